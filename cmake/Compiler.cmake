@@ -1,0 +1,42 @@
+# Flags for every target, and the two functions that make one.
+add_library(tunica_flags INTERFACE)
+target_compile_options(tunica_flags INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor
+                       -Woverloaded-virtual -Wcast-qual -Wformat=2)
+if(TUNICA_WERROR)
+  target_compile_options(tunica_flags INTERFACE -Werror)
+endif()
+if(TUNICA_SANITIZE)
+  # -O1: at -O0 Eigen is so slow that the sanitizer run would need an hour.
+  target_compile_options(tunica_flags INTERFACE -O1 -fsanitize=address,undefined -fno-sanitize-recover=undefined
+                         -fno-omit-frame-pointer)
+  target_link_options(tunica_flags INTERFACE -fsanitize=address,undefined)
+endif()
+
+if(TUNICA_X86_64_V3 AND CMAKE_SYSTEM_PROCESSOR STREQUAL "x86_64")
+  include(CheckCXXSourceRuns)
+  check_cxx_source_runs("int main() { return __builtin_cpu_supports(\"avx2\") && __builtin_cpu_supports(\"fma\") &&
+                                       __builtin_cpu_supports(\"bmi2\") ? 0 : 1; }" TUNICA_HAS_X86_64_V3)
+  if(TUNICA_HAS_X86_64_V3)
+    target_compile_options(tunica_flags INTERFACE -march=x86-64-v3)
+  endif()
+endif()
+
+# tunica_library(NAME LINKS lib... PRIVATE lib...): lib/NAME/*.cpp as the static library tunica_NAME. LINKS are the
+# rooms it may include: the link lines are the architecture.
+function(tunica_library name)
+  cmake_parse_arguments(arg "" "" "LINKS;PRIVATE" ${ARGN})
+  file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*.cpp)
+  add_library(tunica_${name} STATIC ${sources})
+  target_include_directories(tunica_${name} PUBLIC ${PROJECT_SOURCE_DIR}/lib ${PROJECT_BINARY_DIR}/generated)
+  target_link_libraries(tunica_${name} PUBLIC ${arg_LINKS} PRIVATE tunica_flags ${arg_PRIVATE})
+endfunction()
+
+# tunica_test(NAME LINKS lib...): every .cpp of the current folder as one GoogleTest program.
+function(tunica_test name)
+  cmake_parse_arguments(arg "" "" "LINKS" ${ARGN})
+  file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*.cpp)
+  add_executable(test_${name} ${sources})
+  target_link_libraries(test_${name} PRIVATE tunica_flags ${arg_LINKS} GTest::gtest_main GTest::gmock)
+  target_include_directories(test_${name} PRIVATE ${PROJECT_SOURCE_DIR}/tests)
+  gtest_discover_tests(test_${name} TEST_PREFIX ${name}. DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 600)
+endfunction()

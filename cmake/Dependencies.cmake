@@ -1,0 +1,35 @@
+# Debian 12 package names: see setup in Makefile.pipeline.
+set(CGAL_DO_NOT_WARN_ABOUT_CMAKE_BUILD_TYPE ON)
+set(CGAL_DATA_DIR unused)
+find_package(CGAL 5.5 REQUIRED)
+find_package(Eigen3 3.4 REQUIRED NO_MODULE)  # CGAL puts its own, older find module first
+find_package(HDF5 1.10 REQUIRED COMPONENTS C)
+find_package(assimp 5.2 REQUIRED)
+find_package(TBB REQUIRED)
+find_package(fmt REQUIRED)
+find_package(CLI11 REQUIRED)
+find_package(nlohmann_json REQUIRED)
+find_package(ZLIB REQUIRED)
+find_package(OpenSSL REQUIRED COMPONENTS Crypto)
+find_package(tomlplusplus REQUIRED)
+if(TUNICA_TESTS)
+  find_package(GTest REQUIRED)
+  include(GoogleTest)
+endif()
+
+# CHOLMOD comes without a CMake package.
+find_path(CHOLMOD_INCLUDE cholmod.h PATH_SUFFIXES suitesparse REQUIRED)
+find_library(CHOLMOD_LIBRARY cholmod REQUIRED)
+find_library(SUITESPARSE_CONFIG_LIBRARY suitesparseconfig REQUIRED)
+add_library(tunica_cholmod INTERFACE)
+target_include_directories(tunica_cholmod SYSTEM INTERFACE ${CHOLMOD_INCLUDE})
+target_link_libraries(tunica_cholmod INTERFACE ${CHOLMOD_LIBRARY} ${SUITESPARSE_CONFIG_LIBRARY})
+
+# OpenCV's CMake package is in libopencv-dev, which pulls in a gigabyte; the three modules used here are enough.
+find_path(OPENCV_INCLUDE opencv2/core.hpp PATH_SUFFIXES opencv4 REQUIRED)
+add_library(tunica_opencv INTERFACE)
+target_include_directories(tunica_opencv SYSTEM INTERFACE ${OPENCV_INCLUDE})
+foreach(module core imgproc imgcodecs)
+  find_library(OPENCV_${module} opencv_${module} REQUIRED)
+  target_link_libraries(tunica_opencv INTERFACE ${OPENCV_${module}})
+endforeach()

@@ -1,0 +1,327 @@
+#include "cli/tool.hpp"
+
+#include "core/threads.hpp"
+#include "core/version.hpp"
+#include "io/output_file.hpp"
+
+#include <fmt/format.h>
+
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <cstdio>
+#include <memory>
+#include <new>
+#include <string_view>
+
+namespace tunica::cli {
+namespace {
+
+extern "C" void on_signal(int signal) {
+  request_stop(signal);
+  // The second signal ends the program at once: somebody is waiting.
+  std::signal(signal, SIG_DFL);
+}
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+double peak_mebibytes() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_maxrss) / 1024.0;
+}
+
+std::string shell_quoted(const std::string& word) {
+  const bool plain = !word.empty() && word.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
+                                                             "0123456789_-+./,:=%@{}") == std::string::npos;
+  if (plain) {
+    return word;
+  }
+  std::string quoted = "'";
+  for (const char c : word) {
+    if (c == '\'') {
+      quoted += "'\\''";
+    } else {
+      quoted += c;
+    }
+  }
+  return quoted + "'";
+}
+
+// The report of a run whose command line could not be parsed: then no option has been stored yet.
+std::filesystem::path report_argument(int argc, char** argv) {
+  constexpr std::string_view flag = "--report";
+  for (int i = 1; i < argc; ++i) {
+    const std::string_view word = argv[i];
+    if (word == flag && i + 1 < argc) {
+      return argv[i + 1];
+    }
+    if (word.starts_with(flag) && word.substr(flag.size()).starts_with('=')) {
+      return word.substr(flag.size() + 1);
+    }
+  }
+  return {};
+}
+
+std::string one_line(std::string text) {
+  for (char& c : text) {
+    if (c == '\n' || c == '\r') {
+      c = ' ';
+    }
+  }
+  return text;
+}
+
+}  // namespace
+
+Tool::Tool(std::string verb, std::string summary, std::string example)
+    : verb_(std::move(verb)), app_(std::move(summary), "tunica-" + verb_) {
+  app_.footer("Example:\n  " + example);
+  app_.set_help_flag("--help", "print this help and stop");
+  app_.set_version_flag("--version", fmt::format("tunica-{} {}", verb_, version), "print name and version and stop");
+  app_.add_option("--report", report_, "write a JSON record of the run to FILE, also when the run fails")
+      ->type_name("FILE");
+  app_.add_option("--threads", threads_,
+                  "at most N threads (default: TUNICA_THREADS, else SLURM_CPUS_PER_TASK, else all cores)")
+      ->type_name("N");
+  app_.add_flag("--quiet", quiet_, "print nothing but errors");
+  app_.add_flag("--verbose", verbose_, "print more detail");
+  app_.add_flag("--force", force_, "overwrite an existing output");
+}
+
+void Tool::not_yet(const std::string& name) {
+  app_.add_option_function<std::string>(
+          name,
+          [this, name](const std::string&) {
+            after_parse_.insert(after_parse_.begin(),
+                                [name] { throw UsageError(fmt::format("{}: not available yet", name)); });
+          },
+          "not available yet")
+      ->expected(0, 1)
+      ->group("");
+}
+
+CLI::Option* Tool::quantity(const std::string& name, std::optional<double>& value, Dimension dimension,
+                            const std::string& help) {
+  auto text = std::make_shared<std::optional<std::string>>();
+  after_parse_.emplace_back([text, &value, dimension, name] {
+    if (*text) {
+      try {
+        value = parse_quantity(**text, dimension);
+      } catch (const UsageError& error) {
+        throw UsageError(fmt::format("{}: {}", name, error.what()));
+      }
+    }
+  });
+  return app_.add_option(name, *text, help)->type_name("QUANTITY");
+}
+
+CLI::Option* Tool::tolerance(const std::string& name, std::optional<LengthTolerance>& value,
+                             const std::string& help) {
+  auto text = std::make_shared<std::optional<std::string>>();
+  after_parse_.emplace_back([text, &value, name] {
+    if (*text) {
+      try {
+        value = parse_length_tolerance(**text);
+      } catch (const UsageError& error) {
+        throw UsageError(fmt::format("{}: {}", name, error.what()));
+      }
+    }
+  });
+  return app_.add_option(name, *text, help)->type_name("TOLERANCE");
+}
+
+void Tool::parse_common() {
+  std::size_t count = 0;
+  if (threads_) {
+    const auto number = parse_number(*threads_);
+    if (!number || *number < 1 || *number > 4096 || *number != static_cast<double>(static_cast<int>(*number))) {
+      throw UsageError(fmt::format("--threads: '{}' is not a whole number from 1 to 4096", *threads_));
+    }
+    count = static_cast<std::size_t>(*number);
+  } else {
+    count = default_thread_count();
+  }
+  set_thread_count(count);
+  if (quiet_ && verbose_) {
+    throw UsageError("--quiet and --verbose contradict each other: give one");
+  }
+  for (const auto& check : after_parse_) {
+    check();
+  }
+}
+
+int Tool::run(int argc, char** argv, const std::function<void()>& body) {
+  start_ = std::chrono::steady_clock::now();
+  for (int i = 0; i < argc; ++i) {
+    command_ += (i > 0 ? " " : "") + shell_quoted(i > 0 ? argv[i] : "tunica-" + verb_);
+  }
+  std::signal(SIGPIPE, SIG_IGN);
+  try {
+    app_.parse(argc, argv);
+    parse_common();
+  } catch (const CLI::Success& success) {
+    return app_.exit(success);
+  } catch (const CLI::ParseError& error) {
+    report_ = report_argument(argc, argv);
+    return finish(ExitCode::usage, fmt::format("{} (see tunica-{} --help)", error.what(), verb_));
+  } catch (const UsageError& error) {
+    return finish(error.code(), fmt::format("{} (see tunica-{} --help)", error.what(), verb_));
+  }
+  std::signal(SIGINT, on_signal);
+  std::signal(SIGTERM, on_signal);
+  try {
+    if (!report_.empty()) {
+      require_writable(report_, force_);
+    }
+    body();
+    return finish(ExitCode::ok, {});
+  } catch (const UsageError& error) {
+    return finish(error.code(), fmt::format("{} (see tunica-{} --help)", error.what(), verb_));
+  } catch (const Error& error) {
+    return finish(error.code(), error.what());
+  } catch (const Interrupted& interrupted) {
+    finish(ExitCode::ok, fmt::format("stopped by signal {}", interrupted.signal()));
+    return 128 + interrupted.signal();
+  } catch (const std::bad_alloc&) {
+    return finish(ExitCode::internal, "out of memory");
+  } catch (const std::exception& error) {
+    return finish(ExitCode::internal, error.what());
+  }
+}
+
+int Tool::finish(ExitCode code, const std::string& error) {
+  if (bar_open_) {
+    std::fputc('\n', stderr);
+    bar_open_ = false;
+  }
+  const std::string message = one_line(error);
+  if (!message.empty()) {
+    fmt::print(stderr, "tunica-{}: {}\n", verb_, message);
+  }
+  if (!report_.empty()) {
+    try {
+      write_report(message.empty(), message);
+    } catch (const std::exception& failure) {
+      fmt::print(stderr, "tunica-{}: {}\n", verb_, one_line(failure.what()));
+      return static_cast<int>(code == ExitCode::ok ? ExitCode::output : code);
+    }
+  }
+  return static_cast<int>(code);
+}
+
+void Tool::write_report(bool ok, const std::string& error) {
+  Json inputs = Json::array();
+  for (const auto& path : inputs_) {
+    Json hash;
+    try {
+      hash = sha256_of_file(path);
+    } catch (const InputError&) {
+      hash = nullptr;  // a missing input or a folder is why the run failed; the report still has to be written
+    }
+    inputs.push_back({{"path", path.string()}, {"sha256", hash}});
+  }
+  Json outputs = Json::array();
+  for (const auto& path : outputs_) {
+    outputs.push_back(path.string());
+  }
+  Json seconds{{"total", seconds_since(start_)}};
+  seconds.update(seconds_);
+  const Json report{
+      {"tool", "tunica-" + verb_},
+      {"version", version},
+      {"ok", ok},
+      {"error", error.empty() ? Json() : Json(error)},
+      {"command", command_},
+      {"inputs", inputs},
+      {"outputs", outputs},
+      {"seconds", seconds},
+      {"peak_mib", peak_mebibytes()},
+      {"threads", thread_count()},
+      {"result", result_},
+  };
+  // A file name need not be UTF-8; the report has to be.
+  write_file(report_, report.dump(2, ' ', false, Json::error_handler_t::replace) + "\n", force_);
+}
+
+const std::filesystem::path& Tool::input(const std::filesystem::path& path) {
+  inputs_.push_back(path);
+  return path;
+}
+
+const std::filesystem::path& Tool::output(const std::filesystem::path& path) {
+  require_writable(path, force_);
+  for (const auto& other : outputs_) {
+    if (other == path) {
+      throw UsageError(fmt::format("{}: two outputs have the same name", path.string()));
+    }
+  }
+  outputs_.push_back(path);
+  return path;
+}
+
+Tool::Stage::Stage(Tool& tool, std::string name)
+    : tool_(tool), name_(std::move(name)), start_(std::chrono::steady_clock::now()) {}
+
+Tool::Stage::~Stage() {
+  Json& entry = tool_.seconds_[name_];
+  entry = (entry.is_number() ? entry.get<double>() : 0.0) + seconds_since(start_);
+}
+
+void Tool::stages(const std::vector<std::string>& names) {
+  for (const auto& name : names) {
+    seconds_[name] = nullptr;
+  }
+}
+
+Progress Tool::progress(const std::string& doing) {
+  if (quiet_) {
+    return {};
+  }
+  struct Shown {
+    std::chrono::steady_clock::time_point last = std::chrono::steady_clock::now();
+    std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now();
+  };
+  const bool terminal = ::isatty(STDERR_FILENO) == 1;
+  return [this, doing, terminal, shown = std::make_shared<Shown>()](double fraction) {
+    const auto now = std::chrono::steady_clock::now();
+    const auto pause = terminal ? std::chrono::milliseconds(100) : std::chrono::milliseconds(10'000);
+    if (now - shown->last < pause) {
+      return;
+    }
+    shown->last = now;
+    const double percent = 100 * std::min(1.0, std::max(0.0, fraction));
+    if (terminal) {
+      constexpr int width = 30;
+      const auto filled = static_cast<std::size_t>(percent / 100 * width);
+      fmt::print(stderr, "\r{:<10} [{:<{}}] {:5.1f} %  {:.1f} s ", doing, std::string(filled, '#'), width, percent,
+                 seconds_since(shown->start));
+      bar_open_ = true;
+    } else {
+      fmt::print(stderr, "tunica-{}: {} {:.1f} %\n", verb_, doing, percent);
+    }
+  };
+}
+
+void Tool::note(const std::string& text) const {
+  if (!quiet_) {
+    fmt::print(stderr, "{}{}\n", bar_open_ ? "\n" : "", text);
+  }
+}
+
+void Tool::detail(const std::string& text) const {
+  if (verbose_) {
+    fmt::print(stderr, "{}{}\n", bar_open_ ? "\n" : "", text);
+  }
+}
+
+void Tool::warn(const std::string& text) const {
+  if (!quiet_) {
+    fmt::print(stderr, "{}tunica-{}: warning: {}\n", bar_open_ ? "\n" : "", verb_, one_line(text));
+  }
+}
+
+}  // namespace tunica::cli

@@ -1,0 +1,122 @@
+#pragma once
+
+#include "core/error.hpp"
+#include "core/json.hpp"
+#include "core/progress.hpp"
+#include "core/quantity.hpp"
+
+#include <CLI/CLI.hpp>
+
+#include <chrono>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+/// What every executable has in common: the flags of the contract, the report, progress, signals and exit codes.
+///
+///   int main(int argc, char** argv) {
+///     cli::Tool tool("decimate", "Quadric edge collapse.", "tunica-decimate surface.ply coarse.ply --triangles 800");
+///     std::filesystem::path in, out;
+///     tool.arguments().add_option("IN", in, "surface mesh")->required();
+///     tool.arguments().add_option("OUT.ply", out, "coarse mesh")->required();
+///     return tool.run(argc, argv, [&] {
+///       tool.output(out);                                   // fails early when it exists and --force is not given
+///       { auto s = tool.stage("read"); mesh = read_mesh(tool.input(in)); }
+///       { auto s = tool.stage("decimate"); ... decimate(mesh, options, tool.progress("decimate")); }
+///       tool.result()["triangles"] = mesh.triangles.size();
+///     });
+///   }
+namespace tunica::cli {
+
+class Tool {
+public:
+  /// @param verb     the tool is `tunica-<verb>`
+  /// @param summary  one or two sentences for --help
+  /// @param example  command lines that work, one per line, for --help and the man page
+  Tool(std::string verb, std::string summary, std::string example);
+
+  /// Where the tool declares its own arguments, before run().
+  [[nodiscard]] CLI::App& arguments() { return app_; }
+
+  /// Declares a flag or option that a later step of the roadmap brings: using it is a UsageError "not available yet".
+  void not_yet(const std::string& name);
+
+  /// Declares an option that may be given at most once and that is a quantity with a unit; after parsing `value` holds
+  /// it in tunica's units.
+  CLI::Option* quantity(const std::string& name, std::optional<double>& value, Dimension dimension,
+                        const std::string& help);
+
+  /// Declares `name` as a length tolerance ("0.5%" or "0.2mm").
+  CLI::Option* tolerance(const std::string& name, std::optional<LengthTolerance>& value, const std::string& help);
+
+  /// Parses, runs `body`, writes the report, prints one line on an error. @return the exit code for main().
+  int run(int argc, char** argv, const std::function<void()>& body);
+
+  /// Registers an input for the report and returns it.
+  const std::filesystem::path& input(const std::filesystem::path& path);
+
+  /// Registers an output for the report; OutputError when it exists and --force was not given, or cannot be written.
+  const std::filesystem::path& output(const std::filesystem::path& path);
+
+  /// Times a stage: the seconds until the returned object dies are added to report key `seconds.<name>`.
+  class Stage {
+  public:
+    Stage(Tool& tool, std::string name);
+    ~Stage();
+    Stage(const Stage&) = delete;
+    Stage& operator=(const Stage&) = delete;
+
+  private:
+    Tool& tool_;
+    std::string name_;
+    std::chrono::steady_clock::time_point start_;
+  };
+  [[nodiscard]] Stage stage(const std::string& name) { return {*this, name}; }
+
+  /// Declares the names of the stages in order, so that the report has every key also when a stage was not reached.
+  void stages(const std::vector<std::string>& names);
+
+  /// A callback that draws a bar on a terminal, prints a line now and then elsewhere, and is silent with --quiet.
+  [[nodiscard]] Progress progress(const std::string& doing);
+
+  /// A line on stderr: always but with --quiet (`note`), only with --verbose (`detail`), a warning.
+  void note(const std::string& text) const;
+  void detail(const std::string& text) const;
+  void warn(const std::string& text) const;
+
+  /// The `result` object of the report. A value that is undefined is set to null (`Json()`).
+  [[nodiscard]] Json& result() { return result_; }
+
+  [[nodiscard]] bool force() const { return force_; }
+  [[nodiscard]] bool quiet() const { return quiet_; }
+  [[nodiscard]] bool verbose() const { return verbose_; }
+
+  /// The command line as it was typed, for provenance.
+  [[nodiscard]] const std::string& command() const { return command_; }
+
+private:
+  int finish(ExitCode code, const std::string& error);
+  void write_report(bool ok, const std::string& error);
+  void parse_common();
+
+  std::string verb_;
+  CLI::App app_;
+  std::string command_;
+  std::filesystem::path report_;
+  std::optional<std::string> threads_;
+  bool force_ = false;
+  bool quiet_ = false;
+  bool verbose_ = false;
+  bool bar_open_ = false;
+  std::vector<std::filesystem::path> inputs_;
+  std::vector<std::filesystem::path> outputs_;
+  Json seconds_ = Json::object();
+  Json result_ = Json::object();
+  std::vector<std::function<void()>> after_parse_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+}  // namespace tunica::cli

@@ -1,0 +1,47 @@
+#pragma once
+
+#include "shell/shell_mesh.hpp"
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace tunica {
+
+/// A mesh file as read, positions scaled to mm.
+struct MeshFile {
+  TriangleMesh mesh;
+  std::vector<Vec3> normals;  ///< empty, or #V unit vectors (PLY nx ny nz)
+  std::vector<std::array<Vec3, 3>> corner_normals;  ///< empty, or #F
+  std::optional<Patch> patch;                       ///< `surface=` comment
+  std::optional<std::string> units;                 ///< what the file said: "mm", …; none for OBJ, STL, OFF
+  std::string space = "LPS";                        ///< `SPACE=` comment
+  std::vector<std::string> comments;                ///< all PLY comments, for provenance
+  std::vector<std::pair<std::string, std::vector<double>>> vertex_properties;  ///< further scalar ones, e.g. thickness
+};
+
+/// Reads PLY (own strict reader: ASCII, binary little and big endian), OBJ, STL, OFF, GLB (assimp behind guards, then
+/// an exact weld by coordinates). The format is told by content and extension.
+/// @param unit_mm  size in mm of the file's unit, for formats that carry none; none: read as they are (mm)
+/// @param require_unit  without unit_mm, a format that carries no unit is a UsageError that tells to pass --mesh-unit
+/// Errors: InputError naming the file: missing, truncated, bad index, not finite, no triangles, over the limits.
+MeshFile read_mesh(const std::filesystem::path& path, std::optional<double> unit_mm = {}, bool require_unit = false);
+
+/// The curved shell mesh in a file: positions, unit normals, patch. Errors: InputError when it has no normals.
+ShellMesh shell_of(const MeshFile& file, const std::filesystem::path& path);
+
+struct PlyOptions {
+  std::vector<std::string> comments;  ///< further comments (provenance), one line each
+  std::string space = "LPS";
+  bool overwrite = false;
+};
+
+/// Binary little-endian PLY, double x y z, int indices. Errors: OutputError.
+void write_ply(const std::filesystem::path& path, const TriangleMesh& mesh, const PlyOptions& options);
+void write_ply(const std::filesystem::path& path, const ShellMesh& shell, const PlyOptions& options);
+/// With a per-vertex `quality` (double).
+void write_ply(const std::filesystem::path& path, const TriangleMesh& mesh, const std::vector<double>& quality,
+               const PlyOptions& options);
+
+}  // namespace tunica

@@ -1,0 +1,153 @@
+#include "io/output_file.hpp"
+
+#include "core/error.hpp"
+
+#include <fmt/format.h>
+#include <openssl/evp.h>
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <memory>
+#include <vector>
+
+namespace tunica {
+namespace fs = std::filesystem;
+namespace {
+
+std::string reason() { return std::strerror(errno); }
+
+struct Closer {
+  void operator()(std::FILE* file) const { std::fclose(file); }
+};
+using File = std::unique_ptr<std::FILE, Closer>;
+
+File open_input(const fs::path& path) {
+  std::error_code error;
+  const fs::file_status status = fs::status(path, error);
+  if (!fs::exists(status)) {
+    throw InputError(fmt::format("{}: no such file", path.string()));
+  }
+  if (!fs::is_regular_file(status)) {
+    throw InputError(fmt::format("{}: is not a regular file", path.string()));
+  }
+  File file(std::fopen(path.c_str(), "rb"));
+  if (!file) {
+    throw InputError(fmt::format("{}: cannot be read: {}", path.string(), reason()));
+  }
+  return file;
+}
+
+void flush_to_disk(const fs::path& path) {
+  const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (fd < 0) {
+    throw OutputError(fmt::format("{}: cannot be written: {}", path.string(), reason()));
+  }
+  const bool failed = ::fsync(fd) != 0 && errno != EINVAL && errno != EROFS;
+  const std::string why = failed ? reason() : std::string();
+  ::close(fd);
+  if (failed) {
+    throw OutputError(fmt::format("{}: cannot be flushed to the disk: {}", path.string(), why));
+  }
+}
+
+}  // namespace
+
+void require_writable(const fs::path& path, bool overwrite) {
+  std::error_code error;
+  const fs::file_status status = fs::status(path, error);
+  if (fs::is_directory(status)) {
+    throw OutputError(fmt::format("{}: is a folder, name a file", path.string()));
+  }
+  if (fs::exists(status) && !overwrite) {
+    throw OutputError(fmt::format("{}: exists already, remove it or pass --force to overwrite it", path.string()));
+  }
+  const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
+  if (!fs::is_directory(folder, error)) {
+    throw OutputError(fmt::format("{}: the folder {} does not exist", path.string(), folder.string()));
+  }
+  if (::access(folder.c_str(), W_OK) != 0) {
+    throw OutputError(fmt::format("{}: the folder {} cannot be written to: {}", path.string(), folder.string(),
+                                  reason()));
+  }
+}
+
+OutputFile::OutputFile(fs::path path, bool overwrite) : path_(std::move(path)), partial_(path_) {
+  partial_ += ".part";
+  require_writable(path_, overwrite);
+  const File file(std::fopen(partial_.c_str(), "wb"));
+  if (!file) {
+    throw OutputError(fmt::format("{}: cannot be created: {}", partial_.string(), reason()));
+  }
+}
+
+OutputFile::~OutputFile() {
+  if (!done_ && !keep_) {
+    std::error_code ignored;
+    fs::remove(partial_, ignored);
+  }
+}
+
+void OutputFile::commit() {
+  TUNICA_ASSERT(!done_);
+  flush_to_disk(partial_);
+  if (std::rename(partial_.c_str(), path_.c_str()) != 0) {
+    throw OutputError(fmt::format("{}: cannot be written: {}", path_.string(), reason()));
+  }
+  done_ = true;
+}
+
+void write_file(const fs::path& path, std::string_view bytes, bool overwrite) {
+  OutputFile output(path, overwrite);
+  File file(std::fopen(output.partial_path().c_str(), "wb"));
+  const bool written = file && std::fwrite(bytes.data(), 1, bytes.size(), file.get()) == bytes.size() &&
+                       std::fflush(file.get()) == 0;
+  if (!written) {
+    throw OutputError(fmt::format("{}: cannot be written: {}", path.string(), reason()));
+  }
+  file.reset();
+  output.commit();
+}
+
+std::string read_file(const fs::path& path, std::size_t limit) {
+  const File file = open_input(path);
+  std::error_code error;
+  const std::uintmax_t size = fs::file_size(path, error);
+  if (error || size > limit) {
+    throw InputError(fmt::format("{}: is too large ({} bytes, at most {})", path.string(), size, limit));
+  }
+  std::string bytes(static_cast<std::size_t>(size), '\0');
+  const std::size_t got = std::fread(bytes.data(), 1, bytes.size(), file.get());
+  if (got != bytes.size() || std::ferror(file.get()) != 0) {
+    throw InputError(fmt::format("{}: cannot be read to its end: {}", path.string(), reason()));
+  }
+  return bytes;
+}
+
+std::string sha256_of_file(const fs::path& path) {
+  const File file = open_input(path);
+  const std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> context(EVP_MD_CTX_new(), &EVP_MD_CTX_free);
+  TUNICA_ASSERT(context && EVP_DigestInit_ex(context.get(), EVP_sha256(), nullptr) == 1);
+  std::vector<unsigned char> block(1 << 20);
+  while (const std::size_t got = std::fread(block.data(), 1, block.size(), file.get())) {
+    TUNICA_ASSERT(EVP_DigestUpdate(context.get(), block.data(), got) == 1);
+  }
+  if (std::ferror(file.get()) != 0) {
+    throw InputError(fmt::format("{}: cannot be read: {}", path.string(), reason()));
+  }
+  std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
+  unsigned length = 0;
+  TUNICA_ASSERT(EVP_DigestFinal_ex(context.get(), digest.data(), &length) == 1);
+  std::string text;
+  for (unsigned i = 0; i < length; ++i) {
+    text += fmt::format("{:02x}", digest[i]);
+  }
+  return text;
+}
+
+}  // namespace tunica

@@ -1,0 +1,1 @@
+#include "surface/triangle_mesh.hpp"
