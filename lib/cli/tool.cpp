@@ -14,6 +14,7 @@
 #include <memory>
 #include <new>
 #include <string_view>
+#include <utility>
 
 namespace tunica::cli {
 namespace {
@@ -175,7 +176,9 @@ int Tool::run(int argc, char** argv, const std::function<void()>& body) {
   std::signal(SIGTERM, on_signal);
   try {
     if (!report_.empty()) {
-      require_writable(report_, force_);
+      const std::filesystem::path report = std::exchange(report_, {});
+      require_writable(report, force_);
+      report_ = report;
     }
     body();
     return finish(ExitCode::ok, {});

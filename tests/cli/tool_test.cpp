@@ -1,0 +1,165 @@
+#include "cli/tool.hpp"
+
+#include "core/threads.hpp"
+#include "io/output_file.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <unistd.h>
+
+#include <csignal>
+#include <cstdlib>
+
+namespace tunica::cli {
+namespace {
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+class ToolTest : public testing::Test {
+protected:
+  struct Outcome {
+    int code = -1;
+    std::string error;
+    Json report;
+  };
+
+  void SetUp() override {
+    std::string name = (fs::temp_directory_path() / "tunica-test-XXXXXX").string();
+    ASSERT_NE(::mkdtemp(name.data()), nullptr);
+    folder_ = name;
+  }
+  void TearDown() override {
+    fs::remove_all(folder_);
+    request_stop(0);
+    std::signal(SIGINT, SIG_DFL);
+    std::signal(SIGTERM, SIG_DFL);
+  }
+
+  Outcome run(std::vector<std::string> arguments, const std::function<void(Tool&)>& body) {
+    Tool tool("test", "A tool.", "tunica-test a b");
+    std::optional<double> pressure;
+    tool.quantity("--pressure", pressure, dimension::pressure, "a pressure");
+    tool.not_yet("--later");
+    std::vector<char*> argv;
+    arguments.insert(arguments.begin(), "tunica-test");
+    for (auto& argument : arguments) {
+      argv.push_back(argument.data());
+    }
+    Outcome outcome;
+    testing::internal::CaptureStderr();
+    outcome.code = tool.run(static_cast<int>(argv.size()), argv.data(), [&] {
+      if (pressure) {
+        tool.result()["pressure"] = *pressure;
+      }
+      body(tool);
+    });
+    outcome.error = testing::internal::GetCapturedStderr();
+    if (fs::exists(report())) {
+      outcome.report = Json::parse(read_file(report()));
+    }
+    return outcome;
+  }
+  Outcome run(std::vector<std::string> arguments) {
+    return run(std::move(arguments), [](Tool&) {});
+  }
+
+  [[nodiscard]] fs::path report() const { return folder_ / "report.json"; }
+
+  fs::path folder_;
+};
+
+TEST_F(ToolTest, AReportHoldsTheKeysOfTheContract) {
+  write_file(folder_ / "in", "abc", false);
+  const auto outcome = run({"--report", report(), "--threads", "1", "--pressure", "-90 MPa"}, [&](Tool& tool) {
+    tool.input(folder_ / "in");
+    tool.output(folder_ / "out");
+    const auto stage = tool.stage("read");
+  });
+  EXPECT_EQ(outcome.code, 0) << outcome.error;
+  for (const char* key : {"tool", "version", "ok", "error", "command", "inputs", "outputs", "seconds", "peak_mib",
+                          "threads", "result"}) {
+    EXPECT_TRUE(outcome.report.contains(key)) << key;
+  }
+  EXPECT_EQ(outcome.report["ok"], true);
+  EXPECT_TRUE(outcome.report["error"].is_null());
+  EXPECT_EQ(outcome.report["threads"], 1);
+  EXPECT_EQ(outcome.report["result"]["pressure"], -90.0);
+  EXPECT_EQ(outcome.report["inputs"][0]["sha256"].get<std::string>().size(), 64U);
+  EXPECT_GE(outcome.report["seconds"]["total"].get<double>(), outcome.report["seconds"]["read"].get<double>());
+}
+
+TEST_F(ToolTest, ExitCodesAndReportsOfEveryKindOfError) {
+  const auto code_of = [&](const std::function<void()>& failure) {
+    fs::remove(report());
+    const auto outcome = run({"--report", report()}, [&](Tool&) { failure(); });
+    EXPECT_EQ(outcome.report["ok"], false);
+    EXPECT_THAT(outcome.report["error"].get<std::string>(), HasSubstr("why"));
+    EXPECT_THAT(outcome.error, HasSubstr("tunica-test: "));
+    EXPECT_EQ(std::count(outcome.error.begin(), outcome.error.end(), '\n'), 1) << outcome.error;
+    return outcome.code;
+  };
+  EXPECT_EQ(code_of([] { throw UsageError("why"); }), 2);
+  EXPECT_EQ(code_of([] { throw InputError("why\nin two lines"); }), 3);
+  EXPECT_EQ(code_of([] { throw RequirementError("why"); }), 4);
+  EXPECT_EQ(code_of([] { throw OutputError("why"); }), 5);
+  EXPECT_EQ(code_of([] { throw std::runtime_error("why"); }), 1);
+}
+
+TEST_F(ToolTest, UsageErrors) {
+  EXPECT_EQ(run({"--nonsense"}).code, 2);
+  EXPECT_EQ(run({"--later"}).code, 2);
+  EXPECT_THAT(run({"--later", "7"}).error, HasSubstr("not available yet"));
+  EXPECT_THAT(run({"--pressure", "13"}).error, HasSubstr("13kPa"));
+  EXPECT_EQ(run({"--pressure", "13"}).code, 2);
+  EXPECT_EQ(run({"--pressure", "13mm"}).code, 2);
+  EXPECT_EQ(run({"--quiet", "--verbose"}).code, 2);
+  for (const char* threads : {"0", "-1", "1.5", "x", "1e9"}) {
+    EXPECT_EQ(run({"--threads", threads}).code, 2) << threads;
+  }
+}
+
+TEST_F(ToolTest, AUsageErrorStillWritesTheReport) {
+  const auto outcome = run({"--nonsense", "--report", report()});
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_EQ(outcome.report["ok"], false);
+}
+
+TEST_F(ToolTest, ExistingOutputsNeedForce) {
+  write_file(folder_ / "out", "old", false);
+  const auto body = [&](Tool& tool) { tool.output(folder_ / "out"); };
+  EXPECT_EQ(run({}, body).code, 5);
+  EXPECT_EQ(run({"--force"}, body).code, 0);
+}
+
+TEST_F(ToolTest, AReportThatCannotBeWrittenIsFailure) {
+  EXPECT_EQ(run({"--report", folder_ / "no" / "report.json"}).code, 5);
+  write_file(report(), "{}", false);
+  EXPECT_EQ(run({"--report", report()}).code, 5);
+  EXPECT_EQ(run({"--report", report(), "--force"}).code, 0);
+}
+
+TEST_F(ToolTest, ASignalStopsAtTheNextCheckAndSaysSo) {
+  const auto outcome = run({"--report", report()}, [](Tool& tool) {
+    std::raise(SIGTERM);
+    advance(tool.progress("work"), 0.5);
+    FAIL() << "not reached";
+  });
+  EXPECT_EQ(outcome.code, 143);
+  EXPECT_EQ(outcome.report["ok"], false);
+}
+
+TEST_F(ToolTest, ThreadsFromTheEnvironment) {
+  ::unsetenv("TUNICA_THREADS");
+  ::setenv("SLURM_CPUS_PER_TASK", "3", 1);
+  EXPECT_EQ(default_thread_count(), 3U);
+  ::setenv("TUNICA_THREADS", "2", 1);
+  EXPECT_EQ(default_thread_count(), 2U);
+  ::setenv("TUNICA_THREADS", "many", 1);
+  EXPECT_EQ(run({}).code, 2);
+  ::unsetenv("TUNICA_THREADS");
+  ::unsetenv("SLURM_CPUS_PER_TASK");
+}
+
+}  // namespace
+}  // namespace tunica::cli
