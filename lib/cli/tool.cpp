@@ -36,8 +36,9 @@ double peak_mebibytes() {
 }
 
 std::string shell_quoted(const std::string& word) {
-  const bool plain = !word.empty() && word.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
-                                                             "0123456789_-+./,:=%@{}") == std::string::npos;
+  const bool plain = !word.empty() && word.find_first_not_of(
+                                          "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
+                                          "0123456789_-+./,:=%@{}") == std::string::npos;
   if (plain) {
     return word;
   }
@@ -120,8 +121,7 @@ CLI::Option* Tool::quantity(const std::string& name, std::optional<double>& valu
   return app_.add_option(name, *text, help)->type_name("QUANTITY");
 }
 
-CLI::Option* Tool::tolerance(const std::string& name, std::optional<LengthTolerance>& value,
-                             const std::string& help) {
+CLI::Option* Tool::tolerance(const std::string& name, std::optional<LengthTolerance>& value, const std::string& help) {
   auto text = std::make_shared<std::optional<std::string>>();
   after_parse_.emplace_back([text, &value, name] {
     if (*text) {

@@ -72,5 +72,4 @@ public:
 }  // namespace tunica
 
 /// Checked in every build type: a wrong result with exit code 0 costs more than the test.
-#define TUNICA_ASSERT(condition) \
-  ((condition) ? void(0) : ::tunica::assertion_failed(#condition, __FILE__, __LINE__))
+#define TUNICA_ASSERT(condition) ((condition) ? void(0) : ::tunica::assertion_failed(#condition, __FILE__, __LINE__))

@@ -161,8 +161,8 @@ double parse_quantity(std::string_view text, Dimension expected) {
   std::string_view rest = trimmed(text);
   const auto value = take_number(rest);
   if (!value) {
-    throw UsageError(fmt::format("'{}' is not {}: write a number and a unit, for example 2.5{}", text, example.name,
-                                 example.unit));
+    throw UsageError(
+        fmt::format("'{}' is not {}: write a number and a unit, for example 2.5{}", text, example.name, example.unit));
   }
   const std::string_view number = trimmed(text).substr(0, trimmed(text).size() - rest.size());
   rest = trimmed(rest);

@@ -57,8 +57,8 @@ std::size_t default_thread_count() {
     std::size_t count = 0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), count);
     if (error != std::errc{} || end != text.data() + text.size() || count == 0 || count > 4096) {
-      throw UsageError(fmt::format("{}='{}' is not a number of threads: write a whole number from 1 to 4096", name,
-                                   text));
+      throw UsageError(
+          fmt::format("{}='{}' is not a number of threads: write a whole number from 1 to 4096", name, text));
     }
     return count;
   }

@@ -12,7 +12,7 @@ namespace tunica {
 /// A mesh file as read, positions scaled to mm.
 struct MeshFile {
   TriangleMesh mesh;
-  std::vector<Vec3> normals;  ///< empty, or #V unit vectors (PLY nx ny nz)
+  std::vector<Vec3> normals;                        ///< empty, or #V unit vectors (PLY nx ny nz)
   std::vector<std::array<Vec3, 3>> corner_normals;  ///< empty, or #F
   std::optional<Patch> patch;                       ///< `surface=` comment
   std::optional<std::string> units;                 ///< what the file said: "mm", …; none for OBJ, STL, OFF

@@ -72,8 +72,8 @@ void require_writable(const fs::path& path, bool overwrite) {
     throw OutputError(fmt::format("{}: the folder {} does not exist", path.string(), folder.string()));
   }
   if (::access(folder.c_str(), W_OK) != 0) {
-    throw OutputError(fmt::format("{}: the folder {} cannot be written to: {}", path.string(), folder.string(),
-                                  reason()));
+    throw OutputError(
+        fmt::format("{}: the folder {} cannot be written to: {}", path.string(), folder.string(), reason()));
   }
 }
 
@@ -105,8 +105,8 @@ void OutputFile::commit() {
 void write_file(const fs::path& path, std::string_view bytes, bool overwrite) {
   OutputFile output(path, overwrite);
   File file(std::fopen(output.partial_path().c_str(), "wb"));
-  const bool written = file && std::fwrite(bytes.data(), 1, bytes.size(), file.get()) == bytes.size() &&
-                       std::fflush(file.get()) == 0;
+  const bool written =
+      file && std::fwrite(bytes.data(), 1, bytes.size(), file.get()) == bytes.size() && std::fflush(file.get()) == 0;
   if (!written) {
     throw OutputError(fmt::format("{}: cannot be written: {}", path.string(), reason()));
   }

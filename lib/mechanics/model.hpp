@@ -120,8 +120,8 @@ struct Model {
 };
 
 enum class Solver {
-  cg,       ///< preconditioned conjugate gradients
-  direct,   ///< sparse Cholesky (CHOLMOD), symbolic factorisation once
+  cg,      ///< preconditioned conjugate gradients
+  direct,  ///< sparse Cholesky (CHOLMOD), symbolic factorisation once
   automatic,
 };
 

@@ -10,16 +10,16 @@ namespace tunica {
 
 /// One state of a run, as handed to the callback; everything is for all nodes of all bodies in global order.
 struct State {
-  double time = 0;         ///< s; the load factor in a static run
-  double load_factor = 0;  ///< static: of this step; dynamic: of the first load's ramp
-  std::vector<Vec3> displacement;  ///< mm, #nodes
-  std::vector<Vec3> rotation;      ///< rotation vectors, rad, #nodes
+  double time = 0;                     ///< s; the load factor in a static run
+  double load_factor = 0;              ///< static: of this step; dynamic: of the first load's ramp
+  std::vector<Vec3> displacement;      ///< mm, #nodes
+  std::vector<Vec3> rotation;          ///< rotation vectors, rad, #nodes
   std::vector<Vec3> velocity;          ///< mm/s, dynamic only
   std::vector<Vec3> angular_velocity;  ///< rad/s, dynamic only
-  std::optional<double> volume;  ///< mm^3 of the closed bodies' curved surfaces together; none when one is open
-  double strain_energy = 0;   ///< N mm = mJ
-  double kinetic_energy = 0;  ///< mJ
-  double residual = 0;        ///< relative, as compared with RunSettings::converge
+  std::optional<double> volume;        ///< mm^3 of the closed bodies' curved surfaces together; none when one is open
+  double strain_energy = 0;            ///< N mm = mJ
+  double kinetic_energy = 0;           ///< mJ
+  double residual = 0;                 ///< relative, as compared with RunSettings::converge
   std::size_t newton_iterations = 0;
   std::size_t cg_iterations = 0;
   bool converged = false;
@@ -28,8 +28,8 @@ struct State {
 /// Per-element results of one state (#elements of all bodies in order; components in the element's own frame whose
 /// x axis is the projection of the first edge).
 struct ElementFields {
-  std::vector<Vec3> membrane_force;  ///< N/mm: xx, yy, xy
-  std::vector<Vec3> bending_moment;  ///< N: xx, yy, xy
+  std::vector<Vec3> membrane_force;      ///< N/mm: xx, yy, xy
+  std::vector<Vec3> bending_moment;      ///< N: xx, yy, xy
   std::vector<double> von_mises_top;     ///< MPa, at the face the normal points to
   std::vector<double> von_mises_bottom;  ///< MPa
   std::vector<double> pressure;          ///< MPa, of this state
@@ -39,13 +39,13 @@ struct Summary {
   std::size_t dof = 0;    ///< free degrees of freedom
   std::size_t steps = 0;  ///< steps done (not only handed over)
   bool converged = false;
-  double residual = 0;    ///< of the last step
+  double residual = 0;  ///< of the last step
   std::size_t newton_iterations = 0;
   std::size_t cg_iterations = 0;
   std::optional<double> volume_before;  ///< mm^3; none when a body is open
   std::optional<double> volume_after;
-  double strain_energy = 0;    ///< mJ
-  double max_displacement = 0;  ///< mm, of the last state
+  double strain_energy = 0;              ///< mJ
+  double max_displacement = 0;           ///< mm, of the last state
   std::vector<double> seconds_per_step;  ///< wall
 };
 

@@ -6,9 +6,7 @@ Vector9 monomials(double x, double y) {
   return (Vector9() << 1, x, y, x * x, x * y, y * y, x * x * x, x * y * y, y * y * y).finished();
 }
 
-Vector9 monomials_dx(double x, double y) {
-  return (Vector9() << 0, 1, 0, 2 * x, y, 0, 3 * x * x, y * y, 0).finished();
-}
+Vector9 monomials_dx(double x, double y) { return (Vector9() << 0, 1, 0, 2 * x, y, 0, 3 * x * x, y * y, 0).finished(); }
 
 Vector9 monomials_dy(double x, double y) {
   return (Vector9() << 0, 0, 1, 0, x, 2 * y, 0, 2 * x * y, 3 * y * y).finished();

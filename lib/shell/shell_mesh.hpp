@@ -15,9 +15,9 @@ enum class Patch {
 /// A triangle mesh with a unit normal per vertex. The normals fix the slopes at the nodes, so positions and normals
 /// together ARE the curved surface. At a crease the normals of a triangle's corners replace the vertex normals.
 struct ShellMesh {
-  std::vector<Vec3> vertices;                   ///< #V positions, mm
-  std::vector<std::array<Index, 3>> triangles;  ///< #F vertex indices
-  std::vector<Vec3> normals;                    ///< #V unit vectors, outward
+  std::vector<Vec3> vertices;                       ///< #V positions, mm
+  std::vector<std::array<Index, 3>> triangles;      ///< #F vertex indices
+  std::vector<Vec3> normals;                        ///< #V unit vectors, outward
   std::vector<std::array<Vec3, 3>> corner_normals;  ///< empty, or #F: unit normals at each triangle's corners
   Patch patch = Patch::comas;
 

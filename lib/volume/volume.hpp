@@ -11,10 +11,10 @@ namespace tunica {
 
 /// A voxel volume in the machine's memory. Voxel (i, j, k) is data[i + dims[0] * (j + dims[1] * k)].
 struct Volume {
-  using Data = std::variant<std::vector<std::uint8_t>, std::vector<std::int8_t>, std::vector<std::uint16_t>,
-                            std::vector<std::int16_t>, std::vector<std::uint32_t>, std::vector<std::int32_t>,
-                            std::vector<std::uint64_t>, std::vector<std::int64_t>, std::vector<float>,
-                            std::vector<double>>;
+  using Data =
+      std::variant<std::vector<std::uint8_t>, std::vector<std::int8_t>, std::vector<std::uint16_t>,
+                   std::vector<std::int16_t>, std::vector<std::uint32_t>, std::vector<std::int32_t>,
+                   std::vector<std::uint64_t>, std::vector<std::int64_t>, std::vector<float>, std::vector<double>>;
 
   std::array<std::size_t, 3> dims{0, 0, 0};
   Data data;  ///< stored values; the meaning of v is slope * v + intercept
