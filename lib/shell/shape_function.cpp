@@ -64,4 +64,9 @@ Matrix9 inverse_shape_matrix(const PlaneTriangle& triangle) {
   return inverse;
 }
 
+double centre_ordinate(double foot, double b300, double b210, double b120, double b030, double b201, double b021) {
+  // d^3 w / dx^2 dy = 0, with x the direction (-1, 1, 0) and y the direction (foot - 1, -foot, 1), both up to a factor.
+  return 0.5 * (b201 + b021 - (1 - foot) * (b300 - 2 * b210 + b120) - foot * (b210 - 2 * b120 + b030));
+}
+
 }  // namespace tunica

@@ -39,4 +39,11 @@ Matrix9 inverse_shape_matrix(const PlaneTriangle& triangle);
 /// Coefficients c from nodal values u without forming the matrix. Cost: about 60 flops.
 Vector9 shape_coefficients(const PlaneTriangle& triangle, const Vector9& u);
 
+/// The same cubic as a Bezier triangle. Corner and edge ordinates follow from values and slopes at the corners alone;
+/// what eq. (1) adds is that x^2 y is missing, and that fixes the centre ordinate.
+/// @param foot  where the foot of corner 3 on the line 1-2 lies, as a fraction of the edge (b / a; may leave [0, 1])
+/// @param b300, b210, b120, b030  the four ordinates along edge 1-2; b201, b021  the first ones from 1 and 2 towards 3
+/// @return b111
+double centre_ordinate(double foot, double b300, double b210, double b120, double b030, double b201, double b021);
+
 }  // namespace tunica
