@@ -6,8 +6,8 @@
 #include "core/threads.hpp"
 #include "shell/shape_function.hpp"
 
-#include <Eigen/Geometry>
 #include <fmt/core.h>
+#include <Eigen/Geometry>
 
 #include <algorithm>
 #include <cmath>
@@ -62,8 +62,8 @@ double largest_norm(const std::array<Vec3, 3>& v) {
   return std::sqrt(std::max({v[0].squaredNorm(), v[1].squaredNorm(), v[2].squaredNorm()}));
 }
 
-/// Maximum of a l1 l2 + b l2 l3 + c l3 l1 over the triangle, for a, b, c >= 0: the squared radius of the smallest circle
-/// around a triangle with squared sides a, b, c.
+/// Maximum of a l1 l2 + b l2 l3 + c l3 l1 over the triangle, for a, b, c >= 0: the squared radius of the smallest
+/// circle around a triangle with squared sides a, b, c.
 double largest_product_sum(double a, double b, double c) {
   const double largest = std::max({a, b, c});
   if (2 * largest >= a + b + c) {
@@ -75,8 +75,8 @@ double largest_product_sum(double a, double b, double c) {
 /// flatness() at level 1; level m divides it by m^2.
 double coarsest_flatness(const CubicPatch& patch) {
   const auto& p = patch.control;
-  // On a piece with edges e: interpolation error = -3 sum_edges l_i l_j S_e, S_e the second difference along the edge at
-  // some points of the piece, each at most its largest over the patch.
+  // On a piece with edges e: interpolation error = -3 sum_edges l_i l_j S_e, S_e the second difference along the edge
+  // at some points of the piece, each at most its largest over the patch.
   return 3 * largest_product_sum(largest_norm(second_difference(p, along_b2, along_b2)),
                                  largest_norm(second_difference(p, along_23, along_23)),
                                  largest_norm(second_difference(p, along_b3, along_b3)));
@@ -252,8 +252,8 @@ void require_fit(const ShellMesh& shell, const std::string& name) {
         throw InputError(fmt::format("{}: vertex {} of triangle {} has a coordinate that is not finite", name, v, t));
       }
       if (!is_unit(shell.normal(t, c))) {
-        throw InputError(fmt::format("{}: the normal at vertex {} ({:.6g}, {:.6g}, {:.6g} mm) is not of unit length", name,
-                                     v, p.x(), p.y(), p.z()));
+        throw InputError(fmt::format("{}: the normal at vertex {} ({:.6g}, {:.6g}, {:.6g} mm) is not of unit length",
+                                     name, v, p.x(), p.y(), p.z()));
       }
     }
     const auto corners = corners_of(shell, t);
@@ -283,9 +283,10 @@ Tessellation tessellate(const ShellMesh& shell, double deviation, std::size_t mo
     const double level = std::ceil(std::sqrt(coarsest_flatness(patches[t]) / deviation * (1 + 1e-12)));
     total += level * level;
     if (!(total <= static_cast<double>(most_triangles))) {
-      throw RequirementError(fmt::format("the curved surface within {:.3g} mm would need more than {} fine triangles; "
-                                         "allow a larger deviation",
-                                         deviation, most_triangles));
+      throw RequirementError(
+          fmt::format("the curved surface within {:.3g} mm would need more than {} fine triangles; "
+                      "allow a larger deviation",
+                      deviation, most_triangles));
     }
     levels[t] = std::max(1, static_cast<int>(level));
   }

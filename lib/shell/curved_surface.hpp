@@ -57,10 +57,10 @@ void require_fit(const ShellMesh& shell, const std::string& name);
 /// exactly (gap O(h^3)). Fine triangles and vertices of one patch are consecutive.
 struct Tessellation {
   TriangleMesh mesh;
-  std::vector<Index> shell;              ///< #F: patch of each fine triangle
-  std::vector<Index> vertex_shell;       ///< #V: patch of each vertex
-  std::vector<Vec2> barycentric;         ///< #V: (b2, b3) of each vertex in its patch
-  double deviation = 0;                  ///< mm: a fine triangle and its part of the patch are at most this far apart
+  std::vector<Index> shell;         ///< #F: patch of each fine triangle
+  std::vector<Index> vertex_shell;  ///< #V: patch of each vertex
+  std::vector<Vec2> barycentric;    ///< #V: (b2, b3) of each vertex in its patch
+  double deviation = 0;             ///< mm: a fine triangle and its part of the patch are at most this far apart
 };
 
 /// As fine as needed, patch by patch, that `deviation` (mm, > 0) certainly holds both ways: every point of the curved

@@ -1,18 +1,18 @@
 #include "shell/curved_surface.hpp"
 
 #include "core/error.hpp"
-#include "shell/shape_function.hpp"
 #include "shell/families.hpp"
+#include "shell/shape_function.hpp"
 
-#include <Eigen/Geometry>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <Eigen/Geometry>
 
 namespace tunica {
 namespace {
 
-using testing::sphere_shell;
 using ::testing::HasSubstr;
+using testing::sphere_shell;
 
 struct Facet {
   std::array<Vec3, 3> corners;
@@ -52,7 +52,8 @@ TEST(CurvedSurface, BezierFormIsTheShapeFunctionAveragedOverTheFirstVertex) {
           Vector9 u;
           for (std::size_t i = 0; i < 3; ++i) {
             const Vec3& normal = facet.normals[order[i]];
-            u.segment<3>(static_cast<Eigen::Index>(3 * i)) << 0, -normal.dot(y) / normal.dot(n), normal.dot(x) / normal.dot(n);
+            u.segment<3>(static_cast<Eigen::Index>(3 * i)) << 0, -normal.dot(y) / normal.dot(n),
+                normal.dot(x) / normal.dot(n);
           }
           const Vector9 c = shape_coefficients({to2.norm(), to3.dot(x), to3.dot(y)}, u);
           w += c.dot(monomials((flat - origin).dot(x), (flat - origin).dot(y))) / 3;
@@ -66,7 +67,8 @@ TEST(CurvedSurface, BezierFormIsTheShapeFunctionAveragedOverTheFirstVertex) {
 TEST(CurvedSurface, DoesNotDependOnTheOrderOfTheVertices) {
   for (const Facet& f : facets()) {
     const CubicPatch a = comas_patch(f.corners, f.normals);
-    const CubicPatch b = comas_patch({f.corners[1], f.corners[2], f.corners[0]}, {f.normals[1], f.normals[2], f.normals[0]});
+    const CubicPatch b =
+        comas_patch({f.corners[1], f.corners[2], f.corners[0]}, {f.normals[1], f.normals[2], f.normals[0]});
     for (const Vec2& p : {Vec2(0.2, 0.3), Vec2(0.7, 0.1), Vec2(1.0 / 3, 1.0 / 3)}) {
       EXPECT_LT((a.point(p) - b.point({p[1], 1 - p[0] - p[1]})).norm(), 1e-12);
     }
@@ -94,7 +96,9 @@ TEST(CurvedSurface, DerivativesAgreeWithDifferences) {
     const Vec3 difference = (patch.point(b + step) - patch.point(b - step)) / (2 * e);
     EXPECT_LT((patch.tangents(b)[static_cast<std::size_t>(i)] - difference).norm(), 1e-8);
     for (int j = i; j < 2; ++j) {
-      const Vec3 second = (patch.tangents(b + step)[static_cast<std::size_t>(j)] - patch.tangents(b - step)[static_cast<std::size_t>(j)]) / (2 * e);
+      const Vec3 second = (patch.tangents(b + step)[static_cast<std::size_t>(j)] -
+                           patch.tangents(b - step)[static_cast<std::size_t>(j)]) /
+                          (2 * e);
       EXPECT_LT((patch.second_derivatives(b)[static_cast<std::size_t>(i + j)] - second).norm(), 1e-7);
     }
   }
@@ -128,7 +132,8 @@ double sampled_deviation(const ShellMesh& shell, const Tessellation& fine) {
 TEST(CurvedSurface, CertifiedDeviationHoldsAndIsTight) {
   std::vector<ShellMesh> shells{sphere_shell(0), sphere_shell(1)};
   for (const Facet& f : facets()) {
-    shells.push_back({{f.corners.begin(), f.corners.end()}, {{0, 1, 2}}, {f.normals.begin(), f.normals.end()}, {}, Patch::comas});
+    shells.push_back(
+        {{f.corners.begin(), f.corners.end()}, {{0, 1, 2}}, {f.normals.begin(), f.normals.end()}, {}, Patch::comas});
   }
   for (const ShellMesh& shell : shells) {
     for (const double wanted : {1e-1, 1e-2, 1e-3, 1e-4}) {
@@ -267,7 +272,8 @@ TEST(CurvedSurface, VolumeDoesNotDependOnTheOrigin) {
 TEST(CurvedSurface, VolumeOfASphereConvergesWithTheFourthPowerOfTheSize) {
   const double exact = 4 * M_PI / 3;
   for (int times = 1; times <= 2; ++times) {
-    const double rate = std::log2((exact - curved_volume(sphere_shell(times))) / (exact - curved_volume(sphere_shell(times + 1))));
+    const double rate =
+        std::log2((exact - curved_volume(sphere_shell(times))) / (exact - curved_volume(sphere_shell(times + 1))));
     EXPECT_GT(rate, 3.5);
     EXPECT_LT(rate, 4.5);
   }

@@ -11,11 +11,21 @@ namespace tunica::testing {
 /// An icosahedron on the unit sphere, each triangle cut 1:4 `times` times: 20 * 4^times triangles.
 inline TriangleMesh sphere(int times, double radius = 1) {
   const double g = (1 + std::sqrt(5.0)) / 2;
-  TriangleMesh mesh{{{-1, g, 0}, {1, g, 0}, {-1, -g, 0}, {1, -g, 0}, {0, -1, g}, {0, 1, g}, {0, -1, -g}, {0, 1, -g},
-                     {g, 0, -1}, {g, 0, 1}, {-g, 0, -1}, {-g, 0, 1}},
-                    {{0, 11, 5}, {0, 5, 1},  {0, 1, 7},   {0, 7, 10}, {0, 10, 11}, {1, 5, 9}, {5, 11, 4},
-                     {11, 10, 2}, {10, 7, 6}, {7, 1, 8}, {3, 9, 4},  {3, 4, 2},  {3, 2, 6},   {3, 6, 8},
-                     {3, 8, 9},  {4, 9, 5},  {2, 4, 11}, {6, 2, 10}, {8, 6, 7},  {9, 8, 1}}};
+  TriangleMesh mesh{{{-1, g, 0},
+                     {1, g, 0},
+                     {-1, -g, 0},
+                     {1, -g, 0},
+                     {0, -1, g},
+                     {0, 1, g},
+                     {0, -1, -g},
+                     {0, 1, -g},
+                     {g, 0, -1},
+                     {g, 0, 1},
+                     {-g, 0, -1},
+                     {-g, 0, 1}},
+                    {{0, 11, 5},  {0, 5, 1},  {0, 1, 7},  {0, 7, 10}, {0, 10, 11}, {1, 5, 9}, {5, 11, 4},
+                     {11, 10, 2}, {10, 7, 6}, {7, 1, 8},  {3, 9, 4},  {3, 4, 2},   {3, 2, 6}, {3, 6, 8},
+                     {3, 8, 9},   {4, 9, 5},  {2, 4, 11}, {6, 2, 10}, {8, 6, 7},   {9, 8, 1}}};
   for (; times > 0; --times) {
     std::map<std::pair<Index, Index>, Index> middle;
     const auto mid = [&](Index a, Index b) {
