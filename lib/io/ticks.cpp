@@ -1,0 +1,80 @@
+#include "io/ticks.hpp"
+
+#include "core/error.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace tunica {
+
+double round_step(double low, double high, int count) {
+  TUNICA_ASSERT(count > 0);
+  const double rough = high / count - low / count;
+  if (!(rough > 0) || !std::isfinite(rough)) {
+    return 0;
+  }
+  const double power = std::pow(10, std::floor(std::log10(rough)));
+  if (power == 0) {
+    return 0;  // the range is below the smallest normal number
+  }
+  for (const double factor : {1.0, 2.0, 2.5, 5.0}) {
+    if (factor * power >= rough * (1 - 1e-9)) {
+      return factor * power;
+    }
+  }
+  return 10 * power;
+}
+
+std::vector<double> round_ticks(double low, double high, int count) {
+  const double step = round_step(low, high, count);
+  if (step == 0) {
+    return {low};
+  }
+  const double slack = 1e-6;
+  const double first = std::ceil(low / step - slack);
+  const double last = std::floor(high / step + slack);
+  std::vector<double> ticks;
+  for (double i = first; i <= last && ticks.size() <= static_cast<std::size_t>(count); ++i) {
+    ticks.push_back(i == 0 ? 0 : i * step);
+  }
+  return ticks;
+}
+
+double round_below(double value) {
+  TUNICA_ASSERT(value > 0 && std::isfinite(value));
+  const double power = std::pow(10, std::floor(std::log10(value)));
+  double best = power;
+  for (const double factor : {2.0, 5.0, 10.0}) {
+    if (factor * power <= value * (1 + 1e-9)) {
+      best = factor * power;
+    }
+  }
+  return best;
+}
+
+std::string tick_text(double tick, double step) {
+  const double size = std::abs(tick);
+  if (step <= 0 || !std::isfinite(step) || step < 1e-4 || size >= 1e6) {
+    return short_number(tick);
+  }
+  int decimals = 0;
+  for (double scaled = step; decimals < 6 && std::abs(scaled - std::round(scaled)) > 1e-6 * scaled; scaled *= 10) {
+    ++decimals;
+  }
+  return fmt::format("{:.{}f}", tick, decimals);
+}
+
+std::string short_number(double value) {
+  if (value == 0) {
+    return "0";
+  }
+  const double size = std::abs(value);
+  if (size >= 1000 && size < 1e6) {
+    return fmt::format("{:.0f}", value);
+  }
+  return fmt::format("{:.3g}", value);
+}
+
+}  // namespace tunica
