@@ -1,0 +1,64 @@
+#include "io/volume_file.hpp"
+
+#include "core/error.hpp"
+#include "io/volume_format.hpp"
+
+#include <fmt/format.h>
+
+namespace tunica {
+namespace fs = std::filesystem;
+namespace {
+
+using namespace volume_format;
+
+// What the content is, when it is something else that people have in such folders.
+std::string other_content(const fs::path& path, std::string_view head) {
+  const auto begins = [&](std::string_view magic) { return head.starts_with(magic); };
+  const std::string extension = lower_case(path.extension().string());
+  if (begins("ply") || begins("OFF") || begins("glTF") || begins("solid") || begins("# vtk DataFile") ||
+      begins("<?xml") || begins("<VTKFile") || extension == ".stl" || extension == ".obj" || extension == ".off" ||
+      extension == ".vtk" || extension == ".vtp") {
+    return "is a surface mesh or another VTK file, not a volume; the volume is wanted here";
+  }
+  if (head.size() >= 132 && head.substr(128, 4) == "DICM") {
+    return "is DICOM: convert the series to NIfTI first (for example with dcm2niix)";
+  }
+  if (begins("\x89HDF")) {
+    return "is an HDF5 file: convert the volume to NIfTI, NRRD or MetaImage first";
+  }
+  if (begins("\xff\xd8\xff") || begins("GIF8") || begins("BM")) {
+    return "is a picture whose format is not exact enough for labels: save the slices as PNG or TIFF";
+  }
+  return "is not a volume that tunica knows: NIfTI (.nii, .nii.gz), NRRD (.nrrd, .seg.nrrd, .nhdr), MetaImage (.mha, "
+         ".mhd), a multi-page TIFF, or a folder of TIFF or PNG slices";
+}
+
+VolumeFile read_any(const fs::path& path, const VolumeOptions& options) {
+  const auto refuse_spacing = [&] {
+    if (options.spacing) {
+      throw UsageError(fmt::format("{}: --spacing is for slice stacks; this file brings its own", path.string()));
+    }
+  };
+  ByteStream stream(path, 0, coding_of(path));
+  std::string head(1024, '\0');
+  head.resize(stream.read(head.data(), head.size()));
+  if (head.empty()) {
+    throw InputError(fmt::format("{}: is empty", path.string()));
+  }
+  if (looks_like_nifti(head)) {
+    refuse_spacing();
+    return read_nifti(path, options);
+  }
+  throw InputError(fmt::format("{}: {}", path.string(), other_content(path, head)));
+}
+
+}  // namespace
+
+VolumeFile read_volume(const fs::path& path, const VolumeOptions& options) {
+  VolumeFile file = read_any(path, options);
+  const std::size_t values = std::visit([](const auto& data) { return data.size(); }, file.volume.data);
+  TUNICA_ASSERT(values == file.volume.voxels());
+  return file;
+}
+
+}  // namespace tunica

@@ -1,0 +1,113 @@
+#pragma once
+
+#include "io/volume_file.hpp"
+
+#include <cstdint>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+/// What the volume formats share. Internal to lib/io.
+namespace tunica::volume_format {
+
+/// Stored types, in the order of Volume::Data's alternatives.
+enum class VoxelType { uint8, int8, uint16, int16, uint32, int32, uint64, int64, float32, float64 };
+
+std::size_t size_of(VoxelType type);
+std::string name_of(VoxelType type);
+
+enum class Coding { plain, deflated };  ///< deflated: a gzip or zlib stream
+
+/// Deflated when the file begins with gzip's magic number. Errors: InputError: missing, not a regular file.
+Coding coding_of(const std::filesystem::path& path);
+
+/// The bytes of a regular file from an offset on, inflated on the way when they are deflated. It never holds more than
+/// a small buffer, and never inflates more than it is asked for.
+class ByteStream {
+public:
+  /// Errors: InputError: missing, not a regular file, unreadable, shorter than `offset`.
+  ByteStream(const std::filesystem::path& path, std::uint64_t offset, Coding coding);
+  ~ByteStream();
+  ByteStream(const ByteStream&) = delete;
+  ByteStream& operator=(const ByteStream&) = delete;
+
+  /// @return the bytes read, fewer than `size` only at the end. Errors: InputError: corrupt deflate data.
+  std::size_t read(void* to, std::size_t size);
+  /// As read(), dropping the bytes.
+  std::uint64_t skip(std::uint64_t size);
+
+  /// Called after the last voxel: checks that a compressed stream is whole, and warns of bytes that follow.
+  void finish(std::vector<std::string>& warnings);
+
+  /// Bytes delivered or skipped so far.
+  [[nodiscard]] std::uint64_t position() const { return position_; }
+  /// The most bytes that can be in the stream from its beginning on: what deflate can make of the file at the best.
+  [[nodiscard]] std::uint64_t most_bytes() const { return most_bytes_; }
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+private:
+  struct Inflater;
+  std::size_t read_plain(void* to, std::size_t size);
+  std::size_t read_deflated(void* to, std::size_t size);
+
+  std::filesystem::path path_;
+  std::unique_ptr<std::FILE, int (*)(std::FILE*)> file_;
+  std::unique_ptr<Inflater> inflater_;
+  std::uint64_t position_ = 0;
+  std::uint64_t most_bytes_ = 0;
+};
+
+/// An axis of the stored array. With `pick`, only that one of its `size` slabs is wanted.
+struct Axis {
+  std::uint64_t size = 1;
+  std::optional<std::uint64_t> pick;
+};
+
+/// Reads an array whose first axis runs fastest, and checks that the stream holds all of it, before memory is taken.
+/// Trailing bytes become a warning. @param what  the name of the data in messages
+/// Errors: InputError: overflow, truncated.
+Volume::Data read_voxels(ByteStream& stream, VoxelType type, bool big_endian, const std::vector<Axis>& axes,
+                         std::vector<std::string>& warnings);
+
+/// As read_voxels, for numbers written as text.
+Volume::Data read_text_voxels(ByteStream& stream, VoxelType type, const std::vector<Axis>& axes,
+                              std::vector<std::string>& warnings);
+
+/// Index of the frame (layer) to read of `count`: the only one, or the one chosen.
+/// @param what  "frame" or "layer"; @param hint  added to the message that asks for the choice
+/// Errors: InputError: none chosen of several, or the choice does not exist.
+std::size_t choose(const std::filesystem::path& path, const char* what, std::uint64_t count,
+                   std::optional<std::size_t> chosen, const std::string& hint = {});
+
+/// Sets the volume's affine (index to LPS mm), spacing and orientation letters.
+/// Errors: InputError: not finite, singular, or beyond any scanner.
+void set_affine(VolumeFile& file, const std::filesystem::path& path, const Eigen::Matrix<double, 3, 4>& lps);
+
+/// RAS to LPS and back.
+Eigen::Matrix<double, 3, 4> flip_xy(Eigen::Matrix<double, 3, 4> affine);
+
+/// Sets volume.dims. Errors: InputError: a size is 0 or the count overflows.
+void set_dims(VolumeFile& file, const std::filesystem::path& path, std::span<const std::uint64_t, 3> dims);
+
+/// The data file a header names, beside the header. Errors: InputError: absolute, in another folder, a pattern.
+std::filesystem::path data_file_beside(const std::filesystem::path& header, const std::string& name);
+
+/// Text of a header line without the white space around it.
+std::string_view trimmed(std::string_view text);
+/// The words of a line, split at white space.
+std::vector<std::string_view> words(std::string_view text);
+std::string lower_case(std::string_view text);
+/// A whole number >= 0 that fills the text.
+std::optional<std::uint64_t> parse_count(std::string_view text);
+
+/// One reader per format. `head` is the beginning of the file's content, inflated if need be.
+bool looks_like_nifti(std::string_view head);
+
+VolumeFile read_nifti(const std::filesystem::path& path, const VolumeOptions& options);
+
+}  // namespace tunica::volume_format
