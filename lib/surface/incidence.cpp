@@ -1,0 +1,86 @@
+#include "surface/incidence.hpp"
+
+#include <algorithm>
+
+namespace tunica {
+
+Incidence incidence(const TriangleMesh& mesh) {
+  Incidence result;
+  result.offsets.assign(mesh.vertices.size() + 1, 0);
+  for (const auto& triangle : mesh.triangles) {
+    for (const Index v : triangle) {
+      ++result.offsets[v + 1];
+    }
+  }
+  for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
+    result.offsets[v + 1] += result.offsets[v];
+  }
+  result.triangles.resize(3 * mesh.triangles.size());
+  std::vector<std::size_t> next(result.offsets.begin(), result.offsets.end() - 1);
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    for (const Index v : mesh.triangles[t]) {
+      result.triangles[next[v]++] = static_cast<Index>(t);
+    }
+  }
+  return result;
+}
+
+std::vector<std::array<Index, 3>> neighbours(const TriangleMesh& mesh, const Incidence& around) {
+  std::vector<std::array<Index, 3>> result(mesh.triangles.size(), {no_neighbour, no_neighbour, no_neighbour});
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Index u = mesh.triangles[t][k];
+      const Index v = mesh.triangles[t][(k + 1) % 3];
+      Index other = no_neighbour;
+      std::size_t shared = 0;
+      for (const Index candidate : around.of(u)) {
+        const auto& corners = mesh.triangles[candidate];
+        if (candidate != t && std::find(corners.begin(), corners.end(), v) != corners.end()) {
+          other = candidate;
+          ++shared;
+        }
+      }
+      if (shared == 1) {
+        result[t][k] = other;
+      }
+    }
+  }
+  return result;
+}
+
+std::vector<std::vector<Index>> boundary_loops(const TriangleMesh& mesh) {
+  const auto across = neighbours(mesh, incidence(mesh));
+  std::vector<std::pair<Index, Index>> edges;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (across[t][k] == no_neighbour) {
+        edges.emplace_back(mesh.triangles[t][k], mesh.triangles[t][(k + 1) % 3]);
+      }
+    }
+  }
+  std::sort(edges.begin(), edges.end());
+  std::vector<bool> used(edges.size(), false);
+  const auto next_unused = [&](Index from) {
+    auto it = std::lower_bound(edges.begin(), edges.end(), std::pair<Index, Index>{from, 0});
+    while (it != edges.end() && it->first == from && used[static_cast<std::size_t>(it - edges.begin())]) {
+      ++it;
+    }
+    return it != edges.end() && it->first == from ? it : edges.end();
+  };
+  std::vector<std::vector<Index>> loops;
+  for (std::size_t start = 0; start < edges.size(); ++start) {
+    if (used[start]) {
+      continue;
+    }
+    std::vector<Index> loop;
+    for (auto it = edges.begin() + static_cast<std::ptrdiff_t>(start); it != edges.end();
+         it = next_unused(it->second)) {
+      used[static_cast<std::size_t>(it - edges.begin())] = true;
+      loop.push_back(it->first);
+    }
+    loops.push_back(std::move(loop));
+  }
+  return loops;
+}
+
+}  // namespace tunica

@@ -1,0 +1,31 @@
+#pragma once
+
+#include "surface/triangle_mesh.hpp"
+
+#include <span>
+
+namespace tunica {
+
+/// The triangles around each vertex, in two flat arrays.
+struct Incidence {
+  std::vector<std::size_t> offsets;  ///< #V + 1
+  std::vector<Index> triangles;      ///< 3 #F: those of vertex v are [offsets[v], offsets[v + 1]), ascending
+
+  [[nodiscard]] std::span<const Index> of(Index vertex) const {
+    return {triangles.data() + offsets[vertex], triangles.data() + offsets[vertex + 1]};
+  }
+};
+
+/// Cost: linear.
+Incidence incidence(const TriangleMesh& mesh);
+
+/// For each triangle t and k = 0, 1, 2 the triangle across the edge from corner k to corner k + 1; `no_neighbour` at a
+/// boundary and where the edge is not shared by exactly two triangles.
+inline constexpr Index no_neighbour = 0xffffffff;
+std::vector<std::array<Index, 3>> neighbours(const TriangleMesh& mesh, const Incidence& around);
+
+/// The boundary of an oriented manifold as closed loops of vertices, each in the direction of its triangles' edges.
+/// Limits: where the boundary touches itself at a vertex, the loops there are split in one of the possible ways.
+std::vector<std::vector<Index>> boundary_loops(const TriangleMesh& mesh);
+
+}  // namespace tunica

@@ -1,1 +1,0 @@
-#include "surface/triangle_mesh.hpp"
