@@ -39,15 +39,30 @@ VolumeFile read_any(const fs::path& path, const VolumeOptions& options) {
       throw UsageError(fmt::format("{}: --spacing is for slice stacks; this file brings its own", path.string()));
     }
   };
+  std::error_code error;
+  if (fs::is_directory(path, error)) {
+    return read_slices(path, options);
+  }
   ByteStream stream(path, 0, coding_of(path));
   std::string head(1024, '\0');
   head.resize(stream.read(head.data(), head.size()));
   if (head.empty()) {
     throw InputError(fmt::format("{}: is empty", path.string()));
   }
+  if (looks_like_tiff(head) || looks_like_png(head)) {
+    return read_slices(path, options);
+  }
   if (looks_like_nifti(head)) {
     refuse_spacing();
     return read_nifti(path, options);
+  }
+  if (looks_like_nrrd(head)) {
+    refuse_spacing();
+    return read_nrrd(path, options);
+  }
+  if (looks_like_metaimage(head)) {
+    refuse_spacing();
+    return read_metaimage(path, options);
   }
   throw InputError(fmt::format("{}: {}", path.string(), other_content(path, head)));
 }

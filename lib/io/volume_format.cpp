@@ -432,6 +432,10 @@ void ByteStream::finish(std::vector<std::string>& warnings) {
   }
 }
 
+Volume::Data make_voxels(VoxelType type, std::size_t count) {
+  return with_type(type, [&](auto zero) { return Volume::Data(std::vector<decltype(zero)>(count)); });
+}
+
 Volume::Data read_voxels(ByteStream& stream, VoxelType type, bool big_endian, const std::vector<Axis>& axes,
                          std::vector<std::string>& warnings) {
   const Plan sizes = plan(stream, axes, size_of(type));

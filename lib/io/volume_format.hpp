@@ -78,6 +78,9 @@ Volume::Data read_voxels(ByteStream& stream, VoxelType type, bool big_endian, co
 Volume::Data read_text_voxels(ByteStream& stream, VoxelType type, const std::vector<Axis>& axes,
                               std::vector<std::string>& warnings);
 
+/// `count` voxels of 0.
+Volume::Data make_voxels(VoxelType type, std::size_t count);
+
 /// Index of the frame (layer) to read of `count`: the only one, or the one chosen.
 /// @param what  "frame" or "layer"; @param hint  added to the message that asks for the choice
 /// Errors: InputError: none chosen of several, or the choice does not exist.
@@ -107,7 +110,14 @@ std::optional<std::uint64_t> parse_count(std::string_view text);
 
 /// One reader per format. `head` is the beginning of the file's content, inflated if need be.
 bool looks_like_nifti(std::string_view head);
+bool looks_like_nrrd(std::string_view head);
+bool looks_like_metaimage(std::string_view head);
+bool looks_like_tiff(std::string_view head);
+bool looks_like_png(std::string_view head);
 
 VolumeFile read_nifti(const std::filesystem::path& path, const VolumeOptions& options);
+VolumeFile read_nrrd(const std::filesystem::path& path, const VolumeOptions& options);
+VolumeFile read_metaimage(const std::filesystem::path& path, const VolumeOptions& options);
+VolumeFile read_slices(const std::filesystem::path& path, const VolumeOptions& options);
 
 }  // namespace tunica::volume_format
