@@ -153,6 +153,19 @@ std::vector<Index> used_vertices(const TriangleMesh& mesh) {
   return used;
 }
 
+// A surface whose faces point inward: its signed volume about the mean of its vertices is negative.
+bool turned_inside_out(const TriangleMesh& mesh, const std::vector<Index>& used) {
+  Vec3 origin = Vec3::Zero();
+  for (const Index v : used) {
+    origin += mesh.vertices[v] / static_cast<double>(used.size());
+  }
+  double volume = 0;
+  for (const auto& [a, b, c] : mesh.triangles) {
+    volume += (mesh.vertices[a] - origin).dot((mesh.vertices[b] - origin).cross(mesh.vertices[c] - origin));
+  }
+  return volume < 0;
+}
+
 // Principal axes of the surface's second moments of area, each turned so that its largest component is positive.
 Mat3 principal_axes(const TriangleMesh& mesh, const std::vector<Index>& used) {
   Vec3 origin = Vec3::Zero();
@@ -285,16 +298,22 @@ Palette colour_map() {
   cv::Mat coloured;
   cv::applyColorMap(ramp, coloured, cv::COLORMAP_VIRIDIS);
   Palette palette;
+  // Lifted towards white: shading on viridis' own darkest colours would hide the shape.
+  constexpr double lift = 0.2;
   for (int i = 0; i < 256; ++i) {
-    palette[static_cast<std::size_t>(i)] = coloured.at<cv::Vec3b>(i);
+    const cv::Vec3b colour = coloured.at<cv::Vec3b>(i);
+    for (int c = 0; c < 3; ++c) {
+      palette[static_cast<std::size_t>(i)][c] = cv::saturate_cast<unsigned char>(colour[c] + lift * (255 - colour[c]));
+    }
   }
   return palette;
 }
 
 struct Paint {
   Palette palette = colour_map();
-  double top = 0;      ///< mm, value of the palette's last colour; 0: no values
-  bool plain = false;  ///< no colours at all
+  double top = 0;           ///< mm, value of the palette's last colour; 0: no values
+  bool plain = false;       ///< no colours at all
+  bool inside_out = false;  ///< what faces the viewer is the inner side
 };
 
 cv::Vec3b surface_colour(const Paint& paint, float value) {
@@ -330,8 +349,8 @@ void paint_raster(cv::Mat target, const Raster& raster, const Paint& paint, doub
         if (raster.depth[at] == Raster::empty) {
           continue;
         }
-        double light = 0.42 + 0.66 * static_cast<double>(raster.light[at]);
-        if (raster.inner[at] != 0) {
+        double light = 0.46 + 0.58 * static_cast<double>(raster.light[at]);
+        if ((raster.inner[at] != 0) != paint.inside_out) {
           light *= 0.72;
         }
         if (on_outline(raster, x, y, static_cast<float>(jump))) {
@@ -389,7 +408,7 @@ void paint_lines(cv::Mat target, const Raster& raster, const Camera& camera,
 void draw_colour_bar(Canvas& canvas, const Paint& paint, const PictureOptions& options, double largest) {
   constexpr double left = 1432, right = 1466, top = 190, bottom = 800;
   const double middle = (left + right) / 2;
-  canvas.text(ascii(options.quantity), middle, top - 62, 15, black, Align::centre);
+  canvas.text(ascii(options.quantity), middle, top - 72, 15, black, Align::centre);
   for (int i = 0; i < 256; ++i) {
     const double y0 = bottom + (top - bottom) * i / 256;
     const double y1 = bottom + (top - bottom) * (i + 1) / 256;
@@ -405,8 +424,8 @@ void draw_colour_bar(Canvas& canvas, const Paint& paint, const PictureOptions& o
   }
   if (options.diagonal) {
     const double top_percent = 100 * paint.top / *options.diagonal;
-    canvas.text("% of", left - 14, top - 40, 13, grey, Align::right);
-    canvas.text("diagonal", left - 14, top - 20, 13, grey, Align::right);
+    canvas.text("% of", left - 14, top - 44, 13, grey, Align::right);
+    canvas.text("diagonal", left - 14, top - 24, 13, grey, Align::right);
     for (const double tick : round_ticks(0, top_percent, 7)) {
       const double y = place(top_percent > 0 ? tick / top_percent : 0);
       canvas.line(left - 8, y, left, y, 1.2, grey);
@@ -479,9 +498,11 @@ void draw(const std::filesystem::path& path, const TriangleMesh& surface, const 
     largest = scene.worst ? std::max(0.0, values[*scene.worst]) : 0;
   }
   scene.axes = principal_axes(surface, scene.used);
-  scene.worst_direction = scene.worst ? vertex_direction(surface, *scene.worst) : Vec3::Zero();
-
   Paint paint;
+  paint.inside_out = turned_inside_out(surface, scene.used);
+  if (scene.worst) {
+    scene.worst_direction = (paint.inside_out ? -1 : 1) * vertex_direction(surface, *scene.worst);
+  }
   paint.plain = values.empty();
   paint.top = options.maximum.value_or(largest);
 

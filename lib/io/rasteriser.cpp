@@ -12,7 +12,7 @@ namespace tunica {
 namespace {
 
 // Light from the upper left behind the viewer, in the camera's axes (right, up, towards).
-const Vec3 light_direction = Vec3(-0.35, 0.45, 0.82).normalized();
+const Vec3 light_direction = Vec3(-0.3, 0.4, 0.87).normalized();
 
 struct ProjectedTriangle {
   std::array<Vec3, 3> corner;  // pixels, pixels, mm
@@ -68,7 +68,9 @@ void draw_triangle(Raster& raster, const ProjectedTriangle& triangle, const std:
       }
       const Vec3 direction = wa * normal[0] + wb * normal[1] + wc * normal[2];
       const double length = direction.norm();
-      const double lit = length > 0 ? side * direction.dot(light_direction) / length : 0;
+      // A little light reaches round the corner: the terminator of a plain cosine hides the colours behind it.
+      const double cosine = length > 0 ? side * direction.dot(light_direction) / length : 0;
+      const double lit = (cosine + 0.4) / 1.4;
       raster.depth[at] = depth;
       raster.light[at] = static_cast<float>(std::clamp(lit, 0.0, 1.0));
       raster.value[at] = static_cast<float>(wa * value[0] + wb * value[1] + wc * value[2]);
