@@ -1,0 +1,104 @@
+#include "cli/tool.hpp"
+#include "io/output_file.hpp"
+#include "io/report_chart.hpp"
+
+namespace {
+
+using namespace tunica;
+
+std::vector<Report> read_good_reports(cli::Tool& tool, const std::vector<std::filesystem::path>& paths, Json& skipped) {
+  std::vector<Report> reports;
+  for (const auto& path : paths) {
+    Report report = read_report(tool.input(path));
+    if (report.ok()) {
+      reports.push_back(std::move(report));
+    } else {
+      tool.warn(path.string() + ": the run failed, its report is skipped");
+      skipped.push_back(path.string());
+    }
+  }
+  if (reports.empty()) {
+    throw InputError(paths.front().string() + ": nothing to draw: every run failed; see the reports' key 'error'");
+  }
+  return reports;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  cli::Tool tool("chart", "Draws speed against accuracy, or any two numbers, from the tools' own reports as SVG.",
+                 "tunica-chart relax-*.json -o chart.svg --series result.shells --csv chart.csv");
+  std::vector<std::filesystem::path> paths;
+  std::filesystem::path out;
+  std::filesystem::path csv;
+  std::filesystem::path reference;
+  ReportChartOptions options;
+  const std::map<std::string, Scale> scales{
+      {"auto", Scale::automatic}, {"linear", Scale::linear}, {"log", Scale::logarithmic}};
+  CLI::App& arguments = tool.arguments();
+  arguments.add_option("REPORT", paths, "reports of runs, written by --report")->required()->type_name("FILE");
+  arguments.add_option("-o,--output", out, "the chart")->required()->type_name("OUT.svg");
+  arguments.add_option("--x", options.x, "dotted key of the x axis, e.g. seconds.total (default: time)")
+      ->type_name("KEY");
+  arguments
+      .add_option("--y", options.y, "dotted key of the y axis, e.g. result.hausdorff_percent.upper (default: error)")
+      ->type_name("KEY");
+  arguments.add_option("--series", options.series, "colour, marker and legend by the value of KEY, or by 'file'")
+      ->type_name("KEY");
+  arguments.add_option("--label", options.label, "write the value of KEY, or 'file', beside each mark")
+      ->type_name("KEY");
+  arguments
+      .add_option("--reference", reference,
+                  "a finer run: errors are taken against its probes, largest displacement or distance")
+      ->type_name("REPORT");
+  arguments.add_option("--csv", csv, "write the numbers behind the picture")->type_name("OUT.csv");
+  arguments.add_option("--title", options.title, "text above the chart")->type_name("TEXT");
+  arguments.add_option("--x-label", options.x_label, "text of the x axis (default: from the key)")->type_name("TEXT");
+  arguments.add_option("--y-label", options.y_label, "text of the y axis (default: from the key)")->type_name("TEXT");
+  arguments.add_option("--x-scale", options.x_scale, "scale of the x axis (default auto: log where that helps)")
+      ->transform(CLI::CheckedTransformer(scales))
+      ->type_name("auto|linear|log");
+  arguments.add_option("--y-scale", options.y_scale, "scale of the y axis (default auto: log where that helps)")
+      ->transform(CLI::CheckedTransformer(scales))
+      ->type_name("auto|linear|log");
+  arguments.add_flag("--lines", options.joined, "join the marks of a series by a line, in the order of x");
+
+  return tool.run(argc, argv, [&] {
+    tool.stages({"read", "draw", "write"});
+    tool.output(out);
+    if (!csv.empty()) {
+      tool.output(csv);
+    }
+    Json skipped = Json::array();
+    std::vector<Report> reports;
+    {
+      const auto stage = tool.stage("read");
+      reports = read_good_reports(tool, paths, skipped);
+      if (!reference.empty()) {
+        options.reference = read_report(tool.input(reference));
+        if (!options.reference->ok()) {
+          throw InputError(reference.string() + ": the reference run failed; give one that succeeded");
+        }
+      }
+    }
+    ReportChart made;
+    std::string svg;
+    {
+      const auto stage = tool.stage("draw");
+      made = chart_of_reports(reports, options);
+      svg = chart_svg(made.chart);
+    }
+    for (const std::string& warning : made.warnings) {
+      tool.warn(warning);
+    }
+    {
+      const auto stage = tool.stage("write");
+      write_file(out, svg, tool.force());
+      if (!csv.empty()) {
+        write_file(csv, made.csv, tool.force());
+      }
+    }
+    tool.result() = {
+        {"x", made.x_key}, {"y", made.y_key}, {"marks", made.marks}, {"on_front", made.on_front}, {"skipped", skipped}};
+  });
+}
