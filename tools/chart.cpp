@@ -6,6 +6,12 @@ namespace {
 
 using namespace tunica;
 
+const std::vector<std::string> scales{"auto", "linear", "log"};
+
+Scale scale_of(const std::string& name) {
+  return name == "log" ? Scale::logarithmic : name == "linear" ? Scale::linear : Scale::automatic;
+}
+
 std::vector<Report> read_good_reports(cli::Tool& tool, const std::vector<std::filesystem::path>& paths, Json& skipped) {
   std::vector<Report> reports;
   for (const auto& path : paths) {
@@ -33,8 +39,8 @@ int main(int argc, char** argv) {
   std::filesystem::path csv;
   std::filesystem::path reference;
   ReportChartOptions options;
-  const std::map<std::string, Scale> scales{
-      {"auto", Scale::automatic}, {"linear", Scale::linear}, {"log", Scale::logarithmic}};
+  std::string x_scale = "auto";
+  std::string y_scale = "auto";
   CLI::App& arguments = tool.arguments();
   arguments.add_option("REPORT", paths, "reports of runs, written by --report")->required()->type_name("FILE");
   arguments.add_option("-o,--output", out, "the chart")->required()->type_name("OUT.svg");
@@ -55,12 +61,12 @@ int main(int argc, char** argv) {
   arguments.add_option("--title", options.title, "text above the chart")->type_name("TEXT");
   arguments.add_option("--x-label", options.x_label, "text of the x axis (default: from the key)")->type_name("TEXT");
   arguments.add_option("--y-label", options.y_label, "text of the y axis (default: from the key)")->type_name("TEXT");
-  arguments.add_option("--x-scale", options.x_scale, "scale of the x axis (default auto: log where that helps)")
-      ->transform(CLI::CheckedTransformer(scales))
-      ->type_name("auto|linear|log");
-  arguments.add_option("--y-scale", options.y_scale, "scale of the y axis (default auto: log where that helps)")
-      ->transform(CLI::CheckedTransformer(scales))
-      ->type_name("auto|linear|log");
+  arguments.add_option("--x-scale", x_scale, "scale of the x axis (default auto: log where that helps)")
+      ->check(CLI::IsMember(scales))
+      ->type_name("SCALE");
+  arguments.add_option("--y-scale", y_scale, "scale of the y axis (default auto: log where that helps)")
+      ->check(CLI::IsMember(scales))
+      ->type_name("SCALE");
   arguments.add_flag("--lines", options.joined, "join the marks of a series by a line, in the order of x");
 
   return tool.run(argc, argv, [&] {
@@ -85,6 +91,8 @@ int main(int argc, char** argv) {
     std::string svg;
     {
       const auto stage = tool.stage("draw");
+      options.x_scale = scale_of(x_scale);
+      options.y_scale = scale_of(y_scale);
       made = chart_of_reports(reports, options);
       svg = chart_svg(made.chart);
     }

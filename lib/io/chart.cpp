@@ -187,7 +187,7 @@ Axis logarithmic_axis(const std::vector<double>& values) {
   const int first = static_cast<int>(std::floor(from));
   const int last = static_cast<int>(std::ceil(to));
   const int every = std::max(1, (last - first + 7) / 8);
-  const bool close = to - from < 1.6;
+  const bool close = to - from < 2.6;
   for (int power = first; power <= last; ++power) {
     for (int factor = 1; factor < 10; ++factor) {
       const double value = factor * std::pow(10, power);
@@ -293,7 +293,7 @@ public:
     }
     plot_.left = 24 + label_size + 12 + widest + 10;
     plot_.right = plot_.left + plot_width;
-    plot_.top = chart.title.empty() ? 44 : 76;
+    plot_.top = chart.title.empty() ? 44 : 68;
     plot_.bottom = picture_height - 66;
   }
 
