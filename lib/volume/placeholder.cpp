@@ -1,1 +1,0 @@
-#include "volume/volume.hpp"
