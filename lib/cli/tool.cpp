@@ -1,5 +1,6 @@
 #include "cli/tool.hpp"
 
+#include "cli/documentation.hpp"
 #include "core/threads.hpp"
 #include "core/version.hpp"
 #include "io/output_file.hpp"
@@ -161,6 +162,14 @@ int Tool::run(int argc, char** argv, const std::function<void()>& body) {
     command_ += (i > 0 ? " " : "") + shell_quoted(i > 0 ? argv[i] : "tunica-" + verb_);
   }
   std::signal(SIGPIPE, SIG_IGN);
+  // For the build alone, so not among the options: the manual page and the completion that are installed.
+  if (argc == 3 && std::string_view(argv[1]) == "--documentation") {
+    const std::string_view kind = argv[2];
+    if (kind == "man" || kind == "bash") {
+      fmt::print("{}", kind == "man" ? man_page(app_) : bash_completion(app_));
+      return std::fflush(stdout) == 0 ? 0 : static_cast<int>(ExitCode::output);
+    }
+  }
   try {
     app_.parse(argc, argv);
     parse_common();

@@ -33,8 +33,8 @@ struct ReportChart {
 /// Makes a chart of runs, one mark per run, or a line of marks where a key leads through a list.
 /// Time is `result.ms_per_step.median` where all runs are simulations that have it, else the seconds of each tool's
 /// algorithm alone. Error is the upper bound of the distance for decimate, relax and compare, the difference between
-/// the volumes of mesh and voxels for extract, the algebraic error for simulate, or what error_against() finds.
-/// With `y` and `reference` the error is the relative difference of that key, in percent.
+/// the volumes of mesh and voxels for extract, the algebraic error or else the residual for simulate, or what
+/// error_against() finds. With `y` and `reference` the error is the relative difference of that key, in percent.
 /// Errors: InputError naming the file where a key is missing or not a number, or when nothing is left to draw.
 ReportChart chart_of_reports(const std::vector<Report>& reports, const ReportChartOptions& options);
 
