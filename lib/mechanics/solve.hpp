@@ -23,6 +23,7 @@ struct State {
   std::size_t newton_iterations = 0;
   std::size_t cg_iterations = 0;
   bool converged = false;
+  bool linear = false;  ///< of the linear theory: rotations are not finite ones
 };
 
 /// Per-element results of one state (#elements of all bodies in order; components in the element's own frame whose

@@ -1,0 +1,92 @@
+#include "mechanics/block_matrix.hpp"
+
+#include "core/error.hpp"
+#include "core/threads.hpp"
+
+#include <algorithm>
+
+namespace tunica {
+
+std::size_t BlockMatrix::find(Index row, Index wanted) const {
+  const auto begin = column.begin() + static_cast<std::ptrdiff_t>(row_start[row]);
+  const auto end = column.begin() + static_cast<std::ptrdiff_t>(row_start[row + 1]);
+  const auto place = std::lower_bound(begin, end, wanted);
+  TUNICA_ASSERT(place != end && *place == wanted);
+  return static_cast<std::size_t>(place - column.begin());
+}
+
+BlockMatrix make_block_matrix(std::size_t nodes, const std::vector<std::array<Index, 3>>& triangles) {
+  std::vector<std::uint64_t> pairs;
+  pairs.reserve(nodes + 6 * triangles.size());
+  const auto pair = [](Index row, Index column) { return (std::uint64_t{row} << 32) | column; };
+  for (std::size_t i = 0; i < nodes; ++i) {
+    pairs.push_back(pair(static_cast<Index>(i), static_cast<Index>(i)));
+  }
+  for (const auto& t : triangles) {
+    for (const Index i : t) {
+      for (const Index j : t) {
+        if (i != j) {
+          pairs.push_back(pair(i, j));
+        }
+      }
+    }
+  }
+  std::sort(pairs.begin(), pairs.end());
+  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+
+  BlockMatrix matrix;
+  matrix.row_start.assign(nodes + 1, 0);
+  matrix.column.reserve(pairs.size());
+  for (const std::uint64_t p : pairs) {
+    ++matrix.row_start[(p >> 32) + 1];
+    matrix.column.push_back(static_cast<Index>(p));
+  }
+  for (std::size_t i = 0; i < nodes; ++i) {
+    matrix.row_start[i + 1] += matrix.row_start[i];
+  }
+  matrix.transposed.resize(pairs.size());
+  for (std::size_t i = 0; i < nodes; ++i) {
+    for (std::size_t k = matrix.row_start[i]; k < matrix.row_start[i + 1]; ++k) {
+      matrix.transposed[k] = matrix.find(matrix.column[k], static_cast<Index>(i));
+    }
+  }
+  matrix.values.assign(36 * pairs.size(), 0);
+  return matrix;
+}
+
+void multiply(const BlockMatrix& matrix, const VectorX& x, VectorX& y) {
+  y.resize(x.size());
+  parallel_for_blocks(matrix.node_count(), 256, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      Eigen::Matrix<double, 6, 1> sum = Eigen::Matrix<double, 6, 1>::Zero();
+      for (std::size_t k = matrix.row_start[i]; k < matrix.row_start[i + 1]; ++k) {
+        sum.noalias() += matrix.block(k) * x.segment<6>(6 * static_cast<Eigen::Index>(matrix.column[k]));
+      }
+      y.segment<6>(6 * static_cast<Eigen::Index>(i)) = sum;
+    }
+  });
+}
+
+void symmetrise(BlockMatrix& matrix) {
+  for (std::size_t i = 0; i < matrix.node_count(); ++i) {
+    for (std::size_t k = matrix.row_start[i]; k < matrix.row_start[i + 1]; ++k) {
+      if (matrix.column[k] >= i) {
+        const Matrix6 mean = 0.5 * (matrix.block(k) + matrix.block(matrix.transposed[k]).transpose());
+        matrix.block(k) = mean;
+        matrix.block(matrix.transposed[k]) = mean.transpose();
+      }
+    }
+  }
+}
+
+double dot(const VectorX& a, const VectorX& b) {
+  constexpr Eigen::Index grain = 8192;
+  double sum = 0;
+  for (Eigen::Index begin = 0; begin < a.size(); begin += grain) {
+    const Eigen::Index size = std::min(grain, a.size() - begin);
+    sum += a.segment(begin, size).dot(b.segment(begin, size));
+  }
+  return sum;
+}
+
+}  // namespace tunica

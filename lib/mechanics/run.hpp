@@ -1,0 +1,26 @@
+#pragma once
+
+#include "mechanics/newton.hpp"
+#include "mechanics/solve.hpp"
+
+/// The kinds of run behind solve(): each takes a system and hands its states over.
+namespace tunica {
+
+using StateCallback = std::function<void(const State&)>;
+
+/// Everything of a state that follows from the configuration.
+State make_state(const ShellSystem& system, const Model& model, const Configuration& configuration, double time);
+
+/// Collects what solve() returns from the steps of a run.
+void record_step(const State& state, double seconds, Summary& summary);
+
+Summary run_static(ShellSystem& system, const Model& model, const RunSettings& settings, const StaticRun& run,
+                   const StateCallback& on_state, const Progress& progress);
+
+Summary run_linear(ShellSystem& system, const Model& model, const RunSettings& settings, const StaticRun& run,
+                   const StateCallback& on_state, const Progress& progress);
+
+Summary run_dynamic(ShellSystem& system, const Model& model, const RunSettings& settings, const DynamicRun& run,
+                    const StateCallback& on_state, const Progress& progress);
+
+}  // namespace tunica

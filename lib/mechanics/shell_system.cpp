@@ -1,0 +1,531 @@
+#include "mechanics/shell_system.hpp"
+
+#include "core/error.hpp"
+#include "core/threads.hpp"
+#include "mechanics/pressure.hpp"
+#include "mechanics/rotation.hpp"
+#include "mechanics/supports.hpp"
+#include "shell/curved_surface.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <numeric>
+
+namespace tunica {
+namespace {
+
+constexpr std::size_t grain = 64;
+
+Eigen::Index at(std::size_t node) { return 6 * static_cast<Eigen::Index>(node); }
+
+double mean_thickness(const ShellBody& body, const std::array<Index, 3>& triangle) {
+  if (body.thickness.size() == 1) {
+    return body.thickness[0];
+  }
+  return (body.thickness[triangle[0]] + body.thickness[triangle[1]] + body.thickness[triangle[2]]) / 3;
+}
+
+/// Area-weighted mean of the facets' normals at every vertex.
+std::vector<Vec3> facet_normals_at_vertices(const ShellMesh& mesh) {
+  std::vector<Vec3> normals(mesh.vertices.size(), Vec3::Zero());
+  for (const auto& t : mesh.triangles) {
+    const Vec3 n = (mesh.vertices[t[1]] - mesh.vertices[t[0]]).cross(mesh.vertices[t[2]] - mesh.vertices[t[0]]);
+    for (const Index v : t) {
+      normals[v] += n;
+    }
+  }
+  for (Vec3& n : normals) {
+    n.normalize();
+  }
+  return normals;
+}
+
+void colour_elements(ShellSystem& system) {
+  // Greedy: the smallest colour that no element around the three nodes has yet. 64 colours are plenty for a manifold
+  // mesh of sane valence; a node of a higher valence opens further groups.
+  std::vector<std::vector<bool>> taken(system.node_count());
+  for (std::size_t e = 0; e < system.elements.size(); ++e) {
+    std::size_t colour = 0;
+    const auto is_taken = [&](std::size_t c) {
+      return std::any_of(system.elements[e].nodes.begin(), system.elements[e].nodes.end(),
+                         [&](Index v) { return c < taken[v].size() && taken[v][c]; });
+    };
+    while (is_taken(colour)) {
+      ++colour;
+    }
+    for (const Index v : system.elements[e].nodes) {
+      if (taken[v].size() <= colour) {
+        taken[v].resize(colour + 1, false);
+      }
+      taken[v][colour] = true;
+    }
+    if (system.colours.size() <= colour) {
+      system.colours.resize(colour + 1);
+    }
+    system.colours[colour].push_back(static_cast<Index>(e));
+  }
+}
+
+void find_pieces(ShellSystem& system, const Model& model) {
+  std::vector<Index> parent(system.node_count());
+  std::iota(parent.begin(), parent.end(), Index{0});
+  const auto root = [&](Index i) {
+    while (parent[i] != i) {
+      parent[i] = parent[parent[i]];
+      i = parent[i];
+    }
+    return i;
+  };
+  for (const ShellElement& e : system.elements) {
+    parent[root(e.nodes[1])] = root(e.nodes[0]);
+    parent[root(e.nodes[2])] = root(e.nodes[0]);
+  }
+  std::vector<std::size_t> piece_of(system.node_count(), SIZE_MAX);
+  for (std::size_t body = 0; body < model.shells.size(); ++body) {
+    for (std::size_t i = model.first_node(body); i < model.first_node(body + 1); ++i) {
+      if (system.used[i] == 0) {
+        continue;
+      }
+      std::size_t& piece = piece_of[root(static_cast<Index>(i))];
+      if (piece == SIZE_MAX) {
+        piece = system.pieces.size();
+        system.pieces.push_back({body, {}});
+      }
+      system.pieces[piece].nodes.push_back(static_cast<Index>(i));
+    }
+  }
+}
+
+/// Load of one triangle per unit of pressure along its reference normals: forces along fixed directions and directors.
+void add_dead_pressure(const ShellSystem& system, std::size_t element, const std::array<Vec3, 3>& normals, double value,
+                       DeadLoad& load) {
+  const ShellElement& e = system.elements[element];
+  const std::array<Vec3, 3> corners{e.from_centroid.col(0), e.from_centroid.col(1), e.from_centroid.col(2)};
+  double volume = 0;
+  Vector18 gradient;
+  if (!patch_volume(corners, normals, volume, gradient, nullptr)) {
+    return;  // check_model() refuses such a mesh
+  }
+  const Vec3 facet = (corners[1] - corners[0]).cross(corners[2] - corners[0]) / 6;
+  for (int k = 0; k < 3; ++k) {
+    const Index node = e.nodes[static_cast<std::size_t>(k)];
+    load.force.segment<3>(at(node)) += value * (facet + gradient.segment<3>(3 * k));
+    load.director[node] += value * normals[static_cast<std::size_t>(k)] * gradient.segment<3>(9 + 3 * k).transpose();
+  }
+}
+
+/// A force per area of fixed direction: its normal part works on the deflection of the cubic, as pressure does.
+void add_area_load(const ShellSystem& system, std::size_t element, const Vec3& per_area, DeadLoad& load) {
+  const ShellElement& e = system.elements[element];
+  const Vec3 normal = e.axes.row(2).transpose();
+  const double across = normal.dot(per_area);
+  add_dead_pressure(system, element, {normal, normal, normal}, across, load);
+  const Vec3 in_plane = (per_area - across * normal) * (e.area / 3);
+  for (const Index node : e.nodes) {
+    load.force.segment<3>(at(node)) += in_plane;
+  }
+}
+
+Index used_node(const ShellSystem& system, const Model& model, std::size_t body, Index node) {
+  const std::size_t global = model.first_node(body) + node;
+  if (node >= model.shells[body].mesh.vertices.size() || system.used[global] == 0) {
+    throw InputError(fmt::format("{}: a load acts on node {}, which no triangle uses", model.shells[body].name, node));
+  }
+  return static_cast<Index>(global);
+}
+
+void add_edge_load(const ShellSystem& system, const Model& model, std::size_t body, const EdgeLoad& edge_load,
+                   DeadLoad& load) {
+  for (const auto& edge : edge_load.edges) {
+    const Index a = used_node(system, model, body, edge[0]);
+    const Index b = used_node(system, model, body, edge[1]);
+    const double length = (system.reference[a] - system.reference[b]).norm();
+    load.force.segment<3>(at(a)) += edge_load.per_length * (length / 2);
+    load.force.segment<3>(at(b)) += edge_load.per_length * (length / 2);
+  }
+}
+
+void make_loads(ShellSystem& system, const Model& model) {
+  system.dead.resize(model.loads.size());
+  for (std::size_t l = 0; l < model.loads.size(); ++l) {
+    const Load& load = model.loads[l];
+    DeadLoad& dead = system.dead[l];
+    const std::size_t begin = system.first_element[load.body];
+    const std::size_t end = system.first_element[load.body + 1];
+    if (const auto* pressure = std::get_if<PressureLoad>(&load.kind); pressure != nullptr && pressure->follower) {
+      system.follower_pressures.emplace_back(l, load.body);
+      continue;
+    }
+    dead.force = VectorX::Zero(at(system.node_count()));
+    if (std::holds_alternative<PressureLoad>(load.kind) || std::holds_alternative<AreaLoad>(load.kind)) {
+      dead.director.assign(system.node_count(), Mat3::Zero());
+    }
+    if (const auto* pressure = std::get_if<PressureLoad>(&load.kind)) {
+      for (std::size_t e = begin; e < end; ++e) {
+        add_dead_pressure(system, e, system.normals[e], pressure->value, dead);
+      }
+    } else if (const auto* area = std::get_if<AreaLoad>(&load.kind)) {
+      for (std::size_t e = begin; e < end; ++e) {
+        add_area_load(system, e, area->per_area, dead);
+      }
+    } else if (const auto* force = std::get_if<ForceLoad>(&load.kind)) {
+      for (const Index node : force->nodes) {
+        dead.force.segment<3>(at(used_node(system, model, load.body, node))) +=
+            force->total / static_cast<double>(force->nodes.size());
+      }
+    } else if (const auto* moment = std::get_if<MomentLoad>(&load.kind)) {
+      for (const Index node : moment->nodes) {
+        dead.force.segment<3>(at(used_node(system, model, load.body, node)) + 3) +=
+            moment->total / static_cast<double>(moment->nodes.size());
+      }
+    } else if (const auto* edge = std::get_if<EdgeLoad>(&load.kind)) {
+      add_edge_load(system, model, load.body, *edge, dead);
+    } else if (const auto* gravity = std::get_if<GravityLoad>(&load.kind)) {
+      for (std::size_t i = model.first_node(load.body); i < model.first_node(load.body + 1); ++i) {
+        dead.force.segment<3>(at(i)) = system.mass[static_cast<Eigen::Index>(i)] * gravity->acceleration;
+      }
+    }
+  }
+}
+
+CornerMotion corner_motion(const ShellElement& element, const Configuration& configuration) {
+  CornerMotion motion;
+  for (int k = 0; k < 3; ++k) {
+    const Index node = element.nodes[static_cast<std::size_t>(k)];
+    motion.displacement.col(k) = configuration.displacement[node];
+    motion.rotation[static_cast<std::size_t>(k)] = configuration.rotation[node].toRotationMatrix();
+  }
+  return motion;
+}
+
+void scatter(const std::array<std::size_t, 9>& places, const Matrix18& matrix, double factor, BlockMatrix& target) {
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      target.block(places[static_cast<std::size_t>(3 * i + j)]) += factor * matrix.block<6, 6>(6 * i, 6 * j);
+    }
+  }
+}
+
+void add_dead_loads(const ShellSystem& system, const Configuration& configuration, const std::vector<double>& factors,
+                    VectorX& external, BlockMatrix* tangent) {
+  for (std::size_t l = 0; l < system.dead.size(); ++l) {
+    const DeadLoad& load = system.dead[l];
+    const double factor = factors[l];
+    if (load.force.size() == 0 || factor == 0) {
+      continue;
+    }
+    external += factor * load.force;
+    for (std::size_t i = 0; i < load.director.size(); ++i) {
+      // Moment: sum of (R n) x g. With M = R n g' its spin derivative is M - trace(M).
+      const Mat3 m = factor * (configuration.rotation[i] * load.director[i]);
+      external.segment<3>(at(i) + 3) += Vec3(m(1, 2) - m(2, 1), m(2, 0) - m(0, 2), m(0, 1) - m(1, 0));
+      if (tangent != nullptr) {
+        auto block = tangent->block(tangent->find(static_cast<Index>(i), static_cast<Index>(i)));
+        block.block<3, 3>(3, 3) += m.trace() * Mat3::Identity() - m;
+      }
+    }
+  }
+}
+
+}  // namespace
+
+ShellSystem make_system(const Model& model) {
+  ShellSystem system;
+  const std::size_t nodes = model.node_count();
+  system.reference.reserve(nodes);
+  system.used.assign(nodes, 0);
+  system.first_element.push_back(0);
+  double edges = 0;
+  for (std::size_t b = 0; b < model.shells.size(); ++b) {
+    const ShellBody& body = model.shells[b];
+    const auto offset = static_cast<Index>(model.first_node(b));
+    system.reference.insert(system.reference.end(), body.mesh.vertices.begin(), body.mesh.vertices.end());
+    const std::vector<Vec3> at_vertices = facet_normals_at_vertices(body.mesh);
+    const bool curved = body.curved && body.rest == Rest::curved;
+    for (std::size_t t = 0; t < body.mesh.triangles.size(); ++t) {
+      const auto& v = body.mesh.triangles[t];
+      const std::array<Vec3, 3> corners{body.mesh.vertices[v[0]], body.mesh.vertices[v[1]], body.mesh.vertices[v[2]]};
+      const double thickness = mean_thickness(body, v);
+      const double scale =
+          body.membrane == Membrane::adapt
+              ? adapted_scale(corners, {at_vertices[v[0]], at_vertices[v[1]], at_vertices[v[2]]}, thickness)
+              : 1;
+      ShellElement element = make_shell_element(corners, body.material, thickness, body.membrane, body.bending, scale);
+      element.body = b;
+      std::array<Vec3, 3> normals;
+      for (std::size_t k = 0; k < 3; ++k) {
+        element.nodes[k] = v[k] + offset;
+        system.used[element.nodes[k]] = 1;
+        normals[k] = curved ? body.mesh.normal(t, static_cast<int>(k)) : Vec3(element.axes.row(2).transpose());
+        edges += (corners[(k + 1) % 3] - corners[k]).norm();
+      }
+      const double membrane = body.material.young * thickness;
+      system.stiffness_norm += membrane * membrane;
+      system.normals.push_back(normals);
+      system.elements.push_back(element);
+    }
+    system.first_element.push_back(system.elements.size());
+  }
+  system.stiffness_norm = std::sqrt(system.stiffness_norm);
+  system.length = edges / (3 * static_cast<double>(std::max<std::size_t>(1, system.elements.size())));
+
+  std::vector<std::array<Index, 3>> triangles;
+  triangles.reserve(system.elements.size());
+  for (const ShellElement& e : system.elements) {
+    triangles.push_back(e.nodes);
+  }
+  system.pattern = make_block_matrix(nodes, triangles);
+  system.placement.resize(system.elements.size());
+  for (std::size_t e = 0; e < system.elements.size(); ++e) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      for (std::size_t j = 0; j < 3; ++j) {
+        system.placement[e][3 * i + j] = system.pattern.find(triangles[e][i], triangles[e][j]);
+      }
+    }
+  }
+  colour_elements(system);
+  find_pieces(system, model);
+
+  system.area = VectorX::Zero(static_cast<Eigen::Index>(nodes));
+  system.mass = system.area;
+  system.inertia = system.area;
+  for (const ShellElement& e : system.elements) {
+    const double mass = model.shells[e.body].material.density.value_or(0) * e.thickness * e.area / 3;
+    for (const Index node : e.nodes) {
+      system.area[node] += e.area / 3;
+      system.mass[node] += mass;
+      system.inertia[node] += mass * e.thickness * e.thickness / 12;
+    }
+  }
+  make_loads(system, model);
+  make_supports(system, model);
+  return system;
+}
+
+Configuration reference_configuration(const ShellSystem& system) {
+  return {std::vector<Vec3>(system.node_count(), Vec3::Zero()),
+          std::vector<Eigen::Quaterniond>(system.node_count(), Eigen::Quaterniond::Identity())};
+}
+
+void advance_configuration(Configuration& configuration, const VectorX& increment) {
+  for (std::size_t i = 0; i < configuration.displacement.size(); ++i) {
+    configuration.displacement[i] += increment.segment<3>(at(i));
+    const Vec3 spin = increment.segment<3>(at(i) + 3);
+    if (spin != Vec3::Zero()) {
+      configuration.rotation[i] = (exponential(spin) * configuration.rotation[i]).normalized();
+    }
+  }
+}
+
+double factor_of(const Ramp& ramp, bool is_static, double time) {
+  return is_static && ramp.points.empty() ? time : ramp.at(time);
+}
+
+std::vector<double> load_factors(const Model& model, bool is_static, double time) {
+  std::vector<double> factors;
+  for (const Load& load : model.loads) {
+    factors.push_back(factor_of(load.ramp, is_static, time));
+  }
+  return factors;
+}
+
+void evaluate(const ShellSystem& system, const Model& model, const Configuration& configuration,
+              const std::vector<double>& factors, const ViscousState& viscous, Forces& forces, BlockMatrix* tangent) {
+  const Eigen::Index size = at(system.node_count());
+  forces.internal.setZero(size);
+  forces.external.setZero(size);
+  forces.deformation.resize(system.elements.size());
+  if (tangent != nullptr) {
+    std::fill(tangent->values.begin(), tangent->values.end(), 0.0);
+  }
+  std::vector<double> pressure(model.shells.size(), 0);
+  for (const auto& [load, body] : system.follower_pressures) {
+    pressure[body] += factors[load] * std::get<PressureLoad>(model.loads[load].kind).value;
+  }
+  std::vector<double> energies(system.elements.size());
+  std::atomic<bool> valid{true};
+  for (const std::vector<Index>& colour : system.colours) {
+    parallel_for_blocks(colour.size(), grain, [&](std::size_t begin, std::size_t end) {
+      ElementResponse response;
+      Matrix18 stiffness;
+      Vector18 load;
+      for (std::size_t i = begin; i < end; ++i) {
+        const std::size_t e = colour[i];
+        const ShellElement& element = system.elements[e];
+        const CornerMotion motion = corner_motion(element, configuration);
+        const Viscous damping{viscous.factor, viscous.previous == nullptr ? nullptr : &(*viscous.previous)[e]};
+        if (!corotational_response(element, motion, damping, response, tangent == nullptr ? nullptr : &stiffness)) {
+          valid = false;
+          continue;
+        }
+        forces.deformation[e] = response.deformation;
+        energies[e] = response.energy;
+        for (int k = 0; k < 3; ++k) {
+          forces.internal.segment<6>(at(element.nodes[static_cast<std::size_t>(k)])) +=
+              response.force.segment<6>(6 * k);
+        }
+        if (tangent != nullptr) {
+          scatter(system.placement[e], stiffness, 1, *tangent);
+        }
+        const double p = pressure[element.body];
+        if (p == 0) {
+          continue;
+        }
+        std::array<Vec3, 3> corners, normals;
+        for (int k = 0; k < 3; ++k) {
+          const auto s = static_cast<std::size_t>(k);
+          corners[s] = element.from_centroid.col(k) + (motion.displacement.col(k) - motion.displacement.col(0));
+          normals[s] = motion.rotation[s] * system.normals[e][s];
+        }
+        if (!unit_pressure(corners, normals, load, tangent == nullptr ? nullptr : &stiffness)) {
+          valid = false;
+          continue;
+        }
+        for (int k = 0; k < 3; ++k) {
+          forces.external.segment<6>(at(element.nodes[static_cast<std::size_t>(k)])) += p * load.segment<6>(6 * k);
+        }
+        if (tangent != nullptr) {
+          scatter(system.placement[e], stiffness, -p, *tangent);
+        }
+      }
+    });
+  }
+  forces.energy = std::accumulate(energies.begin(), energies.end(), 0.0);
+  add_dead_loads(system, configuration, factors, forces.external, tangent);
+  forces.valid = valid && forces.internal.allFinite() && forces.external.allFinite();
+}
+
+void linear_stiffness(const ShellSystem& system, BlockMatrix& matrix) {
+  std::fill(matrix.values.begin(), matrix.values.end(), 0.0);
+  for (const std::vector<Index>& colour : system.colours) {
+    parallel_for_blocks(colour.size(), grain, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        scatter(system.placement[colour[i]], linear_stiffness(system.elements[colour[i]]), 1, matrix);
+      }
+    });
+  }
+}
+
+double force_norm(const ShellSystem& system, const VectorX& force) {
+  double sum = 0;
+  for (std::size_t i = 0; i < system.node_count(); ++i) {
+    sum += force.segment<3>(at(i)).squaredNorm() +
+           force.segment<3>(at(i) + 3).squaredNorm() / (system.length * system.length);
+  }
+  return std::sqrt(sum);
+}
+
+double round_off(const ShellSystem& system, const Configuration& configuration) {
+  double largest = 0;
+  for (const Vec3& u : configuration.displacement) {
+    largest = std::max(largest, u.squaredNorm());
+  }
+  return 4 * std::numeric_limits<double>::epsilon() * system.stiffness_norm * (system.length + std::sqrt(largest));
+}
+
+ShellMesh deformed_mesh(const ShellSystem& system, const Model& model, const Configuration& configuration,
+                        std::size_t body) {
+  ShellMesh mesh = model.shells[body].mesh;
+  const std::size_t offset = model.first_node(body);
+  for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
+    mesh.vertices[i] += configuration.displacement[offset + i];
+  }
+  mesh.corner_normals.resize(mesh.triangles.size());
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      mesh.corner_normals[t][k] =
+          configuration.rotation[offset + mesh.triangles[t][k]] * system.normals[system.first_element[body] + t][k];
+    }
+  }
+  return mesh;
+}
+
+std::optional<double> enclosed_volume(const ShellSystem& system, const Model& model,
+                                      const Configuration& configuration) {
+  double volume = 0;
+  for (std::size_t body = 0; body < model.shells.size(); ++body) {
+    try {
+      volume += curved_volume(deformed_mesh(system, model, configuration, body));
+    } catch (const InputError&) {
+      return std::nullopt;  // open
+    }
+  }
+  return model.shells.empty() ? std::nullopt : std::optional(volume);
+}
+
+void take_out_rigid_motion(const ShellSystem& system, const Piece& piece, Configuration& configuration) {
+  double weight = 0;
+  Vec3 centre = Vec3::Zero();
+  for (const Index i : piece.nodes) {
+    weight += system.area[i];
+    centre += system.area[i] * system.reference[i];
+  }
+  centre /= weight;
+  for (int iteration = 0; iteration < 30; ++iteration) {
+    Vec3 shift = Vec3::Zero();
+    Vec3 moment = Vec3::Zero();
+    Mat3 inertia = Mat3::Zero();
+    for (const Index i : piece.nodes) {
+      shift += system.area[i] / weight * configuration.displacement[i];
+    }
+    for (const Index i : piece.nodes) {
+      const Vec3 arm = system.reference[i] - centre;
+      const Vec3 now = arm + configuration.displacement[i] - shift;
+      moment += system.area[i] * arm.cross(configuration.displacement[i] - shift);
+      inertia += system.area[i] * (arm.dot(now) * Mat3::Identity() - now * arm.transpose());
+    }
+    const Vec3 turn = -inertia.partialPivLu().solve(moment);
+    const Eigen::Quaterniond q = exponential(turn);
+    // (q - 1) x, so that small displacements keep their digits.
+    const auto change = [&](const Vec3& x) {
+      const Vec3 t = 2 * q.vec().cross(x);
+      return Vec3(q.w() * t + q.vec().cross(t));
+    };
+    for (const Index i : piece.nodes) {
+      Vec3& u = configuration.displacement[i];
+      u -= shift;
+      u += change(system.reference[i] - centre + u);
+      configuration.rotation[i] = (q * configuration.rotation[i]).normalized();
+    }
+    if (!(turn.norm() > 1e-14)) {
+      break;
+    }
+  }
+}
+
+void take_out_linear_rigid_motion(const ShellSystem& system, const Model& model, VectorX& displacement) {
+  for (const Piece& piece : system.pieces) {
+    if (!held_by_rigid_motions(model, piece.body)) {
+      continue;
+    }
+    double weight = 0;
+    Vec3 centre = Vec3::Zero();
+    Vec3 shift = Vec3::Zero();
+    for (const Index i : piece.nodes) {
+      weight += system.area[i];
+      centre += system.area[i] * system.reference[i];
+      shift += system.area[i] * displacement.segment<3>(at(i));
+    }
+    centre /= weight;
+    shift /= weight;
+    Vec3 moment = Vec3::Zero();
+    Mat3 inertia = Mat3::Zero();
+    for (const Index i : piece.nodes) {
+      const Vec3 arm = system.reference[i] - centre;
+      moment += system.area[i] * arm.cross(displacement.segment<3>(at(i)) - shift);
+      inertia += system.area[i] * (arm.squaredNorm() * Mat3::Identity() - arm * arm.transpose());
+    }
+    const Vec3 turn = inertia.ldlt().solve(moment);
+    for (const Index i : piece.nodes) {
+      displacement.segment<3>(at(i)) -= shift + turn.cross(system.reference[i] - centre);
+      displacement.segment<3>(at(i) + 3) -= turn;
+    }
+  }
+}
+
+}  // namespace tunica

@@ -1,0 +1,111 @@
+#include "mechanics/solve.hpp"
+
+#include "core/error.hpp"
+#include "mechanics/rotation.hpp"
+#include "mechanics/run.hpp"
+
+#include <algorithm>
+
+namespace tunica {
+
+State make_state(const ShellSystem& system, const Model& model, const Configuration& configuration, double time) {
+  State state;
+  state.time = time;
+  state.displacement = configuration.displacement;
+  state.rotation.reserve(configuration.rotation.size());
+  for (const Eigen::Quaterniond& q : configuration.rotation) {
+    state.rotation.push_back(logarithm(q));
+  }
+  state.volume = enclosed_volume(system, model, configuration);
+  for (const ShellElement& element : system.elements) {
+    CornerMotion motion;
+    for (int k = 0; k < 3; ++k) {
+      const Index node = element.nodes[static_cast<std::size_t>(k)];
+      motion.displacement.col(k) = configuration.displacement[node];
+      motion.rotation[static_cast<std::size_t>(k)] = configuration.rotation[node].toRotationMatrix();
+    }
+    Vector18 d;
+    if (deformation(element, motion, d)) {
+      state.strain_energy += strain_energy(element, d);
+    }
+  }
+  return state;
+}
+
+void record_step(const State& state, double seconds, Summary& summary) {
+  ++summary.steps;
+  summary.converged = state.converged && (summary.steps == 1 || summary.converged);
+  summary.residual = state.residual;
+  summary.newton_iterations += state.newton_iterations;
+  summary.cg_iterations += state.cg_iterations;
+  summary.volume_after = state.volume;
+  summary.strain_energy = state.strain_energy;
+  summary.max_displacement = 0;
+  for (const Vec3& u : state.displacement) {
+    summary.max_displacement = std::max(summary.max_displacement, u.norm());
+  }
+  summary.seconds_per_step.push_back(seconds);
+}
+
+Summary solve(const Model& model, const RunSettings& settings, const std::function<void(const State&)>& on_state,
+              const Progress& progress) {
+  check_model(model, settings);
+  ShellSystem system = make_system(model);
+  if (const auto* dynamic = std::get_if<DynamicRun>(&settings.kind)) {
+    return run_dynamic(system, model, settings, *dynamic, on_state, progress);
+  }
+  const auto& run = std::get<StaticRun>(settings.kind);
+  return run.linear ? run_linear(system, model, settings, run, on_state, progress)
+                    : run_static(system, model, settings, run, on_state, progress);
+}
+
+ElementFields element_fields(const Model& model, const State& state) {
+  ElementFields fields;
+  const std::size_t nodes = model.node_count();
+  TUNICA_ASSERT(state.displacement.size() == nodes && state.rotation.size() == nodes);
+  const ShellSystem system = make_system(model);
+  std::vector<double> pressure(model.shells.size(), 0);
+  for (const Load& load : model.loads) {
+    if (const auto* p = std::get_if<PressureLoad>(&load.kind)) {
+      pressure[load.body] += p->value * factor_of(load.ramp, state.velocity.empty(), state.time);
+    }
+  }
+  const auto von_mises = [](const Vec3& s) {
+    return std::sqrt(std::max(0.0, s[0] * s[0] - s[0] * s[1] + s[1] * s[1] + 3 * s[2] * s[2]));
+  };
+  for (const ShellElement& element : system.elements) {
+    Vector18 d = Vector18::Zero();
+    if (state.linear) {
+      for (int k = 0; k < 3; ++k) {
+        const Index node = element.nodes[static_cast<std::size_t>(k)];
+        d.segment<3>(6 * k) = element.axes * state.displacement[node];
+        d.segment<3>(6 * k + 3) = element.axes * state.rotation[node];
+      }
+    } else {
+      CornerMotion motion;
+      for (int k = 0; k < 3; ++k) {
+        const Index node = element.nodes[static_cast<std::size_t>(k)];
+        motion.displacement.col(k) = state.displacement[node];
+        motion.rotation[static_cast<std::size_t>(k)] = exponential(state.rotation[node]).toRotationMatrix();
+      }
+      deformation(element, motion, d);
+    }
+    Vector9 in_plane, out_of_plane;
+    for (int k = 0; k < 3; ++k) {
+      in_plane.segment<3>(3 * k) << d[6 * k], d[6 * k + 1], d[6 * k + 5];
+      out_of_plane.segment<3>(3 * k) << d[6 * k + 2], d[6 * k + 3], d[6 * k + 4];
+    }
+    const double t = element.thickness;
+    const Mat3 elasticity = plane_stress(model.shells[element.body].material);
+    const Vec3 force = t * elasticity * (element.membrane_strain * in_plane);
+    const Vec3 moment = t * t * t / 12 * elasticity * (element.curvature * out_of_plane);
+    fields.membrane_force.push_back(force);
+    fields.bending_moment.push_back(moment);
+    fields.von_mises_top.push_back(von_mises(force / t + 6 / (t * t) * moment));
+    fields.von_mises_bottom.push_back(von_mises(force / t - 6 / (t * t) * moment));
+    fields.pressure.push_back(pressure[element.body]);
+  }
+  return fields;
+}
+
+}  // namespace tunica

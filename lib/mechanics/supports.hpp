@@ -1,0 +1,24 @@
+#pragma once
+
+#include "mechanics/shell_system.hpp"
+
+namespace tunica {
+
+/// Fills `held` and `prescribed`: the union of the fixes, six statically determinate supports in every piece of a body
+/// that is held by its rigid motions only (static runs), and nodes that no triangle uses.
+/// Errors: InputError when two fixes ask for different displacements of one component.
+void make_supports(ShellSystem& system, const Model& model);
+
+/// Number of rigid motions of a piece that its held freedoms leave free (0 ... 6).
+int free_rigid_motions(const ShellSystem& system, const Piece& piece);
+
+/// Net force and moment of all loads at their full value on a piece, relative to the sum of their magnitudes.
+double imbalance(const ShellSystem& system, const Piece& piece, const VectorX& external);
+
+/// Whether a body is held by its rigid motions.
+bool held_by_rigid_motions(const Model& model, std::size_t body);
+
+/// Releases the supports of bodies held by their rigid motions: in a dynamic run inertia holds them.
+void release_rigid_motion_supports(ShellSystem& system, const Model& model);
+
+}  // namespace tunica

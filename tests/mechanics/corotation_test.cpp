@@ -1,0 +1,218 @@
+// The co-rotational element: forces are the gradient of the energy, the tangent is the gradient of the forces.
+
+#include "mechanics/pressure.hpp"
+#include "mechanics/rotation.hpp"
+#include "mechanics/shell_element.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <random>
+
+namespace tunica {
+namespace {
+
+class Random {
+public:
+  double operator()(double scale) { return scale * uniform_(engine_); }
+  Vec3 vector(double scale) { return {(*this)(scale), (*this)(scale), (*this)(scale)}; }
+
+private:
+  std::mt19937 engine_{7};
+  std::uniform_real_distribution<double> uniform_{-1, 1};
+};
+
+ShellElement some_element(Membrane membrane = Membrane::opt, Bending bending = Bending::dkt) {
+  return make_shell_element({Vec3(0.1, 0.2, 0.3), Vec3(1.3, 0.1, 0.5), Vec3(0.4, 1.1, -0.2)}, {1000, 0.3, {}}, 0.1,
+                            membrane, bending, 0.7);
+}
+
+/// A large rigid motion and a deformation of some 20 %.
+CornerMotion large_motion(const ShellElement& element, Random& random) {
+  const Mat3 turn = exponential(Vec3(0.9, -1.4, 0.8)).toRotationMatrix();
+  CornerMotion motion;
+  for (int k = 0; k < 3; ++k) {
+    motion.displacement.col(k) =
+        turn * (element.from_centroid.col(k) + random.vector(0.2)) - element.from_centroid.col(k) + Vec3(3, 4, 5);
+    motion.rotation[static_cast<std::size_t>(k)] = exponential(random.vector(0.4)).toRotationMatrix() * turn;
+  }
+  return motion;
+}
+
+CornerMotion moved(const CornerMotion& motion, int freedom, double amount) {
+  CornerMotion result = motion;
+  const int corner = freedom / 6;
+  if (freedom % 6 < 3) {
+    result.displacement(freedom % 6, corner) += amount;
+  } else {
+    auto& rotation = result.rotation[static_cast<std::size_t>(corner)];
+    rotation = exponential(amount * Vec3::Unit(freedom % 6 - 3)).toRotationMatrix() * rotation;
+  }
+  return result;
+}
+
+TEST(Corotation, ForceIsTheGradientOfTheEnergy) {
+  Random random;
+  const ShellElement element = some_element();
+  const CornerMotion motion = large_motion(element, random);
+  ElementResponse response, plus, minus;
+  ASSERT_TRUE(corotational_response(element, motion, {}, response, nullptr));
+  constexpr double step = 1e-5;
+  for (int i = 0; i < 18; ++i) {
+    ASSERT_TRUE(corotational_response(element, moved(motion, i, step), {}, plus, nullptr));
+    ASSERT_TRUE(corotational_response(element, moved(motion, i, -step), {}, minus, nullptr));
+    EXPECT_NEAR(response.force[i], (plus.energy - minus.energy) / (2 * step), 1e-8 * response.force.norm()) << i;
+  }
+}
+
+TEST(Corotation, TangentIsTheGradientOfTheForce) {
+  Random random;
+  const ShellElement element = some_element();
+  const CornerMotion motion = large_motion(element, random);
+  ElementResponse response, plus, minus;
+  Matrix18 tangent;
+  Vector18 previous;
+  for (int i = 0; i < 18; ++i) {
+    previous[i] = i % 6 == 2 ? 0 : random(0.1);
+  }
+  for (const double damping : {0.0, 0.7}) {
+    const Viscous viscous{damping, &previous};
+    ASSERT_TRUE(corotational_response(element, motion, viscous, response, &tangent));
+    constexpr double step = 1e-5;
+    for (int i = 0; i < 18; ++i) {
+      ASSERT_TRUE(corotational_response(element, moved(motion, i, step), viscous, plus, nullptr));
+      ASSERT_TRUE(corotational_response(element, moved(motion, i, -step), viscous, minus, nullptr));
+      const Vector18 difference = (plus.force - minus.force) / (2 * step);
+      EXPECT_LT((difference - tangent.col(i)).norm(), 1e-7 * tangent.norm()) << i << ' ' << damping;
+    }
+  }
+}
+
+TEST(Corotation, ReferenceIsFreeOfForcesToTheLastBit) {
+  const ShellElement element = some_element();
+  CornerMotion motion{Mat3::Zero(), {Mat3::Identity(), Mat3::Identity(), Mat3::Identity()}};
+  ElementResponse response;
+  Matrix18 tangent;
+  ASSERT_TRUE(corotational_response(element, motion, {}, response, &tangent));
+  EXPECT_LT(response.force.norm(), 1e-13);
+  EXPECT_LT((tangent - linear_stiffness(element)).norm(), 1e-13 * tangent.norm());
+}
+
+TEST(Corotation, RigidMotionGivesNoForces) {
+  for (const Bending bending : {Bending::comas, Bending::comas_consistent, Bending::dkt}) {
+    for (const Membrane membrane : {Membrane::cst, Membrane::opt}) {
+      const ShellElement element = some_element(membrane, bending);
+      const Mat3 turn = exponential(Vec3(1.9, -1.4, 0.8)).toRotationMatrix();
+      CornerMotion motion{Mat3((turn - Mat3::Identity()) * element.from_centroid).colwise() + Vec3(1, 2, 3),
+                          {turn, turn, turn}};
+      ElementResponse response;
+      ASSERT_TRUE(corotational_response(element, motion, {}, response, nullptr));
+      EXPECT_LT(response.force.norm(), 1e-12 * 1000 * 0.1);
+    }
+  }
+}
+
+TEST(Corotation, ForcesAreInBalance) {
+  Random random;
+  const ShellElement element = some_element();
+  const CornerMotion motion = large_motion(element, random);
+  ElementResponse response;
+  ASSERT_TRUE(corotational_response(element, motion, {}, response, nullptr));
+  Vec3 force = Vec3::Zero();
+  Vec3 moment = Vec3::Zero();
+  for (int k = 0; k < 3; ++k) {
+    const Vec3 f = response.force.segment<3>(6 * k);
+    force += f;
+    moment +=
+        (element.from_centroid.col(k) + motion.displacement.col(k)).cross(f) + response.force.segment<3>(6 * k + 3);
+  }
+  EXPECT_LT(force.norm(), 1e-13 * response.force.norm());
+  EXPECT_LT(moment.norm(), 2e-14 * 10 * response.force.norm());
+}
+
+TEST(Corotation, CollapsedTriangleIsReported) {
+  const ShellElement element = some_element();
+  CornerMotion motion{Mat3::Zero(), {Mat3::Identity(), Mat3::Identity(), Mat3::Identity()}};
+  motion.displacement.col(2) = element.from_centroid.col(1) - element.from_centroid.col(2);
+  ElementResponse response;
+  EXPECT_FALSE(corotational_response(element, motion, {}, response, nullptr));
+}
+
+struct Patch {
+  std::array<Vec3, 3> corners{Vec3(0.1, 0.2, 0.3), Vec3(1.3, 0.1, 0.5), Vec3(0.4, 1.1, -0.2)};
+  std::array<Vec3, 3> normals;
+};
+
+Patch some_patch() {
+  Random random;
+  Patch patch;
+  const Vec3 n = (patch.corners[1] - patch.corners[0]).cross(patch.corners[2] - patch.corners[0]).normalized();
+  for (Vec3& normal : patch.normals) {
+    normal = (n + random.vector(0.4)).normalized();
+  }
+  return patch;
+}
+
+TEST(Pressure, GradientAndHessianOfTheVolume) {
+  const Patch patch = some_patch();
+  double volume = 0;
+  Vector18 gradient;
+  Matrix18 hessian;
+  ASSERT_TRUE(patch_volume(patch.corners, patch.normals, volume, gradient, &hessian));
+  constexpr double step = 1e-5;
+  for (int i = 0; i < 18; ++i) {
+    std::array<double, 2> values{};
+    std::array<Vector18, 2> gradients;
+    for (std::size_t side = 0; side < 2; ++side) {
+      Patch other = patch;
+      auto& vectors = i < 9 ? other.corners : other.normals;
+      vectors[static_cast<std::size_t>(i % 9 / 3)][i % 3] += side == 0 ? step : -step;
+      ASSERT_TRUE(patch_volume(other.corners, other.normals, values[side], gradients[side], nullptr));
+    }
+    EXPECT_NEAR(gradient[i], (values[0] - values[1]) / (2 * step), 1e-9);
+    EXPECT_LT(((gradients[0] - gradients[1]) / (2 * step) - hessian.col(i)).norm(), 1e-8);
+  }
+}
+
+TEST(Pressure, StiffnessIsTheGradientOfTheForce) {
+  const Patch patch = some_patch();
+  Vector18 force;
+  Matrix18 stiffness;
+  ASSERT_TRUE(unit_pressure(patch.corners, patch.normals, force, &stiffness));
+  constexpr double step = 1e-5;
+  for (int i = 0; i < 18; ++i) {
+    std::array<Vector18, 2> forces;
+    for (std::size_t side = 0; side < 2; ++side) {
+      Patch other = patch;
+      const double amount = side == 0 ? step : -step;
+      const auto corner = static_cast<std::size_t>(i / 6);
+      if (i % 6 < 3) {
+        other.corners[corner][i % 6] += amount;
+      } else {
+        other.normals[corner] = exponential(amount * Vec3::Unit(i % 6 - 3)) * other.normals[corner];
+      }
+      ASSERT_TRUE(unit_pressure(other.corners, other.normals, forces[side], nullptr));
+    }
+    EXPECT_LT(((forces[0] - forces[1]) / (2 * step) - stiffness.col(i)).norm(), 1e-8);
+  }
+}
+
+TEST(Pressure, PartOfThePatchIsInBalanceByItself) {
+  const Patch patch = some_patch();
+  double volume = 0;
+  Vector18 gradient;
+  ASSERT_TRUE(patch_volume(patch.corners, patch.normals, volume, gradient, nullptr));
+  Vec3 force = Vec3::Zero();
+  Vec3 moment = Vec3::Zero();
+  for (int k = 0; k < 3; ++k) {
+    const auto s = static_cast<std::size_t>(k);
+    force += gradient.segment<3>(3 * k);
+    moment +=
+        patch.corners[s].cross(gradient.segment<3>(3 * k)) + patch.normals[s].cross(gradient.segment<3>(9 + 3 * k));
+  }
+  EXPECT_LT(force.norm(), 1e-15);
+  EXPECT_LT(moment.norm(), 1e-15);
+}
+
+}  // namespace
+}  // namespace tunica
