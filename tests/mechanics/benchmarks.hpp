@@ -1,0 +1,158 @@
+#pragma once
+
+#include "mechanics/solve.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <map>
+#include <numbers>
+#include <random>
+
+/// Meshes and models of the published problems that the tests share. Numbers are unit-free: read mm, N, MPa.
+namespace tunica::benchmarks {
+
+inline constexpr double pi = std::numbers::pi;
+
+enum class Diagonals { one, alternating, random };
+
+struct Grid {
+  std::vector<Vec2> parameters;  ///< in the unit square
+  ShellMesh mesh;
+  std::size_t columns = 0;  ///< nodes in v per u
+
+  [[nodiscard]] Index node(std::size_t i, std::size_t j) const { return static_cast<Index>(i * columns + j); }
+};
+
+/// nx x ny cells over the unit square, mapped. `random` moves the inner nodes by up to 0.15 of a cell, and draws
+/// diagonals and first vertices.
+inline Grid make_grid(std::size_t nx, std::size_t ny, const std::function<Vec3(double u, double v)>& map,
+                      Diagonals diagonals = Diagonals::one) {
+  Grid grid;
+  grid.columns = ny + 1;
+  std::mt19937 engine(3);
+  std::uniform_real_distribution<double> uniform(-0.15, 0.15);
+  for (std::size_t i = 0; i <= nx; ++i) {
+    for (std::size_t j = 0; j <= ny; ++j) {
+      Vec2 p(static_cast<double>(i) / static_cast<double>(nx), static_cast<double>(j) / static_cast<double>(ny));
+      if (diagonals == Diagonals::random && i > 0 && i < nx && j > 0 && j < ny && !(2 * i == nx && 2 * j == ny)) {
+        p += Vec2(uniform(engine) / static_cast<double>(nx), uniform(engine) / static_cast<double>(ny));
+      }
+      grid.parameters.push_back(p);
+      grid.mesh.vertices.push_back(map(p.x(), p.y()));
+    }
+  }
+  for (std::size_t i = 0; i < nx; ++i) {
+    for (std::size_t j = 0; j < ny; ++j) {
+      const Index a = grid.node(i, j), b = grid.node(i + 1, j), c = grid.node(i + 1, j + 1), d = grid.node(i, j + 1);
+      const bool first = diagonals == Diagonals::one || (diagonals == Diagonals::alternating && (i + j) % 2 == 0) ||
+                         (diagonals == Diagonals::random && engine() % 2 == 0);
+      std::array<std::array<Index, 3>, 2> cell{{{a, b, c}, {a, c, d}}};
+      if (!first) {
+        cell = {{{a, b, d}, {b, c, d}}};
+      }
+      for (auto t : cell) {
+        if (diagonals == Diagonals::random) {
+          std::rotate(t.begin(), t.begin() + engine() % 3, t.end());
+        }
+        grid.mesh.triangles.push_back(t);
+      }
+    }
+  }
+  return grid;
+}
+
+/// Icosahedron split `levels` times onto the sphere: 20 x 4^levels triangles, with the sphere's normals.
+inline ShellMesh make_sphere(double radius, int levels) {
+  const double g = (1 + std::sqrt(5.0)) / 2;
+  ShellMesh mesh;
+  mesh.vertices = {{-1, g, 0},  {1, g, 0},  {-1, -g, 0}, {1, -g, 0}, {0, -1, g},  {0, 1, g},
+                   {0, -1, -g}, {0, 1, -g}, {g, 0, -1},  {g, 0, 1},  {-g, 0, -1}, {-g, 0, 1}};
+  mesh.triangles = {{0, 11, 5},  {0, 5, 1},  {0, 1, 7},  {0, 7, 10}, {0, 10, 11}, {1, 5, 9}, {5, 11, 4},
+                    {11, 10, 2}, {10, 7, 6}, {7, 1, 8},  {3, 9, 4},  {3, 4, 2},   {3, 2, 6}, {3, 6, 8},
+                    {3, 8, 9},   {4, 9, 5},  {2, 4, 11}, {6, 2, 10}, {8, 6, 7},   {9, 8, 1}};
+  for (int level = 0; level < levels; ++level) {
+    std::map<std::pair<Index, Index>, Index> middles;
+    const auto middle = [&](Index a, Index b) {
+      const auto [place, is_new] = middles.emplace(std::minmax(a, b), static_cast<Index>(mesh.vertices.size()));
+      if (is_new) {
+        const Vec3 point = mesh.vertices[a].normalized() + mesh.vertices[b].normalized();
+        mesh.vertices.push_back(point);
+      }
+      return place->second;
+    };
+    std::vector<std::array<Index, 3>> finer;
+    for (const auto& [a, b, c] : mesh.triangles) {
+      const Index ab = middle(a, b), bc = middle(b, c), ca = middle(c, a);
+      finer.insert(finer.end(), {{a, ab, ca}, {ab, b, bc}, {ca, bc, c}, {ab, bc, ca}});
+    }
+    mesh.triangles = finer;
+  }
+  for (Vec3& v : mesh.vertices) {
+    mesh.normals.push_back(v.normalized());
+    v = radius * v.normalized();
+  }
+  return mesh;
+}
+
+inline ShellBody flat_body(ShellMesh mesh, double young, double poisson, double thickness) {
+  ShellBody body;
+  body.name = "shell";
+  body.mesh = std::move(mesh);
+  body.curved = false;
+  body.rest = Rest::flat;
+  body.thickness = {thickness};
+  body.material = {young, poisson, std::nullopt};
+  return body;
+}
+
+inline std::vector<Index> nodes_where(const ShellMesh& mesh, const std::function<bool(const Vec3&)>& condition) {
+  std::vector<Index> nodes;
+  for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
+    if (condition(mesh.vertices[i])) {
+      nodes.push_back(static_cast<Index>(i));
+    }
+  }
+  return nodes;
+}
+
+inline Index nearest(const ShellMesh& mesh, const Vec3& point) {
+  const auto closer = [&](const Vec3& a, const Vec3& b) {
+    return (a - point).squaredNorm() < (b - point).squaredNorm();
+  };
+  return static_cast<Index>(std::min_element(mesh.vertices.begin(), mesh.vertices.end(), closer) -
+                            mesh.vertices.begin());
+}
+
+/// Holds the components of `translation` and `rotation` ("xyz") of the nodes where the condition holds.
+inline void hold(Model& model, const std::function<bool(const Vec3&)>& condition, const std::string& translation,
+                 const std::string& rotation) {
+  Fix fix;
+  fix.nodes = nodes_where(model.shells[0].mesh, condition);
+  for (std::size_t c = 0; c < 3; ++c) {
+    fix.translation[c] = translation.find("xyz"[c]) != std::string::npos;
+    fix.rotation[c] = rotation.find("xyz"[c]) != std::string::npos;
+  }
+  model.fixes.push_back(fix);
+}
+
+inline RunSettings linear_run() {
+  RunSettings settings;
+  settings.kind = StaticRun{true, {1}};
+  return settings;
+}
+
+inline RunSettings nonlinear_run(std::vector<double> factors) {
+  RunSettings settings;
+  settings.kind = StaticRun{false, std::move(factors)};
+  return settings;
+}
+
+inline State last_state(const Model& model, const RunSettings& settings) {
+  State last;
+  solve(model, settings, [&](const State& state) { last = state; });
+  return last;
+}
+
+}  // namespace tunica::benchmarks
