@@ -32,6 +32,18 @@ Format format_of(std::string_view bytes, const std::filesystem::path& path) {
   if (bytes.starts_with("ply\n") || bytes.starts_with("ply\r") || extension == ".ply") {
     return Format::ply;
   }
+  if (bytes.starts_with("glTF") || extension == ".glb") {
+    return Format::glb;
+  }
+  if (extension == ".off") {
+    return Format::off;
+  }
+  if (extension == ".obj") {
+    return Format::obj;
+  }
+  if (extension == ".stl") {
+    return Format::stl;
+  }
   throw InputError(
       fmt::format("{}: is no mesh of a known format: PLY, OBJ, STL, OFF and GLB are understood", path.string()));
 }
@@ -41,9 +53,18 @@ MeshFile read_as(Format format, std::string_view bytes, const std::string& name)
     throw InputError(fmt::format("{}: is empty", name));
   }
   switch (format) {
-    default:
+    case Format::ply:
       return read_ply(bytes, name);
+    case Format::obj:
+      return read_obj(bytes, name);
+    case Format::stl:
+      return read_stl(bytes, name);
+    case Format::off:
+      return read_off(bytes, name);
+    case Format::glb:
+      return read_glb(bytes, name);
   }
+  TUNICA_ASSERT(false);
 }
 
 double size_of_unit(const std::string& unit, const std::string& name) {
@@ -52,6 +73,20 @@ double size_of_unit(const std::string& unit, const std::string& name) {
   } catch (const UsageError&) {
     throw InputError(fmt::format("{}: its comment \"units {}\" is not understood: um, mm, cm and m are", name, unit));
   }
+}
+
+/// Whether no two corners share a vertex: the file names positions, not neighbours.
+bool is_soup(const TriangleMesh& mesh) {
+  std::vector<bool> used(mesh.vertices.size(), false);
+  for (const auto& triangle : mesh.triangles) {
+    for (const Index corner : triangle) {
+      if (used[corner]) {
+        return false;
+      }
+      used[corner] = true;
+    }
+  }
+  return true;
 }
 
 void scale(MeshFile& file, double unit_mm) {
@@ -96,11 +131,17 @@ MeshFile read_mesh(const std::filesystem::path& path, std::optional<double> unit
   const std::string bytes = read_file(path);
   const Format format = format_of(bytes, path);
   MeshFile file = read_as(format, bytes, name);
-  if (file.units) {
+  const bool has_attributes = !file.normals.empty() || !file.vertex_properties.empty();
+  if (format == Format::glb || (!has_attributes && is_soup(file.mesh))) {
+    weld_exactly(file.mesh);
+  }
+  if (format == Format::glb && unit_mm) {
+    scale(file, *unit_mm);
+  } else if (file.units) {
     scale(file, size_of_unit(*file.units, name));
   } else if (unit_mm) {
     scale(file, *unit_mm);
-  } else if (require_unit && format != Format::ply) {
+  } else if (require_unit && format != Format::ply && format != Format::glb) {
     throw UsageError(fmt::format("{}: its format carries no unit of length, pass --mesh-unit mm|cm|m|um", name));
   }
   require_valid(file, name);
