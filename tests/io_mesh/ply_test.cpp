@@ -1,6 +1,4 @@
-#include "core/error.hpp"
-#include "io/mesh_file.hpp"
-#include "support/temporary_folder.hpp"
+#include "io_mesh/helpers.hpp"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -14,22 +12,13 @@
 namespace tunica {
 namespace {
 
+using test::message_of;
 using test::TemporaryFolder;
+using test::with;
 using ::testing::HasSubstr;
 
-template <typename E>
-std::string message_of(const std::function<void()>& action) {
-  try {
-    action();
-  } catch (const E& error) {
-    return error.what();
-  }
-  return "no such error";
-}
-
-std::string refusal(const TemporaryFolder& folder, std::string_view bytes, const std::string& name = "mesh.ply") {
-  const auto path = folder.file(name, bytes);
-  return message_of<InputError>([&] { read_mesh(path); });
+std::string refusal(const TemporaryFolder& folder, std::string_view bytes) {
+  return test::refusal(folder, bytes, "mesh.ply");
 }
 
 template <typename T>
@@ -46,12 +35,6 @@ const std::string tetrahedron_ascii =
     "ply\nformat ascii 1.0\ncomment SPACE=RAS\ncomment units cm\nelement vertex 4\nproperty float x\n"
     "property float y\nproperty float z\nelement face 4\nproperty list uchar int vertex_indices\nend_header\n"
     "0 0 0\n1 0 0\n0 1 0\n0 0 1.5e-1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n";
-
-std::string with(std::string text, std::string_view from, std::string_view to) {
-  const std::size_t at = text.find(from);
-  EXPECT_NE(at, std::string::npos) << from;
-  return text.replace(at, from.size(), to);
-}
 
 /// A binary tetrahedron with everything a stranger's file may hold besides.
 std::string crowded_binary(bool big_endian) {
