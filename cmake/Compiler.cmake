@@ -2,6 +2,9 @@
 add_library(tunica_flags INTERFACE)
 target_compile_options(tunica_flags INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor
                        -Woverloaded-virtual -Wcast-qual -Wformat=2)
+if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
+  target_compile_options(tunica_flags INTERFACE -Wno-restrict)  # false alarms on string + string (GCC bug 105651)
+endif()
 if(TUNICA_WERROR)
   target_compile_options(tunica_flags INTERFACE -Werror)
 endif()

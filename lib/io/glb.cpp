@@ -25,6 +25,7 @@ constexpr std::uint32_t json_chunk = 0x4e4f534a;
 constexpr std::uint32_t binary_chunk = 0x004e4942;
 constexpr std::size_t max_json = std::size_t{64} << 20;
 constexpr std::size_t max_depth = 256;
+constexpr std::size_t max_stride = 252;
 
 using SortedJson = nlohmann::json;  // finds a key among a million hostile ones in no time, unlike Json
 
@@ -103,13 +104,18 @@ public:
       fail("has no triangles");
     }
     out_["scenes"] = SortedJson::array({{{"nodes", roots}}});
-    out_["buffers"] = SortedJson::array({{{"byteLength", binary_.size()}}});
+    // assimp wants the last item of an interleaved view to be as long as the others: zeros follow the data.
+    const std::size_t padded = (binary_.size() + max_stride + 3) / 4 * 4;
+    out_["buffers"] = SortedJson::array({{{"byteLength", padded}}});
     std::string json = out_.dump();
     json.resize((json.size() + 3) / 4 * 4, ' ');
     std::string bytes = "glTF";
-    const std::size_t padded = (binary_.size() + 3) / 4 * 4;
     append_word(bytes, 2);
-    append_word(bytes, 12 + 8 + json.size() + 8 + padded);
+    const std::size_t length = 12 + 8 + json.size() + 8 + padded;
+    if (length > 0xffffffff) {
+      fail("is too large for a GLB file");
+    }
+    append_word(bytes, length);
     append_word(bytes, json.size());
     append_word(bytes, json_chunk);
     bytes += json;
@@ -331,12 +337,12 @@ private:
     const std::size_t stride = std::max(whole(view, "byteStride", item_bytes), std::size_t{1});
     const std::size_t offset = whole(accessor, "byteOffset", 0);
     const std::size_t needed = count == 0 ? 0 : (count - 1) * stride + item_bytes;
-    if (stride < item_bytes || stride > 252 || offset > view_length || needed > view_length - offset ||
+    if (stride < item_bytes || stride > max_stride || offset > view_length || needed > view_length - offset ||
         view_offset > binary_.size() || view_length > binary_.size() - view_offset) {
       fail(fmt::format("is truncated or broken: an accessor of {} items reaches beyond its {} bytes of data", count,
                        binary_.size()));
     }
-    SortedJson view_copy = {{"buffer", 0}, {"byteOffset", view_offset + offset}, {"byteLength", needed}};
+    SortedJson view_copy = {{"buffer", 0}, {"byteOffset", view_offset + offset}, {"byteLength", count * stride}};
     if (stride != item_bytes) {
       view_copy["byteStride"] = stride;
     }
