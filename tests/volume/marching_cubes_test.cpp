@@ -3,6 +3,7 @@
 #include "core/error.hpp"
 #include "core/threads.hpp"
 #include "mesh_check.hpp"
+#include "volumes.hpp"
 
 #include <gtest/gtest.h>
 
@@ -11,29 +12,14 @@
 namespace tunica {
 namespace {
 
+using test::above;
+using test::below;
 using test::check_mesh;
+using test::label_one;
+using test::make_volume;
 using test::MeshCheck;
 using test::Random;
-
-template <typename T, typename Value>
-Volume make_volume(const std::array<std::size_t, 3>& dims, Value&& value) {
-  Volume volume;
-  volume.dims = dims;
-  std::vector<T> data;
-  for (std::size_t k = 0; k < dims[2]; ++k) {
-    for (std::size_t j = 0; j < dims[1]; ++j) {
-      for (std::size_t i = 0; i < dims[0]; ++i) {
-        data.push_back(static_cast<T>(value(i, j, k)));
-      }
-    }
-  }
-  volume.data = std::move(data);
-  return volume;
-}
-
-constexpr Inside label_one{Inside::Rule::label, 1};
-Inside above(double value) { return {Inside::Rule::above, value}; }
-Inside below(double value) { return {Inside::Rule::below, value}; }
+using test::sphere_value;
 
 void expect_closed_manifold(const TriangleMesh& mesh, const std::string& what) {
   const MeshCheck check = check_mesh(mesh);
@@ -42,10 +28,6 @@ void expect_closed_manifold(const TriangleMesh& mesh, const std::string& what) {
                                 << " vertices " << check.bad_vertices << " unused " << check.unused_vertices;
   EXPECT_GT(check.least_sine, 1e-8) << what;
   EXPECT_EQ(check.coincident_vertices, 0U) << what;
-}
-
-double sphere_value(std::size_t i, std::size_t j, std::size_t k, const Vec3& centre, double radius) {
-  return radius - (Vec3(static_cast<double>(i), static_cast<double>(j), static_cast<double>(k)) - centre).norm();
 }
 
 TEST(MarchingCubes, EveryPairOfNeighbouringCellsInEveryDirection) {
