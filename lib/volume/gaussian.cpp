@@ -1,5 +1,7 @@
 #include "core/error.hpp"
 #include "core/threads.hpp"
+#include "surface/measure.hpp"
+#include "volume/marching_cubes.hpp"
 #include "volume/smoothing.hpp"
 
 #include <fmt/format.h>
@@ -157,6 +159,52 @@ float level_above_which(const std::vector<float>& values, std::size_t count) {
   return 0.5F * (from_above(count) + from_above(count + 1));
 }
 
+/// The level at which the surface encloses `volume` mm^3, by regula falsi (Illinois) from a first guess.
+double level_of_volume(const Volume& field, double volume, double guess) {
+  const auto excess = [&](double level) {
+    return signed_volume(marching_cubes(field, {Inside::Rule::above, level})) / volume - 1;
+  };
+  constexpr double enough = 1e-4;
+  constexpr int most_steps = 10;
+  // The volume falls as the level rises.
+  double low = 0;
+  double high = 1;
+  double excess_low = 0;
+  double excess_high = 0;
+  int last_side = 0;
+  bool has_low = false;
+  bool has_high = false;
+  double best = guess;
+  double best_excess = std::numeric_limits<double>::infinity();
+  double level = guess;
+  for (int step = 0; step < most_steps; ++step) {
+    const double e = excess(level);
+    if (std::abs(e) < std::abs(best_excess)) {
+      best = level;
+      best_excess = e;
+    }
+    if (std::abs(e) < enough) {
+      break;
+    }
+    if (e > 0) {
+      low = level;
+      excess_high *= last_side > 0 ? 0.5 : 1;
+      excess_low = e;
+      has_low = true;
+      last_side = 1;
+    } else {
+      high = level;
+      excess_low *= last_side < 0 ? 0.5 : 1;
+      excess_high = e;
+      has_high = true;
+      last_side = -1;
+    }
+    level = has_low && has_high ? low + (high - low) * excess_low / (excess_low - excess_high)
+                                : (e > 0 ? level + 0.1 * (1 - level) : 0.9 * level);
+  }
+  return best;
+}
+
 }  // namespace
 
 SmoothedField smooth_mask(const Mask& mask, double sigma, const Progress& progress) {
@@ -169,8 +217,10 @@ SmoothedField smooth_mask(const Mask& mask, double sigma, const Progress& progre
   };
   SmoothedField result;
   result.field = smooth(mask.dims(), mask.affine(), sigma, fill, progress);
-  const float level = level_above_which(std::get<std::vector<float>>(result.field.data), count_voxels(mask));
-  result.rule = {Inside::Rule::above, static_cast<double>(level)};
+  const std::size_t voxels = count_voxels(mask);
+  const float guess = level_above_which(std::get<std::vector<float>>(result.field.data), voxels);
+  const double volume = static_cast<double>(voxels) * mask.voxel_volume();
+  result.rule = {Inside::Rule::above, voxels == 0 ? 0.5 : level_of_volume(result.field, volume, guess)};
   advance(progress, 1.0);
   return result;
 }

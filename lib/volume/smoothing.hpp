@@ -15,9 +15,10 @@ struct SmoothedField {
 
 /// Gaussian smoothing of a selection: 1 inside, 0 outside, convolved with a Gaussian of `sigma` mm along each axis of
 /// the image (cut at four sigma, weights normalised over what lies in the image, so that the border does not draw the
-/// surface in). The level is the one above which there are as many voxels as were selected: the volume does not shrink.
+/// surface in). The level is the one whose marching-cubes surface, closed at the image's border, encloses the volume of
+/// the selected voxels to 0.01 % where the field allows it.
 /// Errors: UsageError unless sigma is positive and finite.
-/// Cost: two float volumes; time proportional to voxels times sigma over voxel size.
+/// Cost: two float volumes; time proportional to voxels times sigma over voxel size, and some four extractions.
 /// Limits: the volume is kept as a whole, not per piece; parts thinner than about 2 sigma break. With a sheared affine
 /// the Gaussian is sheared as well.
 SmoothedField smooth_mask(const Mask& mask, double sigma, const Progress& progress = {});
