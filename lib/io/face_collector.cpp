@@ -129,39 +129,45 @@ void FaceCollector::add(std::span<const Index> corners) {
   }
 }
 
-std::vector<std::array<Index, 3>> FaceCollector::finish(const std::vector<Vec3>& vertices) {
-  std::size_t face = 0;
-  const auto check = [&](std::span<const Index> corners) {
-    for (const Index corner : corners) {
-      if (corner >= vertices.size()) {
-        throw InputError(fmt::format("{}: face {} names vertex {}, but there are only {} (counted from 0)", name_, face,
-                                     corner, vertices.size()));
-      }
+void FaceCollector::check(std::span<const Index> corners, std::vector<bool>& used) {
+  for (const Index corner : corners) {
+    if (corner >= used.size()) {
+      throw InputError(fmt::format("{}: face {} names vertex {}, but there are only {} (counted from 0)", name_,
+                                   checked_, corner, used.size()));
     }
-    ++face;
-  };
-  if (polygons_.empty()) {
-    for (const auto& triangle : triangles_) {
-      check(triangle);
-    }
-    return std::move(triangles_);
+    faces_are_apart_ = faces_are_apart_ && !used[corner];
   }
-  std::vector<std::array<Index, 3>> result;
+  for (const Index corner : corners) {
+    used[corner] = true;
+  }
+  ++checked_;
+}
+
+void FaceCollector::finish(MeshFile& file) {
+  const std::vector<Vec3>& vertices = file.mesh.vertices;
+  std::vector<std::array<Index, 3>>& result = file.mesh.triangles;
+  std::vector<bool> used(vertices.size(), false);
   std::size_t done = 0;
   for (const Polygon& polygon : polygons_) {
     for (; done < polygon.triangles_before; ++done) {
-      check(triangles_[done]);
+      check(triangles_[done], used);
       result.push_back(triangles_[done]);
     }
-    check(polygon.corners);
-    split(polygon.corners, vertices, name_, face - 1, result);
+    check(polygon.corners, used);
+    split(polygon.corners, vertices, name_, checked_ - 1, result);
     check_interrupt();
   }
-  for (; done < triangles_.size(); ++done) {
-    check(triangles_[done]);
-    result.push_back(triangles_[done]);
+  for (std::size_t t = done; t < triangles_.size(); ++t) {
+    check(triangles_[t], used);
   }
-  return result;
+  if (result.empty()) {
+    result = std::move(triangles_);
+  } else {
+    result.insert(result.end(), triangles_.begin() + static_cast<std::ptrdiff_t>(done), triangles_.end());
+  }
+  if (faces_are_apart_ && file.normals.empty() && file.vertex_properties.empty()) {
+    weld_exactly(file.mesh);
+  }
 }
 
 }  // namespace tunica

@@ -440,6 +440,7 @@ MeshFile read_glb(std::string_view bytes, const std::string& name) {
     throw InputError(fmt::format("{}: cannot be read as GLB: {}", name, importer.GetErrorString()));
   }
   append_node(*scene, *scene->mRootNode, Eigen::Matrix4d::Identity(), file.mesh, name);
+  weld_exactly(file.mesh);
   return file;
 }
 

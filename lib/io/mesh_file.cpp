@@ -75,20 +75,6 @@ double size_of_unit(const std::string& unit, const std::string& name) {
   }
 }
 
-/// Whether no two corners share a vertex: the file names positions, not neighbours.
-bool is_soup(const TriangleMesh& mesh) {
-  std::vector<bool> used(mesh.vertices.size(), false);
-  for (const auto& triangle : mesh.triangles) {
-    for (const Index corner : triangle) {
-      if (used[corner]) {
-        return false;
-      }
-      used[corner] = true;
-    }
-  }
-  return true;
-}
-
 void scale(MeshFile& file, double unit_mm) {
   if (unit_mm != 1) {
     for (Vec3& vertex : file.mesh.vertices) {
@@ -131,10 +117,6 @@ MeshFile read_mesh(const std::filesystem::path& path, std::optional<double> unit
   const std::string bytes = read_file(path);
   const Format format = format_of(bytes, path);
   MeshFile file = read_as(format, bytes, name);
-  const bool has_attributes = !file.normals.empty() || !file.vertex_properties.empty();
-  if (format == Format::glb || (!has_attributes && is_soup(file.mesh))) {
-    weld_exactly(file.mesh);
-  }
   if (format == Format::glb && unit_mm) {
     scale(file, *unit_mm);
   } else if (file.units) {

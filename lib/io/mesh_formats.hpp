@@ -31,16 +31,22 @@ public:
   [[nodiscard]] std::size_t faces() const { return triangles_.size() + polygons_.size(); }
   [[nodiscard]] bool has_polygons() const { return !polygons_.empty(); }
 
-  /// Checks every index and splits the polygons. A convex polygon becomes a fan from its first corner, another one is
-  /// cut ear by ear in the plane of its mean normal. Errors: InputError.
-  std::vector<std::array<Index, 3>> finish(const std::vector<Vec3>& vertices);
+  /// Checks every index and gives `file`, whose vertices are there, its triangles. A convex polygon becomes a fan from
+  /// its first corner, another one is cut ear by ear in the plane of its mean normal. Where no two faces share a vertex
+  /// and vertices are nothing but positions, the file names places, not neighbours: they are joined by weld_exactly().
+  /// Errors: InputError.
+  void finish(MeshFile& file);
 
 private:
   struct Polygon {
     std::size_t triangles_before;
     std::vector<Index> corners;
   };
+  void check(std::span<const Index> corners, std::vector<bool>& used);
+
   std::string name_;
+  std::size_t checked_ = 0;
+  bool faces_are_apart_ = true;
   std::vector<std::array<Index, 3>> triangles_;
   std::vector<Polygon> polygons_;
 };

@@ -25,7 +25,7 @@ public:
         check_interrupt();
       }
     }
-    file_.mesh.triangles = faces_.finish(file_.mesh.vertices);
+    faces_.finish(file_);
     return std::move(file_);
   }
 

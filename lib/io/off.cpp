@@ -43,7 +43,7 @@ public:
     if (next_content()) {
       fail("text follows the last face, so the counts of the header are wrong");
     }
-    file.mesh.triangles = collector.finish(file.mesh.vertices);
+    collector.finish(file);
     return file;
   }
 

@@ -639,7 +639,7 @@ void read_body(Body body, const Header& header, const std::string& name, MeshFil
     }
   }
   body.finish();
-  file.mesh.triangles = faces.finish(file.mesh.vertices);
+  faces.finish(file);
 }
 
 /// No allocation before this: the bytes that are there can hold what the header promises.

@@ -146,7 +146,10 @@ bool looks_like_text(std::string_view bytes) {
 MeshFile read_stl(std::string_view bytes, const std::string& name) {
   const bool has_binary_length =
       bytes.size() >= header_bytes && bytes.size() == header_bytes + promised_triangles(bytes) * triangle_bytes;
-  return !has_binary_length && looks_like_text(bytes) ? AsciiReader(bytes, name).read() : read_binary(bytes, name);
+  const bool is_text = !has_binary_length && looks_like_text(bytes);
+  MeshFile file = is_text ? AsciiReader(bytes, name).read() : read_binary(bytes, name);
+  weld_exactly(file.mesh);
+  return file;
 }
 
 }  // namespace tunica

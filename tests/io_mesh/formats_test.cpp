@@ -44,6 +44,14 @@ TEST(Obj, JoinsAFileWhoseFacesShareNoVertex) {
   EXPECT_EQ(file.mesh.triangles[1], (std::array<Index, 3>{1, 0, 3}));
 }
 
+TEST(Obj, JoinsPolygonsThatShareNoVertex) {
+  const TemporaryFolder folder;
+  const MeshFile file = read_mesh(folder.file(
+      "a.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\nv 1 0 0\nv 0 0 0\nv 0 0 1\nv 1 0 1\nf 5 6 7 8\n"));
+  EXPECT_EQ(file.mesh.vertices.size(), 6U);
+  EXPECT_EQ(file.mesh.triangles.size(), 4U);
+}
+
 TEST(Obj, RefusesWhatIsWrong) {
   const TemporaryFolder folder;
   const auto bad = [&](std::string_view from, std::string_view to) {
