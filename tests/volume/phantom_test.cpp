@@ -1,0 +1,178 @@
+#include "volume/phantom.hpp"
+
+#include "core/error.hpp"
+#include "core/threads.hpp"
+#include "mesh_check.hpp"
+#include "surface/checks.hpp"
+#include "surface/closest_point.hpp"
+#include "surface/measure.hpp"
+#include "volume/components.hpp"
+#include "volume/marching_cubes.hpp"
+#include "volumes.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace tunica {
+namespace {
+
+using test::check_mesh;
+using test::label_one;
+
+struct Case {
+  std::string name;
+  bool open;
+};
+
+class PhantomOf : public testing::TestWithParam<Case> {
+protected:
+  static PhantomOptions options(std::size_t size) {
+    PhantomOptions result;
+    result.shape = *phantom_shape(GetParam().name);
+    result.size = size;
+    return result;
+  }
+};
+
+INSTANTIATE_TEST_SUITE_P(Shapes, PhantomOf,
+                         testing::Values(Case{"sphere", false}, Case{"tube", true}, Case{"aneurysm", true},
+                                         Case{"capsule", false}, Case{"bladder", false}, Case{"colon", false}),
+                         [](const auto& shape) { return shape.param.name; });
+
+TEST_P(PhantomOf, TheTruthIsAnOrientedManifoldThatEndsOnTheImageBorder) {
+  PhantomOptions tall = options(48);
+  tall.spacing = Vec3(0.7, 0.9, 2.5);
+  const Phantom phantom = make_phantom(tall);
+  const TriangleMesh truth = phantom_surface(tall);
+  const MeshFacts facts = examine(truth);
+  EXPECT_TRUE(facts.manifold && facts.oriented);
+  EXPECT_EQ(facts.components, 1U);
+  EXPECT_EQ(facts.euler, GetParam().open ? 0 : 2);
+  EXPECT_EQ(facts.boundary_loops, GetParam().open ? 2U : 0U);
+  EXPECT_EQ(facts.degenerate_triangles, 0U);
+  const Box box = bounding_box(truth);
+  if (GetParam().open) {
+    EXPECT_DOUBLE_EQ(box.upper[2], 0.5 * 2.5 * static_cast<double>(phantom.volume.dims[2]));
+    EXPECT_DOUBLE_EQ(box.lower[2], -box.upper[2]);
+  } else {
+    EXPECT_NEAR(phantom_volume(truth), signed_volume(truth), 1e-9 * signed_volume(truth));
+  }
+}
+
+TEST_P(PhantomOf, TheLongestSideHasTheVoxelsAskedForAndAMargin) {
+  for (const Vec3& spacing : {Vec3(1, 1, 1), Vec3(0.8, 0.8, 4), Vec3(3, 0.5, 0.5)}) {
+    for (const std::size_t size : {16, 33, 64}) {
+      PhantomOptions chosen = options(size);
+      chosen.spacing = spacing;
+      const Phantom phantom = make_phantom(chosen);
+      const auto& dims = phantom.volume.dims;
+      EXPECT_EQ(*std::ranges::max_element(dims), size);
+      const Mask mask = select(phantom.volume, label_one);
+      EXPECT_GT(phantom.inside, 0U);
+      for (std::size_t k = 0; k < dims[2]; ++k) {
+        for (std::size_t j = 0; j < dims[1]; ++j) {
+          for (std::size_t i = 0; i < dims[0]; ++i) {
+            const bool border = i == 0 || j == 0 || i + 1 == dims[0] || j + 1 == dims[1] ||
+                                (!GetParam().open && (k == 0 || k + 1 == dims[2]));
+            ASSERT_FALSE(border && mask(i, j, k));
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST_P(PhantomOf, TheVoxelsComeCloserToTheTruthAsTheyShrink) {
+  double before = 1;
+  for (const std::size_t size : {24, 48, 96}) {
+    const PhantomOptions chosen = options(size);
+    const Phantom phantom = make_phantom(chosen);
+    const TriangleMesh truth = phantom_surface(chosen);
+    MarchingCubesOptions extraction;
+    extraction.open_border = GetParam().open;
+    const Mask mask = select(phantom.volume, label_one);
+    EXPECT_EQ(piece_sizes(mask).size(), 1U);
+    const TriangleMesh surface = marching_cubes(mask, extraction);
+    const auto check = check_mesh(surface);
+    EXPECT_EQ(check.components, 1U);
+    EXPECT_EQ(check.euler, GetParam().open ? 0 : 2) << size;
+    // Half a voxel's diagonal is the most that rounding to voxels can move a surface that is flat at that scale.
+    const ClosestPoint tree(truth);
+    double worst = 0;
+    for (const Vec3& p : surface.vertices) {
+      worst = std::max(worst, std::sqrt(tree.closest(p).squared_distance));
+    }
+    EXPECT_LT(worst, 0.5 * std::sqrt(3.0)) << size;
+    const double volume = phantom_volume(truth);
+    const double error = std::abs(static_cast<double>(phantom.inside) - volume) / volume;
+    EXPECT_LT(error, 3 * area(truth) / volume / static_cast<double>(size)) << size;
+    EXPECT_LT(error, std::max(0.6 * before, 2e-3));
+    before = error;
+  }
+}
+
+TEST_P(PhantomOf, IsTheSameWhateverTheNumberOfThreads) {
+  const std::size_t threads = thread_count();
+  PhantomOptions chosen = options(40);
+  chosen.noise = 0.2;
+  set_thread_count(1);
+  const Phantom one = make_phantom(chosen);
+  set_thread_count(4);
+  const Phantom four = make_phantom(chosen);
+  set_thread_count(threads);
+  EXPECT_EQ(one.volume.data, four.volume.data);
+}
+
+TEST(Phantom, TheSphereIsTheFormula) {
+  PhantomOptions options;
+  options.size = 64;
+  options.spacing = Vec3::Constant(0.5);
+  const TriangleMesh truth = phantom_surface(options);
+  const double radius = 15;
+  for (const Vec3& p : truth.vertices) {
+    ASSERT_NEAR(p.norm(), radius, 1e-9);
+  }
+  EXPECT_NEAR(phantom_volume(truth), 4.0 / 3 * M_PI * std::pow(radius, 3), 2e-4 * 14137);
+}
+
+TEST(Phantom, NoiseFlipsTheShareOfBorderVoxelsAskedFor) {
+  PhantomOptions options;
+  options.size = 40;
+  const Phantom clean = make_phantom(options);
+  EXPECT_EQ(clean.flipped, 0U);
+  options.noise = 1;
+  const std::size_t border = make_phantom(options).flipped;
+  EXPECT_GT(border, 1000U);
+  options.noise = 0.25;
+  const Phantom noisy = make_phantom(options);
+  EXPECT_NEAR(static_cast<double>(noisy.flipped), 0.25 * static_cast<double>(border),
+              5 * std::sqrt(0.19 * static_cast<double>(border)));
+  options.seed = 2;
+  EXPECT_NE(make_phantom(options).volume.data, noisy.volume.data);
+  options.seed = 1;
+  EXPECT_EQ(make_phantom(options).volume.data, noisy.volume.data);
+}
+
+TEST(Phantom, OptionsOutOfRangeAreUsageErrors) {
+  PhantomOptions options;
+  EXPECT_FALSE(phantom_shape("spleen"));
+  const auto expect_refused = [](PhantomOptions wrong) { EXPECT_THROW(make_phantom(wrong), UsageError); };
+  options.size = 15;
+  expect_refused(options);
+  options.size = 5000;
+  expect_refused(options);
+  options.size = 32;
+  options.noise = 1.5;
+  expect_refused(options);
+  options.noise = std::nan("");
+  expect_refused(options);
+  options.noise = 0;
+  options.spacing[1] = 0;
+  expect_refused(options);
+  options.spacing[1] = std::nan("");
+  expect_refused(options);
+}
+
+}  // namespace
+}  // namespace tunica
