@@ -23,7 +23,8 @@ namespace {
 
 constexpr std::uint32_t json_chunk = 0x4e4f534a;
 constexpr std::uint32_t binary_chunk = 0x004e4942;
-constexpr std::size_t max_json = std::size_t{64} << 20;
+constexpr std::size_t max_json = std::size_t{16} << 20;
+constexpr int max_nesting = 32;
 constexpr std::size_t max_depth = 256;
 constexpr std::size_t max_stride = 252;
 
@@ -86,7 +87,8 @@ class SceneFilter {
 public:
   SceneFilter(const Chunks& chunks, std::size_t file_bytes, const std::string& name)
       : binary_(chunks.binary), budget_(file_bytes), name_(name) {
-    in_ = SortedJson::parse(chunks.json, nullptr, false);
+    const auto keep = [](int depth, SortedJson::parse_event_t, const SortedJson&) { return depth <= max_nesting; };
+    in_ = SortedJson::parse(chunks.json, keep, false);  // a hundred bytes of memory for each of a million `[` otherwise
     if (!in_.is_object()) {
       fail("its JSON is broken");
     }

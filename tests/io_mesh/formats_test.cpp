@@ -207,6 +207,13 @@ TEST(Glb, RefusesWhatIsWrong) {
               HasSubstr("version 1"));
 }
 
+TEST(Glb, PassesOverDeepNestingWithoutTheMemoryForIt) {
+  const TemporaryFolder folder;
+  const std::string deep = "\"extras\":" + std::string(1000000, '[') + std::string(1000000, ']') + ",\"asset\":";
+  const std::string json = with(test::tetrahedron_glb_json, "\"asset\":", deep);
+  EXPECT_EQ(read_mesh(folder.file("a.glb", test::glb(json, test::tetrahedron_glb_data()))).mesh.triangles.size(), 4U);
+}
+
 TEST(Glb, RefusesToMultiplyASmallFile) {
   const TemporaryFolder folder;
   std::string nodes = "{\"mesh\":0}";

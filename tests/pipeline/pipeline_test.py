@@ -87,13 +87,13 @@ class Rules(Pipeline):
         self.assertIn("--label 3 --smooth none --open-border --frame 2 --threads 3", extract)
         self.assertIn("--triangles 123", decimate)
         self.assertIn("--tolerance 0.5% --refine --method barycentre", relax)
-        self.assertIn("--fix below z=-10mm --pressure 1kPa --young 1MPa --poisson 0.45 --thickness 1.5mm "
+        self.assertIn("--fix below z=-10mm --pressure=1kPa --young 1MPa --poisson 0.45 --thickness 1.5mm "
                       "--density 1100kg/m3 --static", simulate)
 
     def test_defaults(self):
         self.make(VOLUMES="a.nii.gz", ISOVALUE=-0.5, **LOAD)
         extract, decimate, relax, simulate = self.calls()
-        self.assertIn("--isovalue -0.5 --smooth staircase --largest --fill-cavities", extract)
+        self.assertIn("--isovalue=-0.5 --smooth staircase --largest --fill-cavities", extract)
         self.assertNotIn("--open-border", extract)
         self.assertIn("--triangles 800", decimate)
         self.assertNotIn("--tolerance", relax)
