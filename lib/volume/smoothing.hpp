@@ -27,4 +27,31 @@ SmoothedField smooth_mask(const Mask& mask, double sigma, const Progress& progre
 /// Limits: a sample that is not finite spoils all within four sigma of it.
 Volume smooth_values(const Volume& volume, double sigma, const Progress& progress = {});
 
+struct StaircaseOptions {
+  /// The surface was extracted with an open border: what lies on the image's border stays in its plane.
+  bool open_border = false;
+  Progress progress;
+};
+
+struct StaircaseResult {
+  double largest_move = 0;    ///< in voxels, along any axis of the image; below 0.5
+  double volume_change = 0;   ///< largest of any component of 100 voxels or more, as a fraction of its volume
+  std::size_t held_back = 0;  ///< vertices that stayed nearer to where they were, so that no triangle turned over
+};
+
+/// Smooths away the staircase of a marching-cubes surface: of all surfaces with these triangles whose vertices stay
+/// within half a voxel of where they were, along each axis of the image, about the one that bends least.
+///
+/// Every point of the result lies within half a voxel, per axis, of the corresponding point of the input, and the other
+/// way round: corners move by less than half a voxel, and points within a triangle move by means of the corners'
+/// moves. Each component of 100 voxels or more keeps its volume to 0.1 %, by an offset along the normals that respects
+/// the same limits. Triangles stay as they are, and none is turned over or flattened.
+/// The result is the same to the bit whatever the number of threads.
+/// @param mesh  the marching-cubes surface of a selection, in world mm; changed in place
+/// @param grid  the selection (its dims and affine are used)
+/// Source: Gibson, Constrained elastic surface nets, MICCAI 1998, with a thin plate's energy in place of springs;
+/// Nesterov's accelerated projected gradient with restarts (O'Donoghue and Candes 2015).
+/// Cost: some 200 passes over the mesh.
+StaircaseResult smooth_staircase(TriangleMesh& mesh, const Mask& grid, const StaircaseOptions& options = {});
+
 }  // namespace tunica

@@ -1,0 +1,408 @@
+// S. F. F. Gibson: Constrained elastic surface nets: generating smooth surfaces from binary segmented data. MICCAI
+// 1998. B. O'Donoghue, E. Candes: Adaptive restart for accelerated gradient schemes. Found. Comput. Math. 15 (2015).
+#include "core/error.hpp"
+#include "core/threads.hpp"
+#include "volume/smoothing.hpp"
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numeric>
+#include <utility>
+#include <vector>
+
+namespace tunica {
+namespace {
+
+constexpr std::size_t grain = 4096;
+/// Vertices move by at most this many voxels along each axis: a little less than half, so that two walls one voxel
+/// apart cannot meet.
+constexpr double reach = 0.49;
+/// A triangle is spoilt when its normal turns by more than the angle with this cosine, or its shape falls below this
+/// ratio of twice its area to its longest edge squared.
+constexpr double least_cosine = 0.1;
+constexpr double least_shape = 0.02;
+
+/// Sum over [0, size) of term(i), in blocks: the same whatever the number of threads.
+template <typename Term>
+double sum_blocks(std::size_t size, const Term& term) {
+  std::vector<double> parts((size + grain - 1) / grain, 0.0);
+  parallel_for_blocks(size, grain, [&](std::size_t begin, std::size_t end) {
+    double sum = 0;
+    for (std::size_t i = begin; i < end; ++i) {
+      sum += term(i);
+    }
+    parts[begin / grain] = sum;
+  });
+  return std::accumulate(parts.begin(), parts.end(), 0.0);
+}
+
+template <typename Body>
+void for_all(std::size_t size, const Body& body) {
+  parallel_for_blocks(size, grain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      body(i);
+    }
+  });
+}
+
+/// Neighbours of each vertex: all around an inner vertex, along the boundary for one on the boundary.
+class Neighbours {
+public:
+  Neighbours(const TriangleMesh& mesh, const std::vector<bool>& boundary) : first_(mesh.vertices.size() + 1, 0) {
+    // Every edge of an inner vertex is run along once in each direction; of a boundary edge the way back is missing.
+    std::map<std::pair<Index, Index>, int> border_edges;
+    for_each_edge(mesh, [&](Index a, Index b) {
+      if (!boundary[a]) {
+        ++first_[a + 1];
+      } else if (boundary[b]) {
+        ++border_edges[std::minmax(a, b)];
+      }
+    });
+    std::erase_if(border_edges, [](const auto& edge) { return edge.second != 1; });
+    for (const auto& [edge, uses] : border_edges) {
+      ++first_[edge.first + 1];
+      ++first_[edge.second + 1];
+    }
+    std::partial_sum(first_.begin(), first_.end(), first_.begin());
+    list_.resize(first_.back());
+    std::vector<std::size_t> next(first_.begin(), first_.end() - 1);
+    for_each_edge(mesh, [&](Index a, Index b) {
+      if (!boundary[a]) {
+        list_[next[a]++] = b;
+      }
+    });
+    for (const auto& [edge, uses] : border_edges) {
+      list_[next[edge.first]++] = edge.second;
+      list_[next[edge.second]++] = edge.first;
+    }
+  }
+
+  /// x minus the mean of its neighbours.
+  template <typename T>
+  [[nodiscard]] T laplacian(const std::vector<T>& x, std::size_t vertex) const {
+    const std::size_t begin = first_[vertex];
+    const std::size_t end = first_[vertex + 1];
+    T sum = x[list_[begin]];
+    for (std::size_t i = begin + 1; i < end; ++i) {
+      sum += x[list_[i]];
+    }
+    return x[vertex] - sum / static_cast<double>(end - begin);
+  }
+  [[nodiscard]] bool alone(std::size_t vertex) const { return first_[vertex] == first_[vertex + 1]; }
+
+private:
+  template <typename Visit>
+  static void for_each_edge(const TriangleMesh& mesh, const Visit& visit) {
+    for (const auto& t : mesh.triangles) {
+      for (int i = 0; i < 3; ++i) {
+        visit(t[i], t[(i + 1) % 3]);
+      }
+    }
+  }
+
+  std::vector<std::size_t> first_;
+  std::vector<Index> list_;
+};
+
+/// Number of the connected component of each vertex, and how many there are.
+std::pair<std::vector<Index>, std::size_t> label_components(const TriangleMesh& mesh) {
+  std::vector<Index> parent(mesh.vertices.size());
+  std::iota(parent.begin(), parent.end(), Index{0});
+  const auto root = [&](Index v) {
+    while (parent[v] != v) {
+      v = parent[v] = parent[parent[v]];
+    }
+    return v;
+  };
+  for (const auto& t : mesh.triangles) {
+    for (int i = 1; i < 3; ++i) {
+      const Index a = root(t[0]);
+      const Index b = root(t[i]);
+      parent[std::max(a, b)] = std::min(a, b);
+    }
+  }
+  std::vector<Index> number(parent.size());
+  std::size_t count = 0;
+  for (Index v = 0; v < parent.size(); ++v) {
+    number[v] = root(v) == v ? static_cast<Index>(count++) : number[root(v)];
+  }
+  return {number, count};
+}
+
+class Smoother {
+public:
+  /// Works in voxel coordinates, in which the limits are cubes.
+  Smoother(const TriangleMesh& mesh, const Mask& grid, bool open_border)
+      : mesh_(mesh),
+        to_world_(grid.affine().leftCols<3>()),
+        start_(mesh.vertices.size()),
+        boundary_(mesh.vertices.size(), false),
+        low_(mesh.vertices.size()),
+        high_(mesh.vertices.size()) {
+    const Mat3 to_voxel = to_world_.inverse();
+    mirrored_ = to_world_.determinant() < 0;
+    for (std::size_t v = 0; v < start_.size(); ++v) {
+      start_[v] = to_voxel * (mesh.vertices[v] - grid.affine().col(3));
+      low_[v] = start_[v].array() - reach;
+      high_[v] = start_[v].array() + reach;
+      for (int axis = 0; open_border && axis < 3; ++axis) {
+        const double last = static_cast<double>(grid.dims()[axis]) - 0.5;
+        const double plane = start_[v][axis] < 0.5 * last ? -0.5 : last;
+        if (std::abs(start_[v][axis] - plane) < 1e-6) {
+          boundary_[v] = true;
+          low_[v][axis] = high_[v][axis] = start_[v][axis];
+        }
+      }
+    }
+    now_ = start_;
+  }
+
+  StaircaseResult run(const Progress& progress) {
+    const Neighbours neighbours(mesh_, boundary_);
+    std::tie(component_, components_) = label_components(mesh_);
+    // The boundary first, as curves in their planes; then the rest, with the boundary given.
+    relax(neighbours, boundary_, most_iterations, {});
+    std::vector<bool> inner(boundary_);
+    inner.flip();
+    for (int round = 0; round < rounds; ++round) {
+      relax(neighbours, inner, most_iterations / rounds,
+            [&](double fraction) { advance(progress, 0.9 * (round + fraction) / rounds); });
+      remove_local_drift(neighbours);
+    }
+    StaircaseResult result;
+    // Holding vertices back changes the volume, and offsetting for the volume may spoil a triangle: until neither.
+    for (int round = 0; round < 8; ++round) {
+      correct_volume();
+      const std::size_t held = hold_back_spoilt();
+      result.held_back += held;
+      if (held == 0) {
+        break;
+      }
+    }
+    while (hold_back_spoilt() > 0) {
+    }
+    for (std::size_t v = 0; v < start_.size(); ++v) {
+      result.largest_move = std::max(result.largest_move, (now_[v] - start_[v]).cwiseAbs().maxCoeff());
+    }
+    result.volume_change = largest_volume_change();
+    advance(progress, 1.0);
+    return result;
+  }
+
+  void store(TriangleMesh& mesh, const Vec3& origin) const {
+    for_all(now_.size(), [&](std::size_t v) {
+      if (now_[v] != start_[v]) {
+        mesh.vertices[v] = to_world_ * now_[v] + origin;
+      }
+    });
+  }
+
+private:
+  static constexpr int most_iterations = 240;
+  static constexpr int rounds = 3;
+
+  [[nodiscard]] Vec3 confine(std::size_t v, const Vec3& p) const { return p.cwiseMax(low_[v]).cwiseMin(high_[v]); }
+
+  /// Minimises the sum over `active` vertices of degree * |laplacian|^2. With the degrees as metric the gradient is the
+  /// laplacian of the laplacian, whose eigenvalues are at most 4, and the limits stay separate for each coordinate.
+  void relax(const Neighbours& neighbours, const std::vector<bool>& active, int iterations, const Progress& progress) {
+    constexpr double step = 0.25;
+    constexpr double enough = 2e-4;
+    const std::size_t size = now_.size();
+    if (std::ranges::find(active, true) == active.end()) {
+      return;
+    }
+    std::vector<Vec3> ahead = now_;
+    std::vector<Vec3> bend(size, Vec3::Zero());
+    std::vector<Vec3> next = now_;
+    double momentum = 1;
+    for (int iteration = 0; iteration < iterations; ++iteration) {
+      advance(progress, static_cast<double>(iteration) / iterations);
+      for_all(size, [&](std::size_t v) {
+        if (active[v] && !neighbours.alone(v)) {
+          bend[v] = neighbours.laplacian(ahead, v);
+        }
+      });
+      for_all(size, [&](std::size_t v) {
+        if (active[v] && !neighbours.alone(v)) {
+          next[v] = confine(v, ahead[v] - step * neighbours.laplacian(bend, v));
+        }
+      });
+      const double uphill =
+          sum_blocks(size, [&](std::size_t v) { return (ahead[v] - next[v]).dot(next[v] - now_[v]); });
+      const double moved =
+          std::sqrt(sum_blocks(size, [&](std::size_t v) { return (next[v] - now_[v]).squaredNorm(); }) /
+                    static_cast<double>(size));
+      const double faster = uphill > 0 ? 1 : 0.5 * (1 + std::sqrt(1 + 4 * momentum * momentum));
+      const double carry = uphill > 0 ? 0 : (momentum - 1) / faster;
+      for_all(size, [&](std::size_t v) {
+        ahead[v] = next[v] + carry * (next[v] - now_[v]);
+        now_[v] = next[v];
+      });
+      momentum = faster;
+      if (moved < enough) {
+        break;
+      }
+    }
+  }
+
+  /// Area vectors of the triangles summed at the vertices, in voxel coordinates, outward, not normalised.
+  [[nodiscard]] std::vector<Vec3> normals(const std::vector<Vec3>& at) const {
+    std::vector<Vec3> result(at.size(), Vec3::Zero());
+    for (const auto& [a, b, c] : mesh_.triangles) {
+      const Vec3 n = (mirrored_ ? -0.5 : 0.5) * (at[b] - at[a]).cross(at[c] - at[a]);
+      result[a] += n;
+      result[b] += n;
+      result[c] += n;
+    }
+    return result;
+  }
+
+  /// A thin part bends less when it is thinner, and would shrink up to the limits. The staircase itself moves as much
+  /// outward as inward over a few steps, so the mean move along the normal over some neighbours is taken back.
+  void remove_local_drift(const Neighbours& neighbours) {
+    constexpr int spread = 24;
+    const std::vector<Vec3> normal = normals(now_);
+    std::vector<double> drift(now_.size(), 0.0);
+    for_all(now_.size(), [&](std::size_t v) { drift[v] = (now_[v] - start_[v]).dot(normal[v].normalized()); });
+    std::vector<double> next = drift;
+    for (int i = 0; i < spread; ++i) {
+      for_all(now_.size(), [&](std::size_t v) {
+        if (!neighbours.alone(v)) {
+          next[v] = drift[v] - 0.5 * neighbours.laplacian(drift, v);
+        }
+      });
+      drift.swap(next);
+    }
+    for_all(now_.size(), [&](std::size_t v) { now_[v] = confine(v, now_[v] - drift[v] * normal[v].normalized()); });
+  }
+
+  /// Volume swept by each component from its start, in voxels, outward positive; exact for straight moves of corners.
+  [[nodiscard]] std::vector<double> swept() const {
+    std::vector<double> volume(components_, 0.0);
+    for (const auto& [a, b, c] : mesh_.triangles) {
+      const Vec3 move = ((now_[a] - start_[a]) + (now_[b] - start_[b]) + (now_[c] - start_[c])) / 3;
+      const auto area = [&](double t) -> Vec3 {
+        const Vec3 p = start_[a] + t * (now_[a] - start_[a]);
+        const Vec3 q = start_[b] + t * (now_[b] - start_[b]);
+        const Vec3 r = start_[c] + t * (now_[c] - start_[c]);
+        return 0.5 * (q - p).cross(r - p);
+      };
+      const Vec3 mean = (area(0) + 4 * area(0.5) + area(1)) / 6;
+      volume[component_[a]] += (mirrored_ ? -1 : 1) * moment(a, b, c, mean, move);
+    }
+    return volume;
+  }
+  static double moment(Index, Index, Index, const Vec3& area, const Vec3& move) { return area.dot(move); }
+
+  void correct_volume() {
+    constexpr int most_steps = 40;
+    for (int iteration = 0; iteration < most_steps; ++iteration) {
+      const std::vector<double> excess = swept();
+      const std::vector<Vec3> normal = normals(now_);
+      // How much volume a unit of offset gains where the limits leave room for it.
+      std::vector<double> gain(components_, 0.0);
+      std::vector<double> size(components_, 0.0);
+      for (std::size_t v = 0; v < now_.size(); ++v) {
+        const Vec3 direction = normal[v].normalized();
+        const double sign = excess[component_[v]] > 0 ? -1 : 1;
+        const Vec3 moved = confine(v, now_[v] + sign * 1e-3 * direction) - now_[v];
+        gain[component_[v]] += sign * 1e3 * moved.dot(normal[v]) / 3;
+        size[component_[v]] += normal[v].norm() / 3;
+      }
+      bool done = true;
+      std::vector<double> offset(components_, 0.0);
+      for (std::size_t c = 0; c < components_; ++c) {
+        if (std::abs(excess[c]) > 1e-7 * size[c] && gain[c] > 1e-3 * size[c]) {
+          offset[c] = -excess[c] / gain[c];
+          done = false;
+        }
+      }
+      if (done) {
+        return;
+      }
+      for_all(now_.size(),
+              [&](std::size_t v) { now_[v] = confine(v, now_[v] + offset[component_[v]] * normal[v].normalized()); });
+    }
+  }
+
+  /// Where triangles turned over or got too flat, takes half of their corners' moves back, for good.
+  std::size_t hold_back_spoilt() {
+    std::vector<bool> spoilt(now_.size(), false);
+    for (const auto& t : mesh_.triangles) {
+      if (is_spoilt(t)) {
+        spoilt[t[0]] = spoilt[t[1]] = spoilt[t[2]] = true;
+      }
+    }
+    std::size_t count = 0;
+    for (std::size_t v = 0; v < now_.size(); ++v) {
+      if (spoilt[v]) {
+        const Vec3 half = 0.5 * (now_[v] - start_[v]);
+        now_[v] = half.norm() > 1e-3 ? Vec3(start_[v] + half) : start_[v];
+        low_[v] = high_[v] = now_[v];
+        ++count;
+      }
+    }
+    return count;
+  }
+
+  [[nodiscard]] bool is_spoilt(const std::array<Index, 3>& t) const {
+    if (now_[t[0]] == start_[t[0]] && now_[t[1]] == start_[t[1]] && now_[t[2]] == start_[t[2]]) {
+      return false;
+    }
+    const auto edges = [&](const std::vector<Vec3>& at) {
+      return std::pair<Vec3, Vec3>(to_world_ * (at[t[1]] - at[t[0]]), to_world_ * (at[t[2]] - at[t[0]]));
+    };
+    const auto [p, q] = edges(start_);
+    const auto [u, v] = edges(now_);
+    const Vec3 before = p.cross(q);
+    const Vec3 after = u.cross(v);
+    const auto shape = [](const Vec3& a, const Vec3& b, const Vec3& n) {
+      return n.norm() / std::max({a.squaredNorm(), b.squaredNorm(), (a - b).squaredNorm()});
+    };
+    return before.dot(after) < least_cosine * before.norm() * after.norm() ||
+           shape(u, v, after) < std::min(least_shape, 0.5 * shape(p, q, before));
+  }
+
+  [[nodiscard]] double largest_volume_change() const {
+    std::vector<double> volume(components_, 0.0);
+    for (const auto& [a, b, c] : mesh_.triangles) {
+      volume[component_[a]] += start_[a].dot(start_[b].cross(start_[c])) / 6;
+    }
+    const std::vector<double> change = swept();
+    double largest = 0;
+    for (std::size_t c = 0; c < components_; ++c) {
+      if (std::abs(volume[c]) >= 100) {
+        largest = std::max(largest, std::abs(change[c] / volume[c]));
+      }
+    }
+    return largest;
+  }
+
+  const TriangleMesh& mesh_;
+  Mat3 to_world_;
+  bool mirrored_ = false;
+  std::vector<Vec3> start_;     ///< voxel coordinates of the input
+  std::vector<Vec3> now_;       ///< and of the surface as it is
+  std::vector<bool> boundary_;  ///< on the image's border, with open_border
+  std::vector<Vec3> low_;       ///< limits of each vertex
+  std::vector<Vec3> high_;
+  std::vector<Index> component_;
+  std::size_t components_ = 0;
+};
+
+}  // namespace
+
+StaircaseResult smooth_staircase(TriangleMesh& mesh, const Mask& grid, const StaircaseOptions& options) {
+  Smoother smoother(mesh, grid, options.open_border);
+  const StaircaseResult result = smoother.run(options.progress);
+  smoother.store(mesh, grid.affine().col(3));
+  return result;
+}
+
+}  // namespace tunica
