@@ -1,0 +1,14 @@
+#pragma once
+
+#include "io/scene.hpp"
+
+#include <filesystem>
+
+namespace tunica {
+
+/// Reads a scene file (TOML). Mesh paths are relative to the file. The result has passed check_scene().
+/// Errors: InputError "FILE:line:column: what is wrong, and what to do": syntax, unknown or missing keys, wrong types
+/// and units, names that match nothing. UsageError for what a later version brings ("not available yet").
+Scene read_scene(const std::filesystem::path& path);
+
+}  // namespace tunica

@@ -1,0 +1,452 @@
+#include "cli/tool.hpp"
+#include "io/output_file.hpp"
+#include "io/result_file.hpp"
+#include "io/scene.hpp"
+#include "io/scene_file.hpp"
+#include "mechanics/solve.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace tunica {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Arguments {
+  std::vector<fs::path> files;
+  fs::path scene;
+  std::optional<double> young, thickness, density, pressure, duration, step, ramp;
+  std::optional<std::string> poisson, mesh_unit, membrane, bending, solver, cg_tolerance, converge;
+  std::optional<std::string> load_steps, cg_iterations, every;
+  std::vector<std::string> fixes;
+  bool is_static = false;
+  bool check = false;
+};
+
+constexpr const char* scene_flag = "--scene";
+
+// What --scene contradicts: all that a scene file says itself.
+constexpr std::array scene_says{"--young",         "--poisson",  "--thickness",  "--density",  "--pressure",
+                                "--fix",           "--static",   "--load-steps", "--duration", "--step",
+                                "--ramp",          "--membrane", "--bending",    "--solver",   "--cg-tolerance",
+                                "--cg-iterations", "--converge", "--every",      "--mesh-unit"};
+
+void declare(cli::Tool& tool, Arguments& a) {
+  CLI::App& app = tool.arguments();
+  app.add_option("FILES", a.files, "SHELL.ply OUT.hdf; with --scene only OUT.hdf; with --check OUT.hdf may be left out")
+      ->expected(0, 2)
+      ->type_name("FILE");
+  app.add_option(scene_flag, a.scene, "read everything from a scene file (TOML)")->type_name("SCENE.toml");
+  tool.quantity("--young", a.young, dimension::pressure, "Young's modulus, e.g. 1MPa");
+  app.add_option("--poisson", a.poisson, "Poisson's ratio, in (-1, 0.5)")->type_name("NUMBER");
+  tool.quantity("--thickness", a.thickness, dimension::length, "thickness of the shell, e.g. 1.5mm");
+  tool.quantity("--density", a.density, dimension::density, "mass density, e.g. 1100kg/m3 (dynamic runs need it)");
+  tool.quantity("--pressure", a.pressure, dimension::pressure,
+                "pressure that follows the surface; positive pushes along the normals, outward");
+  app.add_option("--fix", a.fixes,
+                 "what is held, may repeat: boundary | 'below z=-10mm' | 'above x=3cm' | rigid-motions (a closed organ "
+                 "under its own pressure)")
+      ->type_name("WHERE")
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  app.add_flag("--static", a.is_static, "solve for the state of rest");
+  app.add_option("--load-steps", a.load_steps, "static: steps in which the load grows (default 10)")->type_name("N");
+  tool.quantity("--duration", a.duration, dimension::time, "dynamic: time simulated, e.g. 2s");
+  tool.quantity("--step", a.step, dimension::time, "dynamic: time step, e.g. 40ms");
+  tool.quantity("--ramp", a.ramp, dimension::time,
+                "dynamic: the load grows from zero over this time (default: at once)");
+  app.add_option("--membrane", a.membrane, "membrane element: cst | opt | adapt (default adapt)")->type_name("NAME");
+  app.add_option("--bending", a.bending, "bending element: comas (the paper's) | comas-consistent | dkt (default dkt)")
+      ->type_name("NAME");
+  app.add_option("--solver", a.solver, "cg | direct | auto (default auto)")->type_name("NAME");
+  app.add_option("--cg-tolerance", a.cg_tolerance, "relative residual at which CG stops, e.g. 5% (the paper's)")
+      ->type_name("PERCENT");
+  app.add_option("--cg-iterations", a.cg_iterations,
+                 "at most N CG iterations; without --cg-tolerance a fixed count that asks for no convergence")
+      ->type_name("N");
+  app.add_option("--converge", a.converge, "relative residual at which a step counts as solved (default 1e-8)")
+      ->type_name("NUMBER");
+  app.add_option("--every", a.every, "write every N-th state (default 1); the first and the last always")
+      ->type_name("N");
+  app.add_option("--mesh-unit", a.mesh_unit, "unit of length of a mesh in a format that carries none: mm | cm | m | um")
+      ->type_name("UNIT");
+  app.add_flag("--check", a.check, "validate, print the resolved scene in SI units, and stop");
+  tool.not_yet("--resume");
+  tool.not_yet("--export");
+}
+
+template <typename Value>
+Value required(const std::optional<Value>& value, const char* flag, const char* example) {
+  if (!value) {
+    throw UsageError(fmt::format("{0} is missing: give it, for example {0} {1}", flag, example));
+  }
+  return *value;
+}
+
+double number(const std::optional<std::string>& text, const char* flag, double otherwise) {
+  if (!text) {
+    return otherwise;
+  }
+  const auto value = parse_number(*text);
+  if (!value) {
+    throw UsageError(fmt::format("{}: '{}' is not a number", flag, *text));
+  }
+  return *value;
+}
+
+std::optional<std::size_t> count(const std::optional<std::string>& text, const char* flag, double most) {
+  if (!text) {
+    return std::nullopt;
+  }
+  const auto value = parse_number(*text);
+  if (!value || *value < 1 || *value > most || *value != std::floor(*value)) {
+    throw UsageError(fmt::format("{}: '{}' is not a whole number from 1 to {:.0f}", flag, *text, most));
+  }
+  return static_cast<std::size_t>(*value);
+}
+
+template <typename Value>
+void choose(const std::optional<std::string>& word, const char* flag, Value& value,
+            std::initializer_list<std::pair<std::string_view, Value>> choices) {
+  if (!word) {
+    return;
+  }
+  std::string known;
+  for (const auto& [name, meaning] : choices) {
+    if (*word == name) {
+      value = meaning;
+      return;
+    }
+    known += fmt::format("{}{}", known.empty() ? "" : ", ", name);
+  }
+  throw UsageError(fmt::format("{}: '{}' is not one of {}", flag, *word, known));
+}
+
+Places flags_as_places(std::initializer_list<const char*> keys) {
+  Places places{{"command line", true}, {}};
+  for (const char* key : keys) {
+    places.keys[key] = {std::string("--") + key, true};
+  }
+  return places;
+}
+
+// "boundary", "rigid-motions", "below z=-10mm", "above x = 3cm".
+Selection parse_fix(const std::string& text) {
+  if (text == "boundary") {
+    return BoundaryNodes{};
+  }
+  if (text == "rigid-motions") {
+    return RigidMotions{};
+  }
+  const auto unknown = [&] {
+    throw UsageError(fmt::format(
+        "--fix: '{}' is not understood: write boundary, rigid-motions, 'below z=-10mm' or 'above x=3cm'", text));
+  };
+  HalfSpaceNodes half;
+  half.below = text.starts_with("below ");
+  if (!half.below && !text.starts_with("above ")) {
+    unknown();
+  }
+  const std::size_t axis = text.find_first_not_of(' ', 6);
+  const std::size_t equals = text.find('=');
+  if (axis == std::string::npos || text[axis] < 'x' || text[axis] > 'z' || equals == std::string::npos ||
+      text.find_first_not_of(' ', axis + 1) != equals) {
+    unknown();
+  }
+  half.axis = text[axis] - 'x';
+  try {
+    half.at = parse_quantity(text.substr(equals + 1), dimension::length);
+  } catch (const UsageError& error) {
+    throw UsageError(fmt::format("--fix '{}': {}", text, error.what()));
+  }
+  return half;
+}
+
+void set_kind(const Arguments& a, Scene& scene, Ramp& load_ramp) {
+  if (a.is_static) {
+    for (const auto& [given, flag] :
+         {std::pair{a.duration.has_value(), "--duration"}, std::pair{a.step.has_value(), "--step"},
+          std::pair{a.ramp.has_value(), "--ramp"}}) {
+      if (given) {
+        throw UsageError(fmt::format("--static and {} contradict each other: give one", flag));
+      }
+    }
+    scene.run.kind = StaticRun{false, equal_load_factors(count(a.load_steps, "--load-steps", 1e6).value_or(10))};
+    return;
+  }
+  if (!a.duration && !a.step) {
+    throw UsageError("--static is missing: give it, or --duration and --step for a dynamic run");
+  }
+  if (a.load_steps) {
+    throw UsageError("--load-steps belongs to --static: in a dynamic run give --ramp");
+  }
+  DynamicRun& dynamic = scene.run.kind.emplace<DynamicRun>();
+  dynamic.duration = required(a.duration, "--duration", "2s");
+  dynamic.step = required(a.step, "--step", "40ms");
+  if (a.ramp) {
+    if (!(*a.ramp > 0)) {
+      throw UsageError("--ramp: must be greater than zero");
+    }
+    load_ramp.points = {{0, 0}, {*a.ramp, 1}};
+  }
+}
+
+// The scene that the flags describe: one shell under pressure.
+Scene scene_of_flags(const Arguments& a) {
+  Scene scene;
+  SceneLoad load{"shell", std::nullopt, PressureLoad{}, {}, flags_as_places({})};
+  scene.run_places = flags_as_places({"duration", "step", "solver", "converge", "every"});
+  scene.run_places.keys["cg_tolerance"] = {"--cg-tolerance", true};
+  scene.run_places.keys["cg_iterations"] = {"--cg-iterations", true};
+  set_kind(a, scene, load.ramp);
+  choose<Solver>(a.solver, "--solver", scene.run.solver,
+                 {{"auto", Solver::automatic}, {"cg", Solver::cg}, {"direct", Solver::direct}});
+  if (a.cg_tolerance) {
+    scene.run.cg_tolerance = parse_percent(*a.cg_tolerance);
+    scene.cg_tolerance_stated = true;
+  }
+  scene.run.cg_iterations = count(a.cg_iterations, "--cg-iterations", 1e9);
+  scene.run.converge = number(a.converge, "--converge", scene.run.converge);
+  scene.run.every = count(a.every, "--every", 1e9).value_or(1);
+
+  SceneShell shell;
+  shell.name = load.body;
+  shell.places = flags_as_places({"thickness", "young", "poisson", "density"});
+  shell.mesh = a.files.front();
+  if (a.mesh_unit) {
+    shell.unit_mm = parse_length_unit(*a.mesh_unit);
+  }
+  shell.material.young = required(a.young, "--young", "1MPa");
+  (void)required(a.poisson, "--poisson", "0.45");
+  shell.material.poisson = number(a.poisson, "--poisson", 0);
+  shell.thickness = required(a.thickness, "--thickness", "1.5mm");
+  if (!a.is_static) {
+    (void)required(a.density, "--density", "1100kg/m3");
+  }
+  shell.material.density = a.density;
+  choose<Membrane>(a.membrane, "--membrane", shell.membrane,
+                   {{"cst", Membrane::cst}, {"opt", Membrane::opt}, {"adapt", Membrane::adapt}});
+  choose<Bending>(a.bending, "--bending", shell.bending,
+                  {{"comas", Bending::comas}, {"comas-consistent", Bending::comas_consistent}, {"dkt", Bending::dkt}});
+  scene.shells.push_back(shell);
+
+  load.kind = PressureLoad{required(a.pressure, "--pressure", "100mmHg"), true};
+  scene.loads.push_back(load);
+  for (const std::string& text : a.fixes) {
+    SceneFix fix;
+    fix.body = shell.name;
+    fix.where = parse_fix(text);
+    fix.places = {{fmt::format("--fix '{}'", text), true}, {}};
+    scene.fixes.push_back(fix);
+  }
+  settle_solver(scene);
+  check_scene(scene);
+  return scene;
+}
+
+// Which files the positional arguments name; OUT is empty where --check needs none.
+fs::path output_path(const cli::Tool& tool, const CLI::App& app, const Arguments& a) {
+  (void)tool;
+  const bool from_scene = !a.scene.empty();
+  if (from_scene) {
+    for (const char* flag : scene_says) {
+      if (app.count(flag) > 0) {
+        throw UsageError(fmt::format("{} and {} contradict each other: write it in the scene file", scene_flag, flag));
+      }
+    }
+  }
+  const std::size_t inputs = from_scene ? 0 : 1;
+  const std::size_t wanted = inputs + (a.check ? 0 : 1);
+  if (a.files.size() < wanted) {
+    throw UsageError(from_scene || a.files.size() == 1 ? "OUT.hdf is missing: name the result file"
+                                                       : "SHELL.ply and OUT.hdf are missing: name them, or --scene");
+  }
+  if (a.files.size() > inputs + 1) {
+    throw UsageError(
+        fmt::format("{}: one file too many, with {} only OUT.hdf is named", a.files.back().string(), scene_flag));
+  }
+  return a.files.size() > inputs ? a.files.back() : fs::path();
+}
+
+void refuse_overwriting_inputs(const fs::path& out, const std::vector<fs::path>& inputs) {
+  for (const fs::path& input : inputs) {
+    std::error_code ignored;
+    if (fs::equivalent(out, input, ignored)) {
+      throw UsageError(fmt::format("{}: is an input, name another result file", out.string()));
+    }
+  }
+}
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+Json triple(const Vec3& v) { return Json::array({v.x(), v.y(), v.z()}); }
+
+Json or_null(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
+
+// The keys of the contract, undefined until the run fills them.
+void prepare_result(Json& result, const Model& model) {
+  std::size_t shells = 0;
+  for (const ShellBody& body : model.shells) {
+    shells += body.mesh.triangles.size();
+  }
+  result = {{"shells", shells},
+            {"tetrahedra", 0},
+            {"nodes", model.node_count()},
+            {"dof", nullptr},
+            {"steps", 0},
+            {"converged", false},
+            {"max_displacement_mm", nullptr},
+            {"volume_before_mm3", nullptr},
+            {"volume_after_mm3", nullptr},
+            {"strain_energy_mj", nullptr},
+            {"residual", nullptr},
+            {"algebraic_error_percent", nullptr},
+            {"newton_iterations", 0},
+            {"cg_iterations", 0},
+            {"ms_per_step", {{"median", nullptr}, {"max", nullptr}}},
+            {"real_time_factor", nullptr},
+            {"probes", Json::object()},
+            {"frequencies_hz", Json::array()},
+            {"buckling_factors", Json::array()}};
+  for (const Probe& probe : model.probes) {
+    result["probes"][probe.name] = {{"time_s", Json::array()},
+                                    {"load_factor", Json::array()},
+                                    {"displacement_mm", Json::array()},
+                                    {"rotation_rad", Json::array()}};
+  }
+}
+
+// What is known of a run that may still fail.
+void report_state(Json& result, const Model& model, const State& state, bool dynamic) {
+  double most = 0;
+  for (const Vec3& u : state.displacement) {
+    most = std::max(most, u.norm());
+  }
+  result["max_displacement_mm"] = most;
+  if (result["volume_before_mm3"].is_null()) {
+    result["volume_before_mm3"] = or_null(state.volume);
+  }
+  result["volume_after_mm3"] = or_null(state.volume);
+  result["strain_energy_mj"] = state.strain_energy;
+  result["residual"] = state.residual;
+  for (const Probe& probe : model.probes) {
+    const std::size_t node = model.first_node(probe.body) + probe.node;
+    Json& record = result["probes"][probe.name];
+    record["time_s"].push_back(dynamic ? Json(state.time) : Json());
+    record["load_factor"].push_back(state.load_factor);
+    record["displacement_mm"].push_back(triple(state.displacement[node]));
+    record["rotation_rad"].push_back(triple(state.rotation[node]));
+  }
+}
+
+void report_summary(Json& result, const Summary& summary, std::optional<double> duration) {
+  result["dof"] = summary.dof;
+  result["steps"] = summary.steps;
+  result["converged"] = summary.converged;
+  result["max_displacement_mm"] = summary.max_displacement;
+  result["volume_before_mm3"] = or_null(summary.volume_before);
+  result["volume_after_mm3"] = or_null(summary.volume_after);
+  result["strain_energy_mj"] = summary.strain_energy;
+  result["residual"] = summary.residual;
+  result["newton_iterations"] = summary.newton_iterations;
+  result["cg_iterations"] = summary.cg_iterations;
+  const std::vector<double>& seconds = summary.seconds_per_step;
+  if (!seconds.empty()) {
+    result["ms_per_step"] = {{"median", 1e3 * median(seconds)},
+                             {"max", 1e3 * *std::max_element(seconds.begin(), seconds.end())}};
+    double wall = 0;
+    for (const double s : seconds) {
+      wall += s;
+    }
+    if (duration && wall > 0) {
+      result["real_time_factor"] = *duration / wall;
+    }
+  }
+}
+
+void simulate(cli::Tool& tool, const Arguments& a) {
+  const fs::path out = output_path(tool, tool.arguments(), a);
+  std::vector<fs::path> inputs;
+  const auto register_input = [&](const fs::path& path) {
+    inputs.push_back(tool.input(path));
+    if (!out.empty()) {
+      refuse_overwriting_inputs(out, {path});
+    }
+  };
+
+  std::optional<cli::Tool::Stage> stage(std::in_place, tool, "read");
+  Scene scene;
+  if (a.scene.empty()) {
+    scene = scene_of_flags(a);
+  } else {
+    register_input(a.scene);
+    scene = read_scene(a.scene);
+  }
+  for (const SceneShell& shell : scene.shells) {
+    if (std::find(inputs.begin(), inputs.end(), shell.mesh) == inputs.end()) {
+      register_input(shell.mesh);
+    }
+  }
+  if (!a.check) {
+    tool.output(out);
+  }
+  const LoadedScene loaded = load_scene(scene);
+  const Model& model = loaded.model;
+  for (const std::string& note : loaded.notes) {
+    tool.note(note);
+  }
+
+  stage.emplace(tool, "setup");
+  prepare_result(tool.result(), model);
+  check_model(model, scene.run);
+  const std::string text = scene_text(scene);
+  if (a.check) {
+    fmt::print("{}", text);
+    return;
+  }
+  const auto* dynamic = std::get_if<DynamicRun>(&scene.run.kind);
+  ResultOptions options{dynamic != nullptr, tool.command(), text, {}, tool.force()};
+  for (const fs::path& path : inputs) {
+    options.inputs.emplace_back(path.string(), sha256_of_file(path));
+  }
+
+  stage.emplace(tool, "write");
+  ResultFile file(out, model, options);
+  stage.emplace(tool, "solve");
+  const Summary summary = solve(
+      model, scene.run,
+      [&](const State& state) {
+        stage.emplace(tool, "write");
+        report_state(tool.result(), model, state, dynamic != nullptr);
+        file.append(state, element_fields(model, state));
+        stage.emplace(tool, "solve");
+      },
+      tool.progress("solve"));
+  stage.emplace(tool, "write");
+  report_summary(tool.result(), summary, dynamic != nullptr ? std::optional(dynamic->duration) : std::nullopt);
+  file.commit(summary.converged);
+}
+
+}  // namespace
+}  // namespace tunica
+
+int main(int argc, char** argv) {
+  using namespace tunica;
+  cli::Tool tool("simulate", "Pressure load on thin curved shells, static or dynamic.",
+                 "tunica-simulate shell.ply result.hdf --young 1MPa --poisson 0.45 --thickness 1.5mm --pressure 1kPa "
+                 "--fix boundary --static\n"
+                 "  tunica-simulate shell.ply result.hdf --young 1MPa --poisson 0.45 --thickness 1.5mm --density "
+                 "1100kg/m3 --pressure 100mmHg --fix 'below z=-10mm' --duration 2s --step 40ms --ramp 1s\n"
+                 "  tunica-simulate --scene scene.toml result.hdf");
+  Arguments arguments;
+  declare(tool, arguments);
+  tool.stages({"read", "setup", "solve", "write"});
+  return tool.run(argc, argv, [&] { simulate(tool, arguments); });
+}
