@@ -1,0 +1,208 @@
+#include "core/threads.hpp"
+#include "mesh_check.hpp"
+#include "surface/closest_point.hpp"
+#include "surface/measure.hpp"
+#include "volume/components.hpp"
+#include "volume/marching_cubes.hpp"
+#include "volume/phantom.hpp"
+#include "volume/smoothing.hpp"
+#include "volumes.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+
+#include <cmath>
+
+namespace tunica {
+namespace {
+
+using test::check_mesh;
+using test::label_one;
+using test::make_volume;
+using test::Random;
+
+/// Largest move of a vertex along an axis of the image, in voxels.
+double largest_move(const TriangleMesh& before, const TriangleMesh& after, const Mask& grid) {
+  const Mat3 to_voxel = grid.affine().leftCols<3>().inverse();
+  double largest = 0;
+  for (std::size_t v = 0; v < before.vertices.size(); ++v) {
+    largest = std::max(largest, (to_voxel * (after.vertices[v] - before.vertices[v])).cwiseAbs().maxCoeff());
+  }
+  return largest;
+}
+
+/// Area-weighted mean distance of a surface's facets to another.
+double mean_distance(const TriangleMesh& mesh, const ClosestPoint& truth) {
+  double sum = 0;
+  for (const auto& [a, b, c] : mesh.triangles) {
+    const Vec3 centre = (mesh.vertices[a] + mesh.vertices[b] + mesh.vertices[c]) / 3;
+    sum += triangle_area(mesh.vertices[a], mesh.vertices[b], mesh.vertices[c]) *
+           std::sqrt(truth.closest(centre).squared_distance);
+  }
+  return sum / area(mesh);
+}
+
+struct Case {
+  std::string shape;
+  std::size_t size;
+  Vec3 spacing;
+  double gain;  ///< error of the smoothed surface over that of the staircase, at most
+};
+
+class StaircaseOf : public testing::TestWithParam<Case> {};
+
+INSTANTIATE_TEST_SUITE_P(
+    Phantoms, StaircaseOf,
+    testing::Values(Case{"sphere", 48, Vec3(1, 1, 1), 0.5}, Case{"aneurysm", 96, Vec3(1, 1, 1), 0.5},
+                    Case{"tube", 64, Vec3(0.7, 0.7, 2), 0.5}, Case{"capsule", 64, Vec3(1, 1, 1), 0.5},
+                    Case{"bladder", 64, Vec3(0.8, 0.8, 3), 0.5}, Case{"colon", 96, Vec3(1, 1, 1), 0.7}));
+
+TEST_P(StaircaseOf, StaysWithinHalfAVoxelKeepsTheVolumeAndComesCloserToTheTruth) {
+  PhantomOptions options;
+  options.shape = *phantom_shape(GetParam().shape);
+  options.size = GetParam().size;
+  options.spacing = GetParam().spacing;
+  const Mask mask = select(make_phantom(options).volume, label_one);
+  MarchingCubesOptions extraction;
+  extraction.open_border = GetParam().shape == "tube" || GetParam().shape == "aneurysm";
+  const TriangleMesh before = marching_cubes(mask, extraction);
+  TriangleMesh after = before;
+  StaircaseOptions smoothing;
+  smoothing.open_border = extraction.open_border;
+  const StaircaseResult result = smooth_staircase(after, mask, smoothing);
+
+  EXPECT_EQ(before.triangles, after.triangles);
+  EXPECT_LE(largest_move(before, after, mask), 0.5);
+  EXPECT_NEAR(largest_move(before, after, mask), result.largest_move, 1e-9);
+  EXPECT_NEAR(phantom_volume(after) / phantom_volume(before), 1, 1e-3);
+  EXPECT_LE(result.volume_change, 1e-3);
+  const auto check = check_mesh(after);
+  EXPECT_TRUE(check.manifold());
+  EXPECT_GT(check.least_sine, 1e-3);
+  const TriangleMesh truth = phantom_surface(options);
+  const ClosestPoint tree(truth);
+  EXPECT_LT(mean_distance(after, tree), GetParam().gain * mean_distance(before, tree));
+  EXPECT_NEAR(area(after), area(truth), 0.03 * area(truth));
+}
+
+TEST(Staircase, AnInclinedPlaneBecomesFlat) {
+  // 1 in 12: steps twelve voxels long.
+  const Volume volume = make_volume<std::uint8_t>({60, 20, 16}, [](auto i, auto, auto k) { return 12 * k < i + 60; });
+  const Mask mask = select(volume, label_one);
+  MarchingCubesOptions open;
+  open.open_border = true;
+  TriangleMesh mesh = marching_cubes(mask, open);
+  StaircaseOptions smoothing;
+  smoothing.open_border = true;
+  smooth_staircase(mesh, mask, smoothing);
+  // The steps' mean height: (i + 60) / 12 rounded up, less 1, and half a voxel.
+  double worst = 0;
+  for (const Vec3& p : mesh.vertices) {
+    if (p[0] > 12 && p[0] < 47) {
+      worst = std::max(worst, std::abs(p[2] - (p[0] + 60) / 12 - 11.0 / 24 + 0.5));
+    }
+  }
+  EXPECT_LT(worst, 0.25);
+}
+
+TEST(Staircase, OpenEndsStayInThePlaneOfTheBorder) {
+  PhantomOptions options;
+  options.shape = PhantomShape::tube;
+  options.size = 48;
+  const Mask mask = select(make_phantom(options).volume, label_one);
+  MarchingCubesOptions open;
+  open.open_border = true;
+  const TriangleMesh before = marching_cubes(mask, open);
+  TriangleMesh after = before;
+  StaircaseOptions smoothing;
+  smoothing.open_border = true;
+  smooth_staircase(after, mask, smoothing);
+  std::size_t ends = 0;
+  for (std::size_t v = 0; v < before.vertices.size(); ++v) {
+    if (std::abs(std::abs(before.vertices[v][2]) - 24) < 1e-9) {
+      EXPECT_NEAR(after.vertices[v][2], before.vertices[v][2], 1e-9);
+      ++ends;
+    } else {
+      EXPECT_LT(std::abs(after.vertices[v][2]), 24);
+    }
+  }
+  EXPECT_GT(ends, 20U);
+}
+
+TEST(Staircase, EachPieceKeepsItsVolumeAndThinOnesDoNotVanish) {
+  // A ball, a rod two voxels thick, a plate one voxel thick, and a single voxel.
+  const Volume volume = make_volume<std::uint8_t>({40, 60, 24}, [](auto i, auto j, auto k) {
+    const bool ball = test::sphere_value(i, j, k, Vec3(12, 14, 11), 8) > 0;
+    const bool rod = i >= 30 && i < 32 && k >= 10 && k < 12 && j >= 4 && j < 50;
+    const bool plate = k == 11 && i >= 4 && i < 24 && j >= 36 && j < 54;
+    return ball || rod || plate || (i == 36 && j == 30 && k == 5);
+  });
+  const Mask mask = select(volume, label_one);
+  const TriangleMesh before = marching_cubes(mask);
+  TriangleMesh after = before;
+  const StaircaseResult result = smooth_staircase(after, mask);
+  EXPECT_LE(result.volume_change, 1e-3);
+  EXPECT_LE(largest_move(before, after, mask), 0.5);
+  const auto check = check_mesh(after);
+  EXPECT_TRUE(check.closed() && check.manifold());
+  EXPECT_EQ(check.components, 4U);
+  EXPECT_GT(check.least_sine, 1e-3);
+  // The rod is as thick in the middle as it was: about 1.6 voxels across.
+  double widest = 0;
+  for (const Vec3& p : after.vertices) {
+    if (p[0] > 28 && p[0] < 34 && std::abs(p[1] - 27) < 3) {
+      widest = std::max(widest, std::abs(p[0] - 30.5));
+    }
+  }
+  EXPECT_GT(widest, 0.6);
+}
+
+TEST(Staircase, NoiseStaysAManifoldWithoutTurnedTriangles) {
+  Random random(31);
+  for (const double density : {0.2, 0.5, 0.8}) {
+    Volume volume = make_volume<std::uint8_t>({24, 20, 18}, [&](auto...) { return random.uniform() < density; });
+    volume.affine.leftCols<3>() << -0.5, 0.1, 0, 0.2, 0.6, 0.1, 0, 0.3, 2;
+    const Mask mask = select(volume, label_one);
+    const TriangleMesh before = marching_cubes(mask);
+    TriangleMesh after = before;
+    smooth_staircase(after, mask);
+    EXPECT_LE(largest_move(before, after, mask), 0.5);
+    const auto check = check_mesh(after);
+    EXPECT_TRUE(check.closed() && check.manifold());
+    EXPECT_GT(check.least_sine, 1e-4);
+    for (std::size_t t = 0; t < before.triangles.size(); ++t) {
+      const auto& [a, b, c] = before.triangles[t];
+      const auto normal = [&](const TriangleMesh& mesh) -> Vec3 {
+        return (mesh.vertices[b] - mesh.vertices[a]).cross(mesh.vertices[c] - mesh.vertices[a]);
+      };
+      ASSERT_GT(normal(before).dot(normal(after)), 0);
+    }
+  }
+}
+
+TEST(Staircase, SameToTheBitWhateverTheNumberOfThreads) {
+  PhantomOptions options;
+  options.shape = PhantomShape::bladder;
+  options.size = 64;
+  const Mask mask = select(make_phantom(options).volume, label_one);
+  const TriangleMesh start = marching_cubes(mask);
+  const std::size_t threads = thread_count();
+  set_thread_count(1);
+  TriangleMesh one = start;
+  smooth_staircase(one, mask);
+  set_thread_count(3);
+  TriangleMesh three = start;
+  smooth_staircase(three, mask);
+  set_thread_count(threads);
+  EXPECT_EQ(one.vertices, three.vertices);
+}
+
+TEST(Staircase, NothingIsLeftAsItIs) {
+  const Mask mask({4, 4, 4}, Eigen::Matrix<double, 3, 4>::Identity());
+  TriangleMesh mesh;
+  EXPECT_EQ(smooth_staircase(mesh, mask).largest_move, 0);
+}
+
+}  // namespace
+}  // namespace tunica
