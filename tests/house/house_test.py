@@ -1,0 +1,154 @@
+#!/usr/bin/python3
+"""The house checks itself: every rule on every file, and every rule on a snippet that breaks it."""
+
+import os
+import re
+import shutil
+import subprocess
+import unittest
+from pathlib import Path
+
+import rules
+
+SOURCE = Path(os.environ.get("TUNICA_SOURCE", Path(__file__).resolve().parents[2]))
+TEXT = (".hpp", ".cpp", ".h", ".in", ".py", ".cmake", ".txt", ".md", ".json", ".toml", ".cff", ".sh", ".mk", "")
+TOOLS = ["phantom", "extract", "decimate", "relax", "compare", "simulate", "chart"]
+SKIPPED_FOLDERS = {"build", ".git", "__pycache__", "data-samples", ".cache", "out"}
+
+
+def text_files():
+    for folder, folders, names in os.walk(SOURCE):
+        folders[:] = sorted(d for d in folders if d not in SKIPPED_FOLDERS)
+        for name in sorted(names):
+            path = Path(folder) / name
+            if path.suffix in TEXT and name not in ("LICENSE", ".git") and path.is_file():
+                data = path.read_bytes()
+                if b"\0" not in data:
+                    yield path.relative_to(SOURCE).as_posix(), data.decode("utf-8", errors="replace")
+
+
+class House(unittest.TestCase):
+    """Every rule on every file."""
+
+    def test_rules(self):
+        files = list(text_files())
+        self.assertGreater(len(files), 20, "the source folder was not found")
+        for rule in rules.RULES:
+            with self.subTest(rule=rule.__name__):
+                found = []
+                for path, text in files:
+                    # The bad snippets below are bad on purpose.
+                    if path != "tests/house/house_test.py":
+                        found += rule(path, text)
+                self.assertEqual(found, [], f"{rule.__doc__}\n" + "\n".join(found))
+
+    def test_every_tool_is_there(self):
+        missing = [verb for verb in TOOLS if not (SOURCE / "tools" / f"{verb}.cpp").is_file()]
+        self.assertEqual(missing, [], "tools without a main")
+
+    def test_every_main_is_a_known_tool(self):
+        mains = sorted(path.stem for path in (SOURCE / "tools").glob("*.cpp"))
+        self.assertEqual([main for main in mains if main not in TOOLS], [])
+
+    def test_every_room_has_its_order(self):
+        rooms = sorted(path.name for path in (SOURCE / "lib").iterdir() if path.is_dir())
+        self.assertEqual(rooms, sorted(rules.ROOMS))
+
+    def test_clang_format(self):
+        program = shutil.which("clang-format")
+        version = subprocess.run([program, "--version"], capture_output=True, text=True).stdout if program else ""
+        if not re.search(r"version 14\.", version):
+            self.skipTest("needs clang-format 14: other versions break lines differently")
+        files = [path for path, _ in text_files() if path.endswith((".hpp", ".cpp"))]
+        run = subprocess.run([program, "--dry-run", "-Werror", *files], cwd=SOURCE, capture_output=True, text=True)
+        found = sorted(set(re.findall(r"^([^:\n]+):\d+:\d+: error", run.stderr, flags=re.M)))
+        self.assertEqual(run.returncode, 0, "run clang-format -i on: " + " ".join(found) + "\n" + run.stderr[-500:])
+
+
+class EveryRuleCanFail(unittest.TestCase):
+    """A rule that finds nothing in these snippets checks nothing."""
+
+    def bad(self, rule, path, text):
+        self.assertNotEqual(rule(path, text), [], f"{rule.__name__} missed: {text}")
+
+    def good(self, rule, path, text):
+        self.assertEqual(rule(path, text), [])
+
+    def test_order_of_rooms(self):
+        rule = rules.order_of_rooms
+        self.bad(rule, "lib/core/a.cpp", '#include "surface/measure.hpp"\n')
+        self.bad(rule, "lib/volume/a.hpp", '#include "surface/measure.hpp"\n')
+        self.bad(rule, "lib/surface/a.cpp", '#include "volume/volume.hpp"\n')
+        self.bad(rule, "lib/surface/a.cpp", '#include "shell/shell_mesh.hpp"\n')
+        self.bad(rule, "lib/shell/a.cpp", '#  include "mechanics/model.hpp"\n')
+        self.bad(rule, "lib/mechanics/a.cpp", '#include "io/output_file.hpp"\n')
+        self.bad(rule, "lib/io/a.cpp", '#include "cli/tool.hpp"\n')
+        self.bad(rule, "lib/io/a.cpp", '#include "picture.hpp"\n')
+        self.bad(rule, "lib/surface/CMakeLists.txt", "tunica_library(surface LINKS tunica_shell)\n")
+        self.good(rule, "lib/shell/a.cpp", '#include "surface/measure.hpp"\n#include "core/types.hpp"\n')
+        self.good(rule, "tools/relax.cpp", '#include "cli/tool.hpp"\n')
+        self.good(rule, "lib/shell/CMakeLists.txt", "tunica_library(shell LINKS tunica_surface)\n")
+
+    def test_third_party_headers(self):
+        rule = rules.third_party_headers
+        for header in ("CGAL/Surface_mesh.h", "assimp/scene.h", "opencv2/core.hpp", "hdf5.h", "toml++/toml.h",
+                       "zlib.h", "openssl/evp.h", "cholmod.h", "suitesparse/cholmod.h", "tbb/parallel_for.h",
+                       "CLI/CLI.hpp", "nlohmann/json.hpp"):
+            self.bad(rule, "lib/volume/a.cpp", f"#include <{header}>\n")
+            self.bad(rule, "tools/extract.cpp", f"#include <{header}>\n")
+        self.bad(rule, "lib/surface/a.hpp", "#include <CGAL/Surface_mesh.h>\n")
+        self.bad(rule, "lib/io/a.hpp", "#include <hdf5.h>\n")
+        self.bad(rule, "lib/core/a.hpp", "#include <fmt/format.h>\n")
+        self.bad(rule, "lib/shell/a.cpp", "#include <fstream>\n")
+        self.good(rule, "lib/surface/a.cpp", "#include <CGAL/Surface_mesh.h>\n")
+        self.good(rule, "lib/io/a.cpp", "#include <hdf5.h>\n#include <fstream>\n#include <fmt/format.h>\n")
+
+    def test_commented_out_code(self):
+        rule = rules.commented_out_code
+        for text in ("// x = f(y);\n", "  // if (a) {\n", "// }\n", "/* old(); */\n", "#if 0\n", "int a;  // int b = 2;\n",
+                     "// #include <vector>\n", "// return a;\n"):
+            self.bad(rule, "lib/core/a.cpp", text)
+        for text in ("// The larger of both; see eq. (3).\n", "/// tool.run(argc, argv);\n",
+                     'const char* a = "http://x.org/f(x);";\n', "// Rounded outward (upper bound)\n"):
+            self.good(rule, "lib/core/a.cpp", text)
+        for text in ("# x = 1\n", "    # print(x)\n", "# import os\n"):
+            self.bad(rule, "tests/a.py", text)
+        for text in ("# sizes in mm\n", "#!/usr/bin/python3\n", "# Note: a remark\n"):
+            self.good(rule, "tests/a.py", text)
+        self.bad(rule, "lib/core/CMakeLists.txt", "# find_package(CGAL)\n")
+
+    def test_open_ends(self):
+        self.bad(rules.open_ends, "lib/core/a.cpp", "// TODO later\n")
+        self.bad(rules.open_ends, "README.md", "FIXME\n")
+        self.good(rules.open_ends, "README.md", "todos\n")
+
+    def test_pragma_once(self):
+        self.bad(rules.pragma_once, "lib/core/a.hpp", "int f();\n")
+        self.bad(rules.pragma_once, "lib/core/a.hpp", "")
+        self.good(rules.pragma_once, "lib/core/a.hpp", "// why\n#pragma once\n")
+
+    def test_docstrings(self):
+        rule = rules.docstrings
+        self.bad(rule, "lib/core/a.hpp", "namespace a {\n\nint f(int x);\n\n}\n")
+        self.bad(rule, "lib/core/a.hpp", "/// documented\nint f();\n\nstd::vector<int> g(const A& a,\n  int b);\n")
+        self.bad(rule, "lib/core/a.hpp", "/// A class.\nclass A {\n  int x();\n};\n\nvoid h();\n")
+        self.good(rule, "lib/core/a.hpp", "/// what it does\nint f(int x);\nint g(int x);\n\nusing F = int(int);\n")
+        self.good(rule, "lib/core/a.hpp", "struct A {\n  int f();\n};\n")
+
+    def test_length(self):
+        self.bad(rules.length, "lib/core/a.cpp", "int a;\n" * 701)
+        self.good(rules.length, "lib/core/a.cpp", "int a;\n" * 700)
+
+    def test_blanks(self):
+        for text in ("\tint a;\n", "int a; \n", "int a;", "int a;\n\n", "int a;\r\n"):
+            self.bad(rules.blanks, "lib/core/a.cpp", text)
+        self.good(rules.blanks, "Makefile.pipeline", "a:\n\techo\n")
+
+    def test_machine_paths(self):
+        for text in ('open("/home/me/x")\n', "cd /work/main\n", "seen on farm-7\n"):
+            self.bad(rules.machine_paths, "README.md", text)
+        self.good(rules.machine_paths, "README.md", "see ../shared/data and $PREFIX/home/x, http://a.org/work/x\n")
+
+
+if __name__ == "__main__":
+    unittest.main()

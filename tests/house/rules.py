@@ -1,0 +1,216 @@
+"""The rules of the house, each a function from a file to findings "path:line: what is wrong"."""
+
+import ast
+import re
+from pathlib import PurePosixPath
+
+ROOMS = {
+    "core": {"core"},
+    "volume": {"core", "volume"},
+    "surface": {"core", "surface"},
+    "shell": {"core", "surface", "shell"},
+    "mechanics": {"core", "surface", "shell", "mechanics"},
+    "io": {"core", "volume", "surface", "shell", "mechanics", "io"},
+    "cli": {"core", "volume", "surface", "shell", "mechanics", "io", "cli"},
+}
+
+# Header pattern, what it belongs to, and which files may include it.
+OWNERS = [
+    (r"CGAL/", "CGAL", r"lib/surface/[^/]*\.cpp"),
+    (r"assimp/", "assimp", r"lib/io/[^/]*\.cpp"),
+    (r"opencv2/", "OpenCV", r"lib/io/[^/]*\.cpp"),
+    (r"(hdf5\.h|hdf5_hl\.h|H5\w*\.h|hdf5/)", "HDF5", r"lib/io/[^/]*\.cpp"),
+    (r"toml", "toml++", r"lib/io/[^/]*\.cpp"),
+    (r"zlib\.h", "zlib", r"lib/io/[^/]*\.cpp"),
+    (r"openssl/", "OpenSSL", r"lib/io/[^/]*\.cpp"),
+    (r"(suitesparse/|cholmod|SuiteSparse|umfpack|amd\.h|colamd\.h)", "CHOLMOD", r"lib/mechanics/[^/]*\.cpp"),
+    (r"Eigen/CholmodSupport", "CHOLMOD", r"lib/mechanics/[^/]*\.cpp"),
+    (r"(tbb|oneapi)/", "TBB", r"lib/core/[^/]*\.cpp"),
+    (r"omp\.h", "OpenMP (threads go through core/threads.hpp)", r"lib/core/[^/]*\.cpp"),
+    (r"CLI/", "CLI11", r"lib/cli/[^/]*"),
+    (r"nlohmann/", "nlohmann json", r"lib/core/json\.hpp"),
+    (r"fmt/", "fmt", r".*\.cpp"),
+    (r"(iostream|fstream)$", "streams on files and the terminal", r"lib/(io|cli)/[^/]*\.cpp|tools/.*"),
+]
+
+LONGEST_FILE = 700
+CODE = (".hpp", ".cpp", ".h", ".in")
+
+
+def _lines(text):
+    return enumerate(text.split("\n"), start=1)
+
+
+def _room(path):
+    parts = PurePosixPath(path).parts
+    return parts[1] if len(parts) > 2 and parts[0] == "lib" else None
+
+
+def _product(path):
+    return path.startswith(("lib/", "tools/"))
+
+
+def order_of_rooms(path, text):
+    """core < volume; core < surface < shell < mechanics; all < io < cli < tools."""
+    room = _room(path)
+    found = []
+    if path.endswith(CODE) and _product(path):
+        for number, line in _lines(text):
+            match = re.match(r'\s*#\s*include\s*"([^"]+)"', line)
+            if not match:
+                continue
+            target = match.group(1).split("/")[0]
+            if "/" not in match.group(1) or target not in ROOMS:
+                found.append(f'{path}:{number}: include "{match.group(1)}" does not name a room of lib/')
+            elif room is not None and target not in ROOMS.get(room, ROOMS):
+                found.append(f"{path}:{number}: {room} includes {target}, against the order of the rooms")
+    elif room is not None and path.endswith("CMakeLists.txt"):
+        for number, line in _lines(text):
+            for target in re.findall(r"\btunica_(\w+)", line):
+                if target in ROOMS and target not in ROOMS[room]:
+                    found.append(f"{path}:{number}: {room} links {target}, against the order of the rooms")
+    return found
+
+
+def third_party_headers(path, text):
+    """A library is included by its owner only."""
+    found = []
+    if path.endswith(CODE) and _product(path):
+        for number, line in _lines(text):
+            match = re.match(r'\s*#\s*include\s*[<"]([^>"]+)[>"]', line)
+            for pattern, name, owner in OWNERS if match else []:
+                if re.match(pattern, match.group(1)) and not re.fullmatch(owner, path):
+                    found.append(f"{path}:{number}: {name} may only be included by {owner}")
+    return found
+
+
+def _python_comment_is_code(comment):
+    try:
+        body = ast.parse(comment).body
+    except (SyntaxError, ValueError):
+        return False
+    statements = (ast.Assign, ast.AugAssign, ast.AnnAssign, ast.Import, ast.ImportFrom, ast.Return, ast.Delete)
+    for node in body:
+        if isinstance(node, ast.AnnAssign) and node.value is None:
+            continue  # "Note: something"
+        if isinstance(node, statements) or (isinstance(node, ast.Expr) and isinstance(node.value, ast.Call)):
+            return True
+    return False
+
+
+def commented_out_code(path, text):
+    """Code that is not compiled is deleted: the history keeps it. Examples in docstrings (///) are text."""
+    found = []
+    if path.endswith(CODE):
+        for number, line in _lines(text):
+            if re.match(r"\s*#\s*if\s+(0|false)\b", line):
+                found.append(f"{path}:{number}: code behind #if 0")
+            # After https:// no comment begins, after a quote none either.
+            match = re.search(r'(?:^|[\s;{})])//(?!/)(.*)$', re.sub(r'"(\\.|[^"\\])*"', '""', line))
+            comment = match.group(1).strip() if match else ""
+            block = re.match(r"\s*/\*(?!\*)(.*?)(\*/)?\s*$", line)
+            if block:
+                comment = block.group(1).strip()
+            statement = re.search(r"[;{]$", comment) and re.search(r"[=(]|->|::|\+\+|\breturn\b|\belse\b", comment)
+            if statement or comment in ("}", "};", "});") or re.match(r"#\s*(include|define|if|endif)\b", comment):
+                found.append(f"{path}:{number}: commented-out code: {comment}")
+    elif path.endswith(".py"):
+        for number, line in _lines(text):
+            match = re.match(r"\s*#(?!!)\s?(.*)$", line)
+            if match and _python_comment_is_code(match.group(1).strip()):
+                found.append(f"{path}:{number}: commented-out code: {match.group(1).strip()}")
+    elif path.endswith((".cmake", "CMakeLists.txt")):
+        for number, line in _lines(text):
+            if re.match(r"\s*#\s*[a-z_]+\s*\([^)]*\)\s*$", line):
+                found.append(f"{path}:{number}: commented-out code: {line.strip()}")
+    return found
+
+
+def open_ends(path, text):
+    """What is to be done stands in an issue."""
+    words = "|".join(["TO" + "DO", "FIX" + "ME", "XX" + "X", "HA" + "CK"])
+    return [f"{path}:{number}: {line.strip()}" for number, line in _lines(text) if re.search(rf"\b({words})\b", line)]
+
+
+def pragma_once(path, text):
+    """The first line of code of a header is #pragma once."""
+    if not path.endswith((".hpp", ".h", ".hpp.in")):
+        return []
+    for number, line in _lines(text):
+        stripped = line.strip()
+        if stripped and not stripped.startswith("//"):
+            return [] if stripped == "#pragma once" else [f"{path}:{number}: the header does not begin with #pragma once"]
+    return [f"{path}:1: the header does not begin with #pragma once"]
+
+
+def _blanked(text):
+    """The text without string contents and comments but for ///, at the same places."""
+    text = re.sub(r'"(\\.|[^"\\\n])*"', lambda m: '"' + " " * (len(m.group()) - 2) + '"', text)
+    text = re.sub(r"/\*.*?\*/", lambda m: re.sub(r"[^\n]", " ", m.group()), text, flags=re.S)
+    return re.sub(r"(?<!/)//(?!/)[^\n]*", lambda m: " " * len(m.group()), text)
+
+
+def docstrings(path, text):
+    """A function declared at the left margin of a header in lib/ has a /// comment, its own or its paragraph's."""
+    if not (path.startswith("lib/") and path.endswith(".hpp")):
+        return []
+    found = []
+    paragraph_documented = False
+    previous_blank = True
+    depth = 0  # of braces that are not a namespace's
+    for number, line in _lines(_blanked(text)):
+        if not line.strip():
+            previous_blank = True
+            continue
+        if previous_blank:
+            paragraph_documented = False
+        previous_blank = False
+        if depth == 0 and line.startswith("///"):
+            paragraph_documented = True
+        declares = re.match(r"(?!using|typedef|static_assert|struct|class|enum|namespace|extern|#|template|friend|return)"
+                            r"(\[\[\w+\]\] )?[\w:][\w:<>,&* ]*[ &*>]\w+\(", line)
+        if depth == 0 and declares and not paragraph_documented:
+            found.append(f"{path}:{number}: a public function without a docstring: {line.strip()}")
+        code = line.split("///")[0]
+        if not re.match(r"(inline )?namespace\b|extern \"", code) and not re.match(r"}\s*$", code):
+            depth += code.count("{") - code.count("}")
+        elif re.match(r"}\s*$", code) and depth > 0:
+            depth -= 1
+    return found
+
+
+def length(path, text):
+    """A file that nobody reads whole is two files."""
+    count = text.count("\n")
+    readable = path.endswith(CODE + (".py", ".cmake", "CMakeLists.txt")) or "Makefile" in path
+    return [f"{path}:{count}: {count} lines, at most {LONGEST_FILE}"] if readable and count > LONGEST_FILE else []
+
+
+def blanks(path, text):
+    """No tabs (but in makefiles), no blanks at the end of a line, one newline at the end of the file."""
+    found = []
+    makefile = "Makefile" in path or path.endswith(".mk")
+    for number, line in _lines(text):
+        if "\t" in line and not makefile:
+            found.append(f"{path}:{number}: tab")
+        if line.endswith("\r"):
+            found.append(f"{path}:{number}: carriage return")
+        elif line != line.rstrip():
+            found.append(f"{path}:{number}: blank at the end of the line")
+    if text and (not text.endswith("\n") or text.endswith("\n\n")):
+        found.append(f"{path}: does not end with exactly one newline")
+    return found
+
+
+def machine_paths(path, text):
+    """No path and no name of one particular machine."""
+    found = []
+    for number, line in _lines(text):
+        if re.search(r"(?<![\w.$})/-])/(work|home|root|farm|Users|mnt|srv|scratch)/\w", line) or re.search(
+                r"\bfarm-\w", line):
+            found.append(f"{path}:{number}: path of one machine: {line.strip()}")
+    return found
+
+
+RULES = [order_of_rooms, third_party_headers, commented_out_code, open_ends, pragma_once, docstrings, length, blanks,
+         machine_paths]
