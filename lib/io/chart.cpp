@@ -151,13 +151,14 @@ struct Axis {
   }
 };
 
+std::string exponent(int power) { return fmt::format("{}{}", power < 0 ? "−" : "", std::abs(power)); }
+
 Tick power_tick(int factor, int power) {
   const double value = factor * std::pow(10, power);
   if (power >= -4 && power <= 4) {
     return {value, fmt::format("{:.{}f}", value, std::max(0, -power)), ""};
   }
-  return {value, factor == 1 ? "10" : fmt::format("{}×10", factor),
-          fmt::format("{}{}", power < 0 ? "−" : "", std::abs(power))};
+  return {value, factor == 1 ? "10" : fmt::format("{}×10", factor), exponent(power)};
 }
 
 Axis logarithmic_axis(const std::vector<double>& values) {
@@ -215,35 +216,32 @@ Axis linear_axis(const std::vector<double>& values) {
   } else if (most <= 0 && most > 0.4 * least) {
     most = 0;
   }
-  if (!(most / 2 - least / 2 > 1e-12 * std::max(std::abs(least), std::abs(most)))) {
-    const double around = most == 0 ? 1 : 0.1 * std::abs(most);
+  // Equal values, to rounding or next to zero, stand in the middle of a range of their size.
+  const double narrowest = std::max(1e-12 * std::max(std::abs(least), std::abs(most)), 1e-290);
+  if (!(most / 2 - least / 2 > narrowest)) {
+    const double around = most == 0 ? 1 : std::max(0.1 * std::abs(most), 1e-290);
     least -= around;
     most += around;
   }
-  const double limit = std::numeric_limits<double>::max() / 4;
-  least = std::clamp(least, -limit, limit);
-  most = std::clamp(most, -limit, limit);
-  const double step = round_step(least, most, count);
-  if (step > 0) {
-    axis.low = std::floor(least / step + 1e-9) * step;
-    axis.high = std::ceil(most / step - 1e-9) * step;
-  } else {
-    axis.low = least;
-    axis.high = most;
+  axis.low = std::isfinite(least) ? least : -std::numeric_limits<double>::max();
+  axis.high = std::isfinite(most) ? most : std::numeric_limits<double>::max();
+  const double step = round_step(axis.low, axis.high, count);
+  const double round_low = std::floor(axis.low / step + 1e-9) * step;
+  const double round_high = std::ceil(axis.high / step - 1e-9) * step;
+  if (step > 0 && std::isfinite(round_low) && std::isfinite(round_high)) {
+    axis.low = round_low;
+    axis.high = round_high;
   }
+  const double size = std::max(std::abs(axis.low), std::abs(axis.high));
+  const bool plain = size >= 1e-3 && size < 1e6;
+  // All ticks with the power of the largest, with the decimals that the step needs.
+  const int power = static_cast<int>(std::floor(std::log10(size) + 1e-9));
   for (const double value : round_ticks(axis.low, axis.high, count + 2)) {
-    const double size = std::max(std::abs(axis.low), std::abs(axis.high));
-    if (size >= 1e6 || size < 1e-3) {
-      const std::string text = fmt::format("{:.4g}", value);
-      const std::string scientific = fmt::format("{:.3e}", value);
-      const std::size_t e = scientific.find('e');
-      const int power = std::stoi(scientific.substr(e + 1));
-      const std::string factor = fmt::format("{:g}", std::stod(scientific.substr(0, e)));
-      axis.ticks.push_back(
-          value == 0 ? Tick{0, "0", ""}
-                     : Tick{value, factor + "×10", fmt::format("{}{}", power < 0 ? "−" : "", std::abs(power))});
+    if (plain || value == 0) {
+      axis.ticks.push_back({value, value == 0 ? "0" : tick_text(value, step), ""});
     } else {
-      axis.ticks.push_back({value, tick_text(value, step), ""});
+      const double unit = std::pow(10, power);
+      axis.ticks.push_back({value, tick_text(value / unit, step / unit) + "×10", exponent(power)});
     }
   }
   return axis;

@@ -10,12 +10,13 @@
 namespace tunica {
 
 struct PictureOptions {
-  std::string title;                       ///< empty: none; the largest value is added by write_error_map_picture
-  std::string caption;                     ///< a second, smaller line below the title
-  std::string quantity = "distance";       ///< what the colours stand for, above the colour bar
-  std::optional<double> maximum;           ///< mm, the top of the colour bar; none: the largest value
-  std::optional<double> diagonal;          ///< mm, > 0; gives the colour bar a second scale in percent of it
-  std::vector<std::array<Vec3, 2>> lines;  ///< mm, segments on the surface drawn dark, e.g. the edges of the shells
+  std::string title = {};               ///< empty: none; the largest value is added by write_error_map_picture
+  std::string caption = {};             ///< a second, smaller line below the title
+  std::string quantity = "distance";    ///< what the colours stand for, above the colour bar
+  std::optional<double> maximum = {};   ///< mm, the top of the colour bar; none: the largest value
+  std::optional<double> diagonal = {};  ///< mm, > 0; gives the colour bar a second scale in percent of it
+  std::vector<std::array<Vec3, 2>> lines =
+      {};  ///< mm, segments on the surface drawn dark, e.g. the edges of the shells
   bool overwrite = false;
 };
 

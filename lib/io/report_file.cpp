@@ -257,7 +257,7 @@ ReportValues values_at(const Report& report, const std::string& key) {
   if (search.hit && search.group == nullptr) {
     return search.found;
   }
-  if (search.group != nullptr) {
+  if (search.group != nullptr && !key.empty()) {
     std::vector<std::string> names;
     for (const auto& [name, value] : search.group->items()) {
       names.push_back(key + "." + name);

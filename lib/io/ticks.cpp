@@ -55,15 +55,22 @@ double round_below(double value) {
 }
 
 std::string tick_text(double tick, double step) {
-  const double size = std::abs(tick);
-  if (step <= 0 || !std::isfinite(step) || step < 1e-4 || size >= 1e6) {
+  if (tick == 0 && (step < 1e-6 || step > 1)) {
+    return "0";
+  }
+  if (!(step > 0) || !std::isfinite(step)) {
     return short_number(tick);
   }
   int decimals = 0;
-  for (double scaled = step; decimals < 6 && std::abs(scaled - std::round(scaled)) > 1e-6 * scaled; scaled *= 10) {
+  for (double scaled = step; decimals < 7 && std::abs(scaled - std::round(scaled)) > 1e-6 * scaled; scaled *= 10) {
     ++decimals;
   }
-  return fmt::format("{:.{}f}", tick, decimals);
+  if (decimals < 7 && std::abs(tick) < 1e6) {
+    return fmt::format("{:.{}f}", tick, decimals);
+  }
+  // As many digits as tell the tick from its neighbours.
+  const int digits = 1 + static_cast<int>(std::ceil(std::log10(std::max(1.0, std::abs(tick) / step))));
+  return fmt::format("{:.{}g}", tick, std::min(digits, 17));
 }
 
 std::string short_number(double value) {

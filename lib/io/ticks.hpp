@@ -16,7 +16,7 @@ std::vector<double> round_ticks(double low, double high, int count);
 /// The largest of 1, 2, 5 times a power of ten that is not above `value` > 0.
 double round_below(double value);
 
-/// A tick with the decimals that its step needs: "0.05" beside "0.10"; outside 1e-4 … 1e6 as "2e-07".
+/// A tick with the decimals that its step needs: "0.05" beside "0.10"; below 1e-6 and from 1e6 on as "2e-07".
 std::string tick_text(double tick, double step);
 
 /// A number with three significant digits, without needless zeros: "0.42", "1230", "3.1e-07".

@@ -85,6 +85,7 @@ class EveryRuleCanFail(unittest.TestCase):
         self.bad(rule, "lib/io/a.cpp", '#include "cli/tool.hpp"\n')
         self.bad(rule, "lib/io/a.cpp", '#include "picture.hpp"\n')
         self.bad(rule, "lib/surface/CMakeLists.txt", "tunica_library(surface LINKS tunica_shell)\n")
+        self.good(rule, "lib/volume/a.hpp", '#include "surface/triangle_mesh.hpp"\n')
         self.good(rule, "lib/shell/a.cpp", '#include "surface/measure.hpp"\n#include "core/types.hpp"\n')
         self.good(rule, "tools/relax.cpp", '#include "cli/tool.hpp"\n')
         self.good(rule, "lib/shell/CMakeLists.txt", "tunica_library(shell LINKS tunica_surface)\n")
@@ -133,6 +134,8 @@ class EveryRuleCanFail(unittest.TestCase):
         self.bad(rule, "lib/core/a.hpp", "/// documented\nint f();\n\nstd::vector<int> g(const A& a,\n  int b);\n")
         self.bad(rule, "lib/core/a.hpp", "/// A class.\nclass A {\n  int x();\n};\n\nvoid h();\n")
         self.good(rule, "lib/core/a.hpp", "/// what it does\nint f(int x);\nint g(int x);\n\nusing F = int(int);\n")
+        self.bad(rule, "lib/core/a.hpp", "/// all of them\nnamespace a {\n\nint f();\nint g();\n\nint h();\n\n}\n")
+        self.good(rule, "lib/core/a.hpp", "/// all of them\nnamespace a {\n\nint f();\nint g();\n\n}\n")
         self.good(rule, "lib/core/a.hpp", "struct A {\n  int f();\n};\n")
 
     def test_length(self):

@@ -14,6 +14,9 @@ ROOMS = {
     "cli": {"core", "volume", "surface", "shell", "mechanics", "io", "cli"},
 }
 
+# The noun that marching cubes returns; its header holds nothing but the two arrays.
+SHARED_NOUNS = {"volume": {"surface/triangle_mesh.hpp"}}
+
 # Header pattern, what it belongs to, and which files may include it.
 OWNERS = [
     (r"CGAL/", "CGAL", r"lib/surface/[^/]*\.cpp"),
@@ -62,6 +65,8 @@ def order_of_rooms(path, text):
             target = match.group(1).split("/")[0]
             if "/" not in match.group(1) or target not in ROOMS:
                 found.append(f'{path}:{number}: include "{match.group(1)}" does not name a room of lib/')
+            elif match.group(1) in SHARED_NOUNS.get(room, ()):
+                continue
             elif room is not None and target not in ROOMS.get(room, ROOMS):
                 found.append(f"{path}:{number}: {room} includes {target}, against the order of the rooms")
     elif room is not None and path.endswith("CMakeLists.txt"):
@@ -151,19 +156,24 @@ def _blanked(text):
 
 
 def docstrings(path, text):
-    """A function declared at the left margin of a header in lib/ has a /// comment, its own or its paragraph's."""
+    """A function declared at the left margin of a header in lib/ has a /// comment: its own, its paragraph's, or, right
+    after the opening of a namespace, the namespace's."""
     if not (path.startswith("lib/") and path.endswith(".hpp")):
         return []
     found = []
     paragraph_documented = False
+    namespace_documented = False
     previous_blank = True
     depth = 0  # of braces that are not a namespace's
     for number, line in _lines(_blanked(text)):
         if not line.strip():
             previous_blank = True
             continue
+        if line.startswith("namespace"):
+            namespace_documented = paragraph_documented and not previous_blank
+            continue
         if previous_blank:
-            paragraph_documented = False
+            paragraph_documented, namespace_documented = namespace_documented, False
         previous_blank = False
         if depth == 0 and line.startswith("///"):
             paragraph_documented = True
