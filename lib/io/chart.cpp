@@ -198,7 +198,7 @@ Axis logarithmic_axis(const std::vector<double>& values) {
       const bool written = factor == 1 ? power % every == 0 : close && (factor == 2 || factor == 5);
       if (written) {
         axis.ticks.push_back(power_tick(factor, power));
-      } else if (every == 1 || factor == 1) {
+      } else if (every == 1 || (factor == 1 && every <= 10)) {
         axis.ticks.push_back({value, "", ""});
       }
     }
@@ -236,7 +236,7 @@ Axis linear_axis(const std::vector<double>& values) {
   const bool plain = size >= 1e-3 && size < 1e6;
   // All ticks with the power of the largest, with the decimals that the step needs.
   const int power = static_cast<int>(std::floor(std::log10(size) + 1e-9));
-  for (const double value : round_ticks(axis.low, axis.high, count + 2)) {
+  for (const double value : multiples(axis.low, axis.high, step)) {
     if (plain || value == 0) {
       axis.ticks.push_back({value, value == 0 ? "0" : tick_text(value, step), ""});
     } else {

@@ -80,10 +80,8 @@ Coordinate natural_error(const std::vector<Report>& reports) {
     }
   }
   if (all_of_tool(reports, "tunica-simulate")) {
-    throw InputError(
-        fmt::format("{}: a simulation does not know its own error: give --reference a finer run, or --y a "
-                    "key",
-                    reports.front().path.string()));
+    // What is left unbalanced is not the error of the model, but all that a single simulation knows.
+    return by_key(reports, "result.residual");
   }
   return by_key(reports, "result.hausdorff_percent.upper");
 }

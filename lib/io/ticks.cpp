@@ -27,19 +27,23 @@ double round_step(double low, double high, int count) {
   return 10 * power;
 }
 
-std::vector<double> round_ticks(double low, double high, int count) {
-  const double step = round_step(low, high, count);
-  if (step == 0) {
+std::vector<double> multiples(double low, double high, double step) {
+  if (!(step > 0)) {
     return {low};
   }
-  const double slack = 1e-6;
+  constexpr double slack = 1e-6;
+  constexpr std::size_t most = 1000;
   const double first = std::ceil(low / step - slack);
   const double last = std::floor(high / step + slack);
-  std::vector<double> ticks;
-  for (double i = first; i <= last && ticks.size() <= static_cast<std::size_t>(count); ++i) {
-    ticks.push_back(i == 0 ? 0 : i * step);
+  std::vector<double> values;
+  for (double i = first; i <= last && values.size() < most; ++i) {
+    values.push_back(i == 0 ? 0 : i * step);
   }
-  return ticks;
+  return values;
+}
+
+std::vector<double> round_ticks(double low, double high, int count) {
+  return multiples(low, high, round_step(low, high, count));
 }
 
 double round_below(double value) {

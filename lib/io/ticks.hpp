@@ -10,6 +10,9 @@ namespace tunica {
 /// @return 0 when high <= low.
 double round_step(double low, double high, int count);
 
+/// The multiples of `step` within [low, high], to rounding; only `low` when the step is 0.
+std::vector<double> multiples(double low, double high, double step);
+
 /// The multiples of round_step() within [low, high], to rounding; only `low` when high <= low.
 std::vector<double> round_ticks(double low, double high, int count);
 
