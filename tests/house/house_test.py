@@ -77,7 +77,7 @@ class EveryRuleCanFail(unittest.TestCase):
     def test_order_of_rooms(self):
         rule = rules.order_of_rooms
         self.bad(rule, "lib/core/a.cpp", '#include "surface/measure.hpp"\n')
-        self.bad(rule, "lib/volume/a.hpp", '#include "surface/measure.hpp"\n')
+        self.bad(rule, "lib/volume/a.hpp", '#include "surface/decimate.hpp"\n')
         self.bad(rule, "lib/surface/a.cpp", '#include "volume/volume.hpp"\n')
         self.bad(rule, "lib/surface/a.cpp", '#include "shell/shell_mesh.hpp"\n')
         self.bad(rule, "lib/shell/a.cpp", '#  include "mechanics/model.hpp"\n')
@@ -85,6 +85,7 @@ class EveryRuleCanFail(unittest.TestCase):
         self.bad(rule, "lib/io/a.cpp", '#include "cli/tool.hpp"\n')
         self.bad(rule, "lib/io/a.cpp", '#include "picture.hpp"\n')
         self.bad(rule, "lib/surface/CMakeLists.txt", "tunica_library(surface LINKS tunica_shell)\n")
+        self.bad(rule, "lib/volume/CMakeLists.txt", "tunica_library(volume LINKS tunica_shell)\n")
         self.good(rule, "lib/volume/a.hpp", '#include "surface/triangle_mesh.hpp"\n')
         self.good(rule, "lib/shell/a.cpp", '#include "surface/measure.hpp"\n#include "core/types.hpp"\n')
         self.good(rule, "tools/relax.cpp", '#include "cli/tool.hpp"\n')
