@@ -67,6 +67,7 @@ public:
   using std::logic_error::logic_error;
 };
 
+/// What a failed TUNICA_ASSERT calls. Errors: InternalError with the condition and its place.
 [[noreturn]] void assertion_failed(const char* condition, const char* file, int line);
 
 }  // namespace tunica

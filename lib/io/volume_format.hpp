@@ -18,6 +18,7 @@ namespace tunica::volume_format {
 /// Stored types, in the order of Volume::Data's alternatives.
 enum class VoxelType { uint8, int8, uint16, int16, uint32, int32, uint64, int64, float32, float64 };
 
+/// Bytes of one stored voxel, and the type's name for messages.
 std::size_t size_of(VoxelType type);
 std::string name_of(VoxelType type);
 
@@ -115,6 +116,7 @@ bool looks_like_metaimage(std::string_view head);
 bool looks_like_tiff(std::string_view head);
 bool looks_like_png(std::string_view head);
 
+/// Each reads a whole file of its format, detached data included. Errors: InputError naming the file.
 VolumeFile read_nifti(const std::filesystem::path& path, const VolumeOptions& options);
 VolumeFile read_nrrd(const std::filesystem::path& path, const VolumeOptions& options);
 VolumeFile read_metaimage(const std::filesystem::path& path, const VolumeOptions& options);

@@ -30,6 +30,7 @@ inline Vec3 logarithm(const Eigen::Quaterniond& q) {
   return (2 * std::atan2(sine, std::abs(q.w())) / sine * sign) * q.vec();
 }
 
+/// Rotation vector, of length at most pi, of a rotation matrix.
 inline Vec3 logarithm(const Mat3& rotation) {
   // Small rotations directly, to keep the relative accuracy of their components.
   const Vec3 axis =
@@ -51,6 +52,7 @@ struct SpinCoefficients {
   double mu = 0;
 };
 
+/// The coefficients for a rotation by `angle` (radians), by their series where it is small.
 inline SpinCoefficients spin_coefficients(double angle) {
   const double t2 = angle * angle;
   if (angle < 0.1) {

@@ -64,6 +64,7 @@ struct ShellSystem {
 /// triangles, an edge load on an edge that is not there).
 ShellSystem make_system(const Model& model);
 
+/// The configuration without displacements and rotations.
 Configuration reference_configuration(const ShellSystem& system);
 
 /// Adds spin and displacement increments (6 per node).

@@ -62,6 +62,7 @@ void check_model(const Model& model, const RunSettings& settings);
 Summary solve(const Model& model, const RunSettings& settings, const std::function<void(const State&)>& on_state,
               const Progress& progress = {});
 
+/// Forces, moments and stresses of every triangle in one state.
 ElementFields element_fields(const Model& model, const State& state);
 
 }  // namespace tunica

@@ -24,6 +24,7 @@ double area(const TriangleMesh& mesh);
 /// Limits: of an open mesh it is the volume of the cone from the centre of the bounding box.
 double signed_volume(const TriangleMesh& mesh);
 
+/// Area of a triangle, mm^2.
 double triangle_area(const Vec3& a, const Vec3& b, const Vec3& c);
 
 /// Smallest of the three angles, degrees; 0 for a degenerate triangle.
