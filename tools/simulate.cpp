@@ -239,7 +239,7 @@ Scene scene_of_flags(const Arguments& a) {
     SceneFix fix;
     fix.body = shell.name;
     fix.where = parse_fix(text);
-    fix.places = {{fmt::format("--fix '{}'", text), true}, {}};
+    fix.places = {{fmt::format("{}: --fix '{}'", shell.mesh.string(), text), true}, {}};
     scene.fixes.push_back(fix);
   }
   settle_solver(scene);
@@ -247,9 +247,20 @@ Scene scene_of_flags(const Arguments& a) {
   return scene;
 }
 
+// Mechanics knows bodies, not files: says which file a refused or unsolved model came from.
+template <typename Work>
+auto naming(const fs::path& file, const Work& work) {
+  try {
+    return work();
+  } catch (const InputError& error) {
+    throw InputError(fmt::format("{}: {}", file.string(), error.what()));
+  } catch (const RequirementError& error) {
+    throw RequirementError(fmt::format("{}: {}", file.string(), error.what()));
+  }
+}
+
 // Which files the positional arguments name; OUT is empty where --check needs none.
-fs::path output_path(const cli::Tool& tool, const CLI::App& app, const Arguments& a) {
-  (void)tool;
+fs::path output_path(const CLI::App& app, const Arguments& a) {
   const bool from_scene = !a.scene.empty();
   if (from_scene) {
     for (const char* flag : scene_says) {
@@ -346,10 +357,10 @@ void report_state(Json& result, const Model& model, const State& state, bool dyn
   }
 }
 
-void report_summary(Json& result, const Summary& summary, std::optional<double> duration) {
+void report_summary(Json& result, const Summary& summary, bool converged, std::optional<double> duration) {
   result["dof"] = summary.dof;
   result["steps"] = summary.steps;
-  result["converged"] = summary.converged;
+  result["converged"] = converged;
   result["max_displacement_mm"] = summary.max_displacement;
   result["volume_before_mm3"] = or_null(summary.volume_before);
   result["volume_after_mm3"] = or_null(summary.volume_after);
@@ -372,7 +383,7 @@ void report_summary(Json& result, const Summary& summary, std::optional<double> 
 }
 
 void simulate(cli::Tool& tool, const Arguments& a) {
-  const fs::path out = output_path(tool, tool.arguments(), a);
+  const fs::path out = output_path(tool.arguments(), a);
   std::vector<fs::path> inputs;
   const auto register_input = [&](const fs::path& path) {
     inputs.push_back(tool.input(path));
@@ -405,7 +416,8 @@ void simulate(cli::Tool& tool, const Arguments& a) {
 
   stage.emplace(tool, "setup");
   prepare_result(tool.result(), model);
-  check_model(model, scene.run);
+  const fs::path& subject = inputs.front();
+  naming(subject, [&] { check_model(model, scene.run); });
   const std::string text = scene_text(scene);
   if (a.check) {
     fmt::print("{}", text);
@@ -420,18 +432,19 @@ void simulate(cli::Tool& tool, const Arguments& a) {
   stage.emplace(tool, "write");
   ResultFile file(out, model, options);
   stage.emplace(tool, "solve");
-  const Summary summary = solve(
-      model, scene.run,
-      [&](const State& state) {
-        stage.emplace(tool, "write");
-        report_state(tool.result(), model, state, dynamic != nullptr);
-        file.append(state, element_fields(model, state));
-        stage.emplace(tool, "solve");
-      },
-      tool.progress("solve"));
+  const auto on_state = [&](const State& state) {
+    stage.emplace(tool, "write");
+    report_state(tool.result(), model, state, dynamic != nullptr);
+    file.append(state, element_fields(model, state));
+    stage.emplace(tool, "solve");
+  };
+  const Summary summary = naming(subject, [&] { return solve(model, scene.run, on_state, tool.progress("solve")); });
   stage.emplace(tool, "write");
-  report_summary(tool.result(), summary, dynamic != nullptr ? std::optional(dynamic->duration) : std::nullopt);
-  file.commit(summary.converged);
+  // A fixed count of iterations asks for no convergence, so none is claimed.
+  const bool converged = summary.converged && !scene.run.cg_fixed_count;
+  report_summary(tool.result(), summary, converged,
+                 dynamic != nullptr ? std::optional(dynamic->duration) : std::nullopt);
+  file.commit(converged);
 }
 
 }  // namespace

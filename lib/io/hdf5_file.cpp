@@ -20,6 +20,10 @@ static_assert(std::is_same_v<Id, hid_t> && std::is_same_v<Size, hsize_t>);
 constexpr unsigned gzip_level = 1;
 constexpr Size most_chunk_bytes = Size{4} << 20;
 
+// After a write that failed (a full disk), HDF5 1.10 crashes when it closes what it could not flush, also at exit. Then
+// nothing more is asked of it: what was flushed before is whole, and the process is about to end with an error.
+bool library_failed = false;
+
 Size product(const std::vector<Size>& shape) {
   return std::accumulate(shape.begin(), shape.end(), Size{1}, std::multiplies<>());
 }
@@ -30,6 +34,9 @@ bool Handle::close() {
   const Id id = std::exchange(id_, -1);
   if (id < 0) {
     return true;
+  }
+  if (library_failed) {
+    return false;
   }
   switch (H5Iget_type(id)) {
     case H5I_FILE:
@@ -51,6 +58,7 @@ bool Handle::close() {
 
 Writer::Writer(const std::filesystem::path& path) : name_(path.string()) {
   // Errors become exceptions; the library's own account of them is not for users.
+  (void)H5dont_atexit();
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
   errno = 0;
   const Handle access = own(H5Pcreate(H5P_FILE_ACCESS), "created");
@@ -61,6 +69,7 @@ Writer::Writer(const std::filesystem::path& path) : name_(path.string()) {
 
 void Writer::check(int result, const std::string& doing) const {
   if (result < 0) {
+    library_failed = true;
     const std::string why = errno != 0 ? fmt::format(": {}", std::strerror(errno)) : std::string();
     throw OutputError(fmt::format("{}: cannot be {}{}", name_, doing, why));
   }

@@ -3,9 +3,9 @@
 #include "io/mesh_file.hpp"
 #include "surface/measure.hpp"
 
-#include <Eigen/Geometry>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <Eigen/Geometry>
 
 #include <algorithm>
 #include <cmath>

@@ -1,17 +1,16 @@
 #include "mechanics/curved_displacement.hpp"
 
 #include "core/threads.hpp"
-
-#include <Eigen/Geometry>
+#include "mechanics/rotation.hpp"
 
 namespace tunica {
 namespace {
 
 constexpr std::size_t vertices_per_block = 4096;
 
-Vec3 turned(const Vec3& normal, const Vec3& rotation) {
-  const double angle = rotation.norm();
-  return angle > 0 ? Vec3(Eigen::AngleAxisd(angle, rotation / angle) * normal) : normal;
+// In the linear theory a rotation is not a finite one: the normal moves by rotation x normal.
+Vec3 turned(const Vec3& normal, const Vec3& rotation, bool linear) {
+  return linear ? Vec3((normal + rotation.cross(normal)).normalized()) : Vec3(exponential(rotation) * normal);
 }
 
 }  // namespace
@@ -39,7 +38,7 @@ std::vector<Vec3> curved_displacement(const Model& model, std::size_t body, cons
           moves[k] = state.displacement[first + node];
           corner.vertices[k] = mesh.vertices[node] + moves[k];
           corner.corner_normals[0][k] =
-              turned(mesh.normal(triangle, static_cast<int>(k)), state.rotation[first + node]);
+              turned(mesh.normal(triangle, static_cast<int>(k)), state.rotation[first + node], state.linear);
         }
         reference = curved_patch(mesh, triangle);
         deformed.reset();

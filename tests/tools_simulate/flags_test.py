@@ -1,0 +1,282 @@
+"""The command line of tunica-simulate: every flag, every exit code, signals, --check."""
+import os
+import resource
+import signal
+import subprocess
+import time
+import unittest
+
+import h5py
+import numpy as np
+
+from support import SIMULATE, SimulateTest, grid, sphere, write_ply
+
+MATERIAL = ["--young", "1MPa", "--poisson", "0.3", "--thickness", "0.5mm"]
+PRESSED = MATERIAL + ["--pressure", "100Pa"]
+HELD = PRESSED + ["--fix", "rigid-motions", "--static"]
+DYNAMIC = PRESSED + ["--density", "1100kg/m3", "--duration", "0.1s", "--step", "10ms"]
+
+RESULT_KEYS = ["shells", "tetrahedra", "nodes", "dof", "steps", "converged", "max_displacement_mm", "volume_before_mm3",
+               "volume_after_mm3", "strain_energy_mj", "residual", "algebraic_error_percent", "newton_iterations",
+               "cg_iterations", "ms_per_step", "real_time_factor", "probes", "frequencies_hz", "buckling_factors"]
+
+
+class Flags(SimulateTest):
+    def setUp(self):
+        super().setUp()
+        write_ply(self.path("ball.ply"), *sphere(1, 10))
+        write_ply(self.path("plate.ply"), *grid(4, 4, 10, 10))
+
+    def test_report_holds_the_keys_of_the_contract(self):
+        report = self.run_tool("ball.ply", "out.hdf", *HELD)
+        self.assertEqual(list(report["result"]), RESULT_KEYS)
+        result = report["result"]
+        self.assertEqual((result["shells"], result["tetrahedra"], result["nodes"]), (80, 0, 42))
+        self.assertTrue(result["converged"])
+        self.assertEqual(result["steps"], 10)
+        self.assertLess(result["residual"], 1e-8)
+        self.assertIsNone(result["real_time_factor"])
+        self.assertGreater(result["volume_after_mm3"], result["volume_before_mm3"])
+        self.assertEqual(set(result["ms_per_step"]), {"median", "max"})
+        self.assertEqual(list(report["seconds"]), ["total", "read", "setup", "solve", "write"])
+        self.assertTrue(all(report["seconds"][stage] > 0 for stage in report["seconds"]))
+        self.assertEqual([i["path"] for i in report["inputs"]], ["ball.ply"])
+        self.assertEqual(report["outputs"], ["out.hdf"])
+        self.assertEqual(os.listdir(self.folder).count("out.hdf.part"), 0)
+
+    def test_open_body_has_no_volume(self):
+        result = self.run_tool("plate.ply", "out.hdf", *PRESSED, "--fix", "boundary", "--static")["result"]
+        self.assertIsNone(result["volume_before_mm3"])
+        self.assertIsNone(result["volume_after_mm3"])
+
+    def test_dynamic_run(self):
+        report = self.run_tool("ball.ply", "out.hdf", *DYNAMIC, "--ramp", "50ms", "--every", "4")
+        result = report["result"]
+        self.assertEqual(result["steps"], 10)
+        self.assertGreater(result["real_time_factor"], 0)
+        with h5py.File(self.path("out.hdf")) as file:
+            np.testing.assert_allclose(file["tunica/history/time"], [0, 0.04, 0.08, 0.1], atol=1e-12)
+            np.testing.assert_allclose(file["tunica/history/load_factor"], [0, 0.8, 1, 1], atol=1e-12)
+
+    def test_load_steps(self):
+        self.assertEqual(self.run_tool("ball.ply", "out.hdf", *HELD, "--load-steps", "3")["result"]["steps"], 3)
+
+    def test_fixes_unite(self):
+        self.run_tool("plate.ply", "out.hdf", *PRESSED, "--static", "--fix", "below x=0mm", "--fix", "above x = 1cm")
+        with h5py.File(self.path("out.hdf")) as file:
+            u = file["tunica/nodes/displacement"][-1].reshape(5, 5, 3)
+            self.assertTrue((u[:, [0, 4]] == 0).all())
+            self.assertTrue((u[:, 1:4, 2] > 0).all())
+
+    def test_solvers_and_elements_are_chosen(self):
+        reference = self.run_tool("ball.ply", "a.hdf", *HELD, "--solver", "direct")["result"]
+        self.assertEqual(reference["cg_iterations"], 0)
+        by_cg = self.run_tool("ball.ply", "b.hdf", *HELD, "--solver", "cg")["result"]
+        self.assertGreater(by_cg["cg_iterations"], 0)
+        self.assertAlmostEqual(by_cg["max_displacement_mm"] / reference["max_displacement_mm"], 1, places=6)
+        for flag, names in (("--membrane", ["cst", "opt", "adapt"]), ("--bending", ["comas", "comas-consistent", "dkt"])):
+            values = set()
+            for name in names:
+                result = self.run_tool("plate.ply", "c.hdf", "--force", *PRESSED, "--static", "--fix",
+                                       "below x=0mm", "--load-steps", "2", flag, name)["result"]
+                values.add(result["max_displacement_mm"])
+            self.assertGreater(len(values), 1, f"{flag} changes nothing")
+
+    def test_fixed_count_of_iterations_is_no_failure_and_not_converged(self):
+        result = self.run_tool("ball.ply", "out.hdf", *DYNAMIC, "--cg-iterations", "3")["result"]
+        self.assertFalse(result["converged"])
+        self.assertGreater(result["cg_iterations"], 0)
+        with h5py.File(self.path("out.hdf")) as file:
+            self.assertEqual(file["tunica/converged"][()], 0)
+
+    def test_tolerance_of_cg(self):
+        result = self.run_tool("ball.ply", "out.hdf", *HELD, "--cg-tolerance", "5%", "--converge", "1e-6")["result"]
+        self.assertTrue(result["converged"])
+        self.assertLess(result["residual"], 1e-6)
+
+    def test_usage_errors(self):
+        def refused(*arguments, says):
+            self.run_tool(*arguments, expect=2)
+            self.assertIn(says, self.done.stderr)
+            self.assertFalse(os.path.exists(self.path("out.hdf")))
+
+        io = ["ball.ply", "out.hdf"]
+        for i in range(0, len(PRESSED), 2):
+            rest = PRESSED[:i] + PRESSED[i + 2:]
+            refused(*io, *rest, "--fix", "rigid-motions", "--static", says=f"{PRESSED[i]} is missing")
+        refused(*io, *PRESSED, "--duration", "1s", "--step", "1ms", says="--density is missing")
+        refused(*io, *PRESSED, "--duration", "1s", says="--step is missing")
+        refused(*io, *PRESSED, "--step", "1s", says="--duration is missing")
+        refused(*io, *PRESSED, says="--static is missing")
+        refused(*io, *HELD, "--duration", "1s", says="contradict")
+        refused(*io, *HELD, "--ramp", "1s", says="contradict")
+        refused(*io, *DYNAMIC, "--load-steps", "3", says="--load-steps")
+        refused(*io, *HELD, "--young", "1MPa", says="--young")
+        refused(*io, *HELD, "--load-steps", "0", says="--load-steps")
+        refused(*io, *HELD, "--every", "1.5", says="--every")
+        refused(*io, *HELD, "--solver", "lu", says="--solver")
+        refused(*io, *HELD, "--membrane", "dkt", says="--membrane")
+        refused(*io, *HELD, "--bending", "cst", says="--bending")
+        refused(*io, *HELD, "--cg-tolerance", "0.05", says="5%")
+        refused(*io, *HELD, "--cg-tolerance", "200%", says="--cg-tolerance")
+        refused(*io, *HELD, "--converge", "nan", says="--converge")
+        refused(*io, *HELD, "--converge", "0", says="--converge")
+        refused(*io, *HELD, "--solver", "direct", "--cg-iterations", "3", says="direct")
+        refused(*io, *HELD, "--fix", "below z=3", says="no unit")
+        refused(*io, *HELD, "--fix", "under z=3mm", says="--fix")
+        refused(*io, *HELD, "--mesh-unit", "inch", says="unit of length")
+        refused(*io, *HELD, "--resume", says="not available yet")
+        refused(*io, *HELD, "--export", "pvd", says="not available yet")
+        refused(*io, *HELD, "--frobnicate", says="--frobnicate")
+        refused("ball.ply", *HELD, says="OUT.hdf is missing")
+        refused("ball.ply", "ball.ply", *HELD, "--force", says="is an input")
+        refused("--scene", "a.toml", says="OUT.hdf is missing")
+        refused("--scene", "a.toml", "out.hdf", "--young", "1MPa", says="contradict")
+        refused("--scene", "a.toml", "out.hdf", "--static", says="contradict")
+        refused("--scene", "a.toml", "ball.ply", "out.hdf", says="too many")
+        for flag, bare in (("--young", "1"), ("--thickness", "1"), ("--pressure", "1"), ("--density", "1"),
+                           ("--young", "1mm"), ("--poisson", "0.3mm"), ("--poisson", "0.5"), ("--thickness", "-1mm"),
+                           ("--thickness", "0mm"), ("--young", "-1MPa")):
+            arguments = [word for pair in zip(PRESSED[::2], PRESSED[1::2]) if pair[0] != flag for word in pair]
+            refused(*io, *arguments, "--static", "--fix", "rigid-motions", flag, bare, says=flag)
+
+    def test_input_errors(self):
+        def refused(*arguments, says):
+            report = self.run_tool(*arguments, expect=3)
+            self.assertIn(says, self.done.stderr)
+            self.assertFalse(report["ok"])
+            self.assertIn(says, report["error"])
+            self.assertFalse(os.path.exists(self.path("out.hdf.part")))
+
+        refused("nosuch.ply", "out.hdf", *HELD, says="nosuch.ply: no such file")
+        refused("ball.ply", "out.hdf", *PRESSED, "--static", says="ball.ply: ")  # free to move
+        refused("ball.ply", "out.hdf", *PRESSED, "--static", "--fix", "boundary", says="closed")
+        refused("ball.ply", "out.hdf", *PRESSED, "--static", "--fix", "below z=-1m", says="selects no node")
+        refused("--scene", "nosuch.toml", "out.hdf", says="nosuch.toml: no such file")
+        self.write("bad.toml", "[run]\nkind = \"static\"\n[[shell]]\nname = 3\n")
+        refused("--scene", "bad.toml", "out.hdf", says="bad.toml:4:8: ")
+        self.write("later.toml", "[run]\nkind = \"buckling\"\n")
+        self.run_tool("--scene", "later.toml", "out.hdf", expect=2)
+        self.assertIn("later.toml:2:8: ", self.done.stderr)
+
+    def test_mesh_without_a_unit_needs_one(self):
+        vertices, triangles, _ = sphere(1, 0.01)
+        lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
+        lines += [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in triangles]
+        self.write("ball.obj", "\n".join(lines) + "\n")
+        self.run_tool("ball.obj", "out.hdf", *HELD, expect=2)
+        self.assertIn("--mesh-unit", self.done.stderr)
+        metres = self.run_tool("ball.obj", "out.hdf", *HELD, "--mesh-unit", "m")["result"]
+        self.assertAlmostEqual(metres["volume_before_mm3"] / 4188.79, 1, delta=0.15)
+        self.assertIn("no normals", self.done.stderr)
+
+    def test_no_equilibrium_is_a_requirement_not_met(self):
+        pressed = [word if word != "100Pa" else "10MPa" for word in HELD]
+        report = self.run_tool("ball.ply", "out.hdf", *pressed, expect=4)
+        self.assertIn("ball.ply: ", report["error"])
+        self.assertFalse(report["result"]["converged"])
+        self.assertFalse(os.path.exists(self.path("out.hdf")))
+        with h5py.File(self.path("out.hdf.part")) as file:  # the last good state
+            self.assertEqual(file["tunica/converged"][()], 0)
+            last = file["tunica/nodes/displacement"][-1]
+            self.assertTrue(np.isfinite(last).all())
+            self.assertAlmostEqual(np.linalg.norm(last, axis=1).max(), report["result"]["max_displacement_mm"])
+
+    def test_outputs_that_cannot_be_written(self):
+        self.run_tool("ball.ply", "out.hdf", *HELD)
+        self.run_tool("ball.ply", "out.hdf", *HELD, expect=5)
+        self.assertIn("--force", self.done.stderr)
+        self.run_tool("ball.ply", "out.hdf", *HELD, "--force")
+        self.run_tool("ball.ply", "nosuch/out.hdf", *HELD, expect=5)
+
+    def test_full_disk(self):
+        for size in (2000, 60_000, 200_000):
+            def limit(size=size):
+                signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+                resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+
+            self.done = subprocess.run([SIMULATE, "ball.ply", "full.hdf", *DYNAMIC], cwd=self.folder, text=True,
+                                       capture_output=True, check=False, preexec_fn=limit, restore_signals=False)
+            self.assertEqual(self.done.returncode, 5, self.done.stderr)
+            self.assertEqual(len(self.done.stderr.strip().splitlines()), 1, self.done.stderr)
+            self.assertIn("full.hdf", self.done.stderr)
+            self.assertFalse(os.path.exists(self.path("full.hdf")))
+
+    def test_check_prints_a_scene_that_gives_the_same_run(self):
+        self.run_tool("ball.ply", *HELD, "--check")
+        text = self.done.stdout
+        self.assertIn("young = \"1e+06Pa\"", text)
+        self.assertEqual(os.listdir(self.folder).count("out.hdf"), 0)
+        self.write("scene.toml", text)
+        self.run_tool("--scene", "scene.toml", "--check")
+        self.assertEqual(self.done.stdout, text)
+        by_flags = self.run_tool("ball.ply", "a.hdf", *HELD, "--threads", "1")["result"]
+        by_scene = self.run_tool("--scene", "scene.toml", "b.hdf", "--threads", "1")["result"]
+        self.assertEqual(by_flags["max_displacement_mm"], by_scene["max_displacement_mm"])
+        with h5py.File(self.path("a.hdf")) as a:
+            self.assertEqual(a["tunica/scene"][()].decode(), text)
+        self.run_tool("ball.ply", *PRESSED, "--static", "--check", expect=3)  # free to move: check finds it
+
+    def test_quiet_says_nothing_and_help_says_much(self):
+        self.run_tool("ball.ply", "out.hdf", *HELD, "--quiet")
+        self.assertEqual(self.done.stderr + self.done.stdout, "")
+        self.done = subprocess.run([SIMULATE, "--help"], capture_output=True, text=True, check=True)
+        for flag in ("--young", "--fix", "--scene", "--cg-iterations", "--check", "--mesh-unit", "Example"):
+            self.assertIn(flag, self.done.stdout)
+
+
+class Stopped(SimulateTest):
+    LONG = PRESSED + ["--density", "1100kg/m3", "--duration", "1000s", "--step", "5ms", "--quiet"]
+
+    def start(self):
+        write_ply(self.path("ball.ply"), *sphere(1, 10))
+        running = subprocess.Popen([SIMULATE, "ball.ply", "out.hdf", *self.LONG, "--report", self.path("r.json"),
+                                    "--force"], cwd=self.folder, stderr=subprocess.PIPE, text=True)
+        self.addCleanup(running.stderr.close)
+        self.addCleanup(running.wait)
+        self.addCleanup(running.kill)
+        for _ in range(600):  # until a few states are there: the file can be read while it grows
+            time.sleep(0.05)
+            try:
+                with h5py.File(self.path("out.hdf.part"), "r") as file:
+                    if file["VTKHDF/Steps"].attrs["NSteps"] >= 3:
+                        return running
+            except (OSError, KeyError):
+                pass
+        self.fail("no state was written within 30 s")
+
+    def check_part(self):
+        with h5py.File(self.path("out.hdf.part"), "r") as file:
+            steps = file["VTKHDF/Steps"].attrs["NSteps"]
+            self.assertGreaterEqual(steps, 3)
+            points = file["VTKHDF/NumberOfPoints"][0]
+            self.assertGreaterEqual(file["VTKHDF/PointData/displacement"].shape[0], steps * points)
+            self.assertTrue(np.isfinite(file["VTKHDF/PointData/displacement"][:steps * points]).all())
+            u = file["tunica/nodes/displacement"][:steps]
+            self.assertTrue(np.isfinite(u).all())
+            self.assertTrue((np.abs(u[1:]).max(axis=(1, 2)) > 0).all())
+            np.testing.assert_allclose(file["VTKHDF/Steps/Values"][:steps], 0.005 * np.arange(steps), atol=1e-9)
+            self.assertEqual(file["tunica/converged"][()], 0)
+        self.assertFalse(os.path.exists(self.path("out.hdf")))
+
+    def test_kill_leaves_a_readable_part(self):
+        for delay in (0, 0.037, 0.113):
+            running = self.start()
+            time.sleep(delay)
+            running.kill()
+            running.wait()
+            self.check_part()
+            os.remove(self.path("out.hdf.part"))
+
+    def test_interrupt_and_terminate(self):
+        for number, code in ((signal.SIGINT, 130), (signal.SIGTERM, 143)):
+            running = self.start()
+            running.send_signal(number)
+            self.assertEqual(running.wait(timeout=60), code)
+            self.check_part()
+            self.assertTrue(os.path.exists(self.path("r.json")))
+            os.remove(self.path("out.hdf.part"))
+
+
+if __name__ == "__main__":
+    unittest.main()
