@@ -51,6 +51,7 @@ void declare(cli::Tool& tool, Arguments& a) {
                  "under its own pressure)")
       ->type_name("WHERE")
       ->expected(1)
+      ->allow_extra_args(false)  // the next word is a file
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
   app.add_flag("--static", a.is_static, "solve for the state of rest");
   app.add_option("--load-steps", a.load_steps, "static: steps in which the load grows (default 10)")->type_name("N");

@@ -58,6 +58,12 @@ class Flags(SimulateTest):
             np.testing.assert_allclose(file["tunica/history/time"], [0, 0.04, 0.08, 0.1], atol=1e-12)
             np.testing.assert_allclose(file["tunica/history/load_factor"], [0, 0.8, 1, 1], atol=1e-12)
 
+    def test_order_of_words_does_not_matter(self):
+        for words in (["--static", "--fix", "rigid-motions", "ball.ply", "out.hdf", *MATERIAL],
+                      ["ball.ply", *MATERIAL, "--fix", "rigid-motions", "out.hdf", "--static"]):
+            result = self.run_tool(*words, "--pressure", "-0.5kPa", "--force")["result"]
+            self.assertLess(result["volume_after_mm3"], result["volume_before_mm3"])
+
     def test_load_steps(self):
         self.assertEqual(self.run_tool("ball.ply", "out.hdf", *HELD, "--load-steps", "3")["result"]["steps"], 3)
 

@@ -1,0 +1,188 @@
+#include "scene_fixture.hpp"
+
+#include "core/error.hpp"
+#include "io/result_file.hpp"
+#include "mechanics/curved_displacement.hpp"
+
+#include <gmock/gmock.h>
+#include <hdf5.h>
+#include <Eigen/Geometry>
+
+#include <numbers>
+
+namespace tunica::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+class ResultTest : public SceneTest {
+protected:
+  ResultTest() {
+    model_ = load(R"(
+[run]
+kind = "static"
+[[shell]]
+name = "ball"
+mesh = "ball.ply"
+thickness = "0.5mm"
+young = "1MPa"
+poisson = 0.3
+[[shell]]
+name = "plate"
+mesh = "plate.ply"
+thickness = "0.1mm"
+young = "1MPa"
+poisson = 0.3
+[[probe]]
+name = "last"
+body = "plate"
+nearest = ["10mm", "10mm", "0mm"]
+)")
+                 .model;
+    options_.scene = "[run]\n";
+    options_.command = "tunica-simulate";
+    options_.inputs = {{"ball.ply", "00"}, {"a longer name.ply", "11"}};
+  }
+
+  /// The whole model turned by `rotation` about `centre` and moved by `shift`.
+  [[nodiscard]] State moved(const Vec3& rotation, const Vec3& centre, const Vec3& shift) const {
+    const Mat3 turn = Eigen::AngleAxisd(rotation.norm(), rotation.stableNormalized()).toRotationMatrix();
+    State state;
+    state.time = state.load_factor = 0.5;
+    for (const ShellBody& body : model_.shells) {
+      for (const Vec3& x : body.mesh.vertices) {
+        state.displacement.emplace_back(turn * (x - centre) + centre + shift - x);
+        state.rotation.push_back(rotation);
+      }
+    }
+    return state;
+  }
+
+  [[nodiscard]] ElementFields fields(double value) const {
+    std::size_t count = 0;
+    for (const ShellBody& body : model_.shells) {
+      count += body.mesh.triangles.size();
+    }
+    ElementFields result;
+    result.membrane_force.assign(count, Vec3::Constant(value));
+    result.bending_moment.assign(count, Vec3::Constant(2 * value));
+    result.von_mises_top.assign(count, value);
+    result.von_mises_bottom.assign(count, value);
+    for (std::size_t i = 0; i < count; ++i) {
+      result.pressure.push_back(static_cast<double>(i));
+    }
+    return result;
+  }
+
+  /// All values of a data set, as double.
+  static std::vector<double> values(const fs::path& path, const char* name) {
+    const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
+    EXPECT_GE(file, 0) << path;
+    const hid_t set = H5Dopen2(file, name, H5P_DEFAULT);
+    EXPECT_GE(set, 0) << name;
+    const hid_t space = H5Dget_space(set);
+    std::vector<double> result(static_cast<std::size_t>(H5Sget_simple_extent_npoints(space)));
+    EXPECT_GE(H5Dread(set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, result.data()), 0);
+    H5Sclose(space);
+    H5Dclose(set);
+    H5Fclose(file);
+    return result;
+  }
+
+  [[nodiscard]] fs::path out() const { return folder_ / "out.hdf"; }
+  [[nodiscard]] fs::path part() const { return folder_ / "out.hdf.part"; }
+
+  Model model_;
+  ResultOptions options_;
+};
+
+TEST_F(ResultTest, rigidMotionMovesTheCurvedSurfaceRigidly) {
+  const Vec3 rotation = 2.5 * Vec3(1, -2, 0.5).normalized();
+  const Vec3 centre(3, 1, -7);
+  const Vec3 shift(100, 0, 4);
+  const State state = moved(rotation, centre, shift);
+  const Mat3 turn = Eigen::AngleAxisd(rotation.norm(), rotation.normalized()).toRotationMatrix();
+  for (std::size_t body = 0; body < model_.shells.size(); ++body) {
+    const Tessellation surface = tessellate_uniformly(model_.shells[body].mesh, 3);
+    const std::vector<Vec3> u = curved_displacement(model_, body, state, surface);
+    ASSERT_EQ(u.size(), surface.mesh.vertices.size());
+    for (std::size_t v = 0; v < u.size(); ++v) {
+      const Vec3& x = surface.mesh.vertices[v];
+      EXPECT_LT((u[v] - (turn * (x - centre) + centre + shift - x)).norm(), 1e-11);
+    }
+  }
+}
+
+TEST_F(ResultTest, aNormalTurnedIntoItsFacetStillGivesADisplacement) {
+  State state = moved(Vec3::Zero(), Vec3::Zero(), Vec3(0, 0, 1));
+  state.rotation[0] = Vec3(0, std::numbers::pi / 2, 0);
+  const Tessellation surface = tessellate_uniformly(model_.shells[0].mesh, 2);
+  for (const Vec3& u : curved_displacement(model_, 0, state, surface)) {
+    EXPECT_TRUE(u.allFinite());
+    EXPECT_LT(u.norm(), 20);
+  }
+}
+
+TEST_F(ResultTest, aSeriesGrowsAndASingleStateIsReplaced) {
+  for (const bool series : {false, true}) {
+    options_.series = series;
+    options_.overwrite = true;
+    ResultFile file(out(), model_, options_);
+    file.append(moved(Vec3::Zero(), Vec3::Zero(), Vec3::Zero()), fields(0));
+    file.append(moved(Vec3::Zero(), Vec3::Zero(), Vec3(1, 2, 3)), fields(7));
+    file.commit(true);
+    const double points = values(out(), "/VTKHDF/NumberOfPoints").at(0);
+    const double cells = values(out(), "/VTKHDF/NumberOfCells").at(0);
+    EXPECT_EQ(points, 40 * 15);  // 8 + 32 shells, 4 pieces per edge
+    EXPECT_EQ(cells, 40 * 16);
+    const double states = series ? 2 : 1;
+    const std::vector<double> u = values(out(), "/VTKHDF/PointData/displacement");
+    ASSERT_EQ(static_cast<double>(u.size()), 3 * points * states);
+    EXPECT_NEAR(u[u.size() - 1], 3, 1e-6);
+    const std::vector<double> pressure = values(out(), "/VTKHDF/CellData/pressure");
+    ASSERT_EQ(static_cast<double>(pressure.size()), cells * states);
+    EXPECT_EQ(pressure[0], 0);
+    EXPECT_EQ(pressure[16], 1);
+    EXPECT_EQ(pressure.back(), 39);
+    EXPECT_EQ(values(out(), "/VTKHDF/CellData/bending_moment").back(), 14);
+    const std::vector<double> body = values(out(), "/VTKHDF/CellData/body");
+    EXPECT_EQ(body.front(), 0);
+    EXPECT_EQ(body.back(), 1);
+    EXPECT_NEAR(values(out(), "/VTKHDF/PointData/thickness").front(), 0.5, 1e-7);
+    EXPECT_NEAR(values(out(), "/VTKHDF/PointData/thickness").back(), 0.1, 1e-7);
+    EXPECT_EQ(values(out(), "/tunica/nodes/displacement").size(), 2U * 31 * 3);
+    EXPECT_THAT(values(out(), "/tunica/probes/last/displacement"), ::testing::ElementsAre(0, 0, 0, 1, 2, 3));
+    EXPECT_TRUE(std::isnan(values(out(), "/tunica/history/volume").at(0)));
+    EXPECT_THAT(values(out(), "/tunica/converged"), ::testing::ElementsAre(1));
+    EXPECT_FALSE(fs::exists(part()));
+  }
+}
+
+TEST_F(ResultTest, thePartStaysFromTheFirstStateOn) {
+  { const ResultFile file(out(), model_, options_); }
+  EXPECT_FALSE(fs::exists(part()));
+  {
+    ResultFile file(out(), model_, options_);
+    file.append(moved(Vec3::Zero(), Vec3::Zero(), Vec3(1, 2, 3)), fields(7));
+  }
+  EXPECT_EQ(values(part(), "/tunica/nodes/displacement").back(), 3);
+  EXPECT_THAT(values(part(), "/tunica/converged"), ::testing::ElementsAre(0));
+  EXPECT_FALSE(fs::exists(out()));
+}
+
+TEST_F(ResultTest, anExistingResultIsKept) {
+  (void)folder_.file("out.hdf", "precious");
+  EXPECT_THROW(ResultFile(out(), model_, options_), OutputError);
+  EXPECT_EQ(bytes_of(out()), "precious");
+}
+
+TEST_F(ResultTest, largeModelsAreDrawnCoarser) {
+  EXPECT_EQ(drawing_level(1), 4);
+  EXPECT_EQ(drawing_level(12'500), 4);
+  EXPECT_EQ(drawing_level(12'501), 3);
+  EXPECT_EQ(drawing_level(50'000), 2);
+  EXPECT_EQ(drawing_level(1'000'000), 1);
+}
+
+}  // namespace
+}  // namespace tunica::test
