@@ -181,6 +181,18 @@ Vec3 CubicPatch::normal(const Vec2& b) const {
   return d[0].cross(d[1]).stableNormalized();
 }
 
+double averaged_centre(const std::array<Vec3, 3>& edges, const std::array<double, 10>& ordinates) {
+  const auto& b = ordinates;
+  double sum = 0;
+  for (std::size_t i = 0; i < 3; ++i) {  // edge i is the x axis
+    const std::size_t next = (i + 1) % 3;
+    const std::size_t previous = (i + 2) % 3;
+    const double foot = -edges[previous].dot(edges[i]) / edges[i].squaredNorm();
+    sum += centre_ordinate(foot, b[i], b[3 + 2 * i], b[4 + 2 * i], b[next], b[4 + 2 * previous], b[3 + 2 * next]);
+  }
+  return sum / 3;
+}
+
 Deflection comas_deflection(const std::array<Vec3, 3>& corners, const std::array<Vec3, 3>& normals) {
   const std::array<Vec3, 3> edges{corners[1] - corners[0], corners[2] - corners[1], corners[0] - corners[2]};
   Deflection w;
@@ -194,15 +206,7 @@ Deflection comas_deflection(const std::array<Vec3, 3>& corners, const std::array
     b[3 + 2 * i] = -normals[i].dot(edges[i]) / (3 * agreement);
     b[4 + 2 * previous] = normals[i].dot(edges[previous]) / (3 * agreement);
   }
-  // Edge 1-2 as the x axis, then 2-3, then 3-1.
-  double centre = 0;
-  for (std::size_t i = 0; i < 3; ++i) {
-    const std::size_t next = (i + 1) % 3;
-    const std::size_t previous = (i + 2) % 3;
-    const double foot = -edges[previous].dot(edges[i]) / edges[i].squaredNorm();
-    centre += centre_ordinate(foot, 0, b[3 + 2 * i], b[4 + 2 * i], 0, b[4 + 2 * previous], b[3 + 2 * next]);
-  }
-  b[9] = centre / 3;
+  b[9] = averaged_centre(edges, b);
   return w;
 }
 
