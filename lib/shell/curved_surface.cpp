@@ -82,6 +82,11 @@ double coarsest_flatness(const CubicPatch& patch) {
                                  largest_norm(second_difference(p, along_b3, along_b3)));
 }
 
+/// Pieces per edge for which flatness() is at most `deviation`.
+double level_for(const CubicPatch& patch, double deviation) {
+  return std::max(1.0, std::ceil(std::sqrt(coarsest_flatness(patch) / deviation * (1 + 1e-12))));
+}
+
 std::array<Vec3, 3> corners_of(const ShellMesh& shell, std::size_t t) {
   const auto& v = shell.triangles[t];
   return {shell.vertices[v[0]], shell.vertices[v[1]], shell.vertices[v[2]]};
@@ -278,13 +283,21 @@ double flatness(const CubicPatch& patch, int level) {
   return coarsest_flatness(patch) / (static_cast<double>(level) * static_cast<double>(level));
 }
 
+double tessellation_size(const ShellMesh& shell, double deviation) {
+  double total = 0;
+  for (std::size_t t = 0; t < shell.triangles.size(); ++t) {
+    total += std::pow(level_for(curved_patch(shell, t), deviation), 2);
+  }
+  return total;
+}
+
 Tessellation tessellate(const ShellMesh& shell, double deviation, std::size_t most_triangles) {
   TUNICA_ASSERT(deviation > 0);
   const auto patches = all_patches(shell);
   std::vector<int> levels(patches.size());
   double total = 0;
   for (std::size_t t = 0; t < patches.size(); ++t) {
-    const double level = std::ceil(std::sqrt(coarsest_flatness(patches[t]) / deviation * (1 + 1e-12)));
+    const double level = level_for(patches[t], deviation);
     total += level * level;
     if (!(total <= static_cast<double>(most_triangles))) {
       throw RequirementError(
@@ -292,7 +305,7 @@ Tessellation tessellate(const ShellMesh& shell, double deviation, std::size_t mo
                       "allow a larger deviation",
                       deviation, most_triangles));
     }
-    levels[t] = std::max(1, static_cast<int>(level));
+    levels[t] = static_cast<int>(level);
   }
   return tessellate_by(shell, patches, levels);
 }

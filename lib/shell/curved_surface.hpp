@@ -74,6 +74,9 @@ struct Tessellation {
 /// Cost: O(#F), about (3/4 second difference / deviation) triangles per patch.
 Tessellation tessellate(const ShellMesh& shell, double deviation, std::size_t most_triangles = 100'000'000);
 
+/// How many triangles tessellate() would make.
+double tessellation_size(const ShellMesh& shell, double deviation);
+
 /// level >= 1 pieces per edge: level^2 triangles per patch. Its `deviation` is certified too.
 Tessellation tessellate_uniformly(const ShellMesh& shell, int level);
 
