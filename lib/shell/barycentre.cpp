@@ -242,7 +242,7 @@ NodeMoves move_by_barycentre(const Target& target, TriangleMesh& mesh, double of
       const auto barycentre = target.barycentre_of_three(mesh.vertices[v], sides[v], target.diagonal());
       if (barycentre && (*barycentre - foot->point).norm() <= shortest_edge[v] / 2) {
         const auto there = target.closest_facing(*barycentre, sides[v], target.diagonal());
-        if (there && there->distance <= std::max(off_target, foot->distance)) {
+        if (there && there->distance <= off_target) {
           goal[v] = *barycentre;
           way[v] = Way::rule;
         }

@@ -1,4 +1,5 @@
-// Normals by least squares (then least sixth powers) of the distances between the curved surface and the target.
+// Normals by coordinate descent: node by node the turn that lessens a power of the distances between the curved surface
+// and the target, accepted only when it truly does.
 #include "core/progress.hpp"
 #include "core/threads.hpp"
 #include "shell/curved_surface.hpp"
@@ -6,7 +7,7 @@
 #include "surface/incidence.hpp"
 
 #include <Eigen/Geometry>
-#include <Eigen/SparseCholesky>
+#include <Eigen/LU>
 
 #include <algorithm>
 #include <cmath>
@@ -14,18 +15,18 @@
 namespace tunica {
 namespace {
 
-constexpr int sample_level = 6;             // shell samples per facet: the grid of 28 points but the corners
+constexpr int sample_level = 4;  // shell samples per facet: the grid of 15 points but the corners
+constexpr std::size_t shell_samples = 12;
 constexpr int search_level = 4;             // pieces per edge of the surface on which target samples find their place
-constexpr std::size_t target_samples = 32;  // per shell, at most
-constexpr int square_steps = 4;
-constexpr int power_steps = 8;
-constexpr double power = 6;
+constexpr std::size_t target_samples = 24;  // per shell, at most
+constexpr std::array<double, 2> powers{4, 8};  // of the distances, one round each: the largest is what counts
+constexpr int sweeps = 4;                      // per round
+constexpr std::array<double, 3> step_lengths{1, 0.4, 0.1};
 constexpr double damping = 1e-3;      // of the diagonal
-constexpr double largest_turn = 0.3;  // rad per step
+constexpr double largest_turn = 0.4;  // rad
 constexpr double least_agreement = 0.25;
-constexpr std::size_t facets_per_block = 16;
+constexpr double settled = 1e-3;  // a sweep that lessens the cost by less than this part ends the round
 
-using Matrix6 = Eigen::Matrix<double, 6, 6>;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
 /// A sample: at `at` of its facet the surface should move by -distance along `direction`.
@@ -91,104 +92,120 @@ public:
       : target_(target),
         shell_(shell),
         around_(incidence(flat_facets(shell))),
-        facets_(facet_normals(flat_facets(shell))) {
-    const std::size_t vertices = target.mesh().vertices.size();
-    stride_ = std::max<std::size_t>(1, vertices / (target_samples * std::max<std::size_t>(1, shell.triangles.size())));
+        normals_(facet_normals(flat_facets(shell))),
+        facets_(shell.triangles.size()) {
+    for (std::size_t t = 0; t < facets_.size(); ++t) {
+      const auto p = corners(t);
+      facets_[t].area = (p[1] - p[0]).cross(p[2] - p[0]).norm() / 2;
+    }
+    colour();
   }
 
   NormalFit run() {
     NormalFit out;
-    std::vector<Vec3> best = shell_.normals;
-    double best_largest = gather();
-    out.largest_before = best_largest;
-    for (int step = 0; step < square_steps + power_steps; ++step) {
-      check_interrupt();
-      turn(step < square_steps ? 2 : power, largest_);
-      ++out.steps;
-      if (const double largest = gather(); largest < best_largest) {
-        best_largest = largest;
-        best = shell_.normals;
+    bool first = true;
+    for (const double power : powers) {
+      power_ = power;
+      sample_target();
+      scale_ = largest_distance();
+      if (first) {
+        out.largest_before = scale_;
       }
+      if (!(scale_ > 1e-12 * target_.diagonal())) {
+        break;
+      }
+      double cost = evaluate_all();
+      for (int sweep = 0; sweep < sweeps; ++sweep) {
+        for (const auto& nodes : colours_) {
+          check_interrupt();
+          parallel_for_blocks(nodes.size(), 8, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t i = begin; i < end; ++i) {
+              improve(nodes[i], first && sweep == 0);
+            }
+          });
+        }
+        ++out.sweeps;
+        double now = 0;
+        for (const Facet& facet : facets_) {
+          now += facet.state.cost;
+        }
+        const bool done = now > (1 - settled) * cost;
+        cost = now;
+        if (done) {
+          break;
+        }
+      }
+      first = false;
     }
-    shell_.normals = best;
-    out.largest_after = best_largest;
+    out.largest_after = largest_distance();
     return out;
   }
 
 private:
+  using Normals = std::array<Vec3, 3>;
+
+  /// What a facet's patch costs with some normals, and its samples.
+  struct State {
+    double cost = 0;
+    std::vector<Sample> samples;
+  };
+  /// A point of the target whose closest point lies on the facet's patch.
+  struct Attached {
+    Vec3 point;
+    Vec2 at;
+    Vec3 direction;  // the patch's normal there; beside the patch the way to it
+    double area;
+  };
+  struct Facet {
+    double area = 0;
+    std::vector<Attached> attached;
+    State state;
+  };
+
   std::array<Vec3, 3> corners(std::size_t t) const {
     const auto& v = shell_.triangles[t];
     return {shell_.vertices[v[0]], shell_.vertices[v[1]], shell_.vertices[v[2]]};
   }
-  std::array<Vec3, 3> normals(std::size_t t) const {
-    return {shell_.normal(t, 0), shell_.normal(t, 1), shell_.normal(t, 2)};
-  }
+  Normals normals(std::size_t t) const { return {shell_.normal(t, 0), shell_.normal(t, 1), shell_.normal(t, 2)}; }
 
-  /// Samples both surfaces as they are now. @return the largest distance
-  double gather() {
-    const std::size_t count = shell_.triangles.size();
-    samples_.assign(count, {});
-    parallel_for_blocks(count, facets_per_block, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t t = begin; t < end; ++t) {
-        sample_shell(t);
-      }
-    });
-    sample_target();
-    largest_ = 0;
-    for (const auto& of_facet : samples_) {
-      for (const Sample& s : of_facet) {
-        largest_ = std::max(largest_, s.distance);
-      }
-    }
-    return largest_;
-  }
-
-  void sample_shell(std::size_t t) {
-    const auto p = corners(t);
-    const CubicPatch patch = comas_patch(p, normals(t));
-    const double area = (p[1] - p[0]).cross(p[2] - p[0]).norm() / 2 / 25;
-    for (int i = 0; i <= sample_level; ++i) {
-      for (int j = 0; i + j <= sample_level; ++j) {
-        if (std::max({i, j, sample_level - i - j}) == sample_level) {
-          continue;
-        }
-        const Vec2 b(static_cast<double>(i) / sample_level, static_cast<double>(j) / sample_level);
-        const Vec3 on = patch.point(b);
-        const Vec3 n = patch.normal(b);
-        const auto foot = target_.closest_facing(on, n, target_.diagonal());
-        if (foot) {
-          // Near the closest point the target is its tangent plane; off an edge or rim the way back itself counts.
-          const Vec3 away = on - foot->point;
-          const double along = away.dot(foot->facet_normal);
-          const bool beside = std::abs(along) < 0.7 * foot->distance;
-          const Vec3 direction = beside ? Vec3(away / foot->distance) : foot->facet_normal;
-          samples_[t].push_back({b, direction, away.dot(direction), foot->distance, area});
+  /// Nodes of one colour share no triangle: they can be turned at the same time.
+  void colour() {
+    std::vector<int> colour_of(shell_.vertices.size(), -1);
+    for (std::size_t v = 0; v < shell_.vertices.size(); ++v) {
+      std::vector<std::uint8_t> used(colours_.size() + 1, 0);
+      for (const Index t : around_.of(static_cast<Index>(v))) {
+        for (const Index w : shell_.triangles[t]) {
+          if (colour_of[w] >= 0) {
+            used[static_cast<std::size_t>(colour_of[w])] = 1;
+          }
         }
       }
+      const auto free = static_cast<std::size_t>(std::find(used.begin(), used.end(), 0) - used.begin());
+      if (free == colours_.size()) {
+        colours_.emplace_back();
+      }
+      colours_[free].push_back(static_cast<Index>(v));
+      colour_of[v] = static_cast<int>(free);
     }
   }
 
+  /// Finds for points of the target the patch they are closest to.
   void sample_target() {
     const Tessellation fine = tessellate_uniformly(shell_, search_level);
     const ClosestPoint tree(fine.mesh);
     const auto& vertices = target_.mesh().vertices;
-    const std::size_t count = (vertices.size() + stride_ - 1) / stride_;
-    struct Place {
-      Index facet;
-      Sample sample;
-    };
+    const std::size_t stride = std::max<std::size_t>(1, vertices.size() / (target_samples * facets_.size()));
+    const std::size_t count = (vertices.size() + stride - 1) / stride;
     double area = 0;
-    for (std::size_t t = 0; t < shell_.triangles.size(); ++t) {
-      const auto p = corners(t);
-      area += (p[1] - p[0]).cross(p[2] - p[0]).norm() / 2;
+    for (const Facet& facet : facets_) {
+      area += facet.area;
     }
-    std::vector<Place> places(count);
+    std::vector<std::pair<Index, Attached>> found(count);
     parallel_for_blocks(count, 256, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
-        const Vec3& q = vertices[i * stride_];
+        const Vec3& q = vertices[i * stride];
         const auto hit = tree.closest(q);
-        const auto& v = fine.mesh.triangles[hit.triangle];
-        const auto& [a, b, c] = v;
+        const auto& [a, b, c] = fine.mesh.triangles[hit.triangle];
         const Vec3 &pa = fine.mesh.vertices[a], &pb = fine.mesh.vertices[b], &pc = fine.mesh.vertices[c];
         const Vec3 normal = (pb - pa).cross(pc - pa);
         const double twice = std::max(normal.norm(), 1e-300);
@@ -196,105 +213,175 @@ private:
         const double lb = std::clamp((hit.point - pa).cross(pc - pa).dot(n) / twice, 0.0, 1.0);
         const double lc = std::clamp((pb - pa).cross(hit.point - pa).dot(n) / twice, 0.0, 1.0 - lb);
         const Vec2 at = (1 - lb - lc) * fine.barycentric[a] + lb * fine.barycentric[b] + lc * fine.barycentric[c];
-        const Vec3 away = curved_patch(shell_, fine.shell[hit.triangle]).point(at) - q;
+        const Vec3 away = hit.point - q;
         const double distance = away.norm();
-        const double along = away.dot(n);
-        const bool beside = std::abs(along) < 0.7 * distance;
-        const Vec3 direction = beside ? Vec3(away / distance) : n;
-        places[i] = {fine.shell[hit.triangle],
-                     {at, direction, away.dot(direction), distance, area / static_cast<double>(count)}};
+        const bool beside = std::abs(away.dot(n)) < 0.7 * distance;
+        found[i] = {fine.shell[hit.triangle],
+                    {q, at, beside ? Vec3(away / distance) : n, area / static_cast<double>(count)}};
       }
     });
-    for (const Place& place : places) {
-      samples_[place.facet].push_back(place.sample);
+    for (Facet& facet : facets_) {
+      facet.attached.clear();
+    }
+    for (const auto& [t, attached] : found) {
+      facets_[t].attached.push_back(attached);
     }
   }
 
-  /// One Gauss-Newton step on sum area |distance|^p, weights scaled by the largest distance.
-  void turn(double p, double largest) {
-    const std::size_t count = shell_.triangles.size();
-    std::vector<Matrix6> matrices(count);
-    std::vector<Vector6> sides(count);
-    parallel_for_blocks(count, facets_per_block, [&](std::size_t begin, std::size_t end) {
+  State evaluate(std::size_t t, const Normals& with) const {
+    const CubicPatch patch = comas_patch(corners(t), with);
+    State state;
+    state.samples.reserve(shell_samples + facets_[t].attached.size());
+    for (int i = 0; i <= sample_level; ++i) {
+      for (int j = 0; i + j <= sample_level; ++j) {
+        if (std::max({i, j, sample_level - i - j}) == sample_level) {
+          continue;
+        }
+        const Vec2 b(static_cast<double>(i) / sample_level, static_cast<double>(j) / sample_level);
+        const Vec3 on = patch.point(b);
+        if (const auto foot = target_.closest_facing(on, normals_[t], target_.diagonal())) {
+          // Near the closest point the target is its tangent plane; off an edge or rim the way back itself counts.
+          const Vec3 away = on - foot->point;
+          const bool beside = std::abs(away.dot(foot->facet_normal)) < 0.7 * foot->distance;
+          const Vec3 direction = beside ? Vec3(away / foot->distance) : foot->facet_normal;
+          state.samples.push_back({b, direction, away.dot(direction), foot->distance, facets_[t].area / shell_samples});
+        }
+      }
+    }
+    for (const Attached& q : facets_[t].attached) {
+      const double signed_distance = (patch.point(q.at) - q.point).dot(q.direction);
+      state.samples.push_back({q.at, q.direction, signed_distance, std::abs(signed_distance), q.area});
+    }
+    for (const Sample& s : state.samples) {
+      state.cost += s.area * std::pow(s.distance / scale_, power_);
+    }
+    return state;
+  }
+
+  double evaluate_all() {
+    parallel_for_blocks(facets_.size(), 16, [&](std::size_t begin, std::size_t end) {
       for (std::size_t t = begin; t < end; ++t) {
-        const auto change = sensitivity(corners(t), normals(t));
-        Matrix6 matrix = Matrix6::Zero();
-        Vector6 side = Vector6::Zero();
-        for (const Sample& s : samples_[t]) {
-          const double weight = s.area * std::pow(std::max(s.distance / largest, 1e-3), p - 2);
-          const Vector6 row = facets_[t].dot(s.direction) * change.at(s.at);
-          matrix += weight * row * row.transpose();
-          side -= weight * s.signed_distance * row;
-        }
-        matrices[t] = matrix;
-        sides[t] = side;
+        facets_[t].state = evaluate(t, normals(t));
       }
     });
-    solve(matrices, sides);
+    double cost = 0;
+    for (const Facet& facet : facets_) {
+      cost += facet.state.cost;
+    }
+    return cost;
   }
 
-  void solve(const std::vector<Matrix6>& matrices, const std::vector<Vector6>& sides) {
-    const auto unknowns = static_cast<Eigen::Index>(2 * shell_.vertices.size());
-    std::vector<Eigen::Triplet<double>> entries;
-    entries.reserve(36 * matrices.size() + static_cast<std::size_t>(unknowns));
-    Eigen::VectorXd side = Eigen::VectorXd::Zero(unknowns), diagonal = Eigen::VectorXd::Zero(unknowns);
-    for (std::size_t t = 0; t < matrices.size(); ++t) {
-      const auto at = [&](Eigen::Index i) {
-        return static_cast<Eigen::Index>(2 * shell_.triangles[t][static_cast<std::size_t>(i / 2)]) + i % 2;
-      };
-      for (Eigen::Index i = 0; i < 6; ++i) {
-        side[at(i)] += sides[t][i];
-        diagonal[at(i)] += matrices[t](i, i);
-        for (Eigen::Index j = 0; j < 6; ++j) {
-          entries.emplace_back(at(i), at(j), matrices[t](i, j));
-        }
+  double largest_distance() {
+    scale_ = 1;
+    evaluate_all();
+    double largest = 0;
+    for (const Facet& facet : facets_) {
+      for (const Sample& s : facet.state.samples) {
+        largest = std::max(largest, s.distance);
       }
     }
-    const double floor = 1e-9 * diagonal.maxCoeff() + 1e-300;
-    for (Eigen::Index i = 0; i < unknowns; ++i) {
-      entries.emplace_back(i, i, damping * diagonal[i] + floor);
-    }
-    Eigen::SparseMatrix<double> matrix(unknowns, unknowns);
-    matrix.setFromTriplets(entries.begin(), entries.end());
-    const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver(matrix);
-    if (solver.info() != Eigen::Success) {
+    return largest;
+  }
+
+  /// Turns one node's normal when that lessens what the facets around it cost.
+  void improve(Index v, bool also_elsewhere) {
+    const auto fan = around_.of(v);
+    if (fan.empty()) {
       return;
     }
-    const Eigen::VectorXd step = solver.solve(side);
-    if (!step.allFinite()) {
-      return;
+    std::vector<Vec3> fan_normals;
+    double cost = 0, largest = 0;
+    for (const Index t : fan) {
+      fan_normals.push_back(normals_[t]);
+      cost += facets_[t].state.cost;
+      for (const Sample& s : facets_[t].state.samples) {
+        largest = std::max(largest, s.distance);
+      }
     }
-    std::vector<Vec3> fan;
-    for (std::size_t v = 0; v < shell_.vertices.size(); ++v) {
-      fan.clear();
-      for (const Index t : around_.of(static_cast<Index>(v))) {
-        fan.push_back(facets_[t]);
+    if (also_elsewhere && largest > 0.25 * scale_) {
+      for (const Vec3& n : fan_normals) {
+        try_normal(v, n, fan_normals, cost);
       }
-      if (fan.empty()) {
-        continue;
-      }
-      Vec3& n = shell_.normals[v];
-      const auto turn = turns(n);
-      const auto i = static_cast<Eigen::Index>(2 * v);
-      Vec3 change = step[i] * turn[0] + step[i + 1] * turn[1];
+      try_normal(v, most_compatible_normal(fan_normals).normal, fan_normals, cost);
+    }
+    const Vec3 here = shell_.normals[v];
+    const Vec2 step = newton_step(v);
+    const auto turn = turns(here);
+    for (const double length : step_lengths) {
+      Vec3 change = length * (step[0] * turn[0] + step[1] * turn[1]);
       if (const double size = change.norm(); size > largest_turn) {
         change *= largest_turn / size;
       }
-      double now = 1;
-      for (const Vec3& f : fan) {
-        now = std::min(now, n.dot(f));
+      if (try_normal(v, (here + change).normalized(), fan_normals, cost)) {
+        break;
       }
-      n = compatible_normal((n + change).normalized(), fan, std::min(least_agreement, now)).value_or(n);
     }
+  }
+
+  /// Takes the normal nearest to `wanted` that is compatible when the facets around cost less with it than `cost`.
+  bool try_normal(Index v, const Vec3& wanted, const std::vector<Vec3>& fan_normals, double& cost) {
+    const Vec3 old = shell_.normals[v];
+    double now = 1;
+    for (const Vec3& f : fan_normals) {
+      now = std::min(now, old.dot(f));
+    }
+    const auto normal = compatible_normal(wanted, fan_normals, std::min(least_agreement, now));
+    if (!normal) {
+      return false;
+    }
+    const auto fan = around_.of(v);
+    std::vector<State> states;
+    double sum = 0;
+    for (const Index t : fan) {
+      Normals with = normals(t);
+      for (std::size_t i = 0; i < 3; ++i) {
+        if (shell_.triangles[t][i] == v) {
+          with[i] = *normal;
+        }
+      }
+      states.push_back(evaluate(t, with));
+      sum += states.back().cost;
+      if (sum >= cost) {
+        return false;
+      }
+    }
+    for (std::size_t i = 0; i < fan.size(); ++i) {
+      facets_[fan[i]].state = std::move(states[i]);
+    }
+    shell_.normals[v] = *normal;
+    cost = sum;
+    return true;
+  }
+
+  /// Gauss-Newton step of the two turns of one node for the cost of the facets around it.
+  Vec2 newton_step(Index v) const {
+    Eigen::Matrix2d matrix = Eigen::Matrix2d::Zero();
+    Vec2 side = Vec2::Zero();
+    for (const Index t : around_.of(v)) {
+      const auto change = sensitivity(corners(t), normals(t));
+      const auto corner =
+          std::find(shell_.triangles[t].begin(), shell_.triangles[t].end(), v) - shell_.triangles[t].begin();
+      for (const Sample& s : facets_[t].state.samples) {
+        const double weight = s.area * std::pow(s.distance / scale_, power_ - 2);
+        const Vec2 row = normals_[t].dot(s.direction) * change.at(s.at).segment<2>(2 * corner);
+        matrix += weight * row * row.transpose();
+        side -= weight * s.signed_distance * row;
+      }
+    }
+    matrix.diagonal() *= 1 + damping;
+    matrix.diagonal().array() += 1e-300;
+    const Vec2 step = matrix.inverse() * side;
+    return step.allFinite() ? step : Vec2::Zero();
   }
 
   const Target& target_;
   ShellMesh& shell_;
   Incidence around_;
-  std::vector<Vec3> facets_;
-  std::size_t stride_ = 1;
-  std::vector<std::vector<Sample>> samples_;
-  double largest_ = 0;
+  std::vector<Vec3> normals_;
+  std::vector<Facet> facets_;
+  std::vector<std::vector<Index>> colours_;
+  double power_ = 2;
+  double scale_ = 1;
 };
 
 }  // namespace

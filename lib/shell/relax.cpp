@@ -31,6 +31,23 @@ bool faces_other_way(const TriangleMesh& mesh, const Target& target) {
   return agreement < 0;
 }
 
+ShellMesh without_unused(const TriangleMesh& mesh) {
+  constexpr Index unused = 0xffffffff;
+  ShellMesh out;
+  std::vector<Index> number(mesh.vertices.size(), unused);
+  for (auto v : mesh.triangles) {
+    for (Index& i : v) {
+      if (number[i] == unused) {
+        number[i] = static_cast<Index>(out.vertices.size());
+        out.vertices.push_back(mesh.vertices[i]);
+      }
+      i = number[i];
+    }
+    out.triangles.push_back(v);
+  }
+  return out;
+}
+
 class Relaxation {
 public:
   Relaxation(const TriangleMesh& coarse, const Target& target, const RelaxOptions& options)
@@ -38,7 +55,7 @@ public:
     if (options.tolerance) {
       width_ = std::min(width_, *options.tolerance / 20);
     }
-    current_ = {coarse.vertices, coarse.triangles, {}, {}, Patch::comas};
+    current_ = without_unused(coarse);
     if (faces_other_way(coarse, target)) {
       result_.turned_around = true;
       for (auto& v : current_.triangles) {
@@ -81,7 +98,6 @@ public:
     if (options_.tolerance && !result_.reached) {
       result_.reached = false;
     }
-    measure_best();
     return std::move(result_);
   }
 
@@ -121,7 +137,7 @@ private:
     iteration.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     result_.iterations.push_back(iteration);
     if (options_.on_iteration) {
-      options_.on_iteration(iteration);
+      options_.on_iteration(iteration, result_.shell);
     }
     return distance.both.upper;
   }
@@ -141,15 +157,6 @@ private:
       return false;
     }
     return true;
-  }
-
-  void measure_best() {
-    ShellDistanceOptions measuring;
-    measuring.width = width_;
-    measuring.with_mean = true;
-    result_.distance = shell_distance(result_.shell, target_, measuring);
-    measuring.with_mean = false;
-    result_.flat = flat_distance(result_.shell, target_, measuring).both;
   }
 
   const Target& target_;

@@ -33,14 +33,14 @@ struct RelaxOptions {
   std::optional<std::size_t> max_shells;  ///< for refine
   std::optional<int> max_iterations;      ///< none: 20, with refine 60
   std::optional<double> width;            ///< mm: of the measured intervals; none: 0.01 % of the target's diagonal
-  std::function<void(const RelaxIteration&)> on_iteration;  ///< tells how it goes
+  /// Tells how it goes; the mesh is the best one until then.
+  std::function<void(const RelaxIteration&, const ShellMesh&)> on_iteration;
   Progress progress;
 };
 
 struct RelaxResult {
-  ShellMesh shell;         ///< the best iterate
-  ShellDistance distance;  ///< of its curved surface, with mean and rms
-  Interval flat;           ///< two-sided Hausdorff distance of its flat facets, mm
+  ShellMesh shell;         ///< the best iterate, without unused nodes
+  ShellDistance distance;  ///< of its curved surface
   std::vector<RelaxIteration> iterations;
   std::optional<bool> reached;  ///< the tolerance; none without one
   std::string stopped;          ///< why it ended there, in words
