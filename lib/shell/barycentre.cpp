@@ -18,10 +18,11 @@ constexpr double upright = 0.2;     // agreement of a facet with the target's no
 constexpr double collapsed = 0.05;  // height over longest edge
 constexpr int halvings = 6;
 
-/// Length along a closed polyline and its closest point to p.
+/// Length along a closed polyline at its closest point to p, and the direction of the segment there.
 struct OnCurve {
   double arc;
   double squared_distance;
+  Vec3 direction;
 };
 
 class ClosedCurve {
@@ -34,14 +35,14 @@ public:
   [[nodiscard]] double length() const { return arc_.back(); }
 
   [[nodiscard]] OnCurve closest(const Vec3& p) const {
-    OnCurve best{0, std::numeric_limits<double>::infinity()};
+    OnCurve best{0, std::numeric_limits<double>::infinity(), Vec3::Zero()};
     for (std::size_t i = 0; i < points_.size(); ++i) {
       const Vec3 along = next(i) - points_[i];
       const double squared = along.squaredNorm();
       const double s = squared > 0 ? std::clamp((p - points_[i]).dot(along) / squared, 0.0, 1.0) : 0;
       const double d = (points_[i] + s * along - p).squaredNorm();
       if (d < best.squared_distance) {
-        best = {arc_[i] + s * (arc_[i + 1] - arc_[i]), d};
+        best = {arc_[i] + s * (arc_[i + 1] - arc_[i]), d, along};
       }
     }
     return best;
@@ -171,12 +172,19 @@ std::vector<Vec3> without_flips(const TriangleMesh& mesh, const std::vector<Vec3
   return moved;
 }
 
-double mean_distance(const ClosedCurve& curve, const TriangleMesh& mesh, const std::vector<Index>& loop) {
-  double sum = 0;
-  for (const Index v : loop) {
-    sum += std::sqrt(curve.closest(mesh.vertices[v]).squared_distance);
+/// How badly a loop fits a curve: the mean distance, and far more when they run opposite ways, as the rims of the two
+/// walls of a thin organ do.
+double misfit(const ClosedCurve& curve, const TriangleMesh& mesh, const std::vector<Index>& loop) {
+  double sum = 0, along = 0;
+  for (std::size_t i = 0; i < loop.size(); ++i) {
+    const Vec3& p = mesh.vertices[loop[i]];
+    const Vec3& next = mesh.vertices[loop[(i + 1) % loop.size()]];
+    const OnCurve found = curve.closest((p + next) / 2);
+    sum += std::sqrt(found.squared_distance);
+    along += (next - p).dot(found.direction.stableNormalized());
   }
-  return sum / static_cast<double>(loop.size());
+  const double mean = sum / static_cast<double>(loop.size());
+  return along >= 0 ? mean : 10 * (mean + curve.length());
 }
 
 }  // namespace
@@ -192,7 +200,7 @@ std::vector<std::optional<std::size_t>> match_boundaries(const Target& target, c
     const ClosedCurve curve(target.boundary()[c]);
     if (curve.length() > 0) {
       for (std::size_t l = 0; l < loops.size(); ++l) {
-        pairs.push_back({mean_distance(curve, mesh, loops[l]), l, c});
+        pairs.push_back({misfit(curve, mesh, loops[l]), l, c});
       }
     }
   }

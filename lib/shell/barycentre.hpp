@@ -13,9 +13,9 @@ struct NodeMoves {
   double largest = 0;         ///< mm, the longest way a node went
 };
 
-/// Which boundary loop of the target each boundary loop of the mesh belongs to: pairs by ascending mean distance, each
-/// target loop once while there are free ones. @return indices into target.boundary(); nothing for an open mesh on a
-/// closed target.
+/// Which boundary loop of the target each boundary loop of the mesh belongs to: pairs that run the same way by
+/// ascending mean distance, each target loop once while there are free ones. @return indices into target.boundary();
+/// nothing for an open mesh on a closed target.
 std::vector<std::optional<std::size_t>> match_boundaries(const Target& target, const TriangleMesh& mesh,
                                                          const std::vector<std::vector<Index>>& loops);
 

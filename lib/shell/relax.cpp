@@ -125,9 +125,7 @@ private:
                       folded.size(), folded.size() == 1 ? "" : "s", folded[0], p.x(), p.y(), p.z()));
     }
     fit_normals(target_, current_);
-    ShellDistanceOptions measuring;
-    measuring.width = width_;
-    const ShellDistance distance = shell_distance(current_, target_, measuring);
+    const ShellDistance distance = measure();
     if (result_.iterations.empty() || distance.both.upper < result_.distance.both.upper) {
       result_.shell = current_;
       result_.distance = distance;
@@ -142,13 +140,30 @@ private:
     return distance.both.upper;
   }
 
+  /// A tenth of the distance is narrow enough to compare iterates; to decide on the tolerance it gets narrower.
+  ShellDistance measure() {
+    errors_ = shell_errors(current_, target_, options_.tolerance.value_or(default_off_target * target_.diagonal()) / 4);
+    ShellDistanceOptions measuring;
+    measuring.width = std::max(width_, *std::max_element(errors_.begin(), errors_.end()) / 10);
+    while (true) {
+      const ShellDistance distance = shell_distance(current_, target_, measuring);
+      const bool open_question =
+          options_.tolerance && distance.both.lower <= *options_.tolerance && distance.both.upper > *options_.tolerance;
+      if (!open_question || measuring.width <= width_) {
+        return distance;
+      }
+      measuring.width = std::max(width_, measuring.width / 3);
+    }
+  }
+
   bool refine() {
     const std::size_t before = current_.triangles.size();
     const std::size_t most = options_.max_shells.value_or(max_index);
     if (options_.tolerance) {
-      const double wanted = *options_.tolerance * 0.8;  // what samples miss must not keep it above the tolerance
-      const auto errors = shell_errors(current_, target_, *options_.tolerance / 20);
-      current_ = refine_where(current_, errors, wanted, most);
+      // What the samples of the errors miss must not keep the distance above the tolerance.
+      const double largest = *std::max_element(errors_.begin(), errors_.end());
+      const double wanted = std::min(0.8 * *options_.tolerance, 0.95 * largest);
+      current_ = refine_where(current_, errors_, wanted, most);
     } else if (4 * before <= most) {
       current_ = split_shells(current_, std::vector<Split>(before, Split::all_edges));
     }
@@ -163,6 +178,7 @@ private:
   const RelaxOptions& options_;
   double width_;
   ShellMesh current_;
+  std::vector<double> errors_;  // of each current shell, mm
   RelaxResult result_;
 };
 

@@ -3,6 +3,7 @@
 #include "core/threads.hpp"
 #include "shell/curved_surface.hpp"
 #include "surface/hausdorff.hpp"
+#include "surface/incidence.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -17,6 +18,31 @@ Tessellation affordable_tessellation(const ShellMesh& shell, double deviation) {
     deviation *= 2;
   }
   return tessellate(shell, deviation);
+}
+
+/// For each inner edge three points midway between the edge curves of its two patches.
+std::vector<Vec3> points_between_patches(const ShellMesh& shell) {
+  const auto across = neighbours(flat_facets(shell), incidence(flat_facets(shell)));
+  const auto on_edge = [&](std::size_t t, std::size_t k, double s) {
+    const std::array<Vec2, 3> corners{Vec2(0, 0), Vec2(1, 0), Vec2(0, 1)};
+    return curved_patch(shell, t).point((1 - s) * corners[k] + s * corners[(k + 1) % 3]);
+  };
+  std::vector<Vec3> points;
+  for (std::size_t t = 0; t < across.size(); ++t) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Index other = across[t][k];
+      if (other == no_neighbour || other < t) {
+        continue;
+      }
+      const Index end = shell.triangles[t][(k + 1) % 3];
+      const auto& v = shell.triangles[other];
+      const auto l = static_cast<std::size_t>(std::find(v.begin(), v.end(), end) - v.begin());
+      for (const double s : {0.25, 0.5, 0.75}) {
+        points.emplace_back((on_edge(t, k, s) + on_edge(other, l, 1 - s)) / 2);
+      }
+    }
+  }
+  return points;
 }
 
 ShellDistance distance(const TriangleMesh& mesh, double deviation, double width, const Target& target,
@@ -55,16 +81,18 @@ std::vector<double> shell_errors(const ShellMesh& shell, const Target& target, d
   }
   const ClosestPoint tree(fine.mesh);
   const auto& mesh = target.mesh();
-  const std::size_t vertices = mesh.vertices.size();
-  std::vector<ClosestPoint::Hit> hits(vertices + mesh.triangles.size());
+  std::vector<Vec3> points = mesh.vertices;
+  for (const auto& [a, b, c] : mesh.triangles) {
+    points.emplace_back((mesh.vertices[a] + mesh.vertices[b] + mesh.vertices[c]) / 3);
+  }
+  // Adjacent patches gape along their edge, more narrowly than the target's triangles: over the gap ask the target too.
+  for (const Vec3& p : points_between_patches(shell)) {
+    points.push_back(target.closest(p).point);
+  }
+  std::vector<ClosestPoint::Hit> hits(points.size());
   parallel_for_blocks(hits.size(), 256, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      if (i < vertices) {
-        hits[i] = tree.closest(mesh.vertices[i]);
-      } else {
-        const auto& [a, b, c] = mesh.triangles[i - vertices];
-        hits[i] = tree.closest((mesh.vertices[a] + mesh.vertices[b] + mesh.vertices[c]) / 3);
-      }
+      hits[i] = tree.closest(points[i]);
     }
   });
   for (const auto& hit : hits) {

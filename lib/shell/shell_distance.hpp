@@ -33,7 +33,7 @@ ShellDistance shell_distance(const ShellMesh& shell, const Target& target, const
 ShellDistance flat_distance(const ShellMesh& shell, const Target& target, const ShellDistanceOptions& options);
 
 /// Largest sampled distance of each shell, mm: of points of its patch from the target, and of the target's vertices and
-/// centroids whose closest patch it is.
+/// centroids whose closest patch it is, and of those over the gaps between patches.
 std::vector<double> shell_errors(const ShellMesh& shell, const Target& target, double deviation);
 
 }  // namespace tunica
