@@ -53,7 +53,7 @@ public:
   Relaxation(const TriangleMesh& coarse, const Target& target, const RelaxOptions& options)
       : target_(target), options_(options), width_(options.width.value_or(default_width * target.diagonal())) {
     if (options.tolerance) {
-      width_ = std::min(width_, *options.tolerance / 20);
+      width_ = std::min(width_, *options.tolerance / 10);
     }
     current_ = without_unused(coarse);
     if (faces_other_way(coarse, target)) {
