@@ -82,6 +82,11 @@ double coarsest_flatness(const CubicPatch& patch) {
                                  largest_norm(second_difference(p, along_b3, along_b3)));
 }
 
+/// Pieces per edge for which flatness() is at most `deviation`.
+double level_for(const CubicPatch& patch, double deviation) {
+  return std::max(1.0, std::ceil(std::sqrt(coarsest_flatness(patch) / deviation * (1 + 1e-12))));
+}
+
 std::array<Vec3, 3> corners_of(const ShellMesh& shell, std::size_t t) {
   const auto& v = shell.triangles[t];
   return {shell.vertices[v[0]], shell.vertices[v[1]], shell.vertices[v[2]]};
@@ -181,6 +186,18 @@ Vec3 CubicPatch::normal(const Vec2& b) const {
   return d[0].cross(d[1]).stableNormalized();
 }
 
+double averaged_centre(const std::array<Vec3, 3>& edges, const std::array<double, 10>& ordinates) {
+  const auto& b = ordinates;
+  double sum = 0;
+  for (std::size_t i = 0; i < 3; ++i) {  // edge i is the x axis
+    const std::size_t next = (i + 1) % 3;
+    const std::size_t previous = (i + 2) % 3;
+    const double foot = -edges[previous].dot(edges[i]) / edges[i].squaredNorm();
+    sum += centre_ordinate(foot, b[i], b[3 + 2 * i], b[4 + 2 * i], b[next], b[4 + 2 * previous], b[3 + 2 * next]);
+  }
+  return sum / 3;
+}
+
 Deflection comas_deflection(const std::array<Vec3, 3>& corners, const std::array<Vec3, 3>& normals) {
   const std::array<Vec3, 3> edges{corners[1] - corners[0], corners[2] - corners[1], corners[0] - corners[2]};
   Deflection w;
@@ -194,15 +211,7 @@ Deflection comas_deflection(const std::array<Vec3, 3>& corners, const std::array
     b[3 + 2 * i] = -normals[i].dot(edges[i]) / (3 * agreement);
     b[4 + 2 * previous] = normals[i].dot(edges[previous]) / (3 * agreement);
   }
-  // Edge 1-2 as the x axis, then 2-3, then 3-1.
-  double centre = 0;
-  for (std::size_t i = 0; i < 3; ++i) {
-    const std::size_t next = (i + 1) % 3;
-    const std::size_t previous = (i + 2) % 3;
-    const double foot = -edges[previous].dot(edges[i]) / edges[i].squaredNorm();
-    centre += centre_ordinate(foot, 0, b[3 + 2 * i], b[4 + 2 * i], 0, b[4 + 2 * previous], b[3 + 2 * next]);
-  }
-  b[9] = centre / 3;
+  b[9] = averaged_centre(edges, b);
   return w;
 }
 
@@ -274,13 +283,21 @@ double flatness(const CubicPatch& patch, int level) {
   return coarsest_flatness(patch) / (static_cast<double>(level) * static_cast<double>(level));
 }
 
+double tessellation_size(const ShellMesh& shell, double deviation) {
+  double total = 0;
+  for (std::size_t t = 0; t < shell.triangles.size(); ++t) {
+    total += std::pow(level_for(curved_patch(shell, t), deviation), 2);
+  }
+  return total;
+}
+
 Tessellation tessellate(const ShellMesh& shell, double deviation, std::size_t most_triangles) {
   TUNICA_ASSERT(deviation > 0);
   const auto patches = all_patches(shell);
   std::vector<int> levels(patches.size());
   double total = 0;
   for (std::size_t t = 0; t < patches.size(); ++t) {
-    const double level = std::ceil(std::sqrt(coarsest_flatness(patches[t]) / deviation * (1 + 1e-12)));
+    const double level = level_for(patches[t], deviation);
     total += level * level;
     if (!(total <= static_cast<double>(most_triangles))) {
       throw RequirementError(
@@ -288,7 +305,7 @@ Tessellation tessellate(const ShellMesh& shell, double deviation, std::size_t mo
                       "allow a larger deviation",
                       deviation, most_triangles));
     }
-    levels[t] = std::max(1, static_cast<int>(level));
+    levels[t] = static_cast<int>(level);
   }
   return tessellate_by(shell, patches, levels);
 }

@@ -38,6 +38,10 @@ struct Deflection {
   std::array<double, 10> ordinates;
   Vec3 normal;
 };
+/// The centre ordinate that the nine terms of eq. (1) give to a facet's edge ordinates, averaged over the three choices
+/// of the first vertex. Linear in the ordinates.
+/// @param edges  1-2, 2-3, 3-1; ordinates  as in Deflection, corners and edges
+double averaged_centre(const std::array<Vec3, 3>& edges, const std::array<double, 10>& ordinates);
 Deflection comas_deflection(const std::array<Vec3, 3>& corners, const std::array<Vec3, 3>& normals);
 
 /// The curved patch of one triangle, as shell.patch says. Errors: UsageError for a patch that does not exist yet.
@@ -69,6 +73,9 @@ struct Tessellation {
 /// Source: linear interpolation of a cubic Bezier triangle, bounded by second differences of its control points.
 /// Cost: O(#F), about (3/4 second difference / deviation) triangles per patch.
 Tessellation tessellate(const ShellMesh& shell, double deviation, std::size_t most_triangles = 100'000'000);
+
+/// How many triangles tessellate() would make.
+double tessellation_size(const ShellMesh& shell, double deviation);
 
 /// level >= 1 pieces per edge: level^2 triangles per patch. Its `deviation` is certified too.
 Tessellation tessellate_uniformly(const ShellMesh& shell, int level);

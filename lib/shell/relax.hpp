@@ -1,0 +1,61 @@
+#pragma once
+
+#include "core/progress.hpp"
+#include "shell/barycentre.hpp"
+#include "shell/normals.hpp"
+#include "shell/shell_distance.hpp"
+#include "shell/shell_mesh.hpp"
+#include "shell/target.hpp"
+
+#include <functional>
+#include <optional>
+#include <string>
+
+namespace tunica {
+
+/// How the nodes are moved; normals and measuring are the same for all.
+enum class RelaxMethod {
+  barycentre,  ///< the paper's rule
+};
+
+/// One iteration: nodes moved, normals chosen, distance measured.
+struct RelaxIteration {
+  std::size_t shells = 0;
+  Interval hausdorff;  ///< mm
+  double seconds = 0;
+  NodeMoves moves;
+};
+
+struct RelaxOptions {
+  RelaxMethod method = RelaxMethod::barycentre;
+  std::optional<double> tolerance;        ///< mm: done when the two-sided distance is certainly at most this
+  bool refine = false;                    ///< split where the distance is above the tolerance; without one, everywhere
+  std::optional<std::size_t> max_shells;  ///< for refine
+  std::optional<int> max_iterations;      ///< none: 20, with refine 60
+  std::optional<double> width;            ///< mm: of the measured intervals; none: 0.01 % of the target's diagonal
+  /// Tells how it goes; the mesh is the best one until then.
+  std::function<void(const RelaxIteration&, const ShellMesh&)> on_iteration;
+  Progress progress;
+};
+
+struct RelaxResult {
+  ShellMesh shell;         ///< the best iterate, without unused nodes
+  ShellDistance distance;  ///< of its curved surface
+  std::vector<RelaxIteration> iterations;
+  std::optional<bool> reached;  ///< the tolerance; none without one
+  std::string stopped;          ///< why it ended there, in words
+  std::size_t flips = 0;        ///< edges turned for triangles standing upright
+  bool turned_around = false;   ///< all triangles of COARSE faced the other way than the target's
+};
+
+/// Moves a coarse mesh onto a target as curved shells. Per iteration: the method's move of the nodes, edges turned
+/// where a triangle stands upright on the target, nodal normals from the target and fitted to it, the two-sided
+/// distance of the curved surface. It ends when the tolerance certainly holds; when three iterations in a row brought
+/// less than 1 % (then it refines, if it may); or at the limits. The best iterate is the result.
+/// @param coarse  an oriented manifold; @param target  likewise
+/// Errors: InputError when facets fold so sharply that no normal can serve at a node: it names the node and place.
+/// Source: Comas, Duriez, Cotin 2010, section 3.
+/// Cost: per iteration about 100 us per shell plus 2 us per target triangle for each step of the normals' fit.
+RelaxResult relax(const TriangleMesh& coarse, const Target& target, const RelaxOptions& options);
+
+}  // namespace tunica

@@ -1,0 +1,39 @@
+#pragma once
+
+#include "core/progress.hpp"
+#include "shell/shell_mesh.hpp"
+#include "shell/target.hpp"
+
+#include <optional>
+
+namespace tunica {
+
+/// How far the curved surface of a shell mesh and a target lie apart, mm.
+struct ShellDistance {
+  Interval both;  ///< two-sided Hausdorff distance
+  Interval shell_to_target;
+  Interval target_to_shell;
+  double mean = 0;  ///< of the distance from the curved surface to the target, over its area
+  double rms = 0;
+};
+
+struct ShellDistanceOptions {
+  double width = 0;             ///< mm: upper - lower wanted of each interval
+  bool with_mean = false;       ///< mean and rms too
+  std::optional<double> limit;  ///< mm: whether the distance is at most this is all that matters
+  Progress progress;
+};
+
+/// Certified: the curved surface is cut into flat triangles that provably lie within a part of `width`, and the
+/// intervals are widened by that. Where a patch is so wild that this would take more than four million triangles the
+/// intervals come out wider.
+ShellDistance shell_distance(const ShellMesh& shell, const Target& target, const ShellDistanceOptions& options);
+
+/// The same of the flat facets.
+ShellDistance flat_distance(const ShellMesh& shell, const Target& target, const ShellDistanceOptions& options);
+
+/// Largest sampled distance of each shell, mm: of points of its patch from the target, and of the target's vertices and
+/// centroids whose closest patch it is, and of those over the gaps between patches.
+std::vector<double> shell_errors(const ShellMesh& shell, const Target& target, double deviation);
+
+}  // namespace tunica

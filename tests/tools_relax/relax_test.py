@@ -1,0 +1,312 @@
+#!/usr/bin/python3
+"""tunica-relax from outside: the contract's keys and exit codes, the patch in the file, the paper's own targets."""
+import json
+import os
+import signal
+import subprocess
+import tempfile
+import unittest
+
+import numpy as np
+
+from curved_patch import columns, patch_points, read_ply
+
+BIN = os.environ["TUNICA_BIN"]
+PAPER = os.path.join(os.environ.get("TUNICA_SHARED_DATA", ""), "paper")
+
+
+def write_ply(path, vertices, triangles):
+    vertices = np.asarray(vertices, "<f8")
+    faces = np.empty(len(triangles), np.dtype([("n", "u1"), ("v", "<i4", 3)]))
+    faces["n"], faces["v"] = 3, triangles
+    header = (f"ply\nformat binary_little_endian 1.0\ncomment units mm\ncomment SPACE=LPS\n"
+              f"element vertex {len(vertices)}\nproperty double x\nproperty double y\nproperty double z\n"
+              f"element face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n")
+    with open(path, "wb") as file:
+        file.write(header.encode() + vertices.tobytes() + faces.tobytes())
+
+
+def cylinder(around, along, radius=10.0, length=30.0):
+    """An open cylinder, odd rows shifted by half a cell."""
+    rows, columns_ = np.meshgrid(np.arange(along + 1), np.arange(around), indexing="ij")
+    angle = 2 * np.pi * (columns_ + 0.5 * (rows % 2)) / around
+    vertices = np.stack([radius * np.cos(angle), radius * np.sin(angle), length * rows / along], -1).reshape(-1, 3)
+    triangles = []
+    for j in range(along):
+        for i in range(around):
+            a, b = j * around + i, j * around + (i + 1) % around
+            c, d = a + around, b + around
+            triangles += [(a, b, c), (b, d, c)] if j % 2 == 0 else [(a, b, d), (a, d, c)]
+    return vertices, np.array(triangles)
+
+
+def sphere(times, radius=20.0):
+    g = (1 + 5**0.5) / 2
+    vertices = [(-1, g, 0), (1, g, 0), (-1, -g, 0), (1, -g, 0), (0, -1, g), (0, 1, g), (0, -1, -g), (0, 1, -g),
+                (g, 0, -1), (g, 0, 1), (-g, 0, -1), (-g, 0, 1)]
+    triangles = [(0, 11, 5), (0, 5, 1), (0, 1, 7), (0, 7, 10), (0, 10, 11), (1, 5, 9), (5, 11, 4), (11, 10, 2),
+                 (10, 7, 6), (7, 1, 8), (3, 9, 4), (3, 4, 2), (3, 2, 6), (3, 6, 8), (3, 8, 9), (4, 9, 5), (2, 4, 11),
+                 (6, 2, 10), (8, 6, 7), (9, 8, 1)]
+    vertices = [np.array(v, float) / np.hypot(1, g) for v in vertices]
+    for _ in range(times):
+        middle, finer = {}, []
+
+        def mid(a, b):
+            key = (min(a, b), max(a, b))
+            if key not in middle:
+                middle[key] = len(vertices)
+                m = vertices[a] + vertices[b]
+                vertices.append(m / np.linalg.norm(m))
+            return middle[key]
+
+        for a, b, c in triangles:
+            ab, bc, ca = mid(a, b), mid(b, c), mid(c, a)
+            finer += [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+        triangles = finer
+    return radius * np.array(vertices), np.array(triangles)
+
+
+class Case(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.addCleanup(self.folder.cleanup)
+
+    def path(self, name):
+        return os.path.join(self.folder.name, name)
+
+    def relax(self, *arguments, expect=0):
+        """Runs the tool; @return its report and stderr."""
+        report = self.path("report.json")
+        run = subprocess.run([os.path.join(BIN, "tunica-relax"), *map(str, arguments), "--report", report],
+                             capture_output=True, text=True, timeout=500)
+        self.assertEqual(run.returncode, expect, run.stderr)
+        if not os.path.exists(report):
+            return None, run.stderr
+        with open(report) as file:
+            record = json.load(file)
+        self.assertEqual(record["ok"], expect == 0)
+        if expect:
+            self.assertEqual(run.stderr.strip().splitlines()[-1].count("tunica-relax: "), 1)
+        return record, run.stderr
+
+
+class Contract(Case):
+    def setUp(self):
+        super().setUp()
+        self.target, self.coarse, self.out = self.path("target.ply"), self.path("coarse.ply"), self.path("shell.ply")
+        write_ply(self.target, *cylinder(64, 40))
+        write_ply(self.coarse, *cylinder(8, 3, radius=10.3))
+
+    def test_report_holds_every_key_and_the_intervals_are_intervals(self):
+        record, _ = self.relax(self.coarse, self.target, self.out, "--map", self.path("map.ply"), "--picture",
+                               self.path("map.png"), "--curved", self.path("curved.ply"))
+        result = record["result"]
+        self.assertEqual(list(record["seconds"]), ["total", "read", "relax", "measure", "write"])
+        for key in ("shells", "hausdorff_mm", "hausdorff_percent", "one_sided_percent", "mean_percent", "rms_percent",
+                    "flat_hausdorff_percent", "iterations", "min_angle_deg", "self_intersections", "reached"):
+            self.assertIn(key, result)
+        self.assertEqual(result["shells"], 48)
+        self.assertIsNone(result["reached"])
+        self.assertEqual(result["self_intersections"], 0)
+        diagonal = np.linalg.norm([20, 20, 30])
+        for side in ("lower", "upper"):
+            self.assertAlmostEqual(result["hausdorff_mm"][side] / diagonal * 100, result["hausdorff_percent"][side],
+                                   delta=0.01 * result["hausdorff_percent"][side])
+        sides = result["one_sided_percent"]
+        for interval in (result["hausdorff_percent"], result["flat_hausdorff_percent"], sides["shell_to_target"],
+                         sides["target_to_shell"]):
+            self.assertLessEqual(interval["lower"], interval["upper"])
+            self.assertLess(interval["upper"] - interval["lower"], 0.011)
+        self.assertAlmostEqual(max(s["upper"] for s in sides.values()), result["hausdorff_percent"]["upper"], delta=1e-9)
+        self.assertLessEqual(result["mean_percent"], result["rms_percent"])
+        self.assertLessEqual(result["rms_percent"], sides["shell_to_target"]["upper"])
+        self.assertLess(result["hausdorff_percent"]["upper"], result["flat_hausdorff_percent"]["lower"] / 2)
+        self.assertLessEqual(result["hausdorff_percent"]["lower"],
+                             min(i["hausdorff_percent"]["upper"] for i in result["iterations"]))
+        vertices, _, comments = read_ply(self.path("map.ply"))
+        self.assertIn("quality", vertices.dtype.names)
+        self.assertLessEqual(vertices["quality"].max(), result["hausdorff_mm"]["upper"])
+        with open(self.path("map.png"), "rb") as file:
+            self.assertEqual(file.read(8), b"\x89PNG\r\n\x1a\n")
+        vertices, _, comments = read_ply(self.out)
+        for comment in ("surface=comas", "units mm", "SPACE=LPS"):
+            self.assertIn(comment, comments)
+        normals = columns(vertices, ("nx", "ny", "nz"))
+        self.assertLess(np.abs(np.linalg.norm(normals, axis=1) - 1).max(), 1e-12)
+
+    def test_refine_reaches_the_tolerance_and_two_threads_give_the_same_bytes(self):
+        record, _ = self.relax(self.coarse, self.target, self.out, "--tolerance", "0.1%", "--refine", "--threads", 1)
+        self.assertTrue(record["result"]["reached"])
+        self.assertLessEqual(record["result"]["hausdorff_percent"]["upper"], 0.1)
+        other = self.path("other.ply")
+        self.relax(self.coarse, self.target, other, "--tolerance", "0.1%", "--refine", "--threads", 2)
+        first, second = read_ply(self.out), read_ply(other)
+        self.assertTrue((first[0] == second[0]).all() and (first[1] == second[1]).all())
+
+    def test_tolerance_out_of_reach_is_4_and_the_best_mesh_stays(self):
+        record, error = self.relax(self.coarse, self.target, self.out, "--tolerance", "0.0001%", "--max-iterations", 2,
+                                   expect=4)
+        self.assertIn("not reached", error)
+        self.assertFalse(os.path.exists(self.out))
+        vertices, triangles, _ = read_ply(self.out + ".part")
+        self.assertEqual(len(triangles), 48)
+        self.assertIs(record["result"]["reached"], False)
+        self.assertEqual(record["result"]["shells"], 48)
+
+    def test_limit_of_shells_is_kept_and_makes_4(self):
+        record, _ = self.relax(self.coarse, self.target, self.out, "--tolerance", "0.01%", "--refine", "--max-shells",
+                               100, expect=4)
+        self.assertLessEqual(record["result"]["shells"], 100)
+
+    def test_wrong_usage_is_2(self):
+        for extra in (["--tolerance", "0.5"], ["--tolerance", "-1mm"], ["--method", "fit"], ["--method", "nonsense"],
+                      ["--surface", "watertight"], ["--shells", "100"], ["--refine"], ["--max-shells", "10"],
+                      ["--max-iterations", "0"], ["--mesh-unit", "parsec"], ["--unknown"]):
+            self.relax(self.coarse, self.target, self.out, *extra, expect=2)
+        for later in (["--method", "fit"], ["--surface", "watertight"], ["--shells", "100"]):
+            self.assertIn("not available yet", self.relax(self.coarse, self.target, self.out, *later, expect=2)[1])
+        self.relax(self.coarse, self.target, expect=2)
+
+    def test_a_format_without_a_unit_needs_one(self):
+        vertices, triangles = cylinder(8, 3, radius=1.03, length=3.0)
+        obj = self.path("coarse.obj")
+        with open(obj, "w") as file:
+            file.writelines(f"v {x} {y} {z}\n" for x, y, z in vertices)
+            file.writelines(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in triangles)
+        self.assertIn("--mesh-unit", self.relax(obj, self.target, self.out, expect=2)[1])
+        record, _ = self.relax(obj, self.target, self.out, "--mesh-unit", "cm")
+        self.assertLess(record["result"]["hausdorff_percent"]["upper"], 1)
+
+    def test_unfit_inputs_are_3(self):
+        vertices, triangles = cylinder(8, 3)
+        bad = self.path("bad.ply")
+        fan = np.vstack([triangles, [[0, 1, 30]]])  # a third triangle on an edge
+        write_ply(bad, vertices, fan)
+        for arguments in ((bad, self.target), (self.coarse, bad)):
+            record, error = self.relax(*arguments, self.out, expect=3)
+            self.assertIn("bad.ply", error)
+            self.assertIn("near (", error)
+        self.relax(self.path("absent.ply"), self.target, self.out, expect=3)
+        with open(self.target, "rb") as file:
+            whole = file.read()
+        with open(bad, "wb") as file:
+            file.write(whole[:len(whole) // 2])
+        self.relax(self.coarse, bad, self.out, expect=3)
+        flat = self.path("point.ply")
+        write_ply(flat, np.zeros((3, 3)), [[0, 1, 2]])
+        self.relax(self.coarse, flat, self.out, expect=3)
+
+    def test_existing_output_is_5_unless_forced(self):
+        with open(self.out, "w") as file:
+            file.write("kept")
+        self.relax(self.coarse, self.target, self.out, expect=5)
+        with open(self.out) as file:
+            self.assertEqual(file.read(), "kept")
+        self.relax(self.coarse, self.target, self.out, "--force")
+        self.relax(self.coarse, self.target, self.path("no/such/folder.ply"), expect=5)
+
+    def test_a_mismatch_of_boundaries_is_said(self):
+        write_ply(self.coarse, *sphere(1, 12))
+        _, error = self.relax(self.coarse, self.target, self.out, "--max-iterations", 1)
+        self.assertIn("boundary loop", error)
+
+    def test_an_interrupt_leaves_the_best_mesh(self):
+        write_ply(self.target, *sphere(5))
+        write_ply(self.coarse, *sphere(0))
+        run = subprocess.Popen([os.path.join(BIN, "tunica-relax"), self.coarse, self.target, self.out, "--tolerance",
+                                "0.00001%", "--refine", "--verbose"], stderr=subprocess.PIPE, text=True)
+        lines = []
+        while sum("shells:" in line for line in lines) < 2:
+            lines.append(run.stderr.readline())
+            self.assertTrue(lines[-1], "".join(lines))
+        run.send_signal(signal.SIGINT)
+        run.stderr.read()
+        self.assertEqual(run.wait(60), 130)
+        run.stderr.close()
+        self.assertFalse(os.path.exists(self.out))
+        self.assertGreaterEqual(len(read_ply(self.out + ".part")[1]), 20)
+
+
+class Patch(Case):
+    def test_the_file_alone_gives_the_curved_surface(self):
+        vertices, triangles = sphere(3)
+        vertices *= 1 + 0.15 * np.sin(vertices[:, :1] / 7) * np.cos(vertices[:, 1:2] / 5)
+        coarse, coarse_triangles = sphere(1)
+        write_ply(self.path("target.ply"), vertices, triangles)
+        write_ply(self.path("coarse.ply"), coarse, coarse_triangles)
+        self.relax(self.path("coarse.ply"), self.path("target.ply"), self.path("shell.ply"), "--curved",
+                   self.path("curved.ply"))
+        shell, triangles, _ = read_ply(self.path("shell.ply"))
+        points, normals = columns(shell, "xyz"), columns(shell, ("nx", "ny", "nz"))
+        curved, fine, _ = read_ply(self.path("curved.ply"))
+        curved = columns(curved, "xyz")
+        size = np.linalg.norm(points.max(0) - points.min(0))
+
+        # The fine vertices come patch by patch: a grid of level m has (m + 1)(m + 2) / 2 of them, rows along corner 3.
+        used, fine_used = 0, 0
+        for corners in triangles:
+            level = 1
+            while not (np.array_equal(curved[used], points[corners[0]])
+                       and used + (level + 1) * (level + 2) // 2 <= len(curved)
+                       and np.array_equal(curved[used + level], points[corners[1]])
+                       and np.array_equal(curved[used + (level + 1) * (level + 2) // 2 - 1], points[corners[2]])):
+                level += 1
+                self.assertLess(level, 1000)
+            b = np.array([(level - i - j, i, j) for j in range(level + 1) for i in range(level + 1 - j)]) / level
+            expected = patch_points(points[corners], normals[corners], b)
+            block = curved[used:used + len(b)]
+            self.assertLess(np.abs(block - expected).max(), 1e-9 * size)
+            # Within 0.001 % of the diagonal: the middles of the fine triangles against the patch at their parameters.
+            cells = fine[fine_used:fine_used + level**2] - used
+            middles = patch_points(points[corners], normals[corners], b[cells].mean(1))
+            self.assertLess(np.linalg.norm(block[cells].mean(1) - middles, axis=1).max(), 1e-5 * size)
+            used += len(b)
+            fine_used += level**2
+        self.assertEqual(used, len(curved))
+        self.assertEqual(fine_used, len(fine))
+
+
+@unittest.skipUnless(os.path.isdir(PAPER), f"no paper meshes in {PAPER}")
+class PaperTargets(Case):
+    def decimated(self, target, count):
+        out = self.path("coarse.ply")
+        subprocess.run([os.path.join(BIN, "tunica-decimate"), target, out, "--triangles", str(count), "--mesh-unit", "mm",
+                        "--force"], check=True, capture_output=True, timeout=300)
+        return out
+
+    def error(self, coarse, name, *arguments):
+        record, _ = self.relax(coarse, os.path.join(PAPER, name), self.path("shell.ply"), "--mesh-unit", "mm", "--force",
+                               *arguments)
+        return record["result"]
+
+    def test_cylinder_is_below_the_flat_mesh_and_one_split_brings_a_tenth(self):
+        coarse = os.path.join(PAPER, "cylinderLowRes.obj")
+        first = self.error(coarse, "cylinderHighRes.obj", "--max-iterations", 1)
+        self.assertEqual(first["shells"], 40)
+        self.assertLess(first["hausdorff_percent"]["upper"], 2.01 / 2)  # the same shells with plain normals: 2.01
+        split = self.error(coarse, "cylinderHighRes.obj", "--max-iterations", 2, "--refine")
+        self.assertEqual(split["shells"], 160)
+        self.assertLess(split["hausdorff_percent"]["upper"], first["hausdorff_percent"]["upper"] / 8)
+
+    def test_liver_capsule_is_closer_than_the_papers(self):
+        target = os.path.join(PAPER, "liverHighRes.obj")
+        for count, of_the_paper in ((300, 4.39), (1200, 4.48)):
+            result = self.error(self.decimated(target, count), "liverHighRes.obj", "--max-iterations", 3)
+            self.assertLessEqual(result["shells"], count)
+            self.assertLess(result["hausdorff_percent"]["upper"], of_the_paper)
+
+    def test_aneurysm_is_closer_than_the_papers_shells(self):
+        target = os.path.join(PAPER, "aneurysmHighRes.obj")
+        for count, of_the_paper in ((200, 38), (800, 5.2)):
+            result = self.error(self.decimated(target, count), "aneurysmHighRes.obj", "--max-iterations", 3)
+            self.assertLess(result["hausdorff_percent"]["upper"], of_the_paper / 2)
+
+    def test_a_non_manifold_coarse_mesh_of_the_paper_is_refused_with_its_place(self):
+        for name in ("liverLowRes300.obj", "liverLowRes300_iteration1.obj"):
+            _, error = self.relax(os.path.join(PAPER, name), os.path.join(PAPER, "liverHighRes.obj"),
+                                  self.path("shell.ply"), "--mesh-unit", "mm", expect=3)
+            self.assertIn("near (", error)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,277 @@
+// tunica-relax COARSE TARGET OUT.ply: a coarse mesh becomes curved shells on its target, with a certified distance.
+#include "shell/relax.hpp"
+#include "cli/tool.hpp"
+#include "io/mesh_file.hpp"
+#include "io/picture.hpp"
+#include "shell/curved_surface.hpp"
+#include "surface/checks.hpp"
+#include "surface/hausdorff.hpp"
+#include "surface/measure.hpp"
+
+#include <fmt/core.h>
+
+#include <cmath>
+
+namespace fs = std::filesystem;
+using namespace tunica;
+
+namespace {
+
+constexpr double interval_width = 1e-4;    // of the diagonal: what the report certifies
+constexpr double curved_deviation = 1e-5;  // of the diagonal: the contract of --curved
+constexpr std::size_t map_triangles = 200'000;
+
+struct Arguments {
+  fs::path coarse, target, out;
+  std::optional<fs::path> map, picture, curved;
+  std::optional<LengthTolerance> tolerance;
+  std::string method = "barycentre";
+  std::string surface = "comas";
+  std::optional<std::string> mesh_unit;
+  bool refine = false;
+  std::optional<std::size_t> max_shells;
+  std::optional<int> max_iterations;
+};
+
+void declare(cli::Tool& tool, Arguments& given) {
+  auto& app = tool.arguments();
+  app.add_option("COARSE", given.coarse, "coarse mesh, e.g. from tunica-decimate")->required();
+  app.add_option("TARGET", given.target, "surface that the shells are to become")->required();
+  app.add_option("OUT.ply", given.out, "shell mesh: positions and unit normals")->required();
+  tool.tolerance("--tolerance", given.tolerance,
+                 "stop when the two-sided distance is certainly below it, e.g. 0.5% of the target's diagonal or 0.2mm; "
+                 "exit code 4 when it cannot be reached");
+  app.add_option("--method", given.method, "how nodes move: barycentre (the paper's rule)")
+      ->check(CLI::IsMember({"barycentre", "fit"}));
+  app.add_option("--surface", given.surface, "the patch: comas (the paper's 9-term cubic)")
+      ->check(CLI::IsMember({"comas", "watertight"}));
+  app.add_flag("--refine", given.refine,
+               "split shells where the distance is above the tolerance; without one, all 1:4");
+  app.add_option("--max-shells", given.max_shells, "at most N shells")->check(CLI::PositiveNumber)->type_name("N");
+  app.add_option("--max-iterations", given.max_iterations, "at most N iterations (20, with --refine 60)")
+      ->check(CLI::Range(1, 100000))
+      ->type_name("N");
+  app.add_option("--map", given.map, "error map: the curved surface with its distance to the target, PLY");
+  app.add_option("--picture", given.picture, "picture of the error map, PNG");
+  app.add_option("--curved", given.curved, "the curved surface as a fine triangle mesh, PLY");
+  app.add_option("--mesh-unit", given.mesh_unit, "unit of OBJ, STL and OFF files: mm, cm, m or um")->type_name("UNIT");
+  tool.not_yet("--shells");
+}
+
+void refuse_contradictions(const Arguments& given) {
+  if (given.method == "fit") {
+    throw UsageError("--method fit is not available yet; use barycentre");
+  }
+  if (given.surface == "watertight") {
+    throw UsageError("--surface watertight is not available yet; use comas");
+  }
+  if (given.max_shells && !given.refine) {
+    throw UsageError("--max-shells limits --refine; without it the number of shells does not change");
+  }
+  if (given.refine && !given.tolerance && !given.max_shells && !given.max_iterations) {
+    throw UsageError("--refine needs to know where to end: --tolerance, --max-shells or --max-iterations");
+  }
+}
+
+TriangleMesh read_surface(const fs::path& path, const std::optional<double>& unit_mm) {
+  TriangleMesh mesh = read_mesh(path, unit_mm, true).mesh;
+  if (const auto why = why_unfit(examine(mesh))) {
+    throw InputError(path.string() + ": " + *why + "; repair it first");
+  }
+  if (!(diagonal(mesh) > 0)) {
+    throw InputError(path.string() + ": the mesh has no extent");
+  }
+  return mesh;
+}
+
+void warn_of_mismatch(const cli::Tool& tool, const TriangleMesh& coarse, const TriangleMesh& target) {
+  const MeshFacts a = examine(coarse), b = examine(target);
+  const auto differ = [&](std::size_t of_coarse, std::size_t of_target, const std::string& what) {
+    if (of_coarse != of_target) {
+      tool.warn(fmt::format("COARSE has {} {}, TARGET has {}; the distance will show what cannot be covered", of_coarse,
+                            what, of_target));
+    }
+  };
+  differ(a.components, b.components, "component(s)");
+  differ(a.boundary_loops, b.boundary_loops, "boundary loop(s)");
+}
+
+Json interval(const Interval& mm, double scale) { return {{"lower", mm.lower * scale}, {"upper", mm.upper * scale}}; }
+
+PlyOptions ply_options(const cli::Tool& tool) {
+  PlyOptions options;
+  options.comments = {"made by " + tool.command()};
+  options.overwrite = tool.force();
+  return options;
+}
+
+/// Distances at the vertices of a surface fine enough to be looked at, with the edges of the shells.
+void write_maps(cli::Tool& tool, const Arguments& given, const ShellMesh& shell, const Target& target,
+                const ShellDistance& distance) {
+  const double per_shell = static_cast<double>(map_triangles) / static_cast<double>(shell.triangles.size());
+  const int level = std::clamp(static_cast<int>(std::sqrt(per_shell)), 4, 24);
+  const Tessellation fine = tessellate_uniformly(shell, level);
+  const auto distances = vertex_distances(fine.mesh, target.tree());
+  if (given.map) {
+    write_ply(*given.map, fine.mesh, distances, ply_options(tool));
+  }
+  if (given.picture) {
+    PictureOptions options;
+    options.title = fmt::format("{}: {} shells", given.out.filename().string(), shell.triangles.size());
+    options.caption = fmt::format("two-sided Hausdorff distance at most {:.4g} mm ({:.3g} %), mean {:.3g} mm",
+                                  distance.both.upper, 100 * distance.both.upper / target.diagonal(), distance.mean);
+    options.quantity = "distance to the target";
+    options.diagonal = target.diagonal();
+    options.overwrite = tool.force();
+    const auto on_edge = [](const Vec2& a, const Vec2& b) {
+      return (a[0] == 0 && b[0] == 0) || (a[1] == 0 && b[1] == 0) || (a[0] + a[1] > 1 - 1e-9 && b[0] + b[1] > 1 - 1e-9);
+    };
+    for (const auto& v : fine.mesh.triangles) {
+      for (std::size_t i = 0; i < 3; ++i) {
+        const Index a = v[i], b = v[(i + 1) % 3];
+        if (on_edge(fine.barycentric[a], fine.barycentric[b])) {
+          options.lines.push_back({fine.mesh.vertices[a], fine.mesh.vertices[b]});
+        }
+      }
+    }
+    write_error_map_picture(*given.picture, fine.mesh, distances, options);
+  }
+}
+
+void run(cli::Tool& tool, const Arguments& given) {
+  refuse_contradictions(given);
+  tool.stages({"read", "relax", "measure", "write"});
+  tool.output(given.out);
+  for (const auto& path : {given.map, given.picture, given.curved}) {
+    if (path) {
+      tool.output(*path);
+    }
+  }
+
+  std::optional<double> unit_mm;
+  if (given.mesh_unit) {
+    unit_mm = parse_length_unit(*given.mesh_unit);
+  }
+  TriangleMesh coarse;
+  std::optional<Target> target;
+  {
+    const auto stage = tool.stage("read");
+    coarse = read_surface(tool.input(given.coarse), unit_mm);
+    TriangleMesh surface = read_surface(tool.input(given.target), unit_mm);
+    warn_of_mismatch(tool, coarse, surface);
+    target.emplace(std::move(surface));
+  }
+  const double diagonal = target->diagonal();
+  const double percent = 100 / diagonal;
+
+  const auto keep_partial = [&](const ShellMesh& shell) {
+    PlyOptions options = ply_options(tool);
+    options.overwrite = true;
+    write_ply(fs::path(given.out.string() + ".part"), shell, options);
+  };
+  ShellMesh best;
+  RelaxOptions options;
+  options.refine = given.refine;
+  options.max_shells = given.max_shells;
+  options.max_iterations = given.max_iterations;
+  options.width = interval_width * diagonal;
+  options.progress = tool.progress("relax");
+  if (given.tolerance) {
+    options.tolerance = given.tolerance->millimetres(diagonal);
+  }
+  options.on_iteration = [&](const RelaxIteration& iteration, const ShellMesh& so_far) {
+    best = so_far;
+    tool.detail(
+        fmt::format("{} shells: {:.4f} to {:.4f} %; nodes by the rule {}, to the closest point {}, on the boundary {}, "
+                    "held back {}; {:.2f} s",
+                    iteration.shells, percent * iteration.hausdorff.lower, percent * iteration.hausdorff.upper,
+                    iteration.moves.by_rule, iteration.moves.to_closest_point, iteration.moves.on_boundary,
+                    iteration.moves.shortened, iteration.seconds));
+  };
+  RelaxResult relaxed;
+  try {
+    const auto stage = tool.stage("relax");
+    relaxed = relax(coarse, *target, options);
+  } catch (const Interrupted&) {
+    if (!best.triangles.empty()) {
+      keep_partial(best);
+    }
+    throw;
+  } catch (const InputError& error) {
+    throw InputError(given.coarse.string() + ": " + error.what());
+  }
+  if (relaxed.turned_around) {
+    tool.warn("COARSE faces the other way than TARGET; its triangles were turned around");
+  }
+
+  ShellDistance distance;
+  {
+    const auto stage = tool.stage("measure");
+    ShellDistanceOptions measuring;
+    measuring.width = interval_width * diagonal;
+    if (options.tolerance) {
+      measuring.width = std::min(measuring.width, *options.tolerance / 20);
+    }
+    const ShellDistance flat = flat_distance(relaxed.shell, *target, measuring);
+    measuring.with_mean = true;
+    measuring.progress = tool.progress("measure");
+    distance = shell_distance(relaxed.shell, *target, measuring);
+
+    Json& result = tool.result();
+    result["shells"] = relaxed.shell.triangles.size();
+    result["hausdorff_mm"] = interval(distance.both, 1);
+    result["hausdorff_percent"] = interval(distance.both, percent);
+    result["one_sided_percent"] = {{"shell_to_target", interval(distance.shell_to_target, percent)},
+                                   {"target_to_shell", interval(distance.target_to_shell, percent)}};
+    result["mean_percent"] = distance.mean * percent;
+    result["rms_percent"] = distance.rms * percent;
+    result["flat_hausdorff_percent"] = interval(flat.both, percent);
+    result["iterations"] = Json::array();
+    for (const RelaxIteration& iteration : relaxed.iterations) {
+      result["iterations"].push_back({{"shells", iteration.shells},
+                                      {"hausdorff_percent", interval(iteration.hausdorff, percent)},
+                                      {"seconds", iteration.seconds}});
+    }
+    result["min_angle_deg"] = min_angle_degrees(flat_facets(relaxed.shell));
+    result["self_intersections"] = Json();
+    result["reached"] = relaxed.reached ? Json(*relaxed.reached) : Json();
+    result["stopped"] = relaxed.stopped;
+    result["edges_turned"] = relaxed.flips;
+    result["diagonal_mm"] = diagonal;
+  }
+  tool.note(fmt::format("{} shells, two-sided distance {:.4f} to {:.4f} % of the diagonal: {}",
+                        relaxed.shell.triangles.size(), percent * distance.both.lower, percent * distance.both.upper,
+                        relaxed.stopped));
+
+  const auto stage = tool.stage("write");
+  if (options.tolerance && !*relaxed.reached) {
+    keep_partial(relaxed.shell);
+    throw RequirementError(fmt::format(
+        "{}: the tolerance of {:.4g} % is not reached: {:.4g} % with {} shells ({}); the best mesh is {}.part. {}",
+        given.out.string(), percent * *options.tolerance, percent * distance.both.upper, relaxed.shell.triangles.size(),
+        relaxed.stopped, given.out.string(),
+        given.refine ? "Allow more shells or iterations" : "Add --refine, or take a coarse mesh with more triangles"));
+  }
+  require_fit(relaxed.shell, given.out.string());
+  write_ply(given.out, relaxed.shell, ply_options(tool));
+  if (given.curved) {
+    write_ply(*given.curved, tessellate(relaxed.shell, curved_deviation * diagonal).mesh, ply_options(tool));
+  }
+  if (given.map || given.picture) {
+    write_maps(tool, given, relaxed.shell, *target, distance);
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  cli::Tool tool(
+      "relax",
+      "Moves a coarse mesh onto its target as curved shells, and certifies the distance of the curved surface "
+      "to the target, both ways.",
+      "tunica-relax coarse.ply surface.ply shell.ply --tolerance 1% --refine --picture map.png\n"
+      "tunica-relax coarse.obj surface.obj shell.ply --mesh-unit mm --max-iterations 5");
+  Arguments given;
+  declare(tool, given);
+  return tool.run(argc, argv, [&] { run(tool, given); });
+}
