@@ -58,6 +58,7 @@ private:
   bool collapse_cheapest();
   [[nodiscard]] std::optional<Target> target(HalfEdge h, Placement placement) const;
   [[nodiscard]] Target best_on_curve(HalfEdge h, const Quadric& q) const;
+  [[nodiscard]] Quadric cost_of(Index u, Index v) const;
   void evaluate(Index edge, Placement placement);
   [[nodiscard]] bool keeps_topology(HalfEdge h);
   [[nodiscard]] bool keeps_shape(HalfEdge h, const Vec3& position) const;
@@ -69,7 +70,9 @@ private:
   Vec3 centre_ = Vec3::Zero();
   double scale_ = 1;
   std::vector<Vec3> position_;
-  std::vector<Quadric> quadric_;
+  std::vector<Quadric> quadric_;      // #V of the planes of the triangles, weighted by area
+  std::vector<double> area_;          // #V sum of those weights
+  std::vector<Quadric> wall_;         // #V of the planes on the boundary edges; empty when there is no boundary
   std::vector<Index> corners_;        // #3F vertex of each corner; the half-edge starts there
   std::vector<HalfEdge> twin_;        // #3F or none
   std::vector<Index> edge_;           // #3F edge of each half-edge

@@ -92,7 +92,8 @@ public:
     }
     const double step = cumulative.back() / static_cast<double>(count);
     if (!(step > 0)) {
-      return {0, 0};
+      constexpr double undefined = std::numeric_limits<double>::quiet_NaN();
+      return {undefined, undefined};
     }
     struct Sum {
       double distance = 0, squared_distance = 0;

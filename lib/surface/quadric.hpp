@@ -39,6 +39,11 @@ struct Quadric {
   }
   friend Quadric operator+(Quadric l, const Quadric& r) { return l += r; }
 
+  [[nodiscard]] Quadric times(double f) const {
+    return {f * xx, f * xy, f * xz, f * yy, f * yz, f * zz, f * bx, f * by, f * bz, f * c};
+  }
+
+  /// A p.
   [[nodiscard]] Vec3 times(const Vec3& p) const {
     return {xx * p.x() + xy * p.y() + xz * p.z(), xy * p.x() + yy * p.y() + yz * p.z(),
             xz * p.x() + yz * p.y() + zz * p.z()};
