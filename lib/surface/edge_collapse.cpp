@@ -19,7 +19,7 @@ constexpr double fold_cosine = -0.9;
 constexpr double least_height = 0.01;
 /// Weight of the planes that stand on boundary edges. New boundary vertices lie on the curve, so all of their error is
 /// on one side of it; and a ragged rim is seen before a rough surface.
-constexpr double boundary_weight = 100;
+constexpr double boundary_weight = 30;
 /// How strongly a new vertex is held near the middle of its edge where the quadric is flat.
 constexpr double pull = 1e-5;
 /// Weight of an edge's squared length times its quadric's weight: on flat ground short edges go first.
@@ -140,6 +140,7 @@ void EdgeCollapse::find_boundary(const TriangleMesh& mesh) {
 void EdgeCollapse::sum_quadrics() {
   quadric_.assign(position_.size(), {});
   area_.assign(position_.size(), 0);
+  facing_.assign(position_.size(), Vec3::Zero());
   wall_.assign(curves_.empty() ? 0 : position_.size(), {});
   for (HalfEdge h = 0; h < corners_.size(); h += 3) {
     const Vec3& a = position_[corners_[h]];
@@ -153,6 +154,7 @@ void EdgeCollapse::sum_quadrics() {
     for (HalfEdge k = h; k < h + 3; ++k) {
       quadric_[corners_[k]] += plane;
       area_[corners_[k]] += doubled_area;
+      facing_[corners_[k]] += normal;
       if (twin_[k] == none) {
         const Vec3 edge = position_[to(k)] - position_[from(k)];
         const Vec3 outward = edge.cross(unit);
@@ -340,6 +342,7 @@ bool EdgeCollapse::keeps_shape(HalfEdge h, const Vec3& position) const {
 bool EdgeCollapse::fan_keeps_shape(Index vertex, Index other, const Vec3& position) const {
   bool good = true;
   const Vec3& old_position = position_[vertex];
+  const Vec3 facing = facing_[vertex] + facing_[other];
   around(vertex, [&](HalfEdge h) {
     const Index i = to(h);
     const Index j = to(next(h));
@@ -354,8 +357,11 @@ bool EdgeCollapse::fan_keeps_shape(Index vertex, Index other, const Vec3& positi
     const double old_height = height_over_longest(before, old_position, a, b);
     const double new_height = height_over_longest(after, position, a, b);
     const bool was_flat = !(old_height > 1e-9);
+    // Many small turns may add up: the given surface that the three corners stand for must be faced as well.
+    const Vec3 given = facing + facing_[i] + facing_[j];
     good = (was_flat || before.dot(after) > least_cosine * lengths) &&
-           new_height > std::min(least_height, 0.7 * old_height) && after.squaredNorm() > 0;
+           (after.dot(given) > 0 || before.dot(given) <= 0) && new_height > std::min(least_height, 0.7 * old_height) &&
+           after.squaredNorm() > 0;
     const HalfEdge across = twin_[next(h)];
     if (good && across != none) {
       // The triangle on the outer side stays: the new one must not lie back on it.
@@ -418,6 +424,7 @@ void EdgeCollapse::collapse(HalfEdge h, const Target& chosen) {
   position_[u] = chosen.position;
   quadric_[u] += quadric_[v];
   area_[u] += area_[v];
+  facing_[u] += facing_[v];
   if (!wall_.empty()) {
     wall_[u] += wall_[v];
   }

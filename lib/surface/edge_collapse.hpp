@@ -72,6 +72,7 @@ private:
   std::vector<Vec3> position_;
   std::vector<Quadric> quadric_;      // #V of the planes of the triangles, weighted by area
   std::vector<double> area_;          // #V sum of those weights
+  std::vector<Vec3> facing_;          // #V sum of the given triangles' normals times area that a vertex stands for
   std::vector<Quadric> wall_;         // #V of the planes on the boundary edges; empty when there is no boundary
   std::vector<Index> corners_;        // #3F vertex of each corner; the half-edge starts there
   std::vector<HalfEdge> twin_;        // #3F or none

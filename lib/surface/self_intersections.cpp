@@ -4,7 +4,7 @@
 #include "core/progress.hpp"
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
-#include <CGAL/Triangle_3_Triangle_3_do_intersect.h>
+#include <CGAL/Intersections_3/Triangle_3_Triangle_3.h>
 #include <CGAL/box_intersection_d.h>
 
 #include <algorithm>
