@@ -2,6 +2,7 @@
 
 #include "core/error.hpp"
 #include "core/threads.hpp"
+#include "surface/cover_bound.hpp"
 #include "surface/measure.hpp"
 
 #include <algorithm>
@@ -30,7 +31,7 @@ struct Piece {
 
 // Where on the segment p-q the triangles s (closest to p) and t (closest to q) of B are equally far; none when an end
 // is a tie already.
-std::optional<double> tie(const ClosestPoint& b, const Vec3& p, const Vec3& q, Index s, Index t) {
+std::optional<double> tie(const ClosestPoint& b, const Vec3& p, const Vec3& q, Index s, Index t, double precision) {
   const auto difference = [&](double along) {
     const Vec3 x = p + along * (q - p);
     return std::sqrt(b.squared_distance_to(x, s)) - std::sqrt(b.squared_distance_to(x, t));
@@ -39,7 +40,7 @@ std::optional<double> tie(const ClosestPoint& b, const Vec3& p, const Vec3& q, I
   double right = 1;
   double at_left = difference(left);
   double at_right = difference(right);
-  const double noise = 1e-9 * (q - p).norm();
+  const double noise = std::max(precision, 1e-12 * (q - p).norm());
   if (!(at_left < -noise) || !(at_right > noise)) {
     return std::nullopt;
   }
@@ -49,7 +50,7 @@ std::optional<double> tie(const ClosestPoint& b, const Vec3& p, const Vec3& q, I
   for (int i = 0; i < 24 && right - left > 1e-12; ++i) {
     middle = (left * at_right - right * at_left) / (at_right - at_left);
     const double value = difference(middle);
-    if (std::abs(value) <= 1e-14 * (q - p).norm()) {
+    if (std::abs(value) <= noise) {
       break;
     }
     if (value > 0) {
@@ -71,7 +72,7 @@ std::optional<double> tie(const ClosestPoint& b, const Vec3& p, const Vec3& q, I
 class OneSided {
 public:
   OneSided(const ClosestPoint& a, const ClosestPoint& b, const HausdorffOptions& options)
-      : a_(a), b_(b), options_(options) {
+      : a_(a), b_(b), options_(options), cover_(b) {
     // With the largest reach, so that it can be added to every bound: a thousandth of the width at most in practice.
     double reach = 0;
     const Box box_a = bounding_box({a.vertices(), a.triangles()});
@@ -91,7 +92,8 @@ public:
     }
     const double step = cumulative.back() / static_cast<double>(count);
     if (!(step > 0)) {
-      return {0, 0};
+      constexpr double undefined = std::numeric_limits<double>::quiet_NaN();
+      return {undefined, undefined};
     }
     struct Sum {
       double distance = 0, squared_distance = 0;
@@ -156,6 +158,7 @@ private:
     double settled = 0;
     std::size_t splits = 0;
     std::vector<Piece> live;
+    CoverBound::Visited visited;
   };
 
   void raise(const Farthest& found) {
@@ -210,7 +213,7 @@ private:
     }
   }
 
-  void bound(Piece& piece) const {
+  void bound(Piece& piece, Block& block) const {
     double squared = std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < 3; ++i) {
       if (std::find(piece.nearest.begin(), piece.nearest.begin() + static_cast<std::ptrdiff_t>(i), piece.nearest[i]) ==
@@ -219,6 +222,12 @@ private:
       }
     }
     piece.upper = std::min(piece.upper, std::sqrt(squared));
+    const double wanted = enough(block.farthest.distance);
+    for (std::size_t i = 0; i < 3 && piece.upper > wanted; ++i) {
+      if (i == 0 || (piece.nearest[i] != piece.nearest[i - 1] && piece.nearest[i] != piece.nearest[0])) {
+        piece.upper = std::min(piece.upper, cover_(piece.corner, piece.nearest[i], wanted, block.visited));
+      }
+    }
   }
 
   // Keeps a piece, or settles it.
@@ -254,7 +263,7 @@ private:
           query(piece, corner, guess, block);
           guess = piece.nearest[corner];
         }
-        bound(piece);
+        bound(piece, block);
         file(piece, block);
       }
     });
@@ -324,8 +333,8 @@ private:
     other.corner[i] = one.corner[j];
     other.distance[i] = one.distance[j];
     other.nearest[i] = one.nearest[j];
-    bound(one);
-    bound(other);
+    bound(one, block);
+    bound(other, block);
     split(one, levels - 1, block);
     split(other, levels - 1, block);
   }
@@ -346,7 +355,7 @@ private:
         const Index s = piece.nearest[k];
         const Index t = piece.nearest[(k + 1) % 3];
         if (s != t && touch(s, t)) {
-          if (const auto along = tie(b_, piece.corner[k], piece.corner[(k + 1) % 3], s, t)) {
+          if (const auto along = tie(b_, piece.corner[k], piece.corner[(k + 1) % 3], s, t, 0.05 * options_.width)) {
             return {k, *along};
           }
         }
@@ -365,6 +374,7 @@ private:
   const ClosestPoint& a_;
   const ClosestPoint& b_;
   const HausdorffOptions& options_;
+  CoverBound cover_;
   double rounding_ = 0;
   Farthest farthest_;
   double settled_ = 0;  // upper bound of all pieces that are settled

@@ -4,21 +4,21 @@
 
 namespace tunica {
 
-Incidence incidence(const TriangleMesh& mesh) {
+Incidence incidence(std::size_t vertices, std::span<const std::array<Index, 3>> triangles) {
   Incidence result;
-  result.offsets.assign(mesh.vertices.size() + 1, 0);
-  for (const auto& triangle : mesh.triangles) {
+  result.offsets.assign(vertices + 1, 0);
+  for (const auto& triangle : triangles) {
     for (const Index v : triangle) {
       ++result.offsets[v + 1];
     }
   }
-  for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
+  for (std::size_t v = 0; v < vertices; ++v) {
     result.offsets[v + 1] += result.offsets[v];
   }
-  result.triangles.resize(3 * mesh.triangles.size());
+  result.triangles.resize(3 * triangles.size());
   std::vector<std::size_t> next(result.offsets.begin(), result.offsets.end() - 1);
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    for (const Index v : mesh.triangles[t]) {
+  for (std::size_t t = 0; t < triangles.size(); ++t) {
+    for (const Index v : triangles[t]) {
       result.triangles[next[v]++] = static_cast<Index>(t);
     }
   }

@@ -17,7 +17,8 @@ struct Incidence {
 };
 
 /// Cost: linear.
-Incidence incidence(const TriangleMesh& mesh);
+Incidence incidence(std::size_t vertices, std::span<const std::array<Index, 3>> triangles);
+inline Incidence incidence(const TriangleMesh& mesh) { return incidence(mesh.vertices.size(), mesh.triangles); }
 
 /// For each triangle t and k = 0, 1, 2 the triangle across the edge from corner k to corner k + 1; `no_neighbour` at a
 /// boundary and where the edge is not shared by exactly two triangles.

@@ -155,6 +155,26 @@ TEST(Hausdorff, NeverBelowTheTruthOnTriangleSoup) {
   }
 }
 
+TEST(Hausdorff, NeverBelowTheTruthOnCoarseAgainstFine) {
+  // Large triangles over many small ones, on rough, folded, open and touching surfaces.
+  const TriangleMesh fine = shapes::sphere(5);
+  const TriangleMesh strip = shapes::tube(90, 60, 1, 4);
+  std::vector<std::pair<TriangleMesh, TriangleMesh>> pairs;
+  for (const double roughness : {0.001, 0.01, 0.05, 0.3}) {
+    pairs.emplace_back(shapes::sphere(2), shapes::shaken(fine, roughness, 3));
+    pairs.emplace_back(shapes::tube(7, 2, 1, 4), shapes::shaken(strip, roughness, 4));
+    pairs.emplace_back(shapes::plane(2, 2), shapes::shaken(shapes::plane(40, 40), roughness, 5));
+    pairs.emplace_back(shapes::plane(2, 2), shapes::together(shapes::shaken(shapes::plane(40, 40), roughness, 5),
+                                                             shapes::shaken(shapes::plane(30, 20), roughness, 6)));
+  }
+  for (const auto& [a, b] : pairs) {
+    const HausdorffResult result = measure(a, b, 1e-6);
+    EXPECT_LE(result.both.upper - result.both.lower, 1.1e-6 * diagonal(b));
+    EXPECT_GE(result.a_to_b.upper, sampled(a, b, 40));
+    EXPECT_GE(result.b_to_a.upper, sampled(b, a, 2));
+  }
+}
+
 TEST(Hausdorff, TightIntervalsLieInsideWideOnes) {
   const TriangleMesh a = shapes::shaken(shapes::sphere(4), 0.02, 5);
   const TriangleMesh b = shapes::sphere(3);

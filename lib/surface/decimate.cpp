@@ -1,0 +1,148 @@
+#include "surface/decimate.hpp"
+
+#include "core/error.hpp"
+#include "surface/checks.hpp"
+#include "surface/edge_collapse.hpp"
+#include "surface/hausdorff.hpp"
+#include "surface/measure.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <numeric>
+
+namespace tunica {
+namespace {
+
+// The mesh after the first `steps` collapses.
+TriangleMesh replay(const TriangleMesh& mesh, const std::vector<Collapse>& history, std::size_t steps) {
+  std::vector<Vec3> position = mesh.vertices;
+  std::vector<Index> root(mesh.vertices.size());
+  std::iota(root.begin(), root.end(), Index{0});
+  for (std::size_t i = 0; i < steps; ++i) {
+    root[history[i].removed] = history[i].kept;
+    position[history[i].kept] = history[i].position;
+  }
+  // A vertex is removed once, into one that lives longer: backwards, every root is final when it is needed.
+  for (std::size_t i = steps; i-- > 0;) {
+    root[history[i].removed] = root[history[i].kept];
+  }
+  TriangleMesh result;
+  constexpr Index unused = 0xffffffff;
+  std::vector<Index> renumbered(mesh.vertices.size(), unused);
+  for (const auto& triangle : mesh.triangles) {
+    std::array<Index, 3> corners{root[triangle[0]], root[triangle[1]], root[triangle[2]]};
+    if (corners[0] == corners[1] || corners[1] == corners[2] || corners[2] == corners[0]) {
+      continue;
+    }
+    for (Index& v : corners) {
+      if (renumbered[v] == unused) {
+        renumbered[v] = static_cast<Index>(result.vertices.size());
+        result.vertices.push_back(position[v]);
+      }
+      v = renumbered[v];
+    }
+    result.triangles.push_back(corners);
+  }
+  return result;
+}
+
+// Finds how far along the history the error still holds.
+class ErrorSearch {
+public:
+  ErrorSearch(const TriangleMesh& mesh, const std::vector<Collapse>& history, double max_error)
+      : mesh_(mesh), history_(history), max_error_(max_error), tree_(mesh) {
+    options_.limit = max_error;
+    options_.width = 1e-3 * max_error;
+    options_.samples = 0;
+  }
+
+  DecimateResult run(const Progress& progress) {
+    std::size_t holds = 0;
+    std::size_t fails = history_.size() + 1;
+    best_ = replay(mesh_, history_, 0);
+    if (try_steps(history_.size())) {
+      return result();
+    }
+    fails = history_.size();
+    // The error grows like a power of the count: halve the interval in the logarithm of the count.
+    const double width = std::log(remaining(holds) / remaining(fails));
+    while (fails - holds > 1 && remaining(holds) - remaining(fails) > 1e-3 * remaining(fails)) {
+      const double middle = std::sqrt(remaining(holds) * remaining(fails));
+      const auto steps = std::clamp(static_cast<std::size_t>(remaining(0) - middle), holds + 1, fails - 1);
+      (try_steps(steps) ? holds : fails) = steps;
+      advance(progress, 1 - std::log(remaining(holds) / remaining(fails)) / width);
+    }
+    // The error need not grow at every step: somewhat later it may hold again.
+    for (const double further : {0.99, 0.97, 0.95, 0.92, 0.88}) {
+      const auto steps = static_cast<std::size_t>(remaining(0) - further * remaining(holds));
+      if (steps < history_.size() && steps > holds) {
+        try_steps(steps);
+      }
+    }
+    return result();
+  }
+
+private:
+  [[nodiscard]] double remaining(std::size_t steps) const { return static_cast<double>(history_.size() + 4 - steps); }
+
+  bool try_steps(std::size_t steps) {
+    TriangleMesh candidate = replay(mesh_, history_, steps);
+    const Interval error = hausdorff(ClosestPoint(candidate), tree_, options_).both;
+    if (error.upper > max_error_) {
+      return false;
+    }
+    if (candidate.triangles.size() <= best_.triangles.size()) {
+      best_ = std::move(candidate);
+      error_ = error;
+    }
+    return true;
+  }
+
+  DecimateResult result() {
+    DecimateResult found;
+    found.error = error_ ? *error_ : hausdorff(ClosestPoint(best_), tree_, options_).both;
+    found.error_kept = found.error->upper <= max_error_;
+    found.mesh = std::move(best_);
+    return found;
+  }
+
+  const TriangleMesh& mesh_;
+  const std::vector<Collapse>& history_;
+  double max_error_;
+  ClosestPoint tree_;
+  HausdorffOptions options_;
+  TriangleMesh best_;
+  std::optional<Interval> error_;
+};
+
+}  // namespace
+
+DecimateResult decimate(const TriangleMesh& mesh, const DecimateOptions& options) {
+  if (const auto reason = why_unfit(examine(mesh))) {
+    throw InputError(fmt::format("not an oriented manifold: {}", *reason));
+  }
+  if (!(diagonal(mesh) > 0)) {
+    throw InputError("all its vertices lie in one point");
+  }
+  const auto part = [&](double begin, double end) -> Progress {
+    if (!options.progress) {
+      return {};
+    }
+    return [&options, begin, end](double fraction) { options.progress(begin + (end - begin) * fraction); };
+  };
+  EdgeCollapse collapse(mesh);
+  const double collapsing = options.max_error ? 0.2 : 1;
+  const std::size_t left = collapse.run(options.triangles.value_or(0), part(0, collapsing));
+  DecimateResult result;
+  if (options.max_error) {
+    result = ErrorSearch(mesh, collapse.history(), *options.max_error).run(part(collapsing, 1));
+  } else {
+    result.mesh = replay(mesh, collapse.history(), collapse.history().size());
+  }
+  result.count_reached = !options.triangles || result.mesh.triangles.size() <= *options.triangles;
+  TUNICA_ASSERT(options.max_error || result.mesh.triangles.size() == left);
+  return result;
+}
+
+}  // namespace tunica

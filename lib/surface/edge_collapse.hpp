@@ -1,0 +1,93 @@
+#pragma once
+
+#include "core/progress.hpp"
+#include "surface/edge_heap.hpp"
+#include "surface/quadric.hpp"
+#include "surface/triangle_mesh.hpp"
+
+namespace tunica {
+
+/// One step of a decimation: vertex `removed` becomes `kept`, which moves to `position` (of the given mesh's frame).
+struct Collapse {
+  Index kept;
+  Index removed;
+  Vec3 position;
+};
+
+/// Greedy quadric edge collapse on an oriented manifold. Keeps the topology (link condition: Euler number, pieces,
+/// loops), the boundary (its vertices stay on the given boundary curve), and the side every triangle faces.
+/// Works in a frame of its own in which the mesh has diagonal 1.
+class EdgeCollapse {
+public:
+  /// @param mesh  an oriented manifold, with boundary or without (see why_unfit)
+  explicit EdgeCollapse(const TriangleMesh& mesh);
+
+  /// Collapses edges until at most `triangles` are left or none can be collapsed. @return triangles left.
+  std::size_t run(std::size_t triangles, const Progress& progress);
+
+  /// What was done, in order.
+  [[nodiscard]] const std::vector<Collapse>& history() const { return history_; }
+
+private:
+  using HalfEdge = Index;  // 3 t + k: from corner k of triangle t to corner k + 1
+  enum class Placement : unsigned char { best, end };
+  struct Target {
+    Vec3 position;
+    double cost;
+    double curve = 0;  // place on the boundary curve
+  };
+  // A boundary loop of the given mesh, as a closed polyline; places on it are segment number + fraction.
+  struct Curve {
+    std::vector<Vec3> points;
+    [[nodiscard]] Vec3 at(double place) const;
+  };
+
+  static HalfEdge next(HalfEdge h) { return h % 3 == 2 ? h - 2 : h + 1; }
+  static HalfEdge previous(HalfEdge h) { return h % 3 == 0 ? h + 2 : h - 1; }
+  [[nodiscard]] Index from(HalfEdge h) const { return corners_[h]; }
+  [[nodiscard]] Index to(HalfEdge h) const { return corners_[next(h)]; }
+  template <typename Visit>
+  void around(Index vertex, const Visit& visit) const;
+  template <typename Visit>
+  void neighbours_of(Index vertex, const Visit& visit) const;
+
+  void connect(const TriangleMesh& mesh);
+  void find_boundary(const TriangleMesh& mesh);
+  void sum_quadrics();
+  void fill_heap();
+  bool collapse_cheapest();
+  [[nodiscard]] std::optional<Target> target(HalfEdge h, Placement placement) const;
+  [[nodiscard]] Target best_on_curve(HalfEdge h, const Quadric& q) const;
+  [[nodiscard]] Quadric cost_of(Index u, Index v) const;
+  void evaluate(Index edge, Placement placement);
+  [[nodiscard]] bool keeps_topology(HalfEdge h);
+  [[nodiscard]] bool keeps_shape(HalfEdge h, const Vec3& position) const;
+  [[nodiscard]] bool fan_keeps_shape(Index vertex, Index other, const Vec3& position) const;
+  void collapse(HalfEdge h, const Target& target);
+  void unlink(HalfEdge spoke, HalfEdge rim);
+  void set_outgoing(Index vertex, HalfEdge any);
+
+  Vec3 centre_ = Vec3::Zero();
+  double scale_ = 1;
+  std::vector<Vec3> position_;
+  std::vector<Quadric> quadric_;      // #V of the planes of the triangles, weighted by area
+  std::vector<double> area_;          // #V sum of those weights
+  std::vector<Vec3> facing_;          // #V sum of the given triangles' normals times area that a vertex stands for
+  std::vector<Quadric> wall_;         // #V of the planes on the boundary edges; empty when there is no boundary
+  std::vector<Index> corners_;        // #3F vertex of each corner; the half-edge starts there
+  std::vector<HalfEdge> twin_;        // #3F or none
+  std::vector<Index> edge_;           // #3F edge of each half-edge
+  std::vector<HalfEdge> half_of_;     // #E one half-edge of each edge, none when the edge is gone
+  std::vector<Placement> placement_;  // #E
+  std::vector<HalfEdge> outgoing_;    // #V a half-edge from each vertex; at a boundary the one without a twin
+  std::vector<Index> curve_of_;       // #V boundary curve, or none
+  std::vector<double> curve_place_;   // #V
+  std::vector<Curve> curves_;
+  std::vector<Index> mark_;  // #V stamp of the last link check
+  Index stamp_ = 0;
+  EdgeHeap heap_;
+  std::size_t triangles_ = 0;
+  std::vector<Collapse> history_;
+};
+
+}  // namespace tunica

@@ -1,0 +1,121 @@
+"""tunica-compare as its users run it: analytic distances, maps, curved shells, each exit code."""
+import math
+import unittest
+
+import meshes
+from whole_tool import WholeTool
+
+
+def interval_holds(interval, truth, slack=0.0):
+    return interval["lower"] <= truth + slack and truth <= interval["upper"] + slack
+
+
+class Compare(WholeTool):
+    tool = "compare"
+
+    def setUp(self):
+        super().setUp()
+        plane = [(0, 0, 0), (4, 0, 0), (4, 3, 0), (0, 3, 0)]
+        meshes.write_ply(self.path("plane.ply"), plane, [(0, 1, 2), (0, 2, 3)])
+        meshes.write_ply(self.path("offset.ply"), [(x, y, 0.25) for x, y, _ in plane], [(0, 1, 3), (1, 2, 3)])
+        meshes.write_ply(self.path("longer.ply"), [(2 * x, y, z) for x, y, z in plane], [(0, 1, 2), (0, 2, 3)])
+        vertices, triangles = meshes.sphere(2, 10.0)
+        self.normals = [tuple(x / 10 for x in v) for v in vertices]
+        meshes.write_ply(self.path("shell.ply"), vertices, triangles, self.normals, ["SPACE=LPS", "surface=comas"])
+        meshes.write_ply(self.path("sphere.ply"), *meshes.sphere(6, 10.0))
+
+    def test_offset_planes(self):
+        report = self.run_tool("plane.ply", "offset.ply")
+        result = report["result"]
+        self.assertEqual(result["diagonal_mm"], 5)
+        self.assertTrue(interval_holds(result["hausdorff_mm"], 0.25))
+        self.assertTrue(interval_holds(result["hausdorff_percent"], 5))
+        width = result["hausdorff_percent"]["upper"] - result["hausdorff_percent"]["lower"]
+        self.assertLessEqual(width, 0.01)
+        self.assertAlmostEqual(result["mean_percent"], 5, places=6)
+        self.assertAlmostEqual(result["rms_percent"], 5, places=6)
+        self.assertEqual(list(report["seconds"]), ["total", "read", "compare"])
+        self.assertEqual(len(report["inputs"]), 2)
+
+    def test_sides_and_diagonal_of_b(self):
+        result = self.run_tool("plane.ply", "longer.ply", "--tolerance", "0.0001%")["result"]
+        diagonal = math.hypot(8, 3)
+        self.assertAlmostEqual(result["diagonal_mm"], diagonal)
+        self.assertTrue(interval_holds(result["one_sided_percent"]["b_to_a"], 400 / diagonal))
+        self.assertLessEqual(result["one_sided_percent"]["a_to_b"]["upper"], 0.0002)
+        self.assertLessEqual(result["hausdorff_percent"]["upper"] - result["hausdorff_percent"]["lower"], 0.0001)
+
+    def test_identical(self):
+        result = self.run_tool("sphere.ply", "sphere.ply")["result"]
+        self.assertEqual(result["hausdorff_mm"]["lower"], 0)
+        self.assertLess(result["hausdorff_percent"]["upper"], 0.01)
+        self.assertLess(result["mean_percent"], 1e-9)
+
+    def test_curved_shells_are_closer_than_flat_facets(self):
+        flat = self.run_tool("shell.ply", "sphere.ply")["result"]
+        curved = self.run_tool("shell.ply", "sphere.ply", "--shell", "--curved", "curved.ply")["result"]
+        self.assertLess(curved["hausdorff_percent"]["upper"], 0.5 * flat["hausdorff_percent"]["lower"])
+        width = curved["hausdorff_percent"]["upper"] - curved["hausdorff_percent"]["lower"]
+        self.assertLessEqual(width, 0.01)
+        fine = self.run_tool("curved.ply", "sphere.ply")["result"]
+        self.assertLess(abs(fine["hausdorff_percent"]["upper"] - curved["hausdorff_percent"]["upper"]), 0.02)
+
+    def test_threads_change_nothing(self):
+        one = self.run_tool("shell.ply", "sphere.ply", "--shell", "--threads", 1)["result"]
+        self.assertEqual(one, self.run_tool("shell.ply", "sphere.ply", "--shell", "--threads", 4)["result"])
+
+    def test_map_and_picture(self):
+        for flags in [[], ["--shell"]]:
+            result = self.run_tool("shell.ply", "sphere.ply", *flags, "--map", "map.ply", "--picture", "map.png",
+                                   "--force")["result"]
+            header, rows, triangles = meshes.read_ply(self.path("map.ply"))
+            self.assertIn("property double quality", header)
+            self.assertGreater(len(triangles), 2000)
+            largest = max(row[-1] for row in rows)
+            upper = result["one_sided_percent"]["a_to_b"]["upper"] * result["diagonal_mm"] / 100
+            self.assertLessEqual(largest, upper)
+            self.assertGreater(largest, 0.8 * upper)
+            with open(self.path("map.png"), "rb") as file:
+                self.assertEqual(file.read(8), b"\x89PNG\r\n\x1a\n")
+
+    def test_max(self):
+        self.run_tool("plane.ply", "offset.ply", "--max", "0.26mm")
+        self.run_tool("plane.ply", "offset.ply", "--max", "5.0001%")
+        report = self.run_tool("plane.ply", "offset.ply", "--max", "0.2mm", code=4, says="at least")
+        self.assertTrue(interval_holds(report["result"]["hausdorff_mm"], 0.25))
+        # Undecided at the first width: narrowed until the answer is certain, either way.
+        self.run_tool("plane.ply", "offset.ply", "--tolerance", "50%", "--max", "0.251mm")
+        self.run_tool("plane.ply", "offset.ply", "--tolerance", "50%", "--max", "0.249mm", code=4)
+        self.run_tool("plane.ply", "offset.ply", "--tolerance", "50%", "--max", "0.25mm", code=4, says="certainly")
+
+    def test_usage(self):
+        for arguments in [["--tolerance", "0.01"], ["--tolerance", "0%"], ["--max", "1"], ["--nonsense"],
+                          ["--mesh-unit", "inch"]]:
+            self.run_tool("plane.ply", "offset.ply", *arguments, code=2)
+        self.run_tool("plane.ply", "offset.ply", "--curved", "c.ply", code=2, says="--shell")
+        self.run_tool("plane.ply", code=2)
+        meshes.write_obj(self.path("plane.obj"), *meshes.sphere(1))
+        self.run_tool("plane.obj", "offset.ply", "--map", "m.ply", code=2, says="--mesh-unit")
+        self.run_tool("plane.obj", "offset.ply", "--map", "m.ply", "--mesh-unit", "cm")
+
+    def test_bad_input(self):
+        self.run_tool("absent.ply", "plane.ply", code=3, says="absent.ply")
+        self.run_tool("plane.ply", "absent.ply", code=3, says="absent.ply")
+        self.run_tool("plane.ply", "offset.ply", "--shell", code=3, says="normals")
+        meshes.write_ply(self.path("point.ply"), [(1, 1, 1)] * 3, [(0, 1, 2)])
+        self.run_tool("plane.ply", "point.ply", code=3, says="one point")
+        vertices, triangles = meshes.sphere(2, 10.0)
+        flat = [(-n[1], n[0], n[2]) for n in self.normals]
+        meshes.write_ply(self.path("wild.ply"), vertices, triangles, flat, ["surface=comas"])
+        self.run_tool("wild.ply", "sphere.ply", "--shell", code=3, says="wild.ply")
+
+    def test_output_exists(self):
+        with open(self.path("map.ply"), "w") as file:
+            file.write("mine")
+        self.run_tool("plane.ply", "offset.ply", "--map", "map.ply", code=5, says="map.ply")
+        with open(self.path("map.ply")) as file:
+            self.assertEqual(file.read(), "mine")
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,145 @@
+"""tunica-decimate as its users run it: counts, errors kept, topology of the written file, each exit code."""
+import os
+import unittest
+
+import meshes
+from whole_tool import WholeTool
+
+DATA = os.environ.get("TUNICA_SHARED_DATA", "")
+
+
+class Decimate(WholeTool):
+    tool = "decimate"
+
+    def surface(self, name="in.ply", level=4):
+        vertices, triangles = meshes.sphere(level, 20.0)
+        meshes.write_ply(self.path(name), vertices, triangles, comments=["SPACE=RAS"])
+        return vertices, triangles
+
+    def test_count(self):
+        self.surface()
+        report = self.run_tool("in.ply", "out.ply", "--triangles", 200)
+        result = report["result"]
+        header, _, triangles = meshes.read_ply(self.path("out.ply"))
+        self.assertEqual(len(triangles), 200)
+        self.assertEqual(result["triangles"], 200)
+        self.assertEqual(result["triangles_in"], 2048)
+        self.assertTrue(result["manifold"])
+        self.assertLessEqual(result["hausdorff_percent"]["lower"], result["hausdorff_percent"]["upper"])
+        self.assertLess(result["hausdorff_percent"]["upper"], 2)
+        self.assertGreater(result["hausdorff_percent"]["lower"], 0.1)
+        self.assertGreater(result["min_angle_deg"], 1)
+        self.assertGreater(result["mean_quality"], 0.5)
+        self.assertEqual(meshes.euler(triangles), 2)
+        self.assertTrue(meshes.directed_edges_are_unique(triangles))
+        self.assertIn("comment SPACE=RAS", header)
+        self.assertIn("comment units mm", header)
+        self.assertEqual(list(report["seconds"]), ["total", "read", "decimate", "measure", "write"])
+
+    def test_max_error_in_percent_and_mm_agree(self):
+        self.surface()
+        percent = self.run_tool("in.ply", "a.ply", "--max-error", "1%")["result"]
+        self.assertLessEqual(percent["hausdorff_percent"]["upper"], 1)
+        mm = "%.17gmm" % (percent["diagonal_mm"] / 100)
+        self.assertEqual(self.run_tool("in.ply", "b.ply", "--max-error", mm)["result"]["triangles"], percent["triangles"])
+        self.assertLess(percent["triangles"], 400)
+
+    def test_threads_change_nothing(self):
+        self.surface()
+        self.run_tool("in.ply", "a.ply", "--max-error", "0.8%", "--threads", 1)
+        self.run_tool("in.ply", "b.ply", "--max-error", "0.8%", "--threads", 4)
+        self.assertEqual(meshes.read_ply(self.path("a.ply"))[1:], meshes.read_ply(self.path("b.ply"))[1:])
+
+    def test_boundary_stays_on_its_circle(self):
+        meshes.write_ply(self.path("in.ply"), *meshes.tube(64, 40))
+        self.run_tool("in.ply", "out.ply", "--triangles", 150)
+        _, rows, triangles = meshes.read_ply(self.path("out.ply"))
+        rim = {v for edge in meshes.boundary_edges(triangles) for v in edge}
+        self.assertGreaterEqual(len(rim), 6)
+        for v in rim:
+            x, y, z = rows[v][:3]
+            self.assertTrue(abs(z) < 1e-12 or abs(z - 4) < 1e-12)
+            self.assertLess(abs((x * x + y * y) ** 0.5 - 1), 0.002)
+        self.assertEqual(meshes.euler(triangles), 0)
+
+    def test_units(self):
+        vertices, triangles = meshes.sphere(3)
+        meshes.write_obj(self.path("in.obj"), vertices, triangles)
+        self.assertAlmostEqual(self.run_tool("in.obj", "a.ply", "--triangles", 100)["result"]["diagonal_mm"], 12 ** 0.5)
+        cm = self.run_tool("in.obj", "b.ply", "--triangles", 100, "--mesh-unit", "cm")["result"]
+        self.assertAlmostEqual(cm["diagonal_mm"], 10 * 12 ** 0.5)
+
+    def test_real_meshes(self):
+        for name, chi in [("meshes/gca_colon_90_20k.obj", 0), ("meshes/vmtk_aorta_open.stl", -1)]:
+            path = os.path.join(DATA, name)
+            if not os.path.exists(path):
+                self.skipTest(path + " is absent")
+            result = self.run_tool(path, "out.ply", "--triangles", 1500, "--force")["result"]
+            _, _, triangles = meshes.read_ply(self.path("out.ply"))
+            self.assertTrue(result["manifold"])
+            self.assertEqual(meshes.euler(triangles), chi)
+            self.assertLess(result["hausdorff_percent"]["upper"], 2)
+
+    def test_real_mesh_that_is_not_manifold(self):
+        path = os.path.join(DATA, "meshes/awkward_colon_VHF_nonmanifold.obj")
+        if not os.path.exists(path):
+            self.skipTest(path + " is absent")
+        self.run_tool(path, "out.ply", "--triangles", 1500, code=3, says="195 edges are shared by three")
+        self.assertFalse(self.exists("out.ply"))
+
+    def test_usage(self):
+        self.surface()
+        for arguments in [[], ["--triangles", "0"], ["--triangles", "-5"], ["--triangles", "2.5"], ["--triangles", "x"],
+                          ["--max-error", "1"], ["--max-error", "0%"], ["--max-error", "-1mm"], ["--nonsense"],
+                          ["--triangles", "9", "--mesh-unit", "inch"]]:
+            self.run_tool("in.ply", "out.ply", *arguments, code=2)
+        for flag in [["--min-angle", "20"], ["--repair"]]:
+            self.run_tool("in.ply", "out.ply", "--triangles", 100, *flag, code=2, says="not available yet")
+        self.assertFalse(self.exists("out.ply"))
+
+    def test_bad_input(self):
+        self.run_tool("absent.ply", "out.ply", "--triangles", 100, code=3, says="absent.ply")
+        vertices, triangles = self.surface()
+        with open(self.path("in.ply"), "rb") as file:
+            whole = file.read()
+        with open(self.path("cut.ply"), "wb") as file:
+            file.write(whole[:len(whole) // 2])
+        self.run_tool("cut.ply", "out.ply", "--triangles", 100, code=3, says="cut.ply")
+        flipped = [triangles[0][::-1]] + triangles[1:]
+        meshes.write_ply(self.path("flipped.ply"), vertices, flipped)
+        self.run_tool("flipped.ply", "out.ply", "--triangles", 100, code=3, says="face opposite ways")
+        fin = triangles + [(triangles[0][0], triangles[0][1], len(vertices))]
+        meshes.write_ply(self.path("fin.ply"), vertices + [(0.0, 0.0, 90.0)], fin)
+        self.run_tool("fin.ply", "out.ply", "--triangles", 100, code=3, says="shared by three or more")
+        meshes.write_ply(self.path("point.ply"), [(1, 1, 1)] * 3, [(0, 1, 2)])
+        self.run_tool("point.ply", "out.ply", "--triangles", 100, code=3, says="point.ply")
+        self.assertFalse(self.exists("out.ply"))
+
+    def test_count_below_the_topology(self):
+        a, triangles = meshes.sphere(2)
+        b, more = meshes.sphere(2, centre=(5.0, 0.0, 0.0))
+        meshes.write_ply(self.path("in.ply"), a + b, triangles + [tuple(i + len(a) for i in t) for t in more])
+        report = self.run_tool("in.ply", "out.ply", "--triangles", 5, code=4, says="8 triangles are the fewest")
+        self.assertEqual(report["result"]["triangles"], 8)
+        self.assertFalse(self.exists("out.ply"))
+        self.assertEqual(len(meshes.read_ply(self.path("out.ply.part"))[2]), 8)
+
+    def test_count_and_error_that_exclude_each_other(self):
+        self.surface()
+        report = self.run_tool("in.ply", "out.ply", "--triangles", 20, "--max-error", "0.5%", code=4, says="--max-error")
+        self.assertLessEqual(report["result"]["hausdorff_percent"]["upper"], 0.5)
+        self.assertEqual(len(meshes.read_ply(self.path("out.ply.part"))[2]), report["result"]["triangles"])
+        self.run_tool("in.ply", "out.ply", "--max-error", "1e-30mm", code=4, says="double precision")
+
+    def test_output(self):
+        self.surface()
+        self.run_tool("in.ply", "out.ply", "--triangles", 100)
+        self.run_tool("in.ply", "out.ply", "--triangles", 50, code=5, says="out.ply")
+        self.assertEqual(len(meshes.read_ply(self.path("out.ply"))[2]), 100)
+        self.run_tool("in.ply", "out.ply", "--triangles", 50, "--force")
+        self.assertEqual(len(meshes.read_ply(self.path("out.ply"))[2]), 50)
+        self.run_tool("in.ply", "absent/out.ply", "--triangles", 50, code=5)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,254 @@
+#include "cli/tool.hpp"
+#include "io/mesh_file.hpp"
+#include "io/picture.hpp"
+#include "shell/curved_surface.hpp"
+#include "surface/hausdorff.hpp"
+#include "surface/measure.hpp"
+#include "surface/subdivide.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace fs = std::filesystem;
+using namespace tunica;
+
+namespace {
+
+constexpr double default_width = 1e-4;     // of the diagonal: width of the interval
+constexpr double narrowest_width = 1e-6;   // of the diagonal: where deciding --max ends
+constexpr double curved_deviation = 1e-5;  // of the diagonal: the contract of --curved
+constexpr double map_edge = 1.0 / 200;     // of the diagonal: longest edge of the triangles of a map
+constexpr std::size_t map_triangles = 400'000;
+
+struct Arguments {
+  fs::path a, b;
+  bool shell = false;
+  std::optional<LengthTolerance> width, max;
+  std::optional<fs::path> map, picture, curved;
+  std::optional<std::string> mesh_unit;
+};
+
+void declare(cli::Tool& tool, Arguments& given) {
+  auto& app = tool.arguments();
+  app.add_option("A", given.a, "a surface, or with --shell a shell mesh")->required();
+  app.add_option("B", given.b, "the surface it is compared with; percentages are of its diagonal")->required();
+  app.add_flag("--shell", given.shell, "A is curved shells: positions and unit normals");
+  tool.tolerance("--tolerance", given.width, "width of the certified intervals (default: 0.01%)");
+  tool.tolerance("--max", given.max, "exit code 4 unless the distance is certainly at most this");
+  app.add_option("--map", given.map, "error map: A with its distance to B as 'quality', mm, PLY")->type_name("OUT.ply");
+  app.add_option("--picture", given.picture, "picture of the error map")->type_name("OUT.png");
+  app.add_option("--curved", given.curved, "the curved surface of A as a fine triangle mesh (needs --shell)")
+      ->type_name("OUT.ply");
+  app.add_option("--mesh-unit", given.mesh_unit, "unit of OBJ, STL and OFF files: mm, cm, m or um")->type_name("UNIT");
+}
+
+// A as it was read: flat triangles, and the shells when it is curved.
+struct Surface {
+  TriangleMesh flat;
+  std::optional<ShellMesh> shell;
+  std::string space;
+};
+
+Surface read_a(const Arguments& given, const std::optional<double>& unit_mm) {
+  MeshFile file = read_mesh(given.a, unit_mm, given.map.has_value());
+  Surface a;
+  a.space = file.space;
+  if (given.shell) {
+    a.shell = shell_of(file, given.a);
+    require_fit(*a.shell, given.a.string());
+  }
+  a.flat = std::move(file.mesh);
+  return a;
+}
+
+HausdorffResult measure(const Surface& a, const ClosestPoint& b, double width, const std::optional<double>& limit,
+                        const Progress& progress) {
+  HausdorffOptions options;
+  options.limit = limit;
+  options.progress = progress;
+  if (!a.shell) {
+    options.width = width;
+    return hausdorff(ClosestPoint(a.flat), b, options);
+  }
+  // The curved surface in flat triangles: what they may be off by takes a part of the interval.
+  const Tessellation fine = tessellate(*a.shell, width / 8, 20'000'000);
+  options.deviation_a = fine.deviation;
+  options.width = width - 2 * fine.deviation;
+  return hausdorff(ClosestPoint(fine.mesh), b, options);
+}
+
+// The interval, narrowed as far as it takes to decide whether the distance is at most `limit`.
+HausdorffResult measure_and_decide(const Surface& a, const ClosestPoint& b, double width,
+                                   const std::optional<double>& limit, double narrowest, const Progress& progress) {
+  HausdorffResult result = measure(a, b, width, {}, progress);
+  while (limit && result.both.lower <= *limit && result.both.upper > *limit && width > narrowest) {
+    width = std::max(narrowest, width / 8);
+    const HausdorffResult finer = measure(a, b, width, limit, progress);
+    const auto narrowed = [](const Interval& x, const Interval& y) {
+      return Interval{std::max(x.lower, y.lower), std::min(x.upper, y.upper)};
+    };
+    result.both = narrowed(result.both, finer.both);
+    result.a_to_b = narrowed(result.a_to_b, finer.a_to_b);
+    result.b_to_a = narrowed(result.b_to_a, finer.b_to_a);
+  }
+  return result;
+}
+
+// A in triangles small enough to be coloured, and the edges of its facets or shells.
+struct Map {
+  TriangleMesh mesh;
+  std::vector<double> distances;
+  std::vector<std::array<Vec3, 2>> edges;
+};
+
+Map make_map(const Surface& a, const ClosestPoint& b, double diagonal_mm) {
+  Map map;
+  const std::size_t facets = a.flat.triangles.size();
+  if (a.shell) {
+    const double per_shell = static_cast<double>(map_triangles) / static_cast<double>(facets);
+    const int level = std::clamp(static_cast<int>(std::sqrt(per_shell)), 4, 24);
+    const Tessellation fine = tessellate_uniformly(*a.shell, level);
+    const auto on_edge = [&](Index i, Index j) {
+      const Vec2& p = fine.barycentric[i];
+      const Vec2& q = fine.barycentric[j];
+      return (p[0] == 0 && q[0] == 0) || (p[1] == 0 && q[1] == 0) || (p.sum() > 1 - 1e-9 && q.sum() > 1 - 1e-9);
+    };
+    for (const auto& t : fine.mesh.triangles) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        if (on_edge(t[k], t[(k + 1) % 3])) {
+          map.edges.push_back({fine.mesh.vertices[t[k]], fine.mesh.vertices[t[(k + 1) % 3]]});
+        }
+      }
+    }
+    map.mesh = fine.mesh;
+  } else {
+    map.mesh = subdivided(a.flat, map_edge * diagonal_mm, map_triangles);
+    for (std::size_t t = 0; t < facets && facets <= 20'000; ++t) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        map.edges.push_back(
+            {a.flat.vertices[a.flat.triangles[t][k]], a.flat.vertices[a.flat.triangles[t][(k + 1) % 3]]});
+      }
+    }
+  }
+  map.distances = vertex_distances(map.mesh, b);
+  return map;
+}
+
+void write_outputs(const cli::Tool& tool, const Arguments& given, const Surface& a, const ClosestPoint& b,
+                   const HausdorffResult& distance, double diagonal_mm) {
+  PlyOptions options;
+  options.comments = {"made by " + tool.command()};
+  options.space = a.space;
+  options.overwrite = tool.force();
+  if (given.curved) {
+    write_ply(*given.curved, tessellate(*a.shell, curved_deviation * diagonal_mm).mesh, options);
+  }
+  if (!given.map && !given.picture) {
+    return;
+  }
+  const Map map = make_map(a, b, diagonal_mm);
+  if (given.map) {
+    write_ply(*given.map, map.mesh, map.distances, options);
+  }
+  if (given.picture) {
+    PictureOptions look;
+    look.title = fmt::format("{} against {}", given.a.filename().string(), given.b.filename().string());
+    look.caption =
+        fmt::format("two-sided Hausdorff distance {:.4g} to {:.4g} mm (at most {:.3g} %), mean {:.3g} mm",
+                    distance.both.lower, distance.both.upper, 100 * distance.both.upper / diagonal_mm, distance.mean);
+    look.quantity = "distance to " + given.b.filename().string();
+    look.diagonal = diagonal_mm;
+    look.lines = map.edges;
+    look.overwrite = tool.force();
+    write_error_map_picture(*given.picture, map.mesh, map.distances, look);
+  }
+}
+
+Json interval(const Interval& mm, double scale) { return {{"lower", mm.lower * scale}, {"upper", mm.upper * scale}}; }
+
+void run(cli::Tool& tool, const Arguments& given) {
+  if (given.curved && !given.shell) {
+    throw UsageError("--curved writes the curved surface of shells: it needs --shell");
+  }
+  std::optional<double> unit_mm;
+  if (given.mesh_unit) {
+    unit_mm = parse_length_unit(*given.mesh_unit);
+  }
+  tool.stages({"read", "compare"});
+  for (const auto& path : {given.map, given.picture, given.curved}) {
+    if (path) {
+      tool.output(*path);
+    }
+  }
+
+  Surface a;
+  TriangleMesh target;
+  {
+    const auto stage = tool.stage("read");
+    tool.input(given.a);
+    tool.input(given.b);
+    a = read_a(given, unit_mm);
+    target = read_mesh(given.b, unit_mm, given.map.has_value()).mesh;
+  }
+  const double diagonal_mm = diagonal(target);
+  if (!(diagonal_mm > 0)) {
+    throw InputError(
+        fmt::format("{}: all its vertices lie in one point: it has no diagonal to refer to", given.b.string()));
+  }
+  const double width = given.width ? given.width->millimetres(diagonal_mm) : default_width * diagonal_mm;
+  std::optional<double> limit;
+  if (given.max) {
+    limit = given.max->millimetres(diagonal_mm);
+  }
+
+  const auto stage = tool.stage("compare");
+  const ClosestPoint b(target);
+  const HausdorffResult distance =
+      measure_and_decide(a, b, width, limit, std::min(width, narrowest_width * diagonal_mm), tool.progress("compare"));
+  const double percent = 100 / diagonal_mm;
+  tool.result() = {
+      {"hausdorff_mm", interval(distance.both, 1)},
+      {"hausdorff_percent", interval(distance.both, percent)},
+      {"one_sided_percent",
+       {{"a_to_b", interval(distance.a_to_b, percent)}, {"b_to_a", interval(distance.b_to_a, percent)}}},
+      {"mean_percent", distance.mean * percent},
+      {"rms_percent", distance.rms * percent},
+      {"diagonal_mm", diagonal_mm},
+      {"triangles_a", a.flat.triangles.size()},
+      {"triangles_b", target.triangles.size()},
+      {"farthest_mm",
+       {{"a", {distance.worst_a.x(), distance.worst_a.y(), distance.worst_a.z()}},
+        {"b", {distance.worst_b.x(), distance.worst_b.y(), distance.worst_b.z()}}}},
+  };
+  tool.note(fmt::format("distance {:.6g} to {:.6g} mm ({:.4f} to {:.4f} %), mean {:.4f} %, rms {:.4f} %",
+                        distance.both.lower, distance.both.upper, percent * distance.both.lower,
+                        percent * distance.both.upper, percent * distance.mean, percent * distance.rms));
+  if (distance.both.upper - distance.both.lower > 1.01 * width) {
+    tool.warn("the interval is wider than asked for: the work would have passed its bound");
+  }
+  write_outputs(tool, given, a, b, distance, diagonal_mm);
+  if (limit && distance.both.upper > *limit) {
+    throw RequirementError(fmt::format(
+        "{}: its distance to {} is {} {:.6g} mm ({:.4f} %), not at most {:.6g} mm ({:.4f} %) as --max demands",
+        given.a.string(), given.b.string(), distance.both.lower > *limit ? "at least" : "not certainly below",
+        distance.both.lower > *limit ? distance.both.lower : distance.both.upper,
+        percent * (distance.both.lower > *limit ? distance.both.lower : distance.both.upper), *limit,
+        percent * *limit));
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  cli::Tool tool(
+      "compare",
+      "Two-sided Hausdorff distance of two surfaces, flat or curved, as an interval that certainly holds the "
+      "true value.",
+      "tunica-compare coarse.ply surface.ply --max 1%\n"
+      "  tunica-compare shell.ply surface.ply --shell --picture map.png --report compare.json");
+  Arguments given;
+  declare(tool, given);
+  return tool.run(argc, argv, [&] { run(tool, given); });
+}

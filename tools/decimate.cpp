@@ -1,0 +1,166 @@
+#include "surface/decimate.hpp"
+#include "cli/tool.hpp"
+#include "io/mesh_file.hpp"
+#include "surface/checks.hpp"
+#include "surface/hausdorff.hpp"
+#include "surface/measure.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+namespace fs = std::filesystem;
+using namespace tunica;
+
+namespace {
+
+constexpr double interval_width = 1e-5;  // of the diagonal: what the report certifies
+
+struct Arguments {
+  fs::path in, out;
+  std::optional<std::string> triangles;
+  std::optional<LengthTolerance> max_error;
+  std::optional<std::string> mesh_unit;
+};
+
+void declare(cli::Tool& tool, Arguments& given) {
+  auto& app = tool.arguments();
+  app.add_option("IN", given.in, "surface mesh: PLY, OBJ, STL, OFF or GLB")->required();
+  app.add_option("OUT.ply", given.out, "the coarser mesh")->required();
+  app.add_option("--triangles", given.triangles, "at most N triangles")->type_name("N");
+  tool.tolerance(
+      "--max-error", given.max_error,
+      "largest distance to IN, both ways, e.g. 0.5% of IN's diagonal or 0.2mm; with --triangles it wins, and "
+      "the exit code is 4 when both cannot hold");
+  app.add_option("--mesh-unit", given.mesh_unit, "unit of OBJ, STL and OFF files: mm, cm, m or um")->type_name("UNIT");
+  tool.not_yet("--min-angle");
+  tool.not_yet("--repair");
+}
+
+std::optional<std::size_t> wanted_triangles(const Arguments& given) {
+  if (!given.triangles && !given.max_error) {
+    throw UsageError("say how far to go: --triangles N, --max-error TOL, or both");
+  }
+  if (!given.triangles) {
+    return std::nullopt;
+  }
+  const auto number = parse_number(*given.triangles);
+  if (!number || *number < 1 || *number > static_cast<double>(max_index) || *number != std::floor(*number)) {
+    throw UsageError(fmt::format("--triangles: '{}' is not a whole number from 1 to {}", *given.triangles, max_index));
+  }
+  return static_cast<std::size_t>(*number);
+}
+
+MeshFile read_surface(const fs::path& path, const std::optional<double>& unit_mm) {
+  MeshFile file = read_mesh(path, unit_mm);
+  if (const auto reason = why_unfit(examine(file.mesh))) {
+    throw InputError(fmt::format(
+        "{}: {}; decimation needs a surface where every edge has at most two triangles that face the same way: mend it "
+        "first",
+        path.string(), *reason));
+  }
+  if (!(diagonal(file.mesh) > 0)) {
+    throw InputError(fmt::format("{}: all its vertices lie in one point", path.string()));
+  }
+  return file;
+}
+
+// Which requirement was not met, in words; none when all were.
+std::optional<std::string> what_failed(const Arguments& given, const DecimateResult& result) {
+  const std::size_t count = result.mesh.triangles.size();
+  if (!result.error_kept) {
+    return fmt::format("the error asked for by --max-error is below what double precision can certify ({:.3g} mm)",
+                       result.error->upper);
+  }
+  if (!result.count_reached && given.max_error) {
+    return fmt::format("{} triangles are the fewest found that keep --max-error; raise one of the two", count);
+  }
+  if (!result.count_reached) {
+    return fmt::format("{} triangles are the fewest that keep its pieces, holes and handles without folds", count);
+  }
+  return std::nullopt;
+}
+
+void run(cli::Tool& tool, const Arguments& given) {
+  const auto triangles = wanted_triangles(given);
+  std::optional<double> unit_mm;
+  if (given.mesh_unit) {
+    unit_mm = parse_length_unit(*given.mesh_unit);
+  }
+  tool.stages({"read", "decimate", "measure", "write"});
+  tool.output(given.out);
+
+  MeshFile in;
+  {
+    const auto stage = tool.stage("read");
+    in = read_surface(tool.input(given.in), unit_mm);
+  }
+  const double diagonal_mm = diagonal(in.mesh);
+
+  DecimateResult coarse;
+  {
+    const auto stage = tool.stage("decimate");
+    DecimateOptions options;
+    options.triangles = triangles;
+    if (given.max_error) {
+      options.max_error = given.max_error->millimetres(diagonal_mm);
+    }
+    options.progress = tool.progress("decimate");
+    coarse = decimate(in.mesh, options);
+  }
+  const auto failure = what_failed(given, coarse);
+
+  {
+    const auto stage = tool.stage("measure");
+    HausdorffOptions options;
+    options.width = interval_width * diagonal_mm;
+    options.samples = 0;
+    options.progress = tool.progress("measure");
+    Interval distance = hausdorff(coarse.mesh, in.mesh, options).both;
+    if (coarse.error) {
+      distance.upper = std::min(distance.upper, coarse.error->upper);
+    }
+    const MeshFacts facts = examine(coarse.mesh);
+    tool.result() = {
+        {"triangles_in", in.mesh.triangles.size()},
+        {"triangles", coarse.mesh.triangles.size()},
+        {"hausdorff_percent",
+         {{"lower", 100 * distance.lower / diagonal_mm}, {"upper", 100 * distance.upper / diagonal_mm}}},
+        {"hausdorff_mm", {{"lower", distance.lower}, {"upper", distance.upper}}},
+        {"min_angle_deg", min_angle_degrees(coarse.mesh)},
+        {"mean_quality", mean_quality(coarse.mesh)},
+        {"manifold", facts.manifold && facts.oriented},
+        {"euler", facts.euler},
+        {"boundary_loops", facts.boundary_loops},
+        {"diagonal_mm", diagonal_mm},
+    };
+    tool.note(fmt::format("{} of {} triangles, at most {:.4g} % ({:.4g} mm) from the input",
+                          coarse.mesh.triangles.size(), in.mesh.triangles.size(), 100 * distance.upper / diagonal_mm,
+                          distance.upper));
+  }
+
+  const auto stage = tool.stage("write");
+  PlyOptions options;
+  options.comments = {"made by " + tool.command()};
+  options.space = in.space;
+  options.overwrite = tool.force();
+  options.partial = failure.has_value();
+  write_ply(given.out, coarse.mesh, options);
+  if (failure) {
+    throw RequirementError(
+        fmt::format("{}: {}; the best mesh is in {}.part", given.in.string(), *failure, given.out.string()));
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  cli::Tool tool("decimate",
+                 "Quadric edge collapse: fewer triangles for the same surface. Boundaries and topology are kept, no "
+                 "triangle is flipped or degenerate, and the two-sided distance to the input is certified.",
+                 "tunica-decimate surface.ply coarse.ply --triangles 800\n"
+                 "  tunica-decimate surface.ply coarse.ply --max-error 0.5% --report decimate.json");
+  Arguments given;
+  declare(tool, given);
+  return tool.run(argc, argv, [&] { run(tool, given); });
+}
