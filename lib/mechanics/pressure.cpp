@@ -74,14 +74,14 @@ void unit_pressure(const std::array<Vec3, 3>& corners, const PatchHeight& height
   }
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) {
-      // dA/dx_i = n x o_i / 2, and d(2A n)/dx_j = -skew(o_j) ... with 2A n = sum of x_k x x_(k+1).
+      // With o_i the edge opposite to corner i: dA/dx_i = n x o_i / 2, and d(2A n)/dx_j = skew(o_j).
       Mat3 second = 0.25 / area * (opposite.col(i).dot(opposite.col(j)) * n * n.transpose());
       if (i != j) {
-        const double sign = j == (i + 1) % 3 ? 0.5 : -0.5;
+        const double sign = j == (i + 1) % 3 ? -0.5 : 0.5;
         second += sign * skew(n);
       }
       auto block = stiffness->block<3, 3>(3 * i, 3 * j);
-      block = -skew(opposite.col(j)) / 6 + mean * second + area_gradient.col(i) * height_gradient.col(j).transpose() +
+      block = skew(opposite.col(j)) / 6 + mean * second + area_gradient.col(i) * height_gradient.col(j).transpose() +
               height_gradient.col(i) * area_gradient.col(j).transpose() +
               area * height.coupling(i, j) * Mat3::Identity();
     }
