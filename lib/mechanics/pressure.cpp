@@ -5,174 +5,104 @@
 namespace tunica {
 namespace {
 
-using Vector6 = Eigen::Matrix<double, 6, 1>;
-using Matrix6 = Eigen::Matrix<double, 6, 6>;
-using Vector9 = Eigen::Matrix<double, 9, 1>;
-using Matrix9 = Eigen::Matrix<double, 9, 9>;
-using Matrix69 = Eigen::Matrix<double, 6, 9>;
-
-/// Share of one corner in -60 times the volume: with edges d and e from the corner to the next ones and its normal N,
-///   phi = |d x e|^2 / (N.(d x e)) [ (3/2 - d.e / 2d.d) N.d + (3/2 - d.e / 2e.e) N.e ].
-/// It is the integral of the cubic Bezier triangle whose ordinates are -(N.d)/(3 N.n) next to the corner; the centre
-/// ordinate is the mean of those that make the slope across one edge linear.
-/// A function of six invariants: A = d.d, B = e.e, C = d.e, N.d, N.e, and the triple product.
-struct CornerShare {
-  double value = 0;
-  Vector9 gradient;  ///< by d, e, N
-  Matrix9 hessian;
-};
-
-bool corner_share(const Vec3& d, const Vec3& e, const Vec3& normal, bool with_hessian, CornerShare& share) {
-  const double a = d.squaredNorm(), b = e.squaredNorm(), c = d.dot(e);
-  const double nd = normal.dot(d), ne = normal.dot(e);
-  const Vec3 cross = d.cross(e);
-  const double triple = normal.dot(cross);
-  if (!(triple > 0.05 * cross.norm() * normal.norm())) {
-    return false;
-  }
-  const double rho = (a * b - c * c) / triple;
-  const double alpha = 1.5 * (nd + ne) - 0.5 * c * (nd / a + ne / b);
-  share.value = rho * alpha;
-  Vector6 rho1, alpha1;
-  rho1 << b / triple, a / triple, -2 * c / triple, 0, 0, -rho / triple;
-  alpha1 << 0.5 * c * nd / (a * a), 0.5 * c * ne / (b * b), -0.5 * (nd / a + ne / b), 1.5 - 0.5 * c / a,
-      1.5 - 0.5 * c / b, 0;
-  const Vector6 first = alpha * rho1 + rho * alpha1;
-  Matrix69 jacobian;
-  jacobian.setZero();
-  jacobian.block<1, 3>(0, 0) = 2 * d.transpose();
-  jacobian.block<1, 3>(1, 3) = 2 * e.transpose();
-  jacobian.block<1, 3>(2, 0) = e.transpose();
-  jacobian.block<1, 3>(2, 3) = d.transpose();
-  jacobian.block<1, 3>(3, 0) = normal.transpose();
-  jacobian.block<1, 3>(3, 6) = d.transpose();
-  jacobian.block<1, 3>(4, 3) = normal.transpose();
-  jacobian.block<1, 3>(4, 6) = e.transpose();
-  jacobian.block<1, 3>(5, 0) = e.cross(normal).transpose();
-  jacobian.block<1, 3>(5, 3) = normal.cross(d).transpose();
-  jacobian.block<1, 3>(5, 6) = cross.transpose();
-  share.gradient.noalias() = jacobian.transpose() * first;
-  if (!with_hessian) {
-    return true;
-  }
-  const double inverse_square = 1 / (triple * triple);
-  Matrix6 second = rho1 * alpha1.transpose() + alpha1 * rho1.transpose();
-  const auto add = [&second](int i, int j, double value) {
-    second(i, j) += value;
-    if (i != j) {
-      second(j, i) += value;
-    }
-  };
-  add(0, 1, alpha / triple);
-  add(2, 2, -2 * alpha / triple);
-  add(0, 5, -alpha * b * inverse_square);
-  add(1, 5, -alpha * a * inverse_square);
-  add(2, 5, 2 * alpha * c * inverse_square);
-  add(5, 5, 2 * alpha * rho * inverse_square);
-  add(0, 0, -rho * c * nd / (a * a * a));
-  add(1, 1, -rho * c * ne / (b * b * b));
-  add(0, 2, 0.5 * rho * nd / (a * a));
-  add(1, 2, 0.5 * rho * ne / (b * b));
-  add(0, 3, 0.5 * rho * c / (a * a));
-  add(1, 4, 0.5 * rho * c / (b * b));
-  add(2, 3, -0.5 * rho / a);
-  add(2, 4, -0.5 * rho / b);
-  const Matrix69 product = second * jacobian;
-  Matrix9& hessian = share.hessian;
-  hessian.noalias() = jacobian.transpose() * product;
-  const Mat3 identity = Mat3::Identity();
-  hessian.block<3, 3>(0, 0) += 2 * first[0] * identity;
-  hessian.block<3, 3>(3, 3) += 2 * first[1] * identity;
-  const Mat3 de = first[2] * identity - first[5] * skew(normal);
-  const Mat3 dn = first[3] * identity + first[5] * skew(e);
-  const Mat3 en = first[4] * identity - first[5] * skew(d);
-  hessian.block<3, 3>(0, 3) += de;
-  hessian.block<3, 3>(3, 0) += de.transpose();
-  hessian.block<3, 3>(0, 6) += dn;
-  hessian.block<3, 3>(6, 0) += dn.transpose();
-  hessian.block<3, 3>(3, 6) += en;
-  hessian.block<3, 3>(6, 3) += en.transpose();
-  return true;
+/// The mean of the ten ordinates of the patch is sum_ij weight_ij b_ij / 10 over its six edge ordinates
+/// b_ij = slope_i . (x_j - x_i) / 3; the centre ordinate is the mean of the three that make the slope across one edge
+/// linear. With mu the place of the opposite corner's foot on the edge, from i on: weight = 3/2 - mu/2.
+double weight(const Vec3& edge, const Vec3& to_opposite) {
+  return 1.5 - 0.5 * edge.dot(to_opposite) / edge.squaredNorm();
 }
+
+std::size_t next(std::size_t i) { return (i + 1) % 3; }
 
 }  // namespace
 
-bool patch_volume(const std::array<Vec3, 3>& corners, const std::array<Vec3, 3>& normals, double& volume,
-                  Vector18& gradient, Matrix18* hessian) {
-  volume = 0;
-  gradient.setZero();
-  if (hessian != nullptr) {
-    hessian->setZero();
-  }
-  CornerShare share;
-  for (int i = 0; i < 3; ++i) {
-    const int j = (i + 1) % 3;
-    const int k = (i + 2) % 3;
-    const Vec3& corner = corners[static_cast<std::size_t>(i)];
-    if (!corner_share(corners[static_cast<std::size_t>(j)] - corner, corners[static_cast<std::size_t>(k)] - corner,
-                      normals[static_cast<std::size_t>(i)], hessian != nullptr, share)) {
-      return false;
-    }
-    volume -= share.value / 60;
-    gradient.segment<3>(3 * i) += (share.gradient.segment<3>(0) + share.gradient.segment<3>(3)) / 60;
-    gradient.segment<3>(3 * j) -= share.gradient.segment<3>(0) / 60;
-    gradient.segment<3>(3 * k) -= share.gradient.segment<3>(3) / 60;
-    gradient.segment<3>(9 + 3 * i) -= share.gradient.segment<3>(6) / 60;
-    if (hessian == nullptr) {
-      continue;
-    }
-    // d = x_j - x_i, e = x_k - x_i.
-    const std::array<int, 3> place{3 * j, 3 * k, 9 + 3 * i};
-    for (int r = 0; r < 3; ++r) {
-      for (int c = 0; c < 3; ++c) {
-        const Mat3 block = share.hessian.block<3, 3>(3 * r, 3 * c) / 60;
-        hessian->block<3, 3>(place[static_cast<std::size_t>(r)], place[static_cast<std::size_t>(c)]) -= block;
-        if (r < 2) {
-          hessian->block<3, 3>(3 * i, place[static_cast<std::size_t>(c)]) += block;
-        }
-        if (c < 2) {
-          hessian->block<3, 3>(place[static_cast<std::size_t>(r)], 3 * i) += block;
-        }
-        if (r < 2 && c < 2) {
-          hessian->block<3, 3>(3 * i, 3 * i) -= block;
-        }
-      }
+PatchHeight patch_height(const std::array<Vec3, 3>& corners, const std::array<Vec3, 3>& normals) {
+  const Vec3 area = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+  const double twice_area = area.norm();
+  const Vec3 n = area / twice_area;
+  // T with trace T = mean height: sum of weight_ij / 30 slope_i (x_j - x_i)', symmetric part.
+  Mat3 t = Mat3::Zero();
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Vec3 slope = n - normals[i] / normals[i].dot(n);
+    for (const std::size_t j : {next(i), next(next(i))}) {
+      const std::size_t k = 3 - i - j;
+      const Vec3 edge = corners[j] - corners[i];
+      t += weight(edge, corners[k] - corners[i]) / 30 * slope * edge.transpose();
     }
   }
-  return true;
+  // Stretch C = sum_kl (x_k.x_l) g_k g_l' with the gradients g of the barycentric coordinates; height = T:(1 + C) / 2.
+  Mat3 gradients;
+  for (std::size_t k = 0; k < 3; ++k) {
+    gradients.col(static_cast<Eigen::Index>(k)) = n.cross(corners[next(next(k))] - corners[next(k)]) / twice_area;
+  }
+  return {t.trace(), gradients.transpose() * (0.5 * (t + t.transpose())) * gradients};
 }
 
-bool unit_pressure(const std::array<Vec3, 3>& corners, const std::array<Vec3, 3>& normals, Vector18& force,
-                   Matrix18* stiffness) {
-  double volume = 0;
-  Vector18 gradient;
-  Matrix18 hessian;
-  if (!patch_volume(corners, normals, volume, gradient, stiffness == nullptr ? nullptr : &hessian)) {
-    return false;
-  }
-  const Vec3 facet = (corners[1] - corners[0]).cross(corners[2] - corners[0]) / 6;
+double patch_volume(const std::array<Vec3, 3>& corners, const PatchHeight& height) {
+  double mean = height.constant;
   for (int k = 0; k < 3; ++k) {
-    force.segment<3>(6 * k) = facet + gradient.segment<3>(3 * k);
-    force.segment<3>(6 * k + 3) = normals[static_cast<std::size_t>(k)].cross(gradient.segment<3>(9 + 3 * k));
+    for (int l = 0; l < 3; ++l) {
+      // Relative to the first corner, to keep the digits.
+      mean +=
+          height.coupling(k, l) *
+          (corners[static_cast<std::size_t>(k)] - corners[0]).dot(corners[static_cast<std::size_t>(l)] - corners[0]);
+    }
+  }
+  return mean / 2 * (corners[1] - corners[0]).cross(corners[2] - corners[0]).norm() / 2;
+}
+
+void unit_pressure(const std::array<Vec3, 3>& corners, const PatchHeight& height, Vector9& force, Matrix9* stiffness) {
+  Mat3 x;
+  for (int k = 0; k < 3; ++k) {
+    x.col(k) = corners[static_cast<std::size_t>(k)] - corners[0];
+  }
+  const Vec3 twice = x.col(1).cross(x.col(2));
+  const double twice_area = twice.norm();
+  const double area = twice_area / 2;
+  const Vec3 n = twice / twice_area;
+  const Mat3 height_gradient = x * height.coupling;  // columns, per corner
+  const double mean = (height.constant + (x.transpose() * x).cwiseProduct(height.coupling).sum()) / 2;
+  Mat3 area_gradient;
+  Mat3 opposite;
+  for (int k = 0; k < 3; ++k) {
+    opposite.col(k) = x.col((k + 2) % 3) - x.col((k + 1) % 3);
+    area_gradient.col(k) = 0.5 * n.cross(opposite.col(k));
+    force.segment<3>(3 * k) = twice / 6 + mean * area_gradient.col(k) + area * height_gradient.col(k);
   }
   if (stiffness == nullptr) {
-    return true;
+    return;
   }
-  // dN = spin x N; moment = N x dV/dN.
-  for (int j = 0; j < 3; ++j) {
-    const Mat3 turn = -skew(normals[static_cast<std::size_t>(j)]);
-    const Mat3 facet_change =
-        skew(corners[static_cast<std::size_t>((j + 2) % 3)] - corners[static_cast<std::size_t>((j + 1) % 3)]) / 6;
-    for (int i = 0; i < 3; ++i) {
-      const Mat3 moment = skew(normals[static_cast<std::size_t>(i)]);
-      stiffness->block<3, 3>(6 * i, 6 * j) = hessian.block<3, 3>(3 * i, 3 * j) + facet_change;
-      stiffness->block<3, 3>(6 * i, 6 * j + 3) = hessian.block<3, 3>(3 * i, 9 + 3 * j) * turn;
-      stiffness->block<3, 3>(6 * i + 3, 6 * j) = moment * hessian.block<3, 3>(9 + 3 * i, 3 * j);
-      stiffness->block<3, 3>(6 * i + 3, 6 * j + 3) = moment * hessian.block<3, 3>(9 + 3 * i, 9 + 3 * j) * turn;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      // With o_i the edge opposite to corner i: dA/dx_i = n x o_i / 2, and d(2A n)/dx_j = skew(o_j).
+      Mat3 second = 0.25 / area * (opposite.col(i).dot(opposite.col(j)) * n * n.transpose());
+      if (i != j) {
+        const double sign = j == (i + 1) % 3 ? -0.5 : 0.5;
+        second += sign * skew(n);
+      }
+      auto block = stiffness->block<3, 3>(3 * i, 3 * j);
+      block = skew(opposite.col(j)) / 6 + mean * second + area_gradient.col(i) * height_gradient.col(j).transpose() +
+              height_gradient.col(i) * area_gradient.col(j).transpose() +
+              area * height.coupling(i, j) * Mat3::Identity();
     }
-    stiffness->block<3, 3>(6 * j + 3, 6 * j + 3) += skew(gradient.segment<3>(9 + 3 * j)) * (-turn);
   }
-  return true;
+}
+
+PlateLoad plate_load(const std::array<Vec3, 3>& corners) {
+  const double area = (corners[1] - corners[0]).cross(corners[2] - corners[0]).norm() / 2;
+  PlateLoad load;
+  load.force.fill(area / 3);
+  load.director.fill(Vec3::Zero());
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (const std::size_t j : {next(i), next(next(i))}) {
+      const Vec3 edge = corners[j] - corners[i];
+      const double share = area / 30 * weight(edge, corners[3 - i - j] - corners[i]);
+      load.force[i] += share;
+      load.force[j] -= share;
+      load.director[i] -= share * edge;
+    }
+  }
+  return load;
 }
 
 }  // namespace tunica

@@ -2,28 +2,44 @@
 
 #include "core/types.hpp"
 
-/// Pressure on the curved patch of a triangle, derived from the volume it adds: force = pressure x gradient of volume.
+/// Follower pressure on curved triangles: pressure times the gradient of the enclosed volume.
 ///
-/// The volume between the patch and its facet is the integral of w, and that is invariant under rigid motions: its
-/// gradient is in balance by itself, triangle by triangle. What the facets enclose adds p A n / 3 at each corner,
-/// which is in balance on a closed surface. So uniform pressure on a closed shell has no net force and no net moment.
+/// What the facets enclose adds p A n / 3 at each corner; on a closed surface that is in balance. What lies between a
+/// facet and its curved patch, area times mean height of the patch, is invariant under rigid motions, so that its
+/// gradient is in balance by itself. Uniform pressure on a closed shell thus has no net force and no net moment, in any
+/// configuration, and its stiffness is symmetric away from free edges.
+///
+/// The height follows the stretch of the facet, not the nodal rotations: where a shell is thin against its elements the
+/// rotations are held by little more than their bending stiffness, and pressure would bulge the patches at no cost in
+/// membrane energy (a spurious instability from strains of (t R / h^2)^2 on).
 namespace tunica {
 
-/// Variables: corners x1, x2, x3, then normals N1, N2, N3.
-using Vector18 = Eigen::Matrix<double, 18, 1>;
-using Matrix18 = Eigen::Matrix<double, 18, 18>;
+using Vector9 = Eigen::Matrix<double, 9, 1>;
+using Matrix9 = Eigen::Matrix<double, 9, 9>;
 
-/// Volume between the comas patch (averaged over the three choices of the first vertex) and its facet, with gradient
-/// and, when asked for, Hessian by (x1, x2, x3, N1, N2, N3).
-/// The normals need not be unit vectors; only their directions count.
-/// @return false when a normal is nearly in the facet's plane (N.n < 0.05): there is no patch.
-bool patch_volume(const std::array<Vec3, 3>& corners, const std::array<Vec3, 3>& normals, double& volume,
-                  Vector18& gradient, Matrix18* hessian);
+/// Mean height of a patch over its facet as a function of the corners: (constant + sum_kl coupling_kl x_k.x_l) / 2.
+/// Exact at the reference; to first order the slopes at the corners stay what they were.
+struct PatchHeight {
+  double constant = 0;           ///< mm
+  Mat3 coupling = Mat3::Zero();  ///< 1/mm; rows and columns add up to zero
+};
 
-/// Forces of a unit follower pressure (N per MPa), ordered (force, moment) per corner, world axes, when the normals
-/// turn with the nodes; the load stiffness d force / d (displacement, spin) when asked for.
-/// @return false as patch_volume() does.
-bool unit_pressure(const std::array<Vec3, 3>& corners, const std::array<Vec3, 3>& normals, Vector18& force,
-                   Matrix18* stiffness);
+/// Of the comas patch (averaged over the three choices of the first vertex) with these unit normals.
+/// Limits: N.n > 0, which check_model() asks for.
+PatchHeight patch_height(const std::array<Vec3, 3>& corners, const std::array<Vec3, 3>& normals);
+
+/// Volume between patch and facet.
+double patch_volume(const std::array<Vec3, 3>& corners, const PatchHeight& height);
+
+/// Forces of a unit follower pressure (N per MPa) on the three corners, and d force / d corners when asked for.
+void unit_pressure(const std::array<Vec3, 3>& corners, const PatchHeight& height, Vector9& force, Matrix9* stiffness);
+
+/// Work-equivalent nodal loads of a unit pressure on the cubic deflection over a flat facet: forces along the normal,
+/// and vectors g in the facet such that a corner's normal N does the work g.N.
+struct PlateLoad {
+  std::array<double, 3> force{};
+  std::array<Vec3, 3> director;
+};
+PlateLoad plate_load(const std::array<Vec3, 3>& corners);
 
 }  // namespace tunica

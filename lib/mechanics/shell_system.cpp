@@ -101,33 +101,29 @@ void find_pieces(ShellSystem& system, const Model& model) {
   }
 }
 
-/// Load of one triangle per unit of pressure along its reference normals: forces along fixed directions and directors.
-void add_dead_pressure(const ShellSystem& system, std::size_t element, const std::array<Vec3, 3>& normals, double value,
-                       DeadLoad& load) {
+std::array<Vec3, 3> reference_corners(const ShellElement& e) {
+  return {e.from_centroid.col(0), e.from_centroid.col(1), e.from_centroid.col(2)};
+}
+
+void add_dead_pressure(const ShellSystem& system, std::size_t element, double value, DeadLoad& load) {
   const ShellElement& e = system.elements[element];
-  const std::array<Vec3, 3> corners{e.from_centroid.col(0), e.from_centroid.col(1), e.from_centroid.col(2)};
-  double volume = 0;
-  Vector18 gradient;
-  if (!patch_volume(corners, normals, volume, gradient, nullptr)) {
-    return;  // check_model() refuses such a mesh
-  }
-  const Vec3 facet = (corners[1] - corners[0]).cross(corners[2] - corners[0]) / 6;
+  Vector9 force;
+  unit_pressure(reference_corners(e), system.heights[element], force, nullptr);
   for (int k = 0; k < 3; ++k) {
-    const Index node = e.nodes[static_cast<std::size_t>(k)];
-    load.force.segment<3>(at(node)) += value * (facet + gradient.segment<3>(3 * k));
-    load.director[node] += value * normals[static_cast<std::size_t>(k)] * gradient.segment<3>(9 + 3 * k).transpose();
+    load.force.segment<3>(at(e.nodes[static_cast<std::size_t>(k)])) += value * force.segment<3>(3 * k);
   }
 }
 
-/// A force per area of fixed direction: its normal part works on the deflection of the cubic, as pressure does.
+/// A force per area of fixed direction: its normal part works on the deflection of the cubic.
 void add_area_load(const ShellSystem& system, std::size_t element, const Vec3& per_area, DeadLoad& load) {
   const ShellElement& e = system.elements[element];
   const Vec3 normal = e.axes.row(2).transpose();
   const double across = normal.dot(per_area);
-  add_dead_pressure(system, element, {normal, normal, normal}, across, load);
   const Vec3 in_plane = (per_area - across * normal) * (e.area / 3);
-  for (const Index node : e.nodes) {
-    load.force.segment<3>(at(node)) += in_plane;
+  const PlateLoad plate = plate_load(reference_corners(e));
+  for (std::size_t k = 0; k < 3; ++k) {
+    load.force.segment<3>(at(e.nodes[k])) += in_plane + across * plate.force[k] * normal;
+    load.director[e.nodes[k]] += across * normal * plate.director[k].transpose();
   }
 }
 
@@ -162,12 +158,12 @@ void make_loads(ShellSystem& system, const Model& model) {
       continue;
     }
     dead.force = VectorX::Zero(at(system.node_count()));
-    if (std::holds_alternative<PressureLoad>(load.kind) || std::holds_alternative<AreaLoad>(load.kind)) {
+    if (std::holds_alternative<AreaLoad>(load.kind)) {
       dead.director.assign(system.node_count(), Mat3::Zero());
     }
     if (const auto* pressure = std::get_if<PressureLoad>(&load.kind)) {
       for (std::size_t e = begin; e < end; ++e) {
-        add_dead_pressure(system, e, system.normals[e], pressure->value, dead);
+        add_dead_pressure(system, e, pressure->value, dead);
       }
     } else if (const auto* area = std::get_if<AreaLoad>(&load.kind)) {
       for (std::size_t e = begin; e < end; ++e) {
@@ -267,6 +263,7 @@ ShellSystem make_system(const Model& model) {
       const double membrane = body.material.young * thickness;
       system.stiffness_norm += membrane * membrane;
       system.normals.push_back(normals);
+      system.heights.push_back(patch_height(corners, normals));
       system.elements.push_back(element);
     }
     system.first_element.push_back(system.elements.size());
@@ -353,7 +350,8 @@ void evaluate(const ShellSystem& system, const Model& model, const Configuration
     parallel_for_blocks(colour.size(), grain, [&](std::size_t begin, std::size_t end) {
       ElementResponse response;
       Matrix18 stiffness;
-      Vector18 load;
+      Vector9 load;
+      Matrix9 load_stiffness;
       for (std::size_t i = begin; i < end; ++i) {
         const std::size_t e = colour[i];
         const ShellElement& element = system.elements[e];
@@ -376,21 +374,22 @@ void evaluate(const ShellSystem& system, const Model& model, const Configuration
         if (p == 0) {
           continue;
         }
-        std::array<Vec3, 3> corners, normals;
+        std::array<Vec3, 3> corners;
         for (int k = 0; k < 3; ++k) {
-          const auto s = static_cast<std::size_t>(k);
-          corners[s] = element.from_centroid.col(k) + (motion.displacement.col(k) - motion.displacement.col(0));
-          normals[s] = motion.rotation[s] * system.normals[e][s];
+          corners[static_cast<std::size_t>(k)] =
+              element.from_centroid.col(k) + (motion.displacement.col(k) - motion.displacement.col(0));
         }
-        if (!unit_pressure(corners, normals, load, tangent == nullptr ? nullptr : &stiffness)) {
-          valid = false;
-          continue;
-        }
+        unit_pressure(corners, system.heights[e], load, tangent == nullptr ? nullptr : &load_stiffness);
         for (int k = 0; k < 3; ++k) {
-          forces.external.segment<6>(at(element.nodes[static_cast<std::size_t>(k)])) += p * load.segment<6>(6 * k);
+          forces.external.segment<3>(at(element.nodes[static_cast<std::size_t>(k)])) += p * load.segment<3>(3 * k);
         }
         if (tangent != nullptr) {
-          scatter(system.placement[e], stiffness, -p, *tangent);
+          for (int r = 0; r < 3; ++r) {
+            for (int c = 0; c < 3; ++c) {
+              tangent->block(system.placement[e][static_cast<std::size_t>(3 * r + c)]).topLeftCorner<3, 3>() -=
+                  p * load_stiffness.block<3, 3>(3 * r, 3 * c);
+            }
+          }
         }
       }
     });

@@ -2,6 +2,7 @@
 
 #include "mechanics/block_matrix.hpp"
 #include "mechanics/model.hpp"
+#include "mechanics/pressure.hpp"
 #include "mechanics/shell_element.hpp"
 
 #include <optional>
@@ -39,6 +40,7 @@ struct ShellSystem {
   std::vector<ShellElement> elements;
   /// Reference normals at the corners of each element: of the curved surface, or the facet's.
   std::vector<std::array<Vec3, 3>> normals;
+  std::vector<PatchHeight> heights;                   ///< of the curved patches over the facets, for pressure
   std::vector<std::vector<Index>> colours;            ///< elements of one colour share no node
   std::vector<std::array<std::size_t, 9>> placement;  ///< where each element's blocks go in the matrix
   BlockMatrix pattern;
