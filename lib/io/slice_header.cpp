@@ -10,6 +10,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cstring>
 #include <map>
@@ -124,7 +125,7 @@ private:
   // Directories and tables that together are larger than the file overlap: a file made to waste time.
   void spend(std::uint64_t bytes) {
     spent_ += bytes;
-    if (bytes > file_.size() || spent_ > file_.size()) {
+    if (spent_ > 2 * file_.size()) {
       throw_corrupt("its tables are larger than the file");
     }
   }
@@ -139,7 +140,6 @@ private:
     if (count > 4096) {
       throw_corrupt(fmt::format("a page has {} tags", count));
     }
-    spend(count_size + count * entry_size);
     entries_.clear();
     std::uint64_t at = next_ + count_size;
     for (std::uint64_t i = 0; i < count; ++i, at += entry_size) {
@@ -155,6 +155,7 @@ private:
     }
     file_.read(at, bytes.data(), word);
     next_ = number(bytes.data(), word, big_endian_);
+    spend(count_size + count * entry_size);
   }
 
   static std::uint64_t size_of_type(std::uint64_t type) {
@@ -172,7 +173,9 @@ private:
     if (size == 0 || entry.count > file_.size() / size) {
       throw_corrupt(fmt::format("tag {} is damaged", static_cast<std::uint64_t>(tag)));
     }
-    spend(size * entry.count);
+    if (size * entry.count > 8) {
+      spend(size * entry.count);
+    }
     std::vector<unsigned char> bytes(size * entry.count);
     file_.read(entry.offset, bytes.data(), bytes.size());
     std::vector<std::uint64_t> result(entry.count);
@@ -213,10 +216,10 @@ private:
     const std::uint64_t format = value(sample_format, 1);
     const bool real = format == 3;
     if ((bits != 8 && bits != 16 && bits != 32 && bits != 64) || format < 1 || format > 3 || (real && bits < 32) ||
-        (!real && bits > 32)) {
+        (!real && bits > 32) || (format == 1 && bits == 32)) {
       refuse(
-          fmt::format("has pixels of {} bits (sample format {}): save integers of 8, 16 or 32 bits or floats of 32 or "
-                      "64 bits",
+          fmt::format("has pixels of {} bits (sample format {}): save integers of 8 or 16 bits, signed ones of "
+                      "32 bits, or floats of 32 or 64 bits",
                       bits, format));
     }
     header.bits = static_cast<unsigned>(bits);
@@ -302,6 +305,132 @@ private:
   std::map<std::uint64_t, Entry> entries_;
 };
 
+constexpr std::size_t png_signature = 8;
+
+// Walks over the chunks of a PNG file: use(type, offset of its data, length), up to and with IEND.
+template <class Use>
+void for_each_chunk(RandomFile& file, const fs::path& path, Use use) {
+  std::uint64_t at = png_signature;
+  for (std::string type; type != "IEND";) {
+    check_interrupt();
+    std::array<unsigned char, 8> head{};
+    file.read(at, head.data(), head.size());
+    const std::uint64_t length = number(head.data(), 4, true);
+    type.assign(reinterpret_cast<const char*>(head.data()) + 4, 4);
+    if (at + 12 + length > file.size()) {
+      throw_truncated(path, at + 12 + length - file.size());
+    }
+    if ((at == png_signature) != (type == "IHDR") || (type == "IHDR" && length != 13)) {
+      throw InputError(fmt::format("{}: its PNG header is not where it belongs: the file is corrupt", path.string()));
+    }
+    use(type, at + 8, length);
+    at += 12 + length;
+  }
+}
+
+struct Rows {
+  std::uint64_t count = 0;
+  std::uint64_t bytes = 0;  // of each, with the filter's byte in front
+};
+
+// The rows in the order of the stream; an interlaced picture (Adam7) has seven sets of them.
+std::vector<Rows> rows_of(const SliceHeader& header, bool interlaced) {
+  const std::uint64_t pixel = header.bits / 8;
+  if (!interlaced) {
+    return {{header.height, 1 + header.width * pixel}};
+  }
+  constexpr std::array<std::array<std::uint64_t, 4>, 7> passes{
+      {{0, 8, 0, 8}, {4, 8, 0, 8}, {0, 4, 4, 8}, {2, 4, 0, 4}, {0, 2, 2, 4}, {1, 2, 0, 2}, {0, 1, 1, 2}}};
+  std::vector<Rows> rows;
+  for (const auto& [x, dx, y, dy] : passes) {
+    const std::uint64_t columns = header.width > x ? (header.width - x + dx - 1) / dx : 0;
+    const std::uint64_t lines = header.height > y ? (header.height - y + dy - 1) / dy : 0;
+    if (columns > 0 && lines > 0) {
+      rows.push_back({lines, 1 + columns * pixel});
+    }
+  }
+  return rows;
+}
+
+// Inflates the pixels and drops them, to see that they are all there and every row has a filter that exists.
+void require_rows(const fs::path& path, std::vector<unsigned char>& stored, const std::vector<Rows>& rows) {
+  z_stream stream{};
+  if (inflateInit(&stream) != Z_OK) {
+    throw std::bad_alloc();
+  }
+  const std::unique_ptr<z_stream, int (*)(z_streamp)> guard(&stream, &inflateEnd);
+  std::uint64_t total = 0;
+  for (const Rows& set : rows) {
+    total += set.count * set.bytes;
+  }
+  std::vector<unsigned char> buffer(std::size_t{1} << 18);
+  std::size_t fed = 0;
+  std::uint64_t done = 0;
+  std::uint64_t next_filter = 0;
+  std::size_t set = 0;
+  std::uint64_t row = 0;
+  while (done < total) {
+    check_interrupt();
+    if (stream.avail_in == 0) {
+      stream.next_in = stored.data() + fed;
+      stream.avail_in = static_cast<uInt>(std::min<std::size_t>(stored.size() - fed, std::size_t{1} << 30));
+      fed += stream.avail_in;
+    }
+    stream.next_out = buffer.data();
+    stream.avail_out = static_cast<uInt>(std::min<std::uint64_t>(buffer.size(), total - done));
+    const uInt wanted = stream.avail_out;
+    const int code = inflate(&stream, Z_NO_FLUSH);
+    const uInt got = wanted - stream.avail_out;
+    while (next_filter < done + got) {
+      if (buffer[next_filter - done] > 4) {
+        throw InputError(
+            fmt::format("{}: the filter of a row of its pixels does not exist: the PNG file is corrupt; get "
+                        "it again",
+                        path.string()));
+      }
+      next_filter += rows[set].bytes;
+      if (++row == rows[set].count) {
+        ++set;
+        row = 0;
+      }
+    }
+    done += got;
+    if (done == total) {
+      return;
+    }
+    if (code == Z_STREAM_END || (code == Z_BUF_ERROR && fed == stored.size())) {
+      throw InputError(
+          fmt::format("{}: truncated: {} of the {} bytes of its pixels are missing; get the whole file again",
+                      path.string(), total - done, total));
+    }
+    if (code != Z_OK && code != Z_BUF_ERROR) {
+      throw InputError(
+          fmt::format("{}: its compressed pixels are corrupt after {} bytes; get the file again", path.string(), done));
+    }
+  }
+}
+
+SliceHeader parse_png_header(const fs::path& path, const std::array<unsigned char, 13>& bytes) {
+  SliceHeader header;
+  header.width = number(bytes.data(), 4, true);
+  header.height = number(bytes.data() + 4, 4, true);
+  header.bits = bytes[8];
+  const unsigned colour = bytes[9];
+  if (colour != 0) {
+    throw InputError(
+        fmt::format("{}: has colours (PNG colour type {}): save one grey value per pixel", path.string(), colour));
+  }
+  if (header.bits != 8 && header.bits != 16) {
+    throw InputError(fmt::format("{}: has grey values of {} bits: save 8 or 16", path.string(), header.bits));
+  }
+  if (header.width == 0 || header.height == 0 || header.width > 0x7fffffff || header.height > 0x7fffffff ||
+      bytes[10] != 0 || bytes[11] != 0 || bytes[12] > 1) {
+    throw InputError(fmt::format("{}: its PNG header ({} x {} pixels) is corrupt; get the file again", path.string(),
+                                 header.width, header.height));
+  }
+  return header;
+}
+
 }  // namespace
 
 bool looks_like_tiff(std::string_view head) {
@@ -315,58 +444,58 @@ std::vector<SliceHeader> read_tiff_headers(const fs::path& path) { return TiffRe
 
 SliceHeader read_png_header(const fs::path& path) {
   RandomFile file(path);
-  std::uint64_t at = 8;
   std::uint64_t stored = 0;
   SliceHeader header;
-  std::vector<unsigned char> buffer;
-  for (std::string type; type != "IEND";) {
-    check_interrupt();
-    std::array<unsigned char, 8> head{};
-    file.read(at, head.data(), head.size());
-    const std::uint64_t length = number(head.data(), 4, true);
-    type.assign(reinterpret_cast<const char*>(head.data()) + 4, 4);
-    if (at + 12 + length > file.size()) {
-      throw_truncated(path, at + 12 + length - file.size());
-    }
-    buffer.resize(length + 8);
-    file.read(at + 4, buffer.data(), buffer.size());  // type, data, checksum
-    const auto checksum = crc32(0, buffer.data(), static_cast<uInt>(length + 4));
-    if (checksum != number(buffer.data() + length + 4, 4, true)) {
-      throw InputError(fmt::format(
-          "{}: its PNG chunk at byte {} has a wrong checksum: the file is corrupt; get it again", path.string(), at));
-    }
-    if (at == 8) {
-      if (type != "IHDR" || length != 13) {
-        throw InputError(fmt::format("{}: does not begin with a PNG header: the file is corrupt", path.string()));
-      }
-      header.width = number(buffer.data() + 4, 4, true);
-      header.height = number(buffer.data() + 8, 4, true);
-      header.bits = buffer[12];
-      const unsigned colour = buffer[13];
-      if (colour != 0) {
-        throw InputError(
-            fmt::format("{}: has colours (PNG colour type {}): save one grey value per pixel", path.string(), colour));
-      }
-      if (header.bits != 8 && header.bits != 16) {
-        throw InputError(fmt::format("{}: has grey values of {} bits: save 8 or 16", path.string(), header.bits));
-      }
-      if (header.width == 0 || header.height == 0 || header.width > 0x7fffffff || header.height > 0x7fffffff) {
-        throw InputError(fmt::format("{}: a picture of {} x {} pixels is impossible: the file is corrupt",
-                                     path.string(), header.width, header.height));
-      }
+  for_each_chunk(file, path, [&](const std::string& type, std::uint64_t offset, std::uint64_t length) {
+    if (type == "IHDR") {
+      std::array<unsigned char, 13> bytes{};
+      file.read(offset, bytes.data(), bytes.size());
+      header = parse_png_header(path, bytes);
     } else if (type == "IDAT") {
       stored += length;
     } else if (type == "tRNS") {
       throw InputError(fmt::format("{}: has a transparent grey value: save it without", path.string()));
     }
-    at += 12 + length;
-  }
+  });
   const std::uint64_t wanted = header.width * header.height * (header.bits / 8);
   if (wanted / 1032 > stored) {
     throw InputError(fmt::format("{}: truncated: {} x {} pixels, and at least {} bytes of them are missing",
                                  path.string(), header.width, header.height, wanted / 1032 - stored));
   }
   return header;
+}
+
+std::vector<unsigned char> read_png_pixels(const fs::path& path) {
+  RandomFile file(path);
+  std::vector<unsigned char> result(png_signature);
+  file.read(0, result.data(), result.size());
+  std::vector<unsigned char> pixels;
+  SliceHeader header;
+  bool interlaced = false;
+  for_each_chunk(file, path, [&](const std::string& type, std::uint64_t offset, std::uint64_t length) {
+    if (type != "IHDR" && type != "IDAT" && type != "IEND") {
+      return;
+    }
+    const std::size_t begin = result.size();
+    result.resize(begin + length + 12);
+    unsigned char* chunk = result.data() + begin;  // length, type, data, checksum
+    file.read(offset - 8, chunk, length + 12);
+    if (crc32(0, chunk + 4, static_cast<uInt>(length + 4)) != number(chunk + 8 + length, 4, true)) {
+      throw InputError(
+          fmt::format("{}: its PNG chunk at byte {} has a wrong checksum: the file is corrupt; get it again",
+                      path.string(), offset - 8));
+    }
+    if (type == "IHDR") {
+      std::array<unsigned char, 13> bytes{};
+      std::copy_n(chunk + 8, bytes.size(), bytes.begin());
+      header = parse_png_header(path, bytes);
+      interlaced = bytes[12] == 1;
+    } else {
+      pixels.insert(pixels.end(), chunk + 8, chunk + 8 + length);
+    }
+  });
+  require_rows(path, pixels, rows_of(header, interlaced));
+  return result;
 }
 
 }  // namespace tunica::volume_format

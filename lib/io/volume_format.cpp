@@ -245,7 +245,7 @@ std::vector<T> read_text(ByteStream& stream, const std::vector<Axis>& axes, cons
     const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
     if (error != std::errc() || end != word.data() + word.size()) {
       throw InputError(fmt::format("{}: voxel {} is '{}', which is no number of the type the header names",
-                                   stream.path().string(), n, word.substr(0, 40)));
+                                   stream.path().string(), n, shown(word.substr(0, 40))));
     }
     values.push_back(value);
   }
@@ -536,15 +536,28 @@ void set_dims(VolumeFile& file, const fs::path& path, std::span<const std::uint6
 
 fs::path data_file_beside(const fs::path& header, const std::string& name) {
   const fs::path relative(name);
-  const bool plain = !name.empty() && relative.is_relative() &&
+  const bool plain = shown(name) == name && !name.empty() && relative.is_relative() &&
                      std::none_of(relative.begin(), relative.end(), [](const fs::path& part) { return part == ".."; });
   if (!plain) {
     throw InputError(
-        fmt::format("{}: its data file '{}' is not in the header's own folder: move it there and name it by "
-                    "its file name alone",
-                    header.string(), name));
+        fmt::format("{}: its data file '{}' is not in the header's own folder: move it there and name it "
+                    "by its file name alone",
+                    header.string(), shown(name)));
   }
-  return header.parent_path() / relative;
+  const fs::path path = header.parent_path() / relative;
+  std::error_code error;
+  if (!fs::exists(path, error)) {
+    throw InputError(
+        fmt::format("{}: its data file {} is missing: put it beside the header", header.string(), path.string()));
+  }
+  return path;
+}
+
+std::string shown(std::string_view text) {
+  std::string result(text.substr(0, 200));
+  std::replace_if(
+      result.begin(), result.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, '?');
+  return text.size() > result.size() ? result + "..." : result;
 }
 
 std::string_view trimmed(std::string_view text) {

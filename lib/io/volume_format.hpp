@@ -98,8 +98,11 @@ Eigen::Matrix<double, 3, 4> flip_xy(Eigen::Matrix<double, 3, 4> affine);
 /// Sets volume.dims. Errors: InputError: a size is 0 or the count overflows.
 void set_dims(VolumeFile& file, const std::filesystem::path& path, std::span<const std::uint64_t, 3> dims);
 
-/// The data file a header names, beside the header. Errors: InputError: absolute, in another folder, a pattern.
+/// The data file a header names, beside the header. Errors: InputError: absolute, in another folder, missing.
 std::filesystem::path data_file_beside(const std::filesystem::path& header, const std::string& name);
+
+/// What a file says, fit for a message: without control characters, not longer than 200 bytes.
+std::string shown(std::string_view text);
 
 /// Text of a header line without the white space around it.
 std::string_view trimmed(std::string_view text);

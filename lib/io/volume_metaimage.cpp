@@ -39,12 +39,12 @@ Header read_header(const fs::path& path) {
     if (equals == std::string_view::npos) {
       throw InputError(
           fmt::format("{}: the MetaImage header's line '{}' is not of the form 'Key = Value': it is corrupt",
-                      path.string(), trimmed(line).substr(0, 60)));
+                      path.string(), shown(trimmed(line))));
     }
     const std::string key(trimmed(line.substr(0, equals)));
     if (!header.fields.emplace(key, trimmed(line.substr(equals + 1))).second) {
       throw InputError(
-          fmt::format("{}: the MetaImage header has the key '{}' twice: it is corrupt", path.string(), key));
+          fmt::format("{}: the MetaImage header has the key '{}' twice: it is corrupt", path.string(), shown(key)));
     }
     if (key == "ElementDataFile") {
       header.end = begin;
@@ -74,7 +74,7 @@ std::string_view require(const fs::path& path, const Header& header, std::string
 
 [[noreturn]] void throw_field(const fs::path& path, std::string_view name, std::string_view value) {
   throw InputError(fmt::format("{}: the MetaImage header's {} is '{}', which makes no sense here: it is corrupt",
-                               path.string(), name, value.substr(0, 80)));
+                               path.string(), name, shown(value)));
 }
 
 bool is_true(std::string_view text) { return !text.empty() && (text[0] == 'T' || text[0] == 't' || text[0] == '1'); }
@@ -106,7 +106,7 @@ VoxelType voxel_type(const fs::path& path, std::string_view text) {
   const auto at = types.find(text);
   if (at == types.end()) {
     throw InputError(fmt::format("{}: its voxels are of type '{}': convert them to integers, MET_FLOAT or MET_DOUBLE",
-                                 path.string(), text));
+                                 path.string(), shown(text)));
   }
   return at->second;
 }
@@ -149,7 +149,7 @@ void set_geometry(VolumeFile& file, const fs::path& path, const Header& header, 
   if (unit == "um" || unit == "cm" || unit == "m") {
     affine *= parse_length_unit(unit);
   } else if (!unit.empty() && unit != "mm" && unit != "?") {
-    file.warnings.push_back(fmt::format("{}: unknown unit of length '{}' taken as mm", path.string(), unit));
+    file.warnings.push_back(fmt::format("{}: unknown unit of length '{}' taken as mm", path.string(), shown(unit)));
   }
   set_affine(file, path, affine);
 }
@@ -176,7 +176,7 @@ Place voxel_place(const fs::path& path, const Header& header) {
   }
   if (name.starts_with("LIST") || name.find('%') != std::string::npos) {
     throw InputError(fmt::format("{}: its voxels are in several data files ('{}'): join them into one MetaImage",
-                                 path.string(), name));
+                                 path.string(), shown(name)));
   }
   return {data_file_beside(path, name), 0};
 }
@@ -222,7 +222,7 @@ Volume::Data read_data(VolumeFile& file, const fs::path& path, const Header& hea
       throw_field(path, "CompressedDataSize", text);
     }
     const std::uint64_t left = error || size < place.offset ? 0 : size - place.offset;
-    if (fs::exists(place.path) && left < *bytes) {
+    if (left < *bytes) {
       throw InputError(
           fmt::format("{}: truncated: {} of the {} bytes of compressed voxels its header promises are "
                       "missing; get the whole file again",
@@ -253,12 +253,12 @@ VolumeFile read_metaimage(const fs::path& path, const VolumeOptions& options) {
   const std::size_t dimensions = dimensions_text == "3" ? 3 : dimensions_text == "4" ? 4 : 0;
   if (dimensions == 0) {
     throw InputError(fmt::format("{}: has {} dimensions, a volume has three (or four, with frames)", path.string(),
-                                 dimensions_text.substr(0, 20)));
+                                 shown(dimensions_text)));
   }
   const std::string_view channels = find(header, {"ElementNumberOfChannels"});
   if (!channels.empty() && channels != "1") {
-    throw InputError(fmt::format("{}: has {} values per voxel: one value per voxel is needed", path.string(),
-                                 channels.substr(0, 20)));
+    throw InputError(
+        fmt::format("{}: has {} values per voxel: one value per voxel is needed", path.string(), shown(channels)));
   }
   std::vector<std::uint64_t> sizes;
   const std::string_view sizes_text = require(path, header, "DimSize");

@@ -292,6 +292,10 @@ void set_transform(VolumeFile& file, const fs::path& path, const Header& header,
     throw InputError(fmt::format("{}: its voxel spacing {} x {} x {} is not positive: correct the header",
                                  path.string(), header.pixdim[1], header.pixdim[2], header.pixdim[3]));
   }
+  if (file.transform == "qform" && !(Vec3(header.quatern.data()).squaredNorm() < 1.01)) {
+    throw InputError(fmt::format("{}: its qform's quaternion ({}, {}, {}) is no rotation: the header is corrupt",
+                                 path.string(), header.quatern[0], header.quatern[1], header.quatern[2]));
+  }
   const double scale = unit_size(path, header.units, file.warnings);
   const Affine ras = use_qform ? qform(header) : has_sform ? sform(header) : without_orientation(header);
   set_affine(file, path, flip_xy(scale * ras));

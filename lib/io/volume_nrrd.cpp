@@ -81,7 +81,7 @@ Header read_header(const fs::path& path) {
     const std::size_t colon = line.find(':');
     if (colon == std::string_view::npos) {
       throw InputError(fmt::format("{}: the NRRD header's line '{}' is neither a field nor a key: it is corrupt",
-                                   path.string(), trimmed(line).substr(0, 60)));
+                                   path.string(), shown(trimmed(line))));
     }
     const std::string_view name = line.substr(0, colon);
     if (line.substr(colon).starts_with(":=")) {
@@ -108,7 +108,8 @@ Header read_header(const fs::path& path) {
     std::string key = lower_case(name);
     std::erase(key, ' ');
     if (!header.fields.emplace(key, trimmed(line.substr(colon + 1))).second) {
-      throw InputError(fmt::format("{}: the NRRD header has the field '{}' twice: it is corrupt", path.string(), name));
+      throw InputError(
+          fmt::format("{}: the NRRD header has the field '{}' twice: it is corrupt", path.string(), shown(name)));
     }
   }
 }
@@ -128,7 +129,7 @@ const std::string& require(const fs::path& path, const Header& header, const std
 
 [[noreturn]] void throw_field(const fs::path& path, const std::string& name, std::string_view value) {
   throw InputError(fmt::format("{}: the NRRD header's field '{}' is '{}', which makes no sense here: it is corrupt",
-                               path.string(), name, value.substr(0, 80)));
+                               path.string(), name, shown(value)));
 }
 
 VoxelType voxel_type(const fs::path& path, const std::string& text) {
@@ -177,7 +178,7 @@ VoxelType voxel_type(const fs::path& path, const std::string& text) {
   const auto at = types.find(lower_case(text));
   if (at == types.end()) {
     throw InputError(fmt::format("{}: its voxels are of type '{}': convert them to integers or to float or double",
-                                 path.string(), text));
+                                 path.string(), shown(text)));
   }
   return at->second;
 }
@@ -339,7 +340,7 @@ void set_roles(const fs::path& path, std::vector<AxisInfo>& axes, bool has_direc
     }
     if (axis.role == Role::values) {
       throw InputError(fmt::format("{}: has {} values per voxel (kind {}): one value per voxel is needed",
-                                   path.string(), axis.size, axis.kind));
+                                   path.string(), axis.size, shown(axis.kind)));
     }
     if (++count.at(static_cast<std::size_t>(axis.role)) > 1 && axis.role != Role::space) {
       throw InputError(fmt::format("{}: has two list or two time axes: split the file", path.string()));
@@ -373,12 +374,12 @@ double unit_size(const fs::path& path, const Header& header, bool has_directions
     if (size == 0) {
       const bool none = word.empty() || word == "none" || word == "???" || word == "s" || word == "ms";
       if (!none) {
-        warnings.push_back(fmt::format("{}: unknown unit of length '{}' taken as mm", path.string(), word));
+        warnings.push_back(fmt::format("{}: unknown unit of length '{}' taken as mm", path.string(), shown(word)));
       }
       continue;
     }
     if (unit != 0 && unit != size) {
-      throw InputError(fmt::format("{}: its axes have different units of length ({})", path.string(), *text));
+      throw InputError(fmt::format("{}: its axes have different units of length ({})", path.string(), shown(*text)));
     }
     unit = size;
   }
@@ -422,7 +423,7 @@ void set_geometry(VolumeFile& file, const fs::path& path, const Header& header, 
     affine = signs->asDiagonal() * affine;
   } else if (has_directions) {
     file.warnings.push_back(fmt::format("{}: its space '{}' is not tied to the body: taken as left-posterior-superior",
-                                        path.string(), space != nullptr ? *space : "unnamed"));
+                                        path.string(), space != nullptr ? shown(*space) : "unnamed"));
   }
   set_affine(file, path, affine);
 }
@@ -434,10 +435,10 @@ std::string layer_hint(const Header& header, std::uint64_t layers) {
     std::string names;
     for (const auto& [number, segment] : header.segments) {
       if (segment.layer == layer && names.size() < 160) {
-        names += fmt::format("{}{}", names.empty() ? "" : ", ", segment.name);
+        names += fmt::format("{}{}", names.empty() ? "" : ", ", shown(segment.name));
       }
     }
-    hint += names.empty() ? "" : fmt::format("{}{} holds {}", hint.empty() ? "; layer " : "; ", layer, names);
+    hint += names.empty() ? "" : fmt::format("; layer {} holds {}", layer, names);
   }
   return hint;
 }
@@ -476,7 +477,7 @@ Place voxel_place(const fs::path& path, const Header& header) {
     const auto parts = words(*detached);
     if (parts.empty() || parts[0] == "LIST" || detached->find('%') != std::string::npos) {
       throw InputError(fmt::format("{}: its voxels are in several data files ('{}'): join them into one NRRD file",
-                                   path.string(), *detached));
+                                   path.string(), shown(*detached)));
     }
     place = {data_file_beside(path, *detached), 0};
   } else if (!header.complete) {
@@ -514,7 +515,7 @@ Volume::Data read_data(VolumeFile& file, const fs::path& path, const Header& hea
   const bool gzip = encoding == "gzip" || encoding == "gz";
   if (!gzip && encoding != "raw") {
     throw InputError(
-        fmt::format("{}: its encoding is '{}': save it with encoding raw or gzip", path.string(), encoding));
+        fmt::format("{}: its encoding is '{}': save it with encoding raw or gzip", path.string(), shown(encoding)));
   }
   bool big_endian = false;
   if (size_of(type) > 1) {

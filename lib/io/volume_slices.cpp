@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <iostream>
 
 namespace tunica::volume_format {
 namespace fs = std::filesystem;
@@ -24,9 +25,7 @@ VoxelType voxel_type(const SliceHeader& header) {
     case 16:
       return header.kind == Kind::integer ? VoxelType::int16 : VoxelType::uint16;
     case 32:
-      return header.kind == Kind::real      ? VoxelType::float32
-             : header.kind == Kind::integer ? VoxelType::int32
-                                            : VoxelType::uint32;
+      return header.kind == Kind::real ? VoxelType::float32 : VoxelType::int32;
     default:
       return VoxelType::float64;
   }
@@ -75,20 +74,20 @@ std::optional<std::pair<std::string, std::uint64_t>> numbered(const fs::path& pa
 }
 
 void warn_of_gaps(const fs::path& folder, const std::vector<fs::path>& slices, std::vector<std::string>& warnings) {
-  std::uint64_t step = 0;
+  std::vector<std::uint64_t> steps;
   for (std::size_t i = 1; i < slices.size(); ++i) {
     const auto before = numbered(slices[i - 1]);
     const auto after = numbered(slices[i]);
     if (!before || !after || before->first != after->first || after->second <= before->second) {
       return;
     }
-    const std::uint64_t now = after->second - before->second;
-    if (step != 0 && now != step) {
-      warnings.push_back(fmt::format("{}: a slice seems to be missing between {} and {}", folder.string(),
-                                     slices[i - 1].filename().string(), slices[i].filename().string()));
-      return;
-    }
-    step = now;
+    steps.push_back(after->second - before->second);
+  }
+  const auto largest = std::max_element(steps.begin(), steps.end());
+  if (largest != steps.end() && *largest > *std::min_element(steps.begin(), steps.end())) {
+    const auto before = static_cast<std::size_t>(largest - steps.begin());
+    warnings.push_back(fmt::format("{}: a slice seems to be missing between {} and {}", folder.string(),
+                                   slices[before].filename().string(), slices[before + 1].filename().string()));
   }
 }
 
@@ -132,7 +131,7 @@ std::string content_head(const fs::path& path) {
   return head;
 }
 
-std::vector<SliceHeader> headers_of(const fs::path& path) {
+std::vector<SliceHeader> headers_of(const fs::path& path, bool& png) {
   const std::string head = content_head(path);
   if (head.empty()) {
     throw InputError(fmt::format("{}: is empty", path.string()));
@@ -140,7 +139,8 @@ std::vector<SliceHeader> headers_of(const fs::path& path) {
   if (looks_like_tiff(head)) {
     return read_tiff_headers(path);
   }
-  if (looks_like_png(head)) {
+  png = looks_like_png(head);
+  if (png) {
     return {read_png_header(path)};
   }
   throw InputError(fmt::format("{}: is neither TIFF nor PNG, whatever its name says", path.string()));
@@ -151,17 +151,33 @@ std::vector<SliceHeader> headers_of(const fs::path& path) {
                                path.string(), page));
 }
 
-// OpenCV's messages would come as a second line of error.
-void silence_opencv() {
-  cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
-  cv::redirectError([](int, const char*, const char*, const char*, int, void*) { return 0; });
-}
+// While it lives OpenCV says nothing: its messages would come as a second line of error.
+class Silence {
+public:
+  Silence()
+      : level_(cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT)),
+        stream_(std::cerr.rdbuf(nullptr)) {
+    cv::redirectError([](int, const char*, const char*, const char*, int, void*) { return 0; });
+  }
+  ~Silence() {
+    cv::redirectError(nullptr);
+    std::cerr.rdbuf(stream_);
+    cv::utils::logging::setLogLevel(level_);
+  }
+  Silence(const Silence&) = delete;
+  Silence& operator=(const Silence&) = delete;
 
-std::vector<cv::Mat> decode(const fs::path& path, std::size_t first, std::size_t count) {
+private:
+  cv::utils::logging::LogLevel level_;
+  std::streambuf* stream_;
+};
+
+std::vector<cv::Mat> decode(const fs::path& path, bool png, std::size_t first, std::size_t count) {
+  const Silence silence;
   std::vector<cv::Mat> pages;
   try {
-    if (first == 0 && count == 1) {
-      pages.push_back(cv::imread(path.string(), cv::IMREAD_UNCHANGED));
+    if (png) {
+      pages.push_back(cv::imdecode(read_png_pixels(path), cv::IMREAD_UNCHANGED));
     } else {
       cv::imreadmulti(path.string(), pages, static_cast<int>(first), static_cast<int>(count), cv::IMREAD_UNCHANGED);
     }
@@ -194,6 +210,7 @@ void store(const fs::path& path, std::size_t first, const std::vector<cv::Mat>& 
 
 struct Slice {
   fs::path path;
+  bool png;
   std::size_t pages;
 };
 
@@ -220,7 +237,8 @@ VolumeFile read_slices(const fs::path& path, const VolumeOptions& options) {
   std::optional<SliceHeader> common;
   std::size_t count = 0;
   for (const fs::path& slice : paths) {
-    const std::vector<SliceHeader> headers = headers_of(slice);
+    bool png = false;
+    const std::vector<SliceHeader> headers = headers_of(slice, png);
     if (folder && headers.size() > 1) {
       throw InputError(fmt::format("{}: has {} pages: name this file itself, or keep one page per file in the folder",
                                    slice.string(), headers.size()));
@@ -236,7 +254,7 @@ VolumeFile read_slices(const fs::path& path, const VolumeOptions& options) {
                         common->height, name_of(voxel_type(*common))));
       }
     }
-    slices.push_back({slice, headers.size()});
+    slices.push_back({slice, png, headers.size()});
     count += headers.size();
   }
   if (count == 1) {
@@ -245,8 +263,7 @@ VolumeFile read_slices(const fs::path& path, const VolumeOptions& options) {
                     "folder of the slices",
                     path.string()));
   }
-  const bool tiff = looks_like_tiff(content_head(paths.front()));
-  file.format = fmt::format("{} stack", tiff ? "TIFF" : "PNG");
+  file.format = slices.front().png ? "PNG stack" : "TIFF stack";
   const VoxelType type = voxel_type(*common);
   file.datatype = name_of(type);
   set_dims(file, path, std::array<std::uint64_t, 3>{common->width, common->height, count});
@@ -255,7 +272,6 @@ VolumeFile read_slices(const fs::path& path, const VolumeOptions& options) {
   affine.leftCols<3>() = options.spacing->asDiagonal();
   set_affine(file, path, affine);
 
-  silence_opencv();
   file.volume.data = make_voxels(type, file.volume.voxels());
   char* to = std::visit([](auto& values) { return reinterpret_cast<char*>(values.data()); }, file.volume.data);
   constexpr std::size_t pages_at_once = 16;
@@ -263,7 +279,7 @@ VolumeFile read_slices(const fs::path& path, const VolumeOptions& options) {
     for (std::size_t first = 0; first < slice.pages; first += pages_at_once) {
       check_interrupt();
       const std::size_t now = std::min(pages_at_once, slice.pages - first);
-      store(slice.path, first, decode(slice.path, first, now), now, *common, to);
+      store(slice.path, first, decode(slice.path, slice.png, first, now), now, *common, to);
     }
   }
   return file;

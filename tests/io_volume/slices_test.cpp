@@ -1,0 +1,219 @@
+#include "io_volume/builders.hpp"
+
+namespace tunica::test {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+VolumeOptions with_spacing() {
+  VolumeOptions options;
+  options.spacing = Vec3(0.5, 0.25, 2);
+  return options;
+}
+
+template <class T>
+std::vector<std::vector<T>> sample_pages(std::size_t pages, std::size_t pixels) {
+  std::vector<std::vector<T>> result;
+  const auto all = sample_values<T>(pages * pixels);
+  for (std::size_t page = 0; page < pages; ++page) {
+    result.emplace_back(all.begin() + static_cast<long>(page * pixels),
+                        all.begin() + static_cast<long>((page + 1) * pixels));
+  }
+  return result;
+}
+
+template <class T>
+class TiffType : public testing::Test {};
+using Types = testing::Types<std::uint8_t, std::int8_t, std::uint16_t, std::int16_t, std::int32_t, float, double>;
+TYPED_TEST_SUITE(TiffType, Types);
+
+TYPED_TEST(TiffType, EveryEndianSizeAndCompression) {
+  using T = TypeParam;
+  const TemporaryFolder folder;
+  const auto pages = sample_pages<T>(20, 7 * 5);
+  for (const Endian endian : {Endian::little, Endian::big}) {
+    for (const bool big_tiff : {false, true}) {
+      for (const int compression : {1, 8}) {
+        TiffOptions options;
+        options.endian = endian;
+        options.big_tiff = big_tiff;
+        options.compression = compression;
+        options.format = std::is_floating_point_v<T> ? 3 : std::is_signed_v<T> ? 2 : 1;
+        const VolumeFile file = read_volume(folder.file("v.tif", tiff_file<T>(7, 5, pages, options)), with_spacing());
+        EXPECT_EQ(std::get<std::vector<T>>(file.volume.data), sample_values<T>(700));
+        EXPECT_EQ(file.volume.dims, (std::array<std::size_t, 3>{7, 5, 20}));
+        EXPECT_EQ(file.spacing, Vec3(0.5, 0.25, 2));
+        EXPECT_EQ(file.format, "TIFF stack");
+        EXPECT_THAT(file.warnings, IsEmpty());
+      }
+    }
+  }
+}
+
+TEST(Tiff, All256GreyValuesComeAsTheyAre) {
+  const TemporaryFolder folder;
+  std::vector<std::uint8_t> page(256);
+  for (std::size_t i = 0; i < page.size(); ++i) {
+    page[i] = static_cast<std::uint8_t>(i);
+  }
+  const VolumeFile file =
+      read_volume(folder.file("v.tif", tiff_file<std::uint8_t>(16, 16, {page, page})), with_spacing());
+  for (std::size_t i = 0; i < 512; ++i) {
+    EXPECT_EQ(std::get<0>(file.volume.data)[i], i % 256);
+  }
+}
+
+TEST(Tiff, SpacingIsRequiredAndOthersRefuseIt) {
+  const TemporaryFolder folder;
+  const auto path = folder.file("v.tif", tiff_file<std::uint8_t>(7, 5, sample_pages<std::uint8_t>(3, 35)));
+  EXPECT_THAT(error_of(path, {}, ExitCode::usage), HasSubstr("--spacing 0.5,0.5,1.25"));
+  EXPECT_THAT(error_of(folder.file("v.nii", nifti_file()), with_spacing(), ExitCode::usage), HasSubstr("--spacing"));
+}
+
+TEST(Tiff, EveryTruncationIsNoticed) {
+  const TemporaryFolder folder;
+  const std::string bytes = tiff_file<std::uint16_t>(7, 5, sample_pages<std::uint16_t>(4, 35));
+  for (std::size_t size = 4; size < bytes.size(); ++size) {
+    EXPECT_THAT(error_of(folder.file("v.tif", bytes.substr(0, size)), with_spacing()), HasSubstr("bytes are missing"))
+        << size;
+  }
+}
+
+TEST(Tiff, DamagedCompressedPixels) {
+  const TemporaryFolder folder;
+  TiffOptions options;
+  options.compression = 8;
+  std::string bytes = tiff_file<std::uint16_t>(70, 50, sample_pages<std::uint16_t>(3, 3500), options);
+  bytes.replace(30, 40, std::string(40, '\xff'));
+  EXPECT_THAT(error_of(folder.file("v.tif", bytes), with_spacing()), HasSubstr("cannot be decoded"));
+}
+
+TEST(Tiff, WhatWouldComeOutWrongIsRefused) {
+  const TemporaryFolder folder;
+  const auto pages = sample_pages<std::uint8_t>(3, 35);
+  const auto refuse = [&](const TiffOptions& options, const std::string& message) {
+    EXPECT_THAT(error_of(folder.file("v.tif", tiff_file<std::uint8_t>(7, 5, pages, options)), with_spacing()),
+                HasSubstr(message));
+  };
+  TiffOptions options;
+  options.photometric = 0;
+  refuse(options, "white as 0");
+  options.photometric = 3;
+  refuse(options, "colours");
+  options = {};
+  options.samples = 3;
+  refuse(options, "colours");
+  options = {};
+  options.orientation = 3;
+  refuse(options, "orientation 3");
+  options = {};
+  options.compression = 7;
+  refuse(options, "compressed by method 7");
+  options = {};
+  options.format = 3;
+  refuse(options, "8 bits");
+  EXPECT_THAT(error_of(folder.file("v.tif", tiff_file<std::uint32_t>(7, 5, sample_pages<std::uint32_t>(3, 35))),
+                       with_spacing()),
+              HasSubstr("32 bits"));
+  const std::string imagej = std::string("ImageJ=1.53\nimages=40\nslices=40\n") + '\0';
+  options = {};
+  options.description = imagej;
+  EXPECT_THAT(error_of(folder.file("v.tif", tiff_file<std::uint8_t>(7, 5, {pages[0]}, options)), with_spacing()),
+              HasSubstr("holds 40 slices"));
+}
+
+TEST(Tiff, HostileTables) {
+  const TemporaryFolder folder;
+  // A page of 2^20 x 2^20 pixels in a file of a hundred bytes.
+  std::string bytes = tiff_file<std::uint8_t>(1U << 20, 1U << 20, sample_pages<std::uint8_t>(2, 35));
+  EXPECT_THAT(error_of(folder.file("v.tif", bytes), with_spacing()), HasSubstr("bytes of them are missing"));
+  // The last page's link leads back to the first page.
+  bytes = tiff_file<std::uint8_t>(7, 5, sample_pages<std::uint8_t>(2, 35));
+  bytes.replace(bytes.size() - 4, 4, bytes.substr(4, 4));
+  EXPECT_THAT(error_of(folder.file("v.tif", bytes), with_spacing()), HasSubstr("ring"));
+  bytes = tiff_file<std::uint8_t>(7, 5, {});
+  EXPECT_THAT(error_of(folder.file("v.tif", bytes), with_spacing()), HasSubstr("no page"));
+}
+
+TEST(Folder, SlicesInNaturalOrder) {
+  const TemporaryFolder folder;
+  const auto stack = folder / "stack";
+  for (const std::string extension : {".png", ".tif"}) {
+    std::filesystem::remove_all(stack);
+    std::filesystem::create_directory(stack);
+    for (std::uint16_t i = 8; i < 12; ++i) {
+      const std::vector<std::uint16_t> pixels(35, static_cast<std::uint16_t>(1000 * i));
+      folder.file("stack/slice" + std::to_string(i) + extension,
+                  extension == ".png" ? png_file(7, 5, pixels) : tiff_file<std::uint16_t>(7, 5, {pixels}));
+    }
+    const VolumeFile file = read_volume(stack, with_spacing());
+    EXPECT_EQ(file.volume.dims, (std::array<std::size_t, 3>{7, 5, 4}));
+    for (std::size_t k = 0; k < 4; ++k) {
+      EXPECT_EQ(std::get<std::vector<std::uint16_t>>(file.volume.data)[35 * k + 3], 1000 * (8 + k));
+    }
+    EXPECT_EQ(file.data_files.size(), 4U);
+    EXPECT_THAT(file.warnings, IsEmpty());
+    folder.file("stack/notes.txt", "x");
+    std::filesystem::remove(stack / ("slice9" + extension));
+    EXPECT_THAT(read_volume(stack, with_spacing()).warnings,
+                ElementsAre(HasSubstr("1 files that are no slices"), HasSubstr("between slice8")));
+  }
+}
+
+TEST(Folder, WhatIsNoStackIsRefused) {
+  const TemporaryFolder folder;
+  const auto stack = folder / "stack";
+  std::filesystem::create_directory(stack);
+  EXPECT_THAT(error_of(stack, with_spacing()), HasSubstr("holds no .png, .tif or .tiff slices"));
+  folder.file("stack/a1.png", png_file(7, 5, sample_values<std::uint8_t>(35)));
+  folder.file("stack/a2.png", png_file(5, 7, sample_values<std::uint8_t>(35)));
+  EXPECT_THAT(error_of(stack, with_spacing()), HasSubstr("must be alike"));
+  folder.file("stack/a2.png", png_file(7, 5, sample_values<std::uint16_t>(35)));
+  EXPECT_THAT(error_of(stack, with_spacing()), HasSubstr("must be alike"));
+  folder.file("stack/a2.png", png_file(7, 5, sample_values<std::uint8_t>(35), 3));
+  EXPECT_THAT(error_of(stack, with_spacing()), HasSubstr("colour type 3"));
+  folder.file("stack/a2.png", png_file(7, 5, sample_values<std::uint8_t>(35), 0, 4));
+  EXPECT_THAT(error_of(stack, with_spacing()), HasSubstr("4 bits"));
+  folder.file("stack/a2.png", "hello");
+  EXPECT_THAT(error_of(stack, with_spacing()), HasSubstr("neither TIFF nor PNG"));
+  folder.file("stack/a2.png", "");
+  EXPECT_THAT(error_of(stack, with_spacing()), HasSubstr("is empty"));
+  folder.file("stack/a2.png", tiff_file<std::uint8_t>(7, 5, sample_pages<std::uint8_t>(2, 35)));
+  EXPECT_THAT(error_of(stack, with_spacing()), HasSubstr("has 2 pages"));
+}
+
+TEST(Png, EveryTruncationIsNoticed) {
+  const TemporaryFolder folder;
+  const std::string bytes = png_file(7, 5, sample_values<std::uint16_t>(35));
+  for (std::size_t size = 8; size < bytes.size(); ++size) {
+    EXPECT_THAT(error_of(folder.file("v.png", bytes.substr(0, size)), with_spacing()), HasSubstr("bytes are missing"));
+  }
+  EXPECT_THAT(read_volume(folder.file("v.png", bytes), with_spacing()).warnings,
+              ElementsAre(HasSubstr("single slice")));
+}
+
+TEST(Png, Hostile) {
+  const TemporaryFolder folder;
+  std::string bytes = png_file(7, 5, sample_values<std::uint16_t>(35));
+  bytes[45] = static_cast<char>(bytes[45] ^ 1);
+  EXPECT_THAT(error_of(folder.file("v.png", bytes), with_spacing()), HasSubstr("checksum"));
+  bytes = png_file(7, 5, sample_values<std::uint16_t>(35));
+  const std::string ihdr = bytes.substr(0, 33);
+  const auto with_pixels = [&](const std::string& data) {
+    return folder.file("v.png", ihdr + png_chunk("IDAT", data) + png_chunk("IEND", ""));
+  };
+  EXPECT_THAT(error_of(with_pixels(deflated(std::string(70, '\0'), 15)), with_spacing()),
+              HasSubstr("5 of the 75 bytes"));
+  EXPECT_THAT(error_of(with_pixels(deflated(std::string(75, '\5'), 15)), with_spacing()), HasSubstr("filter"));
+  EXPECT_THAT(error_of(with_pixels("not deflated at all"), with_spacing()), HasSubstr("corrupt after 0 bytes"));
+  const std::string header = encoded<std::uint32_t>(1U << 20, Endian::big) +
+                             encoded<std::uint32_t>(1U << 20, Endian::big) + "\x08" + std::string(4, '\0');
+  bytes =
+      "\x89PNG\r\n\x1a\n" + png_chunk("IHDR", header) + png_chunk("IDAT", deflated("x", 15)) + png_chunk("IEND", "");
+  EXPECT_THAT(error_of(folder.file("v.png", bytes), with_spacing()), HasSubstr("bytes of them are missing"));
+}
+
+}  // namespace
+}  // namespace tunica::test

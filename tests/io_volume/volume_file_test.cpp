@@ -1,0 +1,121 @@
+#include "io_volume/builders.hpp"
+#include "support/mutate.hpp"
+
+#include <Eigen/LU>
+
+#include <sys/stat.h>
+
+#include <chrono>
+
+namespace tunica::test {
+namespace {
+
+using testing::HasSubstr;
+
+TEST(VolumeFile, WhatIsNoVolumeIsRefusedByContent) {
+  const TemporaryFolder folder;
+  const auto refuse = [&](const std::string& name, const std::string& bytes, const std::string& message) {
+    EXPECT_THAT(error_of(folder.file(name, bytes)), HasSubstr(message));
+  };
+  refuse("v.nii", "", "is empty");
+  refuse("v.nii.gz", deflated(""), "is empty");
+  refuse("v.nii", "hello", "is not a volume");
+  refuse("v.nii.gz", deflated("hello"), "is not a volume");
+  refuse("v.nii", "ply\nformat ascii 1.0\n", "surface mesh");
+  refuse("v.stl", std::string(84, '\0'), "surface mesh");
+  refuse("v.dcm", std::string(128, '\0') + "DICM", "DICOM");
+  refuse("v.h5", "\x89HDF\r\n\x1a\n", "HDF5");
+  refuse("v.jpg", "\xff\xd8\xff\xe0", "not exact enough");
+  EXPECT_THAT(error_of(folder / "missing.nii"), HasSubstr("no such file"));
+}
+
+TEST(VolumeFile, APipeIsRefusedAtOnce) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(::mkfifo((folder / "pipe.nii").c_str(), 0600), 0);
+  EXPECT_THAT(error_of(folder / "pipe.nii"), HasSubstr("not a regular file"));
+  folder.file("v.mhd", metaimage_header("MET_UCHAR", "", "pipe.nii"));
+  EXPECT_THAT(error_of(folder / "v.mhd"), HasSubstr("not a regular file"));
+}
+
+// Every damage of a good file is a clean refusal or a volume, in bounded memory and time.
+TEST(VolumeFile, ThreeHundredDamagesOfEachFormat) {
+  const TemporaryFolder folder;
+  const std::string voxels = encoded(sample_values<std::uint8_t>(120), Endian::little);
+  const std::vector<std::uint8_t> page(35, 3);
+  NiftiOptions two;
+  two.version = 2;
+  two.endian = Endian::big;
+  TiffOptions packed;
+  packed.compression = 8;
+  const std::vector<std::pair<std::string, std::string>> files{
+      {"a.nii", nifti_file()},
+      {"b.nii", nifti_file(two)},
+      {"c.nii.gz", deflated(nifti_file())},
+      {"d.nrrd", nrrd_header("int16", "endian: big\nencoding: raw\n") + voxels},
+      {"e.nrrd", nrrd_header("uint8", "encoding: gzip\n") + deflated(voxels.substr(0, 60))},
+      {"f.nrrd", nrrd_header("uint8", "encoding: ascii\n") + std::string(240, '1')},
+      {"g.mha", metaimage_header("MET_SHORT") + voxels},
+      {"h.mha", metaimage_header("MET_UCHAR", "CompressedData = True\n") + deflated(voxels.substr(0, 60), 15)},
+      {"i.tif", tiff_file<std::uint8_t>(7, 5, {page, page, page})},
+      {"j.tif", tiff_file<std::uint8_t>(7, 5, {page, page, page}, packed)},
+      {"k.png", png_file(7, 5, page)},
+  };
+  const auto start = std::chrono::steady_clock::now();
+  std::size_t refused = 0;
+  std::size_t read = 0;
+  for (const auto& [name, bytes] : files) {
+    for (std::uint64_t seed = 0; seed < 300; ++seed) {
+      VolumeOptions options;
+      if (name.ends_with("tif") || name.ends_with("png")) {
+        options.spacing = Vec3(1, 1, 1);
+      }
+      try {
+        const VolumeFile file = read_volume(folder.file(name, mutate(bytes, seed)), options);
+        EXPECT_LE(file.volume.voxels(), 1000000U);
+        ++read;
+      } catch (const InputError& error) {
+        EXPECT_TRUE(std::string(error.what()).starts_with((folder / "").string())) << error.what();
+        ++refused;
+      } catch (const UsageError&) {
+        ++refused;  // damaged into another format, which brings its own spacing
+      }
+    }
+  }
+  EXPECT_GT(refused, 1000U);
+  EXPECT_GT(read, 300U);
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(60));
+}
+
+// The real volumes, by the facts of their README.
+TEST(SharedVolumes, HeadersAreUnderstood) {
+  const std::filesystem::path folder = std::filesystem::path(TUNICA_SHARED_DATA) / "volumes";
+  if (!std::filesystem::exists(folder)) {
+    GTEST_SKIP() << folder << " is absent";
+  }
+  struct Fact {
+    std::string name, orientation, datatype;
+    std::array<std::size_t, 3> dims;
+    double determinant;
+  };
+  for (const Fact& fact : std::vector<Fact>{
+           {"ts_aorta_dissection.nii.gz", "LPS", "uint8", {120, 126, 164}, 3.375},
+           {"ts_abdomen_multilabel.nii.gz", "RAS", "uint8", {122, 101, 30}, 27},
+           {"nv_torso_5mm.nii.gz", "RAS", "uint8", {384, 320, 89}, 3.058},
+           {"nv_lesion_oblique.nii.gz", "RAS", "uint8", {124, 160, 140}, 1},
+           {"nvd_ct_pitch_oblique.nii.gz", "RAS", "uint8", {175, 248, 58}, 1.582},
+           {"sio_thorax_10mm.seg.nrrd", "RAS", "uint8", {128, 128, 34}, 92.83},
+           {"vmtk_aorta_levelset.mha", "RAS", "float32", {157, 393, 34}, 1.159},
+       }) {
+    const VolumeFile file = read_volume(folder / fact.name);
+    EXPECT_EQ(file.orientation, fact.orientation) << fact.name;
+    EXPECT_EQ(file.datatype, fact.datatype) << fact.name;
+    EXPECT_EQ(file.volume.dims, fact.dims) << fact.name;
+    EXPECT_NEAR(file.volume.affine.leftCols<3>().determinant(), fact.determinant, 1e-3 * fact.determinant) << fact.name;
+  }
+  EXPECT_EQ(read_volume(folder / "sio_thorax_10mm.seg.nrrd").volume.label_names.size(), 7U);
+  EXPECT_THAT(error_of(folder / "sio_thorax_overlapping_4d.seg.nrrd"),
+              HasSubstr("has 2 layers: choose one with --layer 0..1"));
+}
+
+}  // namespace
+}  // namespace tunica::test

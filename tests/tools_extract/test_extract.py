@@ -1,0 +1,514 @@
+"""tunica-extract as a user meets it: exit codes, messages, reports, and above all the surfaces it writes, which are
+parsed here and compared with the voxels as numpy and nibabel see them."""
+import json
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import nibabel
+import numpy
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from volumes import (LPS, Ply, expected_vertices, read_stl, read_volume, write_mha, write_nrrd)  # noqa: E402
+
+TOOL = os.path.join(os.environ["TUNICA_BIN"], "tunica-extract")
+SHARED = pathlib.Path(os.environ.get("TUNICA_SHARED_DATA", "absent"))
+KEYS = ["vertices", "triangles", "components", "euler", "closed", "manifold", "oriented_outward", "volume_mm3",
+        "voxel_volume_mm3", "area_mm2", "diagonal_mm"]
+
+
+def ball(shape=(14, 15, 16), radius=5.0):
+    index = numpy.indices(shape).astype(float)
+    centre = (numpy.array(shape) - 1).reshape(3, 1, 1, 1) / 2
+    return ((index - centre) ** 2).sum(axis=0) < radius ** 2
+
+
+class ExtractTest(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+        self.out = self.folder / "out.ply"
+
+    def run_tool(self, *arguments, code=0, force=True):
+        """Runs the tool with a report; checks the exit code and that errors are one line. Returns (report, stderr)."""
+        report = self.folder / "report.json"
+        command = [TOOL, *map(str, arguments), "--report", str(report)] + (["--force"] if force else [])
+        run = subprocess.run(command, capture_output=True, text=True, timeout=600, errors="replace")
+        self.assertEqual(run.returncode, code, run.stderr)
+        self.stdout = run.stdout
+        record = json.loads(report.read_text())
+        self.assertEqual(record["ok"], code == 0)
+        if code != 0:
+            lines = run.stderr.strip().splitlines()
+            errors = [line for line in lines if ": warning: " not in line]
+            self.assertEqual(len(errors), 1, run.stderr)
+            self.assertTrue(errors[0].startswith("tunica-extract: "), errors[0])
+            self.assertIn(record["error"], errors[0])
+        self.assertEqual(list(self.folder.glob("*.part")), [])
+        return record, run.stderr
+
+    def refuse(self, code, *arguments, saying):
+        _, stderr = self.run_tool(*arguments, code=code)
+        for text in [saying] if isinstance(saying, str) else saying:
+            self.assertIn(text, stderr)
+        self.assertFalse(self.out.exists())
+
+    def nifti(self, array, affine=None, name="v.nii.gz"):
+        path = self.folder / name
+        nibabel.save(nibabel.Nifti1Image(array, numpy.eye(4) if affine is None else affine), path)
+        return path
+
+    def check_surface(self, ply, result, mask, affine, tag=""):
+        """A written surface against the mask it came from: exact vertices, closed, oriented outward, the report true."""
+        self.assertTrue(ply.is_closed_oriented_manifold(), tag)
+        index = (numpy.linalg.inv(affine) @ numpy.c_[ply.vertices, numpy.ones(len(ply.vertices))].T).T[:, :3]
+        doubled = numpy.round(2 * index)
+        self.assertLess(numpy.abs(2 * index - doubled).max(), 1e-3, tag)
+        self.assertTrue(numpy.array_equal(numpy.unique(doubled.astype(int), axis=0), expected_vertices(mask)), tag)
+        world = (affine @ numpy.c_[expected_vertices(mask) / 2, numpy.ones(len(expected_vertices(mask)))].T).T[:, :3]
+        scale = numpy.abs(world).max()
+        self.assertLess(numpy.abs(ply.vertices.min(axis=0) - world.min(axis=0)).max(), 1e-6 * scale, tag)
+        self.assertLess(numpy.abs(ply.vertices.max(axis=0) - world.max(axis=0)).max(), 1e-6 * scale, tag)
+        self.assertGreater(ply.smallest_area(), 0, tag)
+        voxel = abs(numpy.linalg.det(affine[:3, :3]))
+        self.assertAlmostEqual(result["voxel_volume_mm3"], mask.sum() * voxel, delta=1e-6 * mask.sum() * voxel)
+        self.assertEqual(result["vertices"], len(ply.vertices))
+        self.assertEqual(result["triangles"], len(ply.triangles))
+        self.assertEqual(result["euler"], ply.euler(), tag)
+        self.assertEqual(result["components"], ply.components(), tag)
+        self.assertIs(result["closed"], True)
+        self.assertIs(result["manifold"], True)
+        self.assertIs(result["oriented_outward"], True)
+        self.assertGreater(ply.volume(), 0, tag)
+        self.assertAlmostEqual(result["volume_mm3"], ply.volume(), delta=1e-6 * ply.volume())
+        self.assertAlmostEqual(result["area_mm2"], ply.area(), delta=1e-6 * ply.area())
+        box = ply.vertices.max(axis=0) - ply.vertices.min(axis=0)
+        self.assertAlmostEqual(result["diagonal_mm"], numpy.linalg.norm(box), delta=1e-6)
+
+    def extract_and_check(self, path, mask, affine, *arguments, tag=""):
+        record, _ = self.run_tool(path, self.out, *arguments)
+        ply = Ply(self.out)
+        self.check_surface(ply, record["result"], mask, affine, tag)
+        return ply, record
+
+
+class Formats(ExtractTest):
+    AFFINES = {
+        "plain": numpy.diag([1.0, 1.0, 1.0, 1.0]),
+        "mirrored": numpy.array([[-0.5, 0, 0, 3], [0, 2, 0, -7], [0, 0, 1.5, 11], [0, 0, 0, 1]]),
+        "sheared": numpy.array([[1, 0.3, -0.2, 3], [0.1, 2, 0.4, -7], [0, 0.2, 1.5, 1100], [0, 0, 0, 1]]),
+        "permuted": numpy.array([[0, 0, 2.0, 5], [-1, 0, 0, 6], [0, -1.5, 0, 7], [0, 0, 0, 1]]),
+    }
+
+    def test_nifti_of_every_type_by_nibabel(self):
+        mask = ball()
+        for name, affine in self.AFFINES.items():
+            for kind in ["u1", "i1", "<u2", ">u2", "<i2", ">i4", "<u4", "<f4", ">f4", "<f8", ">i8", "<u8"]:
+                for writer in [nibabel.Nifti1Image, nibabel.Nifti2Image]:
+                    if name != "sheared" and kind not in ("u1", ">f4"):
+                        continue
+                    header = writer.header_class(endianness=">" if kind[0] == ">" else "<")
+                    header.set_data_dtype(numpy.dtype(kind))
+                    image = writer((mask * 3).astype(kind), affine, header)
+                    image.header.set_xyzt_units("mm")
+                    path = self.folder / "v.nii"
+                    image.to_filename(path)
+                    affine_read = LPS @ nibabel.load(path).affine
+                    self.extract_and_check(path, mask, affine_read, "--label", 3, tag=f"{name} {kind}")
+
+    def test_scaled_labels(self):
+        mask = ball()
+        image = nibabel.Nifti1Image((mask * 4).astype(numpy.int16), numpy.eye(4))
+        image.header.set_slope_inter(0.5, 1)
+        path = self.folder / "v.nii"
+        image.to_filename(path)
+        array, affine = read_volume(path)
+        self.assertEqual(array.max(), 4)  # nibabel divides on writing
+        self.extract_and_check(path, mask, affine, "--label", 4)
+
+    def test_nrrd_and_metaimage(self):
+        mask = ball()
+        for name, affine in self.AFFINES.items():
+            affine = LPS @ affine
+            write_nrrd(self.folder / "v.nrrd", (mask * 3).astype(numpy.int16), affine)
+            self.extract_and_check(self.folder / "v.nrrd", mask, affine, "--label", 3, tag=name)
+            write_nrrd(self.folder / "v.nrrd", (mask * 3).astype(numpy.uint8), affine, encoding="raw")
+            self.extract_and_check(self.folder / "v.nrrd", mask, affine, "--label", 3, tag=name)
+            write_mha(self.folder / "v.mha", (mask * 3).astype(numpy.int16), affine)
+            self.extract_and_check(self.folder / "v.mha", mask, affine, "--label", 3, tag=name)
+
+    def test_units_of_length(self):
+        mask = ball()
+        for unit, scale in [("meter", 1000.0), ("micron", 0.001)]:
+            image = nibabel.Nifti1Image(mask.astype(numpy.uint8), numpy.diag([0.5, 0.25, 2, 1]))
+            image.header.set_xyzt_units(unit)
+            image.to_filename(self.folder / "v.nii")
+            self.extract_and_check(self.folder / "v.nii", mask, LPS @ numpy.diag([0.5 * scale, 0.25 * scale, 2 * scale, 1]),
+                                   "--label", 1)
+
+    def test_sform_qform_and_none(self):
+        mask = ball()
+        image = nibabel.Nifti1Image(mask.astype(numpy.uint8), None)
+        image.set_sform(numpy.diag([1.0, 2, 3, 1]), code=2)
+        qform = numpy.array([[0, -2.0, 0, 5], [1, 0, 0, 6], [0, 0, 3, 7], [0, 0, 0, 1]])
+        image.set_qform(qform, code=1)
+        image.header.set_xyzt_units("mm")
+        path = self.folder / "v.nii"
+        image.to_filename(path)
+        self.extract_and_check(path, mask, LPS @ numpy.diag([1.0, 2, 3, 1]), "--label", 1)
+        _, stderr = self.run_tool(path, self.out, "--label", 1)
+        self.assertIn("sform [1 0 0 0] [0 2 0 0] [0 0 3 0] and qform", stderr)
+        self.extract_and_check(path, mask, LPS @ qform, "--label", 1, "--prefer-qform")
+        image.set_sform(numpy.eye(4), code=0)
+        image.to_filename(path)
+        self.extract_and_check(path, mask, LPS @ qform, "--label", 1)
+        image.set_qform(qform, code=0)
+        image.to_filename(path)
+        _, stderr = self.run_tool(path, self.out, "--label", 1)
+        self.assertIn("neither sform nor qform", stderr)
+        self.assertEqual(Ply(self.out).vertices[:, 0].min(), -9 - 2.5)
+
+
+class Choices(ExtractTest):
+    def two_labels(self):
+        array = numpy.zeros((20, 12, 12), numpy.uint8)
+        array[3:9, 3:9, 3:9] = 1
+        array[5:7, 5:7, 5:7] = 0          # a cavity
+        array[12:14, 3:5, 3:5] = 1        # a second piece
+        array[16:18, 4:8, 4:8] = 7
+        return array
+
+    def test_usage_errors(self):
+        path = self.nifti(self.two_labels())
+        for arguments, saying in [
+            ([], "pass --label N, --all-labels or --isovalue V; its labels are 1, 7"),
+            (["--label", 1, "--isovalue", 2], "contradict"),
+            (["--all-labels", "--label", 1], "contradict"),
+            (["--inside", "below", "--label", 1], "--isovalue"),
+            (["--inside", "left", "--isovalue", 1], "--inside"),
+            (["--isovalue", "high"], "not a number"),
+            (["--smooth", "2", "--label", 1], "2mm"),
+            (["--smooth", "-1mm", "--label", 1], "above 0"),
+            (["--smooth", "rough", "--label", 1], "--smooth"),
+            (["--space", "xyz", "--label", 1], "--space"),
+            (["--all-labels"], "{label}"),
+            (["--spacing", "1,1,1", "--label", 1], "--spacing"),
+            (["--spacing", "1,1", "--label", 1], "X,Y,Z"),
+            (["--frame", "-1", "--label", 1], "--frame"),
+            (["--nonsense"], "--nonsense"),
+        ]:
+            with self.subTest(arguments):
+                self.refuse(2, path, self.out, *arguments, saying=saying)
+        self.run_tool(path, "--label", 1, code=2)
+        self.run_tool(path, self.folder / "out.stl", "--label", 1, code=2)
+
+    def test_labels_that_are_not_there(self):
+        path = self.nifti(self.two_labels())
+        self.refuse(3, path, self.out, "--label", 3, saying="has no voxel with label 3; its labels are 1, 7")
+        self.refuse(3, path, self.out, "--label", "liver", saying="its labels are 1, 7")
+        self.refuse(3, path, self.out, "--isovalue", 9, saying="no voxel is above 9; its values are 0 to 7")
+        empty = self.nifti(numpy.zeros((4, 5, 6), numpy.uint8), name="empty.nii")
+        self.refuse(3, empty, self.out, "--label", 1, saying="every voxel is 0")
+        self.refuse(3, empty, self.out, saying="every voxel is 0")
+        grey = self.nifti(numpy.linspace(-1, 1, 4 * 5 * 6).reshape(4, 5, 6).astype(numpy.float32), name="grey.nii")
+        self.refuse(2, grey, self.out, saying="grey volume with values from -1 to 1: pass --isovalue V")
+        self.refuse(3, grey, self.folder / "{label}.ply", "--all-labels", saying="grey volume")
+
+    def test_existing_output_is_kept(self):
+        path = self.nifti(self.two_labels())
+        self.out.write_text("precious")
+        _, stderr = self.run_tool(path, self.out, "--label", 1, code=5, force=False)
+        self.assertIn("--force", stderr)
+        self.assertEqual(self.out.read_text(), "precious")
+
+    def test_frames(self):
+        frames = numpy.stack([self.two_labels(), self.two_labels() * 0, (self.two_labels() == 7) * 5], axis=3)
+        path = self.nifti(frames.astype(numpy.uint8))
+        self.refuse(3, path, self.out, "--label", 1, saying="has 3 frames: choose one with --frame 0..2")
+        self.refuse(3, path, self.out, "--label", 1, "--frame", 3, saying="--frame 3 does not exist")
+        self.extract_and_check(path, self.two_labels() == 7, LPS, "--label", 5, "--frame", 2)
+
+    def test_pieces_and_cavities(self):
+        array = self.two_labels()
+        path = self.nifti(array)
+        _, record = self.extract_and_check(path, array == 1, LPS, "--label", 1)
+        self.assertEqual((record["result"]["components"], record["result"]["euler"]), (3, 6))
+        whole = record["result"]["voxel_volume_mm3"]
+        largest = (array == 1) & (numpy.indices(array.shape)[0] < 10)
+        filled = largest.copy()
+        filled[5:7, 5:7, 5:7] = True
+        for flags, mask in [(["--largest"], largest), (["--largest", "--fill-cavities"], filled)]:
+            record, _ = self.run_tool(path, self.out, "--label", 1, *flags)
+            result = dict(record["result"], voxel_volume_mm3=float(mask.sum()))
+            self.check_surface(Ply(self.out), result, mask, LPS)
+            self.assertEqual(record["result"]["voxel_volume_mm3"], whole)
+
+    def test_all_labels(self):
+        array = self.two_labels()
+        path = self.nifti(array)
+        record, _ = self.run_tool(path, self.folder / "organ-{label}.ply", "--all-labels")
+        self.assertEqual(record["outputs"], [str(self.folder / "organ-1.ply"), str(self.folder / "organ-7.ply")])
+        for label in (1, 7):
+            self.check_surface(Ply(self.folder / f"organ-{label}.ply"), record["result"]["labels"][str(label)],
+                               array == label, LPS)
+        for key in ("vertices", "triangles", "components", "euler", "area_mm2", "volume_mm3", "voxel_volume_mm3"):
+            self.assertAlmostEqual(record["result"][key],
+                                   sum(record["result"]["labels"][label][key] for label in ("1", "7")), places=6)
+        self.assertIs(record["result"]["closed"], True)
+        self.assertIsNone(record["result"]["diagonal_mm"])
+
+    def test_open_border(self):
+        array = numpy.zeros((8, 9, 10), numpy.uint8)
+        array[2:6, 2:6, 0:7] = 1
+        path = self.nifti(array)
+        self.extract_and_check(path, array == 1, LPS, "--label", 1)
+        record, _ = self.run_tool(path, self.out, "--label", 1, "--open-border")
+        ply = Ply(self.out)
+        self.assertIs(record["result"]["closed"], False)
+        self.assertIs(record["result"]["manifold"], True)
+        self.assertIs(record["result"]["oriented_outward"], True)
+        self.assertIsNone(record["result"]["volume_mm3"])
+        edges = ply.edges()
+        directed = {tuple(edge) for edge in edges.tolist()}
+        rim = [a for a, b in directed if (b, a) not in directed]
+        self.assertGreater(len(rim), 0)
+        self.assertTrue((ply.vertices[rim][:, 2] == -0.5).all())
+        self.refuse_full_image()
+
+    def refuse_full_image(self):
+        self.out.unlink()
+        path = self.nifti(numpy.ones((3, 4, 5), numpy.uint8), name="full.nii")
+        self.refuse(3, path, self.out, "--label", 1, "--open-border", saying="--open-border")
+        self.extract_and_check(path, numpy.ones((3, 4, 5), bool), LPS, "--label", 1)
+
+    def test_space(self):
+        array = self.two_labels()
+        path = self.nifti(array, numpy.diag([1.0, 2, 3, 1]))
+        self.run_tool(path, self.out, "--label", 1)
+        lps = Ply(self.out)
+        self.run_tool(path, self.out, "--label", 1, "--space", "ras")
+        ras = Ply(self.out)
+        self.assertIn("SPACE=LPS", lps.comments)
+        self.assertIn("SPACE=RAS", ras.comments)
+        self.assertIn("units mm", ras.comments)
+        self.assertTrue(numpy.array_equal(lps.vertices * [-1, -1, 1], ras.vertices))
+        self.assertTrue(numpy.array_equal(lps.triangles, ras.triangles))
+        self.assertGreater(ras.volume(), 0)
+
+    def test_isovalue(self):
+        index = numpy.indices((16, 17, 18)).astype(float)
+        distance = numpy.sqrt(((index - 8.1) ** 2).sum(axis=0)) - 5
+        path = self.nifti(distance.astype(numpy.float32))
+        record, _ = self.run_tool(path, self.out, "--isovalue", 0, "--inside", "below")
+        below = Ply(self.out)
+        self.assertTrue(below.is_closed_oriented_manifold())
+        radius = numpy.linalg.norm(below.vertices * [-1, -1, 1] - 8.1, axis=1)
+        self.assertLess(numpy.abs(radius - 5).max(), 0.03)
+        self.assertEqual(record["result"]["voxel_volume_mm3"], (distance.astype(numpy.float32) < 0).sum())
+        self.assertAlmostEqual(below.volume(), 4 / 3 * numpy.pi * 125, delta=15)
+        path = self.nifti((-distance).astype(numpy.float32))
+        self.run_tool(path, self.out, "--isovalue", 0)
+        self.assertAlmostEqual(Ply(self.out).volume(), below.volume(), places=6)
+
+    def test_isovalue_that_equals_samples_gives_no_degenerate_triangle(self):
+        index = numpy.indices((12, 12, 12)).astype(numpy.int16)
+        distance = numpy.abs(index - 6).sum(axis=0)
+        path = self.nifti(distance.astype(numpy.int16))
+        for inside in ("below", "above"):
+            self.run_tool(path, self.out, "--isovalue", 4, "--inside", inside)
+            ply = Ply(self.out)
+            self.assertTrue(ply.is_closed_oriented_manifold())
+            self.assertGreater(ply.smallest_area(), 1e-9)
+
+    def test_same_bytes_whatever_the_threads(self):
+        noise = numpy.random.default_rng(5).random((60, 50, 40)) < 0.3
+        path = self.nifti(noise.astype(numpy.uint8))
+        for flags in ([], ["--smooth", "1.5mm"]):
+            files = []
+            for threads in (1, 2):
+                self.run_tool(path, self.out, "--label", 1, "--threads", threads, *flags)
+                files.append(self.out.read_bytes())
+            self.assertEqual(*files)
+
+    def test_noise_is_a_closed_manifold(self):
+        generator = numpy.random.default_rng(7)
+        for density in (0.05, 0.3, 0.5, 0.7, 0.95):
+            mask = generator.random((24, 25, 26)) < density
+            self.extract_and_check(self.nifti(mask.astype(numpy.uint8)), mask, LPS, "--label", 1, tag=str(density))
+
+    def test_gaussian_keeps_the_volume(self):
+        mask = ball((40, 41, 42), 12.0)
+        path = self.nifti(mask.astype(numpy.uint8))
+        record, _ = self.run_tool(path, self.out, "--label", 1, "--smooth", "1.5mm")
+        ply = Ply(self.out)
+        self.assertTrue(ply.is_closed_oriented_manifold())
+        self.assertAlmostEqual(ply.volume(), mask.sum(), delta=1e-3 * mask.sum())
+        radius = numpy.linalg.norm(ply.vertices - ply.vertices.mean(axis=0), axis=1)
+        self.assertLess(radius.std(), 0.1)
+        self.assertIsNotNone(record["seconds"]["smooth"])
+        self.assertEqual(record["result"]["voxel_volume_mm3"], mask.sum())
+
+    def test_report_and_provenance(self):
+        path = self.nifti(self.two_labels())
+        record, _ = self.run_tool(path, self.out, "--label", 1)
+        self.assertEqual([key for key in KEYS if key not in record["result"]], [])
+        self.assertEqual([key for key in ("total", "read", "smooth", "extract", "write") if key not in record["seconds"]],
+                         [])
+        self.assertEqual(record["inputs"][0]["path"], str(path))
+        self.assertEqual(record["outputs"], [str(self.out)])
+        comments = Ply(self.out).comments
+        self.assertIn("source v.nii.gz", comments)
+        self.assertIn("label 1", comments)
+        self.assertTrue(any(comment.startswith("tunica-extract ") for comment in comments))
+
+    def test_info(self):
+        path = self.nifti(self.two_labels(), numpy.array([[-1.5, 0, 0, 0], [0, 2, 0, 0], [0, 0, 3.0, 0], [0, 0, 0, 1]]))
+        record, _ = self.run_tool(path, "--info")
+        for text in ("20 x 12 x 12", "1.5 x 2 x 3 mm", "LAS", "from sform", "216 voxels", "1944.0 mm3", "288.0 mm3"):
+            self.assertIn(text, self.stdout)
+        self.assertEqual([label["label"] for label in record["result"]["labels"]], [1, 7])
+        self.assertEqual(record["result"]["dims"], [20, 12, 12])
+        self.assertEqual(list(self.folder.glob("*.ply")), [])
+
+    def test_segment_names(self):
+        segments = "Segment0_LabelValue:=1\nSegment0_Name:=aorta\nSegment1_LabelValue:=7\nSegment1_Name:=left atrium\n"
+        write_nrrd(self.folder / "v.seg.nrrd", self.two_labels(), numpy.eye(4), segments)
+        self.run_tool(self.folder / "v.seg.nrrd", "--info")
+        self.assertIn("left atrium", self.stdout)
+        self.extract_and_check(self.folder / "v.seg.nrrd", self.two_labels() == 7, numpy.eye(4), "--label", "left atrium")
+        self.out.unlink()
+        self.refuse(3, self.folder / "v.seg.nrrd", self.out, "--label", 3, saying="1 (aorta), 7 (left atrium)")
+
+
+class Damage(ExtractTest):
+    def test_what_is_no_volume(self):
+        self.refuse(3, self.folder / "missing.nii", self.out, "--label", 1, saying="no such file")
+        (self.folder / "empty.nii").write_bytes(b"")
+        self.refuse(3, self.folder / "empty.nii", self.out, "--label", 1, saying="is empty")
+        (self.folder / "mesh.nii").write_bytes(b"ply\nformat ascii 1.0\n")
+        self.refuse(3, self.folder / "mesh.nii", self.out, "--label", 1, saying="surface mesh")
+        self.refuse(3, self.folder, self.out, "--label", 1, "--spacing", "1,1,1", saying="no .png")
+
+    def test_truncated(self):
+        noise = (numpy.random.default_rng(3).random((30, 30, 30)) * 255).astype(numpy.uint8)
+        for name in ("v.nii", "v.nii.gz"):
+            whole = self.nifti(noise, name=name).read_bytes()
+            for fraction in (0.001, 0.1, 0.5, 0.9, 0.999):
+                (self.folder / name).write_bytes(whole[:int(len(whole) * fraction)])
+                self.refuse(3, self.folder / name, self.out, "--label", 1, saying=f"{name}: ")
+        path = self.nifti(noise, name="v.nii")
+        path.write_bytes(path.read_bytes()[:-1000])
+        self.refuse(3, path, self.out, "--label", 1, saying="1000 of the 27000 bytes")
+
+    def test_a_header_that_claims_a_terabyte_takes_no_memory(self):
+        image = nibabel.Nifti2Image(numpy.zeros((2, 2, 2), numpy.uint8), numpy.eye(4))
+        path = self.folder / "v.nii"
+        image.to_filename(path)
+        data = bytearray(path.read_bytes())
+        data[24:48] = numpy.array([10000, 10000, 10000], "<i8").tobytes()
+        path.write_bytes(data)
+        record, stderr = self.run_tool(path, self.out, "--label", 1, code=3)
+        self.assertIn("truncated", stderr)
+        self.assertLess(record["peak_mib"], 200)
+
+
+@unittest.skipUnless((SHARED / "volumes").is_dir(), f"the shared volumes are absent ({SHARED})")
+class SharedVolumes(ExtractTest):
+    """The real volumes by the facts that were found out about them independently."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.facts = json.loads((SHARED / "facts.json").read_text())
+
+    def check_volume(self, name, labels=None, *flags, layer=None):
+        path = SHARED / "volumes" / name
+        array, affine = read_volume(path, layer)
+        facts = self.facts[f"volumes/{name}"]["labels"]
+        for label, fact in facts.items():
+            if not label.isdigit() or (labels is not None and int(label) not in labels):
+                continue
+            mask = array == int(label)
+            self.assertEqual(mask.sum(), fact["voxels"])
+            ply, record = self.extract_and_check(path, mask, affine, "--label", label, *flags, tag=f"{name} {label}")
+            result = record["result"]
+            self.assertAlmostEqual(result["voxel_volume_mm3"], fact["volume_mm3"], delta=1e-4 * fact["volume_mm3"])
+            self.assertEqual(ply.components(), fact["n6"] + fact["cavities_bg26"] if fact["ambiguous_faces"] == 0
+                             else ply.components())
+            if fact["ambiguous_faces"] == 0 and fact["ambiguous_corners"] == 0:
+                self.assertEqual(ply.euler(), 2 * fact["chi26"], f"{name} {label}")
+            self.assertGreaterEqual(ply.components(), fact["n26"], f"{name} {label}")
+
+    def test_aorta_dissection(self):
+        self.check_volume("ts_aorta_dissection.nii.gz")
+
+    def test_abdomen(self):
+        self.check_volume("ts_abdomen_multilabel.nii.gz")
+
+    def test_torso(self):
+        self.check_volume("nv_torso_5mm.nii.gz", {4, 8, 9, 11})
+
+    def test_oblique_lesion(self):
+        self.check_volume("nv_lesion_oblique.nii.gz")
+
+    def test_thorax_segmentation(self):
+        self.check_volume("sio_thorax_10mm.seg.nrrd", {1, 5, 7})
+
+    def test_overlapping_segments(self):
+        path = SHARED / "volumes" / "sio_thorax_overlapping_4d.seg.nrrd"
+        self.refuse(3, path, self.out, "--label", 1, saying="has 2 layers: choose one with --layer 0..1")
+        for layer in (0, 1):
+            array, affine = read_volume(path, layer)
+            for label in numpy.unique(array)[1:3]:
+                self.extract_and_check(path, array == label, affine, "--label", label, "--layer", layer)
+
+    def test_threshold_mask_full_of_noise(self):
+        self.check_volume("vmtk_aorta_threshold.mha")
+
+    def test_empty(self):
+        path = SHARED / "volumes" / "ts_empty_iliac.nii.gz"
+        self.refuse(3, path, self.out, "--label", 1, saying="every voxel is 0")
+        self.refuse(3, path, self.out, "--isovalue", 0.5, saying="no voxel is above 0.5")
+
+    def test_bone_by_isovalue(self):
+        path = SHARED / "volumes" / "nvd_ct_pitch_oblique.nii.gz"
+        array, affine = read_volume(path)
+        record, _ = self.run_tool(path, self.out, "--isovalue", 200)
+        ply = Ply(self.out)
+        self.assertTrue(ply.is_closed_oriented_manifold())
+        self.assertEqual(record["result"]["voxel_volume_mm3"] / abs(numpy.linalg.det(affine[:3, :3])) // 1,
+                         (array > 200).sum())
+        self.assertAlmostEqual(record["result"]["volume_mm3"], ply.volume(), delta=1e-6 * ply.volume())
+        self.assertGreater(ply.smallest_area(), 0)
+        self.refuse_grey(path)
+
+    def refuse_grey(self, path):
+        self.out.unlink()
+        self.refuse(2, path, self.out, saying="pass --isovalue V")
+
+    def test_gold_surface(self):
+        path = SHARED / "volumes" / "vmtk_aorta_levelset.mha"
+        record, _ = self.run_tool(path, self.out, "--isovalue", 0, "--inside", "below")
+        ply = Ply(self.out)
+        gold = read_stl(SHARED / "meshes" / "vmtk_aorta_gold.stl").reshape(-1, 3) * [-1, -1, 1]
+        gold = numpy.unique(gold, axis=0)
+        self.assertEqual((len(ply.vertices), len(ply.triangles)), (6468, 12932))
+        self.assertEqual(len(gold), 6468)
+        self.assertTrue(ply.is_closed_oriented_manifold())
+        self.assertEqual((ply.euler(), ply.components()), (2, 1))
+        self.assertAlmostEqual(ply.volume(), 13184.2667, delta=0.05)
+        # Both ways, nearest vertex: sort by a coarse grid of x would do; the sets are small enough for blocks.
+        for a, b in ((ply.vertices, gold), (gold, ply.vertices)):
+            worst = max(numpy.sqrt(((block[:, None, :] - b[None, :, :]) ** 2).sum(axis=2)).min(axis=1).max()
+                        for block in numpy.array_split(a, 40))
+            self.assertLess(worst, 2e-5)
+        self.assertAlmostEqual(record["result"]["voxel_volume_mm3"], 13430.3, delta=0.1)
+        self.out.unlink()
+        self.refuse(2, path, self.out, saying="--inside below")
+
+
+if __name__ == "__main__":
+    unittest.main()
