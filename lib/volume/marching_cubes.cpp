@@ -50,16 +50,18 @@ public:
     const std::size_t j = unpadded(row, 1);
     const std::size_t k = unpadded(slice, 2);
     const bool beyond = row == 0 || slice == 0 || row == size_[1] - 1 || slice == size_[2] - 1;
-    std::fill_n(out, words_ + 1, Word{0});
     if (beyond && !open_) {
+      std::fill_n(out, words_ + 1, Word{0});
       return;
     }
     const Word* const in = mask_.row(j, k);
     const std::size_t given = mask_.words_per_row();
-    for (std::size_t w = 0; w < given; ++w) {
-      out[w] |= in[w] << 1;
-      out[w + 1] = in[w] >> (word_bits - 1);
+    out[0] = in[0] << 1;
+    for (std::size_t w = 1; w < given; ++w) {
+      out[w] = in[w] << 1 | in[w - 1] >> (word_bits - 1);
     }
+    out[given] = in[given - 1] >> (word_bits - 1);
+    out[words_] = 0;
     if (open_) {
       out[0] |= in[0] & 1;
       const std::size_t last = size_[0] - 1;
@@ -95,12 +97,14 @@ private:
   std::size_t words_ = 0;
 };
 
+Word shifted(const Word* row, std::size_t w) { return row[w] >> 1 | row[w + 1] << (word_bits - 1); }
+
 /// The four padded rows around a row of cells, as (row + 1 or not, slice + 1 or not). Where the grid ends, the missing
 /// row is a copy, so that no edge towards it is crossed.
 class RowWindow {
 public:
   RowWindow(const PaddedGrid& grid, std::size_t slice)
-      : grid_(grid), slice_(slice), stride_(grid.words() + 1), rows_(4 * stride_) {
+      : grid_(grid), slice_(slice), stride_(grid.words() + 1), rows_(6 * stride_), active_(stride_) {
     load_pair(0, 1);
   }
 
@@ -111,7 +115,12 @@ public:
     } else {
       std::copy_n(pair(near_), 2 * stride_, pair(far_));
     }
+    find_active();
   }
+
+  /// Numbers of the words in which some cell is neither all inside nor all outside; crossed edges are in no others.
+  [[nodiscard]] const std::vector<std::uint32_t>& active() const { return active_list_; }
+  [[nodiscard]] Word active(std::size_t w) const { return active_[w]; }
 
   [[nodiscard]] const Word* a0() const { return pair(near_); }
   [[nodiscard]] const Word* a1() const { return pair(far_); }
@@ -131,15 +140,31 @@ private:
     }
   }
 
+  void find_active() {
+    Word* const any = rows_.data() + 4 * stride_;
+    Word* const all = any + stride_;
+    for (std::size_t w = 0; w < stride_; ++w) {
+      any[w] = a0()[w] | a1()[w] | b0()[w] | b1()[w];
+      all[w] = a0()[w] & a1()[w] & b0()[w] & b1()[w];
+    }
+    active_list_.clear();
+    for (std::size_t w = 0; w + 1 < stride_; ++w) {
+      active_[w] = (any[w] | shifted(any, w)) & ~(all[w] & shifted(all, w));
+      if (active_[w] != 0) {
+        active_list_.push_back(static_cast<std::uint32_t>(w));
+      }
+    }
+  }
+
   const PaddedGrid& grid_;
   std::size_t slice_;
   std::size_t stride_;
   std::vector<Word> rows_;
+  std::vector<Word> active_;
+  std::vector<std::uint32_t> active_list_;
   std::size_t near_ = 0;
   std::size_t far_ = 1;
 };
-
-Word shifted(const Word* row, std::size_t w) { return row[w] >> 1 | row[w + 1] << (word_bits - 1); }
 
 Word crossed_along(const PaddedGrid& grid, const Word* row, std::size_t w) {
   return (row[w] ^ shifted(row, w)) & grid.edges(w);
@@ -153,16 +178,6 @@ struct CellWord {
       : corners{rows.a0()[w], shifted(rows.a0(), w), rows.a1()[w], shifted(rows.a1(), w),
                 rows.b0()[w], shifted(rows.b0(), w), rows.b1()[w], shifted(rows.b1(), w)} {}
 
-  /// Cells that are neither all inside nor all outside.
-  [[nodiscard]] Word active() const {
-    Word any = 0;
-    Word all = ~Word{0};
-    for (const Word corner : corners) {
-      any |= corner;
-      all &= corner;
-    }
-    return any & ~all;
-  }
   [[nodiscard]] unsigned case_of(int bit) const {
     unsigned result = 0;
     for (unsigned corner = 0; corner < 8; ++corner) {
@@ -186,18 +201,17 @@ SliceCounts count_slice(const PaddedGrid& grid, std::size_t slice) {
   for (std::size_t row = 0; row < grid.size(1); ++row) {
     rows.advance(row);
     const bool cells = row + 1 < grid.size(1) && slice + 1 < grid.size(2);
-    for (std::size_t w = 0; w < grid.words(); ++w) {
-      const CellWord word(rows, w);
-      Word active = word.active();
-      if (active == 0) {
-        continue;
-      }
+    for (const std::size_t w : rows.active()) {
       const Word a0 = rows.a0()[w];
       const Word samples = grid.samples(w);
       counts.in_plane += static_cast<std::size_t>(std::popcount(crossed_along(grid, rows.a0(), w)) +
                                                   std::popcount((a0 ^ rows.a1()[w]) & samples));
       counts.upright += static_cast<std::size_t>(std::popcount((a0 ^ rows.b0()[w]) & samples));
-      for (active &= cells ? grid.edges(w) : 0; active != 0; active &= active - 1) {
+      if (!cells) {
+        continue;
+      }
+      const CellWord word(rows, w);
+      for (Word active = rows.active(w) & grid.edges(w); active != 0; active &= active - 1) {
         counts.triangles += cases[word.case_of(std::countr_zero(active))].count;
       }
     }
@@ -268,8 +282,8 @@ public:
     std::size_t triangle = start.triangles;
     for (std::size_t row = 0; row < grid_.size(1); ++row) {
       rows.advance(row);
-      count_row(rows.a0(), rows.a1(), here);
-      count_row(rows.b0(), rows.b1(), above);
+      count_row(rows, rows.a0(), rows.a1(), here);
+      count_row(rows, rows.b0(), rows.b1(), above);
       const bool cells = row + 1 < grid_.size(1) && slice + 1 < grid_.size(2);
       // Running numbers of the next vertex on each of the cell's edges: along x in four rows, y in two slices, z in two
       // rows.
@@ -282,16 +296,12 @@ public:
                                         upright,
                                         0};
       std::size_t upright_in_row = 0;
-      for (std::size_t w = 0; w < grid_.words(); ++w) {
+      for (const std::size_t w : rows.active()) {
         upright_in_row += static_cast<std::size_t>(std::popcount((rows.a0()[w] ^ rows.b0()[w]) & grid_.samples(w)));
       }
       number[7] = upright + upright_in_row;
-      for (std::size_t w = 0; w < grid_.words(); ++w) {
+      for (const std::size_t w : rows.active()) {
         const CellWord word(rows, w);
-        Word active = word.active();
-        if (active == 0) {
-          continue;
-        }
         const Word samples = grid_.samples(w);
         const std::array<Word, 8> crossed{
             crossed_along(grid_, rows.a0(), w),      crossed_along(grid_, rows.a1(), w),
@@ -301,7 +311,7 @@ public:
         add_vertices(w, row, slice, 0, crossed[0], number[0], pinched);
         add_vertices(w, row, slice, 1, crossed[4], number[4], pinched);
         add_vertices(w, row, slice, 2, crossed[6], number[6], pinched);
-        for (active &= cells ? grid_.edges(w) : 0; active != 0; active &= active - 1) {
+        for (Word active = cells ? rows.active(w) & grid_.edges(w) : 0; active != 0; active &= active - 1) {
           const int bit = std::countr_zero(active);
           const Word before = (Word{1} << bit) - 1;
           std::array<std::size_t, 8> id;
@@ -341,10 +351,10 @@ private:
     [[nodiscard]] std::size_t next() const { return first + along_x + along_y; }
   };
 
-  void count_row(const Word* row, const Word* next, RowStart& start) const {
+  void count_row(const RowWindow& rows, const Word* row, const Word* next, RowStart& start) const {
     start.along_x = 0;
     start.along_y = 0;
-    for (std::size_t w = 0; w < grid_.words(); ++w) {
+    for (const std::size_t w : rows.active()) {
       start.along_x += static_cast<std::size_t>(std::popcount(crossed_along(grid_, row, w)));
       start.along_y += static_cast<std::size_t>(std::popcount((row[w] ^ next[w]) & grid_.samples(w)));
     }

@@ -318,7 +318,7 @@ private:
       bool done = true;
       std::vector<double> offset(components_, 0.0);
       for (std::size_t c = 0; c < components_; ++c) {
-        if (std::abs(excess[c]) > 1e-7 * size[c] && gain[c] > 1e-3 * size[c]) {
+        if (std::abs(excess[c]) > 1e-5 * size[c] && gain[c] > 1e-3 * size[c]) {
           offset[c] = -excess[c] / gain[c];
           done = false;
         }
