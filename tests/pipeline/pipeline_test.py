@@ -212,6 +212,7 @@ class Rules(Pipeline):
         (self.folder / "other").mkdir()
         (self.folder / "other" / "a.nii").write_text("another")
         self.assertIn("same stem", self.refusal(VOLUMES="a.nii.gz other/a.nii", LABEL=1, **LOAD))
+        self.assertIn("without spaces", self.refusal(VOLUMES="a.nii.gz", LABEL=1, OUT=f"{self.out} 2", **LOAD))
         self.assertIn("names with the sign '", self.refusal(VOLUMES="a'.nii", LABEL=1, **LOAD))
 
     def test_names_with_spaces_are_explained(self):
