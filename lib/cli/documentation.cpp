@@ -17,6 +17,7 @@ namespace {
 struct Value {
   std::string placeholder;           ///< empty for a flag
   std::vector<std::string> choices;  ///< empty: free
+  bool described = false;            ///< the choices are named in the description
   bool file = false;
 };
 
@@ -32,6 +33,32 @@ std::vector<std::string> split(const std::string& text, char separator) {
 bool is_word(const std::string& text) {
   return !text.empty() &&
          std::ranges::all_of(text, [](char c) { return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '-'; });
+}
+
+// The words of a description that ends in a choice: "bending element: comas (the paper's) | dkt (default dkt)".
+std::vector<std::string> described_choices(const std::string& description) {
+  std::string plain;
+  int depth = 0;
+  for (const char c : description) {
+    depth += c == '(' ? 1 : 0;
+    if (depth == 0) {
+      plain += c;
+    }
+    depth -= c == ')' ? 1 : 0;
+  }
+  if (plain.find('|') == std::string::npos) {
+    return {};
+  }
+  const std::size_t colon = plain.rfind(": ", plain.find('|'));
+  std::vector<std::string> words;
+  for (const std::string& part : split(colon == std::string::npos ? plain : plain.substr(colon + 2), '|')) {
+    const std::size_t begin = std::min(part.find_first_not_of(' '), part.size());
+    const std::string word = part.substr(begin, part.find_last_not_of(' ') + 1 - begin);
+    if (is_word(word)) {
+      words.push_back(word);
+    }
+  }
+  return words.size() > 1 ? words : std::vector<std::string>{};
 }
 
 Value value_of(const CLI::Option& option) {
@@ -53,8 +80,12 @@ Value value_of(const CLI::Option& option) {
       }
     }
   }
-  constexpr std::array<const char*, 11> not_files{"N",         "INT", "UINT", "FLOAT",   "NUMBER", "QUANTITY",
-                                                  "TOLERANCE", "KEY", "TEXT", "PERCENT", "DEG"};
+  if (value.choices.empty()) {
+    value.choices = described_choices(option.get_description());
+    value.described = !value.choices.empty();
+  }
+  constexpr std::array<const char*, 13> not_files{"NAME",     "WHERE",     "N",   "INT",  "UINT",    "FLOAT", "NUMBER",
+                                                  "QUANTITY", "TOLERANCE", "KEY", "TEXT", "PERCENT", "DEG"};
   const auto known = [&](const char* name) { return value.placeholder == name; };
   value.file = option.get_positional() || (value.choices.empty() && std::ranges::none_of(not_files, known));
   return value;
@@ -153,7 +184,7 @@ std::string option_entry(const CLI::Option& option) {
   }
   const std::string description = capital(option.get_description());
   entry += roff(description) + (description.ends_with('.') ? "\n" : ".\n");
-  if (!value.choices.empty()) {
+  if (!value.choices.empty() && !value.described) {
     entry += roff(fmt::format("One of {}.", fmt::join(value.choices, ", "))) + "\n";
   }
   if (option.get_required()) {

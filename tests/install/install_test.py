@@ -91,6 +91,9 @@ class Installed(unittest.TestCase):
         chart = self.completion("tunica-chart")
         self.assertEqual(complete(chart, "tunica-chart", "--x-scale", ""), ["auto", "linear", "log"])
         self.assertEqual(complete(chart, "tunica-chart", "--x-scale", "=", "li"), ["linear"])
+        simulate = self.completion("tunica-simulate")
+        self.assertIn("comas", complete(simulate, "tunica-simulate", "--bending", "com"))
+        self.assertEqual(complete(simulate, "tunica-simulate", "--solver", "d"), ["direct"])
 
 
 if __name__ == "__main__":
