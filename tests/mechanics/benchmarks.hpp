@@ -2,6 +2,8 @@
 
 #include "mechanics/solve.hpp"
 
+#include <Eigen/Geometry>
+
 #include <algorithm>
 #include <cmath>
 #include <functional>

@@ -1,0 +1,128 @@
+// Models that cannot be solved are found and named before anything is solved.
+
+#include "benchmarks.hpp"
+#include "core/error.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace tunica {
+namespace {
+
+using namespace benchmarks;
+
+Model plate() {
+  const Grid grid = make_grid(3, 3, [](double u, double v) { return Vec3(u, v, 0); });
+  Model model;
+  model.shells.push_back(flat_body(grid.mesh, 1000, 0.3, 0.1));
+  hold(
+      model, [](const Vec3& p) { return p.x() < 1e-9; }, "xyz", "xyz");
+  model.loads.push_back({0, PressureLoad{1e-6, true}, {}});
+  return model;
+}
+
+void expect_refused(const Model& model, const std::string& part, const RunSettings& settings = linear_run()) {
+  try {
+    check_model(model, settings);
+    FAIL() << "accepted, expected: " << part;
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr(part));
+  }
+}
+
+TEST(CheckModel, AcceptsAGoodOne) { EXPECT_NO_THROW(check_model(plate(), linear_run())); }
+
+TEST(CheckModel, NamesADegenerateElement) {
+  Model model = plate();
+  model.shells[0].mesh.vertices[5] = model.shells[0].mesh.vertices[6];
+  expect_refused(model, "degenerate");
+}
+
+TEST(CheckModel, NamesAFlippedElement) {
+  Model model = plate();
+  std::swap(model.shells[0].mesh.triangles[7][0], model.shells[0].mesh.triangles[7][1]);
+  expect_refused(model, "inconsistent orientation");
+}
+
+TEST(CheckModel, NamesADoubleElement) {
+  Model model = plate();
+  model.shells[0].mesh.triangles.push_back(model.shells[0].mesh.triangles[4]);
+  expect_refused(model, "there twice");
+}
+
+TEST(CheckModel, NamesANonManifoldEdge) {
+  Model model = plate();
+  ShellMesh& mesh = model.shells[0].mesh;
+  mesh.vertices.emplace_back(0.5, 0.5, 1.0);
+  const auto t = mesh.triangles[6];
+  mesh.triangles.push_back({t[0], t[1], static_cast<Index>(mesh.vertices.size() - 1)});
+  expect_refused(model, "n");
+}
+
+TEST(CheckModel, NamesAPieceThatCanMove) {
+  Model model = plate();
+  model.fixes.clear();
+  expect_refused(model, "6 of its 6 rigid motions");
+  // Along x and y held, the rest free.
+  hold(
+      model, [](const Vec3& p) { return p.x() < 1e-9; }, "xy", "z");
+  expect_refused(model, "3 of its 6 rigid motions");
+  // A line of held nodes is a hinge.
+  model.fixes.clear();
+  hold(
+      model, [](const Vec3& p) { return p.x() < 1e-9; }, "xyz", "");
+  expect_refused(model, "1 of its 6 rigid motions");
+}
+
+TEST(CheckModel, AFreePieceIsAllowedInADynamicRun) {
+  Model model = plate();
+  model.fixes.clear();
+  model.shells[0].material.density = 1e-9;
+  RunSettings settings;
+  settings.kind = DynamicRun{1, 0.1, {}, Integrator::backward_euler};
+  EXPECT_NO_THROW(check_model(model, settings));
+}
+
+TEST(CheckModel, NamesAThicknessThatIsNotPositive) {
+  Model model = plate();
+  model.shells[0].thickness.assign(16, 0.1);
+  model.shells[0].thickness[3] = 0;
+  expect_refused(model, "thickness at node 3");
+}
+
+TEST(CheckModel, NamesANormalInItsFacetsPlane) {
+  Model model = plate();
+  model.shells[0].mesh.normals.assign(16, Vec3::UnitZ());
+  model.shells[0].mesh.normals[5] = Vec3::UnitX();
+  model.shells[0].curved = true;
+  model.shells[0].rest = Rest::curved;
+  expect_refused(model, "shell");
+}
+
+TEST(CheckModel, DynamicsNeedsADensity) {
+  RunSettings settings;
+  settings.kind = DynamicRun{1, 0.1, {}, Integrator::backward_euler};
+  expect_refused(plate(), "density", settings);
+}
+
+TEST(CheckModel, RigidMotionsAreHeldOnlyUnderBalancedLoads) {
+  Model model;
+  ShellBody body = flat_body(make_sphere(10, 1), 1000, 0.3, 0.1);
+  model.shells.push_back(body);
+  model.rigid_motions.push_back({0});
+  model.loads.push_back({0, PressureLoad{1e-4, true}, {}});
+  EXPECT_NO_THROW(check_model(model, linear_run()));
+  model.loads.push_back({0, ForceLoad{{0}, Vec3(0, 0, 1)}, {}});
+  expect_refused(model, "net force or moment");
+}
+
+TEST(CheckModel, NamesFixesThatContradictEachOther) {
+  Model model = plate();
+  Fix fix = model.fixes[0];
+  fix.displacement = Vec3(0, 0, 1);
+  model.fixes.push_back(fix);
+  expect_refused(model, "different displacements");
+}
+
+}  // namespace
+}  // namespace tunica

@@ -1,0 +1,202 @@
+// Large displacements against Sze, Liu, Lo 2004 and exact solutions.
+
+#include "benchmarks.hpp"
+#include "core/error.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace tunica {
+namespace {
+
+using namespace benchmarks;
+constexpr double eps = 1e-9;
+
+std::vector<double> equal_steps(std::size_t count) {
+  std::vector<double> factors;
+  for (std::size_t i = 1; i <= count; ++i) {
+    factors.push_back(static_cast<double>(i) / static_cast<double>(count));
+  }
+  return factors;
+}
+
+Model strip(double length, std::size_t cells, Grid& grid) {
+  grid = make_grid(cells, 1, [&](double u, double v) { return Vec3(length * u, v, 0); });
+  Model model;
+  model.shells.push_back(flat_body(grid.mesh, 1.2e6, 0, 0.1));
+  hold(
+      model, [](const Vec3& p) { return p.x() < eps; }, "xyz", "xyz");
+  return model;
+}
+
+TEST(Nonlinear, CantileverUnderEndShear) {
+  Grid grid;
+  Model model = strip(10, 16, grid);
+  model.loads.push_back({0, EdgeLoad{{{grid.node(16, 0), grid.node(16, 1)}}, Vec3(0, 0, 4)}, {}});
+  const std::map<double, std::pair<double, double>> reference{
+      {0.2, {0.381, 2.493}}, {0.6, {2.002, 5.444}}, {1.0, {3.286, 6.698}}};
+  std::size_t seen = 0;
+  solve(model, nonlinear_run({0.2, 0.6, 1.0}), [&](const State& state) {
+    const auto place = reference.find(state.time);
+    if (place != reference.end()) {
+      const Vec3 u = state.displacement[grid.node(16, 0)];
+      EXPECT_NEAR(-u.x(), place->second.first, 0.01);
+      EXPECT_NEAR(u.z(), place->second.second, 0.015);
+      EXPECT_TRUE(state.converged);
+      EXPECT_LE(state.residual, 1e-8);
+      ++seen;
+    }
+  });
+  EXPECT_EQ(seen, 3U);
+}
+
+TEST(Nonlinear, CantileverRollsUpIntoACircle) {
+  Grid grid;
+  Model model = strip(12, 16, grid);
+  model.loads.push_back({0, MomentLoad{{grid.node(16, 0), grid.node(16, 1)}, Vec3(0, -50 * pi / 3, 0)}, {}});
+  const State state = last_state(model, nonlinear_run(equal_steps(20)));
+  const Vec3 u = state.displacement[grid.node(16, 0)];
+  EXPECT_NEAR(u.x(), -12, 0.12);
+  EXPECT_NEAR(u.z(), 0, 0.12);
+}
+
+TEST(Nonlinear, HingedRoofEndsAtItsLimitLoad) {
+  constexpr std::size_t n = 8;
+  const Grid grid = make_grid(
+      n, n, [](double u, double v) { return Vec3(254 * u, 2540 * std::sin(0.1 * v), 2540 * std::cos(0.1 * v)); });
+  Model model;
+  model.shells.push_back(flat_body(grid.mesh, 3102.75, 0.3, 12.7));
+  hold(
+      model, [](const Vec3& p) { return std::abs(p.y() - 2540 * std::sin(0.1)) < 1e-6; }, "xyz", "yz");
+  hold(
+      model, [](const Vec3& p) { return p.x() < 1e-6; }, "x", "yz");
+  hold(
+      model, [](const Vec3& p) { return std::abs(p.y()) < 1e-6; }, "y", "xz");
+  model.loads.push_back({0, ForceLoad{{grid.node(0, 0)}, Vec3(0, 0, -750)}, {}});
+  double reached = 0;
+  try {
+    solve(model, nonlinear_run(equal_steps(10)), [&](const State& state) {
+      reached = state.time;
+      EXPECT_TRUE(state.converged);
+    });
+    FAIL() << "passed the limit load";
+  } catch (const RequirementError& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr("beyond load factor 0.74"));
+  }
+  EXPECT_NEAR(reached, 0.7, 1e-12);  // the last whole step
+}
+
+Model pressurised_sphere(int level, double thickness, double pressure) {
+  Model model;
+  ShellBody body = flat_body(make_sphere(10, level), 1000, 0.3, thickness);
+  body.curved = true;
+  body.rest = Rest::curved;
+  model.shells.push_back(body);
+  model.rigid_motions.push_back({0});
+  model.loads.push_back({0, PressureLoad{pressure, true}, {}});
+  return model;
+}
+
+TEST(Nonlinear, ClosedSphereUnderPressureIsInBalance) {
+  // The supports of a body held by its rigid motions carry nothing, and the shell does not move as a whole.
+  const Model model = pressurised_sphere(1, 1, 0.5);
+  const State state = last_state(model, nonlinear_run({1}));
+  Vec3 mean = Vec3::Zero();
+  for (const Vec3& u : state.displacement) {
+    mean += u;
+  }
+  EXPECT_LT(mean.norm(), 1e-9);
+  EXPECT_LE(state.residual, 1e-8);
+}
+
+TEST(Nonlinear, SmallLoadsGiveProportionalDisplacements) {
+  Grid grid;
+  std::array<double, 2> deflections{};
+  for (std::size_t k = 0; k < 2; ++k) {
+    Model model = strip(10, 8, grid);
+    const double load = k == 0 ? 1e-3 : 1e-9;
+    model.loads.push_back({0, EdgeLoad{{{grid.node(8, 0), grid.node(8, 1)}}, Vec3(0, 0, load)}, {}});
+    deflections[k] = last_state(model, nonlinear_run({1})).displacement[grid.node(8, 0)].z() / load;
+  }
+  EXPECT_NEAR(deflections[1] / deflections[0], 1, 1e-5);
+}
+
+TEST(Nonlinear, LoadFreeStateStaysAtRest) {
+  Grid grid;
+  const Model model = strip(10, 4, grid);
+  const State state = last_state(model, nonlinear_run({1}));
+  for (const Vec3& u : state.displacement) {
+    EXPECT_EQ(u, Vec3::Zero());
+  }
+}
+
+TEST(Nonlinear, PrescribedDisplacementIsReached) {
+  Grid grid;
+  Model model = strip(10, 8, grid);
+  model.fixes.push_back(
+      {0, {grid.node(8, 0), grid.node(8, 1)}, {false, false, true}, {false, false, false}, Vec3(0, 0, 4), {}});
+  const State state = last_state(model, nonlinear_run({0.5, 1}));
+  EXPECT_NEAR(state.displacement[grid.node(8, 0)].z(), 4, 1e-12);
+  EXPECT_GT(state.strain_energy, 0);
+}
+
+TEST(Nonlinear, ConjugateGradientsAgreeWithTheDirectSolver) {
+  Grid grid;
+  Model model = strip(10, 8, grid);
+  model.loads.push_back({0, EdgeLoad{{{grid.node(8, 0), grid.node(8, 1)}}, Vec3(0, 0, 0.4)}, {}});
+  RunSettings settings = nonlinear_run({1});
+  const double direct = last_state(model, settings).displacement[grid.node(8, 0)].z();
+  settings.solver = Solver::cg;
+  const double iterative = last_state(model, settings).displacement[grid.node(8, 0)].z();
+  EXPECT_NEAR(iterative, direct, 1e-6 * direct);
+  settings.cg_fixed_count = true;
+  settings.cg_iterations = 5;
+  settings.newton_max = 1;
+  const State stopped = last_state(model, settings);
+  EXPECT_FALSE(stopped.converged);
+  EXPECT_EQ(stopped.cg_iterations, 5U);
+}
+
+TEST(Dynamics, FreeVibrationDecaysUnderBackwardEulerAndKeepsItsPeriod) {
+  // A cantilever strip, first mode: omega = 1.8751^2 sqrt(E I / (rho A)) / L^2, let go from under a tip load.
+  Grid grid;
+  Model model = strip(10, 8, grid);
+  model.shells[0].material.density = 1e-9;
+  const double omega = 1.8751 * 1.8751 / 100 * std::sqrt(1.2e6 * 0.1 * 0.1 / 12 / 1e-9);
+  const double period = 2 * pi / omega;
+  model.loads.push_back(
+      {0, EdgeLoad{{{grid.node(8, 0), grid.node(8, 1)}}, Vec3(0, 0, 1e-3)}, {{{0, 1}, {1e-12, 1}, {2e-12, 0}}}});
+  // One short step under the load sets it off.
+  model.loads[0].ramp = {{{0, 1}, {0.02 * period, 1}, {0.021 * period, 0}}};
+  RunSettings settings;
+  settings.kind = DynamicRun{2 * period, period / 200, {}, Integrator::backward_euler};
+  std::vector<double> tip;
+  std::vector<double> energy;
+  solve(model, settings, [&](const State& state) {
+    tip.push_back(state.displacement[grid.node(8, 0)].z());
+    energy.push_back(state.kinetic_energy + state.strain_energy);
+  });
+  for (std::size_t i = 6; i < energy.size(); ++i) {
+    EXPECT_LE(energy[i], energy[i - 1] * (1 + 1e-6));
+  }
+  std::vector<std::size_t> crossings;
+  for (std::size_t i = 20; i < tip.size(); ++i) {
+    if (tip[i - 1] < 0 && tip[i] >= 0) {
+      crossings.push_back(i);
+    }
+  }
+  ASSERT_FALSE(crossings.empty());
+  EXPECT_NEAR(static_cast<double>(crossings[0]) / 200, 1, 0.05);
+}
+
+TEST(Dynamics, BalloonSettlesAtItsStaticEquilibrium) {
+  Model model = pressurised_sphere(1, 1, 0.5);
+  const double at_rest = last_state(model, nonlinear_run({1})).displacement[0].norm();
+  model.shells[0].material.density = 1.1e-9;
+  RunSettings settings;
+  settings.kind = DynamicRun{0.4, 0.04, {}, Integrator::backward_euler};
+  EXPECT_NEAR(last_state(model, settings).displacement[0].norm(), at_rest, 1e-6 * at_rest);
+}
+
+}  // namespace
+}  // namespace tunica
