@@ -241,7 +241,7 @@ class Stopped(SimulateTest):
         self.addCleanup(running.stderr.close)
         self.addCleanup(running.wait)
         self.addCleanup(running.kill)
-        for _ in range(600):  # until a few states are there: the file can be read while it grows
+        for _ in range(2400):  # until a few states are there: the file can be read while it grows
             time.sleep(0.05)
             try:
                 with h5py.File(self.path("out.hdf.part"), "r") as file:
@@ -249,7 +249,7 @@ class Stopped(SimulateTest):
                         return running
             except (OSError, KeyError):
                 pass
-        self.fail("no state was written within 30 s")
+        self.fail("no state was written within 120 s")
 
     def check_part(self):
         with h5py.File(self.path("out.hdf.part"), "r") as file:
