@@ -115,7 +115,9 @@ DirectSolver::DirectSolver(DirectSolver&&) noexcept = default;
 DirectSolver::Factored DirectSolver::factor(const BlockMatrix& matrix) {
   Implementation& s = *implementation_;
   if (openblas_set_num_threads != nullptr) {
-    openblas_set_num_threads(static_cast<int>(thread_count()));
+    // The dense blocks of a small factor are too small to share: waiting for each other costs more than it gives.
+    constexpr std::size_t worth_sharing = 30'000;
+    openblas_set_num_threads(s.freedoms.size() < worth_sharing ? 1 : static_cast<int>(thread_count()));
   }
   auto* const values = static_cast<double*>(s.matrix->x);
   const double* const blocks = matrix.values.data();

@@ -228,6 +228,27 @@ void add_dead_loads(const ShellSystem& system, const Configuration& configuratio
   }
 }
 
+/// What round_off() needs. The element matrices themselves, not E t: those of a sliver are larger by the square of its
+/// edge over its height, and so is the noise that one unit in the last place of a rotation makes there.
+void add_stiffness_norms(ShellSystem& system) {
+  double translation = 0;
+  double rotation = 0;
+  for (const ShellElement& element : system.elements) {
+    for (int row = 0; row < 9; ++row) {
+      const bool membrane_moment = row % 3 == 2;
+      const bool bending_moment = row % 3 != 0;
+      for (int column = 0; column < 9; ++column) {
+        const double m = element.membrane(row, column) / (membrane_moment ? system.length : 1);
+        const double b = element.bending(row, column) / (bending_moment ? system.length : 1);
+        (column % 3 == 2 ? rotation : translation) += m * m;
+        rotation += column % 3 == 0 ? 0 : b * b;
+      }
+    }
+  }
+  system.translation_stiffness = std::sqrt(translation);
+  system.rotation_stiffness = std::sqrt(rotation);
+}
+
 }  // namespace
 
 ShellSystem make_system(const Model& model) {
@@ -260,16 +281,14 @@ ShellSystem make_system(const Model& model) {
         normals[k] = curved ? body.mesh.normal(t, static_cast<int>(k)) : Vec3(element.axes.row(2).transpose());
         edges += (corners[(k + 1) % 3] - corners[k]).norm();
       }
-      const double membrane = body.material.young * thickness;
-      system.stiffness_norm += membrane * membrane;
       system.normals.push_back(normals);
       system.heights.push_back(patch_height(corners, normals));
       system.elements.push_back(element);
     }
     system.first_element.push_back(system.elements.size());
   }
-  system.stiffness_norm = std::sqrt(system.stiffness_norm);
   system.length = edges / (3 * static_cast<double>(std::max<std::size_t>(1, system.elements.size())));
+  add_stiffness_norms(system);
 
   std::vector<std::array<Index, 3>> triangles;
   triangles.reserve(system.elements.size());
@@ -424,7 +443,8 @@ double round_off(const ShellSystem& system, const Configuration& configuration) 
   for (const Vec3& u : configuration.displacement) {
     largest = std::max(largest, u.squaredNorm());
   }
-  return 4 * std::numeric_limits<double>::epsilon() * system.stiffness_norm * (system.length + std::sqrt(largest));
+  return 4 * std::numeric_limits<double>::epsilon() *
+         std::hypot(system.translation_stiffness * (system.length + std::sqrt(largest)), system.rotation_stiffness);
 }
 
 ShellMesh deformed_mesh(const ShellSystem& system, const Model& model, const Configuration& configuration,

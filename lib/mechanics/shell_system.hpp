@@ -56,8 +56,10 @@ struct ShellSystem {
   VectorX inertia;         ///< tonne mm^2 per node, about every axis: rho t^3 / 12 times the area
   std::vector<bool> held;  ///< 6 per node
   std::vector<PrescribedFreedom> prescribed;
-  double length = 0;          ///< mean edge, mm: what makes moments comparable with forces
-  double stiffness_norm = 0;  ///< root of the sum of (E t)^2 over the elements
+  double length = 0;  ///< mean edge, mm: what makes moments comparable with forces
+  /// Norms of the elements' stiffness, moments divided by `length`: forces by displacements (N/mm), by rotations (N).
+  double translation_stiffness = 0;
+  double rotation_stiffness = 0;
 
   [[nodiscard]] std::size_t node_count() const { return reference.size(); }
 };
