@@ -71,8 +71,11 @@ void declare(CLI::App& app, Arguments& arguments) {
   app.add_option("--space", arguments.space, "world axes of the surface (default lps)")
       ->check(CLI::IsMember({"lps", "ras"}))
       ->type_name("lps|ras");
-  app.add_option("--frame", arguments.volume_options.frame, "which volume of a time series, from 0")->type_name("N");
+  app.add_option("--frame", arguments.volume_options.frame, "which volume of a time series, from 0")
+      ->check(CLI::NonNegativeNumber)
+      ->type_name("N");
   app.add_option("--layer", arguments.volume_options.layer, "which layer of overlapping segments, from 0")
+      ->check(CLI::NonNegativeNumber)
       ->type_name("N");
   app.add_flag("--prefer-qform", arguments.volume_options.prefer_qform,
                "NIfTI: take the qform where sform and qform are both set");
@@ -273,8 +276,10 @@ Json undefined_result() {
 
 struct Surface {
   TriangleMesh mesh;
-  Mask mask;                    // the selection the mesh bounds
-  double voxel_volume_mm3 = 0;  // of the whole selection, before pieces were dropped
+  Mask mask;                                 // the selection the mesh bounds
+  double voxel_volume_mm3 = 0;               // of the whole selection, before pieces were dropped
+  bool outward = false;                      // of the surface before the staircase was smoothed
+  std::optional<StaircaseResult> staircase;  // what that smoothing did
 };
 
 void keep_wanted_pieces(Mask& mask, const Arguments& arguments) {
@@ -311,30 +316,39 @@ Surface extract(cli::Tool& tool, const fs::path& path, const Volume& volume, con
       smoothed = {smooth_values(volume, smoothing.sigma, tool.progress("smooth")), target.inside};
     }
   }
-  const auto stage = tool.stage("extract");
-  const MarchingCubesOptions options{arguments.open_border, tool.progress("extract")};
-  if (gaussian) {
-    mask.emplace(select(smoothed.field, smoothed.rule));
-    keep_wanted_pieces(*mask, arguments);
+  std::optional<Surface> surface;
+  {
+    const auto stage = tool.stage("extract");
+    const MarchingCubesOptions options{arguments.open_border, tool.progress("extract")};
+    if (gaussian) {
+      mask.emplace(select(smoothed.field, smoothed.rule));
+      keep_wanted_pieces(*mask, arguments);
+    }
+    TriangleMesh mesh =
+        marching_cubes(gaussian ? smoothed.field : volume, gaussian ? smoothed.rule : target.inside, *mask, options);
+    surface.emplace(Surface{std::move(mesh), std::move(*mask), voxel_volume, false, {}});
   }
-  Surface surface{
-      marching_cubes(gaussian ? smoothed.field : volume, gaussian ? smoothed.rule : target.inside, *mask, options),
-      std::move(*mask), voxel_volume};
-  if (surface.mesh.triangles.empty()) {
+  if (surface->mesh.triangles.empty()) {
     throw InputError(fmt::format("{}: the surface of {} is empty: {}", path.string(), target.name,
                                  gaussian ? "the smoothing removes it; pass a smaller sigma"
                                           : "it fills the whole image; leave out --open-border"));
   }
-  return surface;
+  surface->outward = faces_outward(surface->mesh, surface->mask, arguments.open_border);
+  if (smoothing.kind == Smoothing::Kind::staircase) {
+    const auto stage = tool.stage("smooth");
+    const StaircaseOptions options{arguments.open_border, tool.progress("smooth")};
+    surface->staircase = smooth_staircase(surface->mesh, surface->mask, options);
+  }
+  return std::move(*surface);
 }
 
 // Measures what was made; a surface that is not what marching cubes promises is a defect of ours.
 Json measured(const Surface& surface, bool open_border) {
   const MeshFacts facts = examine(surface.mesh);
-  const bool outward = facts.oriented && faces_outward(surface.mesh, surface.mask);
   if (const auto why = why_unfit(facts, open_border ? Boundary::allowed : Boundary::forbidden)) {
     throw InternalError("the extracted surface is not a manifold: " + *why);
   }
+  const double volume = signed_volume(surface.mesh);
   Json result = undefined_result();
   result["vertices"] = facts.vertices;
   result["triangles"] = facts.triangles;
@@ -342,11 +356,16 @@ Json measured(const Surface& surface, bool open_border) {
   result["euler"] = facts.euler;
   result["closed"] = facts.closed;
   result["manifold"] = facts.manifold;
-  result["oriented_outward"] = outward;
-  result["volume_mm3"] = facts.closed ? Json(signed_volume(surface.mesh)) : Json();
+  result["oriented_outward"] = facts.oriented && surface.outward && (!facts.closed || volume > 0);
+  result["volume_mm3"] = facts.closed ? Json(volume) : Json();
   result["voxel_volume_mm3"] = surface.voxel_volume_mm3;
   result["area_mm2"] = area(surface.mesh);
   result["diagonal_mm"] = diagonal(surface.mesh);
+  if (surface.staircase) {
+    result["staircase"] = {{"largest_move_voxels", surface.staircase->largest_move},
+                           {"volume_change", surface.staircase->volume_change},
+                           {"held_back", surface.staircase->held_back}};
+  }
   return result;
 }
 
@@ -356,7 +375,7 @@ Json summed(const Json& labels) {
   for (const auto& [label, result] : labels.items()) {
     for (const auto& [key, value] : result.items()) {
       if (key == "diagonal_mm") {
-        continue;
+        continue;  // boxes of several surfaces do not add up
       }
       if (value.is_boolean()) {
         total[key] = (total[key].is_null() || total[key].get<bool>()) && value.get<bool>();

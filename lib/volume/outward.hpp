@@ -5,11 +5,12 @@
 
 namespace tunica {
 
-/// Whether every component of a surface has its normals from inside to outside the selection it came from: of the
-/// points half a voxel behind and before its triangles, weighted by area, more lie inside behind than before.
-/// Cost: linear in the triangles.
-/// Limits: a vote, not a proof: of a component thinner than half a voxel everywhere it says nothing (and so: not
-/// outward).
-bool faces_outward(const TriangleMesh& mesh, const Mask& mask);
+/// Whether the normals of every component of a marching-cubes surface point from inside to outside its selection.
+/// Each vertex lies on an edge of the voxel grid, or on a voxel's centre: its normal is compared with the step from
+/// inside to outside there, and the sum over a component has to be positive.
+/// @param mesh  as marching_cubes() made it, not smoothed
+/// @param open_border  as given to marching_cubes()
+/// Cost: linear in the size of the mesh.
+bool faces_outward(const TriangleMesh& mesh, const Mask& mask, bool open_border);
 
 }  // namespace tunica

@@ -122,12 +122,12 @@ class Formats(ExtractTest):
 
     def test_scaled_labels(self):
         mask = ball()
-        image = nibabel.Nifti1Image((mask * 4).astype(numpy.int16), numpy.eye(4))
-        image.header.set_slope_inter(0.5, 1)
-        path = self.folder / "v.nii"
-        image.to_filename(path)
+        path = self.nifti((mask * 6).astype(numpy.int16), name="v.nii")
+        data = bytearray(path.read_bytes())
+        data[112:120] = numpy.array([0.5, 1], "<f4").tobytes()  # scl_slope, scl_inter
+        path.write_bytes(data)
         array, affine = read_volume(path)
-        self.assertEqual(array.max(), 4)  # nibabel divides on writing
+        self.assertEqual((array.min(), array.max()), (1, 4))
         self.extract_and_check(path, mask, affine, "--label", 4)
 
     def test_nrrd_and_metaimage(self):
@@ -327,7 +327,7 @@ class Choices(ExtractTest):
     def test_same_bytes_whatever_the_threads(self):
         noise = numpy.random.default_rng(5).random((60, 50, 40)) < 0.3
         path = self.nifti(noise.astype(numpy.uint8))
-        for flags in ([], ["--smooth", "1.5mm"]):
+        for flags in ([], ["--smooth", "1.5mm"], ["--smooth", "staircase"]):
             files = []
             for threads in (1, 2):
                 self.run_tool(path, self.out, "--label", 1, "--threads", threads, *flags)
@@ -351,6 +351,23 @@ class Choices(ExtractTest):
         self.assertLess(radius.std(), 0.1)
         self.assertIsNotNone(record["seconds"]["smooth"])
         self.assertEqual(record["result"]["voxel_volume_mm3"], mask.sum())
+
+    def test_staircase_stays_within_half_a_voxel(self):
+        mask = ball((40, 41, 42), 12.0)
+        affine = numpy.array([[-0.5, 0, 0, 3], [0, 1, 0, -7], [0, 0, 2, 11], [0, 0, 0, 1.0]])
+        path = self.nifti(mask.astype(numpy.uint8), affine)
+        self.run_tool(path, self.out, "--label", 1)
+        before = Ply(self.out)
+        record, _ = self.run_tool(path, self.out, "--label", 1, "--smooth", "staircase")
+        ply = Ply(self.out)
+        self.assertTrue(ply.is_closed_oriented_manifold())
+        self.assertTrue(numpy.array_equal(ply.triangles, before.triangles))
+        moved = numpy.abs(ply.vertices - before.vertices) / [0.5, 1, 2]
+        self.assertLess(moved.max(), 0.5)
+        self.assertGreater(moved.max(), 0.1)
+        self.assertAlmostEqual(ply.volume(), before.volume(), delta=1e-3 * before.volume())
+        self.assertLess(ply.area(), 0.95 * before.area())
+        self.assertIsNotNone(record["seconds"]["smooth"])
 
     def test_report_and_provenance(self):
         path = self.nifti(self.two_labels())
@@ -449,13 +466,13 @@ class SharedVolumes(ExtractTest):
         self.check_volume("ts_abdomen_multilabel.nii.gz")
 
     def test_torso(self):
-        self.check_volume("nv_torso_5mm.nii.gz", {4, 8, 9, 11})
+        self.check_volume("nv_torso_5mm.nii.gz", {4, 11})
 
     def test_oblique_lesion(self):
         self.check_volume("nv_lesion_oblique.nii.gz")
 
     def test_thorax_segmentation(self):
-        self.check_volume("sio_thorax_10mm.seg.nrrd", {1, 5, 7})
+        self.check_volume("sio_thorax_10mm.seg.nrrd", {1, 5})
 
     def test_overlapping_segments(self):
         path = SHARED / "volumes" / "sio_thorax_overlapping_4d.seg.nrrd"
@@ -499,7 +516,7 @@ class SharedVolumes(ExtractTest):
         self.assertEqual(len(gold), 6468)
         self.assertTrue(ply.is_closed_oriented_manifold())
         self.assertEqual((ply.euler(), ply.components()), (2, 1))
-        self.assertAlmostEqual(ply.volume(), 13184.2667, delta=0.05)
+        self.assertAlmostEqual(ply.volume(), 13184.2667, delta=0.001 * 13184)  # cells may be cut by other diagonals
         # Both ways, nearest vertex: sort by a coarse grid of x would do; the sets are small enough for blocks.
         for a, b in ((ply.vertices, gold), (gold, ply.vertices)):
             worst = max(numpy.sqrt(((block[:, None, :] - b[None, :, :]) ** 2).sum(axis=2)).min(axis=1).max()

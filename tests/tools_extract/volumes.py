@@ -1,5 +1,6 @@
 """Volumes and surfaces read and written without tunica: nibabel for NIfTI, by hand for the rest."""
 import gzip
+import pathlib
 import zlib
 
 import nibabel
@@ -12,7 +13,7 @@ class Ply:
     """The binary PLY of the contract, parsed by its header: vertices (n, 3) double, triangles (m, 3) int."""
 
     def __init__(self, path):
-        data = open(path, "rb").read()
+        data = pathlib.Path(path).read_bytes()
         end = data.index(b"end_header\n") + len(b"end_header\n")
         lines = data[:end].decode().splitlines()
         assert lines[:2] == ["ply", "format binary_little_endian 1.0"], lines[:2]
@@ -111,7 +112,7 @@ def read_volume(path, layer=None):
     if name.endswith((".nii", ".nii.gz")):
         image = nibabel.load(name)
         return numpy.asanyarray(image.dataobj), LPS @ image.affine
-    data = open(name, "rb").read()
+    data = pathlib.Path(name).read_bytes()
     if name.endswith(".nrrd"):
         end = data.index(b"\n\n") + 2
         fields = dict(line.split(": ", 1) for line in data[:end].decode().splitlines() if ": " in line and ":=" not in line)
@@ -137,7 +138,7 @@ def read_volume(path, layer=None):
 
 def read_stl(path):
     """Corners of the triangles of a binary STL, (n, 3, 3)."""
-    data = open(path, "rb").read()
+    data = pathlib.Path(path).read_bytes()
     record = numpy.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
     return numpy.frombuffer(data, record, offset=84)["corners"].astype(float)
 
@@ -149,7 +150,7 @@ def write_nrrd(path, array, affine, extra="", encoding="gzip"):
               f"sizes: {' '.join(map(str, array.shape))}\nspace directions: {vectors}\nkinds: domain domain domain\n"
               f"endian: little\nencoding: {encoding}\nspace origin: ({','.join(repr(float(x)) for x in affine[:3, 3])})\n"
               f"{extra}\n")
-    open(path, "wb").write(header.encode() + (gzip.compress(data) if encoding == "gzip" else data))
+    pathlib.Path(path).write_bytes(header.encode() + (gzip.compress(data) if encoding == "gzip" else data))
 
 
 def write_mha(path, array, affine):
@@ -161,4 +162,4 @@ def write_mha(path, array, affine):
               f"CompressedDataSize = {len(packed)}\nTransformMatrix = {words((affine[:3, :3] / spacing).T.reshape(-1))}\n"
               f"Offset = {words(affine[:3, 3])}\nElementSpacing = {words(spacing)}\n"
               f"DimSize = {' '.join(map(str, array.shape))}\nElementType = {kind}\nElementDataFile = LOCAL\n")
-    open(path, "wb").write(header.encode() + packed)
+    pathlib.Path(path).write_bytes(header.encode() + packed)
