@@ -2,6 +2,7 @@
 
 #include "core/error.hpp"
 #include "shell/curved_surface.hpp"
+#include "shell/mend.hpp"
 #include "shell/refine.hpp"
 
 #include <fmt/core.h>
@@ -72,7 +73,12 @@ public:
     result_.stopped = "the limit of iterations was reached";
     for (int i = 0; i < most; ++i) {
       advance(options_.progress, static_cast<double>(i) / most);
-      const double upper = iterate();
+      const auto iterated = iterate();
+      if (!iterated) {
+        result_.stopped = "the facets fold where no normal suits them";
+        break;
+      }
+      const double upper = *iterated;
       if (options_.tolerance && upper <= *options_.tolerance) {
         result_.reached = true;
         result_.stopped = "the tolerance holds";
@@ -80,6 +86,8 @@ public:
       }
       fruitless = upper < worth_it * level_best ? 0 : fruitless + 1;
       level_best = std::min(level_best, upper);
+      futile_ = upper < worth_it * best_upper_ ? 0 : futile_ + 1;
+      best_upper_ = std::min(best_upper_, upper);
       if (options_.refine) {
         // Far from the tolerance another move of the same nodes is not worth its time.
         const bool far = !options_.tolerance || upper > 2 * *options_.tolerance;
@@ -102,7 +110,8 @@ public:
   }
 
 private:
-  double iterate() {
+  /// @return the distance's upper bound; nothing when the mesh has folded beyond repair
+  std::optional<double> iterate() {
     const auto start = std::chrono::steady_clock::now();
     RelaxIteration iteration;
     TriangleMesh mesh = flat_facets(current_);
@@ -114,9 +123,15 @@ private:
         break;
     }
     result_.flips += flip_upright_triangles(target_, mesh);
+    const Mending mending = mend(target_, mesh, off_target, mend_limits());
+    result_.flips += mending.turned;
+    result_.merged += mending.merged;
     current_.vertices = std::move(mesh.vertices);
     current_.triangles = std::move(mesh.triangles);
     const auto folded = take_normals_from(target_, current_);
+    if (!folded.empty() && !result_.iterations.empty()) {
+      return {};
+    }
     if (!folded.empty()) {
       const Vec3& p = current_.vertices[folded[0]];
       throw InputError(
@@ -138,6 +153,14 @@ private:
       options_.on_iteration(iteration, result_.shell);
     }
     return distance.both.upper;
+  }
+
+  /// Where refinement brings nothing, mending may undo it: it steps back.
+  [[nodiscard]] MendLimits mend_limits() const {
+    if (result_.iterations.empty()) {
+      return {};
+    }
+    return futile_ < 2 ? MendLimits{10, 0.4, 1} : futile_ < 4 ? MendLimits{5, 0.3, 1} : MendLimits{2, 0.25, 1};
   }
 
   /// A tenth of the distance is narrow enough to compare iterates; to decide on the tolerance it gets narrower.
@@ -179,6 +202,8 @@ private:
   double width_;
   ShellMesh current_;
   std::vector<double> errors_;  // of each current shell, mm
+  double best_upper_ = std::numeric_limits<double>::infinity();
+  int futile_ = 0;  // iterations in a row that did not better the best
   RelaxResult result_;
 };
 

@@ -44,14 +44,16 @@ struct RelaxResult {
   std::vector<RelaxIteration> iterations;
   std::optional<bool> reached;  ///< the tolerance; none without one
   std::string stopped;          ///< why it ended there, in words
-  std::size_t flips = 0;        ///< edges turned for triangles standing upright
+  std::size_t flips = 0;        ///< edges turned for triangles that stand upright, fold or are thin
+  std::size_t merged = 0;       ///< pairs of nodes, for the same
   bool turned_around = false;   ///< all triangles of COARSE faced the other way than the target's
 };
 
 /// Moves a coarse mesh onto a target as curved shells. Per iteration: the method's move of the nodes, edges turned
-/// where a triangle stands upright on the target, nodal normals from the target and fitted to it, the two-sided
-/// distance of the curved surface. It ends when the tolerance certainly holds; when three iterations in a row brought
-/// less than 1 % (then it refines, if it may); or at the limits. The best iterate is the result.
+/// where a triangle stands upright on the target, folds and thin triangles mended (see mend.hpp), nodal normals from
+/// the target and fitted to it, the two-sided distance of the curved surface. It ends when the tolerance certainly
+/// holds; when three iterations in a row brought less than 1 % (then it refines, if it may); or at the limits. The best
+/// iterate is the result.
 /// @param coarse  an oriented manifold; @param target  likewise
 /// Errors: InputError when facets fold so sharply that no normal can serve at a node: it names the node and place.
 /// Source: Comas, Duriez, Cotin 2010, section 3.

@@ -13,10 +13,10 @@ namespace {
 constexpr Index none = 0xffffffff;
 /// A triangle may turn by at most acos(0.2) = 78 degrees in one collapse.
 constexpr double least_cosine = 0.2;
-/// Neighbours whose normals are nearly opposite are a fold, unless they were before.
-constexpr double fold_cosine = -0.9;
-/// Height over longest edge of the thinnest triangle that a collapse may make, unless it was thinner before.
-constexpr double least_height = 0.01;
+/// What a collapse may make of the triangles: cosine of the sharpest fold between neighbours, and height over longest
+/// edge of the thinnest triangle (0.08 leaves no angle below 4.6 degrees), unless they were worse before. The next
+/// limits count when the ones before leave nothing to collapse.
+constexpr std::array<ShapeLimits, 3> shape_limits{{{0, 0.08}, {-0.5, 0.06}, {-0.9, 0.01}}};
 /// Weight of the planes that stand on boundary edges. New boundary vertices lie on the curve, so all of their error is
 /// on one side of it; and a ragged rim is seen before a rough surface.
 constexpr double boundary_weight = 30;
@@ -186,17 +186,18 @@ void EdgeCollapse::fill_heap() {
 std::size_t EdgeCollapse::run(std::size_t triangles, const Progress& progress) {
   const std::size_t start = triangles_;
   const double work = static_cast<double>(start - std::min(start, triangles));
-  bool progressed = true;
-  while (triangles_ > triangles && progressed) {
-    progressed = false;
+  for (std::size_t limits = 0; triangles_ > triangles && limits < shape_limits.size();) {
+    limits_ = shape_limits[limits];
+    bool progressed = false;
     for (std::size_t step = 0; triangles_ > triangles && !heap_.empty(); ++step) {
       if (step % 4096 == 0) {
         advance(progress, static_cast<double>(start - triangles_) / work);
       }
       progressed = collapse_cheapest() || progressed;
     }
-    if (triangles_ > triangles && progressed) {
-      // What was refused may be possible now that the surroundings have changed.
+    if (triangles_ > triangles) {
+      // What was refused may be possible now that the surroundings have changed, or with the next limits.
+      limits += progressed ? 0 : 1;
       fill_heap();
     }
   }
@@ -360,14 +361,14 @@ bool EdgeCollapse::fan_keeps_shape(Index vertex, Index other, const Vec3& positi
     // Many small turns may add up: the given surface that the three corners stand for must be faced as well.
     const Vec3 given = facing + facing_[i] + facing_[j];
     good = (was_flat || before.dot(after) > least_cosine * lengths) &&
-           (after.dot(given) > 0 || before.dot(given) <= 0) && new_height > std::min(least_height, 0.7 * old_height) &&
-           after.squaredNorm() > 0;
+           (after.dot(given) > 0 || before.dot(given) <= 0) &&
+           new_height > std::min(limits_.least_height, 0.7 * old_height) && after.squaredNorm() > 0;
     const HalfEdge across = twin_[next(h)];
     if (good && across != none) {
       // The triangle on the outer side stays: the new one must not lie back on it.
       const Vec3& c = position_[from(previous(across))];
       const Vec3 outer = (a - b).cross(c - b);
-      const double limit = fold_cosine * outer.norm();
+      const double limit = limits_.fold_cosine * outer.norm();
       good = after.dot(outer) > limit * after.norm() || before.dot(outer) <= limit * before.norm();
     }
   });

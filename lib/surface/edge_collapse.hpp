@@ -7,6 +7,12 @@
 
 namespace tunica {
 
+/// What a collapse may make of the triangles around it, unless they were worse before.
+struct ShapeLimits {
+  double fold_cosine = -1;  ///< of the angle between neighbours' normals
+  double least_height = 0;  ///< height over longest edge
+};
+
 /// One step of a decimation: vertex `removed` becomes `kept`, which moves to `position` (of the given mesh's frame).
 struct Collapse {
   Index kept;
@@ -85,6 +91,7 @@ private:
   std::vector<Curve> curves_;
   std::vector<Index> mark_;  // #V stamp of the last link check
   Index stamp_ = 0;
+  ShapeLimits limits_;
   EdgeHeap heap_;
   std::size_t triangles_ = 0;
   std::vector<Collapse> history_;
