@@ -16,7 +16,7 @@ namespace {
 /// Intervals wide enough for the tests to be quick.
 RelaxOptions quick(const Target& target) {
   RelaxOptions options;
-  options.width = 1e-3 * target.diagonal();
+  options.width = 1e-4 * target.diagonal();
   return options;
 }
 

@@ -77,6 +77,8 @@ class Case(unittest.TestCase):
     def relax(self, *arguments, expect=0):
         """Runs the tool; @return its report and stderr."""
         report = self.path("report.json")
+        if os.path.exists(report):
+            os.remove(report)
         run = subprocess.run([os.path.join(BIN, "tunica-relax"), *map(str, arguments), "--report", report],
                              capture_output=True, text=True, timeout=500)
         self.assertEqual(run.returncode, expect, run.stderr)
