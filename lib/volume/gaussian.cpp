@@ -227,7 +227,6 @@ SmoothedField smooth_mask(const Mask& mask, double sigma, const Progress& progre
 
 Volume smooth_values(const Volume& volume, double sigma, const Progress& progress) {
   const std::size_t columns = volume.dims[0];
-  const Mask checked(volume.dims, volume.affine);
   return std::visit(
       [&](const auto& values) {
         const auto fill = [&](std::size_t row, float* out) {

@@ -294,11 +294,10 @@ private:
         return 0.5 * (q - p).cross(r - p);
       };
       const Vec3 mean = (area(0) + 4 * area(0.5) + area(1)) / 6;
-      volume[component_[a]] += (mirrored_ ? -1 : 1) * moment(a, b, c, mean, move);
+      volume[component_[a]] += (mirrored_ ? -1 : 1) * mean.dot(move);
     }
     return volume;
   }
-  static double moment(Index, Index, Index, const Vec3& area, const Vec3& move) { return area.dot(move); }
 
   void correct_volume() {
     constexpr int most_steps = 40;

@@ -32,15 +32,18 @@ double largest_move(const TriangleMesh& before, const TriangleMesh& after, const
   return largest;
 }
 
-/// Area-weighted mean distance of a surface's facets to another.
+/// Area-weighted mean distance of a surface to another, from every fourth facet.
 double mean_distance(const TriangleMesh& mesh, const ClosestPoint& truth) {
   double sum = 0;
-  for (const auto& [a, b, c] : mesh.triangles) {
+  double weights = 0;
+  for (std::size_t t = 0; t < mesh.triangles.size(); t += 4) {
+    const auto& [a, b, c] = mesh.triangles[t];
     const Vec3 centre = (mesh.vertices[a] + mesh.vertices[b] + mesh.vertices[c]) / 3;
-    sum += triangle_area(mesh.vertices[a], mesh.vertices[b], mesh.vertices[c]) *
-           std::sqrt(truth.closest(centre).squared_distance);
+    const double weight = triangle_area(mesh.vertices[a], mesh.vertices[b], mesh.vertices[c]);
+    sum += weight * std::sqrt(truth.closest(centre).squared_distance);
+    weights += weight;
   }
-  return sum / area(mesh);
+  return sum / weights;
 }
 
 struct Case {
@@ -56,7 +59,7 @@ INSTANTIATE_TEST_SUITE_P(
     Phantoms, StaircaseOf,
     testing::Values(Case{"sphere", 48, Vec3(1, 1, 1), 0.5}, Case{"aneurysm", 96, Vec3(1, 1, 1), 0.5},
                     Case{"tube", 64, Vec3(0.7, 0.7, 2), 0.5}, Case{"capsule", 64, Vec3(1, 1, 1), 0.5},
-                    Case{"bladder", 64, Vec3(0.8, 0.8, 3), 0.5}, Case{"colon", 96, Vec3(1, 1, 1), 0.7}));
+                    Case{"bladder", 64, Vec3(0.8, 0.8, 3), 0.5}, Case{"colon", 80, Vec3(1, 1, 1), 0.7}));
 
 TEST_P(StaircaseOf, StaysWithinHalfAVoxelKeepsTheVolumeAndComesCloserToTheTruth) {
   PhantomOptions options;
@@ -184,7 +187,7 @@ TEST(Staircase, NoiseStaysAManifoldWithoutTurnedTriangles) {
 TEST(Staircase, SameToTheBitWhateverTheNumberOfThreads) {
   PhantomOptions options;
   options.shape = PhantomShape::bladder;
-  options.size = 64;
+  options.size = 40;
   const Mask mask = select(make_phantom(options).volume, label_one);
   const TriangleMesh start = marching_cubes(mask);
   const std::size_t threads = thread_count();
