@@ -52,9 +52,10 @@ void declare(cli::Tool& tool, Arguments& given) {
   app.add_option("--max-iterations", given.max_iterations, "at most N iterations (20, with --refine 60)")
       ->check(CLI::Range(1, 100000))
       ->type_name("N");
-  app.add_option("--map", given.map, "error map: the curved surface with its distance to the target, PLY");
-  app.add_option("--picture", given.picture, "picture of the error map, PNG");
-  app.add_option("--curved", given.curved, "the curved surface as a fine triangle mesh, PLY");
+  app.add_option("--map", given.map, "error map: the curved surface with its distance to the target, PLY")
+      ->type_name("OUT.ply");
+  app.add_option("--picture", given.picture, "picture of the error map, PNG")->type_name("OUT.png");
+  app.add_option("--curved", given.curved, "the curved surface as a fine triangle mesh, PLY")->type_name("OUT.ply");
   app.add_option("--mesh-unit", given.mesh_unit, "unit of OBJ, STL and OFF files: mm, cm, m or um")->type_name("UNIT");
   tool.not_yet("--shells");
 }
