@@ -18,8 +18,9 @@ using namespace tunica;
 
 namespace {
 
-constexpr double interval_width = 1e-4;    // of the diagonal: what the report certifies
-constexpr double curved_deviation = 1e-5;  // of the diagonal: the contract of --curved
+constexpr double interval_width = 1e-4;  // of the diagonal: what the report certifies
+constexpr double curved_deviation =
+    0.8e-5;  // of the diagonal; the contract of --curved, 1e-5, may be taken of either surface
 constexpr std::size_t map_triangles = 200'000;
 
 struct Arguments {
