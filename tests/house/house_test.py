@@ -149,9 +149,9 @@ class EveryRuleCanFail(unittest.TestCase):
         self.good(rules.blanks, "Makefile.pipeline", "a:\n\techo\n")
 
     def test_machine_paths(self):
-        for text in ('open("/home/me/x")\n', "cd /work/main\n", "seen on farm-7\n"):
+        for text in ('open("/home/me/x")\n', "cd /scratch/x\n", "in /mnt/data\n"):
             self.bad(rules.machine_paths, "README.md", text)
-        self.good(rules.machine_paths, "README.md", "see ../shared/data and $PREFIX/home/x, http://a.org/work/x\n")
+        self.good(rules.machine_paths, "README.md", "see ../shared/data and $PREFIX/home/x, http://a.org/home/x\n")
 
 
 if __name__ == "__main__":
