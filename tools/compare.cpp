@@ -52,10 +52,8 @@ struct Surface {
   std::string space;
 };
 
-Surface read_a(const Arguments& given, const std::optional<double>& unit_mm) {
-  MeshFile file = read_mesh(given.a, unit_mm, given.map.has_value());
+Surface surface_of(MeshFile file, const Arguments& given) {
   Surface a;
-  a.space = file.space;
   if (given.shell) {
     a.shell = shell_of(file, given.a);
     require_fit(*a.shell, given.a.string());
@@ -190,8 +188,12 @@ void run(cli::Tool& tool, const Arguments& given) {
     const auto stage = tool.stage("read");
     tool.input(given.a);
     tool.input(given.b);
-    a = read_a(given, unit_mm);
-    target = read_mesh(given.b, unit_mm, given.map.has_value()).mesh;
+    MeshFile file_a = read_mesh(given.a, unit_mm, given.map.has_value());
+    MeshFile file_b = read_mesh(given.b, unit_mm, given.map.has_value());
+    const std::string space = common_space(file_a, given.a, file_b, given.b);
+    a = surface_of(std::move(file_a), given);
+    a.space = space;
+    target = std::move(file_b.mesh);
   }
   const double diagonal_mm = diagonal(target);
   if (!(diagonal_mm > 0)) {

@@ -142,7 +142,7 @@ void run(cli::Tool& tool, const Arguments& given) {
   const auto stage = tool.stage("write");
   PlyOptions options;
   options.comments = {"made by " + tool.command()};
-  options.space = in.space;
+  options.space = in.space.value_or(options.space);
   options.overwrite = tool.force();
   options.partial = failure.has_value();
   write_ply(given.out, coarse.mesh, options);

@@ -76,15 +76,15 @@ void refuse_contradictions(const Arguments& given) {
   }
 }
 
-TriangleMesh read_surface(const fs::path& path, const std::optional<double>& unit_mm) {
-  TriangleMesh mesh = read_mesh(path, unit_mm, true).mesh;
-  if (const auto why = why_unfit(examine(mesh))) {
+MeshFile read_surface(const fs::path& path, const std::optional<double>& unit_mm) {
+  MeshFile file = read_mesh(path, unit_mm, true);
+  if (const auto why = why_unfit(examine(file.mesh))) {
     throw InputError(path.string() + ": " + *why + "; repair it first");
   }
-  if (!(diagonal(mesh) > 0)) {
+  if (!(diagonal(file.mesh) > 0)) {
     throw InputError(path.string() + ": the mesh has no extent");
   }
-  return mesh;
+  return file;
 }
 
 void warn_of_mismatch(const cli::Tool& tool, const TriangleMesh& coarse, const TriangleMesh& target) {
@@ -101,9 +101,10 @@ void warn_of_mismatch(const cli::Tool& tool, const TriangleMesh& coarse, const T
 
 Json interval(const Interval& mm, double scale) { return {{"lower", mm.lower * scale}, {"upper", mm.upper * scale}}; }
 
-PlyOptions ply_options(const cli::Tool& tool) {
+PlyOptions ply_options(const cli::Tool& tool, const std::string& space) {
   PlyOptions options;
   options.comments = {"made by " + tool.command()};
+  options.space = space;
   options.overwrite = tool.force();
   return options;
 }
@@ -116,13 +117,13 @@ std::size_t curved_self_intersections(const ShellMesh& shell) {
 
 /// Distances at the vertices of a surface fine enough to be looked at, with the edges of the shells.
 void write_maps(cli::Tool& tool, const Arguments& given, const ShellMesh& shell, const Target& target,
-                const ShellDistance& distance) {
+                const ShellDistance& distance, const PlyOptions& ply) {
   const double per_shell = static_cast<double>(map_triangles) / static_cast<double>(shell.triangles.size());
   const int level = std::clamp(static_cast<int>(std::sqrt(per_shell)), 4, 24);
   const Tessellation fine = tessellate_uniformly(shell, level);
   const auto distances = vertex_distances(fine.mesh, target.tree());
   if (given.map) {
-    write_ply(*given.map, fine.mesh, distances, ply_options(tool));
+    write_ply(*given.map, fine.mesh, distances, ply);
   }
   if (given.picture) {
     PictureOptions options;
@@ -163,20 +164,23 @@ void run(cli::Tool& tool, const Arguments& given) {
   }
   TriangleMesh coarse;
   std::optional<Target> target;
+  PlyOptions ply;
   {
     const auto stage = tool.stage("read");
-    coarse = read_surface(tool.input(given.coarse), unit_mm);
-    TriangleMesh surface = read_surface(tool.input(given.target), unit_mm);
-    warn_of_mismatch(tool, coarse, surface);
-    target.emplace(std::move(surface));
+    MeshFile file = read_surface(tool.input(given.coarse), unit_mm);
+    MeshFile surface = read_surface(tool.input(given.target), unit_mm);
+    ply = ply_options(tool, common_space(file, given.coarse, surface, given.target));
+    coarse = std::move(file.mesh);
+    warn_of_mismatch(tool, coarse, surface.mesh);
+    target.emplace(std::move(surface.mesh));
   }
   const double diagonal = target->diagonal();
   const double percent = 100 / diagonal;
 
   const auto keep_partial = [&](const ShellMesh& shell) {
-    PlyOptions options = ply_options(tool);
-    options.overwrite = true;
-    write_ply(fs::path(given.out.string() + ".part"), shell, options);
+    PlyOptions always = ply;
+    always.overwrite = true;
+    write_ply(fs::path(given.out.string() + ".part"), shell, always);
   };
   ShellMesh best;
   RelaxOptions options;
@@ -262,12 +266,12 @@ void run(cli::Tool& tool, const Arguments& given) {
         given.refine ? "Allow more shells or iterations" : "Add --refine, or take a coarse mesh with more triangles"));
   }
   require_fit(relaxed.shell, given.out.string());
-  write_ply(given.out, relaxed.shell, ply_options(tool));
+  write_ply(given.out, relaxed.shell, ply);
   if (given.curved) {
-    write_ply(*given.curved, tessellate(relaxed.shell, curved_deviation * diagonal).mesh, ply_options(tool));
+    write_ply(*given.curved, tessellate(relaxed.shell, curved_deviation * diagonal).mesh, ply);
   }
   if (given.map || given.picture) {
-    write_maps(tool, given, relaxed.shell, *target, distance);
+    write_maps(tool, given, relaxed.shell, *target, distance, ply);
   }
 }
 

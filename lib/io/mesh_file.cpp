@@ -14,6 +14,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 
 namespace tunica {
@@ -147,6 +148,22 @@ ShellMesh shell_of(const MeshFile& file, const std::filesystem::path& path) {
     }
   }
   return shell;
+}
+
+std::string common_space(const MeshFile& a, const std::filesystem::path& path_a, const MeshFile& b,
+                         const std::filesystem::path& path_b) {
+  const auto upper_case = [](std::string text) {
+    std::transform(text.begin(), text.end(), text.begin(),
+                   [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
+    return text;
+  };
+  if (a.space && b.space && upper_case(*a.space) != upper_case(*b.space)) {
+    throw InputError(
+        fmt::format("{}: its axes are SPACE={}, those of {} are SPACE={}; make both in the same space, e.g. with "
+                    "tunica-extract --space",
+                    path_a.string(), *a.space, path_b.string(), *b.space));
+  }
+  return a.space.value_or(b.space.value_or("LPS"));
 }
 
 }  // namespace tunica

@@ -16,7 +16,7 @@ struct MeshFile {
   std::vector<std::array<Vec3, 3>> corner_normals;  ///< empty, or #F
   std::optional<Patch> patch;                       ///< `surface=` comment
   std::optional<std::string> units;                 ///< what the file said: "mm", …; none for OBJ, STL, OFF
-  std::string space = "LPS";                        ///< `SPACE=` comment
+  std::optional<std::string> space;                 ///< `SPACE=` comment: world axes, "LPS" or "RAS"
   std::vector<std::string> comments;                ///< all PLY comments, for provenance
   std::vector<std::pair<std::string, std::vector<double>>> vertex_properties;  ///< further scalar ones, e.g. thickness
 };
@@ -36,6 +36,11 @@ MeshFile read_mesh(const std::filesystem::path& path, std::optional<double> unit
 
 /// The curved shell mesh in a file: positions, unit normals, patch. Errors: InputError when it has no normals.
 ShellMesh shell_of(const MeshFile& file, const std::filesystem::path& path);
+
+/// The world axes two meshes share: what either of them says, "LPS" where neither does.
+/// Errors: InputError when both say and differ: every distance between them would be wrong.
+std::string common_space(const MeshFile& a, const std::filesystem::path& path_a, const MeshFile& b,
+                         const std::filesystem::path& path_b);
 
 struct PlyOptions {
   std::vector<std::string> comments = {};  ///< further comments (provenance), one line each

@@ -175,6 +175,28 @@ TEST(PlyReader, ReadsAsciiInFullPrecisionAndScalesToMillimetres) {
   EXPECT_EQ(file.units, "cm");
 }
 
+TEST(PlyReader, TwoMeshesShareTheSpaceThatEitherNames) {
+  MeshFile lps, ras, silent;
+  lps.space = "LPS";
+  ras.space = "RAS";
+  EXPECT_EQ(common_space(lps, "a", lps, "b"), "LPS");
+  EXPECT_EQ(common_space(ras, "a", ras, "b"), "RAS");
+  EXPECT_EQ(common_space(ras, "a", silent, "b"), "RAS");
+  EXPECT_EQ(common_space(silent, "a", ras, "b"), "RAS");
+  EXPECT_EQ(common_space(silent, "a", silent, "b"), "LPS");
+  MeshFile small = lps;
+  small.space = "lps";
+  EXPECT_NO_THROW(common_space(small, "a", lps, "b"));
+  try {
+    common_space(lps, "shell.ply", ras, "organ.ply");
+    FAIL();
+  } catch (const InputError& error) {
+    for (const char* part : {"shell.ply", "organ.ply", "SPACE=LPS", "SPACE=RAS", "--space"}) {
+      EXPECT_THAT(error.what(), ::testing::HasSubstr(part));
+    }
+  }
+}
+
 TEST(PlyReader, OwnUnitWinsOverTheFlagAndNoneIsMillimetres) {
   const TemporaryFolder folder;
   const auto with_unit = folder.file("cm.ply", tetrahedron_ascii);

@@ -60,6 +60,14 @@ class Compare(WholeTool):
         fine = self.run_tool("curved.ply", "sphere.ply")["result"]
         self.assertLess(abs(fine["hausdorff_percent"]["upper"] - curved["hausdorff_percent"]["upper"]), 0.02)
 
+    def test_surfaces_in_different_spaces_are_refused(self):
+        meshes.write_ply(self.path("ras.ply"), *meshes.sphere(2, 10.0), comments=["SPACE=RAS"])
+        meshes.write_ply(self.path("lps.ply"), *meshes.sphere(2, 10.0), comments=["SPACE=LPS"])
+        self.run_tool("ras.ply", "lps.ply", code=3, says="SPACE=LPS")
+        self.run_tool("lps.ply", "ras.ply", code=3, says="SPACE=RAS")
+        self.run_tool("ras.ply", "sphere.ply", "--map", "map.ply")  # the sphere names none
+        self.assertIn("comment SPACE=RAS", meshes.read_ply(self.path("map.ply"))[0])
+
     def test_threads_change_nothing(self):
         one = self.run_tool("shell.ply", "sphere.ply", "--shell", "--threads", 1)["result"]
         self.assertEqual(one, self.run_tool("shell.ply", "sphere.ply", "--shell", "--threads", 4)["result"])

@@ -15,11 +15,11 @@ BIN = os.environ["TUNICA_BIN"]
 PAPER = os.path.join(os.environ.get("TUNICA_SHARED_DATA", ""), "paper")
 
 
-def write_ply(path, vertices, triangles):
+def write_ply(path, vertices, triangles, space="LPS"):
     vertices = np.asarray(vertices, "<f8")
     faces = np.empty(len(triangles), np.dtype([("n", "u1"), ("v", "<i4", 3)]))
     faces["n"], faces["v"] = 3, triangles
-    header = (f"ply\nformat binary_little_endian 1.0\ncomment units mm\ncomment SPACE=LPS\n"
+    header = (f"ply\nformat binary_little_endian 1.0\ncomment units mm\ncomment SPACE={space}\n"
               f"element vertex {len(vertices)}\nproperty double x\nproperty double y\nproperty double z\n"
               f"element face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n")
     with open(path, "wb") as file:
@@ -197,6 +197,19 @@ class Contract(Case):
         flat = self.path("point.ply")
         write_ply(flat, np.zeros((3, 3)), [[0, 1, 2]])
         self.relax(self.coarse, flat, self.out, expect=3)
+
+    def test_the_space_is_kept_and_two_spaces_are_refused(self):
+        write_ply(self.target, *cylinder(64, 40), space="RAS")
+        _, error = self.relax(self.coarse, self.target, self.out, expect=3)
+        for part in ("coarse.ply", "SPACE=LPS", "target.ply", "SPACE=RAS"):
+            self.assertIn(part, error)
+        write_ply(self.coarse, *cylinder(8, 3, radius=10.3), space="RAS")
+        others = [self.path(name) for name in ("map.ply", "curved.ply")]
+        self.relax(self.coarse, self.target, self.out, "--max-iterations", 1, "--map", others[0], "--curved", others[1])
+        for written in (self.out, *others):
+            comments = read_ply(written)[2]
+            self.assertIn("SPACE=RAS", comments)
+            self.assertNotIn("SPACE=LPS", comments)
 
     def test_existing_output_is_5_unless_forced(self):
         with open(self.out, "w") as file:
