@@ -78,6 +78,15 @@ std::string one_line(std::string text) {
   return text;
 }
 
+// CLI11 calls the value of every string TEXT: a positional's own name says more, and a choice is a NAME.
+void name_placeholders(CLI::App& app) {
+  for (CLI::Option* option : app.get_options()) {
+    if (option->get_type_name().starts_with("TEXT")) {
+      option->type_name(option->get_positional() ? "" : "NAME");
+    }
+  }
+}
+
 }  // namespace
 
 Tool::Tool(std::string verb, std::string summary, std::string example)
@@ -162,6 +171,7 @@ int Tool::run(int argc, char** argv, const std::function<void()>& body) {
     command_ += (i > 0 ? " " : "") + shell_quoted(i > 0 ? argv[i] : "tunica-" + verb_);
   }
   std::signal(SIGPIPE, SIG_IGN);
+  name_placeholders(app_);
   // For the build alone, so not among the options: the manual page and the completion that are installed.
   if (argc == 3 && std::string_view(argv[1]) == "--documentation") {
     const std::string_view kind = argv[2];

@@ -12,6 +12,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <ostream>
 
 namespace tunica {
 namespace {
@@ -22,6 +23,8 @@ struct Case {
   std::string name;
   bool open;
 };
+
+void PrintTo(const Case& shape, std::ostream* out) { *out << shape.name; }
 
 class PhantomOf : public testing::TestWithParam<Case> {
 protected:

@@ -13,6 +13,7 @@
 #include <Eigen/LU>
 
 #include <cmath>
+#include <ostream>
 
 namespace tunica {
 namespace {
@@ -52,6 +53,8 @@ struct Case {
   Vec3 spacing;
   double gain;  ///< error of the smoothed surface over that of the staircase, at most
 };
+
+void PrintTo(const Case& phantom, std::ostream* out) { *out << phantom.shape; }
 
 class StaircaseOf : public testing::TestWithParam<Case> {};
 
