@@ -122,7 +122,9 @@ public:
   }
 
   void finish() {
-    pass({}, Z_FINISH);
+    if (gzip_) {
+      pass({}, Z_FINISH);
+    }
     require(std::fflush(file_.get()) == 0);
   }
 
