@@ -1,4 +1,4 @@
-# Flags for every target, and the two functions that make one.
+# Flags for every target, and the functions that make one.
 add_library(tunica_flags INTERFACE)
 target_compile_options(tunica_flags INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor
                        -Woverloaded-virtual -Wcast-qual -Wformat=2)
@@ -42,4 +42,15 @@ function(tunica_test name)
   target_link_libraries(test_${name} PRIVATE tunica_flags ${arg_LINKS} GTest::gtest_main GTest::gmock)
   target_include_directories(test_${name} PRIVATE ${PROJECT_SOURCE_DIR}/tests)
   gtest_discover_tests(test_${name} TEST_PREFIX ${name}. DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 600)
+endfunction()
+
+# tunica_tool_test(NAME SCRIPT script.py [ARGUMENTS a...] [TIMEOUT s]): a Python program of the current folder that runs
+# the built tools. Python is Debian's own: its packages bring NumPy, h5py, NiBabel and VTK.
+function(tunica_tool_test name)
+  cmake_parse_arguments(arg "" "SCRIPT;TIMEOUT" "ARGUMENTS" TIMEOUT 600 ${ARGN})
+  add_test(NAME ${name} COMMAND /usr/bin/python3 -B ${CMAKE_CURRENT_SOURCE_DIR}/${arg_SCRIPT} ${arg_ARGUMENTS})
+  set(environment TUNICA_BIN=${PROJECT_BINARY_DIR}/bin TUNICA_BUILD=${PROJECT_BINARY_DIR}
+                  TUNICA_SOURCE=${PROJECT_SOURCE_DIR} TUNICA_SHARED_DATA=${TUNICA_SHARED_DATA}
+                  PYTHONPATH=${PROJECT_SOURCE_DIR}/tests/support CMAKE=${CMAKE_COMMAND})
+  set_tests_properties(${name} PROPERTIES LABELS whole_tool TIMEOUT ${arg_TIMEOUT} ENVIRONMENT "${environment}")
 endfunction()
