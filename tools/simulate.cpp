@@ -432,11 +432,12 @@ void simulate(cli::Tool& tool, const Arguments& a) {
 
   stage.emplace(tool, "write");
   ResultFile file(out, model, options);
+  const ElementFieldEvaluator fields(model);
   stage.emplace(tool, "solve");
   const auto on_state = [&](const State& state) {
     stage.emplace(tool, "write");
     report_state(tool.result(), model, state, dynamic != nullptr);
-    file.append(state, element_fields(model, state));
+    file.append(state, fields(state));
     stage.emplace(tool, "solve");
   };
   const Summary summary = naming(subject, [&] { return solve(model, scene.run, on_state, tool.progress("solve")); });

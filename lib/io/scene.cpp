@@ -363,6 +363,9 @@ void settle_solver(Scene& scene) {
   }
   run.solver = Solver::cg;
   run.cg_fixed_count = !scene.cg_tolerance_stated;
+  if (run.cg_fixed_count && !scene.run_places.keys.contains("newton_max")) {
+    run.newton_max = 1;  // the paper's: one linearisation per step, and that many iterations
+  }
 }
 
 void check_scene(const Scene& scene) {

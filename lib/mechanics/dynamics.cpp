@@ -1,6 +1,7 @@
 #include "core/error.hpp"
 #include "mechanics/rotation.hpp"
 #include "mechanics/run.hpp"
+#include "mechanics/settle.hpp"
 #include "mechanics/supports.hpp"
 
 #include <fmt/format.h>
@@ -18,6 +19,8 @@ using Clock = std::chrono::steady_clock;
 /// With one linearisation per step nothing brings the residual down: above this part of the forces the step means
 /// nothing.
 constexpr double largest_unchecked_residual = 0.5;
+/// Smallest part of a step's change that is tried on its own.
+constexpr double smallest_part = 1.0 / 256;
 
 Eigen::Index at(std::size_t node) { return 6 * static_cast<Eigen::Index>(node); }
 
@@ -46,45 +49,36 @@ public:
     }
   }
 
-  NewtonResult step(double time, double step, Motion& motion) {
-    const Configuration start = motion.configuration;
-    const VectorX before = motion.velocity;
+  struct StepResult {
+    NewtonResult newton;
+    double reached = 1;  ///< part of the step's change of load up to which solutions were found
+    bool ran_away = false;
+  };
+
+  /// One step. Where Newton's method does not lead from the state before to the end of the step at once, the step's
+  /// change (of loads, prescribed displacements, and what inertia leaves unbalanced at the start) is put on in parts;
+  /// where that path loses its stability the shell is let go, and creeps to where the step's forces are in balance.
+  StepResult step(double time, double step, Motion& motion) {
+    Step s{motion.configuration, motion.velocity, step, {}, load_factors(model_, false, time + step), {}, {}, {}};
+    // A load that is there from time 0 on comes onto a shell at rest without load.
+    s.factors_before = time > 0 ? load_factors(model_, false, time) : std::vector<double>(model_.loads.size(), 0.0);
     if (deformation_.empty()) {
-      evaluate(system_, model_, start, load_factors(model_, false, time), {}, forces_, nullptr);
+      evaluate(system_, model_, s.start, s.factors_before, {}, forces_, nullptr);
       deformation_ = forces_.deformation;
     }
-    const ViscousState viscous{run_.damping.stiffness / step, &deformation_};
-    const std::vector<double> factors = load_factors(model_, false, time + step);
-    VectorX velocity;
-    const auto balance = [&](const Configuration& c, BlockMatrix* tangent) {
-      evaluate(system_, model_, c, factors, viscous, forces_, tangent);
-      velocity_between(start, c, step, velocity);
-      const VectorX inertia = mass_.cwiseProduct((velocity - before) / step + run_.damping.mass * velocity);
-      if (tangent != nullptr) {
-        add_inertia(start, c, step, *tangent);
-      }
-      Balance result;
-      result.valid = forces_.valid;
-      result.unbalanced = forces_.external - forces_.internal - inertia;
-      VectorX reactions = forces_.internal + inertia;
-      for (std::size_t i = 0; i < system_.held.size(); ++i) {
-        if (!system_.held[i]) {
-          reactions[static_cast<Eigen::Index>(i)] = 0;
-        }
-      }
-      result.scale = std::max(
-          {force_norm(system_, forces_.external), force_norm(system_, inertia), force_norm(system_, reactions)});
-      result.floor = round_off(system_, c);
-      return result;
-    };
-    VectorX held = VectorX::Zero(before.size());
+    s.held = VectorX::Zero(motion.velocity.size());
     for (const PrescribedFreedom& p : system_.prescribed) {
       const Ramp& ramp = model_.fixes[p.fix].ramp;
-      held[static_cast<Eigen::Index>(p.freedom)] =
-          p.value * ramp.at(time + step) - start.displacement[p.freedom / 6][static_cast<Eigen::Index>(p.freedom % 6)];
+      s.held[static_cast<Eigen::Index>(p.freedom)] =
+          p.value * ramp.at(time + step) -
+          s.start.displacement[p.freedom / 6][static_cast<Eigen::Index>(p.freedom % 6)];
     }
-    const NewtonResult result = newton(system_, settings_, solver_, balance, held, matrix_, motion.configuration);
-    velocity_between(start, motion.configuration, step, motion.velocity);
+    StepResult result;
+    result.newton = run(s, 0, 1, motion.configuration);
+    if (settings_.newton_max > 1 && !settings_.cg_fixed_count && !acceptable(result.newton)) {
+      follow(s, result, motion.configuration);
+    }
+    velocity_between(s.start, motion.configuration, step, motion.velocity);
     for (const Piece& piece : system_.pieces) {
       if (held_by_rigid_motions(model_, piece.body)) {
         stop_rigid_motion(piece, step, motion);
@@ -100,6 +94,102 @@ public:
   [[nodiscard]] std::size_t freedom_count() const { return solver_.freedom_count(); }
 
 private:
+  struct Step {
+    Configuration start;
+    VectorX velocity_before;
+    double length = 0;  ///< s
+    std::vector<double> factors_before;
+    std::vector<double> factors;
+    VectorX held;           ///< prescribed displacements of the whole step
+    VectorX left_at_start;  ///< unbalanced forces of the start, for a path that begins there
+    VectorX velocity;
+  };
+
+  static bool acceptable(const NewtonResult& result) { return result.converged && result.valid && result.stable; }
+
+  /// Balance of the step with a part of its change; 1: the equation of the step itself.
+  Balance balance(Step& s, double part, const Configuration& c, BlockMatrix* tangent) {
+    const ViscousState viscous{run_.damping.stiffness / s.length, &deformation_};
+    std::vector<double> factors = s.factors;
+    for (std::size_t l = 0; part < 1 && l < factors.size(); ++l) {
+      factors[l] = s.factors_before[l] + part * (s.factors[l] - s.factors_before[l]);
+    }
+    evaluate(system_, model_, c, factors, viscous, forces_, tangent);
+    velocity_between(s.start, c, s.length, s.velocity);
+    const VectorX inertia =
+        mass_.cwiseProduct((s.velocity - s.velocity_before) / s.length + run_.damping.mass * s.velocity);
+    if (tangent != nullptr) {
+      add_inertia(s.start, c, s.length, *tangent);
+    }
+    Balance result;
+    result.valid = forces_.valid;
+    result.unbalanced = forces_.external - forces_.internal - inertia;
+    if (part < 1 && s.left_at_start.size() > 0) {
+      result.unbalanced -= (1 - part) * s.left_at_start;
+    }
+    VectorX reactions = forces_.internal + inertia;
+    for (std::size_t i = 0; i < system_.held.size(); ++i) {
+      if (!system_.held[i]) {
+        reactions[static_cast<Eigen::Index>(i)] = 0;
+      }
+    }
+    result.scale =
+        std::max({force_norm(system_, forces_.external), force_norm(system_, inertia), force_norm(system_, reactions)});
+    result.floor = round_off(system_, c);
+    return result;
+  }
+
+  NewtonResult run(Step& s, double from, double to, Configuration& configuration) {
+    const auto function = [&](const Configuration& c, BlockMatrix* tangent) { return balance(s, to, c, tangent); };
+    return newton(system_, settings_, solver_, function, (to - from) * s.held, matrix_, configuration);
+  }
+
+  void follow(Step& s, StepResult& result, Configuration& configuration) {
+    configuration = s.start;
+    s.left_at_start = balance(s, 0, configuration, nullptr).unbalanced;
+    double done = 0;
+    double part = 0.5;
+    NewtonResult attempted;
+    const auto count = [&] {
+      result.newton.iterations += attempted.iterations;
+      result.newton.cg_iterations += attempted.cg_iterations;
+    };
+    while (done < 1 && part >= smallest_part) {
+      const double next = std::min(1.0, done + part);
+      Configuration attempt = configuration;
+      attempted = run(s, done, next, attempt);
+      count();
+      if (acceptable(attempted)) {
+        configuration = std::move(attempt);
+        done = next;
+        part = std::min(2 * part, 0.5);
+      } else {
+        part /= 2;
+      }
+    }
+    result.reached = done;
+    if (done == 1) {
+      const auto [iterations, cg_iterations] = std::pair(result.newton.iterations, result.newton.cg_iterations);
+      result.newton = attempted;
+      result.newton.iterations = iterations;
+      result.newton.cg_iterations = cg_iterations;
+      return;
+    }
+    if (s.held.squaredNorm() > 0) {
+      return;
+    }
+    const auto whole = [&](const Configuration& c, BlockMatrix* tangent) { return balance(s, 1, c, tangent); };
+    const SettleResult settled = settle(system_, settings_, solver_, whole, matrix_, configuration);
+    result.ran_away = settled.ran_away;
+    result.newton.converged = settled.settled;
+    result.newton.stable = settled.settled;
+    result.newton.valid = settled.settled;
+    result.newton.linear_converged = settled.settled;
+    result.newton.residual = settled.residual;
+    result.newton.iterations += settled.iterations;
+    result.newton.cg_iterations += settled.cg_iterations;
+  }
+
   static void velocity_between(const Configuration& start, const Configuration& end, double step, VectorX& velocity) {
     velocity.resize(at(start.displacement.size()));
     for (std::size_t i = 0; i < start.displacement.size(); ++i) {
@@ -199,24 +289,36 @@ Summary run_dynamic(ShellSystem& system, const Model& model, const RunSettings& 
     const auto start = Clock::now();
     const bool last = s + 1 == steps;
     const double end = last ? run.duration : static_cast<double>(s + 1) * run.step;
-    const NewtonResult result = integrator.step(time, end - time, motion);
+    const auto [result, reached, ran_away] = integrator.step(time, end - time, motion);
     const bool one_linearisation = settings.newton_max == 1;
     const bool accepted = one_linearisation
                               ? (result.linear_converged || settings.cg_fixed_count) &&
                                     (result.residual <= largest_unchecked_residual || settings.cg_fixed_count)
-                              : result.converged || settings.cg_fixed_count;
+                              : (result.converged && result.stable) || settings.cg_fixed_count;
     if (!result.valid || !accepted) {
+      const std::vector<double> wanted_factors = load_factors(model, false, end);
+      std::vector<double> carried =
+          time > 0 ? load_factors(model, false, time) : std::vector<double>(wanted_factors.size(), 0.0);
+      for (std::size_t l = 0; l < carried.size(); ++l) {
+        carried[l] += reached * (wanted_factors[l] - carried[l]);
+      }
       throw RequirementError(
-          fmt::format("the step from {:.6g} s to {:.6g} s {} (relative residual {:.3g} after {} iterations): take a "
-                      "smaller step, a "
-                      "ramp or damping; the last good state is at {:.6g} s",
-                      time, end, result.valid ? "did not converge" : "made elements collapse or fold", result.residual,
-                      result.iterations, time));
+          reached < 1
+              ? fmt::format(
+                    "no equilibrium in the step from {:.6g} s to {:.6g} s: the limit load is reached at "
+                    "{:.3g} of its change of load ({}); beyond it {}; the last good state is at {:.6g} s",
+                    time, end, reached, describe_loads(model, carried, wanted_factors),
+                    ran_away ? "the shell yields without bound" : "no state was found that the shell could rest in",
+                    time)
+              : fmt::format("the step from {:.6g} s to {:.6g} s {} (relative residual {:.3g} after {} "
+                            "iterations): take a smaller step, a ramp or damping; the last good state is at {:.6g} s",
+                            time, end, result.valid ? "did not converge" : "made elements collapse or fold",
+                            result.residual, result.iterations, time));
     }
     time = end;
     const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
     const bool wanted = (s + 1) % settings.every == 0 || last;
-    state = make_state(system, model, motion.configuration, time);
+    state = wanted ? make_state(system, model, motion.configuration, time) : State();
     state.residual = result.residual;
     state.newton_iterations = result.iterations;
     state.cg_iterations = result.cg_iterations;

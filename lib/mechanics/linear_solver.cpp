@@ -11,8 +11,12 @@
 
 #include <cmath>
 
-// Only OpenBLAS has it; another BLAS keeps its own setting.
-extern "C" void openblas_set_num_threads(int) __attribute__((weak));
+// Only OpenBLAS has the first, and only OpenMP's own library the others; what is not there keeps its own setting.
+extern "C" {
+void openblas_set_num_threads(int) __attribute__((weak));
+void omp_set_max_active_levels(int) __attribute__((weak));
+int omp_get_max_active_levels() __attribute__((weak));
+}
 
 namespace tunica {
 
@@ -23,6 +27,37 @@ void mask(const FreeMask& free, VectorX& v) {
     }
   }
 }
+
+namespace {
+
+/// How many threads CHOLMOD and the BLAS under it take while this lives. CHOLMOD opens parallel regions of four threads
+/// whatever the machine has: with a small factor, or when fewer were asked for, they only wait for each other.
+class FactorThreads {
+public:
+  explicit FactorThreads(std::size_t freedoms) {
+    constexpr std::size_t worth_sharing = 30'000;
+    const std::size_t count = freedoms < worth_sharing ? 1 : thread_count();
+    if (openblas_set_num_threads != nullptr) {
+      openblas_set_num_threads(static_cast<int>(count));
+    }
+    if (omp_set_max_active_levels != nullptr && omp_get_max_active_levels != nullptr) {
+      levels_ = omp_get_max_active_levels();
+      omp_set_max_active_levels(count == 1 ? 0 : *levels_);
+    }
+  }
+  ~FactorThreads() {
+    if (levels_) {
+      omp_set_max_active_levels(*levels_);
+    }
+  }
+  FactorThreads(const FactorThreads&) = delete;
+  FactorThreads& operator=(const FactorThreads&) = delete;
+
+private:
+  std::optional<int> levels_;
+};
+
+}  // namespace
 
 struct DirectSolver::Implementation {
   cholmod_common common{};
@@ -114,11 +149,7 @@ DirectSolver::DirectSolver(DirectSolver&&) noexcept = default;
 
 DirectSolver::Factored DirectSolver::factor(const BlockMatrix& matrix) {
   Implementation& s = *implementation_;
-  if (openblas_set_num_threads != nullptr) {
-    // The dense blocks of a small factor are too small to share: waiting for each other costs more than it gives.
-    constexpr std::size_t worth_sharing = 30'000;
-    openblas_set_num_threads(s.freedoms.size() < worth_sharing ? 1 : static_cast<int>(thread_count()));
-  }
+  const FactorThreads threads(s.freedoms.size());
   auto* const values = static_cast<double*>(s.matrix->x);
   const double* const blocks = matrix.values.data();
   parallel_for_blocks(s.source.size(), 65536, [&](std::size_t begin, std::size_t end) {
@@ -161,6 +192,7 @@ DirectSolver::Factored DirectSolver::factor(const BlockMatrix& matrix) {
 
 void DirectSolver::solve(const VectorX& b, VectorX& x) {
   Implementation& s = *implementation_;
+  const FactorThreads threads(s.freedoms.size());
   auto* const right = static_cast<double*>(s.right->x);
   for (std::size_t k = 0; k < s.freedoms.size(); ++k) {
     right[k] = b[s.freedoms[k]];

@@ -39,7 +39,7 @@ std::size_t TangentSolver::freedom_count() const {
   return static_cast<std::size_t>(std::count(free_.begin(), free_.end(), true));
 }
 
-TangentSolver::Result TangentSolver::solve(BlockMatrix& matrix, const VectorX& b, VectorX& x) {
+TangentSolver::Result TangentSolver::solve(BlockMatrix& matrix, const VectorX& b, VectorX& x, bool same_matrix) {
   Result result;
   if (freedom_count() == 0) {
     x.setZero(b.size());
@@ -56,11 +56,13 @@ TangentSolver::Result TangentSolver::solve(BlockMatrix& matrix, const VectorX& b
     result.cg_iterations = cg.iterations;
     return result;
   }
-  const DirectSolver::Factored factored = direct_->factor(matrix);
-  if (!factored.regular) {
+  if (!same_matrix) {
+    factored_ = direct_->factor(matrix);
+  }
+  if (!factored_.regular) {
     return result;
   }
-  result.positive_definite = factored.negative_pivots == 0;
+  result.positive_definite = factored_.negative_pivots == 0;
   direct_->solve(b, x);
   if (!x.allFinite()) {
     return result;

@@ -21,7 +21,8 @@ public:
   };
   /// Solves matrix x = b on the free freedoms. The direct solver also follows the unsymmetric part of the matrix.
   /// The cg solver symmetrises `matrix` in place.
-  Result solve(BlockMatrix& matrix, const VectorX& b, VectorX& x);
+  /// @param same_matrix  the values are those of the last call: the factor at hand is used again
+  Result solve(BlockMatrix& matrix, const VectorX& b, VectorX& x, bool same_matrix = false);
 
   [[nodiscard]] const FreeMask& free() const { return free_; }
   [[nodiscard]] std::size_t freedom_count() const;
@@ -30,6 +31,7 @@ private:
   const RunSettings& settings_;
   FreeMask free_;
   std::optional<DirectSolver> direct_;
+  DirectSolver::Factored factored_;
 };
 
 /// What keeps a configuration from equilibrium.

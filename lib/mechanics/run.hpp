@@ -11,7 +11,12 @@ using StateCallback = std::function<void(const State&)>;
 /// Everything of a state that follows from the configuration.
 State make_state(const ShellSystem& system, const Model& model, const Configuration& configuration, double time);
 
-/// Collects what solve() returns from the steps of a run.
+/// What the loads amount to, for a message: the pressures reached of those wanted with the thinnest wall they act on,
+/// or the factor of the loads where there is none.
+std::string describe_loads(const Model& model, const std::vector<double>& reached, const std::vector<double>& wanted);
+
+/// Collects what solve() returns from the steps of a run; a state without displacements (not handed over, and not the
+/// last) adds its counts only.
 void record_step(const State& state, double seconds, Summary& summary);
 
 /// Load steps, each with Newton's method until it converges. Errors: RequirementError.

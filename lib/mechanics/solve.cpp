@@ -4,6 +4,8 @@
 #include "mechanics/rotation.hpp"
 #include "mechanics/run.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 namespace tunica {
@@ -32,19 +34,38 @@ State make_state(const ShellSystem& system, const Model& model, const Configurat
   return state;
 }
 
+std::string describe_loads(const Model& model, const std::vector<double>& reached, const std::vector<double>& wanted) {
+  std::string text;
+  for (std::size_t l = 0; l < model.loads.size(); ++l) {
+    if (const auto* pressure = std::get_if<PressureLoad>(&model.loads[l].kind)) {
+      const ShellBody& body = model.shells[model.loads[l].body];
+      text += fmt::format("{}{:.4g} kPa of {:.4g} kPa on {}, {:.4g} mm thick{}", text.empty() ? "" : "; ",
+                          1e3 * reached[l] * pressure->value, 1e3 * wanted[l] * pressure->value, body.name,
+                          *std::min_element(body.thickness.begin(), body.thickness.end()),
+                          body.thickness.size() > 1 ? " at its thinnest" : "");
+    }
+  }
+  return text.empty() ? fmt::format("{:.4g} of {:.4g} times the loads", reached.empty() ? 0 : reached.front(),
+                                    wanted.empty() ? 0 : wanted.front())
+                      : text;
+}
+
 void record_step(const State& state, double seconds, Summary& summary) {
   ++summary.steps;
   summary.converged = state.converged && (summary.steps == 1 || summary.converged);
   summary.residual = state.residual;
   summary.newton_iterations += state.newton_iterations;
   summary.cg_iterations += state.cg_iterations;
+  summary.seconds_per_step.push_back(seconds);
+  if (state.displacement.empty()) {
+    return;
+  }
   summary.volume_after = state.volume;
   summary.strain_energy = state.strain_energy;
   summary.max_displacement = 0;
   for (const Vec3& u : state.displacement) {
     summary.max_displacement = std::max(summary.max_displacement, u.norm());
   }
-  summary.seconds_per_step.push_back(seconds);
 }
 
 Summary solve(const Model& model, const RunSettings& settings, const std::function<void(const State&)>& on_state,
@@ -59,11 +80,22 @@ Summary solve(const Model& model, const RunSettings& settings, const std::functi
                     : run_static(system, model, settings, run, on_state, progress);
 }
 
-ElementFields element_fields(const Model& model, const State& state) {
+struct ElementFieldEvaluator::Implementation {
+  const Model& model;
+  ShellSystem system;
+};
+
+ElementFieldEvaluator::ElementFieldEvaluator(const Model& model)
+    : implementation_(new Implementation{model, make_system(model)}) {}
+ElementFieldEvaluator::~ElementFieldEvaluator() = default;
+
+ElementFields element_fields(const Model& model, const State& state) { return ElementFieldEvaluator(model)(state); }
+
+ElementFields ElementFieldEvaluator::operator()(const State& state) const {
+  const auto& [model, system] = *implementation_;
   ElementFields fields;
   const std::size_t nodes = model.node_count();
   TUNICA_ASSERT(state.displacement.size() == nodes && state.rotation.size() == nodes);
-  const ShellSystem system = make_system(model);
   std::vector<double> pressure(model.shells.size(), 0);
   for (const Load& load : model.loads) {
     if (const auto* p = std::get_if<PressureLoad>(&load.kind)) {

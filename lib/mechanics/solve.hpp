@@ -4,6 +4,7 @@
 #include "mechanics/model.hpp"
 
 #include <functional>
+#include <memory>
 #include <optional>
 
 namespace tunica {
@@ -62,7 +63,23 @@ void check_model(const Model& model, const RunSettings& settings);
 Summary solve(const Model& model, const RunSettings& settings, const std::function<void(const State&)>& on_state,
               const Progress& progress = {});
 
-/// Forces, moments and stresses of every triangle in one state.
+/// Forces, moments and stresses of every triangle in one state. For many states of one model: the elements are made
+/// ready once. The model must outlive it.
+class ElementFieldEvaluator {
+public:
+  explicit ElementFieldEvaluator(const Model& model);
+  ~ElementFieldEvaluator();
+  ElementFieldEvaluator(const ElementFieldEvaluator&) = delete;
+  ElementFieldEvaluator& operator=(const ElementFieldEvaluator&) = delete;
+
+  [[nodiscard]] ElementFields operator()(const State& state) const;
+
+private:
+  struct Implementation;
+  std::unique_ptr<Implementation> implementation_;
+};
+
+/// The same for one state.
 ElementFields element_fields(const Model& model, const State& state);
 
 }  // namespace tunica

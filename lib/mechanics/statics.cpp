@@ -1,12 +1,15 @@
 #include "core/error.hpp"
 #include "mechanics/rotation.hpp"
 #include "mechanics/run.hpp"
+#include "mechanics/settle.hpp"
 #include "mechanics/supports.hpp"
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 
 namespace tunica {
 namespace {
@@ -20,6 +23,11 @@ constexpr double smallest_part = 1.0 / 1024;
 /// A step whose change is more than this times its linear prediction has left the path: up to a limit point a quadratic
 /// fold gives at most 2.
 constexpr double largest_departure = 3;
+/// A shell that gives way by less than this part of its thickness (root mean square) has branched off its path, not
+/// jumped.
+constexpr double largest_branch = 0.25;
+/// Part of the thickness by which a shell is pushed off a path that it may leave.
+constexpr double nudge = 0.01;
 /// Net load that the supports of a body held by its rigid motions may carry, relative to the load.
 constexpr double largest_imbalance = 1e-3;
 
@@ -90,6 +98,16 @@ public:
     return result;
   }
 
+  /// Where the path has lost its stability: pushes the shell off it, and lets it creep to where it can rest.
+  SettleResult let_go(double factor, double thickness, Configuration& configuration) {
+    const auto balance = [&](const Configuration& c, BlockMatrix* tangent) {
+      return static_balance(system_, model_, c, factor, forces_, tangent);
+    };
+    advance_configuration(configuration,
+                          nudge * thickness * weakest_direction(system_, solver_, balance, matrix_, configuration));
+    return settle(system_, settings_, solver_, balance, matrix_, configuration);
+  }
+
   [[nodiscard]] std::size_t freedom_count() const { return solver_.freedom_count(); }
 
 private:
@@ -124,18 +142,36 @@ private:
   Forces forces_;
 };
 
-std::string why(const NewtonResult& result, bool left_the_path) {
-  if (left_the_path) {
-    return "limit load: the shell would jump to a distant shape (snap-through)";
+double least_thickness(const Model& model) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const ShellBody& body : model.shells) {
+    least = std::min(least, *std::min_element(body.thickness.begin(), body.thickness.end()));
   }
-  if (result.converged && !result.stable) {
-    return "unstable: equilibrium exists but the shell would leave it (buckling)";
+  return least;
+}
+
+/// Root mean square over the nodes.
+double distance(const Configuration& a, const Configuration& b) {
+  double sum = 0;
+  for (std::size_t i = 0; i < a.displacement.size(); ++i) {
+    sum += (a.displacement[i] - b.displacement[i]).squaredNorm();
   }
-  if (!result.valid) {
-    return "no equilibrium: elements collapse or fold";
+  return std::sqrt(sum / static_cast<double>(a.displacement.size()));
+}
+
+std::string why(const NewtonResult& result, const SettleResult& let_go) {
+  if (let_go.ran_away) {
+    return "limit load: beyond it there is no equilibrium, the shell yields without bound";
   }
-  return result.stable ? "no equilibrium was found: not converged"
-                       : "no equilibrium: the limit load is reached, the stiffness is no longer positive";
+  if (let_go.settled) {
+    return "limit load: beyond it the shell jumps to a distant shape (snap-through or buckling), which a dynamic run "
+           "follows";
+  }
+  if (!result.stable) {
+    return "limit load: the stiffness is no longer positive, and no state was found in which the shell could rest";
+  }
+  return result.valid ? "Newton's method does not converge although the stiffness is positive"
+                      : "elements collapse or fold";
 }
 
 }  // namespace
@@ -152,6 +188,7 @@ Summary run_static(ShellSystem& system, const Model& model, const RunSettings& s
   summary.volume_before = state.volume;
   summary.volume_after = state.volume;
 
+  const double thickness = least_thickness(model);
   double factor = 0;
   double part = 1;
   for (std::size_t s = 0; s < run.load_factors.size(); ++s) {
@@ -178,11 +215,28 @@ Summary run_static(ShellSystem& system, const Model& model, const RunSettings& s
         continue;
       }
       part /= 2;
-      if (part < smallest_part) {
-        throw RequirementError(fmt::format(
-            "no stable static equilibrium beyond load factor {:.6g} of {:.6g}: {}; the last good state is at {:.6g}",
-            factor, run.load_factors.back(), why(result, result.converged && left_the_path), factor));
+      if (part >= smallest_part) {
+        continue;
       }
+      const double beyond = std::min(target, factor + 4 * smallest_part * whole);
+      attempt = configuration;
+      const SettleResult let_go = step.let_go(beyond, thickness, attempt);
+      newton_iterations += let_go.iterations;
+      cg_iterations += let_go.cg_iterations;
+      if (!let_go.settled || distance(attempt, configuration) > largest_branch * thickness) {
+        throw RequirementError(
+            fmt::format("no stable static equilibrium beyond load factor {:.6g} of {:.6g} ({}): {}; the last good "
+                        "state is at {:.6g}",
+                        factor, run.load_factors.back(),
+                        describe_loads(model, load_factors(model, true, factor),
+                                       load_factors(model, true, run.load_factors.back())),
+                        why(result, let_go), factor));
+      }
+      configuration = std::move(attempt);
+      factor = beyond;
+      part = 4 * smallest_part;
+      result.residual = let_go.residual;
+      result.converged = true;
     }
     state = make_state(system, model, configuration, factor);
     state.load_factor = factor;
@@ -226,7 +280,7 @@ Summary run_linear(ShellSystem& system, const Model& model, const RunSettings& s
     VectorX right = forces.external - product;
     mask(solver.free(), right);
     VectorX solution;
-    const TangentSolver::Result solved = solver.solve(matrix, right, solution);
+    const TangentSolver::Result solved = solver.solve(matrix, right, solution, s > 0);
     if (!solved.solved || !solved.positive_definite) {
       throw RequirementError(
           "the linear stiffness is not positive definite: the model is not held, or its elements are "
