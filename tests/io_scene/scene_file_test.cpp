@@ -85,6 +85,7 @@ TEST_F(SceneTest, everyKeyOfADynamicRunArrives) {
 TEST_F(SceneTest, aCountOfIterationsAloneIsAFixedCount) {
   const Scene alone = read("[run]\nkind = \"static\"\ncg_iterations = 100\n" + std::string(plate));
   EXPECT_TRUE(alone.run.cg_fixed_count);
+  EXPECT_EQ(alone.run.newton_max, 1U);  // one linearisation per step
   EXPECT_EQ(alone.run.solver, Solver::cg);
   const Scene both = read("[run]\nkind = \"static\"\ncg_iterations = 100\ncg_tolerance = 1e-6\n" + std::string(plate));
   EXPECT_FALSE(both.run.cg_fixed_count);

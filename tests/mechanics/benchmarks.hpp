@@ -98,6 +98,42 @@ inline ShellMesh make_sphere(double radius, int levels) {
   return mesh;
 }
 
+/// An open vessel with an aneurysm: radius 10 + 10 exp(-((z - 30) / 10)^2) ((1 + cos angle) / 2)^2 mm, z in [0, 60] mm,
+/// odd rows shifted by half a cell; 2 x around x along triangles, the surface's normals.
+inline ShellMesh make_vessel(std::size_t around, std::size_t along) {
+  const auto point = [](double angle, double z) {
+    const double c = (1 + std::cos(angle)) / 2;
+    const double r = 10 + 10 * std::exp(-(z - 30) * (z - 30) / 100) * c * c;
+    return Vec3(r * std::cos(angle), r * std::sin(angle), z);
+  };
+  ShellMesh mesh;
+  for (std::size_t j = 0; j <= along; ++j) {
+    for (std::size_t i = 0; i < around; ++i) {
+      const double angle = 2 * pi * (static_cast<double>(i) + (j % 2 == 1 ? 0.5 : 0)) / static_cast<double>(around);
+      const double z = 60 * static_cast<double>(j) / static_cast<double>(along);
+      constexpr double d = 1e-5;
+      mesh.vertices.push_back(point(angle, z));
+      const Vec3 around_tangent = point(angle + d, z) - point(angle - d, z);
+      const Vec3 along_tangent = point(angle, z + d) - point(angle, z - d);
+      mesh.normals.push_back(around_tangent.cross(along_tangent).normalized());
+    }
+  }
+  for (std::size_t j = 0; j < along; ++j) {
+    for (std::size_t i = 0; i < around; ++i) {
+      const auto a = static_cast<Index>(j * around + i);
+      const auto b = static_cast<Index>(j * around + (i + 1) % around);
+      const auto c = static_cast<Index>(a + around);
+      const auto d = static_cast<Index>(b + around);
+      if (j % 2 == 0) {
+        mesh.triangles.insert(mesh.triangles.end(), {{a, b, c}, {b, d, c}});
+      } else {
+        mesh.triangles.insert(mesh.triangles.end(), {{a, b, d}, {a, d, c}});
+      }
+    }
+  }
+  return mesh;
+}
+
 inline ShellBody flat_body(ShellMesh mesh, double young, double poisson, double thickness) {
   ShellBody body;
   body.name = "shell";
