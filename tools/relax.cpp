@@ -27,11 +27,11 @@ struct Arguments {
   fs::path coarse, target, out;
   std::optional<fs::path> map, picture, curved;
   std::optional<LengthTolerance> tolerance;
-  std::string method = "barycentre";
+  std::string method = "fit";
   std::string surface = "comas";
   std::optional<std::string> mesh_unit;
   bool refine = false;
-  std::optional<std::size_t> max_shells;
+  std::optional<std::size_t> shells, max_shells;
   std::optional<int> max_iterations;
 };
 
@@ -43,12 +43,18 @@ void declare(cli::Tool& tool, Arguments& given) {
   tool.tolerance("--tolerance", given.tolerance,
                  "stop when the two-sided distance is certainly below it, e.g. 0.5% of the target's diagonal or 0.2mm; "
                  "exit code 4 when it cannot be reached");
-  app.add_option("--method", given.method, "how nodes move: barycentre (the paper's rule)")
+  app.add_option("--method", given.method,
+                 "fit (least error: positions, normals and connectivity are chosen together; the default) or "
+                 "barycentre (the paper's rule)")
       ->check(CLI::IsMember({"barycentre", "fit"}));
   app.add_option("--surface", given.surface, "the patch: comas (the paper's 9-term cubic)")
       ->check(CLI::IsMember({"comas", "watertight"}));
   app.add_flag("--refine", given.refine,
                "split shells where the distance is above the tolerance; without one, all 1:4");
+  app.add_option("--shells", given.shells,
+                 "fit: at most N shells instead of as many as COARSE has (with --tolerance: as few as it takes)")
+      ->check(CLI::PositiveNumber)
+      ->type_name("N");
   app.add_option("--max-shells", given.max_shells, "at most N shells")->check(CLI::PositiveNumber)->type_name("N");
   app.add_option("--max-iterations", given.max_iterations, "at most N iterations (20, with --refine 60)")
       ->check(CLI::Range(1, 100000))
@@ -58,20 +64,24 @@ void declare(cli::Tool& tool, Arguments& given) {
   app.add_option("--picture", given.picture, "picture of the error map, PNG")->type_name("OUT.png");
   app.add_option("--curved", given.curved, "the curved surface as a fine triangle mesh, PLY")->type_name("OUT.ply");
   app.add_option("--mesh-unit", given.mesh_unit, "unit of OBJ, STL and OFF files: mm, cm, m or um")->type_name("UNIT");
-  tool.not_yet("--shells");
 }
 
 void refuse_contradictions(const Arguments& given) {
-  if (given.method == "fit") {
-    throw UsageError("--method fit is not available yet; use barycentre");
+  const bool fit = given.method == "fit";
+  if (given.shells && !fit) {
+    throw UsageError(
+        "--shells belongs to --method fit; barycentre has as many shells as COARSE, or with --refine more");
+  }
+  if (given.shells && given.max_shells) {
+    throw UsageError("--shells and --max-shells say the same to --method fit; give one of them");
   }
   if (given.surface == "watertight") {
     throw UsageError("--surface watertight is not available yet; use comas");
   }
-  if (given.max_shells && !given.refine) {
+  if (given.max_shells && !given.refine && !fit) {
     throw UsageError("--max-shells limits --refine; without it the number of shells does not change");
   }
-  if (given.refine && !given.tolerance && !given.max_shells && !given.max_iterations) {
+  if (given.refine && !fit && !given.tolerance && !given.max_shells && !given.max_iterations) {
     throw UsageError("--refine needs to know where to end: --tolerance, --max-shells or --max-iterations");
   }
 }
@@ -184,7 +194,9 @@ void run(cli::Tool& tool, const Arguments& given) {
   };
   ShellMesh best;
   RelaxOptions options;
+  options.method = given.method == "fit" ? RelaxMethod::fit : RelaxMethod::barycentre;
   options.refine = given.refine;
+  options.shells = given.shells;
   options.max_shells = given.max_shells;
   options.max_iterations = given.max_iterations;
   options.width = interval_width * diagonal;

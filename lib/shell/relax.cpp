@@ -2,6 +2,7 @@
 
 #include "core/error.hpp"
 #include "shell/curved_surface.hpp"
+#include "shell/fit.hpp"
 #include "shell/mend.hpp"
 #include "shell/refine.hpp"
 
@@ -121,6 +122,8 @@ private:
       case RelaxMethod::barycentre:
         iteration.moves = move_by_barycentre(target_, mesh, off_target);
         break;
+      case RelaxMethod::fit:  // chooses its own mesh: see relax()
+        break;
     }
     result_.flips += flip_upright_triangles(target_, mesh);
     const Mending mending = mend(target_, mesh, off_target, mend_limits());
@@ -210,7 +213,7 @@ private:
 }  // namespace
 
 RelaxResult relax(const TriangleMesh& coarse, const Target& target, const RelaxOptions& options) {
-  return Relaxation(coarse, target, options).run();
+  return options.method == RelaxMethod::fit ? fit(coarse, target, options) : Relaxation(coarse, target, options).run();
 }
 
 }  // namespace tunica

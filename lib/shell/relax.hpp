@@ -16,6 +16,7 @@ namespace tunica {
 /// How the nodes are moved; normals and measuring are the same for all.
 enum class RelaxMethod {
   barycentre,  ///< the paper's rule
+  fit,         ///< the least-error fit, see fit.hpp
 };
 
 /// One iteration: nodes moved, normals chosen, distance measured.
@@ -30,7 +31,8 @@ struct RelaxOptions {
   RelaxMethod method = RelaxMethod::barycentre;
   std::optional<double> tolerance;        ///< mm: done when the two-sided distance is certainly at most this
   bool refine = false;                    ///< split where the distance is above the tolerance; without one, everywhere
-  std::optional<std::size_t> max_shells;  ///< for refine
+  std::optional<std::size_t> max_shells;  ///< for refine and fit
+  std::optional<std::size_t> shells;      ///< for fit: at most this many instead of as many as COARSE has
   std::optional<int> max_iterations;      ///< none: 20, with refine 60
   std::optional<double> width;            ///< mm: of the measured intervals; none: 0.01 % of the target's diagonal
   /// Tells how it goes; the mesh is the best one until then.

@@ -1,0 +1,282 @@
+#include "shell/fit.hpp"
+
+#include "core/threads.hpp"
+#include "shell/curved_surface.hpp"
+#include "shell/fit_edit.hpp"
+#include "shell/fit_start.hpp"
+#include "surface/closest_point.hpp"
+#include "surface/decimate.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+namespace tunica {
+namespace {
+
+constexpr double default_width = 1e-4;  // of the diagonal
+constexpr int default_rounds = 8;
+constexpr double start_error = 3;      // tolerances: flat error of the mesh that the search starts from
+constexpr double expected_gain = 3;    // shells of the start per shell of the result
+constexpr double start_surplus = 1.5;  // triangles of the start per shell wanted
+constexpr double margin = 0.97;        // of the tolerance: what samples miss
+constexpr double worth_it = 0.985;     // a round that leaves more than this of the count or error is the last
+constexpr int most_repairs = 12;
+constexpr int certificates = 6;
+constexpr std::size_t checked_points = 200'000;  // of the target, for places that the samples miss
+constexpr int checking_level = 6;                // pieces per edge of the patches there
+
+class Fitting {
+public:
+  Fitting(const TriangleMesh& coarse, const Target& target, const RelaxOptions& options)
+      : coarse_(coarse),
+        target_(target),
+        options_(options),
+        width_(options.width.value_or(default_width * target.diagonal())) {
+    if (options.tolerance) {
+      width_ = std::min(width_, *options.tolerance / 20);
+    }
+  }
+
+  RelaxResult run() {
+    const std::size_t shells = options_.shells.value_or(options_.max_shells.value_or(coarse_.triangles.size()));
+    if (options_.tolerance) {
+      to_tolerance(*options_.tolerance);
+    } else {
+      to_count(shells);
+    }
+    if (options_.tolerance) {
+      const std::size_t most = options_.shells.value_or(options_.max_shells.value_or(max_index));
+      result_.reached = result_.distance.both.upper <= *options_.tolerance && result_.shell.triangles.size() <= most;
+      result_.stopped = *result_.reached ? "the tolerance holds" : "no fewer shells were found for the tolerance";
+    }
+    return std::move(result_);
+  }
+
+private:
+  void to_tolerance(double tolerance) {
+    const std::size_t most = options_.shells.value_or(options_.max_shells.value_or(max_index));
+    const FitStart start = start_of_fit(coarse_, target_, {}, start_error * tolerance);
+    FitSamples samples(target_, guess(start.mesh.triangles.size() / expected_gain));
+    FitState state(samples, prepare_fit(start.mesh, target_), {});
+    smooth(state);
+    const int rounds = options_.max_iterations.value_or(default_rounds);
+    double limit = margin * tolerance;
+    repair(state, limit, most);
+    FitState best = state;
+    for (int round = 0; round < rounds; ++round) {
+      advance(options_.progress, static_cast<double>(round) / rounds);
+      const std::size_t before = state.mesh.alive;
+      collapse_edges(state, limit, 4, {});
+      polish(state, limit, 3);
+      repair(state, limit, most);
+      note(state);
+      const bool fits = state.error() <= limit;
+      if (fits && (state.mesh.alive < best.mesh.alive || best.error() > limit)) {
+        best = state;
+      }
+      if (static_cast<double>(state.mesh.alive) > worth_it * static_cast<double>(before)) {
+        break;
+      }
+    }
+    // What the samples miss is found now, added to them, and mended.
+    state = std::move(best);
+    for (int i = 0; i < certificates; ++i) {
+      if (certify(state, tolerance)) {
+        break;
+      }
+      const std::size_t added = add_missed(samples, state, margin * tolerance);
+      limit *= added > 0 ? 0.995 : 0.97;
+      state.attach();
+      state.measure();
+      polish(state, limit, 2);
+      repair(state, limit, most);
+    }
+    no_worse_than_flat(tolerance, most, start);
+  }
+
+  void to_count(std::size_t shells) {
+    FitStart start =
+        start_of_fit(coarse_, target_, static_cast<std::size_t>(start_surplus * static_cast<double>(shells)), 0);
+    FitSamples samples(target_, guess(static_cast<double>(shells)));
+    FitState state(samples, prepare_fit(start.mesh, target_), {});
+    smooth(state);
+    constexpr double any = std::numeric_limits<double>::infinity();
+    collapse_edges(state, any, shells, {});
+    polish(state, state.error(), 4);
+    note(state);
+    FitState best = state;
+    const int rounds = options_.max_iterations.value_or(default_rounds);
+    int fruitless = 0;
+    for (int round = 1; round < rounds && fruitless < 2; ++round) {
+      advance(options_.progress, static_cast<double>(round) / rounds);
+      const double error = state.error();
+      split_worst(state, 0.7 * error, std::max<std::size_t>(1, shells / 40));
+      polish(state, error, 1);
+      collapse_edges(state, any, shells, {});
+      polish(state, error, 3);
+      note(state);
+      fruitless = state.error() < worth_it * best.error() ? 0 : fruitless + 1;
+      if (state.mesh.alive <= shells && state.error() < best.error()) {
+        best = state;
+      }
+    }
+    for (int i = 0; i < 3; ++i) {
+      certify(best, std::nullopt);
+      if (result_.distance.both.lower <= 1.1 * best.error() || add_missed(samples, best, best.error()) == 0) {
+        break;
+      }
+      best.attach();
+      best.measure();
+      polish(best, best.error(), 3);
+    }
+    result_.stopped = fruitless < 2 ? "the limit of rounds was reached" : "further rounds bring nothing";
+    no_worse_than_flat({}, shells, start);
+  }
+
+  static std::size_t guess(double shells) { return static_cast<std::size_t>(std::max(8.0, shells)); }
+
+  /// From slivers to triangles that carry patches.
+  static void smooth(FitState& state) {
+    state.attach();
+    state.measure();
+    for (int i = 0; i < 3; ++i) {
+      flip_edges(state, std::numeric_limits<double>::infinity());
+      state.solve(2, 3);
+      state.attach();
+      state.measure();
+    }
+  }
+
+  static void polish(FitState& state, double limit, int steps) {
+    for (int i = 0; i < steps; ++i) {
+      state.attach();
+      state.measure();
+      flip_edges(state, limit);
+      state.solve(i == 0 ? 4 : 8, 1);
+    }
+    place_worst(state, 0.9 * limit);
+    state.attach();
+    state.measure();
+  }
+
+  static void repair(FitState& state, double limit, std::size_t most) {
+    for (int i = 0; i < most_repairs && state.error() > limit && state.mesh.alive + 2 <= most; ++i) {
+      const std::size_t some = std::max<std::size_t>(1, std::min(state.mesh.alive / 20, (most - state.mesh.alive) / 2));
+      if (split_worst(state, limit, i < 2 ? std::max<std::size_t>(some, state.mesh.alive / 4) : some) == 0) {
+        break;
+      }
+      polish(state, limit, 2);
+    }
+  }
+
+  /// Points of the target farther from the curved surface than `limit` join the samples.
+  std::size_t add_missed(FitSamples& samples, const FitState& state, double limit) const {
+    const Tessellation fine = tessellate_uniformly(state.mesh.shell(), checking_level);
+    const ClosestPoint tree(fine.mesh);
+    const auto& vertices = target_.mesh().vertices;
+    const std::size_t stride = std::max<std::size_t>(1, vertices.size() / checked_points);
+    std::vector<std::uint8_t> missed(vertices.size() / stride + 1, 0);
+    parallel_for_blocks(vertices.size() / stride, 512, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        missed[i] = tree.closest(vertices[i * stride]).squared_distance > limit * limit;
+      }
+    });
+    std::size_t added = 0;
+    for (std::size_t i = 0; i * stride < vertices.size(); ++i) {
+      if (missed[i] != 0) {
+        samples.add(vertices[i * stride]);
+        ++added;
+      }
+    }
+    return added;
+  }
+
+  /// Takes the mesh as the result when it is better. @return whether the tolerance certainly holds
+  bool certify(const FitState& state, std::optional<double> tolerance) {
+    ShellMesh shell = state.mesh.shell();
+    ShellDistanceOptions measuring;
+    measuring.width = std::max(width_, state.error() / 50);
+    measuring.limit = tolerance;
+    ShellDistance distance = shell_distance(shell, target_, measuring);
+    const bool holds = tolerance && distance.both.upper <= *tolerance;
+    if (holds || result_.shell.triangles.empty() || distance.both.upper < result_.distance.both.upper) {
+      result_.shell = std::move(shell);
+      result_.distance = distance;
+    }
+    return holds;
+  }
+
+  /// Flat facets instead, where they do better.
+  void no_worse_than_flat(std::optional<double> tolerance, std::size_t most, const FitStart& start) {
+    if (start.own_topology) {
+      return;
+    }
+    const bool holds = tolerance && result_.distance.both.upper <= *tolerance;
+    // Flat errors fall as 1 / count: far from that nothing needs to be tried.
+    const double flat_count =
+        tolerance ? static_cast<double>(start.mesh.triangles.size()) * start.flat_error / *tolerance : 0;
+    if (holds && static_cast<double>(result_.shell.triangles.size()) < 0.6 * flat_count) {
+      return;
+    }
+    if (!tolerance && result_.distance.both.upper < start.flat_error) {
+      return;
+    }
+    DecimateOptions decimating;
+    decimating.max_error = tolerance;
+    if (!tolerance) {
+      decimating.triangles = most;
+    }
+    const DecimateResult flat = decimate(target_.mesh(), decimating);
+    ShellMesh shell;
+    shell.vertices = flat.mesh.vertices;
+    shell.triangles = flat.mesh.triangles;
+    shell.normals = vertex_normals(flat.mesh);
+    for (const Vec3& n : facet_normals(flat.mesh)) {
+      shell.corner_normals.push_back({n, n, n});
+    }
+    ShellDistanceOptions measuring;
+    measuring.width = width_;
+    const ShellDistance distance = shell_distance(shell, target_, measuring);
+    const bool flat_holds = tolerance && distance.both.upper <= *tolerance;
+    const bool better = tolerance ? flat_holds && (!holds || shell.triangles.size() < result_.shell.triangles.size())
+                                  : distance.both.upper < result_.distance.both.upper;
+    if (better) {
+      result_.shell = std::move(shell);
+      result_.distance = distance;
+    }
+  }
+
+  void note(const FitState& state) {
+    RelaxIteration iteration;
+    iteration.shells = state.mesh.alive;
+    iteration.hausdorff = {0, std::numeric_limits<double>::infinity()};
+    iteration.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - last_).count();
+    last_ = std::chrono::steady_clock::now();
+    ShellMesh shell = state.mesh.shell();
+    ShellDistanceOptions measuring;
+    measuring.width = std::max(width_, state.error() / 4);
+    iteration.hausdorff = shell_distance(shell, target_, measuring).both;
+    result_.iterations.push_back(iteration);
+    if (options_.on_iteration) {
+      options_.on_iteration(iteration, shell);
+    }
+  }
+
+  const TriangleMesh& coarse_;
+  const Target& target_;
+  const RelaxOptions& options_;
+  double width_;
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+  RelaxResult result_;
+};
+
+}  // namespace
+
+RelaxResult fit(const TriangleMesh& coarse, const Target& target, const RelaxOptions& options) {
+  return Fitting(coarse, target, options).run();
+}
+
+}  // namespace tunica

@@ -1,0 +1,27 @@
+#pragma once
+
+#include "shell/relax.hpp"
+
+namespace tunica {
+
+/// The least-error fit: positions, normals and connectivity are chosen together so that the curved surface is closest
+/// to the target, measured both ways, gaps between patches included.
+///
+/// It starts from a quadric decimation of the target, which keeps thin branches and rims (from COARSE where its
+/// topology differs from the target's: then COARSE's is meant). Then in turn: edges collapse, cheapest first by the
+/// curved error that their placed node would have; edges turn; all nodes and normals move at once by Gauss-Newton on
+/// powers of the residuals; patches that are too far off are split. Where the target has a sharp crease, shells carry a
+/// normal per corner. A certified distance ends it.
+///
+/// With `tolerance` the fewest shells found whose certified distance holds; without, the least distance found with at
+/// most `shells` (none: as many as COARSE has). Never more shells, or a larger distance, than plain decimation: where
+/// that wins, its flat facets are the result (flat shells: corner normals are the facets').
+/// @param coarse  an oriented manifold; its count, and its topology, may matter; @param target  likewise
+/// Keeps: topology of the start, boundary loops (on the target's boundary to the same tolerance); smallest angle 20
+/// degrees where the start or a sharp feature does not forbid it. Deterministic, independent of the number of threads.
+/// Errors: Interrupted. Source: error-driven collapse as in Hoppe et al., Mesh optimization, SIGGRAPH 1993, with cubic
+/// patches (Comas, Duriez, Cotin 2010, eq. 1-2) in place of facets.
+/// Cost: n log n for the target, then about 5 ms per shell of the result. Limits: a greedy search.
+RelaxResult fit(const TriangleMesh& coarse, const Target& target, const RelaxOptions& options);
+
+}  // namespace tunica

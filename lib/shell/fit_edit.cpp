@@ -1,0 +1,586 @@
+#include "shell/fit_edit.hpp"
+
+#include "shell/normals.hpp"
+#include "surface/measure.hpp"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+#include <queue>
+
+namespace tunica {
+namespace {
+
+constexpr int placing_steps = 3;
+
+/// What becomes of the patches around a node.
+struct Trial {
+  PlacedNode node;
+  std::vector<PlacedPatch> patches;
+  std::vector<Index> triangles;  // of the mesh, for each of the patches
+  std::vector<Index> points;
+  FitLimits limits;
+};
+
+double smallest_angle(const FitState& state, Index t) {
+  const auto c = state.mesh.corners(t);
+  return smallest_angle_degrees(c[0], c[1], c[2]);
+}
+
+void gather(const FitState& state, Index t, Trial& trial) {
+  const auto& attached = state.patches[t].attached;
+  trial.points.insert(trial.points.end(), attached.begin(), attached.end());
+}
+
+/// What was worse before may stay so.
+void ease_limits(const FitState& state, Index t, FitLimits& limits) {
+  limits.angle = std::min(limits.angle, smallest_angle(state, t) * (1 - 1e-9));
+  limits.agreement =
+      std::min(limits.agreement, normal_agreement(state.mesh.corners(t), state.mesh.corner_normals(t)) - 1e-9);
+  limits.agreement = std::max(limits.agreement, least_normal_agreement + 1e-6);
+}
+
+PlacedPatch placed(const FitState& state, Index t) {
+  PlacedPatch patch;
+  patch.shape = state.shape(t);
+  patch.guesses = state.patches[t].guesses;
+  return patch;
+}
+
+/// Fills in what lies across the edges of the trial's patches.
+/// @param nodes  of each patch's corners, as they will be
+void link(const FitState& state, const std::vector<std::array<Index, 3>>& nodes, const std::vector<Index>& replaced,
+          Trial& trial) {
+  const FitMesh& mesh = state.mesh;
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Index from = nodes[i][k], to = nodes[i][(k + 1) % 3];
+      auto& across = trial.patches[i].across[k];
+      across = {};
+      for (std::size_t j = 0; j < nodes.size(); ++j) {
+        for (std::size_t l = 0; l < 3; ++l) {
+          if (nodes[j][l] == to && nodes[j][(l + 1) % 3] == from) {
+            across.patch = j;
+            across.from = (l + 1) % 3;
+            across.to = l;
+          }
+        }
+      }
+      if (across.patch != PlacedPatch::Across::none || from >= mesh.around.size() || to >= mesh.around.size()) {
+        continue;
+      }
+      for (const Index t : mesh.around[from]) {
+        const std::size_t c = mesh.corner_of(t, from);
+        if (mesh.triangles[t][(c + 2) % 3] == to && std::find(replaced.begin(), replaced.end(), t) == replaced.end()) {
+          across.points = edge_points(mesh.patch(t), c, (c + 2) % 3);
+        }
+      }
+    }
+  }
+}
+
+/// A start where the facets do not suit the normal gets one that does.
+void make_compatible(Trial& trial) {
+  if (trial.node.normals.size() != 1) {
+    return;
+  }
+  std::vector<Vec3> facets;
+  for (const PlacedPatch& p : trial.patches) {
+    auto corners = p.shape.corners;
+    if (p.corner != PlacedPatch::no_corner) {
+      corners[p.corner] = trial.node.position;
+    }
+    facets.push_back(facing_of(corners));
+  }
+  if (const auto normal = compatible_normal(trial.node.normals[0], facets, trial.limits.agreement + 0.05)) {
+    trial.node.normals[0] = *normal;
+  }
+}
+
+class Collapser {
+public:
+  Collapser(FitState& state, double limit) : state_(state), mesh_(state.mesh), limit_(limit) {}
+
+  /// @return the error after the collapse; infinite when it is not possible
+  double evaluate(Index u, Index v) {
+    Trial& trial = trial_;
+    if (!prepare(u, v)) {
+      return std::numeric_limits<double>::infinity();
+    }
+    make_compatible(trial);
+    place_node(state_.samples(), trial.patches, trial.points, trial.limits, limit_, placing_steps, trial.node);
+    return trial.node.error;
+  }
+
+  /// Does what evaluate() tried last.
+  void commit(Index u, Index v) {
+    Trial& trial = trial_;
+    place_node(state_.samples(), trial.patches, trial.points, trial.limits, limit_, 0, trial.node);
+    const auto shared = mesh_.on_edge(u, v);
+    for (std::size_t i = 0; i < shared.count(); ++i) {
+      state_.patches[shared.triangle[i]] = {};
+      mesh_.remove_triangle(shared.triangle[i]);
+    }
+    mesh_.positions[u] = trial.node.position;
+    std::vector<Index> slot_of;
+    for (std::size_t s = 0; s < trial.node.normals.size(); ++s) {
+      slot_of.push_back(classes_[s]);
+      mesh_.normals[classes_[s]] = trial.node.normals[s];
+    }
+    for (const Index t : mesh_.around[v]) {
+      mesh_.triangles[t][mesh_.corner_of(t, v)] = u;
+      mesh_.around[u].push_back(t);
+    }
+    mesh_.around[v].clear();
+    mesh_.on_boundary[u] |= mesh_.on_boundary[v];
+    for (std::size_t i = 0; i < trial.triangles.size(); ++i) {
+      const Index t = trial.triangles[i];
+      PlacedPatch& p = trial.patches[i];
+      mesh_.slots[t][p.corner] = slot_of[p.slot];
+      state_.patches[t] = {std::move(p.guesses), std::move(p.attached), std::move(p.residuals), p.error};
+    }
+  }
+
+private:
+  bool keeps_topology(Index u, Index v) {
+    const std::size_t on_edge = mesh_.on_edge(u, v).count();
+    if (on_edge == 0 || (on_edge == 2 && mesh_.on_boundary[u] != 0 && mesh_.on_boundary[v] != 0) || mesh_.alive <= 4) {
+      return false;
+    }
+    mesh_.ring(u, ring_u_);
+    mesh_.ring(v, ring_v_);
+    common_.clear();
+    std::set_intersection(ring_u_.begin(), ring_u_.end(), ring_v_.begin(), ring_v_.end(), std::back_inserter(common_));
+    if (common_.size() != on_edge) {
+      return false;
+    }
+    for (const Index w : common_) {
+      // A node keeps at least three neighbours, at a boundary two triangles' worth less one.
+      if (mesh_.around[w].size() <= (mesh_.on_boundary[w] != 0 ? 1U : 3U)) {
+        return false;
+      }
+    }
+    return ring_u_.size() + ring_v_.size() >= on_edge + 2 + 3;
+  }
+
+  /// The slots of the merged node: those of u and v, the ones that meet across the edge being one.
+  bool merge_slots(Index u, Index v, const FitMesh::Pair& shared) {
+    std::vector<Index> of_u, of_v;
+    mesh_.slots_of(u, of_u);
+    mesh_.slots_of(v, of_v);
+    std::vector<std::pair<Index, Index>> parent;  // slot, its representative
+    for (const Index s : of_u) {
+      parent.emplace_back(s, s);
+    }
+    for (const Index s : of_v) {
+      parent.emplace_back(s, s);
+    }
+    const auto find = [&](Index s) {
+      return std::find_if(parent.begin(), parent.end(), [&](const auto& p) { return p.first == s; });
+    };
+    for (std::size_t i = 0; i < shared.count(); ++i) {
+      const Index t = shared.triangle[i];
+      const Index a = find(mesh_.slots[t][mesh_.corner_of(t, u)])->second;
+      const Index b = find(mesh_.slots[t][mesh_.corner_of(t, v)])->second;
+      for (auto& p : parent) {
+        if (p.second == b) {
+          p.second = a;
+        }
+      }
+    }
+    classes_.clear();
+    for (const auto& p : parent) {
+      if (std::find(classes_.begin(), classes_.end(), p.second) == classes_.end()) {
+        classes_.push_back(p.second);
+      }
+    }
+    class_of_ = parent;
+    // Two sides of a crease that become one would smooth it away; a crease's end may.
+    return classes_.size() >= std::max(of_u.size(), of_v.size());
+  }
+
+  bool prepare(Index u, Index v) {
+    if (!keeps_topology(u, v)) {
+      return false;
+    }
+    const auto shared = mesh_.on_edge(u, v);
+    if (!merge_slots(u, v, shared)) {
+      return false;
+    }
+    Trial& trial = trial_;
+    trial.patches.clear();
+    trial.triangles.clear();
+    trial.points.clear();
+    trial.limits = state_.limits;
+    for (std::size_t i = 0; i < shared.count(); ++i) {
+      gather(state_, shared.triangle[i], trial);
+      ease_limits(state_, shared.triangle[i], trial.limits);
+    }
+    nodes_.clear();
+    replaced_.assign(shared.triangle.begin(), shared.triangle.end());
+    std::vector<Vec3> sums(classes_.size(), Vec3::Zero());
+    for (const Index node : {u, v}) {
+      for (const Index t : mesh_.around[node]) {
+        if (t == shared.triangle[0] || t == shared.triangle[1]) {
+          continue;
+        }
+        gather(state_, t, trial);
+        ease_limits(state_, t, trial.limits);
+        PlacedPatch patch = placed(state_, t);
+        patch.corner = mesh_.corner_of(t, node);
+        const Index slot = mesh_.slots[t][patch.corner];
+        const auto found =
+            std::find_if(class_of_.begin(), class_of_.end(), [&](const auto& p) { return p.first == slot; });
+        patch.slot =
+            static_cast<std::size_t>(std::find(classes_.begin(), classes_.end(), found->second) - classes_.begin());
+        sums[patch.slot] += mesh_.normals[slot];
+        trial.patches.push_back(std::move(patch));
+        trial.triangles.push_back(t);
+        nodes_.push_back(mesh_.triangles[t]);
+        nodes_.back()[trial.patches.back().corner] = u;
+        replaced_.push_back(t);
+      }
+    }
+    link(state_, nodes_, replaced_, trial);
+    // Start: what is special about one end decides, else the middle.
+    trial.node = {};
+    std::vector<Index> of_u, of_v;
+    mesh_.slots_of(u, of_u);
+    mesh_.slots_of(v, of_v);
+    const int rank_u = mesh_.on_boundary[u] * 4 + static_cast<int>(of_u.size());
+    const int rank_v = mesh_.on_boundary[v] * 4 + static_cast<int>(of_v.size());
+    for (const Vec3& sum : sums) {
+      trial.node.normals.push_back(sum.norm() > 1e-3 ? Vec3(sum.normalized()) : mesh_.normals[classes_[0]]);
+    }
+    if (rank_u != rank_v) {
+      trial.node.position = mesh_.positions[rank_u > rank_v ? u : v];
+    } else {
+      const Vec3 middle = (mesh_.positions[u] + mesh_.positions[v]) / 2;
+      trial.node.position = state_.samples().foot(middle, trial.node.normals[0]).point;
+    }
+    return true;
+  }
+
+  FitState& state_;
+  FitMesh& mesh_;
+  double limit_;
+  Trial trial_;
+  std::vector<Index> ring_u_, ring_v_, common_;
+  std::vector<std::array<Index, 3>> nodes_;
+  std::vector<Index> replaced_;
+  std::vector<Index> classes_;                     // slot that stands for each class
+  std::vector<std::pair<Index, Index>> class_of_;  // slot, the one that stands for its class
+};
+
+}  // namespace
+
+std::size_t collapse_edges(FitState& state, double limit, std::size_t shells, const Progress& progress) {
+  struct Candidate {
+    double error;
+    Index u, v;
+    unsigned version;
+    bool operator<(const Candidate& o) const {
+      return error != o.error ? error > o.error : u != o.u ? u > o.u : v > o.v;
+    }
+  };
+  FitMesh& mesh = state.mesh;
+  Collapser collapser(state, limit);
+  std::vector<unsigned> version(mesh.positions.size(), 1);
+  std::priority_queue<Candidate> queue;
+  const auto current = [&](Index u, Index v) { return version[u] + version[v]; };
+  for (const auto& [u, v] : mesh.edges()) {
+    // A first guess, below the truth: the largest error around.
+    double guess = 0;
+    for (const Index node : {u, v}) {
+      for (const Index t : mesh.around[node]) {
+        guess = std::max(guess, state.patches[t].error);
+      }
+    }
+    queue.push({guess, u, v, 0});
+  }
+  const std::size_t before = mesh.alive;
+  std::size_t gone = 0;
+  while (!queue.empty() && mesh.alive > shells) {
+    Candidate c = queue.top();
+    queue.pop();
+    if (mesh.around[c.u].empty() || mesh.around[c.v].empty() || c.error > limit) {
+      continue;
+    }
+    const double known = c.error;
+    const bool fresh = c.version == current(c.u, c.v);
+    c.error = collapser.evaluate(c.u, c.v);
+    if (c.error > limit) {
+      continue;
+    }
+    if (!fresh && !queue.empty() && c.error > 1.001 * std::max(known, queue.top().error)) {
+      c.version = current(c.u, c.v);
+      queue.push(c);
+      continue;
+    }
+    collapser.commit(c.u, c.v);
+    ++gone;
+    std::vector<Index> ring;
+    mesh.ring(c.u, ring);
+    ++version[c.u];
+    for (const Index w : ring) {
+      ++version[w];
+    }
+    for (const Index w : ring) {
+      queue.push({c.error, std::min(c.u, w), std::max(c.u, w), 0});
+    }
+    if (gone % 32 == 0) {
+      advance(progress, static_cast<double>(before - mesh.alive) / static_cast<double>(before));
+    }
+  }
+  return gone;
+}
+
+std::size_t flip_edges(FitState& state, double limit) {
+  FitMesh& mesh = state.mesh;
+  std::size_t flips = 0;
+  for (const auto& [u, v] : mesh.edges()) {
+    const auto pair = mesh.on_edge(u, v);
+    if (pair.count() != 2) {
+      continue;
+    }
+    // First triangle a b c, second b a d: a, b the edge's ends.
+    const Index t1 = pair.triangle[0], t2 = pair.triangle[1];
+    const std::size_t cu = mesh.corner_of(t1, u);
+    const bool forward = mesh.triangles[t1][(cu + 1) % 3] == v;
+    const Index a = forward ? u : v, b = forward ? v : u;
+    const std::size_t a1 = mesh.corner_of(t1, a), b1 = mesh.corner_of(t1, b), c1 = 3 - a1 - b1;
+    const std::size_t a2 = mesh.corner_of(t2, a), b2 = mesh.corner_of(t2, b), d2 = 3 - a2 - b2;
+    const Index c = mesh.triangles[t1][c1], d = mesh.triangles[t2][d2];
+    const auto &s1 = mesh.slots[t1], &s2 = mesh.slots[t2];
+    if (c == d || s1[a1] != s2[a2] || s1[b1] != s2[b2] || mesh.on_edge(c, d).count() > 0 ||
+        mesh.around[a].size() <= (mesh.on_boundary[a] != 0 ? 1U : 3U) ||
+        mesh.around[b].size() <= (mesh.on_boundary[b] != 0 ? 1U : 3U)) {
+      continue;
+    }
+    Trial trial;
+    trial.limits = state.limits;
+    trial.limits.angle = 0;
+    gather(state, t1, trial);
+    gather(state, t2, trial);
+    const std::array<std::array<Index, 3>, 2> nodes{{{a, d, c}, {d, b, c}}};
+    const std::array<std::array<Index, 3>, 2> slots{{{s1[a1], s2[d2], s1[c1]}, {s2[d2], s1[b1], s1[c1]}}};
+    for (std::size_t i = 0; i < 2; ++i) {
+      PlacedPatch patch;
+      for (std::size_t k = 0; k < 3; ++k) {
+        patch.shape.corners[k] = mesh.positions[nodes[i][k]];
+        patch.shape.normals[k] = mesh.normals[slots[i][k]];
+      }
+      patch.guesses = state.patches[i == 0 ? t1 : t2].guesses;
+      trial.patches.push_back(std::move(patch));
+    }
+    link(state, {nodes[0], nodes[1]}, {t1, t2}, trial);
+    const auto angle_of = [](const PlacedPatch& p) {
+      return smallest_angle_degrees(p.shape.corners[0], p.shape.corners[1], p.shape.corners[2]);
+    };
+    const double old_angle = std::min(smallest_angle(state, t1), smallest_angle(state, t2));
+    const double new_angle = std::min(angle_of(trial.patches[0]), angle_of(trial.patches[1]));
+    const double old_error = std::max(state.patches[t1].error, state.patches[t2].error);
+    const bool mends = old_angle < state.limits.angle && new_angle > old_angle;
+    if (!mends && new_angle < std::min(old_angle, state.limits.angle)) {
+      continue;
+    }
+    // No pair of facets that folds.
+    if (facing_of(trial.patches[0].shape.corners).dot(facing_of(trial.patches[1].shape.corners)) <
+        std::min(0.3, facing_of(mesh.corners(t1)).dot(facing_of(mesh.corners(t2))))) {
+      continue;
+    }
+    place_node(state.samples(), trial.patches, trial.points, trial.limits, limit, 0, trial.node);
+    if (!(trial.node.error < 0.97 * old_error || (mends && trial.node.error <= std::max(limit, old_error)))) {
+      continue;
+    }
+    mesh.remove_triangle(t1);
+    mesh.remove_triangle(t2);
+    for (std::size_t i = 0; i < 2; ++i) {
+      const Index t = mesh.add_triangle(nodes[i], slots[i]);
+      PlacedPatch& p = trial.patches[i];
+      state.patches[t] = {std::move(p.guesses), std::move(p.attached), std::move(p.residuals), p.error};
+    }
+    ++flips;
+  }
+  return flips;
+}
+
+namespace {
+
+bool split_edge(FitState& state, Index u, Index v, double limit) {
+  FitMesh& mesh = state.mesh;
+  const auto pair = mesh.on_edge(u, v);
+  Trial trial;
+  trial.limits = state.limits;
+  std::vector<std::array<Index, 3>> nodes, slots;
+  std::vector<Index> old_slots;  // a slot at the edge's end for each slot of the new node
+  const auto fresh_node = static_cast<Index>(mesh.positions.size());
+  const Vec3 middle = (mesh.positions[u] + mesh.positions[v]) / 2;
+  std::vector<Vec3> on_curves;
+  std::vector<std::array<Index, 2>> sides;
+  for (std::size_t i = 0; i < pair.count(); ++i) {
+    const Index t = pair.triangle[i];
+    gather(state, t, trial);
+    ease_limits(state, t, trial.limits);
+    const std::size_t cu = mesh.corner_of(t, u), cv = mesh.corner_of(t, v);
+    std::array<Vec2, 3> at{Vec2(0, 0), Vec2(1, 0), Vec2(0, 1)};
+    const CubicPatch patch = mesh.patch(t);
+    const Vec2 mid = (at[cu] + at[cv]) / 2;
+    on_curves.push_back(patch.point(mid));
+    const std::array<Index, 2> side{mesh.slots[t][cu], mesh.slots[t][cv]};
+    std::size_t slot = 0;
+    const auto same = std::find(sides.begin(), sides.end(), side);
+    if (same == sides.end()) {
+      slot = sides.size();
+      sides.push_back(side);
+      trial.node.normals.push_back(patch.normal(mid));
+    } else {
+      slot = static_cast<std::size_t>(same - sides.begin());
+      trial.node.normals[slot] = (trial.node.normals[slot] + patch.normal(mid)).normalized();
+    }
+    for (const std::size_t replaced : {cu, cv}) {
+      PlacedPatch p = placed(state, t);
+      p.corner = replaced;
+      p.slot = slot;
+      nodes.push_back(mesh.triangles[t]);
+      nodes.back()[replaced] = fresh_node;
+      slots.push_back(mesh.slots[t]);
+      slots.back()[replaced] = static_cast<Index>(mesh.normals.size() + slot);
+      trial.patches.push_back(std::move(p));
+    }
+  }
+  link(state, nodes, {pair.triangle[0], pair.triangle[1]}, trial);
+  trial.node.position = middle;
+  for (const Vec3& p : on_curves) {
+    trial.node.position += (p - middle) / static_cast<double>(on_curves.size());
+  }
+  trial.limits.angle = std::min(trial.limits.angle, 0.5 * state.limits.angle);
+  make_compatible(trial);
+  place_node(state.samples(), trial.patches, trial.points, trial.limits, limit, placing_steps, trial.node);
+  if (!std::isfinite(trial.node.error)) {
+    return false;
+  }
+  place_node(state.samples(), trial.patches, trial.points, trial.limits, limit, 0, trial.node);
+  for (std::size_t i = 0; i < pair.count(); ++i) {
+    state.patches[pair.triangle[i]] = {};
+  }
+  const std::size_t count = pair.count();
+  for (std::size_t i = 0; i < count; ++i) {
+    mesh.remove_triangle(pair.triangle[i]);
+  }
+  mesh.positions.push_back(trial.node.position);
+  mesh.on_boundary.push_back(count == 1 ? 1 : 0);
+  mesh.around.emplace_back();
+  for (const Vec3& n : trial.node.normals) {
+    mesh.normals.push_back(n);
+  }
+  for (std::size_t i = 0; i < trial.patches.size(); ++i) {
+    const Index t = mesh.add_triangle(nodes[i], slots[i]);
+    state.patches.resize(mesh.triangles.size());
+    PlacedPatch& p = trial.patches[i];
+    state.patches[t] = {std::move(p.guesses), std::move(p.attached), std::move(p.residuals), p.error};
+  }
+  return true;
+}
+
+}  // namespace
+
+std::size_t split_worst(FitState& state, double limit, std::size_t most) {
+  FitMesh& mesh = state.mesh;
+  std::vector<std::pair<double, Index>> worst;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    if (mesh.is_alive(static_cast<Index>(t)) && state.patches[t].error > limit) {
+      worst.emplace_back(-state.patches[t].error, static_cast<Index>(t));
+    }
+  }
+  std::sort(worst.begin(), worst.end());
+  std::vector<std::uint8_t> touched(mesh.positions.size(), 0);
+  std::size_t splits = 0;
+  for (const auto& [error, t] : worst) {
+    if (splits >= most) {
+      break;
+    }
+    const auto v = mesh.triangles[t];
+    if (!mesh.is_alive(t) ||
+        std::any_of(v.begin(), v.end(), [&](Index i) { return i >= touched.size() || touched[i] != 0; })) {
+      continue;
+    }
+    std::size_t longest = 0;
+    double length = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double l = (mesh.positions[v[(k + 1) % 3]] - mesh.positions[v[k]]).norm();
+      if (l > length) {
+        length = l;
+        longest = k;
+      }
+    }
+    if (split_edge(state, v[longest], v[(longest + 1) % 3], limit)) {
+      ++splits;
+      for (const Index i : v) {
+        touched[i] = 1;
+      }
+    }
+  }
+  return splits;
+}
+
+std::size_t place_worst(FitState& state, double limit) {
+  FitMesh& mesh = state.mesh;
+  std::vector<std::pair<double, Index>> nodes;
+  for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
+    double error = 0;
+    for (const Index t : mesh.around[v]) {
+      error = std::max(error, state.patches[t].error);
+    }
+    if (error > limit) {
+      nodes.emplace_back(-error, static_cast<Index>(v));
+    }
+  }
+  std::sort(nodes.begin(), nodes.end());
+  std::size_t better = 0;
+  for (const auto& [negative, v] : nodes) {
+    Trial trial;
+    trial.limits = state.limits;
+    std::vector<Index> own;
+    mesh.slots_of(v, own);
+    trial.node.position = mesh.positions[v];
+    for (const Index s : own) {
+      trial.node.normals.push_back(mesh.normals[s]);
+    }
+    double before = 0;
+    for (const Index t : mesh.around[v]) {
+      gather(state, t, trial);
+      ease_limits(state, t, trial.limits);
+      PlacedPatch p = placed(state, t);
+      p.corner = mesh.corner_of(t, v);
+      p.slot = static_cast<std::size_t>(std::find(own.begin(), own.end(), mesh.slots[t][p.corner]) - own.begin());
+      trial.patches.push_back(std::move(p));
+      trial.triangles.push_back(t);
+      before = std::max(before, state.patches[t].error);
+    }
+    std::vector<std::array<Index, 3>> nodes_around;
+    for (const Index t : trial.triangles) {
+      nodes_around.push_back(mesh.triangles[t]);
+    }
+    link(state, nodes_around, trial.triangles, trial);
+    place_node(state.samples(), trial.patches, trial.points, trial.limits, limit, placing_steps + 1, trial.node);
+    if (!(trial.node.error < 0.99 * before)) {
+      continue;
+    }
+    place_node(state.samples(), trial.patches, trial.points, trial.limits, limit, 0, trial.node);
+    mesh.positions[v] = trial.node.position;
+    for (std::size_t s = 0; s < own.size(); ++s) {
+      mesh.normals[own[s]] = trial.node.normals[s];
+    }
+    for (std::size_t i = 0; i < trial.triangles.size(); ++i) {
+      PlacedPatch& p = trial.patches[i];
+      state.patches[trial.triangles[i]] = {std::move(p.guesses), std::move(p.attached), std::move(p.residuals),
+                                           p.error};
+    }
+    ++better;
+  }
+  return better;
+}
+
+}  // namespace tunica

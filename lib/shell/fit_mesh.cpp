@@ -1,0 +1,155 @@
+#include "shell/fit_mesh.hpp"
+
+#include <algorithm>
+
+namespace tunica {
+
+FitMesh::FitMesh(const TriangleMesh& mesh, const std::vector<Vec3>& node_normals)
+    : positions(mesh.vertices),
+      normals(node_normals),
+      triangles(mesh.triangles),
+      slots(mesh.triangles),
+      around(mesh.vertices.size()),
+      on_boundary(mesh.vertices.size(), 0),
+      alive(mesh.triangles.size()) {
+  for (std::size_t t = 0; t < triangles.size(); ++t) {
+    for (const Index v : triangles[t]) {
+      around[v].push_back(static_cast<Index>(t));
+    }
+  }
+  const auto across = neighbours(mesh, incidence(mesh));
+  for (std::size_t t = 0; t < triangles.size(); ++t) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (across[t][k] == no_neighbour) {
+        on_boundary[triangles[t][k]] = on_boundary[triangles[t][(k + 1) % 3]] = 1;
+      }
+    }
+  }
+}
+
+FitMesh::Pair FitMesh::on_edge(Index u, Index v) const {
+  Pair pair;
+  std::size_t n = 0;
+  for (const Index t : around[u]) {
+    if (has_node(t, v) && n < 2) {
+      pair.triangle[n++] = t;
+    }
+  }
+  return pair;
+}
+
+void FitMesh::ring(Index node, std::vector<Index>& out) const {
+  out.clear();
+  for (const Index t : around[node]) {
+    for (const Index v : triangles[t]) {
+      if (v != node) {
+        out.push_back(v);
+      }
+    }
+  }
+  std::sort(out.begin(), out.end());
+  out.erase(std::unique(out.begin(), out.end()), out.end());
+}
+
+void FitMesh::slots_of(Index node, std::vector<Index>& out) const {
+  out.clear();
+  for (const Index t : around[node]) {
+    out.push_back(slots[t][corner_of(t, node)]);
+  }
+  std::sort(out.begin(), out.end());
+  out.erase(std::unique(out.begin(), out.end()), out.end());
+}
+
+Index FitMesh::add_triangle(const std::array<Index, 3>& nodes, const std::array<Index, 3>& corner_slots) {
+  Index t = no_index;
+  if (free_triangles.empty()) {
+    t = static_cast<Index>(triangles.size());
+    triangles.push_back(nodes);
+    slots.push_back(corner_slots);
+  } else {
+    t = free_triangles.back();
+    free_triangles.pop_back();
+    triangles[t] = nodes;
+    slots[t] = corner_slots;
+  }
+  for (const Index v : nodes) {
+    around[v].push_back(t);
+  }
+  ++alive;
+  return t;
+}
+
+void FitMesh::remove_triangle(Index t) {
+  for (const Index v : triangles[t]) {
+    auto& list = around[v];
+    list.erase(std::find(list.begin(), list.end(), t));
+  }
+  triangles[t] = {no_index, no_index, no_index};
+  free_triangles.push_back(t);
+  --alive;
+}
+
+std::vector<std::array<Index, 2>> FitMesh::edges() const {
+  std::vector<std::array<Index, 2>> out;
+  for (std::size_t t = 0; t < triangles.size(); ++t) {
+    for (std::size_t k = 0; is_alive(static_cast<Index>(t)) && k < 3; ++k) {
+      const Index u = triangles[t][k], v = triangles[t][(k + 1) % 3];
+      // An inner edge is met twice, once in each direction; a boundary edge in one.
+      if (u < v || (on_boundary[u] != 0 && on_boundary[v] != 0 && on_edge(u, v).count() == 1)) {
+        out.push_back({std::min(u, v), std::max(u, v)});
+      }
+    }
+  }
+  return out;
+}
+
+ShellMesh FitMesh::shell(std::vector<Index>* kept) const {
+  ShellMesh out;
+  std::vector<Index> number(positions.size(), no_index), first_slot(positions.size(), no_index);
+  bool creased = false;
+  if (kept != nullptr) {
+    kept->clear();
+  }
+  for (std::size_t t = 0; t < triangles.size(); ++t) {
+    if (!is_alive(static_cast<Index>(t))) {
+      continue;
+    }
+    auto v = triangles[t];
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Index node = v[k];
+      if (number[node] == no_index) {
+        number[node] = static_cast<Index>(out.vertices.size());
+        first_slot[node] = slots[t][k];
+        out.vertices.push_back(positions[node]);
+        out.normals.push_back(normals[slots[t][k]]);
+      }
+      creased = creased || first_slot[node] != slots[t][k];
+      v[k] = number[node];
+    }
+    out.triangles.push_back(v);
+    out.corner_normals.push_back(corner_normals(static_cast<Index>(t)));
+    if (kept != nullptr) {
+      kept->push_back(static_cast<Index>(t));
+    }
+  }
+  if (!creased) {
+    out.corner_normals.clear();
+    return out;
+  }
+  // Where sides meet, the node's own normal is their mean.
+  for (Vec3& n : out.normals) {
+    n.setZero();
+  }
+  for (std::size_t t = 0; t < out.triangles.size(); ++t) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      out.normals[out.triangles[t][k]] += out.corner_normals[t][k];
+    }
+  }
+  for (std::size_t v = 0; v < out.normals.size(); ++v) {
+    Vec3& n = out.normals[v];
+    n = n.norm() > 1e-6 ? Vec3(n.normalized()) : Vec3(Vec3::UnitZ());
+  }
+  return out;
+}
+
+}  // namespace tunica

@@ -1,0 +1,73 @@
+#pragma once
+
+#include "shell/curved_surface.hpp"
+#include "shell/shell_mesh.hpp"
+#include "surface/incidence.hpp"
+
+#include <span>
+
+namespace tunica {
+
+inline constexpr Index no_index = 0xffffffff;
+
+/// A shell mesh under edit: triangles vanish and appear, nodes move, and a node may carry several normals ("slots"),
+/// one for each side of the creases that meet there. Triangles that are gone have no_index corners; their places are
+/// used again.
+struct FitMesh {
+  std::vector<Vec3> positions;                  ///< #V
+  std::vector<Vec3> normals;                    ///< #S unit, one per slot
+  std::vector<std::array<Index, 3>> triangles;  ///< #T nodes
+  std::vector<std::array<Index, 3>> slots;      ///< #T slot of each corner; a slot belongs to one node
+  std::vector<std::vector<Index>> around;       ///< #V triangles around each node; empty: the node is gone
+  std::vector<std::uint8_t> on_boundary;        ///< #V
+  std::vector<Index> free_triangles;
+  std::size_t alive = 0;  ///< triangles
+
+  /// One slot per node, with `normals` #V.
+  FitMesh(const TriangleMesh& mesh, const std::vector<Vec3>& node_normals);
+
+  [[nodiscard]] bool is_alive(Index t) const { return triangles[t][0] != no_index; }
+  [[nodiscard]] std::array<Vec3, 3> corners(Index t) const {
+    const auto& v = triangles[t];
+    return {positions[v[0]], positions[v[1]], positions[v[2]]};
+  }
+  [[nodiscard]] std::array<Vec3, 3> corner_normals(Index t) const {
+    const auto& s = slots[t];
+    return {normals[s[0]], normals[s[1]], normals[s[2]]};
+  }
+  [[nodiscard]] CubicPatch patch(Index t) const { return comas_patch(corners(t), corner_normals(t)); }
+
+  /// 0, 1 or 2: where in triangle t the node stands.
+  [[nodiscard]] std::size_t corner_of(Index t, Index node) const {
+    const auto& v = triangles[t];
+    return v[0] == node ? 0 : v[1] == node ? 1 : 2;
+  }
+  [[nodiscard]] bool has_node(Index t, Index node) const {
+    const auto& v = triangles[t];
+    return v[0] == node || v[1] == node || v[2] == node;
+  }
+
+  /// Up to two triangles on an edge (three or more never happen).
+  struct Pair {
+    std::array<Index, 2> triangle{no_index, no_index};
+    [[nodiscard]] std::size_t count() const { return triangle[1] != no_index ? 2 : triangle[0] != no_index ? 1 : 0; }
+  };
+  [[nodiscard]] Pair on_edge(Index u, Index v) const;
+
+  /// Neighbours of a node, each once, ascending.
+  void ring(Index node, std::vector<Index>& out) const;
+
+  /// The slots in use at a node, each once, ascending.
+  void slots_of(Index node, std::vector<Index>& out) const;
+
+  Index add_triangle(const std::array<Index, 3>& nodes, const std::array<Index, 3>& corner_slots);
+  void remove_triangle(Index t);
+
+  /// Edges (u < v) in a deterministic order.
+  [[nodiscard]] std::vector<std::array<Index, 2>> edges() const;
+
+  /// @param kept  when given, the triangle of this mesh that each triangle of the result is
+  [[nodiscard]] ShellMesh shell(std::vector<Index>* kept = nullptr) const;
+};
+
+}  // namespace tunica

@@ -1,0 +1,237 @@
+#include "shell/fit_place.hpp"
+
+#include "surface/measure.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+
+namespace tunica {
+namespace {
+
+constexpr double largest_tilt = 0.4;  // rad
+constexpr double largest_move = 0.3;  // of the mean edge
+constexpr double hopeless = 8;        // times give_up after the first step
+
+struct Measured {
+  double cost = std::numeric_limits<double>::infinity();
+  double error = std::numeric_limits<double>::infinity();
+};
+
+void put(std::vector<PlacedPatch>& patches, const PlacedNode& node) {
+  for (PlacedPatch& p : patches) {
+    if (p.corner != PlacedPatch::no_corner) {
+      p.shape.corners[p.corner] = node.position;
+      p.shape.normals[p.corner] = node.normals[p.slot];
+    }
+  }
+}
+
+/// @param scale  mm, for the powers of the cost
+Measured measure(const FitSamples& samples, std::vector<PlacedPatch>& patches, const std::vector<Index>& points,
+                 const FitLimits& limits, double scale) {
+  for (const PlacedPatch& p : patches) {
+    if (!is_sound(p.shape, limits.agreement, limits.angle)) {
+      return {};
+    }
+  }
+  for (PlacedPatch& p : patches) {
+    p.attached.clear();
+    p.residuals.clear();
+  }
+  for (const Index q : points) {
+    PlacedPatch* closest = nullptr;
+    double least = std::numeric_limits<double>::infinity();
+    for (PlacedPatch& p : patches) {
+      const auto& c = p.shape.corners;
+      const Vec3& at = samples.points()[q];
+      const double squared = (closest_point_on_triangle(at, c[0], c[1], c[2]) - at).squaredNorm();
+      if (squared < least) {
+        least = squared;
+        closest = &p;
+      }
+    }
+    closest->attached.push_back(q);
+  }
+  std::vector<CubicPatch> curved;
+  for (const PlacedPatch& p : patches) {
+    curved.push_back(comas_patch(p.shape.corners, p.shape.normals));
+  }
+  Measured sum{0, 0};
+  for (std::size_t i = 0; i < patches.size(); ++i) {
+    PlacedPatch& p = patches[i];
+    const CubicPatch& patch = curved[i];
+    for (std::size_t k = 0; k < 3; ++k) {
+      const PlacedPatch::Across& across = p.across[k];
+      if (across.patch != PlacedPatch::Across::none) {
+        FitSamples::from_gap(patch, k, (k + 1) % 3, edge_points(curved[across.patch], across.from, across.to),
+                             p.residuals);
+      } else if (across.points) {
+        FitSamples::from_gap(patch, k, (k + 1) % 3, *across.points, p.residuals);
+      }
+    }
+    const Vec3 facing = facing_of(p.shape.corners);
+    samples.from_patch(patch, facing, p.guesses, p.residuals);
+    for (const Index q : p.attached) {
+      samples.from_target(patch, facing, q, p.residuals);
+    }
+    p.error = 0;
+    for (const Residual& r : p.residuals) {
+      const double d = std::abs(r.distance);
+      p.error = std::max(p.error, d);
+      const double squared = d * d / (scale * scale);
+      sum.cost += squared * squared;
+    }
+    sum.error = std::max(sum.error, p.error);
+  }
+  return sum;
+}
+
+}  // namespace
+
+std::array<Vec3, 2> tilt_axes(const Vec3& normal) {
+  const Vec3 first = normal.unitOrthogonal();
+  return {first, normal.cross(first)};
+}
+
+Vec3 facing_of(const std::array<Vec3, 3>& corners) {
+  return (corners[1] - corners[0]).cross(corners[2] - corners[0]).stableNormalized();
+}
+
+bool is_sound(const PatchShape& shape, double agreement, double angle) {
+  const auto& c = shape.corners;
+  return normal_agreement(c, shape.normals) >= agreement && smallest_angle_degrees(c[0], c[1], c[2]) >= angle;
+}
+
+PatchJacobian patch_jacobian(const PatchShape& shape) {
+  const auto flat = [](const CubicPatch& patch) {
+    return Eigen::Map<const Eigen::Matrix<double, 30, 1>>(patch.control[0].data());
+  };
+  const CubicPatch base = comas_patch(shape.corners, shape.normals);
+  const double step = 1e-6 * std::sqrt((shape.corners[1] - shape.corners[0]).squaredNorm() +
+                                       (shape.corners[2] - shape.corners[0]).squaredNorm());
+  constexpr double tilt = 1e-6;
+  PatchJacobian jacobian;
+  PatchShape changed = shape;
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (Eigen::Index k = 0; k < 3; ++k) {
+      changed.corners[i][k] += step;
+      jacobian.col(3 * static_cast<Eigen::Index>(i) + k) =
+          (flat(comas_patch(changed.corners, changed.normals)) - flat(base)) / step;
+      changed.corners[i] = shape.corners[i];
+    }
+    const auto axes = tilt_axes(shape.normals[i]);
+    for (std::size_t k = 0; k < 2; ++k) {
+      changed.normals[i] = shape.normals[i] + tilt * axes[k];
+      jacobian.col(static_cast<Eigen::Index>(9 + 2 * i + k)) =
+          (flat(comas_patch(changed.corners, changed.normals)) - flat(base)) / tilt;
+      changed.normals[i] = shape.normals[i];
+    }
+  }
+  return jacobian;
+}
+
+Eigen::Matrix<double, 15, 1> residual_gradient(const PatchJacobian& jacobian, const Residual& r) {
+  const double l1 = 1 - r.at[0] - r.at[1], l2 = r.at[0], l3 = r.at[1];
+  const std::array<double, 10> basis{l1 * l1 * l1,     l2 * l2 * l2,     l3 * l3 * l3,     3 * l1 * l1 * l2,
+                                     3 * l1 * l2 * l2, 3 * l2 * l2 * l3, 3 * l2 * l3 * l3, 3 * l3 * l3 * l1,
+                                     3 * l3 * l1 * l1, 6 * l1 * l2 * l3};
+  Eigen::Matrix<double, 30, 1> weights;
+  for (std::size_t i = 0; i < 10; ++i) {
+    weights.segment<3>(3 * static_cast<Eigen::Index>(i)) = basis[i] * r.direction;
+  }
+  return jacobian.transpose() * weights;
+}
+
+void place_node(const FitSamples& samples, std::vector<PlacedPatch>& patches, const std::vector<Index>& points,
+                const FitLimits& limits, double give_up, int steps, PlacedNode& node) {
+  put(patches, node);
+  Measured now = measure(samples, patches, points, limits, give_up);
+  node.error = now.error;
+  if (!std::isfinite(now.error)) {
+    return;
+  }
+  using Matrix = Eigen::MatrixXd;
+  const auto size = static_cast<Eigen::Index>(3 + 2 * node.normals.size());
+  PlacedNode best = node;
+  for (int step = 0; step < steps; ++step) {
+    Matrix h = Matrix::Zero(size, size);
+    Eigen::VectorXd g = Eigen::VectorXd::Zero(size);
+    const double power = step == 0 ? 0 : 4;
+    double edge = 0;
+    std::size_t edges = 0;
+    for (const PlacedPatch& p : patches) {
+      if (p.corner == PlacedPatch::no_corner) {
+        continue;
+      }
+      edge += (p.shape.corners[(p.corner + 1) % 3] - node.position).norm();
+      ++edges;
+      const PatchJacobian jacobian = patch_jacobian(p.shape);
+      const auto c = static_cast<Eigen::Index>(p.corner);
+      Eigen::Matrix<double, 5, 5> own = Eigen::Matrix<double, 5, 5>::Zero();
+      Eigen::Matrix<double, 5, 1> side = Eigen::Matrix<double, 5, 1>::Zero();
+      for (const Residual& r : p.residuals) {
+        const auto full = residual_gradient(jacobian, r);
+        Eigen::Matrix<double, 5, 1> row;
+        row << full.segment<3>(3 * c), full.segment<2>(9 + 2 * c);
+        const double weight = power == 0 ? 1 : std::pow(std::max(std::abs(r.distance) / now.error, 0.1), power);
+        own += weight * row * row.transpose();
+        side -= weight * r.distance * row;
+      }
+      const auto s = static_cast<Eigen::Index>(3 + 2 * p.slot);
+      h.topLeftCorner<3, 3>() += own.topLeftCorner<3, 3>();
+      h.block<3, 2>(0, s) += own.topRightCorner<3, 2>();
+      h.block<2, 3>(s, 0) += own.bottomLeftCorner<2, 3>();
+      h.block<2, 2>(s, s) += own.bottomRightCorner<2, 2>();
+      g.head<3>() += side.head<3>();
+      g.segment<2>(s) += side.tail<2>();
+    }
+    edge /= static_cast<double>(std::max<std::size_t>(edges, 1));
+    const double stiffness = h.topLeftCorner<3, 3>().trace();
+    const double slide = std::min(1.0, std::pow(now.error / edge, 2));  // how far sliding may pay
+    h.topLeftCorner<3, 3>().diagonal().array() += stiffness * (1e-6 + 0.3 * slide);
+    for (Eigen::Index i = 3; i < size; ++i) {
+      h(i, i) += 1e-4 * h(i, i) + 1e-6 * stiffness * edge * edge + 1e-300;
+    }
+    const Eigen::VectorXd x = h.ldlt().solve(g);
+    if (!x.allFinite()) {
+      break;
+    }
+    bool better = false;
+    for (const double length : {1.0, 0.35}) {
+      PlacedNode moved = best;
+      Vec3 move = length * x.head<3>();
+      if (const double far = move.norm(); far > largest_move * edge) {
+        move *= largest_move * edge / far;
+      }
+      moved.position += move;
+      for (std::size_t s = 0; s < moved.normals.size(); ++s) {
+        Vec2 tilt = length * x.segment<2>(static_cast<Eigen::Index>(3 + 2 * s));
+        if (const double far = tilt.norm(); far > largest_tilt) {
+          tilt *= largest_tilt / far;
+        }
+        const auto axes = tilt_axes(best.normals[s]);
+        moved.normals[s] = (best.normals[s] + tilt[0] * axes[0] + tilt[1] * axes[1]).normalized();
+      }
+      put(patches, moved);
+      const Measured then = measure(samples, patches, points, limits, give_up);
+      if (then.cost < now.cost) {
+        now = then;
+        moved.error = then.error;
+        best = moved;
+        better = true;
+        break;
+      }
+    }
+    if (!better || now.error > hopeless * give_up) {
+      break;
+    }
+  }
+  // The patches' residuals are those of the last trial; their owner only needs the shapes.
+  put(patches, best);
+  node = best;
+}
+
+}  // namespace tunica

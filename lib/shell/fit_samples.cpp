@@ -1,0 +1,176 @@
+#include "shell/fit_samples.hpp"
+
+#include "surface/incidence.hpp"
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+
+#include <algorithm>
+#include <cmath>
+
+namespace tunica {
+namespace {
+
+constexpr std::size_t points_per_shell = 16;      // of the target, about
+constexpr std::size_t most_grid_points = 30'000;  // of all patches: few large patches get a finer grid
+constexpr int coarsest_grid = 4;
+constexpr int finest_grid = 8;
+constexpr double beside = 0.7;  // cosine: farther off the normal than this, a distance counts along itself
+
+Vec2 on_edge(std::size_t from, std::size_t to, double s) {
+  const std::array<Vec2, 3> corners{Vec2(0, 0), Vec2(1, 0), Vec2(0, 1)};
+  return (1 - s) * corners[from] + s * corners[to];
+}
+
+Vec2 inside(Vec2 b) {
+  b = b.cwiseMax(0);
+  const double sum = b[0] + b[1];
+  return sum > 1 ? Vec2(b / sum) : b;
+}
+
+/// Along the given normal, or along the distance itself where it points elsewhere (off an edge, rim or boundary).
+Residual residual(const Vec2& at, const Vec3& away, const Vec3& normal) {
+  const double distance = away.norm();
+  const double along = away.dot(normal);
+  if (std::abs(along) < beside * distance) {
+    return {at, away / distance, distance};
+  }
+  return {at, normal, along < 0 ? -distance : distance};
+}
+
+}  // namespace
+
+PatchFoot foot_on_patch(const CubicPatch& patch, const Vec3& q) {
+  const auto& c = patch.control;
+  const Vec3 u = c[1] - c[0], v = c[2] - c[0], w = q - c[0];
+  const double uu = u.dot(u), uv = u.dot(v), vv = v.dot(v), wu = w.dot(u), wv = w.dot(v);
+  const double determinant = std::max(uu * vv - uv * uv, 1e-300);
+  Vec2 at = inside(Vec2((vv * wu - uv * wv) / determinant, (uu * wv - uv * wu) / determinant));
+  PatchFoot best{at, patch.point(at), 0};
+  best.squared_distance = (q - best.point).squaredNorm();
+  for (int i = 0; i < 2; ++i) {
+    const auto d = patch.tangents(at);
+    const Vec3 r = q - best.point;
+    const double a = d[0].dot(d[0]), b = d[0].dot(d[1]), e = d[1].dot(d[1]), f = d[0].dot(r), g = d[1].dot(r);
+    const double det = a * e - b * b;
+    if (!(det > 1e-14 * a * e)) {
+      break;
+    }
+    Vec2 next = at + Vec2((e * f - b * g) / det, (a * g - b * f) / det);
+    if (next[0] < 0 || next[1] < 0 || next[0] + next[1] > 1) {
+      // Along the border that is crossed the step is taken anew.
+      next = inside(next);
+      const Vec2 along = next[0] <= 0 ? Vec2(0, 1) : next[1] <= 0 ? Vec2(1, 0) : Vec2(-1, 1);
+      const auto dn = patch.tangents(next);
+      const Vec3 tangent = along[0] * dn[0] + along[1] * dn[1];
+      next = inside(next + along * (tangent.dot(q - patch.point(next)) / std::max(tangent.squaredNorm(), 1e-300)));
+    }
+    const Vec3 p = patch.point(next);
+    const double squared = (q - p).squaredNorm();
+    if (squared >= best.squared_distance) {
+      break;
+    }
+    at = next;
+    best = {next, p, squared};
+  }
+  return best;
+}
+
+std::array<Vec3, 3> edge_points(const CubicPatch& patch, std::size_t from, std::size_t to) {
+  return {patch.point(on_edge(from, to, 0.25)), patch.point(on_edge(from, to, 0.5)),
+          patch.point(on_edge(from, to, 0.75))};
+}
+
+void FitSamples::from_gap(const CubicPatch& patch, std::size_t from, std::size_t to, const std::array<Vec3, 3>& other,
+                          std::vector<Residual>& out) {
+  const Vec3 inward = patch.control[3 - from - to] - (patch.control[from] + patch.control[to]) / 2;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Vec2 at = on_edge(from, to, 0.25 * static_cast<double>(i + 1));
+    const Vec3 apart = patch.point(at) - other[i];
+    const double width = apart.norm();
+    if (width > 0 && apart.dot(inward) > 0) {  // else they overlap
+      out.push_back({at, apart / width, width / 2});
+    }
+  }
+}
+
+FitSamples::FitSamples(const Target& target, std::size_t shells)
+    : target_(target), facets_(facet_normals(target.mesh())) {
+  const auto& mesh = target.mesh();
+  std::vector<std::uint8_t> used(mesh.vertices.size(), 0);
+  for (const auto& loop : boundary_loops(mesh)) {
+    const std::size_t stride =
+        std::max<std::size_t>(1, loop.size() / (16 * static_cast<std::size_t>(std::sqrt(shells)) + 64));
+    for (std::size_t i = 0; i < loop.size(); i += stride) {
+      points_.push_back(mesh.vertices[loop[i]]);
+      used[loop[i]] = 1;
+    }
+  }
+  const std::size_t wanted = points_per_shell * shells;
+  if (mesh.vertices.size() > wanted) {
+    // Every n-th triangle in the order of space: even over the surface.
+    const auto& order = target.tree().spatial_order();
+    const double stride = std::max(1.0, static_cast<double>(order.size()) / static_cast<double>(wanted));
+    for (double i = stride / 2; i < static_cast<double>(order.size()); i += stride) {
+      const Index v = mesh.triangles[order[static_cast<std::size_t>(i)]][0];
+      if (used[v] == 0) {
+        points_.push_back(mesh.vertices[v]);
+        used[v] = 1;
+      }
+    }
+  } else {
+    for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
+      if (used[v] == 0) {
+        points_.push_back(mesh.vertices[v]);
+      }
+    }
+    if (mesh.triangles.size() + points_.size() <= wanted) {
+      for (const auto& [a, b, c] : mesh.triangles) {
+        points_.emplace_back((mesh.vertices[a] + mesh.vertices[b] + mesh.vertices[c]) / 3);
+      }
+    }
+  }
+  const int level = std::clamp(
+      static_cast<int>(std::sqrt(2.0 * static_cast<double>(most_grid_points) / static_cast<double>(shells + 1))) - 2,
+      coarsest_grid, finest_grid);
+  for (int i = 0; i <= level; ++i) {
+    for (int j = 0; i + j <= level; ++j) {
+      grid_.emplace_back(static_cast<double>(j) / level, static_cast<double>(i) / level);
+    }
+  }
+}
+
+void FitSamples::from_patch(const CubicPatch& patch, const Vec3& facing, std::vector<Index>& guesses,
+                            std::vector<Residual>& out) const {
+  if (guesses.size() != grid_.size()) {
+    guesses.assign(grid_.size(), guesses.empty() ? no_neighbour : guesses[0]);
+  }
+  Index last = guesses[0];
+  for (std::size_t i = 0; i < grid_.size(); ++i) {
+    const Vec3 p = patch.point(grid_[i]);
+    const Index guess = guesses[i] == no_neighbour ? last : guesses[i];
+    const auto hit = guess == no_neighbour ? target_.tree().closest(p) : target_.tree().closest(p, guess);
+    last = guesses[i] = hit.triangle;
+    if (facets_[hit.triangle].dot(facing) > 0) {
+      out.push_back(residual(grid_[i], p - hit.point, facets_[hit.triangle]));
+    } else if (const auto foot = target_.closest_facing(p, facing, target_.diagonal())) {
+      out.push_back(residual(grid_[i], p - foot->point, foot->facet_normal));
+    } else {
+      out.push_back(residual(grid_[i], p - hit.point, facing));
+    }
+  }
+}
+
+void FitSamples::from_target(const CubicPatch& patch, const Vec3& facing, Index point,
+                             std::vector<Residual>& out) const {
+  const PatchFoot foot = foot_on_patch(patch, points_[point]);
+  const Vec3 normal = patch.normal(foot.at);
+  out.push_back(residual(foot.at, foot.point - points_[point], normal.squaredNorm() > 0.5 ? normal : facing));
+}
+
+Target::Foot FitSamples::foot(const Vec3& p, const Vec3& facing) const {
+  const auto foot = target_.closest_facing(p, facing, target_.diagonal());
+  return foot ? *foot : target_.closest(p);
+}
+
+}  // namespace tunica

@@ -1,0 +1,75 @@
+#pragma once
+
+#include "shell/curved_surface.hpp"
+#include "shell/target.hpp"
+
+#include <span>
+
+namespace tunica {
+
+/// A place of a patch and how far it is from where it should be: the point of the patch at `at` ought to move by
+/// -distance along `direction`.
+struct Residual {
+  Vec2 at;
+  Vec3 direction;   ///< unit
+  double distance;  ///< mm, signed
+};
+
+/// What a patch is made of.
+struct PatchShape {
+  std::array<Vec3, 3> corners;
+  std::array<Vec3, 3> normals;
+};
+
+/// A point of a patch near a given one.
+struct PatchFoot {
+  Vec2 at;
+  Vec3 point;
+  double squared_distance;
+};
+
+/// The point of a patch closest to q, nearly: the foot on the facet, then two Newton steps.
+PatchFoot foot_on_patch(const CubicPatch& patch, const Vec3& q);
+
+/// The points at 1/4, 1/2, 3/4 of a patch's edge between two corners.
+std::array<Vec3, 3> edge_points(const CubicPatch& patch, std::size_t from, std::size_t to);
+
+/// Measures patches against the target, both ways: from a grid of points of each patch to the closest point of the
+/// target on the side that the patch faces, and from points of the target to the patch that they are attached to.
+class FitSamples {
+public:
+  /// @param shells  roughly how many there will be: it sets how many points of the target are used
+  FitSamples(const Target& target, std::size_t shells);
+
+  /// Points of the target; all those of its boundary are among them.
+  [[nodiscard]] const std::vector<Vec3>& points() const { return points_; }
+  [[nodiscard]] const Target& target() const { return target_; }
+
+  /// Further points of the target that must be met, such as where the distance was found largest.
+  void add(const Vec3& point) { points_.push_back(point); }
+
+  /// Appends the residuals of the grid of a patch's points. @param facing  the facet's normal; guesses  triangles of
+  /// the target that were closest the last time, kept up to date
+  void from_patch(const CubicPatch& patch, const Vec3& facing, std::vector<Index>& guesses,
+                  std::vector<Residual>& out) const;
+
+  /// Appends what makes two neighbours gape: where their edge curves part sideways, the target is bare between them by
+  /// half the way. Each side has its own residuals, towards the middle.
+  /// @param from, to  corners of the edge in the patch; other  the neighbour's points at 1/4, 1/2, 3/4 of the way
+  static void from_gap(const CubicPatch& patch, std::size_t from, std::size_t to, const std::array<Vec3, 3>& other,
+                       std::vector<Residual>& out);
+
+  /// Appends the residual of a point of the target against a patch.
+  void from_target(const CubicPatch& patch, const Vec3& facing, Index point, std::vector<Residual>& out) const;
+
+  /// The closest facet's normal and point of the target on the side of `facing`.
+  [[nodiscard]] Target::Foot foot(const Vec3& p, const Vec3& facing) const;
+
+private:
+  const Target& target_;
+  std::vector<Vec3> facets_;  // normals
+  std::vector<Vec3> points_;
+  std::vector<Vec2> grid_;
+};
+
+}  // namespace tunica

@@ -1,0 +1,168 @@
+#include "shell/fit_start.hpp"
+
+#include "shell/fit_place.hpp"
+#include "shell/normals.hpp"
+#include "surface/checks.hpp"
+#include "surface/decimate.hpp"
+#include "surface/hausdorff.hpp"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+
+namespace tunica {
+namespace {
+
+constexpr std::size_t ladder_top = 60'000;    // triangles: the first decimation, where the search for the count starts
+constexpr std::size_t most_samples = 20'000;  // for the sampled error of flat facets
+constexpr double crease_cosine = 0.8;         // of the angle between two facets: sharper edges may be creases
+constexpr double crease_share = 0.6;          // of that angle is there already close to the edge
+constexpr double close_by = 0.08;             // of the height of the triangle
+
+bool same_topology(const TriangleMesh& a, const TriangleMesh& b) {
+  const MeshFacts x = examine(a), y = examine(b);
+  return x.components == y.components && x.boundary_loops == y.boundary_loops && x.euler == y.euler;
+}
+
+/// Largest sampled distance between flat facets and target, both ways.
+double sampled_error(const TriangleMesh& mesh, const Target& target) {
+  const ClosestPoint tree(mesh);
+  TriangleMesh some;
+  const auto& vertices = target.mesh().vertices;
+  const std::size_t stride = std::max<std::size_t>(1, vertices.size() / most_samples);
+  for (std::size_t v = 0; v < vertices.size(); v += stride) {
+    some.vertices.push_back(vertices[v]);
+  }
+  double largest = 0;
+  for (const double d : vertex_distances(some, tree)) {
+    largest = std::max(largest, d);
+  }
+  some.vertices = mesh.vertices;
+  for (const auto& [a, b, c] : mesh.triangles) {
+    some.vertices.emplace_back((mesh.vertices[a] + mesh.vertices[b] + mesh.vertices[c]) / 3);
+    some.vertices.emplace_back((mesh.vertices[a] + mesh.vertices[b]) / 2);
+    some.vertices.emplace_back((mesh.vertices[b] + mesh.vertices[c]) / 2);
+    some.vertices.emplace_back((mesh.vertices[c] + mesh.vertices[a]) / 2);
+  }
+  for (const double d : vertex_distances(some, target.tree())) {
+    largest = std::max(largest, d);
+  }
+  return largest;
+}
+
+TriangleMesh decimated(const TriangleMesh& mesh, std::size_t triangles) {
+  DecimateOptions options;
+  options.triangles = triangles;
+  return decimate(mesh, options).mesh;
+}
+
+}  // namespace
+
+FitStart start_of_fit(const TriangleMesh& coarse, const Target& target, std::optional<std::size_t> triangles,
+                      double flat_error) {
+  if (!same_topology(coarse, target.mesh())) {
+    return {coarse, sampled_error(coarse, target), true};
+  }
+  FitStart start;
+  if (triangles) {
+    start.mesh = decimated(target.mesh(), *triangles);
+    start.flat_error = sampled_error(start.mesh, target);
+    return start;
+  }
+  start.mesh = target.mesh().triangles.size() > ladder_top ? decimated(target.mesh(), ladder_top) : target.mesh();
+  while (true) {
+    const std::size_t next = start.mesh.triangles.size() * 7 / 10;
+    TriangleMesh coarser = decimated(start.mesh, next);
+    if (coarser.triangles.size() >= start.mesh.triangles.size()) {
+      return start;
+    }
+    const double error = sampled_error(coarser, target);
+    if (error > flat_error) {
+      return start;
+    }
+    start.mesh = std::move(coarser);
+    start.flat_error = error;
+  }
+}
+
+FitMesh prepare_fit(const TriangleMesh& mesh, const Target& target) {
+  ShellMesh shell;
+  shell.vertices = mesh.vertices;
+  shell.triangles = mesh.triangles;
+  take_normals_from(target, shell);
+  FitMesh out(mesh, shell.normals);
+  const auto facets = facet_normals(mesh);
+  const auto across = neighbours(mesh, incidence(mesh));
+  std::vector<std::array<bool, 3>> crease(mesh.triangles.size(), {false, false, false});
+  std::vector<std::uint8_t> creases_at(mesh.vertices.size(), 0);
+  const auto normal_near = [&](std::size_t t, std::size_t k) {
+    const auto& v = mesh.triangles[t];
+    const Vec3 middle = (mesh.vertices[v[k]] + mesh.vertices[v[(k + 1) % 3]]) / 2;
+    const Vec3 at = middle + close_by * (mesh.vertices[v[(k + 2) % 3]] - middle);
+    const auto foot = target.closest_facing(at, facets[t], target.diagonal());
+    return foot ? foot->facet_normal : facets[t];
+  };
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Index other = across[t][k];
+      if (other == no_neighbour || other < t || facets[t].dot(facets[other]) > crease_cosine) {
+        continue;
+      }
+      std::size_t l = 0;
+      while (mesh.triangles[other][l] != mesh.triangles[t][(k + 1) % 3]) {
+        ++l;
+      }
+      const double turn = std::acos(std::clamp(facets[t].dot(facets[other]), -1.0, 1.0));
+      const double near = std::acos(std::clamp(normal_near(t, k).dot(normal_near(other, l)), -1.0, 1.0));
+      if (near > crease_share * turn) {
+        crease[t][k] = crease[other][l] = true;
+        ++creases_at[mesh.triangles[t][k]];
+        ++creases_at[mesh.triangles[t][(k + 1) % 3]];
+      }
+    }
+  }
+  // Around each node with creases the triangles between two of them share a normal: the mean of their facets'.
+  for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
+    const auto node = static_cast<Index>(v);
+    if (creases_at[v] < (out.on_boundary[v] != 0 ? 1 : 2)) {
+      continue;
+    }
+    std::vector<Index> open = out.around[v];
+    bool first = true;
+    while (!open.empty()) {
+      std::vector<Index> sector{open.back()};
+      open.pop_back();
+      for (std::size_t i = 0; i < sector.size(); ++i) {
+        const Index t = sector[i];
+        for (std::size_t k = 0; k < 3; ++k) {
+          const bool at_node = mesh.triangles[t][k] == node || mesh.triangles[t][(k + 1) % 3] == node;
+          const auto found = at_node && !crease[t][k] ? std::find(open.begin(), open.end(), across[t][k]) : open.end();
+          if (found != open.end()) {
+            sector.push_back(*found);
+            open.erase(found);
+          }
+        }
+      }
+      Vec3 normal = Vec3::Zero();
+      for (const Index t : sector) {
+        const std::size_t c = out.corner_of(t, node);
+        const Vec3 a = mesh.vertices[mesh.triangles[t][(c + 1) % 3]] - mesh.vertices[v];
+        const Vec3 b = mesh.vertices[mesh.triangles[t][(c + 2) % 3]] - mesh.vertices[v];
+        normal += std::atan2(a.cross(b).norm(), a.dot(b)) * facets[t];
+      }
+      if (first) {
+        out.normals[v] = normal.normalized();
+        first = false;
+        continue;
+      }
+      for (const Index t : sector) {
+        out.slots[t][out.corner_of(t, node)] = static_cast<Index>(out.normals.size());
+      }
+      out.normals.emplace_back(normal.normalized());
+    }
+  }
+  return out;
+}
+
+}  // namespace tunica

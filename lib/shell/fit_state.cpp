@@ -1,0 +1,373 @@
+// Global least squares of shells to a target: element by element, solved by preconditioned conjugate gradients.
+#include "shell/fit_state.hpp"
+
+#include "core/progress.hpp"
+#include "core/threads.hpp"
+#include "surface/closest_point.hpp"
+#include "surface/measure.hpp"
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+
+#include <algorithm>
+#include <cmath>
+
+namespace tunica {
+namespace {
+
+constexpr std::size_t patches_per_block = 16;
+constexpr int search_level = 3;  // pieces per edge of the surface on which points of the target find their patch
+constexpr int most_cg_steps = 60;
+constexpr double cg_tolerance = 1e-3;
+constexpr double least_weight = 0.1;  // residuals below this part of the largest count alike
+constexpr double largest_tilt = 0.3;  // rad
+constexpr double largest_move = 0.3;  // of the mean edge at the node
+constexpr int trials = 5;
+
+using Vector15 = Eigen::Matrix<double, 15, 1>;
+using Matrix15 = Eigen::Matrix<double, 15, 15>;
+
+double weight_of(double distance, double power, double scale) {
+  return std::pow(std::max(std::abs(distance) / scale, least_weight), power - 2);
+}
+
+}  // namespace
+
+FitState::FitState(const FitSamples& samples, FitMesh m, const FitLimits& l)
+    : mesh(std::move(m)), limits(l), patches(mesh.triangles.size()), samples_(&samples) {}
+
+void FitState::attach() {
+  std::vector<Index> triangle;
+  const ShellMesh shell = mesh.shell(&triangle);
+  const Tessellation fine = tessellate_uniformly(shell, search_level);
+  const ClosestPoint tree(fine.mesh);
+  const auto& points = samples_->points();
+  std::vector<Index> found(points.size());
+  parallel_for_blocks(points.size(), 512, [&](std::size_t begin, std::size_t end) {
+    std::optional<Index> guess;
+    for (std::size_t i = begin; i < end; ++i) {
+      const auto hit = guess ? tree.closest(points[i], *guess) : tree.closest(points[i]);
+      guess = hit.triangle;
+      found[i] = triangle[fine.shell[hit.triangle]];
+    }
+  });
+  for (Patch& p : patches) {
+    p.attached.clear();
+  }
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    patches[found[i]].attached.push_back(static_cast<Index>(i));
+  }
+}
+
+void FitState::measure(Index t) {
+  Patch& p = patches[t];
+  p.residuals.clear();
+  p.error = 0;
+  if (!mesh.is_alive(t)) {
+    return;
+  }
+  const CubicPatch patch = mesh.patch(t);
+  const Vec3 facing = facing_of(mesh.corners(t));
+  samples_->from_patch(patch, facing, p.guesses, p.residuals);
+  for (const Index q : p.attached) {
+    samples_->from_target(patch, facing, q, p.residuals);
+  }
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Index from = mesh.triangles[t][k], to = mesh.triangles[t][(k + 1) % 3];
+    const auto pair = mesh.on_edge(from, to);
+    if (pair.count() == 2) {
+      const Index other = pair.triangle[0] == t ? pair.triangle[1] : pair.triangle[0];
+      FitSamples::from_gap(patch, k, (k + 1) % 3,
+                           edge_points(mesh.patch(other), mesh.corner_of(other, from), mesh.corner_of(other, to)),
+                           p.residuals);
+    }
+  }
+  for (const Residual& r : p.residuals) {
+    p.error = std::max(p.error, std::abs(r.distance));
+  }
+}
+
+void FitState::measure() {
+  patches.resize(mesh.triangles.size());
+  parallel_for_blocks(patches.size(), patches_per_block, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t t = begin; t < end; ++t) {
+      measure(static_cast<Index>(t));
+    }
+  });
+}
+
+double FitState::error() const {
+  double largest = 0;
+  for (const Patch& p : patches) {
+    largest = std::max(largest, p.error);
+  }
+  return largest;
+}
+
+double FitState::cost_of(const Patch& patch, double power, double scale) const {
+  double cost = 0;
+  for (const Residual& r : patch.residuals) {
+    cost += weight_of(r.distance, power, scale) * r.distance * r.distance / (scale * scale);
+  }
+  return cost;
+}
+
+Vec3 FitState::middle_of_ring(Index node) const {
+  Vec3 sum = Vec3::Zero();
+  double weight = 0;
+  std::vector<Index> ring;
+  mesh.ring(node, ring);
+  for (const Index v : ring) {
+    const auto pair = mesh.on_edge(node, v);
+    // On a boundary or crease a node slides along it only.
+    const bool border = pair.count() == 1;
+    if (mesh.on_boundary[node] != 0 && !border) {
+      continue;
+    }
+    sum += mesh.positions[v];
+    weight += 1;
+  }
+  return weight > 0 ? Vec3(sum / weight) : mesh.positions[node];
+}
+
+double FitState::solve(double power, double smoothing) {
+  check_interrupt();
+  const std::size_t nodes = mesh.positions.size(), slots = mesh.normals.size(), count = mesh.triangles.size();
+  const double scale = error();
+  if (!(scale > 1e-12 * samples_->target().diagonal())) {
+    return 1;
+  }
+  // Patch by patch: matrix, right side.
+  std::vector<Matrix15> matrices(count);
+  std::vector<Vector15> sides(count);
+  std::vector<double> costs(count, 0);
+  parallel_for_blocks(count, patches_per_block, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t t = begin; t < end; ++t) {
+      matrices[t].setZero();
+      sides[t].setZero();
+      if (!mesh.is_alive(static_cast<Index>(t))) {
+        continue;
+      }
+      costs[t] = cost_of(patches[t], power, scale);
+      const PatchJacobian jacobian = patch_jacobian(shape(static_cast<Index>(t)));
+      for (const Residual& r : patches[t].residuals) {
+        const Vector15 row = residual_gradient(jacobian, r);
+        const double weight = weight_of(r.distance, power, scale);
+        matrices[t].selfadjointView<Eigen::Lower>().rankUpdate(row, weight);
+        sides[t] -= weight * r.distance * row;
+      }
+      matrices[t].triangularView<Eigen::StrictlyUpper>() = matrices[t].transpose();
+    }
+  });
+  // Node by node: diagonal blocks with damping, pull to the middle.
+  const std::size_t tilts = 3 * nodes, size = tilts + 2 * slots;
+  Eigen::VectorXd side = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(size));
+  std::vector<Mat3> position_block(nodes, Mat3::Zero()), position_damping(nodes, Mat3::Zero()), position_inverse(nodes);
+  std::vector<Eigen::Matrix2d> tilt_block(slots, Eigen::Matrix2d::Zero()), tilt_inverse(slots);
+  std::vector<double> tilt_damping(slots, 0), edge(nodes, 0);
+  for (std::size_t t = 0; t < count; ++t) {
+    if (!mesh.is_alive(static_cast<Index>(t))) {
+      continue;
+    }
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Index v = mesh.triangles[t][k], s = mesh.slots[t][k];
+      const auto i = static_cast<Eigen::Index>(k);
+      position_block[v] += matrices[t].block<3, 3>(3 * i, 3 * i);
+      tilt_block[s] += matrices[t].block<2, 2>(9 + 2 * i, 9 + 2 * i);
+      side.segment<3>(3 * static_cast<Eigen::Index>(v)) += sides[t].segment<3>(3 * i);
+      side.segment<2>(static_cast<Eigen::Index>(tilts + 2 * s)) += sides[t].segment<2>(9 + 2 * i);
+      edge[v] += (mesh.positions[mesh.triangles[t][(k + 1) % 3]] - mesh.positions[v]).norm();
+    }
+  }
+  std::vector<Index> of_node;
+  for (std::size_t v = 0; v < nodes; ++v) {
+    if (mesh.around[v].empty()) {
+      position_inverse[v].setZero();
+      continue;
+    }
+    edge[v] /= static_cast<double>(mesh.around[v].size());
+    double largest = 0;
+    for (const Index t : mesh.around[v]) {
+      largest = std::max(largest, patches[t].error);
+    }
+    mesh.slots_of(static_cast<Index>(v), of_node);
+    const double stiffness = position_block[v].trace();
+    const double slide = stiffness * std::min(1.0, std::pow(largest / edge[v], 2));
+    Mat3 damping = (1e-6 * stiffness + 0.3 * slide) * Mat3::Identity();
+    if (of_node.size() == 1) {
+      const Vec3& n = mesh.normals[of_node[0]];
+      const Mat3 tangential = Mat3::Identity() - n * n.transpose();
+      damping += smoothing * slide * tangential;
+      side.segment<3>(3 * static_cast<Eigen::Index>(v)) +=
+          smoothing * slide * (tangential * (middle_of_ring(static_cast<Index>(v)) - mesh.positions[v]));
+    }
+    position_damping[v] = damping;
+    position_block[v] += damping;
+    position_inverse[v] = position_block[v].inverse();
+    for (const Index s : of_node) {
+      tilt_damping[s] = 1e-4 * tilt_block[s].trace() + 1e-6 * stiffness * edge[v] * edge[v] + 1e-300;
+      tilt_block[s].diagonal().array() += tilt_damping[s];
+      tilt_inverse[s] = tilt_block[s].inverse();
+    }
+  }
+  // Conjugate gradients.
+  const auto gather = [&](const Eigen::VectorXd& x, std::size_t t) {
+    Vector15 local;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto i = static_cast<Eigen::Index>(k);
+      local.segment<3>(3 * i) = x.segment<3>(3 * static_cast<Eigen::Index>(mesh.triangles[t][k]));
+      local.segment<2>(9 + 2 * i) = x.segment<2>(static_cast<Eigen::Index>(tilts + 2 * mesh.slots[t][k]));
+    }
+    return local;
+  };
+  const auto apply = [&](const Eigen::VectorXd& x) {
+    Eigen::VectorXd y = Eigen::VectorXd::Zero(x.size());
+    for (std::size_t t = 0; t < count; ++t) {
+      if (!mesh.is_alive(static_cast<Index>(t))) {
+        continue;
+      }
+      const Vector15 local = matrices[t] * gather(x, t);
+      for (std::size_t k = 0; k < 3; ++k) {
+        const auto i = static_cast<Eigen::Index>(k);
+        y.segment<3>(3 * static_cast<Eigen::Index>(mesh.triangles[t][k])) += local.segment<3>(3 * i);
+        y.segment<2>(static_cast<Eigen::Index>(tilts + 2 * mesh.slots[t][k])) += local.segment<2>(9 + 2 * i);
+      }
+    }
+    for (std::size_t v = 0; v < nodes; ++v) {
+      const auto i = 3 * static_cast<Eigen::Index>(v);
+      y.segment<3>(i) += position_damping[v] * x.segment<3>(i);
+    }
+    for (std::size_t s = 0; s < slots; ++s) {
+      const auto i = static_cast<Eigen::Index>(tilts + 2 * s);
+      y.segment<2>(i) += tilt_damping[s] * x.segment<2>(i);
+    }
+    return y;
+  };
+  const auto precondition = [&](const Eigen::VectorXd& r) {
+    Eigen::VectorXd z = Eigen::VectorXd::Zero(r.size());
+    for (std::size_t v = 0; v < nodes; ++v) {
+      const auto i = 3 * static_cast<Eigen::Index>(v);
+      z.segment<3>(i) = position_inverse[v] * r.segment<3>(i);
+    }
+    for (std::size_t s = 0; s < slots; ++s) {
+      const auto i = static_cast<Eigen::Index>(tilts + 2 * s);
+      if (tilt_damping[s] > 0) {
+        z.segment<2>(i) = tilt_inverse[s] * r.segment<2>(i);
+      }
+    }
+    return z;
+  };
+  Eigen::VectorXd x = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(size));
+  Eigen::VectorXd r = side, z = precondition(r), d = z;
+  double rz = r.dot(z);
+  const double enough = rz * cg_tolerance * cg_tolerance;
+  for (int i = 0; i < most_cg_steps && rz > enough; ++i) {
+    const Eigen::VectorXd ad = apply(d);
+    const double alpha = rz / d.dot(ad);
+    x += alpha * d;
+    r -= alpha * ad;
+    z = precondition(r);
+    const double next = r.dot(z);
+    d = z + (next / rz) * d;
+    rz = next;
+  }
+  if (!x.allFinite()) {
+    return 1;
+  }
+  // The step, node by node as long as it betters what is around.
+  const auto old_positions = mesh.positions;
+  const auto old_normals = mesh.normals;
+  std::vector<double> old_agreement(count, 0), old_angle(count, 0);
+  std::vector<Vec3> old_facing(count);
+  for (std::size_t t = 0; t < count; ++t) {
+    if (mesh.is_alive(static_cast<Index>(t))) {
+      const auto c = mesh.corners(static_cast<Index>(t));
+      old_facing[t] = facing_of(c);
+      old_agreement[t] = normal_agreement(c, mesh.corner_normals(static_cast<Index>(t)));
+      old_angle[t] = smallest_angle_degrees(c[0], c[1], c[2]);
+    }
+  }
+  std::vector<double> length(nodes, 1), fan_cost(nodes, 0);
+  for (std::size_t t = 0; t < count; ++t) {
+    for (std::size_t k = 0; mesh.is_alive(static_cast<Index>(t)) && k < 3; ++k) {
+      fan_cost[mesh.triangles[t][k]] += costs[t];
+    }
+  }
+  double before = 0;
+  for (const double c : costs) {
+    before += c;
+  }
+  const std::vector<Patch> old_patches = patches;
+  std::vector<double> new_costs(count, 0);
+  for (int trial = 0; trial <= trials; ++trial) {
+    for (std::size_t v = 0; v < nodes; ++v) {
+      if (mesh.around[v].empty()) {
+        continue;
+      }
+      Vec3 move = length[v] * x.segment<3>(3 * static_cast<Eigen::Index>(v));
+      if (const double far = move.norm(); far > largest_move * edge[v]) {
+        move *= largest_move * edge[v] / far;
+      }
+      mesh.positions[v] = old_positions[v] + move;
+      mesh.slots_of(static_cast<Index>(v), of_node);
+      for (const Index s : of_node) {
+        Vec2 tilt = length[v] * x.segment<2>(static_cast<Eigen::Index>(tilts + 2 * s));
+        if (const double far = tilt.norm(); far > largest_tilt) {
+          tilt *= largest_tilt / far;
+        }
+        const auto axes = tilt_axes(old_normals[s]);
+        mesh.normals[s] = length[v] > 0 ? Vec3((old_normals[s] + tilt[0] * axes[0] + tilt[1] * axes[1]).normalized())
+                                        : old_normals[s];
+      }
+    }
+    std::vector<std::uint8_t> bad(nodes, 0), broken(count, 0);
+    parallel_for_blocks(count, patches_per_block, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t t = begin; t < end; ++t) {
+        const auto i = static_cast<Index>(t);
+        if (!mesh.is_alive(i)) {
+          continue;
+        }
+        broken[t] = !is_sound(i, std::min(limits.agreement, old_agreement[t]), std::min(limits.angle, old_angle[t])) ||
+                    facing_of(mesh.corners(i)).dot(old_facing[t]) < 0.3;
+        if (broken[t] == 0) {
+          measure(i);
+          new_costs[t] = cost_of(patches[t], power, scale);
+        } else {
+          new_costs[t] = 0;
+        }
+      }
+    });
+    std::vector<double> now(nodes, 0);
+    double after = 0;
+    bool any = false;
+    for (std::size_t t = 0; t < count; ++t) {
+      after += new_costs[t];
+      for (std::size_t k = 0; mesh.is_alive(static_cast<Index>(t)) && k < 3; ++k) {
+        now[mesh.triangles[t][k]] += new_costs[t];
+        bad[mesh.triangles[t][k]] |= broken[t];
+      }
+    }
+    for (std::size_t v = 0; v < nodes; ++v) {
+      bad[v] = bad[v] != 0 || now[v] > 1.05 * fan_cost[v] + 1e-6 * before;
+      any = any || (bad[v] != 0 && length[v] > 0);
+    }
+    const bool some_broken = std::find(broken.begin(), broken.end(), 1) != broken.end();
+    if (!some_broken && (!any || trial >= trials - 1) && after <= before) {
+      return after / before;
+    }
+    if (trial == trials) {
+      break;
+    }
+    for (std::size_t v = 0; v < nodes; ++v) {
+      if (bad[v] != 0) {
+        length[v] = trial < 2 ? 0.35 * length[v] : 0;
+      }
+    }
+  }
+  mesh.positions = old_positions;
+  mesh.normals = old_normals;
+  patches = old_patches;
+  return 1;
+}
+
+}  // namespace tunica

@@ -1,0 +1,55 @@
+#pragma once
+
+#include "shell/fit_mesh.hpp"
+#include "shell/fit_place.hpp"
+
+namespace tunica {
+
+/// A shell mesh under edit with what is known of the distance of each of its patches to the target.
+class FitState {
+public:
+  FitState(const FitSamples& samples, FitMesh mesh, const FitLimits& limits);
+
+  FitMesh mesh;
+  FitLimits limits;
+
+  struct Patch {
+    std::vector<Index> guesses;   ///< see FitSamples::from_patch
+    std::vector<Index> attached;  ///< points of the target
+    std::vector<Residual> residuals;
+    double error = 0;  ///< mm, largest residual
+  };
+  std::vector<Patch> patches;  ///< #T
+
+  [[nodiscard]] const FitSamples& samples() const { return *samples_; }
+
+  /// Attaches every point of the target to the patch it is closest to. Parallel.
+  void attach();
+
+  /// Measures all patches, or one. Parallel.
+  void measure();
+  void measure(Index t);
+
+  [[nodiscard]] PatchShape shape(Index t) const { return {mesh.corners(t), mesh.corner_normals(t)}; }
+  [[nodiscard]] bool is_sound(Index t, double agreement, double angle) const {
+    return tunica::is_sound(shape(t), agreement, angle);
+  }
+
+  /// Largest residual of all patches.
+  [[nodiscard]] double error() const;
+
+  /// Moves all nodes and turns all normals at once by one Gauss-Newton step on the residuals weighted by
+  /// (|residual| / largest)^(power - 2), where that lessens the sum of the powers around each node.
+  /// @param smoothing  pull towards the middle of the ring, relative to what keeps nodes from sliding
+  /// @return how much of the cost is left, <= 1
+  double solve(double power, double smoothing);
+
+private:
+  struct Step;
+  [[nodiscard]] double cost_of(const Patch& patch, double power, double scale) const;
+  [[nodiscard]] Vec3 middle_of_ring(Index node) const;
+
+  const FitSamples* samples_;
+};
+
+}  // namespace tunica
