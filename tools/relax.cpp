@@ -50,7 +50,8 @@ void declare(cli::Tool& tool, Arguments& given) {
   app.add_option("--surface", given.surface, "the patch: comas (the paper's 9-term cubic)")
       ->check(CLI::IsMember({"comas", "watertight"}));
   app.add_flag("--refine", given.refine,
-               "split shells where the distance is above the tolerance; without one, all 1:4");
+               "barycentre: split shells where the distance is above the tolerance; without one, all 1:4 "
+               "(fit chooses the number of shells itself)");
   app.add_option("--shells", given.shells,
                  "fit: at most N shells instead of as many as COARSE has (with --tolerance: as few as it takes)")
       ->check(CLI::PositiveNumber)
@@ -78,10 +79,10 @@ void refuse_contradictions(const Arguments& given) {
   if (given.surface == "watertight") {
     throw UsageError("--surface watertight is not available yet; use comas");
   }
-  if (given.max_shells && !given.refine && !fit) {
+  if (given.max_shells && !given.refine) {
     throw UsageError("--max-shells limits --refine; without it the number of shells does not change");
   }
-  if (given.refine && !fit && !given.tolerance && !given.max_shells && !given.max_iterations) {
+  if (given.refine && !given.tolerance && !given.max_shells && !given.max_iterations) {
     throw UsageError("--refine needs to know where to end: --tolerance, --max-shells or --max-iterations");
   }
 }
@@ -275,7 +276,9 @@ void run(cli::Tool& tool, const Arguments& given) {
         "{}: the tolerance of {:.4g} % is not reached: {:.4g} % with {} shells ({}); the best mesh is {}.part. {}",
         given.out.string(), percent * *options.tolerance, percent * distance.both.upper, relaxed.shell.triangles.size(),
         relaxed.stopped, given.out.string(),
-        given.refine ? "Allow more shells or iterations" : "Add --refine, or take a coarse mesh with more triangles"));
+        options.method == RelaxMethod::fit ? "Allow more shells or iterations, or a wider tolerance"
+        : given.refine                     ? "Allow more shells or iterations"
+                                           : "Add --refine, or take a coarse mesh with more triangles"));
   }
   require_fit(relaxed.shell, given.out.string());
   write_ply(given.out, relaxed.shell, ply);
@@ -294,8 +297,9 @@ int main(int argc, char** argv) {
       "relax",
       "Moves a coarse mesh onto its target as curved shells, and certifies the distance of the curved surface "
       "to the target, both ways.",
-      "tunica-relax coarse.ply surface.ply shell.ply --tolerance 1% --refine --picture map.png\n"
-      "tunica-relax coarse.obj surface.obj shell.ply --mesh-unit mm --max-iterations 5");
+      "tunica-relax surface.ply surface.ply shell.ply --tolerance 0.3% --picture map.png\n"
+      "tunica-relax coarse.obj surface.obj shell.ply --mesh-unit mm --shells 800\n"
+      "tunica-relax coarse.ply surface.ply shell.ply --method barycentre --tolerance 1% --refine");
   Arguments given;
   declare(tool, given);
   return tool.run(argc, argv, [&] { run(tool, given); });

@@ -18,13 +18,17 @@ namespace {
 
 constexpr double default_width = 1e-4;  // of the diagonal
 constexpr int default_rounds = 8;
-constexpr double start_error = 3;      // tolerances: flat error of the mesh that the search starts from
+constexpr double start_error = 3;  // tolerances: flat error of the mesh that the search starts from
+constexpr double limited_by_target =
+    0.6;                               // of its triangles: a start that needs more follows its facets, not its shape
 constexpr double expected_gain = 3;    // shells of the start per shell of the result
 constexpr double start_surplus = 1.5;  // triangles of the start per shell wanted
 constexpr double margin = 0.97;        // of the tolerance: what samples miss
 constexpr double worth_it = 0.985;     // a round that leaves more than this of the count or error is the last
+constexpr int patience = 3;            // rounds that bring nothing
+constexpr int most_settling = 20;
 constexpr int most_repairs = 12;
-constexpr int certificates = 6;
+constexpr int certificates = 10;
 constexpr std::size_t checked_points = 200'000;  // of the target, for places that the samples miss
 constexpr int checking_level = 6;                // pieces per edge of the patches there
 
@@ -41,27 +45,35 @@ public:
   }
 
   RelaxResult run() {
-    const std::size_t shells = options_.shells.value_or(options_.max_shells.value_or(coarse_.triangles.size()));
-    if (options_.tolerance) {
+    const std::optional<std::size_t> most = options_.shells ? options_.shells : options_.max_shells;
+    if (!options_.tolerance) {
+      to_count(most.value_or(coarse_.triangles.size()));
+      return std::move(result_);
+    }
+    // When the shells allowed do not do, nothing has to be said about fewer.
+    if (most) {
+      to_count(*most);
+    }
+    if (!most || result_.distance.both.upper <= *options_.tolerance) {
       to_tolerance(*options_.tolerance);
-    } else {
-      to_count(shells);
     }
-    if (options_.tolerance) {
-      const std::size_t most = options_.shells.value_or(options_.max_shells.value_or(max_index));
-      result_.reached = result_.distance.both.upper <= *options_.tolerance && result_.shell.triangles.size() <= most;
-      result_.stopped = *result_.reached ? "the tolerance holds" : "no fewer shells were found for the tolerance";
-    }
+    result_.reached = result_.distance.both.upper <= *options_.tolerance;
+    result_.stopped = *result_.reached ? "the tolerance holds" : "closer shells were not found";
     return std::move(result_);
   }
 
 private:
   void to_tolerance(double tolerance) {
-    const std::size_t most = options_.shells.value_or(options_.max_shells.value_or(max_index));
     const FitStart start = start_of_fit(coarse_, target_, {}, start_error * tolerance);
+    const std::size_t most = max_index;
+    if (!start.own_topology && static_cast<double>(start.mesh.triangles.size()) >
+                                   limited_by_target * static_cast<double>(target_.mesh().triangles.size())) {
+      no_worse_than_flat(tolerance, most, start);
+      return;
+    }
     FitSamples samples(target_, guess(start.mesh.triangles.size() / expected_gain));
-    FitState state(samples, prepare_fit(start.mesh, target_), {});
-    smooth(state);
+    FitState state(samples, prepare_fit(start, target_), {});
+    smooth(state, tolerance);
     const int rounds = options_.max_iterations.value_or(default_rounds);
     double limit = margin * tolerance;
     repair(state, limit, most);
@@ -87,8 +99,8 @@ private:
       if (certify(state, tolerance)) {
         break;
       }
-      const std::size_t added = add_missed(samples, state, margin * tolerance);
-      limit *= added > 0 ? 0.995 : 0.97;
+      add_missed(samples, state, margin * tolerance);
+      limit *= std::clamp(tolerance / result_.distance.both.upper, 0.93, 0.985);
       state.attach();
       state.measure();
       polish(state, limit, 2);
@@ -101,25 +113,29 @@ private:
     FitStart start =
         start_of_fit(coarse_, target_, static_cast<std::size_t>(start_surplus * static_cast<double>(shells)), 0);
     FitSamples samples(target_, guess(static_cast<double>(shells)));
-    FitState state(samples, prepare_fit(start.mesh, target_), {});
-    smooth(state);
+    FitState state(samples, prepare_fit(start, target_), {});
+    smooth(state, 0.1 * start.flat_error);
     constexpr double any = std::numeric_limits<double>::infinity();
     collapse_edges(state, any, shells, {});
-    polish(state, state.error(), 4);
+    settle(state);
     note(state);
     FitState best = state;
     const int rounds = options_.max_iterations.value_or(default_rounds);
     int fruitless = 0;
-    for (int round = 1; round < rounds && fruitless < 2; ++round) {
+    for (int round = 1; round < rounds && fruitless < patience; ++round) {
       advance(options_.progress, static_cast<double>(round) / rounds);
+      // Exchange: shells from where they are hardly needed to where the error is largest; more or fewer in turn.
+      state = best;
       const double error = state.error();
-      split_worst(state, 0.7 * error, std::max<std::size_t>(1, shells / 40));
+      const std::array<std::size_t, 3> amounts{shells / 40, 1, shells / 15};
+      split_worst(state, 0.7 * error, std::max<std::size_t>(1, amounts[static_cast<std::size_t>(fruitless) % 3]));
       polish(state, error, 1);
       collapse_edges(state, any, shells, {});
-      polish(state, error, 3);
+      settle(state);
       note(state);
-      fruitless = state.error() < worth_it * best.error() ? 0 : fruitless + 1;
-      if (state.mesh.alive <= shells && state.error() < best.error()) {
+      const bool better = state.mesh.alive <= shells && (state.error() < best.error() || best.mesh.alive > shells);
+      fruitless = better && state.error() < worth_it * best.error() ? 0 : fruitless + 1;
+      if (better) {
         best = state;
       }
     }
@@ -132,19 +148,23 @@ private:
       best.measure();
       polish(best, best.error(), 3);
     }
-    result_.stopped = fruitless < 2 ? "the limit of rounds was reached" : "further rounds bring nothing";
+    result_.stopped = fruitless < patience ? "the limit of rounds was reached" : "further rounds bring nothing";
     no_worse_than_flat({}, shells, start);
   }
 
   static std::size_t guess(double shells) { return static_cast<std::size_t>(std::max(8.0, shells)); }
 
   /// From slivers to triangles that carry patches.
-  static void smooth(FitState& state) {
+  static void smooth(FitState& state, double limit) {
     state.attach();
     state.measure();
     for (int i = 0; i < 3; ++i) {
-      flip_edges(state, std::numeric_limits<double>::infinity());
+      flip_edges(state, limit);
       state.solve(2, 3);
+      place_worst(state, std::max(limit, 0.3 * state.error()));
+      if (i > 0) {
+        detach_worst(state, limit);
+      }
       state.attach();
       state.measure();
     }
@@ -155,11 +175,28 @@ private:
       state.attach();
       state.measure();
       flip_edges(state, limit);
-      state.solve(i == 0 ? 4 : 8, 1);
+      state.solve(i == 0 && steps > 1 ? 4 : 8, 1);
     }
     place_worst(state, 0.9 * limit);
+    detach_worst(state, limit);
     state.attach();
     state.measure();
+  }
+
+  /// Polishes until that brings little.
+  static void settle(FitState& state) {
+    state.attach();
+    state.measure();
+    int fruitless = 0;
+    FitState best = state;
+    for (int i = 0; i < most_settling && fruitless < 3; ++i) {
+      polish(state, 0.95 * state.error(), 1);
+      fruitless = state.error() < 0.98 * best.error() ? 0 : fruitless + 1;
+      if (state.error() < best.error()) {
+        best = state;
+      }
+    }
+    state = std::move(best);
   }
 
   static void repair(FitState& state, double limit, std::size_t most) {
@@ -202,7 +239,9 @@ private:
     measuring.limit = tolerance;
     ShellDistance distance = shell_distance(shell, target_, measuring);
     const bool holds = tolerance && distance.both.upper <= *tolerance;
-    if (holds || result_.shell.triangles.empty() || distance.both.upper < result_.distance.both.upper) {
+    const bool held = tolerance && !result_.shell.triangles.empty() && result_.distance.both.upper <= *tolerance;
+    if (result_.shell.triangles.empty() || (held ? holds && shell.triangles.size() < result_.shell.triangles.size()
+                                                 : distance.both.upper < result_.distance.both.upper)) {
       result_.shell = std::move(shell);
       result_.distance = distance;
     }
@@ -214,14 +253,15 @@ private:
     if (start.own_topology) {
       return;
     }
-    const bool holds = tolerance && result_.distance.both.upper <= *tolerance;
+    const bool none = result_.shell.triangles.empty();
+    const bool holds = tolerance && !none && result_.distance.both.upper <= *tolerance;
     // Flat errors fall as 1 / count: far from that nothing needs to be tried.
     const double flat_count =
         tolerance ? static_cast<double>(start.mesh.triangles.size()) * start.flat_error / *tolerance : 0;
     if (holds && static_cast<double>(result_.shell.triangles.size()) < 0.6 * flat_count) {
       return;
     }
-    if (!tolerance && result_.distance.both.upper < start.flat_error) {
+    if (!tolerance && !none && result_.distance.both.upper < start.flat_error) {
       return;
     }
     DecimateOptions decimating;
@@ -241,8 +281,9 @@ private:
     measuring.width = width_;
     const ShellDistance distance = shell_distance(shell, target_, measuring);
     const bool flat_holds = tolerance && distance.both.upper <= *tolerance;
-    const bool better = tolerance ? flat_holds && (!holds || shell.triangles.size() < result_.shell.triangles.size())
-                                  : distance.both.upper < result_.distance.both.upper;
+    const bool better =
+        none || (tolerance ? flat_holds && (!holds || shell.triangles.size() < result_.shell.triangles.size())
+                           : distance.both.upper < result_.distance.both.upper);
     if (better) {
       result_.shell = std::move(shell);
       result_.distance = distance;

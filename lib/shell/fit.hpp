@@ -17,11 +17,12 @@ namespace tunica {
 /// most `shells` (none: as many as COARSE has). Never more shells, or a larger distance, than plain decimation: where
 /// that wins, its flat facets are the result (flat shells: corner normals are the facets').
 /// @param coarse  an oriented manifold; its count, and its topology, may matter; @param target  likewise
-/// Keeps: topology of the start, boundary loops (on the target's boundary to the same tolerance); smallest angle 20
-/// degrees where the start or a sharp feature does not forbid it. Deterministic, independent of the number of threads.
-/// Errors: Interrupted. Source: error-driven collapse as in Hoppe et al., Mesh optimization, SIGGRAPH 1993, with cubic
-/// patches (Comas, Duriez, Cotin 2010, eq. 1-2) in place of facets.
-/// Cost: n log n for the target, then about 5 ms per shell of the result. Limits: a greedy search.
+/// Keeps: topology of the start, boundary loops (on the target's boundary to the same tolerance). No triangle is made
+/// with an angle below 20 degrees but where the start's are smaller or an error needs a split. Deterministic,
+/// independent of the number of threads. Errors: Interrupted. Source: error-driven collapse as in Hoppe et al., Mesh
+/// optimization, SIGGRAPH 1993, with cubic patches (Comas, Duriez, Cotin 2010, eq. 1-2) in place of facets. Cost: n log
+/// n for the target, then about 10 ms per shell of the result. Limits: a greedy search; where its facets, not its
+/// shape, decide (a target hardly denser than the shells needed) plain decimation is the answer.
 RelaxResult fit(const TriangleMesh& coarse, const Target& target, const RelaxOptions& options);
 
 }  // namespace tunica

@@ -13,6 +13,9 @@ namespace tunica {
 namespace {
 
 constexpr int placing_steps = 3;
+constexpr double kept_angle = 0.98;      // of an angle below the limit
+constexpr double least_split_angle = 3;  // degrees, where nothing better can be had
+constexpr double worth_a_crease = 0.6;   // of its error a patch may keep when it gets normals of its own
 
 /// What becomes of the patches around a node.
 struct Trial {
@@ -35,7 +38,7 @@ void gather(const FitState& state, Index t, Trial& trial) {
 
 /// What was worse before may stay so.
 void ease_limits(const FitState& state, Index t, FitLimits& limits) {
-  limits.angle = std::min(limits.angle, smallest_angle(state, t) * (1 - 1e-9));
+  limits.angle = std::min(limits.angle, kept_angle * smallest_angle(state, t));
   limits.agreement =
       std::min(limits.agreement, normal_agreement(state.mesh.corners(t), state.mesh.corner_normals(t)) - 1e-9);
   limits.agreement = std::max(limits.agreement, least_normal_agreement + 1e-6);
@@ -164,8 +167,9 @@ private:
     return ring_u_.size() + ring_v_.size() >= on_edge + 2 + 3;
   }
 
-  /// The slots of the merged node: those of u and v, the ones that meet across the edge being one.
-  bool merge_slots(Index u, Index v, const FitMesh::Pair& shared) {
+  /// The slots of the merged node: those of u and v, the ones that meet across the edge being one. A crease
+  /// may end so: the error decides.
+  void merge_slots(Index u, Index v, const FitMesh::Pair& shared) {
     std::vector<Index> of_u, of_v;
     mesh_.slots_of(u, of_u);
     mesh_.slots_of(v, of_v);
@@ -196,8 +200,6 @@ private:
       }
     }
     class_of_ = parent;
-    // Two sides of a crease that become one would smooth it away; a crease's end may.
-    return classes_.size() >= std::max(of_u.size(), of_v.size());
   }
 
   bool prepare(Index u, Index v) {
@@ -205,9 +207,7 @@ private:
       return false;
     }
     const auto shared = mesh_.on_edge(u, v);
-    if (!merge_slots(u, v, shared)) {
-      return false;
-    }
+    merge_slots(u, v, shared);
     Trial& trial = trial_;
     trial.patches.clear();
     trial.triangles.clear();
@@ -310,7 +310,7 @@ std::size_t collapse_edges(FitState& state, double limit, std::size_t shells, co
     const double known = c.error;
     const bool fresh = c.version == current(c.u, c.v);
     c.error = collapser.evaluate(c.u, c.v);
-    if (c.error > limit) {
+    if (!(c.error <= limit) || !std::isfinite(c.error)) {
       continue;
     }
     if (!fresh && !queue.empty() && c.error > 1.001 * std::max(known, queue.top().error)) {
@@ -391,7 +391,8 @@ std::size_t flip_edges(FitState& state, double limit) {
       continue;
     }
     place_node(state.samples(), trial.patches, trial.points, trial.limits, limit, 0, trial.node);
-    if (!(trial.node.error < 0.97 * old_error || (mends && trial.node.error <= std::max(limit, old_error)))) {
+    if (!std::isfinite(trial.node.error) ||
+        !(trial.node.error < 0.97 * old_error || (mends && trial.node.error <= std::max(limit, old_error)))) {
       continue;
     }
     mesh.remove_triangle(t1);
@@ -458,6 +459,15 @@ bool split_edge(FitState& state, Index u, Index v, double limit) {
   trial.limits.angle = std::min(trial.limits.angle, 0.5 * state.limits.angle);
   make_compatible(trial);
   place_node(state.samples(), trial.patches, trial.points, trial.limits, limit, placing_steps, trial.node);
+  if (!std::isfinite(trial.node.error)) {
+    // In the facets themselves the parts are as sound as the whole was.
+    trial.node.position = middle;
+    for (std::size_t i = 0; i < trial.patches.size(); ++i) {
+      trial.node.normals[trial.patches[i].slot] = facing_of(mesh.corners(pair.triangle[i / 2]));
+    }
+    trial.limits.angle = std::min(trial.limits.angle, least_split_angle);
+    place_node(state.samples(), trial.patches, trial.points, trial.limits, limit, placing_steps, trial.node);
+  }
   if (!std::isfinite(trial.node.error)) {
     return false;
   }
@@ -581,6 +591,34 @@ std::size_t place_worst(FitState& state, double limit) {
     ++better;
   }
   return better;
+}
+
+std::size_t detach_worst(FitState& state, double limit) {
+  FitMesh& mesh = state.mesh;
+  std::size_t detached = 0;
+  for (Index t = 0; t < mesh.triangles.size(); ++t) {
+    if (!mesh.is_alive(t) || state.patches[t].error <= limit) {
+      continue;
+    }
+    Trial trial;
+    trial.limits = {state.limits.agreement, 0};
+    trial.patches.push_back(placed(state, t));
+    link(state, {mesh.triangles[t]}, {t}, trial);
+    PlacedPatch& patch = trial.patches[0];
+    patch.attached = state.patches[t].attached;
+    patch.shape.normals.fill(facing_of(patch.shape.corners));
+    turn_normals(state.samples(), patch, trial.limits, placing_steps);
+    if (!(patch.error < worth_a_crease * state.patches[t].error)) {
+      continue;
+    }
+    for (std::size_t k = 0; k < 3; ++k) {
+      mesh.slots[t][k] = static_cast<Index>(mesh.normals.size());
+      mesh.normals.push_back(patch.shape.normals[k]);
+    }
+    state.patches[t] = {std::move(patch.guesses), std::move(patch.attached), std::move(patch.residuals), patch.error};
+    ++detached;
+  }
+  return detached;
 }
 
 }  // namespace tunica

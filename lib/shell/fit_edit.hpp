@@ -22,4 +22,8 @@ std::size_t split_worst(FitState& state, double limit, std::size_t most);
 /// Places the nodes around patches with an error above `limit` anew, one by one. @return how many got better
 std::size_t place_worst(FitState& state, double limit);
 
+/// Gives patches with an error above `limit` normals of their own at their corners where these, from flat, bring the
+/// patch much closer: what no common normal can serve, a crease or a rim. @return how many
+std::size_t detach_worst(FitState& state, double limit);
+
 }  // namespace tunica

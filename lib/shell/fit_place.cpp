@@ -148,7 +148,8 @@ Eigen::Matrix<double, 15, 1> residual_gradient(const PatchJacobian& jacobian, co
 void place_node(const FitSamples& samples, std::vector<PlacedPatch>& patches, const std::vector<Index>& points,
                 const FitLimits& limits, double give_up, int steps, PlacedNode& node) {
   put(patches, node);
-  Measured now = measure(samples, patches, points, limits, give_up);
+  const double scale = samples.target().diagonal();
+  Measured now = measure(samples, patches, points, limits, scale);
   node.error = now.error;
   if (!std::isfinite(now.error)) {
     return;
@@ -216,7 +217,7 @@ void place_node(const FitSamples& samples, std::vector<PlacedPatch>& patches, co
         moved.normals[s] = (best.normals[s] + tilt[0] * axes[0] + tilt[1] * axes[1]).normalized();
       }
       put(patches, moved);
-      const Measured then = measure(samples, patches, points, limits, give_up);
+      const Measured then = measure(samples, patches, points, limits, scale);
       if (then.cost < now.cost) {
         now = then;
         moved.error = then.error;
@@ -232,6 +233,48 @@ void place_node(const FitSamples& samples, std::vector<PlacedPatch>& patches, co
   // The patches' residuals are those of the last trial; their owner only needs the shapes.
   put(patches, best);
   node = best;
+}
+
+void turn_normals(const FitSamples& samples, PlacedPatch& patch, const FitLimits& limits, int steps) {
+  const double scale = samples.target().diagonal();
+  const std::vector<Index> points = patch.attached;
+  std::vector<PlacedPatch> one{patch};
+  one[0].corner = PlacedPatch::no_corner;
+  Measured now = measure(samples, one, points, limits, scale);
+  PlacedPatch best = one[0];
+  for (int step = 0; step < steps && std::isfinite(now.error); ++step) {
+    const PatchJacobian jacobian = patch_jacobian(one[0].shape);
+    Eigen::Matrix<double, 6, 6> h = Eigen::Matrix<double, 6, 6>::Zero();
+    Eigen::Matrix<double, 6, 1> g = Eigen::Matrix<double, 6, 1>::Zero();
+    for (const Residual& r : one[0].residuals) {
+      const Eigen::Matrix<double, 6, 1> row = residual_gradient(jacobian, r).tail<6>();
+      const double weight = step == 0 ? 1 : std::pow(std::max(std::abs(r.distance) / now.error, 0.1), 4);
+      h += weight * row * row.transpose();
+      g -= weight * r.distance * row;
+    }
+    h.diagonal().array() += 1e-3 * h.trace() / 6 + 1e-300;
+    const Eigen::Matrix<double, 6, 1> x = h.ldlt().solve(g);
+    if (!x.allFinite()) {
+      break;
+    }
+    for (std::size_t k = 0; k < 3; ++k) {
+      Vec2 tilt = x.segment<2>(static_cast<Eigen::Index>(2 * k));
+      if (const double far = tilt.norm(); far > largest_tilt) {
+        tilt *= largest_tilt / far;
+      }
+      const auto axes = tilt_axes(best.shape.normals[k]);
+      one[0].shape.normals[k] = (best.shape.normals[k] + tilt[0] * axes[0] + tilt[1] * axes[1]).normalized();
+    }
+    const Measured then = measure(samples, one, points, limits, scale);
+    if (!(then.cost < now.cost)) {
+      break;
+    }
+    now = then;
+    best = one[0];
+    best.error = then.error;
+  }
+  best.error = now.error;
+  patch = std::move(best);
 }
 
 }  // namespace tunica

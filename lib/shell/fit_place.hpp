@@ -68,4 +68,8 @@ struct PlacedNode {
 void place_node(const FitSamples& samples, std::vector<PlacedPatch>& patches, const std::vector<Index>& points,
                 const FitLimits& limits, double give_up, int steps, PlacedNode& node);
 
+/// Turns the three normals of one patch, as if they were its own, so that it alone comes closest to the target.
+/// @param patch  in: shape, attached points, what lies across; out: the best, error and residuals
+void turn_normals(const FitSamples& samples, PlacedPatch& patch, const FitLimits& limits, int steps);
+
 }  // namespace tunica

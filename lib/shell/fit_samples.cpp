@@ -15,7 +15,8 @@ constexpr std::size_t points_per_shell = 16;      // of the target, about
 constexpr std::size_t most_grid_points = 30'000;  // of all patches: few large patches get a finer grid
 constexpr int coarsest_grid = 4;
 constexpr int finest_grid = 8;
-constexpr double beside = 0.7;  // cosine: farther off the normal than this, a distance counts along itself
+constexpr double other_wall = 4;  // times as far: beyond that a closest point that faces away is one around a rim
+constexpr double beside = 0.7;    // cosine: farther off the normal than this, a distance counts along itself
 
 Vec2 on_edge(std::size_t from, std::size_t to, double s) {
   const std::array<Vec2, 3> corners{Vec2(0, 0), Vec2(1, 0), Vec2(0, 1)};
@@ -153,10 +154,12 @@ void FitSamples::from_patch(const CubicPatch& patch, const Vec3& facing, std::ve
     last = guesses[i] = hit.triangle;
     if (facets_[hit.triangle].dot(facing) > 0) {
       out.push_back(residual(grid_[i], p - hit.point, facets_[hit.triangle]));
-    } else if (const auto foot = target_.closest_facing(p, facing, target_.diagonal())) {
+    } else if (const auto foot = target_.closest_facing(p, facing, other_wall * std::sqrt(hit.squared_distance))) {
       out.push_back(residual(grid_[i], p - foot->point, foot->facet_normal));
     } else {
-      out.push_back(residual(grid_[i], p - hit.point, facing));
+      const Vec3 away = p - hit.point;
+      const double distance = away.norm();
+      out.push_back({grid_[i], distance > 0 ? Vec3(away / distance) : facing, distance});
     }
   }
 }

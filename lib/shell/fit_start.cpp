@@ -16,6 +16,7 @@ namespace {
 
 constexpr std::size_t ladder_top = 60'000;    // triangles: the first decimation, where the search for the count starts
 constexpr std::size_t most_samples = 20'000;  // for the sampled error of flat facets
+constexpr double start_agreement = 0.35;      // of a corner's normal with its facet
 constexpr double crease_cosine = 0.8;         // of the angle between two facets: sharper edges may be creases
 constexpr double crease_share = 0.6;          // of that angle is there already close to the edge
 constexpr double close_by = 0.08;             // of the height of the triangle
@@ -86,7 +87,8 @@ FitStart start_of_fit(const TriangleMesh& coarse, const Target& target, std::opt
   }
 }
 
-FitMesh prepare_fit(const TriangleMesh& mesh, const Target& target) {
+FitMesh prepare_fit(const FitStart& start, const Target& target) {
+  const TriangleMesh& mesh = start.mesh;
   ShellMesh shell;
   shell.vertices = mesh.vertices;
   shell.triangles = mesh.triangles;
@@ -160,6 +162,15 @@ FitMesh prepare_fit(const TriangleMesh& mesh, const Target& target) {
         out.slots[t][out.corner_of(t, node)] = static_cast<Index>(out.normals.size());
       }
       out.normals.emplace_back(normal.normalized());
+    }
+  }
+  // Where facets fold so that no normal suits them, they stay flat there for the time being.
+  for (Index t = 0; t < mesh.triangles.size(); ++t) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (out.normals[out.slots[t][k]].dot(facets[t]) < start_agreement && facets[t].squaredNorm() > 0.5) {
+        out.slots[t][k] = static_cast<Index>(out.normals.size());
+        out.normals.push_back(facets[t]);
+      }
     }
   }
   return out;

@@ -21,6 +21,6 @@ FitStart start_of_fit(const TriangleMesh& coarse, const Target& target, std::opt
 
 /// The start as a mesh under edit, with the target's normals at its nodes: several at a node where sharp creases of the
 /// target meet there. A crease is an edge whose sides, close by, turn by nearly as much as its facets do.
-FitMesh prepare_fit(const TriangleMesh& mesh, const Target& target);
+FitMesh prepare_fit(const FitStart& start, const Target& target);
 
 }  // namespace tunica

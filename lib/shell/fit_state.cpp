@@ -22,7 +22,8 @@ constexpr double cg_tolerance = 1e-3;
 constexpr double least_weight = 0.1;  // residuals below this part of the largest count alike
 constexpr double largest_tilt = 0.3;  // rad
 constexpr double largest_move = 0.3;  // of the mean edge at the node
-constexpr int trials = 5;
+constexpr int trials = 6;
+constexpr double kept_angle = 0.98;  // of an angle below the limit
 
 using Vector15 = Eigen::Matrix<double, 15, 1>;
 using Matrix15 = Eigen::Matrix<double, 15, 15>;
@@ -287,6 +288,7 @@ double FitState::solve(double power, double smoothing) {
       old_angle[t] = smallest_angle_degrees(c[0], c[1], c[2]);
     }
   }
+  std::vector<std::uint8_t> upright(nodes, 0);
   std::vector<double> length(nodes, 1), fan_cost(nodes, 0);
   for (std::size_t t = 0; t < count; ++t) {
     for (std::size_t k = 0; mesh.is_alive(static_cast<Index>(t)) && k < 3; ++k) {
@@ -308,6 +310,11 @@ double FitState::solve(double power, double smoothing) {
       if (const double far = move.norm(); far > largest_move * edge[v]) {
         move *= largest_move * edge[v] / far;
       }
+      if (upright[v] != 0) {
+        const Vec3& n =
+            old_normals[mesh.slots[mesh.around[v][0]][mesh.corner_of(mesh.around[v][0], static_cast<Index>(v))]];
+        move = n * n.dot(move);
+      }
       mesh.positions[v] = old_positions[v] + move;
       mesh.slots_of(static_cast<Index>(v), of_node);
       for (const Index s : of_node) {
@@ -327,7 +334,8 @@ double FitState::solve(double power, double smoothing) {
         if (!mesh.is_alive(i)) {
           continue;
         }
-        broken[t] = !is_sound(i, std::min(limits.agreement, old_agreement[t]), std::min(limits.angle, old_angle[t])) ||
+        broken[t] = !is_sound(i, std::min(limits.agreement, old_agreement[t]),
+                              std::min(limits.angle, kept_angle * old_angle[t])) ||
                     facing_of(mesh.corners(i)).dot(old_facing[t]) < 0.3;
         if (broken[t] == 0) {
           measure(i);
@@ -360,7 +368,9 @@ double FitState::solve(double power, double smoothing) {
     }
     for (std::size_t v = 0; v < nodes; ++v) {
       if (bad[v] != 0) {
-        length[v] = trial < 2 ? 0.35 * length[v] : 0;
+        // First without sliding, which is what spoils angles; then shorter; then not at all.
+        length[v] = trial == 0 ? length[v] : trial < trials - 2 ? 0.35 * length[v] : 0;
+        upright[v] = 1;
       }
     }
   }

@@ -74,8 +74,11 @@ class Case(unittest.TestCase):
     def path(self, name):
         return os.path.join(self.folder.name, name)
 
+    method = ["--method", "barycentre"]
+
     def relax(self, *arguments, expect=0):
-        """Runs the tool; @return its report and stderr."""
+        """Runs the tool, with the class's method when none is named; @return its report and stderr."""
+        arguments = [*arguments, *([] if "--method" in arguments else self.method)]
         report = self.path("report.json")
         if os.path.exists(report):
             os.remove(report)
@@ -161,12 +164,16 @@ class Contract(Case):
         self.assertLessEqual(record["result"]["shells"], 100)
 
     def test_wrong_usage_is_2(self):
-        for extra in (["--tolerance", "0.5"], ["--tolerance", "-1mm"], ["--method", "fit"], ["--method", "nonsense"],
+        for extra in (["--tolerance", "0.5"], ["--tolerance", "-1mm"], ["--method", "nonsense"],
                       ["--surface", "watertight"], ["--shells", "100"], ["--refine"], ["--max-shells", "10"],
                       ["--max-iterations", "0"], ["--mesh-unit", "parsec"], ["--unknown"]):
             self.relax(self.coarse, self.target, self.out, *extra, expect=2)
-        for later in (["--method", "fit"], ["--surface", "watertight"], ["--shells", "100"]):
-            self.assertIn("not available yet", self.relax(self.coarse, self.target, self.out, *later, expect=2)[1])
+        fit = ["--method", "fit"]
+        for extra in (["--tolerance", "0.5"], ["--refine"], ["--max-shells", "10"], ["--shells", "0"],
+                      ["--shells", "100", "--max-shells", "100", "--refine"]):
+            self.relax(self.coarse, self.target, self.out, *fit, *extra, expect=2)
+        self.assertIn("not available yet",
+                      self.relax(self.coarse, self.target, self.out, "--surface", "watertight", expect=2)[1])
         self.relax(self.coarse, self.target, expect=2)
 
     def test_a_format_without_a_unit_needs_one(self):
@@ -240,6 +247,40 @@ class Contract(Case):
         run.stderr.close()
         self.assertFalse(os.path.exists(self.out))
         self.assertGreaterEqual(len(read_ply(self.out + ".part")[1]), 20)
+
+
+class Fit(Case):
+    method = []  # the default
+
+    def setUp(self):
+        super().setUp()
+        self.target, self.out = self.path("target.ply"), self.path("shell.ply")
+        write_ply(self.target, *cylinder(64, 40))
+
+    def test_tolerance_finds_its_own_count_from_the_target_alone(self):
+        record, _ = self.relax(self.target, self.target, self.out, "--tolerance", "0.3%")
+        result = record["result"]
+        self.assertTrue(result["reached"])
+        self.assertLessEqual(result["hausdorff_percent"]["upper"], 0.3)
+        self.assertLess(result["shells"], 60)
+        self.assertEqual(len(read_ply(self.out)[1]), result["shells"])
+        self.assertEqual(result["self_intersections"], 0)
+        self.assertGreater(len(result["iterations"]), 0)
+
+    def test_count_is_kept_and_threads_do_not_matter(self):
+        record, _ = self.relax(self.target, self.target, self.out, "--shells", 60, "--max-iterations", 1, "--threads", 1)
+        self.assertLessEqual(record["result"]["shells"], 60)
+        self.assertIsNone(record["result"]["reached"])
+        other = self.path("other.ply")
+        self.relax(self.target, self.target, other, "--shells", 60, "--max-iterations", 1, "--threads", 2)
+        first, second = read_ply(self.out), read_ply(other)
+        self.assertTrue((first[0] == second[0]).all() and (first[1] == second[1]).all())
+
+    def test_tolerance_that_the_count_does_not_allow_is_4(self):
+        record, error = self.relax(self.target, self.target, self.out, "--tolerance", "0.001%", "--shells", 20,
+                                   "--max-iterations", 1, expect=4)
+        self.assertIs(record["result"]["reached"], False)
+        self.assertTrue(os.path.exists(self.out + ".part"))
 
 
 class Patch(Case):
