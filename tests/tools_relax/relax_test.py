@@ -236,7 +236,7 @@ class Contract(Case):
         write_ply(self.target, *sphere(5))
         write_ply(self.coarse, *sphere(0))
         run = subprocess.Popen([os.path.join(BIN, "tunica-relax"), self.coarse, self.target, self.out, "--tolerance",
-                                "0.00001%", "--refine", "--verbose"], stderr=subprocess.PIPE, text=True)
+                                "0.00001%", "--refine", "--method", "barycentre", "--verbose"], stderr=subprocess.PIPE, text=True)
         lines = []
         while sum("shells:" in line for line in lines) < 2:
             lines.append(run.stderr.readline())
