@@ -1,6 +1,7 @@
 // tunica-relax COARSE TARGET OUT.ply: a coarse mesh becomes curved shells on its target, with a certified distance.
 #include "shell/relax.hpp"
 #include "cli/tool.hpp"
+#include "cli/usage.hpp"
 #include "io/mesh_file.hpp"
 #include "io/picture.hpp"
 #include "shell/curved_surface.hpp"
@@ -49,15 +50,16 @@ void declare(cli::Tool& tool, Arguments& given) {
       ->check(CLI::IsMember({"comas", "watertight"}));
   app.add_flag("--refine", given.refine,
                "split shells where the distance is above the tolerance; without one, all 1:4");
-  app.add_option("--max-shells", given.max_shells, "at most N shells")->check(CLI::PositiveNumber)->type_name("N");
+  app.add_option("--max-shells", given.max_shells, "at most N shells")->check(cli::whole_number(1))->type_name("N");
   app.add_option("--max-iterations", given.max_iterations, "at most N iterations (20, with --refine 60)")
-      ->check(CLI::Range(1, 100000))
+      ->check(cli::whole_number(1, 100000))
       ->type_name("N");
   app.add_option("--map", given.map, "error map: the curved surface with its distance to the target, PLY")
       ->type_name("OUT.ply");
   app.add_option("--picture", given.picture, "picture of the error map, PNG")->type_name("OUT.png");
   app.add_option("--curved", given.curved, "the curved surface as a fine triangle mesh, PLY")->type_name("OUT.ply");
-  app.add_option("--mesh-unit", given.mesh_unit, "unit of OBJ, STL and OFF files: mm, cm, m or um")->type_name("UNIT");
+  app.add_option("--mesh-unit", given.mesh_unit, "unit of OBJ, STL and OFF files: mm, cm, m or um")
+      ->type_name("mm|cm|m|um");
   tool.not_yet("--shells");
 }
 
@@ -150,11 +152,10 @@ void write_maps(cli::Tool& tool, const Arguments& given, const ShellMesh& shell,
 
 void run(cli::Tool& tool, const Arguments& given) {
   refuse_contradictions(given);
-  tool.stages({"read", "relax", "measure", "write"});
-  tool.output(given.out);
-  for (const auto& path : {given.map, given.picture, given.curved}) {
+  tool.output(given.out, {".ply"});
+  for (const auto& [path, ending] : {std::pair(given.map, ".ply"), {given.picture, ".png"}, {given.curved, ".ply"}}) {
     if (path) {
-      tool.output(*path);
+      tool.output(*path, {ending});
     }
   }
 
@@ -286,5 +287,6 @@ int main(int argc, char** argv) {
       "tunica-relax coarse.obj surface.obj shell.ply --mesh-unit mm --max-iterations 5");
   Arguments given;
   declare(tool, given);
+  tool.stages({"read", "relax", "measure", "write"});
   return tool.run(argc, argv, [&] { run(tool, given); });
 }
