@@ -20,7 +20,7 @@ struct Report {
 };
 
 /// Names the reports of one chart: by their files' names, or, where two are the same, by the folders in which their
-/// paths differ ("aneurysm/1" for out/aneurysm/1/relax.json beside out/tube/1/relax.json).
+/// paths differ ("aneurysm" for out/aneurysm/1/relax.json beside out/tube/1/relax.json).
 void name_apart(std::vector<Report>& reports);
 
 /// Reads a report. Errors: InputError naming the file: missing, over 128 MiB, not JSON (or with NaN), nested deeper
