@@ -26,6 +26,7 @@ std::vector<Report> read_good_reports(cli::Tool& tool, const std::vector<std::fi
   if (reports.empty()) {
     throw InputError(paths.front().string() + ": nothing to draw: every run failed; see the reports' key 'error'");
   }
+  name_apart(reports);
   return reports;
 }
 
@@ -69,11 +70,11 @@ int main(int argc, char** argv) {
       ->type_name("SCALE");
   arguments.add_flag("--lines", options.joined, "join the marks of a series by a line, in the order of x");
 
+  tool.stages({"read", "draw", "write"});
   return tool.run(argc, argv, [&] {
-    tool.stages({"read", "draw", "write"});
-    tool.output(out);
+    tool.output(out, {".svg"});
     if (!csv.empty()) {
-      tool.output(csv);
+      tool.output(csv, {".csv"});
     }
     Json skipped = Json::array();
     std::vector<Report> reports;

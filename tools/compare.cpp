@@ -42,7 +42,8 @@ void declare(cli::Tool& tool, Arguments& given) {
   app.add_option("--picture", given.picture, "picture of the error map")->type_name("OUT.png");
   app.add_option("--curved", given.curved, "the curved surface of A as a fine triangle mesh (needs --shell)")
       ->type_name("OUT.ply");
-  app.add_option("--mesh-unit", given.mesh_unit, "unit of OBJ, STL and OFF files: mm, cm, m or um")->type_name("UNIT");
+  app.add_option("--mesh-unit", given.mesh_unit, "unit of OBJ, STL and OFF files: mm, cm, m or um")
+      ->type_name("mm|cm|m|um");
 }
 
 // A as it was read: flat triangles, and the shells when it is curved.
@@ -175,10 +176,9 @@ void run(cli::Tool& tool, const Arguments& given) {
   if (given.mesh_unit) {
     unit_mm = parse_length_unit(*given.mesh_unit);
   }
-  tool.stages({"read", "compare"});
-  for (const auto& path : {given.map, given.picture, given.curved}) {
+  for (const auto& [path, ending] : {std::pair(given.map, ".ply"), {given.picture, ".png"}, {given.curved, ".ply"}}) {
     if (path) {
-      tool.output(*path);
+      tool.output(*path, {ending});
     }
   }
 
@@ -188,8 +188,10 @@ void run(cli::Tool& tool, const Arguments& given) {
     const auto stage = tool.stage("read");
     tool.input(given.a);
     tool.input(given.b);
-    MeshFile file_a = read_mesh(given.a, unit_mm, given.map.has_value());
-    MeshFile file_b = read_mesh(given.b, unit_mm, given.map.has_value());
+    const auto in_millimetres = [](const auto& length) { return length && !length->relative; };
+    const bool require_unit = given.map || in_millimetres(given.max) || in_millimetres(given.width);
+    MeshFile file_a = read_mesh(given.a, unit_mm, require_unit);
+    MeshFile file_b = read_mesh(given.b, unit_mm, require_unit);
     const std::string space = common_space(file_a, given.a, file_b, given.b);
     a = surface_of(std::move(file_a), given);
     a.space = space;
@@ -253,5 +255,6 @@ int main(int argc, char** argv) {
       "  tunica-compare shell.ply surface.ply --shell --picture map.png --report compare.json");
   Arguments given;
   declare(tool, given);
+  tool.stages({"read", "compare"});
   return tool.run(argc, argv, [&] { run(tool, given); });
 }

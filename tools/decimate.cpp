@@ -32,7 +32,8 @@ void declare(cli::Tool& tool, Arguments& given) {
       "--max-error", given.max_error,
       "largest distance to IN, both ways, e.g. 0.5% of IN's diagonal or 0.2mm; with --triangles it wins, and "
       "the exit code is 4 when both cannot hold");
-  app.add_option("--mesh-unit", given.mesh_unit, "unit of OBJ, STL and OFF files: mm, cm, m or um")->type_name("UNIT");
+  app.add_option("--mesh-unit", given.mesh_unit, "unit of OBJ, STL and OFF files: mm, cm, m or um")
+      ->type_name("mm|cm|m|um");
   tool.not_yet("--min-angle");
   tool.not_yet("--repair");
 }
@@ -51,8 +52,9 @@ std::optional<std::size_t> wanted_triangles(const Arguments& given) {
   return static_cast<std::size_t>(*number);
 }
 
-MeshFile read_surface(const fs::path& path, const std::optional<double>& unit_mm) {
-  MeshFile file = read_mesh(path, unit_mm);
+MeshFile read_surface(const fs::path& path, const std::optional<double>& unit_mm, bool require_unit) {
+  MeshFile file = read_mesh(path, unit_mm, require_unit);
+  require_no_other_unit(file, unit_mm, path);
   if (const auto reason = why_unfit(examine(file.mesh))) {
     throw InputError(fmt::format(
         "{}: {}; decimation needs a surface where every edge has at most two triangles that face the same way: mend it "
@@ -87,13 +89,13 @@ void run(cli::Tool& tool, const Arguments& given) {
   if (given.mesh_unit) {
     unit_mm = parse_length_unit(*given.mesh_unit);
   }
-  tool.stages({"read", "decimate", "measure", "write"});
-  tool.output(given.out);
+  tool.output(given.out, {".ply"});
 
   MeshFile in;
   {
     const auto stage = tool.stage("read");
-    in = read_surface(tool.input(given.in), unit_mm);
+    const bool in_millimetres = given.max_error && !given.max_error->relative;
+    in = read_surface(tool.input(given.in), unit_mm, in_millimetres);
   }
   const double diagonal_mm = diagonal(in.mesh);
 
@@ -143,6 +145,7 @@ void run(cli::Tool& tool, const Arguments& given) {
   PlyOptions options;
   options.comments = {"made by " + tool.command()};
   options.space = in.space.value_or(options.space);
+  options.millimetres = !in.unit_unknown;
   options.overwrite = tool.force();
   options.partial = failure.has_value();
   write_ply(given.out, coarse.mesh, options);
@@ -162,5 +165,6 @@ int main(int argc, char** argv) {
                  "  tunica-decimate surface.ply coarse.ply --max-error 0.5% --report decimate.json");
   Arguments given;
   declare(tool, given);
+  tool.stages({"read", "decimate", "measure", "write"});
   return tool.run(argc, argv, [&] { run(tool, given); });
 }

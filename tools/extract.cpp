@@ -1,4 +1,5 @@
 #include "cli/tool.hpp"
+#include "cli/usage.hpp"
 #include "core/version.hpp"
 #include "io/mesh_file.hpp"
 #include "io/volume_file.hpp"
@@ -72,10 +73,10 @@ void declare(CLI::App& app, Arguments& arguments) {
       ->check(CLI::IsMember({"lps", "ras"}))
       ->type_name("lps|ras");
   app.add_option("--frame", arguments.volume_options.frame, "which volume of a time series, from 0")
-      ->check(CLI::NonNegativeNumber)
+      ->check(cli::whole_number(0))
       ->type_name("N");
   app.add_option("--layer", arguments.volume_options.layer, "which layer of overlapping segments, from 0")
-      ->check(CLI::NonNegativeNumber)
+      ->check(cli::whole_number(0))
       ->type_name("N");
   app.add_flag("--prefer-qform", arguments.volume_options.prefer_qform,
                "NIfTI: take the qform where sform and qform are both set");
@@ -141,10 +142,6 @@ void refuse_contradictions(const Arguments& arguments) {
   }
   if (arguments.out.empty()) {
     refuse("OUT.ply is missing: name the surface to write, or pass --info to look at the volume");
-  }
-  const std::string extension = arguments.out.extension().string();
-  if (extension != ".ply" && extension != ".PLY") {
-    throw UsageError(fmt::format("{}: the surface is written as PLY: name it with .ply", arguments.out.string()));
   }
   if (arguments.all_labels && arguments.out.string().find("{label}") == std::string::npos) {
     throw UsageError(
@@ -461,7 +458,6 @@ VolumeFile read(cli::Tool& tool, const Arguments& arguments) {
 }
 
 void run(cli::Tool& tool, Arguments& arguments) {
-  tool.stages({"read", "smooth", "extract", "write"});
   refuse_contradictions(arguments);
   const Smoothing smoothing = parse_smoothing(arguments.smooth);
   if (arguments.spacing) {
@@ -474,7 +470,7 @@ void run(cli::Tool& tool, Arguments& arguments) {
   }
   const std::vector<Target> targets = targets_of(arguments.volume, file.volume, arguments);
   for (const Target& target : targets) {
-    tool.output(output_path(arguments.out, target));
+    tool.output(output_path(arguments.out, target), {".ply"});
   }
   Json results;
   for (const Target& target : targets) {
@@ -513,5 +509,6 @@ int main(int argc, char** argv) {
                  "  tunica-extract slices/ organ.ply --label 255 --spacing 0.5,0.5,1.25");
   Arguments arguments;
   declare(tool.arguments(), arguments);
+  tool.stages({"read", "smooth", "extract", "write"});
   return tool.run(argc, argv, [&] { run(tool, arguments); });
 }

@@ -58,9 +58,9 @@ int main(int argc, char** argv) {
     }
     options.shape = *known;
     options.spacing = parse_spacing(spacing);
-    tool.output(out);
+    tool.output(out, {".nii.gz", ".nii"});
     if (!truth.empty()) {
-      tool.output(truth);
+      tool.output(truth, {".ply"});
     }
 
     Phantom phantom;

@@ -1,6 +1,7 @@
 // tunica-relax COARSE TARGET OUT.ply: a coarse mesh becomes curved shells on its target, with a certified distance.
 #include "shell/relax.hpp"
 #include "cli/tool.hpp"
+#include "cli/usage.hpp"
 #include "io/mesh_file.hpp"
 #include "io/picture.hpp"
 #include "shell/curved_surface.hpp"
@@ -54,17 +55,18 @@ void declare(cli::Tool& tool, Arguments& given) {
                "(fit chooses the number of shells itself)");
   app.add_option("--shells", given.shells,
                  "fit: at most N shells instead of as many as COARSE has (with --tolerance: as few as it takes)")
-      ->check(CLI::PositiveNumber)
+      ->check(cli::whole_number(1))
       ->type_name("N");
-  app.add_option("--max-shells", given.max_shells, "at most N shells")->check(CLI::PositiveNumber)->type_name("N");
+  app.add_option("--max-shells", given.max_shells, "at most N shells")->check(cli::whole_number(1))->type_name("N");
   app.add_option("--max-iterations", given.max_iterations, "at most N iterations (20, with --refine 60)")
-      ->check(CLI::Range(1, 100000))
+      ->check(cli::whole_number(1, 100000))
       ->type_name("N");
   app.add_option("--map", given.map, "error map: the curved surface with its distance to the target, PLY")
       ->type_name("OUT.ply");
   app.add_option("--picture", given.picture, "picture of the error map, PNG")->type_name("OUT.png");
   app.add_option("--curved", given.curved, "the curved surface as a fine triangle mesh, PLY")->type_name("OUT.ply");
-  app.add_option("--mesh-unit", given.mesh_unit, "unit of OBJ, STL and OFF files: mm, cm, m or um")->type_name("UNIT");
+  app.add_option("--mesh-unit", given.mesh_unit, "unit of OBJ, STL and OFF files: mm, cm, m or um")
+      ->type_name("mm|cm|m|um");
 }
 
 void refuse_contradictions(const Arguments& given) {
@@ -161,11 +163,10 @@ void write_maps(cli::Tool& tool, const Arguments& given, const ShellMesh& shell,
 
 void run(cli::Tool& tool, const Arguments& given) {
   refuse_contradictions(given);
-  tool.stages({"read", "relax", "measure", "write"});
-  tool.output(given.out);
-  for (const auto& path : {given.map, given.picture, given.curved}) {
+  tool.output(given.out, {".ply"});
+  for (const auto& [path, ending] : {std::pair(given.map, ".ply"), {given.picture, ".png"}, {given.curved, ".ply"}}) {
     if (path) {
-      tool.output(*path);
+      tool.output(*path, {ending});
     }
   }
 
@@ -302,5 +303,6 @@ int main(int argc, char** argv) {
       "tunica-relax coarse.ply surface.ply shell.ply --method barycentre --tolerance 1% --refine");
   Arguments given;
   declare(tool, given);
+  tool.stages({"read", "relax", "measure", "write"});
   return tool.run(argc, argv, [&] { run(tool, given); });
 }

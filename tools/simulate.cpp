@@ -3,12 +3,14 @@
 #include "io/result_file.hpp"
 #include "io/scene.hpp"
 #include "io/scene_file.hpp"
+#include "mechanics/curved_displacement.hpp"
 #include "mechanics/solve.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace tunica {
 namespace {
@@ -73,7 +75,7 @@ void declare(cli::Tool& tool, Arguments& a) {
   app.add_option("--every", a.every, "write every N-th state (default 1); the first and the last always")
       ->type_name("N");
   app.add_option("--mesh-unit", a.mesh_unit, "unit of length of a mesh in a format that carries none: mm | cm | m | um")
-      ->type_name("UNIT");
+      ->type_name("mm|cm|m|um");
   app.add_flag("--check", a.check, "validate, print the resolved scene in SI units, and stop");
   tool.not_yet("--resume");
   tool.not_yet("--export");
@@ -283,15 +285,6 @@ fs::path output_path(const CLI::App& app, const Arguments& a) {
   return a.files.size() > inputs ? a.files.back() : fs::path();
 }
 
-void refuse_overwriting_inputs(const fs::path& out, const std::vector<fs::path>& inputs) {
-  for (const fs::path& input : inputs) {
-    std::error_code ignored;
-    if (fs::equivalent(out, input, ignored)) {
-      throw UsageError(fmt::format("{}: is an input, name another result file", out.string()));
-    }
-  }
-}
-
 double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
@@ -386,12 +379,7 @@ void report_summary(Json& result, const Summary& summary, bool converged, std::o
 void simulate(cli::Tool& tool, const Arguments& a) {
   const fs::path out = output_path(tool.arguments(), a);
   std::vector<fs::path> inputs;
-  const auto register_input = [&](const fs::path& path) {
-    inputs.push_back(tool.input(path));
-    if (!out.empty()) {
-      refuse_overwriting_inputs(out, {path});
-    }
-  };
+  const auto register_input = [&](const fs::path& path) { inputs.push_back(tool.input(path)); };
 
   std::optional<cli::Tool::Stage> stage(std::in_place, tool, "read");
   Scene scene;
@@ -434,10 +422,13 @@ void simulate(cli::Tool& tool, const Arguments& a) {
   ResultFile file(out, model, options);
   const ElementFieldEvaluator fields(model);
   stage.emplace(tool, "solve");
+  constexpr double most_bending = std::numbers::pi / 6;
+  std::size_t unresolved = 0;
   const auto on_state = [&](const State& state) {
     stage.emplace(tool, "write");
     report_state(tool.result(), model, state, dynamic != nullptr);
     file.append(state, fields(state));
+    unresolved = count_unresolved(model, state, most_bending);
     stage.emplace(tool, "solve");
   };
   const Summary summary = naming(subject, [&] { return solve(model, scene.run, on_state, tool.progress("solve")); });
@@ -447,6 +438,14 @@ void simulate(cli::Tool& tool, const Arguments& a) {
   report_summary(tool.result(), summary, converged,
                  dynamic != nullptr ? std::optional(dynamic->duration) : std::nullopt);
   file.commit(converged);
+  tool.note(fmt::format("{} nodes in {} steps, {}: largest displacement {:.4g} mm", model.node_count(), summary.steps,
+                        converged ? "converged" : "not asked to converge", summary.max_displacement));
+  if (unresolved > 0) {
+    tool.warn(
+        fmt::format("{}: {} shells bend by more than 30 degrees within themselves: the mesh is too coarse for "
+                    "this load, refine it there",
+                    subject.string(), unresolved));
+  }
 }
 
 }  // namespace

@@ -76,7 +76,7 @@ def draw_chart(tool, folder, names):
     chart = folder / "chart.svg"
     if not reports:
         return None
-    done = subprocess.run([tool, *reports, "-o", chart, "--force", "--quiet"], check=False)
+    done = subprocess.run([tool, *reports, "-o", chart, "--label", "file", "--force", "--quiet"], check=False)
     return chart if done.returncode == 0 else None
 
 

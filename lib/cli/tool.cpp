@@ -1,19 +1,24 @@
 #include "cli/tool.hpp"
 
 #include "cli/documentation.hpp"
+#include "cli/usage.hpp"
 #include "core/threads.hpp"
 #include "core/version.hpp"
 #include "io/output_file.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <csignal>
 #include <cstdio>
+#include <fstream>
 #include <memory>
 #include <new>
+#include <regex>
 #include <string_view>
 #include <utility>
 
@@ -78,12 +83,33 @@ std::string one_line(std::string text) {
   return text;
 }
 
-// CLI11 calls the value of every string TEXT: a positional's own name says more, and a choice is a NAME.
-void name_placeholders(CLI::App& app) {
+// CLI11 calls the value of every string TEXT: a positional's own name says more, and a choice is a NAME. And it takes
+// `--flag=anything` for a flag that is set.
+void tidy_options(CLI::App& app) {
   for (CLI::Option* option : app.get_options()) {
+    if (option->get_items_expected_max() == 0) {
+      option->disable_flag_override();
+    }
     if (option->get_type_name().starts_with("TEXT")) {
       option->type_name(option->get_positional() ? "" : "NAME");
     }
+  }
+}
+
+// Links and dots resolved, also of a file that does not exist yet.
+std::filesystem::path resolved(const std::filesystem::path& path) {
+  std::error_code error;
+  const std::filesystem::path whole = std::filesystem::absolute(path, error);
+  const std::filesystem::path canonical = std::filesystem::weakly_canonical(whole, error);
+  return error ? whole.lexically_normal() : canonical;
+}
+
+// --force is meant for an older report: a slip of the pen must not turn a mesh or a patient's volume into JSON.
+void require_no_other_file(const std::filesystem::path& report) {
+  std::ifstream file(report, std::ios::binary);
+  char first = 0;
+  if (file && file >> first && first != '{') {
+    throw OutputError(fmt::format("{}: exists and is not a report, name another file", report.string()));
   }
 }
 
@@ -91,7 +117,7 @@ void name_placeholders(CLI::App& app) {
 
 Tool::Tool(std::string verb, std::string summary, std::string example)
     : verb_(std::move(verb)), app_(std::move(summary), "tunica-" + verb_) {
-  app_.footer("Example:\n  " + example);
+  app_.footer("Example:\n  " + std::regex_replace(example, std::regex("\n *"), "\n  "));
   app_.set_help_flag("--help", "print this help and stop");
   app_.set_version_flag("--version", fmt::format("tunica-{} {}", verb_, version), "print name and version and stop");
   app_.add_option("--report", report_, "write a JSON record of the run to FILE, also when the run fails")
@@ -167,11 +193,12 @@ void Tool::parse_common() {
 
 int Tool::run(int argc, char** argv, const std::function<void()>& body) {
   start_ = std::chrono::steady_clock::now();
+  start_on_disk_ = std::filesystem::file_time_type::clock::now() - std::chrono::milliseconds(20);  // the disk's tick
   for (int i = 0; i < argc; ++i) {
     command_ += (i > 0 ? " " : "") + shell_quoted(i > 0 ? argv[i] : "tunica-" + verb_);
   }
   std::signal(SIGPIPE, SIG_IGN);
-  name_placeholders(app_);
+  tidy_options(app_);
   // For the build alone, so not among the options: the manual page and the completion that are installed.
   if (argc == 3 && std::string_view(argv[1]) == "--documentation") {
     const std::string_view kind = argv[2];
@@ -187,7 +214,7 @@ int Tool::run(int argc, char** argv, const std::function<void()>& body) {
     return app_.exit(success);
   } catch (const CLI::ParseError& error) {
     report_ = report_argument(argc, argv);
-    return finish(ExitCode::usage, fmt::format("{} (see tunica-{} --help)", error.what(), verb_));
+    return finish(ExitCode::usage, fmt::format("{} (see tunica-{} --help)", usage_message(app_, error), verb_));
   } catch (const UsageError& error) {
     return finish(error.code(), fmt::format("{} (see tunica-{} --help)", error.what(), verb_));
   }
@@ -197,6 +224,7 @@ int Tool::run(int argc, char** argv, const std::function<void()>& body) {
     if (!report_.empty()) {
       const std::filesystem::path report = std::exchange(report_, {});
       require_writable(report, force_);
+      require_no_other_file(report);
       report_ = report;
     }
     body();
@@ -236,19 +264,15 @@ int Tool::finish(ExitCode code, const std::string& error) {
 }
 
 void Tool::write_report(bool ok, const std::string& error) {
-  Json inputs = Json::array();
-  for (const auto& path : inputs_) {
-    Json hash;
-    try {
-      hash = sha256_of_file(path);
-    } catch (const InputError&) {
-      hash = nullptr;  // a missing input or a folder is why the run failed; the report still has to be written
-    }
-    inputs.push_back({{"path", path.string()}, {"sha256", hash}});
-  }
   Json outputs = Json::array();
-  for (const auto& path : outputs_) {
-    outputs.push_back(path.string());
+  for (const std::filesystem::path& path : outputs_) {
+    for (const std::string& name : {path.string(), path.string() + ".part"}) {
+      std::error_code missing;  // an older file that --force would have replaced is not an output of a run that failed
+      const auto written = std::filesystem::last_write_time(name, missing);
+      if (!missing && (ok || written >= start_on_disk_)) {
+        outputs.push_back(name);
+      }
+    }
   }
   Json seconds{{"total", seconds_since(start_)}};
   seconds.update(seconds_);
@@ -258,29 +282,55 @@ void Tool::write_report(bool ok, const std::string& error) {
       {"ok", ok},
       {"error", error.empty() ? Json() : Json(error)},
       {"command", command_},
-      {"inputs", inputs},
+      {"inputs", inputs_},
       {"outputs", outputs},
       {"seconds", seconds},
       {"peak_mib", peak_mebibytes()},
       {"threads", thread_count()},
       {"result", result_},
   };
+  require_no_other_file(report_);
   // A file name need not be UTF-8; the report has to be.
   write_file(report_, report.dump(2, ' ', false, Json::error_handler_t::replace) + "\n", force_);
 }
 
+void Tool::claim(const std::filesystem::path& path, bool written) {
+  const std::filesystem::path place = resolved(path);
+  if (!report_.empty() && place == resolved(report_)) {
+    report_.clear();
+    throw UsageError(fmt::format("{}: --report names a file of the run itself, name another", path.string()));
+  }
+  for (const auto& [other, other_written] : claimed_) {
+    if (other == place && (written || other_written)) {
+      throw UsageError(written && other_written
+                           ? fmt::format("{}: two outputs have the same name", path.string())
+                           : fmt::format("{}: is an input and an output, name another output", path.string()));
+    }
+  }
+  claimed_.emplace_back(place, written);
+}
+
 const std::filesystem::path& Tool::input(const std::filesystem::path& path) {
-  inputs_.push_back(path);
+  claim(path, false);
+  Json hash;
+  if (!report_.empty()) {
+    try {
+      hash = sha256_of_file(path);
+    } catch (const InputError&) {
+      hash = nullptr;  // a missing input or a folder is for the reader to refuse; the report still has to be written
+    }
+  }
+  inputs_.push_back({{"path", path.string()}, {"sha256", hash}});
   return path;
 }
 
-const std::filesystem::path& Tool::output(const std::filesystem::path& path) {
-  require_writable(path, force_);
-  for (const auto& other : outputs_) {
-    if (other == path) {
-      throw UsageError(fmt::format("{}: two outputs have the same name", path.string()));
-    }
+const std::filesystem::path& Tool::output(const std::filesystem::path& path, const std::vector<std::string>& endings) {
+  const std::string name = path.string();
+  if (!endings.empty() && std::ranges::none_of(endings, [&](const auto& ending) { return name.ends_with(ending); })) {
+    throw UsageError(fmt::format("{}: what is written is {}, name the file so", name, fmt::join(endings, " or ")));
   }
+  require_writable(path, force_);
+  claim(path, true);
   outputs_.push_back(path);
   return path;
 }

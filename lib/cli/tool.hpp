@@ -13,6 +13,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 /// What every executable has in common: the flags of the contract, the report, progress, signals and exit codes.
@@ -55,11 +56,12 @@ public:
   /// Parses, runs `body`, writes the report, prints one line on an error. @return the exit code for main().
   int run(int argc, char** argv, const std::function<void()>& body);
 
-  /// Registers an input for the report and returns it.
+  /// Registers an input, with its hash, for the report and returns it. Errors: UsageError when it is also an output.
   const std::filesystem::path& input(const std::filesystem::path& path);
 
-  /// Registers an output for the report; OutputError when it exists and --force was not given, or cannot be written.
-  const std::filesystem::path& output(const std::filesystem::path& path);
+  /// Registers an output for the report; OutputError when it exists and --force was not given, or cannot be written;
+  /// UsageError when it is also an input, another output or the report, or ends with none of `endings`, where given.
+  const std::filesystem::path& output(const std::filesystem::path& path, const std::vector<std::string>& endings = {});
 
   /// Times a stage: the seconds until the returned object dies are added to report key `seconds.<name>`.
   class Stage {
@@ -101,6 +103,7 @@ private:
   int finish(ExitCode code, const std::string& error);
   void write_report(bool ok, const std::string& error);
   void parse_common();
+  void claim(const std::filesystem::path& path, bool written);
 
   std::string verb_;
   CLI::App app_;
@@ -111,11 +114,13 @@ private:
   bool quiet_ = false;
   bool verbose_ = false;
   bool bar_open_ = false;
-  std::vector<std::filesystem::path> inputs_;
+  std::vector<std::pair<std::filesystem::path, bool>> claimed_;  ///< resolved files of the run; written or read
+  Json inputs_ = Json::array();
   std::vector<std::filesystem::path> outputs_;
   Json seconds_ = Json::object();
   Json result_ = Json::object();
   std::vector<std::function<void()>> after_parse_;
+  std::filesystem::file_time_type start_on_disk_;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 

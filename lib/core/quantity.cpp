@@ -182,7 +182,9 @@ double parse_quantity(std::string_view text, Dimension expected) {
     throw UsageError(fmt::format("'{}' is not {}: write for example {}{}", text, example.name, number, example.unit));
   }
   const double result = *value * unit->value;
-  if (!std::isfinite(result)) {
+  // Beyond this bound conversions to SI and products of a few quantities would overflow.
+  constexpr double largest = 1e60;
+  if (!(std::abs(result) <= largest)) {
     throw UsageError(fmt::format("'{}' is too large", text));
   }
   return result;

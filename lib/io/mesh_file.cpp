@@ -126,9 +126,18 @@ MeshFile read_mesh(const std::filesystem::path& path, std::optional<double> unit
     scale(file, *unit_mm);
   } else if (require_unit && format != Format::ply && format != Format::glb) {
     throw UsageError(fmt::format("{}: its format carries no unit of length, pass --mesh-unit mm|cm|m|um", name));
+  } else {
+    file.unit_unknown = format != Format::ply && format != Format::glb;
   }
   require_valid(file, name);
   return file;
+}
+
+void require_no_other_unit(const MeshFile& file, std::optional<double> unit_mm, const std::filesystem::path& path) {
+  if (unit_mm && file.units && size_of_unit(*file.units, path.string()) != *unit_mm) {
+    throw InputError(fmt::format("{}: the file itself says that its unit is {}: do not state another one",
+                                 path.string(), *file.units));
+  }
 }
 
 ShellMesh shell_of(const MeshFile& file, const std::filesystem::path& path) {

@@ -16,6 +16,7 @@ struct MeshFile {
   std::vector<std::array<Vec3, 3>> corner_normals;  ///< empty, or #F
   std::optional<Patch> patch;                       ///< `surface=` comment
   std::optional<std::string> units;                 ///< what the file said: "mm", …; none for OBJ, STL, OFF
+  bool unit_unknown = false;                        ///< no unit in the file's format, and none was given
   std::optional<std::string> space;                 ///< `SPACE=` comment: world axes, "LPS" or "RAS"
   std::vector<std::string> comments;                ///< all PLY comments, for provenance
   std::vector<std::pair<std::string, std::vector<double>>> vertex_properties;  ///< further scalar ones, e.g. thickness
@@ -34,6 +35,9 @@ struct MeshFile {
 /// Limits: 2^31 - 1 vertices and triangles, coordinates within 1e12 mm.
 MeshFile read_mesh(const std::filesystem::path& path, std::optional<double> unit_mm = {}, bool require_unit = false);
 
+/// For a unit that is meant for this file alone. Errors: InputError when the file's own `units` say another one.
+void require_no_other_unit(const MeshFile& file, std::optional<double> unit_mm, const std::filesystem::path& path);
+
 /// The curved shell mesh in a file: positions, unit normals, patch. Errors: InputError when it has no normals.
 ShellMesh shell_of(const MeshFile& file, const std::filesystem::path& path);
 
@@ -45,6 +49,7 @@ std::string common_space(const MeshFile& a, const std::filesystem::path& path_a,
 struct PlyOptions {
   std::vector<std::string> comments = {};  ///< further comments (provenance), one line each
   std::string space = "LPS";
+  bool millimetres = true;  ///< say `units mm`; false where the unit of the numbers is not known
   bool overwrite = false;
   bool partial = false;  ///< leave it as NAME.part: the best mesh of a run that failed its requirement
 };

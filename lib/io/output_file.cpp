@@ -64,6 +64,9 @@ void require_writable(const fs::path& path, bool overwrite) {
   if (fs::is_directory(status)) {
     throw OutputError(fmt::format("{}: is a folder, name a file", path.string()));
   }
+  if (fs::exists(status) && !fs::is_regular_file(status)) {
+    throw OutputError(fmt::format("{}: is a device or a pipe, name a file", path.string()));
+  }
   if (fs::exists(status) && !overwrite) {
     throw OutputError(fmt::format("{}: exists already, remove it or pass --force to overwrite it", path.string()));
   }

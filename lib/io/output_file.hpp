@@ -32,7 +32,8 @@ private:
   bool keep_ = false;
 };
 
-/// Throws OutputError when `path` exists and `overwrite` is false, or when its folder cannot be written to. Tools call
+/// Throws OutputError when `path` exists and `overwrite` is false, or is a folder, a device or a pipe (renaming onto
+/// /dev/null would replace it), or when its folder cannot be written to. Tools call
 /// it before the work, so that an hour of computing does not end at a file that was there all the time.
 void require_writable(const std::filesystem::path& path, bool overwrite);
 

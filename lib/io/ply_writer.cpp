@@ -94,7 +94,10 @@ std::string one_line(std::string text) {
 
 std::string header_of(const Content& content, const PlyOptions& options) {
   std::string header = "ply\nformat binary_little_endian 1.0\n";
-  header += fmt::format("comment SPACE={}\ncomment units mm\n", one_line(options.space));
+  header += fmt::format("comment SPACE={}\n", one_line(options.space));
+  if (options.millimetres) {
+    header += "comment units mm\n";
+  }
   if (content.patch) {
     header += fmt::format("comment surface={}\n", *content.patch == Patch::comas ? "comas" : "watertight");
   }

@@ -127,8 +127,6 @@ Coordinate key_against_reference(const std::vector<Report>& reports, const std::
   return error;
 }
 
-std::string file_name(const Report& report) { return report.path.stem().string(); }
-
 std::string text_of(const Json& value) {
   if (value.is_string()) {
     return value.get<std::string>();
@@ -142,7 +140,7 @@ std::string text_of(const Json& value) {
 // The texts under a key, one per element of a list, or one.
 std::vector<std::string> texts_at(const Report& report, const std::string& key) {
   if (key == "file") {
-    return {file_name(report)};
+    return {report.name};
   }
   std::vector<std::string> texts;
   for (const Json& value : values_at(report, key).values) {
@@ -221,7 +219,7 @@ std::vector<Row> rows_of(const std::vector<Report>& reports, const Coordinate& x
       rows.push_back({&report,
                       i,
                       pick(series, i, options.series.value_or("")),
-                      {*px, *py, file_name(report), pick(labels, i, options.label.value_or(""))}});
+                      {*px, *py, report.name, pick(labels, i, options.label.value_or(""))}});
     }
     if (undefined > 0) {
       warnings.push_back(fmt::format("{}: {} of {} values of '{}' against '{}' are undefined (null) and left out",

@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <set>
 #include <string_view>
 
 namespace tunica {
@@ -228,7 +229,7 @@ std::optional<double> percent_of(double difference, double scale) {
 }  // namespace
 
 Report read_report(const std::filesystem::path& path) {
-  Report report{path, parse_guarded(path, read_file(path, largest_file))};
+  Report report{path, path.stem().string(), parse_guarded(path, read_file(path, largest_file))};
   const Json& json = report.json;
   const auto refuse = [&](const std::string& what) {
     throw InputError(
@@ -249,6 +250,39 @@ Report read_report(const std::filesystem::path& path) {
     }
   }
   return report;
+}
+
+void name_apart(std::vector<Report>& reports) {
+  std::set<std::string> names;
+  std::vector<std::vector<std::string>> parts;  // of the paths, without the ending
+  for (const Report& report : reports) {
+    names.insert(report.path.stem().string());
+    const std::filesystem::path whole = std::filesystem::absolute(report.path).lexically_normal().replace_extension();
+    std::vector<std::string>& list = parts.emplace_back();
+    for (const std::filesystem::path& part : whole) {
+      list.push_back(part.string());
+    }
+  }
+  if (names.size() == reports.size()) {
+    return;
+  }
+  const auto all_equal = [&](auto part_of) {
+    return std::ranges::all_of(
+        parts, [&](const auto& list) { return list.size() > 1 && part_of(list) == part_of(parts.front()); });
+  };
+  while (all_equal([](const auto& list) { return list.back(); })) {
+    for (auto& list : parts) {
+      list.pop_back();
+    }
+  }
+  while (all_equal([](const auto& list) { return list.front(); })) {
+    for (auto& list : parts) {
+      list.erase(list.begin());
+    }
+  }
+  for (std::size_t i = 0; i < reports.size(); ++i) {
+    reports[i].name = fmt::format("{}", fmt::join(parts[i], "/"));
+  }
 }
 
 ReportValues values_at(const Report& report, const std::string& key) {

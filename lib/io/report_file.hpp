@@ -12,11 +12,16 @@ namespace tunica {
 /// The JSON record that a tool wrote about one run.
 struct Report {
   std::filesystem::path path;
-  Json json;  ///< an object with at least `tool` (string), `ok` (bool), `seconds` and `result` (objects)
+  std::string name;  ///< for marks and legends: the file's name without ending, see name_apart()
+  Json json;         ///< an object with at least `tool` (string), `ok` (bool), `seconds` and `result` (objects)
 
   [[nodiscard]] std::string tool() const { return json.at("tool").get<std::string>(); }
   [[nodiscard]] bool ok() const { return json.at("ok").get<bool>(); }
 };
+
+/// Names the reports of one chart: by their files' names, or, where two are the same, by the folders in which their
+/// paths differ ("aneurysm" for out/aneurysm/1/relax.json beside out/tube/1/relax.json).
+void name_apart(std::vector<Report>& reports);
 
 /// Reads a report. Errors: InputError naming the file: missing, over 128 MiB, not JSON (or with NaN), nested deeper
 /// than 64, more than 20 million values, not a report of a tunica tool.

@@ -273,11 +273,16 @@ void make_flat(ShellMesh& mesh) {
 }
 
 MeshFile read_body_mesh(const SceneShell& shell) {
+  const auto read = [&] {
+    MeshFile file = read_mesh(shell.mesh, shell.unit_mm, true);
+    require_no_other_unit(file, shell.unit_mm, shell.mesh);
+    return file;
+  };
   if (shell.places.item.flag) {
-    return read_mesh(shell.mesh, shell.unit_mm, true);
+    return read();
   }
   try {
-    return read_mesh(shell.mesh, shell.unit_mm, true);
+    return read();
   } catch (const UsageError&) {
     throw InputError(fmt::format("{}: {} is in a format that carries no unit of length: add unit = \"mm\" beside mesh",
                                  shell.places.of("mesh").text, shell.mesh.string()));

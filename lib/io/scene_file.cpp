@@ -2,6 +2,7 @@
 
 #include "core/quantity.hpp"
 #include "io/output_file.hpp"
+#include "io/toml_depth.hpp"
 
 #include <fmt/format.h>
 #include <toml++/toml.h>
@@ -555,6 +556,10 @@ void read_load(const toml::table& node, const std::string& file, bool dynamic, S
 }
 
 toml::table parse_toml(const std::string& bytes, const std::string& file) {
+  constexpr std::size_t deepest = 64;
+  if (longest_dotted_key(bytes) > deepest) {
+    throw InputError(fmt::format("{}: it has a key of more than {} dotted parts, which no scene needs", file, deepest));
+  }
   try {
     return toml::parse(bytes, std::string_view(file));
   } catch (const toml::parse_error& error) {

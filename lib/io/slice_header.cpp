@@ -151,6 +151,10 @@ private:
       const std::size_t value_at = 4 + word;
       const bool inside = value_size > 0 && entry.count <= word / value_size;
       entry.offset = inside ? at + value_at : number(bytes.data() + value_at, word, big_endian_);
+      if (!inside && value_size > 0 &&
+          (entry.offset > file_.size() || entry.count > (file_.size() - entry.offset) / value_size)) {
+        throw_corrupt("the value of a tag lies beyond the file's end: it is truncated");
+      }
       entries_[number(bytes.data(), 2, big_endian_)] = entry;
     }
     file_.read(at, bytes.data(), word);

@@ -79,6 +79,10 @@ Header read_header(const fs::path& path) {
       continue;
     }
     const std::size_t colon = line.find(':');
+    if (colon == std::string_view::npos &&
+        (header.fields.contains("datafile") || header.fields.contains("data_file"))) {
+      continue;  // a name in a list of data files, which voxel_place() refuses
+    }
     if (colon == std::string_view::npos) {
       throw InputError(fmt::format("{}: the NRRD header's line '{}' is neither a field nor a key: it is corrupt",
                                    path.string(), shown(trimmed(line))));

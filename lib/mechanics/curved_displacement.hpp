@@ -5,13 +5,17 @@
 
 namespace tunica {
 
-/// Where a state moves the curved surface of a body: at each vertex of a tessellation the point of the deformed patch
-/// (nodes displaced, normals turned with them) minus the same point of the reference patch, so that the deformed body
-/// is as curved as the model is. Where a patch has no deformed counterpart (a normal turned into its facet's plane),
-/// the nodes' displacements are interpolated linearly.
+/// Where a state moves the curved surface of a body: at each vertex of a tessellation the point of the moved patch
+/// minus the same point of the reference patch, so that the deformed body is as curved as the model is. The moved patch
+/// stands on the moved facet, with the slopes of the reference plus those of the corners' rotations relative to the
+/// facet. Where a facet has collapsed, the nodes' displacements are interpolated linearly.
 /// @param state  global node order; `surface` is a tessellation of the body's own mesh
 /// @return #V displacements, mm
 std::vector<Vec3> curved_displacement(const Model& model, std::size_t body, const State& state,
                                       const Tessellation& surface);
+
+/// Shells with a corner that bends by more than `angle` (rad) relative to the facet: strains within a shell are small
+/// no more, and a finer mesh will move differently. Zero for a linear run, whose rotations are small by assumption.
+std::size_t count_unresolved(const Model& model, const State& state, double angle);
 
 }  // namespace tunica

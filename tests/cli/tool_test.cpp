@@ -1,4 +1,5 @@
 #include "cli/tool.hpp"
+#include "cli/usage.hpp"
 
 #include "core/threads.hpp"
 #include "io/output_file.hpp"
@@ -130,6 +131,67 @@ TEST_F(ToolTest, ExistingOutputsNeedForce) {
   const auto body = [&](Tool& tool) { tool.output(folder_ / "out"); };
   EXPECT_EQ(run({}, body).code, 5);
   EXPECT_EQ(run({"--force"}, body).code, 0);
+}
+
+TEST_F(ToolTest, AFileHasOneUse) {
+  write_file(folder_ / "in", "abc", false);
+  fs::create_symlink(folder_ / "in", folder_ / "link");
+  const auto code_of = [&](const fs::path& in, const fs::path& out, const fs::path& reported) {
+    fs::remove(report());
+    return run({"--force", "--report", reported},
+               [&](Tool& tool) {
+                 tool.input(in);
+                 tool.output(out);
+               })
+        .code;
+  };
+  const fs::path in = folder_ / "in";
+  EXPECT_EQ(code_of(in, folder_ / "out", report()), 0);
+  EXPECT_EQ(code_of(in, in, report()), 2);
+  EXPECT_EQ(code_of(in, folder_ / "." / "link", report()), 2);
+  EXPECT_EQ(code_of(in, folder_ / "out", folder_ / "." / "out"), 2);
+  EXPECT_EQ(run({"--force"},
+                [&](Tool& tool) {
+                  tool.output(folder_ / "out");
+                  tool.output(folder_ / "." / "out");
+                })
+                .code,
+            2);
+  EXPECT_EQ(read_file(in), "abc");
+}
+
+TEST_F(ToolTest, AReportReplacesNothingButAReport) {
+  write_file(folder_ / "scan.nii", "not JSON", false);
+  EXPECT_EQ(run({"--force", "--report", folder_ / "scan.nii"}).code, 5);
+  EXPECT_EQ(run({"--force", "--report", folder_ / "scan.nii", "--nonsense"}).code, 2);
+  EXPECT_EQ(read_file(folder_ / "scan.nii"), "not JSON");
+}
+
+TEST_F(ToolTest, TheHashOfAnInputIsOfWhatWasRead) {
+  write_file(folder_ / "in", "abc", false);
+  const auto outcome = run({"--report", report()}, [&](Tool& tool) {
+    tool.input(folder_ / "in");
+    write_file(folder_ / "in", "changed while the tool ran", true);
+  });
+  EXPECT_EQ(outcome.report["inputs"][0]["sha256"], "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+}
+
+TEST_F(ToolTest, UsageErrorsSayWhatToDo) {
+  EXPECT_THAT(run({"--nonsense", "7"}).error, HasSubstr("'--nonsense' is not an option of tunica-test"));
+  EXPECT_THAT(run({"surplus"}).error, HasSubstr("'surplus' is one argument too many"));
+  EXPECT_THAT(run({"--threads"}).error, HasSubstr("--threads needs a value"));
+  EXPECT_THAT(run({"--threads", "1", "--threads", "2"}).error, HasSubstr("--threads is given more than once"));
+  EXPECT_EQ(run({"--quiet=no"}).code, 2);
+}
+
+TEST(WholeNumber, SaysWhichNumbersAreMeant) {
+  const CLI::Validator from_one = whole_number(1, 99);
+  for (std::string good : {"1", "50", "99"}) {
+    EXPECT_EQ(from_one(good), "") << good;
+  }
+  for (std::string bad : {"0", "100", "-1", "1.5", "x", "", "1e1"}) {
+    EXPECT_THAT(from_one(bad), HasSubstr("is not a whole number from 1 to 99")) << bad;
+  }
 }
 
 TEST_F(ToolTest, AReportThatCannotBeWrittenIsFailure) {

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <fstream>
@@ -61,6 +62,13 @@ TEST_F(OutputFileTest, WhatCannotBeWrittenIsSaidBeforeTheWork) {
   EXPECT_THROW(require_writable(in("no/such/folder"), true), OutputError);
   EXPECT_THROW(require_writable(folder_, true), OutputError);
   EXPECT_THROW(OutputFile(in("no/file"), true), OutputError);
+}
+
+TEST_F(OutputFileTest, ADeviceOrAPipeIsNotReplaced) {
+  const fs::path pipe = folder_ / "pipe";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_THROW(write_file(pipe, "bytes", true), OutputError);
+  EXPECT_TRUE(fs::is_fifo(pipe));
 }
 
 TEST_F(OutputFileTest, ReadingRefusesWhatIsNotAFile) {

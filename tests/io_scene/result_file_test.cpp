@@ -123,6 +123,59 @@ TEST_F(ResultTest, aNormalTurnedIntoItsFacetStillGivesADisplacement) {
   }
 }
 
+TEST_F(ResultTest, inflationScalesTheCurvedSurface) {
+  const double stretch = 1.4;
+  State state = moved(Vec3::Zero(), Vec3::Zero(), Vec3::Zero());
+  for (std::size_t body = 0; body < model_.shells.size(); ++body) {
+    const ShellMesh& mesh = model_.shells[body].mesh;
+    for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
+      state.displacement[model_.first_node(body) + v] = (stretch - 1) * mesh.vertices[v];
+    }
+    const Tessellation surface = tessellate_uniformly(mesh, 3);
+    const std::vector<Vec3> u = curved_displacement(model_, body, state, surface);
+    for (std::size_t v = 0; v < u.size(); ++v) {
+      EXPECT_LT((u[v] - (stretch - 1) * surface.mesh.vertices[v]).norm(), 1e-11);
+    }
+  }
+}
+
+TEST_F(ResultTest, aSmallRotationOfOneNodeMovesLinearAndFiniteSurfacesAlike) {
+  const double angle = 1e-5;
+  State finite = moved(Vec3::Zero(), Vec3::Zero(), Vec3::Zero());
+  finite.rotation[0] = angle * Vec3(1, 0.5, -0.2);
+  finite.displacement[1] = 1e-5 * Vec3(0.3, 1, -2);
+  State linear = finite;
+  linear.linear = true;
+  const Tessellation surface = tessellate_uniformly(model_.shells[0].mesh, 3);
+  const std::vector<Vec3> a = curved_displacement(model_, 0, finite, surface);
+  const std::vector<Vec3> b = curved_displacement(model_, 0, linear, surface);
+  double largest = 0;
+  for (std::size_t v = 0; v < a.size(); ++v) {
+    largest = std::max(largest, a[v].norm());
+    EXPECT_LT((a[v] - b[v]).norm(), 100 * angle * angle);
+  }
+  EXPECT_GT(largest, angle / 10);
+}
+
+// A cubic whose end slopes differ by s over a length L rises by 4/27 s L at most, and both ends of an edge may turn.
+TEST_F(ResultTest, aFarTurnedNodeMakesNoSpike) {
+  State state = moved(Vec3::Zero(), Vec3::Zero(), Vec3::Zero());
+  const ShellMesh& mesh = model_.shells[0].mesh;
+  const double angle = 1.4;
+  double longest = 0;
+  for (const auto& triangle : mesh.triangles) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      longest = std::max(longest, (mesh.vertices[triangle[k]] - mesh.vertices[triangle[(k + 1) % 3]]).norm());
+    }
+  }
+  state.rotation[0] = angle * mesh.normals[0].unitOrthogonal();
+  EXPECT_GT(count_unresolved(model_, state, 0.5), 0U);
+  EXPECT_EQ(count_unresolved(model_, state, 2), 0U);
+  for (const Vec3& u : curved_displacement(model_, 0, state, tessellate_uniformly(mesh, 8))) {
+    EXPECT_LT(u.norm(), 0.2 * angle * longest);
+  }
+}
+
 TEST_F(ResultTest, aSeriesGrowsAndASingleStateIsReplaced) {
   for (const bool series : {false, true}) {
     options_.series = series;

@@ -1,6 +1,7 @@
 #include "scene_fixture.hpp"
 
 #include "core/error.hpp"
+#include "io/toml_depth.hpp"
 
 #include <gmock/gmock.h>
 
@@ -223,6 +224,31 @@ TEST_F(SceneTest, theResolvedTextReadsAsTheSameScene) {
   EXPECT_THAT(resolved, HasSubstr("mesh = \"" + (folder_ / "plate.ply").string()));
 }
 
+TEST(TomlDepth, CountsTheLongestDottedKeyOutsideStringsAndComments) {
+  EXPECT_EQ(longest_dotted_key(""), 1U);
+  EXPECT_EQ(longest_dotted_key("a.b.c = 1.5\n[d.e]\n"), 3U);
+  EXPECT_EQ(longest_dotted_key("x = [1.5, 2.5, 3.5, 4.5]\n# a.b.c.d\n"), 2U);
+  EXPECT_EQ(longest_dotted_key("x = \"a.b.c\\\".d\"\ny = 'e.f.g'\n"), 1U);
+  EXPECT_EQ(longest_dotted_key("\"a,b\".'=.'.\"c\" = 1\n"), 3U);
+  EXPECT_EQ(longest_dotted_key("x = {a = \"\"\" \" \n a \"\"\", b.c.d.e = 1}\n"), 4U);
+  EXPECT_EQ(longest_dotted_key("x = \"open a.b.c\ny.z = 1"), 2U);
+}
+
+TEST_F(SceneTest, AKeyOfVeryManyPartsIsRefusedNotACrash) {
+  std::string key = "a";
+  for (int i = 0; i < 200000; ++i) {
+    key += ".a";
+  }
+  for (const std::string& text : {key + " = 1\n", "[" + key + "]\n", "[[" + key + "]]\n", "x = {" + key + " = 1}\n"}) {
+    try {
+      (void)load(text);
+      FAIL() << "accepted";
+    } catch (const InputError& error) {
+      EXPECT_THAT(error.what(), HasSubstr("dotted parts"));
+    }
+  }
+}
+
 struct Wrong {
   const char* name;
   std::string text;
@@ -258,6 +284,7 @@ std::string load_with(const std::string& lines) { return basic("[[load]]\nbody =
 const std::vector<Wrong> wrongs{
     {"syntax", "[run]\nkind = = 1\n", ":2:8: ", "TOML"},
     {"twice", "[run]\nkind = \"static\"\nkind = \"static\"\n", ":3:", "redefine"},
+    {"tooLarge", shell_with("thickness = \"1e70m\""), ":6:", "too large"},
     {"noRun", std::string(plate), ":1:1: ", "no 'run'"},
     {"runTwice", "[[run]]\nkind = \"static\"\n", ":1:1: ", "[run]"},
     {"noShell", run, ":1:1: ", "no [[shell]]"},

@@ -110,7 +110,7 @@ TEST(Nrrd, DetachedData) {
     const std::string text = nrrd_header("uint8", "encoding: raw\ndata file: " + name + "\n");
     EXPECT_THAT(error_of(folder.file("v.nhdr", text)), HasSubstr("not in the header's own folder"));
   }
-  for (const std::string name : {"LIST", "slice%03d.raw 0 4 1"}) {
+  for (const std::string name : {"LIST", "LIST\nv0.raw\nv1.raw", "slice%03d.raw 0 4 1"}) {
     const std::string text = nrrd_header("uint8", "encoding: raw\ndata file: " + name + "\n");
     EXPECT_THAT(error_of(folder.file("v.nhdr", text)), HasSubstr("several data files"));
   }

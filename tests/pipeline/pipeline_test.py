@@ -215,6 +215,10 @@ class Rules(Pipeline):
         self.assertIn("without spaces", self.refusal(VOLUMES="a.nii.gz", LABEL=1, OUT=f"{self.out} 2", **LOAD))
         self.assertIn("names with the sign '", self.refusal(VOLUMES="a'.nii", LABEL=1, **LOAD))
 
+    def test_a_glob_that_matches_a_name_with_a_space_is_refused(self):
+        (self.folder / "a b.nii.gz").write_text("a volume")
+        self.assertIn("has a space in its name", self.refusal(VOLUMES="a*.nii.gz", LABEL=1, **LOAD))
+
     def test_names_with_spaces_are_explained(self):
         (self.folder / "my scan.nii").write_text("a volume")
         done = self.make(VOLUMES="my scan.nii", LABEL=1, **LOAD)

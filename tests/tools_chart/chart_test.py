@@ -177,6 +177,16 @@ class WhatIsDrawn(ChartCase):
         _, head, rows = self.draw(self.write("s.json", simulate))
         self.assertEqual(head[4], "seconds.solve")
 
+    def test_reports_of_one_name_are_told_apart_by_their_folders(self):
+        paths = []
+        for organ, error in (("aorta", 0.2), ("bladder", 0.4)):
+            (self.folder / "out" / organ / "1").mkdir(parents=True)
+            paths.append(self.write(f"out/{organ}/1/relax.json", relax(100, error, 1)))
+        root, _, _ = self.draw(*paths, "--label", "file")
+        self.assertLessEqual({"aorta", "bladder"}, set(texts(root)))
+        root, _, _ = self.draw(paths[0], self.write("out/aorta/1/fit.json", relax(90, 0.1, 1)), "--label", "file")
+        self.assertLessEqual({"relax", "fit"}, set(texts(root)))
+
     def test_title_and_labels_are_escaped(self):
         root, _, _ = self.draw(self.write("a.json", relax(1, 1.0, 1.0, note="<&\">")), "--title", "a < b & \"c\" é",
                                "--x-label", "x<y", "--y-label", "]]>", "--series", "result.note")

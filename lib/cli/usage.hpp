@@ -1,0 +1,17 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+#include <cstddef>
+#include <string>
+
+namespace tunica::cli {
+
+/// The parser's error in words that say what to do: an unknown flag is named before a missing argument, which is often
+/// only its consequence.
+std::string usage_message(const CLI::App& app, const CLI::ParseError& error);
+
+/// A validator for a whole number from `lower` to `upper`.
+CLI::Validator whole_number(std::size_t lower, std::size_t upper = std::size_t{1} << 31);
+
+}  // namespace tunica::cli
