@@ -28,7 +28,7 @@ struct Arguments {
   fs::path coarse, target, out;
   std::optional<fs::path> map, picture, curved;
   std::optional<LengthTolerance> tolerance;
-  std::string method = "fit";
+  std::string method = "barycentre";
   std::string surface = "comas";
   std::optional<std::string> mesh_unit;
   bool refine = false;
@@ -44,9 +44,10 @@ void declare(cli::Tool& tool, Arguments& given) {
   tool.tolerance("--tolerance", given.tolerance,
                  "stop when the two-sided distance is certainly below it, e.g. 0.5% of the target's diagonal or 0.2mm; "
                  "exit code 4 when it cannot be reached");
-  app.add_option("--method", given.method,
-                 "fit (least error: positions, normals and connectivity are chosen together; the default) or "
-                 "barycentre (the paper's rule)")
+  app.add_option(
+         "--method", given.method,
+         "barycentre (the paper's rule; the default) or fit (least error: positions, normals and connectivity are "
+         "chosen together)")
       ->check(CLI::IsMember({"barycentre", "fit"}));
   app.add_option("--surface", given.surface, "the patch: comas (the paper's 9-term cubic)")
       ->check(CLI::IsMember({"comas", "watertight"}));
@@ -298,9 +299,9 @@ int main(int argc, char** argv) {
       "relax",
       "Moves a coarse mesh onto its target as curved shells, and certifies the distance of the curved surface "
       "to the target, both ways.",
-      "tunica-relax surface.ply surface.ply shell.ply --tolerance 0.3% --picture map.png\n"
-      "tunica-relax coarse.obj surface.obj shell.ply --mesh-unit mm --shells 800\n"
-      "tunica-relax coarse.ply surface.ply shell.ply --method barycentre --tolerance 1% --refine");
+      "tunica-relax coarse.ply surface.ply shell.ply --tolerance 1% --refine --picture map.png\n"
+      "tunica-relax coarse.obj surface.obj shell.ply --mesh-unit mm --max-iterations 5\n"
+      "tunica-relax surface.ply surface.ply shell.ply --method fit --tolerance 0.3%");
   Arguments given;
   declare(tool, given);
   tool.stages({"read", "relax", "measure", "write"});

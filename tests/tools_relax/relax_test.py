@@ -74,7 +74,7 @@ class Case(unittest.TestCase):
     def path(self, name):
         return os.path.join(self.folder.name, name)
 
-    method = ["--method", "barycentre"]
+    method = []  # the default
 
     def relax(self, *arguments, expect=0):
         """Runs the tool, with the class's method when none is named; @return its report and stderr."""
@@ -250,7 +250,7 @@ class Contract(Case):
 
 
 class Fit(Case):
-    method = []  # the default
+    method = ["--method", "fit"]
 
     def setUp(self):
         super().setUp()
