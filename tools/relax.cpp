@@ -115,6 +115,10 @@ void warn_of_mismatch(const cli::Tool& tool, const TriangleMesh& coarse, const T
 
 Json interval(const Interval& mm, double scale) { return {{"lower", mm.lower * scale}, {"upper", mm.upper * scale}}; }
 
+Interval intersection(const Interval& a, const Interval& b) {
+  return {std::max(a.lower, b.lower), std::min(a.upper, b.upper)};
+}
+
 PlyOptions ply_options(const cli::Tool& tool, const std::string& space) {
   PlyOptions options;
   options.comments = {"made by " + tool.command()};
@@ -244,6 +248,10 @@ void run(cli::Tool& tool, const Arguments& given) {
     measuring.with_mean = true;
     measuring.progress = tool.progress("measure");
     distance = shell_distance(relaxed.shell, *target, measuring);
+    // Both intervals are certain, so their intersection is: what relax() proved is not taken back.
+    distance.both = intersection(distance.both, relaxed.distance.both);
+    distance.shell_to_target = intersection(distance.shell_to_target, relaxed.distance.shell_to_target);
+    distance.target_to_shell = intersection(distance.target_to_shell, relaxed.distance.target_to_shell);
 
     Json& result = tool.result();
     result["shells"] = relaxed.shell.triangles.size();

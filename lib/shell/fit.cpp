@@ -75,7 +75,7 @@ private:
     FitState state(samples, prepare_fit(start, target_), {});
     smooth(state, tolerance);
     const int rounds = options_.max_iterations.value_or(default_rounds);
-    double limit = margin * tolerance;
+    const double limit = margin * tolerance;
     repair(state, limit, most);
     FitState best = state;
     for (int round = 0; round < rounds; ++round) {
@@ -99,8 +99,10 @@ private:
       if (certify(state, tolerance)) {
         break;
       }
-      add_missed(samples, state, margin * tolerance);
-      limit *= std::clamp(tolerance / result_.distance.both.upper, 0.93, 0.985);
+      const std::size_t added = add_missed(samples, state, margin * tolerance);
+      if (i > 0 || added == 0) {
+        split_wrong(state, 0.985 * tolerance);
+      }
       state.attach();
       state.measure();
       polish(state, limit, 2);
@@ -207,6 +209,17 @@ private:
       }
       polish(state, limit, 2);
     }
+  }
+
+  /// Splits patches that a finer look finds above `limit`.
+  void split_wrong(FitState& state, double limit) const {
+    std::vector<Index> triangles;
+    const ShellMesh shell = state.mesh.shell(&triangles);
+    const auto errors = shell_errors(shell, target_, limit / 30);
+    for (std::size_t i = 0; i < errors.size(); ++i) {
+      state.patches[triangles[i]].error = std::max(state.patches[triangles[i]].error, errors[i]);
+    }
+    split_worst(state, limit, state.mesh.alive);
   }
 
   /// Points of the target farther from the curved surface than `limit` join the samples.
