@@ -65,10 +65,12 @@ public:
 private:
   void to_tolerance(double tolerance) {
     const FitStart start = start_of_fit(coarse_, target_, {}, start_error * tolerance);
-    const std::size_t most = max_index;
+    // Flat errors fall as 1 / count. Where curved shells need as many, flat facets are the answer.
+    const double flat_count = static_cast<double>(start.mesh.triangles.size()) * start.flat_error / tolerance;
+    const std::size_t most = static_cast<std::size_t>(std::clamp(flat_count, 64.0, 1e9));
     if (!start.own_topology && static_cast<double>(start.mesh.triangles.size()) >
                                    limited_by_target * static_cast<double>(target_.mesh().triangles.size())) {
-      no_worse_than_flat(tolerance, most, start);
+      no_worse_than_flat(tolerance, max_index, start);
       return;
     }
     FitSamples samples(target_, guess(start.mesh.triangles.size() / expected_gain));
@@ -107,8 +109,12 @@ private:
       state.measure();
       polish(state, limit, 2);
       repair(state, limit, most);
+      if (state.error() > 2 * limit) {
+        certify(state, tolerance);
+        break;  // a place that more shells do not mend
+      }
     }
-    no_worse_than_flat(tolerance, most, start);
+    no_worse_than_flat(tolerance, max_index, start);
   }
 
   void to_count(std::size_t shells) {
@@ -202,12 +208,17 @@ private:
   }
 
   static void repair(FitState& state, double limit, std::size_t most) {
-    for (int i = 0; i < most_repairs && state.error() > limit && state.mesh.alive + 2 <= most; ++i) {
+    double best = state.error();
+    int fruitless = 0;
+    for (int i = 0; i < most_repairs && fruitless < patience && state.error() > limit && state.mesh.alive + 2 <= most;
+         ++i) {
       const std::size_t some = std::max<std::size_t>(1, std::min(state.mesh.alive / 20, (most - state.mesh.alive) / 2));
       if (split_worst(state, limit, i < 2 ? std::max<std::size_t>(some, state.mesh.alive / 4) : some) == 0) {
         break;
       }
       polish(state, limit, 2);
+      fruitless = state.error() < worth_it * best ? 0 : fruitless + 1;
+      best = std::min(best, state.error());
     }
   }
 

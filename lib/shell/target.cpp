@@ -13,6 +13,17 @@ namespace {
 
 constexpr std::size_t triangles_looked_at = 16;
 
+// Of a corner from its triangle's centroid.
+double largest_radius(const TriangleMesh& mesh, const std::vector<Vec3>& centroids) {
+  double squared = 0;
+  for (std::size_t t = 0; t < centroids.size(); ++t) {
+    for (const Index v : mesh.triangles[t]) {
+      squared = std::max(squared, (mesh.vertices[v] - centroids[t]).squaredNorm());
+    }
+  }
+  return std::sqrt(squared);
+}
+
 std::vector<Vec3> centroids(const TriangleMesh& mesh) {
   std::vector<Vec3> out;
   out.reserve(mesh.triangles.size());
@@ -70,7 +81,8 @@ Target::Target(TriangleMesh mesh)
       facet_normals_(tunica::facet_normals(mesh_)),
       vertex_normals_(tunica::vertex_normals(mesh_)),
       centroids_(tunica::centroids(mesh_)),
-      centroid_tree_(centroids_) {
+      centroid_tree_(centroids_),
+      largest_radius_(largest_radius(mesh_, centroids_)) {
   for (const auto& loop : boundary_loops(mesh_)) {
     auto& polyline = boundary_.emplace_back();
     for (const Index v : loop) {
@@ -105,7 +117,7 @@ std::optional<Target::Foot> Target::closest_facing(const Vec3& p, const Vec3& di
   double best = reach * reach;
   Vec3 on;
   std::optional<Index> triangle;
-  for (const Index t : centroid_tree_.nearest(p, triangles_looked_at, faces)) {
+  for (const Index t : centroid_tree_.nearest(p, triangles_looked_at, faces, reach + largest_radius_)) {
     const auto& v = mesh_.triangles[t];
     const Vec3 q = closest_point_on_triangle(p, mesh_.vertices[v[0]], mesh_.vertices[v[1]], mesh_.vertices[v[2]]);
     if ((p - q).squaredNorm() <= best) {

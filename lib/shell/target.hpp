@@ -53,6 +53,7 @@ private:
   std::vector<Vec3> vertex_normals_;
   std::vector<Vec3> centroids_;
   PointTree centroid_tree_;
+  double largest_radius_;  ///< of a corner from its triangle's centroid, mm
   std::vector<std::vector<Vec3>> boundary_;
 };
 
