@@ -190,6 +190,7 @@ Summary run_static(ShellSystem& system, const Model& model, const RunSettings& s
 
   const double thickness = least_thickness(model);
   double factor = 0;
+  double shown = 0;
   double part = 1;
   for (std::size_t s = 0; s < run.load_factors.size(); ++s) {
     const auto start = Clock::now();
@@ -224,6 +225,12 @@ Summary run_static(ShellSystem& system, const Model& model, const RunSettings& s
       newton_iterations += let_go.iterations;
       cg_iterations += let_go.cg_iterations;
       if (!let_go.settled || distance(attempt, configuration) > largest_branch * thickness) {
+        if (factor != shown) {  // the last good state, also between two load steps
+          state = make_state(system, model, configuration, factor);
+          state.load_factor = factor;
+          state.converged = true;
+          on_state(state);
+        }
         throw RequirementError(
             fmt::format("no stable static equilibrium beyond load factor {:.6g} of {:.6g} ({}): {}; the last good "
                         "state is at {:.6g}",
@@ -248,6 +255,7 @@ Summary run_static(ShellSystem& system, const Model& model, const RunSettings& s
     const bool is_last = s + 1 == run.load_factors.size();
     if ((s + 1) % settings.every == 0 || is_last) {
       on_state(state);
+      shown = factor;
     }
     advance(progress, static_cast<double>(s + 1) / static_cast<double>(run.load_factors.size()));
   }
