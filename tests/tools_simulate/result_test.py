@@ -180,7 +180,7 @@ nearest = ["0mm", "0mm", "{RADIUS}mm"]
             u = file["tunica/nodes/displacement"][:]
             np.testing.assert_allclose(drawn[:, at_nodes], u, atol=1e-6 * np.abs(u).max())
             self.assertTrue((u[0] == 0).all())
-            self.assertEqual(np.linalg.norm(u[-1], axis=1).max(), result["max_displacement_mm"])
+            self.assertAlmostEqual(np.linalg.norm(u[-1], axis=1).max() / result["max_displacement_mm"], 1, delta=1e-14)
             self.assertTrue((file["tunica/history/kinetic_energy"][1:] > 0).all())
         grid, _ = read_by_vtk(self.path("out.hdf"))  # VTK 9.1 knows no Steps: it warns and takes the first
         self.assertEqual(grid.GetNumberOfPoints(), points)
