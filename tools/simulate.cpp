@@ -1,6 +1,8 @@
 #include "cli/tool.hpp"
+#include "core/version.hpp"
 #include "io/output_file.hpp"
 #include "io/result_file.hpp"
+#include "io/run_journal.hpp"
 #include "io/scene.hpp"
 #include "io/scene_file.hpp"
 #include "mechanics/curved_displacement.hpp"
@@ -19,7 +21,7 @@ namespace fs = std::filesystem;
 
 struct Arguments {
   std::vector<fs::path> files;
-  fs::path scene;
+  fs::path scene, resume;
   std::optional<double> young, thickness, density, pressure, duration, step, ramp;
   std::optional<std::string> poisson, mesh_unit, membrane, bending, solver, cg_tolerance, converge;
   std::optional<std::string> load_steps, cg_iterations, every;
@@ -29,6 +31,7 @@ struct Arguments {
 };
 
 constexpr const char* scene_flag = "--scene";
+constexpr const char* resume_flag = "--resume";
 
 // What --scene contradicts: all that a scene file says itself.
 constexpr std::array scene_says{"--young",         "--poisson",  "--thickness",  "--density",  "--pressure",
@@ -77,7 +80,9 @@ void declare(cli::Tool& tool, Arguments& a) {
   app.add_option("--mesh-unit", a.mesh_unit, "unit of length of a mesh in a format that carries none: mm | cm | m | um")
       ->type_name("mm|cm|m|um");
   app.add_flag("--check", a.check, "validate, print the resolved scene in SI units, and stop");
-  tool.not_yet("--resume");
+  app.add_option(resume_flag, a.resume,
+                 "go on with a run that was interrupted, also by kill -9: alone, or beside the same command as before")
+      ->type_name("OUT.hdf.part");
   tool.not_yet("--export");
 }
 
@@ -262,18 +267,36 @@ auto naming(const fs::path& file, const Work& work) {
   }
 }
 
-// Which files the positional arguments name; OUT is empty where --check needs none.
+// OUT.hdf of a run that goes on.
+fs::path resumed_output(const Arguments& a) {
+  fs::path out = a.resume;
+  out.replace_extension();
+  if (a.resume.extension() != ".part" || out.empty()) {
+    throw UsageError(
+        fmt::format("{} {}: name the partial result, which ends with .part", resume_flag, a.resume.string()));
+  }
+  if (a.check) {
+    throw UsageError(fmt::format("--check and {} contradict each other: give one", resume_flag));
+  }
+  return out;
+}
+
+// Which file is written; empty where --check needs none.
 fs::path output_path(const CLI::App& app, const Arguments& a) {
   const bool from_scene = !a.scene.empty();
-  if (from_scene) {
-    for (const char* flag : scene_says) {
-      if (app.count(flag) > 0) {
-        throw UsageError(fmt::format("{} and {} contradict each other: write it in the scene file", scene_flag, flag));
-      }
+  const bool resumed = !a.resume.empty();
+  // A run that goes on knows its scene and its output, and may be told them again.
+  const bool alone = resumed && !from_scene && a.files.size() < 2;
+  for (const char* flag : scene_says) {
+    if ((from_scene || alone) && app.count(flag) > 0) {
+      throw UsageError(
+          from_scene
+              ? fmt::format("{} and {} contradict each other: write it in the scene file", scene_flag, flag)
+              : fmt::format("{} and {}: name SHELL.ply and OUT.hdf too, or nothing of the scene", resume_flag, flag));
     }
   }
-  const std::size_t inputs = from_scene ? 0 : 1;
-  const std::size_t wanted = inputs + (a.check ? 0 : 1);
+  const std::size_t inputs = from_scene || alone ? 0 : 1;
+  const std::size_t wanted = inputs + (a.check || resumed ? 0 : 1);
   if (a.files.size() < wanted) {
     throw UsageError(from_scene || a.files.size() == 1 ? "OUT.hdf is missing: name the result file"
                                                        : "SHELL.ply and OUT.hdf are missing: name them, or --scene");
@@ -282,7 +305,15 @@ fs::path output_path(const CLI::App& app, const Arguments& a) {
     throw UsageError(
         fmt::format("{}: one file too many, with {} only OUT.hdf is named", a.files.back().string(), scene_flag));
   }
-  return a.files.size() > inputs ? a.files.back() : fs::path();
+  const fs::path named = a.files.size() > inputs ? a.files.back() : fs::path();
+  if (!resumed) {
+    return named;
+  }
+  const fs::path out = resumed_output(a);
+  if (!named.empty() && fs::weakly_canonical(fs::absolute(named)) != fs::weakly_canonical(fs::absolute(out))) {
+    throw UsageError(fmt::format("{}: {} goes on with {}, name that", named.string(), resume_flag, out.string()));
+  }
+  return out;
 }
 
 double median(std::vector<double> values) {
@@ -376,24 +407,48 @@ void report_summary(Json& result, const Summary& summary, bool converged, std::o
   }
 }
 
-void simulate(cli::Tool& tool, const Arguments& a) {
-  const fs::path out = output_path(tool.arguments(), a);
-  std::vector<fs::path> inputs;
-  const auto register_input = [&](const fs::path& path) { inputs.push_back(tool.input(path)); };
+fs::path partial(fs::path out) { return out += ".part"; }
 
-  std::optional<cli::Tool::Stage> stage(std::in_place, tool, "read");
+// The scene, from wherever the command line says; what it was read from is registered.
+Scene read_scene_of_run(cli::Tool& tool, const Arguments& a, const std::optional<RunJournal>& before,
+                        std::vector<fs::path>& inputs) {
   Scene scene;
-  if (a.scene.empty()) {
-    scene = scene_of_flags(a);
-  } else {
-    register_input(a.scene);
+  if (!a.scene.empty()) {
+    inputs.push_back(tool.input(a.scene));
     scene = read_scene(a.scene);
+  } else if (before && a.files.size() < 2) {
+    scene = parse_scene(before->identity().scene, a.resume);
+  } else {
+    scene = scene_of_flags(a);
   }
   for (const SceneShell& shell : scene.shells) {
     if (std::find(inputs.begin(), inputs.end(), shell.mesh) == inputs.end()) {
-      register_input(shell.mesh);
+      inputs.push_back(tool.input(shell.mesh));
     }
   }
+  return scene;
+}
+
+RunIdentity identity_of_run(const cli::Tool& tool, const Scene& scene, const std::vector<fs::path>& inputs) {
+  RunIdentity identity{version, scene_text(scene), tool.command(), {}, {}, {}};
+  for (const fs::path& path : inputs) {
+    identity.inputs.emplace_back(path.string(), sha256_of_file(path));
+  }
+  for (const SceneShell& shell : scene.shells) {
+    identity.meshes.emplace_back(shell.mesh.string(), sha256_of_file(shell.mesh));
+  }
+  return identity;
+}
+
+void simulate(cli::Tool& tool, const Arguments& a) {
+  const fs::path out = output_path(tool.arguments(), a);
+  std::optional<cli::Tool::Stage> stage(std::in_place, tool, "read");
+  std::optional<RunJournal> journal;
+  if (!a.resume.empty()) {
+    journal.emplace(RunJournal::open(a.resume));
+  }
+  std::vector<fs::path> inputs;
+  const Scene scene = read_scene_of_run(tool, a, journal, inputs);
   if (!a.check) {
     tool.output(out);
   }
@@ -407,37 +462,65 @@ void simulate(cli::Tool& tool, const Arguments& a) {
   prepare_result(tool.result(), model);
   const fs::path& subject = inputs.front();
   naming(subject, [&] { check_model(model, scene.run); });
-  const std::string text = scene_text(scene);
   if (a.check) {
-    fmt::print("{}", text);
+    fmt::print("{}", scene_text(scene));
     return;
   }
-  const auto* dynamic = std::get_if<DynamicRun>(&scene.run.kind);
-  ResultOptions options{dynamic != nullptr, tool.command(), text, {}, tool.force()};
-  for (const fs::path& path : inputs) {
-    options.inputs.emplace_back(path.string(), sha256_of_file(path));
+  const RunIdentity identity = identity_of_run(tool, scene, inputs);
+  if (!journal) {
+    journal.emplace(RunJournal::create(partial(out), identity));
+  } else if (const std::string differs = difference(journal->identity(), identity); !differs.empty()) {
+    throw InputError(fmt::format("{}: is another run: {}", a.resume.string(), differs));
   }
+  const auto* dynamic = std::get_if<DynamicRun>(&scene.run.kind);
+  const RunIdentity& origin = journal->identity();
 
   stage.emplace(tool, "write");
-  ResultFile file(out, model, options);
+  ResultFile file(out, model, {dynamic != nullptr, origin.command, origin.scene, origin.inputs, tool.force()});
   const ElementFieldEvaluator fields(model);
-  stage.emplace(tool, "solve");
   constexpr double most_bending = std::numbers::pi / 6;
   std::size_t unresolved = 0;
-  const auto on_state = [&](const State& state) {
-    stage.emplace(tool, "write");
+  const auto record = [&](const State& state) {
     report_state(tool.result(), model, state, dynamic != nullptr);
     file.append(state, fields(state));
     unresolved = count_unresolved(model, state, most_bending);
+  };
+  Resumption resumption;
+  if (!a.resume.empty()) {
+    resumption.from = journal->replay(model.node_count(), record);
+    tool.note(resumption.from
+                  ? fmt::format("{}: goes on after step {}", a.resume.string(), resumption.from->summary.steps)
+                  : fmt::format("{}: begins again, it has no checkpoint yet", a.resume.string()));
+  }
+  stage.emplace(tool, "solve");
+  resumption.on_step = [&](const std::function<Checkpoint()>& make) {
+    stage.emplace(tool, "write");
+    journal->offer(make);
     stage.emplace(tool, "solve");
   };
-  const Summary summary = naming(subject, [&] { return solve(model, scene.run, on_state, tool.progress("solve")); });
+  const auto on_state = [&](const State& state) {
+    stage.emplace(tool, "write");
+    journal->append(state);
+    record(state);
+    stage.emplace(tool, "solve");
+  };
+  Summary summary;
+  try {
+    summary = naming(subject, [&] { return solve(model, scene.run, on_state, tool.progress("solve"), resumption); });
+  } catch (const InputError&) {
+    journal->remove();
+    throw;
+  } catch (const RequirementError&) {
+    journal->remove();  // it would end at the same step again
+    throw;
+  }
   stage.emplace(tool, "write");
   // A fixed count of iterations asks for no convergence, so none is claimed.
   const bool converged = summary.converged && !scene.run.cg_fixed_count;
   report_summary(tool.result(), summary, converged,
                  dynamic != nullptr ? std::optional(dynamic->duration) : std::nullopt);
   file.commit(converged);
+  journal->remove();
   tool.note(fmt::format("{} nodes in {} steps, {}: largest displacement {:.4g} mm", model.node_count(), summary.steps,
                         converged ? "converged" : "not asked to converge", summary.max_displacement));
   if (unresolved > 0) {

@@ -591,9 +591,11 @@ std::vector<const toml::table*> tables_of(const toml::table& root, std::string_v
 
 }  // namespace
 
-Scene read_scene(const fs::path& path) {
-  const std::string file = path.string();
-  const toml::table root = parse_toml(read_file(path, most_bytes), file);
+Scene read_scene(const fs::path& path) { return parse_scene(read_file(path, most_bytes), path); }
+
+Scene parse_scene(const std::string& text, const fs::path& name) {
+  const std::string file = name.string();
+  const toml::table root = parse_toml(text, file);
   constexpr std::array<std::string_view, 5> sections{"run", "shell", "fix", "load", "probe"};
   constexpr std::array<std::string_view, 4> later{"solid", "rigid", "attach", "contact"};
   const Table top(root, file, "the scene", sections, later);
@@ -610,7 +612,7 @@ Scene read_scene(const fs::path& path) {
       "name", "mesh", "unit", "scale", "thickness", "young", "poisson", "density", "membrane", "bending", "rest"};
   constexpr std::array<std::string_view, 1> shell_later{"thickness_from"};
   for (const toml::table* table : tables_of(root, "shell", top)) {
-    read_shell(Table(*table, file, "[[shell]]", shell_keys, shell_later), path.parent_path(), scene);
+    read_shell(Table(*table, file, "[[shell]]", shell_keys, shell_later), name.parent_path(), scene);
   }
   constexpr std::array<std::string_view, 6> fix_keys{"body",     "where",        "translation",
                                                      "rotation", "displacement", "ramp"};

@@ -259,11 +259,10 @@ double first_load_factor(const Model& model, double time) {
 }  // namespace
 
 Summary run_dynamic(ShellSystem& system, const Model& model, const RunSettings& settings, const DynamicRun& run,
-                    const StateCallback& on_state, const Progress& progress) {
+                    const StateCallback& on_state, const Progress& progress, const Resumption& resumption) {
   release_rigid_motion_supports(system, model);
   Summary summary;
   BackwardEuler integrator(system, model, settings, run);
-  summary.dof = integrator.freedom_count();
   Motion motion{reference_configuration(system), VectorX::Zero(at(system.node_count()))};
   const auto hand_over = [&](State& state) {
     state.load_factor = first_load_factor(model, state.time);
@@ -276,16 +275,27 @@ Summary run_dynamic(ShellSystem& system, const Model& model, const RunSettings& 
     }
     on_state(state);
   };
-  State state = make_state(system, model, motion.configuration, 0);
-  state.converged = true;
-  hand_over(state);
-  summary.volume_before = state.volume;
-  summary.volume_after = state.volume;
+  State state;
+  double time = 0;
+  if (resumption.from) {
+    summary = resumption.from->summary;
+    time = resumption.from->position;
+    motion.configuration = {resumption.from->displacement, resumption.from->rotation};
+    const std::vector<double>& velocity = resumption.from->memory.at("velocity");
+    TUNICA_ASSERT(velocity.size() == static_cast<std::size_t>(motion.velocity.size()));
+    std::copy(velocity.begin(), velocity.end(), motion.velocity.begin());
+  } else {
+    summary.dof = integrator.freedom_count();
+    state = make_state(system, model, motion.configuration, 0);
+    state.converged = true;
+    hand_over(state);
+    summary.volume_before = state.volume;
+    summary.volume_after = state.volume;
+  }
 
   // The last step may be shorter: the run ends at its duration.
   const auto steps = static_cast<std::size_t>(std::max(1.0, std::ceil(run.duration / run.step - 1e-9)));
-  double time = 0;
-  for (std::size_t s = 0; s < steps; ++s) {
+  for (std::size_t s = summary.steps; s < steps; ++s) {
     const auto start = Clock::now();
     const bool last = s + 1 == steps;
     const double end = last ? run.duration : static_cast<double>(s + 1) * run.step;
@@ -327,6 +337,13 @@ Summary run_dynamic(ShellSystem& system, const Model& model, const RunSettings& 
       hand_over(state);
     }
     record_step(state, seconds, summary);
+    resumption.offer([&] {
+      return Checkpoint{summary,
+                        time,
+                        motion.configuration.displacement,
+                        motion.configuration.rotation,
+                        {{"velocity", {motion.velocity.begin(), motion.velocity.end()}}}};
+    });
     advance(progress, static_cast<double>(s + 1) / static_cast<double>(steps));
   }
   return summary;

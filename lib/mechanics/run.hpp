@@ -21,14 +21,14 @@ void record_step(const State& state, double seconds, Summary& summary);
 
 /// Load steps, each with Newton's method until it converges. Errors: RequirementError.
 Summary run_static(ShellSystem& system, const Model& model, const RunSettings& settings, const StaticRun& run,
-                   const StateCallback& on_state, const Progress& progress);
+                   const StateCallback& on_state, const Progress& progress, const Resumption& resumption);
 
 /// One linear solve about the reference configuration. Errors: RequirementError.
 Summary run_linear(ShellSystem& system, const Model& model, const RunSettings& settings, const StaticRun& run,
-                   const StateCallback& on_state, const Progress& progress);
+                   const StateCallback& on_state, const Progress& progress, const Resumption& resumption);
 
 /// Time steps by backward Euler. Errors: RequirementError.
 Summary run_dynamic(ShellSystem& system, const Model& model, const RunSettings& settings, const DynamicRun& run,
-                    const StateCallback& on_state, const Progress& progress);
+                    const StateCallback& on_state, const Progress& progress, const Resumption& resumption);
 
 }  // namespace tunica

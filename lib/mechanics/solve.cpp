@@ -69,15 +69,15 @@ void record_step(const State& state, double seconds, Summary& summary) {
 }
 
 Summary solve(const Model& model, const RunSettings& settings, const std::function<void(const State&)>& on_state,
-              const Progress& progress) {
+              const Progress& progress, const Resumption& resumption) {
   check_model(model, settings);
   ShellSystem system = make_system(model);
   if (const auto* dynamic = std::get_if<DynamicRun>(&settings.kind)) {
-    return run_dynamic(system, model, settings, *dynamic, on_state, progress);
+    return run_dynamic(system, model, settings, *dynamic, on_state, progress, resumption);
   }
   const auto& run = std::get<StaticRun>(settings.kind);
-  return run.linear ? run_linear(system, model, settings, run, on_state, progress)
-                    : run_static(system, model, settings, run, on_state, progress);
+  return run.linear ? run_linear(system, model, settings, run, on_state, progress, resumption)
+                    : run_static(system, model, settings, run, on_state, progress, resumption);
 }
 
 struct ElementFieldEvaluator::Implementation {

@@ -3,9 +3,13 @@
 #include "core/progress.hpp"
 #include "mechanics/model.hpp"
 
+#include <Eigen/Geometry>
+
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
+#include <string>
 
 namespace tunica {
 
@@ -51,6 +55,32 @@ struct Summary {
   std::vector<double> seconds_per_step;  ///< wall
 };
 
+/// Everything a run needs to go on after a step as if nothing had happened: the numbers as they stand in memory, so
+/// that a run that goes on from here repeats the uninterrupted one (to the bit with the direct solver; what a solver
+/// keeps only to be faster, such as a factor of an earlier matrix, is not here, so with others to their tolerance).
+struct Checkpoint {
+  Summary summary;                           ///< of the steps done; `steps` says where the run goes on
+  double position = 0;                       ///< s; static: the load factor
+  std::vector<Vec3> displacement;            ///< mm, #nodes
+  std::vector<Eigen::Quaterniond> rotation;  ///< #nodes
+  /// What the kind of run remembers between its steps beyond the configuration, by name: velocities, step sizes.
+  std::map<std::string, std::vector<double>, std::less<>> memory;
+};
+
+/// How a run is made to outlive its process.
+struct Resumption {
+  std::optional<Checkpoint> from;  ///< goes on here; the reference state is then not handed over again
+  /// Called after every step, when what `on_state` got is complete up to it; `make` builds the checkpoint, so that none
+  /// is built that nobody wants.
+  std::function<void(const std::function<Checkpoint()>& make)> on_step;
+
+  void offer(const std::function<Checkpoint()>& make) const {
+    if (on_step) {
+      on_step(make);
+    }
+  }
+};
+
 /// Finds what makes a model unsolvable before any time is spent, and names it: degenerate or non-manifold elements,
 /// inconsistent orientation, a normal nearly in its facet's plane, pieces that can move freely (static), a
 /// non-positive thickness, net force on a body held by its rigid motions only.
@@ -60,8 +90,9 @@ void check_model(const Model& model, const RunSettings& settings);
 /// Runs a model. Every `settings.every`-th state, the reference state (time 0) and the last one go to `on_state`.
 /// Errors: InputError as check_model; RequirementError when a step does not converge, has no equilibrium, or becomes
 /// unstable (the last good state has been handed over). With `cg_fixed_count` a run ends normally, `converged` false.
+/// A run that goes on from a checkpoint must have the model and the settings of the run that made it.
 Summary solve(const Model& model, const RunSettings& settings, const std::function<void(const State&)>& on_state,
-              const Progress& progress = {});
+              const Progress& progress = {}, const Resumption& resumption = {});
 
 /// Forces, moments and stresses of every triangle in one state. For many states of one model: the elements are made
 /// ready once. The model must outlive it.

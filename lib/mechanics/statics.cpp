@@ -177,22 +177,31 @@ std::string why(const NewtonResult& result, const SettleResult& let_go) {
 }  // namespace
 
 Summary run_static(ShellSystem& system, const Model& model, const RunSettings& settings, const StaticRun& run,
-                   const StateCallback& on_state, const Progress& progress) {
+                   const StateCallback& on_state, const Progress& progress, const Resumption& resumption) {
   Summary summary;
   LoadStep step(system, model, settings);
-  summary.dof = step.freedom_count();
   Configuration configuration = reference_configuration(system);
-  State state = make_state(system, model, configuration, 0);
-  state.converged = true;
-  on_state(state);
-  summary.volume_before = state.volume;
-  summary.volume_after = state.volume;
-
-  const double thickness = least_thickness(model);
+  State state;
   double factor = 0;
   double shown = 0;
   double part = 1;
-  for (std::size_t s = 0; s < run.load_factors.size(); ++s) {
+  if (resumption.from) {
+    summary = resumption.from->summary;
+    configuration = {resumption.from->displacement, resumption.from->rotation};
+    factor = resumption.from->position;
+    shown = resumption.from->memory.at("shown").at(0);
+    part = resumption.from->memory.at("part").at(0);
+  } else {
+    summary.dof = step.freedom_count();
+    state = make_state(system, model, configuration, 0);
+    state.converged = true;
+    on_state(state);
+    summary.volume_before = state.volume;
+    summary.volume_after = state.volume;
+  }
+
+  const double thickness = least_thickness(model);
+  for (std::size_t s = summary.steps; s < run.load_factors.size(); ++s) {
     const auto start = Clock::now();
     const double target = run.load_factors[s];
     const double whole = target - factor;
@@ -257,28 +266,38 @@ Summary run_static(ShellSystem& system, const Model& model, const RunSettings& s
       on_state(state);
       shown = factor;
     }
+    resumption.offer([&] {
+      return Checkpoint{
+          summary, factor, configuration.displacement, configuration.rotation, {{"shown", {shown}}, {"part", {part}}}};
+    });
     advance(progress, static_cast<double>(s + 1) / static_cast<double>(run.load_factors.size()));
   }
   return summary;
 }
 
 Summary run_linear(ShellSystem& system, const Model& model, const RunSettings& settings, const StaticRun& run,
-                   const StateCallback& on_state, const Progress& progress) {
+                   const StateCallback& on_state, const Progress& progress, const Resumption& resumption) {
   Summary summary;
   TangentSolver solver(system, settings);
-  summary.dof = solver.freedom_count();
   const Configuration reference = reference_configuration(system);
-  State state = make_state(system, model, reference, 0);
-  state.converged = true;
-  state.linear = true;
-  on_state(state);
-  summary.volume_before = state.volume;
-  summary.volume_after = state.volume;
+  State state;
+  if (resumption.from) {
+    summary = resumption.from->summary;
+  } else {
+    summary.dof = solver.freedom_count();
+    state = make_state(system, model, reference, 0);
+    state.converged = true;
+    state.linear = true;
+    on_state(state);
+    summary.volume_before = state.volume;
+    summary.volume_after = state.volume;
+  }
 
   BlockMatrix matrix = system.pattern;
   linear_stiffness(system, matrix);
   Forces forces;
-  for (std::size_t s = 0; s < run.load_factors.size(); ++s) {
+  const std::size_t first = summary.steps;
+  for (std::size_t s = first; s < run.load_factors.size(); ++s) {
     const auto start = Clock::now();
     const double factor = run.load_factors[s];
     evaluate(system, model, reference, load_factors(model, true, factor), {}, forces, nullptr);
@@ -288,7 +307,7 @@ Summary run_linear(ShellSystem& system, const Model& model, const RunSettings& s
     VectorX right = forces.external - product;
     mask(solver.free(), right);
     VectorX solution;
-    const TangentSolver::Result solved = solver.solve(matrix, right, solution, s > 0);
+    const TangentSolver::Result solved = solver.solve(matrix, right, solution, s > first);
     if (!solved.solved || !solved.positive_definite) {
       throw RequirementError(
           "the linear stiffness is not positive definite: the model is not held, or its elements are "
@@ -327,6 +346,7 @@ Summary run_linear(ShellSystem& system, const Model& model, const RunSettings& s
     if ((s + 1) % settings.every == 0 || s + 1 == run.load_factors.size()) {
       on_state(state);
     }
+    resumption.offer([&] { return Checkpoint{summary, factor, {}, {}, {}}; });  // no step needs the one before
     advance(progress, static_cast<double>(s + 1) / static_cast<double>(run.load_factors.size()));
   }
   return summary;
