@@ -1,40 +1,11 @@
 #pragma once
 
-#include "mechanics/block_matrix.hpp"
+#include "mechanics/direct_solver.hpp"
 
-#include <memory>
 #include <optional>
 
 /// Solving for the free freedoms. Held ones are marked in `free` (6 per node) and stay zero in every solution.
 namespace tunica {
-
-using FreeMask = std::vector<bool>;
-
-/// Sparse direct factorisation by CHOLMOD of the symmetric part: supernodal Cholesky where it is positive definite,
-/// else the simplicial LDL'. Symbolic analysis once.
-class DirectSolver {
-public:
-  DirectSolver(const BlockMatrix& pattern, const FreeMask& free);
-  ~DirectSolver();
-  DirectSolver(DirectSolver&&) noexcept;
-  DirectSolver& operator=(DirectSolver&&) = delete;
-  DirectSolver(const DirectSolver&) = delete;
-  DirectSolver& operator=(const DirectSolver&) = delete;
-
-  struct Factored {
-    std::size_t negative_pivots = 0;
-    bool regular = true;  ///< false: a pivot vanished, there is no factor to solve with
-  };
-  /// Errors: RequirementError when the factor does not fit into the memory.
-  Factored factor(const BlockMatrix& matrix);
-
-  /// x = A^-1 b on the free freedoms.
-  void solve(const VectorX& b, VectorX& x);
-
-private:
-  struct Implementation;
-  std::unique_ptr<Implementation> implementation_;
-};
 
 struct CgOptions {
   double tolerance = 1e-10;         ///< relative residual

@@ -121,7 +121,7 @@ struct Model {
 
 enum class Solver {
   cg,      ///< preconditioned conjugate gradients
-  direct,  ///< sparse Cholesky (CHOLMOD), symbolic factorisation once
+  direct,  ///< sparse factorisation (ordering by CHOLMOD), symbolic analysis once
   automatic,
 };
 
