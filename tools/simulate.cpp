@@ -1,6 +1,7 @@
 #include "cli/tool.hpp"
 #include "core/version.hpp"
 #include "io/output_file.hpp"
+#include "io/result_export.hpp"
 #include "io/result_file.hpp"
 #include "io/run_journal.hpp"
 #include "io/scene.hpp"
@@ -25,7 +26,8 @@ struct Arguments {
   std::optional<double> young, thickness, density, pressure, duration, step, ramp;
   std::optional<std::string> poisson, mesh_unit, membrane, bending, solver, cg_tolerance, converge;
   std::optional<std::string> load_steps, cg_iterations, every;
-  std::vector<std::string> fixes;
+  std::optional<std::string> tessellation;
+  std::vector<std::string> fixes, exports;
   bool is_static = false;
   bool check = false;
 };
@@ -83,7 +85,15 @@ void declare(cli::Tool& tool, Arguments& a) {
   app.add_option(resume_flag, a.resume,
                  "go on with a run that was interrupted, also by kill -9: alone, or beside the same command as before")
       ->type_name("OUT.hdf.part");
-  tool.not_yet("--export");
+  app.add_option("--tessellation", a.tessellation,
+                 "pieces per edge into which a curved shell is cut for drawing (default 4, less for many shells)")
+      ->type_name("N");
+  app.add_option("--export", a.exports,
+                 "write beside OUT.hdf, may repeat: pvd (OUT.pvd with a .vtu per state) | xmf (OUT.xmf, XDMF)")
+      ->type_name("pvd|xmf")
+      ->expected(1)
+      ->allow_extra_args(false)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
 }
 
 template <typename Value>
@@ -429,8 +439,54 @@ Scene read_scene_of_run(cli::Tool& tool, const Arguments& a, const std::optional
   return scene;
 }
 
-RunIdentity identity_of_run(const cli::Tool& tool, const Scene& scene, const std::vector<fs::path>& inputs) {
-  RunIdentity identity{version, scene_text(scene), tool.command(), {}, {}, {}};
+struct Drawing {
+  std::string tessellation = "default";
+  bool pvd = false;
+  bool xmf = false;
+
+  [[nodiscard]] std::vector<std::pair<std::string, std::string>> as_options() const {
+    return {{"--tessellation", tessellation},
+            {"--export", pvd && xmf ? "pvd, xmf"
+                         : pvd      ? "pvd"
+                         : xmf      ? "xmf"
+                                    : "nothing"}};
+  }
+  [[nodiscard]] int level() const { return tessellation == "default" ? 0 : std::stoi(tessellation); }
+};
+
+Drawing drawing_of_flags(const Arguments& a) {
+  Drawing drawing;
+  constexpr double finest = 64;
+  if (const auto pieces = count(a.tessellation, "--tessellation", finest)) {
+    drawing.tessellation = std::to_string(*pieces);
+  }
+  for (const std::string& format : a.exports) {
+    if (format != "pvd" && format != "xmf") {
+      throw UsageError(fmt::format("--export: '{}' is not one of pvd, xmf", format));
+    }
+    (format == "pvd" ? drawing.pvd : drawing.xmf) = true;
+  }
+  return drawing;
+}
+
+// A run that goes on draws as it began where nothing else is said.
+Drawing drawing_of_run(const Arguments& a, const RunIdentity& before) {
+  Drawing drawing = drawing_of_flags(a);
+  for (const auto& [flag, value] : before.options) {
+    if (flag == "--tessellation" && !a.tessellation) {
+      drawing.tessellation = value;
+    }
+    if (flag == "--export" && a.exports.empty()) {
+      drawing.pvd = value.find("pvd") != std::string::npos;
+      drawing.xmf = value.find("xmf") != std::string::npos;
+    }
+  }
+  return drawing;
+}
+
+RunIdentity identity_of_run(const cli::Tool& tool, const Scene& scene, const std::vector<fs::path>& inputs,
+                            const Drawing& drawing) {
+  RunIdentity identity{version, scene_text(scene), tool.command(), {}, {}, drawing.as_options()};
   for (const fs::path& path : inputs) {
     identity.inputs.emplace_back(path.string(), sha256_of_file(path));
   }
@@ -447,10 +503,21 @@ void simulate(cli::Tool& tool, const Arguments& a) {
   if (!a.resume.empty()) {
     journal.emplace(RunJournal::open(a.resume));
   }
+  const Drawing drawing = journal ? drawing_of_run(a, journal->identity()) : drawing_of_flags(a);
   std::vector<fs::path> inputs;
   const Scene scene = read_scene_of_run(tool, a, journal, inputs);
+  const auto* dynamic = std::get_if<DynamicRun>(&scene.run.kind);
+  // A run that goes on replaces what it has exported itself.
+  const bool replace_exports = tool.force() || journal.has_value();
+  const ExportOptions exports{drawing.pvd, drawing.xmf, dynamic != nullptr, drawing.level(), replace_exports};
   if (!a.check) {
     tool.output(out);
+    for (const fs::path& path : export_paths(out, exports)) {
+      if (journal) {
+        fs::remove(path);  // of the same run, stopped between its renames
+      }
+      tool.output(path);
+    }
   }
   const LoadedScene loaded = load_scene(scene);
   const Model& model = loaded.model;
@@ -466,23 +533,31 @@ void simulate(cli::Tool& tool, const Arguments& a) {
     fmt::print("{}", scene_text(scene));
     return;
   }
-  const RunIdentity identity = identity_of_run(tool, scene, inputs);
+  const RunIdentity identity = identity_of_run(tool, scene, inputs, drawing);
   if (!journal) {
     journal.emplace(RunJournal::create(partial(out), identity));
   } else if (const std::string differs = difference(journal->identity(), identity); !differs.empty()) {
     throw InputError(fmt::format("{}: is another run: {}", a.resume.string(), differs));
   }
-  const auto* dynamic = std::get_if<DynamicRun>(&scene.run.kind);
   const RunIdentity& origin = journal->identity();
 
   stage.emplace(tool, "write");
-  ResultFile file(out, model, {dynamic != nullptr, origin.command, origin.scene, origin.inputs, tool.force()});
+  ResultFile file(out, model,
+                  {dynamic != nullptr, origin.command, origin.scene, origin.inputs, drawing.level(), tool.force()});
+  std::optional<ResultExport> exported;
+  if (drawing.pvd || drawing.xmf) {
+    exported.emplace(out, model, exports);
+  }
   const ElementFieldEvaluator fields(model);
   constexpr double most_bending = std::numbers::pi / 6;
   std::size_t unresolved = 0;
   const auto record = [&](const State& state) {
     report_state(tool.result(), model, state, dynamic != nullptr);
-    file.append(state, fields(state));
+    const ElementFields of_state = fields(state);
+    file.append(state, of_state);
+    if (exported) {
+      exported->append(state, of_state);
+    }
     unresolved = count_unresolved(model, state, most_bending);
   };
   Resumption resumption;
@@ -519,7 +594,10 @@ void simulate(cli::Tool& tool, const Arguments& a) {
   const bool converged = summary.converged && !scene.run.cg_fixed_count;
   report_summary(tool.result(), summary, converged,
                  dynamic != nullptr ? std::optional(dynamic->duration) : std::nullopt);
-  file.commit(converged);
+  if (exported) {
+    exported->commit();
+  }
+  file.commit(converged);  // last: what is not renamed can still be resumed
   journal->remove();
   tool.note(fmt::format("{} nodes in {} steps, {}: largest displacement {:.4g} mm", model.node_count(), summary.steps,
                         converged ? "converged" : "not asked to converge", summary.max_displacement));

@@ -4,8 +4,7 @@
 #include "core/version.hpp"
 #include "io/hdf5_file.hpp"
 #include "io/output_file.hpp"
-#include "mechanics/curved_displacement.hpp"
-#include "shell/curved_surface.hpp"
+#include "io/result_grid.hpp"
 
 #include <hdf5.h>
 
@@ -22,18 +21,10 @@ using hdf5::Size;
 using hdf5::Writer;
 
 constexpr unsigned char vtk_triangle = 5;
-constexpr std::size_t most_fine_triangles = 200'000;
-constexpr int finest_level = 4;
 constexpr Size history_chunk = 256;
 constexpr Size nodes_chunk_rows = 1;
 
 using Floats = std::vector<float>;
-
-void add(Floats& values, const Vec3& v) {
-  for (int axis = 0; axis < 3; ++axis) {
-    values.push_back(static_cast<float>(v[axis]));
-  }
-}
 
 std::vector<double> flattened(const std::vector<Vec3>& vectors) {
   std::vector<double> values;
@@ -42,35 +33,6 @@ std::vector<double> flattened(const std::vector<Vec3>& vectors) {
     values.insert(values.end(), v.data(), v.data() + 3);
   }
   return values;
-}
-
-// The curved surfaces of all bodies, as one grid.
-struct Grid {
-  std::vector<Tessellation> bodies;
-  std::size_t points = 0;
-  std::size_t cells = 0;
-
-  explicit Grid(const Model& model) {
-    std::size_t shells = 0;
-    for (const ShellBody& body : model.shells) {
-      shells += body.mesh.triangles.size();
-    }
-    const int level = drawing_level(shells);
-    for (const ShellBody& body : model.shells) {
-      bodies.push_back(tessellate_uniformly(body.mesh, level));
-      points += bodies.back().mesh.vertices.size();
-      cells += bodies.back().mesh.triangles.size();
-    }
-  }
-};
-
-double thickness_at(const ShellBody& body, Index triangle, const Vec2& b) {
-  if (body.thickness.size() == 1) {
-    return body.thickness.front();
-  }
-  const auto& corners = body.mesh.triangles[triangle];
-  return (1 - b.x() - b.y()) * body.thickness[corners[0]] + b.x() * body.thickness[corners[1]] +
-         b.y() * body.thickness[corners[2]];
 }
 
 // A field of the grid: in a series it grows and its offset is noted per state, else the one state is written again.
@@ -138,20 +100,12 @@ struct ProbeSeries {
 
 }  // namespace
 
-int drawing_level(std::size_t shells) {
-  int level = finest_level;
-  while (level > 1 && shells * static_cast<std::size_t>(level * level) > most_fine_triangles) {
-    --level;
-  }
-  return level;
-}
-
 struct ResultFile::Implementation {
   Implementation(const std::filesystem::path& path, const Model& the_model, const ResultOptions& options)
       : model(the_model),
         series(options.series),
         output(path, options.overwrite),
-        grid(the_model),
+        grid(the_model, options.tessellation),
         writer(output.partial_path()) {
     write_about(options);
     write_grid();
@@ -184,34 +138,20 @@ struct ResultFile::Implementation {
     writer.attribute(vtk.get(), "Version", H5T_NATIVE_INT64, {2}, vtk_version.data());
     writer.ascii_attribute(vtk.get(), "Type", "UnstructuredGrid");
 
-    std::vector<double> points;
-    std::vector<std::int64_t> connectivity;
-    points.reserve(3 * grid.points);
-    connectivity.reserve(3 * grid.cells);
-    for (const Tessellation& surface : grid.bodies) {
-      const std::size_t first = points.size() / 3;
-      for (const Vec3& p : surface.mesh.vertices) {
-        points.insert(points.end(), p.data(), p.data() + 3);
-      }
-      for (const auto& triangle : surface.mesh.triangles) {
-        for (const Index v : triangle) {
-          connectivity.push_back(static_cast<std::int64_t>(first + v));
-        }
-      }
-    }
-    std::vector<std::int64_t> offsets(grid.cells + 1);
+    const std::vector<std::int64_t> connectivity(grid.connectivity().begin(), grid.connectivity().end());
+    std::vector<std::int64_t> offsets(grid.cells() + 1);
     for (std::size_t i = 0; i < offsets.size(); ++i) {
       offsets[i] = static_cast<std::int64_t>(3 * i);
     }
-    const std::vector<unsigned char> types(grid.cells, vtk_triangle);
+    const std::vector<unsigned char> types(grid.cells(), vtk_triangle);
     const auto count = [&](const char* name, std::size_t value) {
       const auto number = static_cast<std::int64_t>(value);
       (void)writer.dataset(vtk.get(), name, H5T_NATIVE_INT64, {1}, &number);
     };
-    count("NumberOfPoints", grid.points);
-    count("NumberOfCells", grid.cells);
+    count("NumberOfPoints", grid.points());
+    count("NumberOfCells", grid.cells());
     count("NumberOfConnectivityIds", connectivity.size());
-    (void)writer.dataset(vtk.get(), "Points", H5T_NATIVE_DOUBLE, {grid.points, 3}, points.data());
+    (void)writer.dataset(vtk.get(), "Points", H5T_NATIVE_DOUBLE, {grid.points(), 3}, grid.coordinates().data());
     (void)writer.dataset(vtk.get(), "Connectivity", H5T_NATIVE_INT64, {connectivity.size()}, connectivity.data());
     (void)writer.dataset(vtk.get(), "Offsets", H5T_NATIVE_INT64, {offsets.size()}, offsets.data());
     (void)writer.dataset(vtk.get(), "Types", H5T_NATIVE_UINT8, {types.size()}, types.data());
@@ -235,34 +175,30 @@ struct ResultFile::Implementation {
       writer.attribute(steps.get(), "NSteps", H5T_NATIVE_INT64, {}, &none);
       step_count = writer.own(H5Aopen(steps.get(), "NSteps", H5P_DEFAULT), "written");
     }
-    Floats normals;
-    Floats thicknesses;
-    std::vector<std::int32_t> body_of_cell;
-    for (std::size_t body = 0; body < grid.bodies.size(); ++body) {
-      const Tessellation& surface = grid.bodies[body];
-      const ShellBody& shell = model.shells[body];
-      for (std::size_t v = 0; v < surface.mesh.vertices.size(); ++v) {
-        const Index triangle = surface.vertex_shell[v];
-        add(normals, curved_patch(shell.mesh, triangle).normal(surface.barycentric[v]));
-        thicknesses.push_back(static_cast<float>(thickness_at(shell, triangle, surface.barycentric[v])));
+    const auto fixed_layout = ResultGrid::fixed_layout();
+    for (std::size_t i = 0; i < fixed_layout.size(); ++i) {
+      std::vector<Size> shape{grid.points()};
+      if (fixed_layout[i].components > 1) {
+        shape.push_back(fixed_layout[i].components);
       }
-      body_of_cell.insert(body_of_cell.end(), surface.mesh.triangles.size(), static_cast<std::int32_t>(body));
+      fixed.emplace_back(writer, point_data.get(), point_offsets.get(), fixed_layout[i].name, H5T_NATIVE_FLOAT, shape,
+                         grid.fixed()[i].data(), series);
     }
-    fixed.emplace_back(writer, point_data.get(), point_offsets.get(), "normal", H5T_NATIVE_FLOAT,
-                       std::vector<Size>{grid.points, 3}, normals.data(), series);
-    fixed.emplace_back(writer, point_data.get(), point_offsets.get(), "thickness", H5T_NATIVE_FLOAT,
-                       std::vector<Size>{grid.points}, thicknesses.data(), series);
     fixed.emplace_back(writer, cell_data.get(), cell_offsets.get(), "body", H5T_NATIVE_INT32,
-                       std::vector<Size>{grid.cells}, body_of_cell.data(), series);
-    displacement = Field(writer, point_data.get(), point_offsets.get(), "displacement", grid.points, 3, series);
-    const auto cell_field = [&](const char* name, Size components) {
-      return Field(writer, cell_data.get(), cell_offsets.get(), name, grid.cells, components, series);
-    };
-    pressure = cell_field("pressure", 1);
-    von_mises_top = cell_field("von_mises_top", 1);
-    von_mises_bottom = cell_field("von_mises_bottom", 1);
-    membrane_force = cell_field("membrane_force", 3);
-    bending_moment = cell_field("bending_moment", 3);
+                       std::vector<Size>{grid.cells()}, grid.body_of_cell().data(), series);
+    const Handle element_group = writer.group(tunica_group.get(), "elements");
+    for (const GridField& field : ResultGrid::layout()) {
+      fields.emplace_back(writer, (field.of_cells ? cell_data : point_data).get(),
+                          (field.of_cells ? cell_offsets : point_offsets).get(), field.name,
+                          field.of_cells ? grid.cells() : grid.points(), field.components, series);
+      if (field.of_cells) {
+        std::vector<Size> row{grid.elements()};
+        if (field.components > 1) {
+          row.push_back(field.components);
+        }
+        elements.emplace_back(writer, element_group.get(), field.name, H5T_NATIVE_FLOAT, row, 1, true);
+      }
+    }
   }
 
   void make_history() {
@@ -289,9 +225,9 @@ struct ResultFile::Implementation {
     }
   }
 
-  void append(const State& state, const ElementFields& fields) {
+  void append(const State& state, const ElementFields& of_elements) {
     TUNICA_ASSERT(state.displacement.size() == model.node_count() && state.rotation.size() == model.node_count());
-    put_grid(state, fields);
+    put_fields(state, of_elements);
     node_displacement.append(writer, 1, flattened(state.displacement).data());
     node_rotation.append(writer, 1, flattened(state.rotation).data());
     const std::array<double, 6> history{
@@ -319,45 +255,15 @@ struct ResultFile::Implementation {
     output.keep_partial();
   }
 
-  void put_grid(const State& state, const ElementFields& fields) {
-    Floats moved;
-    moved.reserve(3 * grid.points);
-    std::vector<std::size_t> element_of_cell;
-    element_of_cell.reserve(grid.cells);
-    std::size_t first_element = 0;
-    for (std::size_t body = 0; body < grid.bodies.size(); ++body) {
-      for (const Vec3& u : curved_displacement(model, body, state, grid.bodies[body])) {
-        add(moved, u);
-      }
-      for (const Index shell : grid.bodies[body].shell) {
-        element_of_cell.push_back(first_element + shell);
-      }
-      first_element += model.shells[body].mesh.triangles.size();
+  void put_fields(const State& state, const ElementFields& of_elements) {
+    const std::vector<Floats> on_grid = grid.values(state, of_elements);
+    for (std::size_t i = 0; i < fields.size(); ++i) {
+      fields[i].put(writer, on_grid[i]);
     }
-    displacement.put(writer, moved);
-    const auto put_scalar = [&](Field& field, const std::vector<double>& of_elements) {
-      TUNICA_ASSERT(of_elements.size() == first_element);
-      Floats of_cells;
-      of_cells.reserve(grid.cells);
-      for (const std::size_t element : element_of_cell) {
-        of_cells.push_back(static_cast<float>(of_elements[element]));
-      }
-      field.put(writer, of_cells);
-    };
-    const auto put_vector = [&](Field& field, const std::vector<Vec3>& of_elements) {
-      TUNICA_ASSERT(of_elements.size() == first_element);
-      Floats of_cells;
-      of_cells.reserve(3 * grid.cells);
-      for (const std::size_t element : element_of_cell) {
-        add(of_cells, of_elements[element]);
-      }
-      field.put(writer, of_cells);
-    };
-    put_scalar(pressure, fields.pressure);
-    put_scalar(von_mises_top, fields.von_mises_top);
-    put_scalar(von_mises_bottom, fields.von_mises_bottom);
-    put_vector(membrane_force, fields.membrane_force);
-    put_vector(bending_moment, fields.bending_moment);
+    const std::vector<Floats> by_element = element_values(of_elements);
+    for (std::size_t i = 0; i < elements.size(); ++i) {
+      elements[i].append(writer, 1, by_element[i].data());
+    }
     for (FixedField& field : fixed) {
       field.put(writer);
     }
@@ -376,7 +282,7 @@ struct ResultFile::Implementation {
   const Model& model;
   const bool series;
   OutputFile output;
-  Grid grid;
+  ResultGrid grid;
   Writer writer;
   Handle tunica_group;
   Handle vtk;
@@ -384,12 +290,8 @@ struct ResultFile::Implementation {
   Handle step_count;
   Handle converged;
   std::vector<FixedField> fixed;
-  Field displacement;
-  Field pressure;
-  Field von_mises_top;
-  Field von_mises_bottom;
-  Field membrane_force;
-  Field bending_moment;
+  std::vector<Field> fields;
+  std::vector<Series> elements;
   std::vector<Series> zeros;
   Series parts;
   Series values;

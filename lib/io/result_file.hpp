@@ -18,6 +18,7 @@ struct ResultOptions {
   std::string command;
   std::string scene;                                        ///< resolved, SI
   std::vector<std::pair<std::string, std::string>> inputs;  ///< path, sha256
+  int tessellation = 0;  ///< pieces per edge into which a shell is cut for drawing; 0: drawing_level()
   bool overwrite = false;
 };
 
@@ -45,9 +46,5 @@ private:
   struct Implementation;
   std::unique_ptr<Implementation> implementation_;
 };
-
-/// Pieces per edge into which a result's curved triangles are cut for drawing: 4, and fewer for large models so that a
-/// state stays below about 200,000 fine triangles.
-int drawing_level(std::size_t shells);
 
 }  // namespace tunica

@@ -105,6 +105,11 @@ ElementFields ElementFieldEvaluator::operator()(const State& state) const {
   const auto von_mises = [](const Vec3& s) {
     return std::sqrt(std::max(0.0, s[0] * s[0] - s[0] * s[1] + s[1] * s[1] + 3 * s[2] * s[2]));
   };
+  const auto principal = [](const Vec3& strain) {  // xx, yy, and twice the tensor's xy
+    const double mean = (strain[0] + strain[1]) / 2;
+    const double radius = std::hypot((strain[0] - strain[1]) / 2, strain[2] / 2);
+    return Vec2(mean + radius, mean - radius);
+  };
   for (const ShellElement& element : system.elements) {
     Vector18 d = Vector18::Zero();
     if (state.linear) {
@@ -129,12 +134,16 @@ ElementFields ElementFieldEvaluator::operator()(const State& state) const {
     }
     const double t = element.thickness;
     const Mat3 elasticity = plane_stress(model.shells[element.body].material);
-    const Vec3 force = t * elasticity * (element.membrane_strain * in_plane);
-    const Vec3 moment = t * t * t / 12 * elasticity * (element.curvature * out_of_plane);
+    const Vec3 strain = element.membrane_strain * in_plane;
+    const Vec3 curvature = element.curvature * out_of_plane;
+    const Vec3 force = t * elasticity * strain;
+    const Vec3 moment = t * t * t / 12 * elasticity * curvature;
     fields.membrane_force.push_back(force);
     fields.bending_moment.push_back(moment);
     fields.von_mises_top.push_back(von_mises(force / t + 6 / (t * t) * moment));
     fields.von_mises_bottom.push_back(von_mises(force / t - 6 / (t * t) * moment));
+    fields.principal_strain_top.push_back(principal(strain + t / 2 * curvature));
+    fields.principal_strain_bottom.push_back(principal(strain - t / 2 * curvature));
     fields.pressure.push_back(pressure[element.body]);
   }
   return fields;

@@ -38,7 +38,10 @@ struct ElementFields {
   std::vector<Vec3> bending_moment;      ///< N: xx, yy, xy
   std::vector<double> von_mises_top;     ///< MPa, at the face the normal points to
   std::vector<double> von_mises_bottom;  ///< MPa
-  std::vector<double> pressure;          ///< MPa, of this state
+  /// At the faces, largest first; engineering strains of the co-rotated frame.
+  std::vector<Vec2> principal_strain_top;
+  std::vector<Vec2> principal_strain_bottom;
+  std::vector<double> pressure;  ///< MPa, of this state
 };
 
 struct Summary {

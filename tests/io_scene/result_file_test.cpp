@@ -2,6 +2,7 @@
 
 #include "core/error.hpp"
 #include "io/result_file.hpp"
+#include "io/result_grid.hpp"
 #include "mechanics/curved_displacement.hpp"
 
 #include <gmock/gmock.h>
@@ -68,6 +69,8 @@ nearest = ["10mm", "10mm", "0mm"]
     result.bending_moment.assign(count, Vec3::Constant(2 * value));
     result.von_mises_top.assign(count, value);
     result.von_mises_bottom.assign(count, value);
+    result.principal_strain_top.assign(count, Vec2(value, -value));
+    result.principal_strain_bottom.assign(count, Vec2(value, -value));
     for (std::size_t i = 0; i < count; ++i) {
       result.pressure.push_back(static_cast<double>(i));
     }

@@ -132,7 +132,6 @@ class Flags(SimulateTest):
         refused(*io, *HELD, "--fix", "under z=3mm", says="--fix")
         refused(*io, *HELD, "--mesh-unit", "inch", says="unit of length")
         refused(*io, *HELD, "--resume", "out.hdf.part", "--check", says="contradict")
-        refused(*io, *HELD, "--export", "pvd", says="not available yet")
         refused(*io, *HELD, "--frobnicate", says="--frobnicate")
         refused("ball.ply", *HELD, says="OUT.hdf is missing")
         refused("ball.ply", "ball.ply", *HELD, "--force", says="is an input")

@@ -15,9 +15,10 @@ RADIUS = 10
 MATERIAL = ["--young", "1MPa", "--poisson", "0.3", "--thickness", "0.5mm", "--pressure", "1kPa"]
 STATIC = MATERIAL + ["--fix", "rigid-motions", "--static", "--load-steps", "3"]
 DYNAMIC = MATERIAL + ["--density", "1100kg/m3", "--duration", "40ms", "--step", "10ms"]
-POINT_FIELDS = {"displacement": 3, "normal": 3, "thickness": 1}
-CELL_FIELDS = {"body": 1, "pressure": 1, "von_mises_top": 1, "von_mises_bottom": 1, "membrane_force": 3,
-               "bending_moment": 3}
+POINT_FIELDS = {"displacement": 3, "rotation": 3, "normal": 3, "thickness": 1}
+ELEMENT_FIELDS = {"pressure": 1, "von_mises_top": 1, "von_mises_bottom": 1, "membrane_force": 3, "bending_moment": 3,
+                  "principal_strain_top": 2, "principal_strain_bottom": 2}
+CELL_FIELDS = {"body": 1, **ELEMENT_FIELDS}
 
 
 def read_by_vtk(path):
@@ -95,8 +96,16 @@ class Result(SimulateTest):
         stress = 1e-3 * RADIUS / (2 * 0.5)
         for name in ("von_mises_top", "von_mises_bottom"):
             self.assertAlmostEqual(vtk_to_numpy(cells.GetArray(name)).mean() / stress, 1, delta=0.05)
+            strains = vtk_to_numpy(cells.GetArray(name.replace("von_mises", "principal_strain")))
+            self.assertTrue((strains[:, 0] >= strains[:, 1]).all())
+            self.assertAlmostEqual(strains.mean() / (w / RADIUS), 1, delta=0.05)
+            # Of every single element, whatever its frame: Hooke's law for the principal strains gives its von Mises.
+            s1, s2 = np.array([strains[:, 0] + 0.3 * strains[:, 1], strains[:, 1] + 0.3 * strains[:, 0]]) / 0.91
+            np.testing.assert_allclose(np.sqrt(s1**2 - s1 * s2 + s2**2), vtk_to_numpy(cells.GetArray(name)), rtol=1e-4)
         force = vtk_to_numpy(cells.GetArray("membrane_force")).mean(axis=0)
         np.testing.assert_allclose(force / (0.5 * stress), [1, 1, 0], atol=0.05)
+        turned = vtk_to_numpy(grid.GetPointData().GetArray("rotation"))
+        np.testing.assert_allclose(turned[at_nodes], file["tunica/nodes/rotation"][-1], atol=1e-8)
 
     def test_history_of_a_static_path(self):
         self.write("scene.toml", f"""
@@ -140,6 +149,17 @@ nearest = ["0mm", "0mm", "{RADIUS}mm"]
             u = tunica["nodes/displacement"]
             self.assertEqual((u.shape, u.dtype), ((4, len(self.vertices), 3), np.float64))
             self.assertEqual(tunica["nodes/rotation"].shape, u.shape)
+            elements = tunica["elements"]  # every state of the path, though only the last is drawn
+            self.assertEqual(set(elements), set(ELEMENT_FIELDS))
+            count = len(self.triangles)
+            for name, components in ELEMENT_FIELDS.items():
+                self.assertEqual(elements[name].shape, (4, count) if components == 1 else (4, count, components))
+                self.assertLess(np.abs(elements[name][0]).max(), 1e-15)
+                drawn = file["VTKHDF/CellData"][name][()]
+                np.testing.assert_array_equal(np.repeat(elements[name][-1], len(drawn) // count, axis=0), drawn)
+            np.testing.assert_allclose(elements["pressure"][:, 0], [0, 0.25e-3, 0.5e-3, 1e-3], rtol=1e-6)
+            half, whole = elements["membrane_force"][2:].mean(axis=1)[:, 0]
+            self.assertAlmostEqual(half / whole, 0.5, delta=0.02)
             top = np.linalg.norm(self.vertices - [0, 0, RADIUS], axis=1).argmin()
             np.testing.assert_array_equal(tunica["probes/top/displacement"], u[:, top])
             np.testing.assert_array_equal(probe["displacement_mm"], u[:, top])

@@ -106,6 +106,16 @@ class Scenes(SimulateTest):
         radius = 2 * length / math.pi
         np.testing.assert_allclose(self.last(result, "tip"), [radius - length, 0, radius], atol=0.01 * length)
         self.assertAlmostEqual(result["probes"]["tip"]["rotation_rad"][-1][1], -math.pi / 2, delta=0.01)
+        # Bent up, towards its normal: the top is shortened and the bottom lengthened by t / 2 times the curvature.
+        curvature = math.pi / (2 * length)
+        with h5py.File(self.path("out.hdf")) as file:
+            elements = {name: values[-1] for name, values in file["tunica/elements"].items()}
+        top, bottom = elements["principal_strain_top"], elements["principal_strain_bottom"]
+        np.testing.assert_allclose(top.mean(axis=0), [0, -0.05 * curvature], atol=0.02 * 0.05 * curvature)
+        np.testing.assert_allclose(bottom.mean(axis=0), [0.05 * curvature, 0], atol=0.02 * 0.05 * curvature)
+        trace = elements["bending_moment"][:, :2].sum(axis=1)  # whatever each shell's own axes
+        np.testing.assert_allclose(trace.mean(), -moment, rtol=0.02)
+        np.testing.assert_allclose(elements["von_mises_top"].mean(), 0.05 * curvature * young, rtol=0.02)
 
     def test_prescribed_displacement(self):
         """A strip stretched by 0.1 %: stress E e, energy E e^2 / 2 per volume."""
