@@ -354,6 +354,7 @@ void prepare_result(Json& result, const Model& model) {
             {"strain_energy_mj", nullptr},
             {"residual", nullptr},
             {"algebraic_error_percent", nullptr},
+            {"algebraic_error_is_lower_bound", false},
             {"newton_iterations", 0},
             {"cg_iterations", 0},
             {"ms_per_step", {{"median", nullptr}, {"max", nullptr}}},
@@ -401,6 +402,8 @@ void report_summary(Json& result, const Summary& summary, bool converged, std::o
   result["volume_after_mm3"] = or_null(summary.volume_after);
   result["strain_energy_mj"] = summary.strain_energy;
   result["residual"] = summary.residual;
+  result["algebraic_error_percent"] = summary.algebraic_error ? Json(1e2 * *summary.algebraic_error) : Json();
+  result["algebraic_error_is_lower_bound"] = summary.algebraic_error_is_bound;
   result["newton_iterations"] = summary.newton_iterations;
   result["cg_iterations"] = summary.cg_iterations;
   const std::vector<double>& seconds = summary.seconds_per_step;

@@ -190,6 +190,8 @@ void checkpoint_members(Archive& archive, AnyCheckpoint& checkpoint) {
   archive(summary.residual);
   archive(summary.newton_iterations);
   archive(summary.cg_iterations);
+  archive(summary.algebraic_error);
+  archive(summary.algebraic_error_is_bound);
   archive(summary.volume_before);
   archive(summary.volume_after);
   archive(summary.strain_energy);

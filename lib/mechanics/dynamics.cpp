@@ -92,6 +92,7 @@ public:
     return 0.5 * velocity.dot(mass_.cwiseProduct(velocity));
   }
   [[nodiscard]] std::size_t freedom_count() const { return solver_.freedom_count(); }
+  void tell_direct_error(bool tell) { solver_.tell_direct_error(tell); }
 
 private:
   struct Step {
@@ -141,7 +142,10 @@ private:
 
   NewtonResult run(Step& s, double from, double to, Configuration& configuration) {
     const auto function = [&](const Configuration& c, BlockMatrix* tangent) { return balance(s, to, c, tangent); };
-    return newton(system_, settings_, solver_, function, (to - from) * s.held, matrix_, configuration);
+    const NewtonResult result =
+        newton(system_, settings_, solver_, function, (to - from) * s.held, matrix_, configuration, at_rest_);
+    at_rest_ = result.iterations == 0;
+    return result;
   }
 
   void follow(Step& s, StepResult& result, Configuration& configuration) {
@@ -250,6 +254,7 @@ private:
   VectorX mass_;
   Forces forces_;
   std::vector<Vector18> deformation_;  ///< at the start of the step
+  bool at_rest_ = false;               ///< the last step changed nothing
 };
 
 double first_load_factor(const Model& model, double time) {
@@ -299,6 +304,7 @@ Summary run_dynamic(ShellSystem& system, const Model& model, const RunSettings& 
     const auto start = Clock::now();
     const bool last = s + 1 == steps;
     const double end = last ? run.duration : static_cast<double>(s + 1) * run.step;
+    integrator.tell_direct_error(s == 0 || last);
     const auto [result, reached, ran_away] = integrator.step(time, end - time, motion);
     const bool one_linearisation = settings.newton_max == 1;
     const bool accepted = one_linearisation
@@ -332,6 +338,7 @@ Summary run_dynamic(ShellSystem& system, const Model& model, const RunSettings& 
     state.residual = result.residual;
     state.newton_iterations = result.iterations;
     state.cg_iterations = result.cg_iterations;
+    set_algebraic_error(result.algebraic_error, state);
     state.converged = one_linearisation ? result.linear_converged : result.converged;
     if (wanted) {
       hand_over(state);

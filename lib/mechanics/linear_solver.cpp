@@ -19,29 +19,56 @@ void mask(const FreeMask& free, VectorX& v) {
   }
 }
 
+namespace {
+
+/// Inverses of the diagonal blocks. Held rows and columns are left out; a unit keeps the blocks regular.
+struct BlockJacobi {
+  std::vector<Matrix6, Eigen::aligned_allocator<Matrix6>> inverse;
+  bool positive = true;  ///< every block is positive definite; the others are replaced by units
+
+  BlockJacobi(const BlockMatrix& matrix, const FreeMask& free) : inverse(matrix.node_count()) {
+    std::vector<char> good(matrix.node_count(), 1);
+    parallel_for_blocks(matrix.node_count(), 256, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        Matrix6 block = matrix.block(matrix.find(static_cast<Index>(i), static_cast<Index>(i)));
+        for (int c = 0; c < 6; ++c) {
+          if (!free[6 * i + static_cast<std::size_t>(c)]) {
+            block.row(c).setZero();
+            block.col(c).setZero();
+            block(c, c) = 1;
+          }
+        }
+        const Eigen::LLT<Matrix6> factor(block);
+        good[i] = factor.info() == Eigen::Success ? 1 : 0;
+        inverse[i] = good[i] != 0 ? Matrix6(factor.solve(Matrix6::Identity())) : Matrix6::Identity();
+      }
+    });
+    positive = std::find(good.begin(), good.end(), 0) == good.end();
+  }
+
+  void apply(const VectorX& r, VectorX& z) const {
+    z.resize(r.size());
+    parallel_for_blocks(inverse.size(), 1024, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        multiply_block(inverse[i].data(), r.data() + 6 * i, z.data() + 6 * i);
+      }
+    });
+  }
+};
+
+}  // namespace
+
 CgResult conjugate_gradients(const BlockMatrix& matrix, const FreeMask& free, const VectorX& b,
                              const CgOptions& options, VectorX& x) {
-  const std::size_t nodes = matrix.node_count();
-  // Held rows and columns are left out of the diagonal blocks; a unit keeps them regular.
-  std::vector<Matrix6, Eigen::aligned_allocator<Matrix6>> inverse(nodes);
-  std::vector<char> positive(nodes, 1);
-  parallel_for_blocks(nodes, 256, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      Matrix6 block = matrix.block(matrix.find(static_cast<Index>(i), static_cast<Index>(i)));
-      for (int c = 0; c < 6; ++c) {
-        if (!free[6 * i + static_cast<std::size_t>(c)]) {
-          block.row(c).setZero();
-          block.col(c).setZero();
-          block(c, c) = 1;
-        }
-      }
-      const Eigen::LLT<Matrix6> factor(block);
-      positive[i] = factor.info() == Eigen::Success ? 1 : 0;
-      inverse[i] = positive[i] != 0 ? Matrix6(factor.solve(Matrix6::Identity())) : Matrix6::Identity();
+  const BlockJacobi preconditioner(matrix, free);
+  std::vector<Eigen::Index> held;
+  for (std::size_t i = 0; i < free.size(); ++i) {
+    if (!free[i]) {
+      held.push_back(static_cast<Eigen::Index>(i));
     }
-  });
+  }
   CgResult result;
-  result.negative_curvature = std::find(positive.begin(), positive.end(), 0) != positive.end();
+  result.negative_curvature = !preconditioner.positive;
 
   VectorX r = b;
   mask(free, r);
@@ -49,54 +76,80 @@ CgResult conjugate_gradients(const BlockMatrix& matrix, const FreeMask& free, co
   const double norm = std::sqrt(dot(r, r));
   if (norm == 0) {
     result.converged = true;
+    result.error.emplace();
     return result;
   }
-  const auto precondition = [&](const VectorX& v, VectorX& z) {
-    z.resize(v.size());
-    for (std::size_t i = 0; i < nodes; ++i) {
-      z.segment<6>(6 * static_cast<Eigen::Index>(i)).noalias() =
-          inverse[i] * v.segment<6>(6 * static_cast<Eigen::Index>(i));
-    }
-  };
   VectorX z, p, q;
-  precondition(r, z);
+  preconditioner.apply(r, z);
   p = z;
   double rho = dot(r, z);
   const std::size_t most = options.most.value_or(20 * free.size());
+  const double wanted = options.fixed_count ? 1e-15 : options.tolerance;
   result.residual = 1;
-  while (result.iterations < most) {
-    if (result.iterations % 64 == 0) {
+  std::vector<double> terms;
+  bool done = false;       // x is final, what follows is for its error
+  std::size_t enough = 0;  // terms after which that ends
+  while (true) {
+    if (!done && (result.residual <= wanted || result.iterations >= most)) {
+      done = true;
+      enough =
+          result.iterations + (result.residual <= wanted ? 4 * result.iterations + 100 : result.iterations / 10 + 1);
+    }
+    if (done &&
+        (terms.size() >= enough || (result.residual <= wanted && estimate_is_settled(terms, result.iterations)))) {
+      break;
+    }
+    if (terms.size() % 64 == 0) {
       check_interrupt();
     }
     multiply(matrix, p, q);
-    mask(free, q);
+    for (const Eigen::Index i : held) {
+      q[i] = 0;
+    }
     const double curvature = dot(p, q);
     if (!(curvature > 0)) {
-      result.negative_curvature = result.negative_curvature || curvature < 0;
-      if (result.iterations == 0) {
-        x = p;  // a direction of descent is better than none
+      if (!done) {
+        result.negative_curvature = result.negative_curvature || curvature < 0;
+        if (result.iterations == 0) {
+          x = p;  // a direction of descent is better than none
+        }
       }
       break;
     }
     const double step = rho / curvature;
-    x += step * p;
+    terms.push_back(step * rho);
     r -= step * q;
-    ++result.iterations;
-    result.residual = std::sqrt(dot(r, r)) / norm;
-    if (result.residual <= (options.fixed_count ? 1e-15 : options.tolerance)) {
-      break;
+    if (!done) {
+      x += step * p;
+      ++result.iterations;
+      result.residual = std::sqrt(dot(r, r)) / norm;
     }
-    precondition(r, z);
+    preconditioner.apply(r, z);
     const double next = dot(r, z);
     p = z + next / rho * p;
     rho = next;
   }
   result.converged = !options.fixed_count && result.residual <= options.tolerance;
+  if (!result.negative_curvature && !terms.empty() && std::isfinite(terms.back())) {
+    result.error = error_of_iterate(terms, std::min(result.iterations, terms.size()));
+    result.error->is_lower_bound = result.residual > wanted || !done || !estimate_is_settled(terms, result.iterations);
+  }
   return result;
 }
 
-double gmres(const BlockMatrix& matrix, const FreeMask& free, DirectSolver& solver, const VectorX& b, double tolerance,
-             std::size_t most, VectorX& x) {
+AlgebraicError error_by_factor(const BlockMatrix& matrix, const FreeMask& free, const DirectSolver& solver,
+                               const VectorX& b, const VectorX& x) {
+  VectorX product;
+  multiply(matrix, x, product);
+  VectorX r = b - product;
+  mask(free, r);
+  VectorX e;
+  solver.solve(r, e);
+  return {std::sqrt(std::abs(dot(r, e))), std::sqrt(std::abs(dot(b, x))), false};
+}
+
+double gmres(const BlockMatrix& matrix, const FreeMask& free, const DirectSolver& solver, const VectorX& b,
+             double tolerance, std::size_t most, VectorX& x) {
   const double norm = std::sqrt(dot(b, b));
   VectorX product;
   const auto residual = [&] {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "mechanics/algebraic_error.hpp"
 #include "mechanics/direct_solver.hpp"
 
 #include <optional>
@@ -18,10 +19,17 @@ struct CgResult {
   double residual = 0;  ///< relative
   bool converged = false;
   bool negative_curvature = false;  ///< the matrix is not positive definite; x is the last good iterate
+  /// Of x. An estimate where the tolerance was reached, a lower bound where the iterations ended before; none where the
+  /// matrix is not positive definite.
+  std::optional<AlgebraicError> error;
 };
 
 /// Conjugate gradients on the free freedoms, preconditioned by the 6x6 diagonal blocks. The matrix must be symmetric.
 /// A run of a fixed count ends early only when the residual is exactly zero or the round-off floor is reached.
+/// After the last iteration the recursion goes on for the sake of the error alone: x and the counts do not change.
+/// Cost of that: a tenth of the iterations where they ended before the tolerance; else as many as it takes to have most
+/// of the error: a few where convergence is fast, up to four times as many again where it stagnates; where that is not
+/// enough, the error is told as a lower bound.
 CgResult conjugate_gradients(const BlockMatrix& matrix, const FreeMask& free, const VectorX& b,
                              const CgOptions& options, VectorX& x);
 
@@ -29,8 +37,12 @@ CgResult conjugate_gradients(const BlockMatrix& matrix, const FreeMask& free, co
 /// part; starts from x. @return the relative residual reached.
 /// Why: applied moments and pressure at free edges make the tangent unsymmetric at a few nodes; this costs a few
 /// solves with the factor at hand, and keeps Newton's method quadratic.
-double gmres(const BlockMatrix& matrix, const FreeMask& free, DirectSolver& solver, const VectorX& b, double tolerance,
-             std::size_t most, VectorX& x);
+double gmres(const BlockMatrix& matrix, const FreeMask& free, const DirectSolver& solver, const VectorX& b,
+             double tolerance, std::size_t most, VectorX& x);
+
+/// Error of x as a solution of the symmetric part of the matrix, by one more solve with `solver`'s factor of it.
+AlgebraicError error_by_factor(const BlockMatrix& matrix, const FreeMask& free, const DirectSolver& solver,
+                               const VectorX& b, const VectorX& x);
 
 /// Sets the held entries to zero.
 void mask(const FreeMask& free, VectorX& v);

@@ -43,7 +43,7 @@ TangentSolver::Result TangentSolver::solve(BlockMatrix& matrix, const VectorX& b
   Result result;
   if (freedom_count() == 0) {
     x.setZero(b.size());
-    return {true, true, true, 0, 0};
+    return {true, true, true, 0, 0, AlgebraicError{}};
   }
   if (!direct_) {
     symmetrise(matrix);
@@ -54,6 +54,7 @@ TangentSolver::Result TangentSolver::solve(BlockMatrix& matrix, const VectorX& b
     result.positive_definite = !cg.negative_curvature;
     result.residual = cg.residual;
     result.cg_iterations = cg.iterations;
+    result.error = cg.error;
     return result;
   }
   if (!same_matrix) {
@@ -70,6 +71,9 @@ TangentSolver::Result TangentSolver::solve(BlockMatrix& matrix, const VectorX& b
   result.residual = gmres(matrix, free_, *direct_, b, gmres_tolerance, gmres_iterations, x);
   result.solved = x.allFinite();
   result.converged = result.solved;
+  if (tell_direct_error_ && result.solved && result.positive_definite) {
+    result.error = error_by_factor(matrix, free_, *direct_, b, x);
+  }
   return result;
 }
 
@@ -84,10 +88,12 @@ double increment_size(const ShellSystem& system, const VectorX& increment) {
 
 NewtonResult newton(const ShellSystem& system, const RunSettings& settings, TangentSolver& solver,
                     const BalanceFunction& balance, const VectorX& held_increment, BlockMatrix& matrix,
-                    Configuration& configuration) {
+                    Configuration& configuration, bool likely_at_rest) {
   NewtonResult result;
   bool moving = held_increment.squaredNorm() > 0;
-  Balance now = balance(configuration, nullptr);
+  Balance now = balance(configuration, likely_at_rest ? nullptr : &matrix);
+  bool tangent_is_current = !likely_at_rest;
+  double largest_solution = 0;
   VectorX increment;
   VectorX whole = VectorX::Zero(held_increment.size());
   const auto residual_of = [&](const Balance& b) {
@@ -112,7 +118,10 @@ NewtonResult newton(const ShellSystem& system, const RunSettings& settings, Tang
   }
   for (result.iterations = 0; result.iterations < settings.newton_max;) {
     check_interrupt();
-    now = balance(configuration, &matrix);
+    if (!tangent_is_current) {
+      now = balance(configuration, &matrix);
+    }
+    tangent_is_current = false;
     VectorX right = now.unbalanced;
     if (moving) {
       VectorX product;
@@ -124,6 +133,11 @@ NewtonResult newton(const ShellSystem& system, const RunSettings& settings, Tang
     result.cg_iterations += solved.cg_iterations;
     result.stable = solved.positive_definite;
     result.linear_converged = solved.converged;
+    result.algebraic_error = solved.error;
+    if (solved.error) {
+      largest_solution = std::max(largest_solution, solved.error->solution);
+      result.algebraic_error->solution = largest_solution;
+    }
     ++result.iterations;
     if (!solved.solved) {
       result.valid = false;

@@ -18,11 +18,15 @@ public:
     bool positive_definite = false;
     double residual = 0;  ///< relative
     std::size_t cg_iterations = 0;
+    std::optional<AlgebraicError> error;  ///< cg: always; direct: where asked for
   };
   /// Solves matrix x = b on the free freedoms. The direct solver also follows the unsymmetric part of the matrix.
   /// The cg solver symmetrises `matrix` in place.
   /// @param same_matrix  the values are those of the last call: the factor at hand is used again
   Result solve(BlockMatrix& matrix, const VectorX& b, VectorX& x, bool same_matrix = false);
+
+  /// Whether the direct solver tells the error of its solutions, for one more solve each.
+  void tell_direct_error(bool tell) { tell_direct_error_ = tell; }
 
   [[nodiscard]] const FreeMask& free() const { return free_; }
   [[nodiscard]] std::size_t freedom_count() const;
@@ -32,6 +36,7 @@ private:
   FreeMask free_;
   std::optional<DirectSolver> direct_;
   DirectSolver::Factored factored_;
+  bool tell_direct_error_ = false;
 };
 
 /// What keeps a configuration from equilibrium.
@@ -51,6 +56,8 @@ struct NewtonResult {
   double residual = 0;            ///< relative
   std::size_t iterations = 0;
   std::size_t cg_iterations = 0;
+  /// Of the last linear solve, relative to the largest increment: what the algebra leaves of the step's change.
+  std::optional<AlgebraicError> algebraic_error;
   double predicted = 0;  ///< size of the first increment; rotations count with the mean edge length
   double reached = 0;    ///< size of the whole change
 };
@@ -58,9 +65,10 @@ struct NewtonResult {
 /// Newton's method from `configuration`, which is changed. `held_increment` (6 per node) moves prescribed freedoms.
 /// Steps are cut where they turn a node by more than 0.5 rad; where the residual does not fall in the end, a line
 /// search on the work of the unbalanced forces shortens them.
+/// @param likely_at_rest  the configuration may be in balance: the forces are looked at before a tangent is made
 NewtonResult newton(const ShellSystem& system, const RunSettings& settings, TangentSolver& solver,
                     const BalanceFunction& balance, const VectorX& held_increment, BlockMatrix& matrix,
-                    Configuration& configuration);
+                    Configuration& configuration, bool likely_at_rest = false);
 
 /// Size of an increment: root mean square over the nodes of displacements and (mean edge length x) rotations.
 double increment_size(const ShellSystem& system, const VectorX& increment);

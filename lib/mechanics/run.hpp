@@ -15,6 +15,9 @@ State make_state(const ShellSystem& system, const Model& model, const Configurat
 /// or the factor of the loads where there is none.
 std::string describe_loads(const Model& model, const std::vector<double>& reached, const std::vector<double>& wanted);
 
+/// Tells a state the error of its linear solve.
+void set_algebraic_error(const std::optional<AlgebraicError>& error, State& state);
+
 /// Collects what solve() returns from the steps of a run; a state without displacements (not handed over, and not the
 /// last) adds its counts only.
 void record_step(const State& state, double seconds, Summary& summary);

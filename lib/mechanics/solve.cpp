@@ -50,6 +50,13 @@ std::string describe_loads(const Model& model, const std::vector<double>& reache
                       : text;
 }
 
+void set_algebraic_error(const std::optional<AlgebraicError>& error, State& state) {
+  if (error) {
+    state.algebraic_error = error->relative();
+    state.algebraic_error_is_bound = error->is_lower_bound;
+  }
+}
+
 void record_step(const State& state, double seconds, Summary& summary) {
   ++summary.steps;
   summary.converged = state.converged && (summary.steps == 1 || summary.converged);
@@ -57,6 +64,10 @@ void record_step(const State& state, double seconds, Summary& summary) {
   summary.newton_iterations += state.newton_iterations;
   summary.cg_iterations += state.cg_iterations;
   summary.seconds_per_step.push_back(seconds);
+  if (state.algebraic_error) {
+    summary.algebraic_error = std::max(summary.algebraic_error.value_or(0), *state.algebraic_error);
+    summary.algebraic_error_is_bound = summary.algebraic_error_is_bound || state.algebraic_error_is_bound;
+  }
   if (state.displacement.empty()) {
     return;
   }

@@ -27,6 +27,8 @@ struct State {
   double residual = 0;                 ///< relative, as compared with RunSettings::converge
   std::size_t newton_iterations = 0;
   std::size_t cg_iterations = 0;
+  std::optional<double> algebraic_error;  ///< of this step, relative; see Summary
+  bool algebraic_error_is_bound = false;
   bool converged = false;
   bool linear = false;  ///< of the linear theory: rotations are not finite ones
 };
@@ -51,7 +53,12 @@ struct Summary {
   double residual = 0;  ///< of the last step
   std::size_t newton_iterations = 0;
   std::size_t cg_iterations = 0;
-  std::optional<double> volume_before;  ///< mm^3; none when a body is open
+  /// What the linear solver's error leaves of a step's change, relative, in the energy norm of the tangent; the largest
+  /// of all steps with cg, of the first and the last with the direct solver. None where no system was solved, or where
+  /// the tangent was not positive definite.
+  std::optional<double> algebraic_error;
+  bool algebraic_error_is_bound = false;  ///< some step's solve ended before its tolerance: at least this
+  std::optional<double> volume_before;    ///< mm^3; none when a body is open
   std::optional<double> volume_after;
   double strain_energy = 0;              ///< mJ
   double max_displacement = 0;           ///< mm, of the last state

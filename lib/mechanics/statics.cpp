@@ -88,6 +88,9 @@ public:
       result.residual = again.residual;
       result.iterations += again.iterations;
       result.cg_iterations += again.cg_iterations;
+      if (again.algebraic_error && result.algebraic_error) {
+        result.algebraic_error->error = again.algebraic_error->error;
+      }
       if (again.iterations == 0) {
         break;
       }
@@ -109,6 +112,7 @@ public:
   }
 
   [[nodiscard]] std::size_t freedom_count() const { return solver_.freedom_count(); }
+  void tell_direct_error(bool tell) { solver_.tell_direct_error(tell); }
 
 private:
   void require_balance(const Configuration& configuration, double factor) {
@@ -205,6 +209,7 @@ Summary run_static(ShellSystem& system, const Model& model, const RunSettings& s
     const auto start = Clock::now();
     const double target = run.load_factors[s];
     const double whole = target - factor;
+    step.tell_direct_error(s == 0 || s + 1 == run.load_factors.size());
     std::size_t newton_iterations = 0;
     std::size_t cg_iterations = 0;
     NewtonResult result;
@@ -259,6 +264,7 @@ Summary run_static(ShellSystem& system, const Model& model, const RunSettings& s
     state.residual = result.residual;
     state.newton_iterations = newton_iterations;
     state.cg_iterations = cg_iterations;
+    set_algebraic_error(result.algebraic_error, state);
     state.converged = result.converged;
     record_step(state, seconds_since(start), summary);
     const bool is_last = s + 1 == run.load_factors.size();
@@ -279,6 +285,7 @@ Summary run_linear(ShellSystem& system, const Model& model, const RunSettings& s
                    const StateCallback& on_state, const Progress& progress, const Resumption& resumption) {
   Summary summary;
   TangentSolver solver(system, settings);
+  solver.tell_direct_error(true);
   const Configuration reference = reference_configuration(system);
   State state;
   if (resumption.from) {
@@ -335,6 +342,7 @@ Summary run_linear(ShellSystem& system, const Model& model, const RunSettings& s
     state.residual = scale > 0 ? force_norm(system, unbalanced) / scale : 0;
     state.newton_iterations = 1;
     state.cg_iterations = solved.cg_iterations;
+    set_algebraic_error(solved.error, state);
     state.converged = solved.converged;
     if (!solved.converged && !settings.cg_fixed_count) {
       throw RequirementError(

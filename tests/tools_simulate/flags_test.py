@@ -17,7 +17,8 @@ HELD = PRESSED + ["--fix", "rigid-motions", "--static"]
 DYNAMIC = PRESSED + ["--density", "1100kg/m3", "--duration", "0.1s", "--step", "10ms"]
 
 RESULT_KEYS = ["shells", "tetrahedra", "nodes", "dof", "steps", "converged", "max_displacement_mm", "volume_before_mm3",
-               "volume_after_mm3", "strain_energy_mj", "residual", "algebraic_error_percent", "newton_iterations",
+               "volume_after_mm3", "strain_energy_mj", "residual", "algebraic_error_percent",
+               "algebraic_error_is_lower_bound", "newton_iterations",
                "cg_iterations", "ms_per_step", "real_time_factor", "probes", "frequencies_hz", "buckling_factors"]
 
 
@@ -77,8 +78,10 @@ class Flags(SimulateTest):
     def test_solvers_and_elements_are_chosen(self):
         reference = self.run_tool("ball.ply", "a.hdf", *HELD, "--solver", "direct")["result"]
         self.assertEqual(reference["cg_iterations"], 0)
+        self.assertLess(reference["algebraic_error_percent"], 1e-4)
         by_cg = self.run_tool("ball.ply", "b.hdf", *HELD, "--solver", "cg")["result"]
         self.assertGreater(by_cg["cg_iterations"], 0)
+        self.assertFalse(by_cg["algebraic_error_is_lower_bound"])
         self.assertAlmostEqual(by_cg["max_displacement_mm"] / reference["max_displacement_mm"], 1, places=6)
         for flag, names in (("--membrane", ["cst", "opt", "adapt"]), ("--bending", ["comas", "comas-consistent", "dkt"])):
             values = set()
@@ -92,6 +95,8 @@ class Flags(SimulateTest):
         result = self.run_tool("ball.ply", "out.hdf", *DYNAMIC, "--cg-iterations", "3")["result"]
         self.assertFalse(result["converged"])
         self.assertGreater(result["cg_iterations"], 0)
+        self.assertGreater(result["algebraic_error_percent"], 0)
+        self.assertTrue(result["algebraic_error_is_lower_bound"])
         with h5py.File(self.path("out.hdf")) as file:
             self.assertEqual(file["tunica/converged"][()], 0)
 
