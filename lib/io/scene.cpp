@@ -47,7 +47,8 @@ void check_shell(const SceneShell& shell, bool dynamic) {
   require(!shell.name.empty(), places.of("name"), "name is empty");
   require(!shell.mesh.filename().empty(), places.of("mesh"), "mesh names no file");
   require(positive(shell.scale), places.of("scale"), "scale must be greater than zero");
-  require(positive(shell.thickness), places.of("thickness"), "thickness must be greater than zero");
+  require(shell.thickness_from || positive(shell.thickness), places.of("thickness"),
+          "thickness must be greater than zero");
   require(positive(shell.material.young), places.of("young"), "young must be greater than zero");
   require(shell.material.poisson > -1 && shell.material.poisson < 0.5, places.of("poisson"),
           fmt::format("poisson {} is outside (-1, 0.5)", shell.material.poisson));
@@ -291,6 +292,28 @@ MeshFile read_body_mesh(const SceneShell& shell) {
   }
 }
 
+// One value per vertex, in the order of the file.
+std::vector<double> thickness_of(const SceneShell& shell, const MeshFile& file) {
+  if (!shell.thickness_from) {
+    return {shell.thickness};
+  }
+  const Place& place = shell.places.of("thickness_from");
+  std::vector<std::string> names;
+  for (const auto& [name, values] : file.vertex_properties) {
+    if (name == *shell.thickness_from) {
+      for (std::size_t i = 0; i < values.size(); ++i) {
+        require(positive(values[i]), place,
+                fmt::format("{}: '{}' is {} mm at vertex {}: a thickness must be greater than zero",
+                            shell.mesh.string(), name, values[i], i));
+      }
+      return values;
+    }
+    names.push_back(name);
+  }
+  place.fail(fmt::format("{}: has no number '{}' at each vertex (a PLY property): {}{}", shell.mesh.string(),
+                         *shell.thickness_from, names.empty() ? "it has none" : "it has ", fmt::join(names, ", ")));
+}
+
 ShellBody load_body(const SceneShell& shell, std::vector<std::string>& notes) {
   const MeshFile file = read_body_mesh(shell);
   ShellBody body;
@@ -311,7 +334,7 @@ ShellBody load_body(const SceneShell& shell, std::vector<std::string>& notes) {
                       shell.mesh.string()));
     }
   }
-  body.thickness = {shell.thickness};
+  body.thickness = thickness_of(shell, file);
   body.material = shell.material;
   body.membrane = shell.membrane;
   body.bending = shell.bending;

@@ -37,7 +37,8 @@ struct SceneShell {
   std::filesystem::path mesh;
   std::optional<double> unit_mm;  ///< size in mm of the mesh file's unit, for formats that carry none
   double scale = 1;
-  double thickness = 0;  ///< mm
+  double thickness = 0;                       ///< mm; not used beside `thickness_from`
+  std::optional<std::string> thickness_from;  ///< per-vertex property of the mesh file, mm
   Material material;
   Membrane membrane = Membrane::adapt;
   Bending bending = Bending::dkt;

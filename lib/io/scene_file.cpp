@@ -461,7 +461,13 @@ void read_shell(const Table& table, const fs::path& folder, Scene& scene) {
   if (table.has("scale")) {
     shell.scale = table.number("scale");
   }
-  shell.thickness = table.quantity("thickness", dimension::length);
+  shell.thickness_from = table.optional_text("thickness_from");
+  if (shell.thickness_from && table.has("thickness")) {
+    table.place("thickness_from").fail("thickness and thickness_from contradict each other: give one");
+  }
+  if (!shell.thickness_from) {
+    shell.thickness = table.quantity("thickness", dimension::length, " (nor thickness_from)");
+  }
   shell.material.young = table.quantity("young", dimension::pressure);
   shell.material.poisson = table.number("poisson");
   if (table.has("density")) {
@@ -608,11 +614,11 @@ Scene parse_scene(const std::string& text, const fs::path& name) {
   read_run(*run, file, scene);
   const bool dynamic = std::holds_alternative<DynamicRun>(scene.run.kind);
 
-  constexpr std::array<std::string_view, 11> shell_keys{
-      "name", "mesh", "unit", "scale", "thickness", "young", "poisson", "density", "membrane", "bending", "rest"};
-  constexpr std::array<std::string_view, 1> shell_later{"thickness_from"};
+  constexpr std::array<std::string_view, 12> shell_keys{"name",      "mesh",           "unit",    "scale",
+                                                        "thickness", "thickness_from", "young",   "poisson",
+                                                        "density",   "membrane",       "bending", "rest"};
   for (const toml::table* table : tables_of(root, "shell", top)) {
-    read_shell(Table(*table, file, "[[shell]]", shell_keys, shell_later), name.parent_path(), scene);
+    read_shell(Table(*table, file, "[[shell]]", shell_keys), name.parent_path(), scene);
   }
   constexpr std::array<std::string_view, 6> fix_keys{"body",     "where",        "translation",
                                                      "rotation", "displacement", "ramp"};

@@ -155,7 +155,11 @@ void write_shell(const SceneShell& shell, Text& text) {
     text.word("unit", unit == 1 ? "mm" : unit == 10 ? "cm" : unit == 1000 ? "m" : "um");
   }
   text.line("scale", number(shell.scale));
-  text.value("thickness", shell.thickness, "m", dimension::length);
+  if (shell.thickness_from) {
+    text.word("thickness_from", *shell.thickness_from);
+  } else {
+    text.value("thickness", shell.thickness, "m", dimension::length);
+  }
   text.value("young", shell.material.young, "Pa", dimension::pressure);
   text.line("poisson", number(shell.material.poisson));
   if (shell.material.density) {

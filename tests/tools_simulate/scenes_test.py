@@ -117,6 +117,47 @@ class Scenes(SimulateTest):
         np.testing.assert_allclose(trace.mean(), -moment, rtol=0.02)
         np.testing.assert_allclose(elements["von_mises_top"].mean(), 0.05 * curvature * young, rtol=0.02)
 
+    def test_tapered_strip(self):
+        """Thickness from the mesh, a to b linearly along the strip. Stretched by d: energy E w (a - b) d^2 / (2 L ln(a/b)).
+        A force at the thin end: w = 12 P / (E w s^3) [ln t + 2 b/t - b^2 / 2 t^2] between b and a, s = (a - b) / L."""
+        length, width, young, thick, thin = 100, 10, 2e5, 2.0, 0.5
+        slope = (thick - thin) / length
+        energy = young * width * slope * 0.01**2 / (2 * math.log(thick / thin))
+
+        def primitive(t):
+            return math.log(t) + 2 * thin / t - thin**2 / (2 * t**2)
+
+        bend = 12 / (young * width * slope**3) * (primitive(thick) - primitive(thin))
+        held, end = fix("below = {axis = \"x\", at = \"0mm\"}"), f"above = {{axis = \"x\", at = \"{length}mm\"}}"
+        pull = fix(end, "xyz", "xyz", "displacement = [\"0.01mm\", \"0mm\", \"0mm\"]")
+        push = load("edge", f"[\"0N/mm\", \"0N/mm\", \"{1 / width}N/mm\"]", end)
+        errors = []
+        for columns in (10, 20, 40):
+            vertices, triangles = grid(columns, 2, length, width)
+            write_ply(self.path("strip.ply"), vertices, triangles, wall=thick - slope * vertices[:, 0])
+            body = shell("strip.ply", 1, young, 0).replace("thickness = \"1mm\"", "thickness_from = \"wall\"")
+            stretched = self.simulate(LINEAR + body + held + pull)["strain_energy_mj"]
+            bent = self.last(self.simulate(LINEAR + body + held + push + probe("tip", length, width / 2, 0)), "tip")[2]
+            errors.append([abs(stretched / energy - 1), abs(bent / bend - 1)])
+        self.assertLess(max(errors[-1]), 0.002)
+        for coarse, fine in zip(errors, errors[1:]):
+            self.assertLess(fine[0], coarse[0] / 3)  # of second order
+            self.assertLess(fine[1], coarse[1] / 2)
+        with h5py.File(self.path("out.hdf")) as file:
+            drawn, walls = file["VTKHDF/Points"][:, 0], file["VTKHDF/PointData/thickness"][()]
+            np.testing.assert_allclose(walls, thick - slope * drawn, rtol=1e-6)
+            self.assertIn("thickness_from = \"wall\"", file["tunica/scene"][()].decode())
+
+    def test_one_thickness_at_every_vertex_is_that_thickness(self):
+        vertices, triangles, normals = sphere(1, 10)
+        write_ply(self.path("ball.ply"), vertices, triangles, normals, thickness=np.full(len(vertices), 0.5))
+        body = shell("ball.ply", 0.5, 1, 0.3)
+        rest = fix("rigid_motions = true", "", "").replace("translation = \"\"\nrotation = \"\"\n", "")
+        rest += load("pressure", "\"1kPa\"")
+        one = self.simulate(STATIC + body + rest)["max_displacement_mm"]
+        each = self.simulate(STATIC + body.replace("thickness = \"0.5mm\"", "thickness_from = \"thickness\"") + rest)
+        self.assertAlmostEqual(each["max_displacement_mm"] / one, 1, delta=1e-9)
+
     def test_prescribed_displacement(self):
         """A strip stretched by 0.1 %: stress E e, energy E e^2 / 2 per volume."""
         write_ply(self.path("strip.ply"), *grid(8, 2, 40, 10))

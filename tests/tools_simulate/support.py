@@ -11,13 +11,17 @@ import numpy as np
 SIMULATE = os.path.join(os.environ["TUNICA_BIN"], "tunica-simulate")
 
 
-def write_ply(path, vertices, triangles, normals=None):
+def write_ply(path, vertices, triangles, normals=None, **properties):
+    """`properties`: further numbers per vertex."""
     vertices = np.asarray(vertices, float)
     header = ["ply", "format binary_little_endian 1.0", "comment units mm", f"element vertex {len(vertices)}"]
     header += [f"property double {name}" for name in ("x", "y", "z")]
     if normals is not None:
         header += [f"property double {name}" for name in ("nx", "ny", "nz")]
         vertices = np.hstack([vertices, normals])
+    for name, values in properties.items():
+        header.append(f"property double {name}")
+        vertices = np.column_stack([vertices, values])
     header += [f"element face {len(triangles)}", "property list uchar int vertex_indices", "end_header\n"]
     faces = np.zeros(len(triangles), dtype=[("count", "u1"), ("corners", "<i4", 3)])
     faces["count"] = 3
