@@ -152,55 +152,35 @@ private:
   std::string_view bytes_;
 };
 
-// Every member of what is stored, in one order for writing and reading.
+template <typename Archive, typename... Members>
+void each(Archive& archive, Members&... members) {
+  (archive(members), ...);
+}
+
+// Every member of what is stored, in one order for writing and reading. The bindings do not compile when a struct gets
+// a member that is not stored.
 template <typename Archive, typename Identity>
 void identity_members(Archive& archive, Identity& identity) {
-  archive(identity.version);
-  archive(identity.scene);
-  archive(identity.command);
-  archive(identity.inputs);
-  archive(identity.meshes);
-  archive(identity.options);
+  auto& [tunica, scene, command, inputs, meshes, options] = identity;
+  each(archive, tunica, scene, command, inputs, meshes, options);
 }
 
 template <typename Archive, typename AnyState>
 void state_members(Archive& archive, AnyState& state) {
-  archive(state.time);
-  archive(state.load_factor);
-  archive(state.displacement);
-  archive(state.rotation);
-  archive(state.velocity);
-  archive(state.angular_velocity);
-  archive(state.volume);
-  archive(state.strain_energy);
-  archive(state.kinetic_energy);
-  archive(state.residual);
-  archive(state.newton_iterations);
-  archive(state.cg_iterations);
-  archive(state.converged);
-  archive(state.linear);
+  auto& [time, load_factor, displacement, rotation, velocity, angular_velocity, volume, strain, kinetic, residual,
+         newton_iterations, cg_iterations, error, error_is_bound, converged, linear] = state;
+  each(archive, time, load_factor, displacement, rotation, velocity, angular_velocity, volume, strain, kinetic,
+       residual, newton_iterations, cg_iterations, error, error_is_bound, converged, linear);
 }
 
 template <typename Archive, typename AnyCheckpoint>
 void checkpoint_members(Archive& archive, AnyCheckpoint& checkpoint) {
-  auto& summary = checkpoint.summary;
-  archive(summary.dof);
-  archive(summary.steps);
-  archive(summary.converged);
-  archive(summary.residual);
-  archive(summary.newton_iterations);
-  archive(summary.cg_iterations);
-  archive(summary.algebraic_error);
-  archive(summary.algebraic_error_is_bound);
-  archive(summary.volume_before);
-  archive(summary.volume_after);
-  archive(summary.strain_energy);
-  archive(summary.max_displacement);
-  archive(summary.seconds_per_step);
-  archive(checkpoint.position);
-  archive(checkpoint.displacement);
-  archive(checkpoint.rotation);
-  archive(checkpoint.memory);
+  auto& [summary, position, displacement, rotation, memory] = checkpoint;
+  auto& [dof, steps, converged, residual, newton_iterations, cg_iterations, error, error_is_bound, volume_before,
+         volume_after, strain, largest, seconds_per_step] = summary;
+  each(archive, dof, steps, converged, residual, newton_iterations, cg_iterations, error, error_is_bound, volume_before,
+       volume_after, strain, largest, seconds_per_step);
+  each(archive, position, displacement, rotation, memory);
 }
 
 std::uint32_t checksum(std::string_view bytes) {

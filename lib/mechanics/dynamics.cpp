@@ -93,6 +93,8 @@ public:
   }
   [[nodiscard]] std::size_t freedom_count() const { return solver_.freedom_count(); }
   void tell_direct_error(bool tell) { solver_.tell_direct_error(tell); }
+  [[nodiscard]] bool at_rest() const { return at_rest_; }
+  void go_on(bool at_rest) { at_rest_ = at_rest; }
 
 private:
   struct Step {
@@ -289,6 +291,7 @@ Summary run_dynamic(ShellSystem& system, const Model& model, const RunSettings& 
     const std::vector<double>& velocity = resumption.from->memory.at("velocity");
     TUNICA_ASSERT(velocity.size() == static_cast<std::size_t>(motion.velocity.size()));
     std::copy(velocity.begin(), velocity.end(), motion.velocity.begin());
+    integrator.go_on(resumption.from->memory.at("at_rest").at(0) != 0);
   } else {
     summary.dof = integrator.freedom_count();
     state = make_state(system, model, motion.configuration, 0);
@@ -349,7 +352,8 @@ Summary run_dynamic(ShellSystem& system, const Model& model, const RunSettings& 
                         time,
                         motion.configuration.displacement,
                         motion.configuration.rotation,
-                        {{"velocity", {motion.velocity.begin(), motion.velocity.end()}}}};
+                        {{"velocity", {motion.velocity.begin(), motion.velocity.end()}},
+                         {"at_rest", {integrator.at_rest() ? 1.0 : 0.0}}}};
     });
     advance(progress, static_cast<double>(s + 1) / static_cast<double>(steps));
   }
