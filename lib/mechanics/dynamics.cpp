@@ -255,8 +255,8 @@ private:
   BlockMatrix matrix_;
   VectorX mass_;
   Forces forces_;
-  std::vector<Vector18> deformation_;  ///< at the start of the step
-  bool at_rest_ = false;               ///< the last step changed nothing
+  bool at_rest_ = false;                   ///< the last step changed nothing
+  std::vector<ElementState> deformation_;  ///< at the start of the step
 };
 
 double first_load_factor(const Model& model, double time) {

@@ -22,15 +22,26 @@ struct PlaneStiffness {
   Matrix39 mean_strain;
 };
 
-/// Constant-strain triangle. The drilling rotations are tied to the rotation of the triangle by a stiffness that is
-/// `drilling` x E t A: it changes no state of constant strain and stays below what stiffens a curved shell.
-PlaneStiffness membrane_cst(const PlaneTriangle& triangle, const Mat3& elasticity, double thickness);
+/// Membrane part of a triangle. Its mean strain (xx, yy, 2 xy) is that of the chords plus what bows the edges:
+///   sum over edges of bow_k (theta_end - theta_start), edge k from corner k to corner k + 1, theta the drilling
+///   rotations.
+/// The deviations of the drilling rotations from the rotation of the triangle have a stiffness of their own.
+struct MembraneStiffness {
+  Mat3 basic;         ///< to the mean strain (N mm)
+  Mat3 bow;           ///< columns: of the edges
+  Mat3 higher_order;  ///< to the deviations at the corners (N mm)
+};
+
+/// Constant-strain triangle: edges stay straight. The drilling rotations are tied to the rotation of the triangle by a
+/// stiffness that is `drilling` x E t A: it changes no state of constant strain and stays below what stiffens a curved
+/// shell.
+MembraneStiffness membrane_cst(const PlaneTriangle& triangle, const Mat3& elasticity, double thickness);
 
 /// Felippa's optimal triangle of the ANDES template. `higher_order_scale` multiplies the higher-order part: 1 is OPT;
 /// less keeps the patch test and the rank, and softens in-plane bending.
 /// Source: Felippa 2003, "A study of optimal membrane triangles with drilling freedoms", eqs. 20-35.
-PlaneStiffness membrane_opt(const PlaneTriangle& triangle, const Mat3& elasticity, double thickness,
-                            double higher_order_scale = 1);
+MembraneStiffness membrane_opt(const PlaneTriangle& triangle, const Mat3& elasticity, double thickness,
+                               double higher_order_scale = 1);
 
 /// The scale of the higher-order part in `Membrane::adapt`: 1 / (1 + (3 s / t)^2), at least 1e-4, where s is how far
 /// the shell bulges over an edge: the largest |(n_j - n_i).(x_j - x_i)|. OPT alone locks where s is not small

@@ -14,25 +14,20 @@ constexpr std::array<double, 9> beta{1, 2, 1, 0, 1, -1, -1, -1, -2};
 
 }  // namespace
 
-PlaneStiffness membrane_opt(const PlaneTriangle& triangle, const Mat3& elasticity, double thickness,
-                            double higher_order_scale) {
+MembraneStiffness membrane_opt(const PlaneTriangle& triangle, const Mat3& elasticity, double thickness,
+                               double higher_order_scale) {
   const auto corners = corner_matrix(triangle);
   const double area = triangle.a * triangle.h / 2;
   const auto x = [&](int i, int j) { return corners(0, i - 1) - corners(0, j - 1); };
   const auto y = [&](int i, int j) { return corners(1, i - 1) - corners(1, j - 1); };
 
-  // Lumping matrix, eq. 21; per unit of thickness.
-  PlaneStiffness result;
-  constexpr std::array<std::array<int, 3>, 3> cycles{{{1, 2, 3}, {2, 3, 1}, {3, 1, 2}}};
+  // Lumping matrix, eq. 21, gathered by edges: what the rotations at the ends of an edge differ by bows it.
+  MembraneStiffness result;
+  result.basic = area * thickness * elasticity;
   for (int k = 0; k < 3; ++k) {
-    const auto [i, j, m] = cycles[static_cast<std::size_t>(k)];
-    result.mean_strain.col(3 * k) << y(j, m), 0, x(m, j);
-    result.mean_strain.col(3 * k + 1) << 0, x(m, j), y(j, m);
-    result.mean_strain.col(3 * k + 2) << alpha / 6 * y(j, m) * (y(i, m) - y(j, i)),
-        alpha / 6 * x(m, j) * (x(m, i) - x(i, j)), alpha / 3 * (x(m, i) * y(i, m) - x(i, j) * y(j, i));
+    const Vec2 edge = corners.col((k + 1) % 3) - corners.col(k);
+    result.bow.col(k) = alpha / (12 * area) * Vec3(edge.y() * edge.y(), edge.x() * edge.x(), -2 * edge.x() * edge.y());
   }
-  result.mean_strain /= 2 * area;
-  result.stiffness = area * thickness * result.mean_strain.transpose() * elasticity * result.mean_strain;
 
   // Natural strains along the three edges (eq. 24), and the energy in terms of them.
   const double l21 = x(2, 1) * x(2, 1) + y(2, 1) * y(2, 1);
@@ -63,17 +58,10 @@ PlaneStiffness membrane_opt(const PlaneTriangle& triangle, const Mat3& elasticit
   for (const Mat3& q : {Mat3((q1 + q2) / 2), Mat3((q2 + q3) / 2), Mat3((q3 + q1) / 2)}) {
     hierarchical += q.transpose() * natural_elasticity * q;
   }
-  Matrix39 deviation;  // eq. 17: corner rotations minus that of the triangle
-  for (int r = 0; r < 3; ++r) {
-    deviation.row(r) << x(3, 2), y(3, 2), 0, x(1, 3), y(1, 3), 0, x(2, 1), y(2, 1), 0;
-    deviation(r, 3 * r + 2) = 4 * area;
-  }
-  deviation /= 4 * area;
   // The optimal beta_0 depends on Poisson's ratio, which plane stress holds as D12 / D11.
   const double nu = elasticity(0, 1) / elasticity(0, 0);
   const double beta_0 = std::max(0.5 * (1 - 4 * nu * nu), 0.01);
-  result.stiffness +=
-      higher_order_scale * 0.75 * beta_0 * area * thickness * deviation.transpose() * hierarchical * deviation;
+  result.higher_order = higher_order_scale * 0.75 * beta_0 * area * thickness * hierarchical;
   return result;
 }
 

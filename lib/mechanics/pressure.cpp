@@ -88,6 +88,101 @@ void unit_pressure(const std::array<Vec3, 3>& corners, const PatchHeight& height
   }
 }
 
+void unit_pressure(const ShellElement& element, const CornerMotion& motion, Vector18& force, Matrix18* stiffness,
+                   double* volume) {
+  Mat3 x;
+  for (int k = 0; k < 3; ++k) {
+    x.col(k) = element.from_centroid.col(k) - element.from_centroid.col(0) +
+               (motion.displacement.col(k) - motion.displacement.col(0));
+  }
+  const Vec3 twice = x.col(1).cross(x.col(2));
+  const double twice_area = twice.norm();
+  const double area = twice_area / 2;
+  const Vec3 n = twice / twice_area;
+  // Height: sum over the ends of the edges of length x slope x weight / 30, with the sign of the edge's direction.
+  double height = 0;
+  Vector18 height_gradient = Vector18::Zero();
+  Mat3 opposite;
+  Mat3 area_gradient;
+  struct End {
+    int corner = 0;
+    double weight = 0;
+    Vec3 carried;
+  };
+  std::array<std::array<End, 2>, 3> ends;
+  std::array<double, 3> of_length{};
+  for (int k = 0; k < 3; ++k) {
+    const int next_corner = (k + 1) % 3;
+    opposite.col(k) = x.col((k + 2) % 3) - x.col(next_corner);
+    area_gradient.col(k) = 0.5 * n.cross(opposite.col(k));
+    const Vec3 edge = x.col(next_corner) - x.col(k);
+    const double length = edge.norm();
+    const Vec3 normal = element.axes.transpose() * element.edge_normals.col(k);
+    Vec3 carried = Vec3::Zero();
+    for (int e = 0; e < 2; ++e) {
+      End& end = ends[static_cast<std::size_t>(k)][static_cast<std::size_t>(e)];
+      end.corner = e == 0 ? k : next_corner;
+      end.weight = element.height_weights[2 * k + e];
+      end.carried = motion.rotation[static_cast<std::size_t>(end.corner)] * normal;
+      of_length[static_cast<std::size_t>(k)] +=
+          end.weight * (element.slopes[2 * k + e] + element.rest_normals[2 * k + e]);
+      carried += end.weight * end.carried;
+      height_gradient.segment<3>(6 * end.corner + 3) -= end.weight * end.carried.cross(edge);
+    }
+    height += of_length[static_cast<std::size_t>(k)] * length - edge.dot(carried);
+    const Vec3 along = of_length[static_cast<std::size_t>(k)] / length * edge - carried;
+    height_gradient.segment<3>(6 * next_corner) += along;
+    height_gradient.segment<3>(6 * k) -= along;
+  }
+  force = area * height_gradient;
+  for (int k = 0; k < 3; ++k) {
+    force.segment<3>(6 * k) += twice / 6 + height * area_gradient.col(k);
+  }
+  if (volume != nullptr) {
+    *volume = area * height;
+  }
+  if (stiffness == nullptr) {
+    return;
+  }
+  Matrix18& t = *stiffness;
+  t.setZero();
+  for (int k = 0; k < 3; ++k) {
+    const int start = 6 * k;
+    const int stop = 6 * ((k + 1) % 3);
+    const Vec3 edge = x.col((k + 1) % 3) - x.col(k);
+    const double length = edge.norm();
+    const Vec3 direction = edge / length;
+    const Mat3 stretch =
+        area * of_length[static_cast<std::size_t>(k)] / length * (Mat3::Identity() - direction * direction.transpose());
+    t.block<3, 3>(stop, stop) += stretch;
+    t.block<3, 3>(start, start) += stretch;
+    t.block<3, 3>(stop, start) -= stretch;
+    t.block<3, 3>(start, stop) -= stretch;
+    for (const End& end : ends[static_cast<std::size_t>(k)]) {
+      const int spin = 6 * end.corner + 3;
+      const Mat3 turned = area * end.weight * skew(end.carried);
+      t.block<3, 3>(stop, spin) += turned;
+      t.block<3, 3>(start, spin) -= turned;
+      t.block<3, 3>(spin, stop) -= turned;
+      t.block<3, 3>(spin, start) += turned;
+      t.block<3, 3>(spin, spin) +=
+          area * end.weight * (edge.dot(end.carried) * Mat3::Identity() - end.carried * edge.transpose());
+    }
+  }
+  for (int i = 0; i < 3; ++i) {
+    t.middleRows<3>(6 * i).noalias() += area_gradient.col(i) * height_gradient.transpose();
+    t.middleCols<3>(6 * i).noalias() += height_gradient * area_gradient.col(i).transpose();
+    for (int j = 0; j < 3; ++j) {
+      Mat3 second = 0.25 / area * (opposite.col(i).dot(opposite.col(j)) * n * n.transpose());
+      if (i != j) {
+        const double sign = j == (i + 1) % 3 ? -0.5 : 0.5;
+        second += sign * skew(n);
+      }
+      t.block<3, 3>(6 * i, 6 * j) += skew(opposite.col(j)) / 6 + height * second;
+    }
+  }
+}
+
 PlateLoad plate_load(const std::array<Vec3, 3>& corners) {
   const double area = (corners[1] - corners[0]).cross(corners[2] - corners[0]).norm() / 2;
   PlateLoad load;

@@ -1,21 +1,19 @@
 #pragma once
 
-#include "core/types.hpp"
+#include "mechanics/shell_element.hpp"
 
 /// Follower pressure on curved triangles: pressure times the gradient of the enclosed volume.
 ///
 /// What the facets enclose adds p A n / 3 at each corner; on a closed surface that is in balance. What lies between a
-/// facet and its curved patch, area times mean height of the patch, is invariant under rigid motions, so that its
-/// gradient is in balance by itself. Uniform pressure on a closed shell thus has no net force and no net moment, in any
-/// configuration, and its stiffness is symmetric away from free edges.
+/// facet and its curved patch is invariant under rigid motions, so that its gradient is in balance by itself. Uniform
+/// pressure on a closed shell thus has no net force and no net moment, in any configuration, and its stiffness is
+/// symmetric away from free edges.
 ///
-/// The height follows the stretch of the facet, not the nodal rotations: where a shell is thin against its elements the
-/// rotations are held by little more than their bending stiffness, and pressure would bulge the patches at no cost in
-/// membrane energy (a spurious instability from strains of (t R / h^2)^2 on).
+/// Where the shell's slopes count in its membrane strain the patch follows them, and its pressure works on the nodes'
+/// rotations. Where they do not, the rotations of a thin shell are held by little more than its bending stiffness, and
+/// pressure would bulge such patches at no cost in membrane energy (a spurious instability from strains of
+/// (t R / h^2)^2 on): there the height follows the stretch of the facet alone.
 namespace tunica {
-
-using Vector9 = Eigen::Matrix<double, 9, 1>;
-using Matrix9 = Eigen::Matrix<double, 9, 9>;
 
 /// Mean height of a patch over its facet as a function of the corners: (constant + sum_kl coupling_kl x_k.x_l) / 2.
 /// Exact at the reference; to first order the slopes at the corners stay what they were.
@@ -33,6 +31,11 @@ double patch_volume(const std::array<Vec3, 3>& corners, const PatchHeight& heigh
 
 /// Forces of a unit follower pressure (N per MPa) on the three corners, and d force / d corners when asked for.
 void unit_pressure(const std::array<Vec3, 3>& corners, const PatchHeight& height, Vector9& force, Matrix9* stiffness);
+
+/// The same on an element whose slopes count (ShellElement::curved): forces and moments, and their derivative by
+/// displacements and spins. `volume`, where asked for, is that between patch and facet.
+void unit_pressure(const ShellElement& element, const CornerMotion& motion, Vector18& force, Matrix18* stiffness,
+                   double* volume = nullptr);
 
 /// Work-equivalent nodal loads of a unit pressure on the cubic deflection over a flat facet: forces along the normal,
 /// and vectors g in the facet such that a corner's normal N does the work g.N.

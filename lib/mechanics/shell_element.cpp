@@ -1,6 +1,7 @@
 #include "mechanics/shell_element.hpp"
 
 #include "mechanics/rotation.hpp"
+#include "shell/curved_surface.hpp"
 
 namespace tunica {
 namespace {
@@ -52,38 +53,176 @@ Mat3 current_from_centroid(const ShellElement& element, const CornerMotion& moti
   return element.from_centroid + (motion.displacement.colwise() - mean);
 }
 
-Vector18 deformation_in(const ShellElement& element, const CornerMotion& motion, const Frame& frame) {
-  Vector18 result;
+constexpr int next_corner(int k) { return (k + 1) % 3; }
+/// Corner at which end of edge k: row 2 k + end of what is listed by ends.
+constexpr int corner_at(int edge, int end) { return end == 0 ? edge : next_corner(edge); }
+
+/// An edge in the frame, and what its ends carry.
+struct EdgeNow {
+  double length = 0;
+  Vec3 direction;
+  std::array<Vec3, 2> normal;  ///< R m
+  std::array<Vec3, 2> side;    ///< R c
+};
+
+/// Everything that follows from the motion, in the frame's axes.
+struct Kinematics {
+  Frame frame;
+  std::array<EdgeNow, 3> edges;
+  Vector6 slopes;
+  ElementState state;
+
+  [[nodiscard]] Vec3 rotation(int corner) const { return state.segment<3>(3 + 3 * corner); }
+  /// Of the corners about the axes in the plane.
+  [[nodiscard]] Vector6 bending() const {
+    return (Vector6() << state.segment<2>(3), state.segment<2>(6), state.segment<2>(9)).finished();
+  }
+};
+
+/// What the curved patch adds to the chord strain. Fills the edges and slopes.
+Vec3 curved_strain(const ShellElement& element, const std::array<Mat3, 3>& relative, Kinematics& now) {
+  Vec3 strain = Vec3::Zero();
+  Vector6 change;
   for (int k = 0; k < 3; ++k) {
-    result.segment<2>(6 * k) = frame.plane.col(k) - element.plane.col(k);
-    result[6 * k + 2] = 0;
-    const Mat3 relative = frame.axes * motion.rotation[static_cast<std::size_t>(k)] * element.axes.transpose();
-    result.segment<3>(6 * k + 3) = logarithm(relative);
+    EdgeNow& edge = now.edges[static_cast<std::size_t>(k)];
+    const Vec2 along = now.frame.plane.col(next_corner(k)) - now.frame.plane.col(k);
+    edge.length = along.norm();
+    edge.direction << along / edge.length, 0;
+    Vec2 turn;
+    for (int end = 0; end < 2; ++end) {
+      const auto e = static_cast<std::size_t>(end);
+      const Mat3& carrier = relative[static_cast<std::size_t>(corner_at(k, end))];
+      edge.normal[e] = carrier * element.edge_normals.col(k);
+      edge.side[e] = carrier * element.edge_sides.col(k);
+      change[2 * k + end] = element.rest_normals[2 * k + end] - edge.direction.dot(edge.normal[e]);
+      turn[end] = element.rest_sides[2 * k + end] - edge.direction.dot(edge.side[e]);
+    }
+    strain += element.bow.col(k) * (turn[1] - turn[0]);
   }
-  return result;
+  now.slopes = element.slopes + change;
+  const Vector6 middle = 0.5 * (now.slopes + element.slopes);
+  const Vector6 bending = now.bending();
+  for (int i = 0; i < 3; ++i) {
+    const auto s = static_cast<std::size_t>(i);
+    strain[i] += change.dot(element.bulging[s] * middle + element.sideways.row(i).transpose()) +
+                 now.slopes.dot(element.tilting[s] * bending);
+  }
+  return strain;
 }
 
-constexpr std::array<int, 9> membrane_rows{0, 1, 5, 6, 7, 11, 12, 13, 17};
-constexpr std::array<int, 9> bending_rows{2, 3, 4, 8, 9, 10, 14, 15, 16};
-
-Vector9 gather(const Vector18& v, const std::array<int, 9>& rows) {
-  Vector9 part;
-  for (int i = 0; i < 9; ++i) {
-    part[i] = v[rows[static_cast<std::size_t>(i)]];
+bool find_kinematics(const ShellElement& element, const CornerMotion& motion, Kinematics& now) {
+  if (!find_frame(current_from_centroid(element, motion), element.gradients, now.frame)) {
+    return false;
   }
-  return part;
-}
-
-void fill(const ShellElement& element, double factor, Matrix18& stiffness) {
-  stiffness.setZero();
-  for (int j = 0; j < 9; ++j) {
-    for (int i = 0; i < 9; ++i) {
-      const auto row = static_cast<std::size_t>(i);
-      const auto column = static_cast<std::size_t>(j);
-      stiffness(membrane_rows[row], membrane_rows[column]) = factor * element.membrane(i, j);
-      stiffness(bending_rows[row], bending_rows[column]) = factor * element.bending(i, j);
+  std::array<Mat3, 3> relative;
+  for (int k = 0; k < 3; ++k) {
+    const auto s = static_cast<std::size_t>(k);
+    relative[s] = now.frame.axes * motion.rotation[s] * element.axes.transpose();
+    now.state.segment<3>(3 + 3 * k) = logarithm(relative[s]);
+  }
+  const Mat23 stretch = now.frame.plane - element.plane;
+  const Eigen::Matrix2d chord = stretch * element.gradients.transpose();
+  Vec3 strain(chord(0, 0), chord(1, 1), chord(0, 1) + chord(1, 0));
+  if (element.curved) {
+    strain += curved_strain(element, relative, now);
+  } else {
+    for (int k = 0; k < 3; ++k) {
+      strain += element.bow.col(k) * (now.rotation(next_corner(k)).z() - now.rotation(k).z());
     }
   }
+  now.state.head<3>() = strain;
+  return true;
+}
+
+const CornerMotion still{Mat3::Zero(), {Mat3::Identity(), Mat3::Identity(), Mat3::Identity()}};
+
+using Matrix3x18 = Eigen::Matrix<double, 3, 18>;
+using Matrix6x18 = Eigen::Matrix<double, 6, 18>;
+
+/// Derivatives with respect to displacements and spins, in the frame's axes. Slopes: of a curved element only.
+struct Derivatives {
+  Matrix3x18 strain;
+  Matrix6x18 slopes;
+  Matrix6x18 bending;
+};
+
+void add_curved_derivatives(const ShellElement& element, const Kinematics& now, Derivatives& d) {
+  d.slopes.setZero();
+  for (int k = 0; k < 3; ++k) {
+    const EdgeNow& edge = now.edges[static_cast<std::size_t>(k)];
+    const auto across = [&](const Vec3& carried) {
+      return Vec3((carried - edge.direction * edge.direction.dot(carried)) / edge.length);
+    };
+    for (int end = 0; end < 2; ++end) {
+      const Vec3& normal = edge.normal[static_cast<std::size_t>(end)];
+      auto row = d.slopes.row(2 * k + end);
+      row.segment<3>(6 * next_corner(k)) = -across(normal).transpose();
+      row.segment<3>(6 * k) = across(normal).transpose();
+      row.segment<3>(6 * corner_at(k, end) + 3) = -normal.cross(edge.direction).transpose();
+    }
+    const Eigen::RowVector3d difference = across(edge.side[1] - edge.side[0]).transpose();
+    d.strain.block<3, 3>(0, 6 * next_corner(k)) -= element.bow.col(k) * difference;
+    d.strain.block<3, 3>(0, 6 * k) += element.bow.col(k) * difference;
+    d.strain.block<3, 3>(0, 6 * next_corner(k) + 3) -=
+        element.bow.col(k) * edge.side[1].cross(edge.direction).transpose();
+    d.strain.block<3, 3>(0, 6 * k + 3) += element.bow.col(k) * edge.side[0].cross(edge.direction).transpose();
+  }
+  const Vector6 bending = now.bending();
+  Matrix36 of_slopes, of_bending;
+  for (int i = 0; i < 3; ++i) {
+    const auto s = static_cast<std::size_t>(i);
+    of_slopes.row(i) =
+        (element.bulging[s] * now.slopes + element.tilting[s] * bending).transpose() + element.sideways.row(i);
+    of_bending.row(i).noalias() = now.slopes.transpose() * element.tilting[s];
+  }
+  d.strain.noalias() += of_slopes * d.slopes;
+  d.strain.noalias() += of_bending * d.bending;
+}
+
+/// H: spin to rate of the rotation vector; G_k: spin of the frame from the displacement of corner k.
+void find_derivatives(const ShellElement& element, const Kinematics& now, const std::array<Mat3, 3>& h,
+                      const std::array<Mat3, 3>& g, Derivatives& d) {
+  d.strain.setZero();
+  d.bending.setZero();
+  // Chord strain: the corners' motion less the turn of the frame about its normal.
+  Vec3 of_turn = Vec3::Zero();
+  for (int k = 0; k < 3; ++k) {
+    const Vec2 gk = element.gradients.col(k);
+    d.strain.block<3, 2>(0, 6 * k) << gk.x(), 0, 0, gk.y(), gk.y(), gk.x();
+    of_turn += d.strain.block<3, 2>(0, 6 * k) * Vec2(now.frame.plane(1, k), -now.frame.plane(0, k));
+  }
+  for (int k = 0; k < 3; ++k) {
+    d.strain.block<3, 3>(0, 6 * k) += of_turn * g[static_cast<std::size_t>(k)].row(2);
+    const Mat23 rate = h[static_cast<std::size_t>(k)].topRows<2>();
+    d.bending.block<2, 3>(2 * k, 6 * k + 3) = rate;
+    for (int j = 0; j < 3; ++j) {
+      d.bending.block<2, 3>(2 * k, 6 * j) -= rate * g[static_cast<std::size_t>(j)];
+    }
+  }
+  if (element.curved) {
+    add_curved_derivatives(element, now, d);
+    return;
+  }
+  for (int k = 0; k < 3; ++k) {
+    const Vec3 of_rotation = element.bow.col((k + 2) % 3) - element.bow.col(k);
+    const Mat3 of_spin = of_rotation * h[static_cast<std::size_t>(k)].row(2);
+    d.strain.block<3, 3>(0, 6 * k + 3) += of_spin;
+    for (int j = 0; j < 3; ++j) {
+      d.strain.block<3, 3>(0, 6 * j) -= of_spin * g[static_cast<std::size_t>(j)];
+    }
+  }
+}
+
+/// Spin of the frame: sum of G_k times the displacement of corner k.
+std::array<Mat3, 3> frame_spin(const ShellElement& element, const Frame& frame, Mat23& current_gradients) {
+  std::array<Mat3, 3> g;
+  for (int k = 0; k < 3; ++k) {
+    const Vec2 opposite = frame.plane.col((k + 1) % 3) - frame.plane.col((k + 2) % 3);
+    current_gradients.col(k) = Vec2(opposite.y(), -opposite.x()) / frame.twice_area;
+    g[static_cast<std::size_t>(k)] << 0, 0, current_gradients(1, k), 0, 0, -current_gradients(0, k),
+        -element.gradients(1, k) / frame.trace, element.gradients(0, k) / frame.trace, 0;
+  }
+  return g;
 }
 
 void rotate_to_world(const Mat3& axes, Matrix18& matrix) {
@@ -96,10 +235,214 @@ void rotate_to_world(const Mat3& axes, Matrix18& matrix) {
   }
 }
 
+/// The part with the stiffness of the element itself.
+void add_material(const ShellElement& element, double factor, const std::array<Mat3, 3>& h,
+                  const std::array<Mat3, 3>& g, const Derivatives& d, Matrix18& t) {
+  const Matrix3x18 stress = (factor * element.membrane) * d.strain;
+  t.noalias() += d.strain.transpose() * stress;
+  // Rotation vectors: H_i'K_ij H_j between spins, where spins of the frame count against those of the corners.
+  Mat3 all = Mat3::Zero();
+  std::array<Mat3, 3> rows{Mat3::Zero(), Mat3::Zero(), Mat3::Zero()};
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      const Mat3 block = factor * h[static_cast<std::size_t>(i)].transpose() *
+                         element.rotational.block<3, 3>(3 * i, 3 * j) * h[static_cast<std::size_t>(j)];
+      t.block<3, 3>(6 * i + 3, 6 * j + 3) += block;
+      rows[static_cast<std::size_t>(i)] += block;
+    }
+    all += rows[static_cast<std::size_t>(i)];
+  }
+  for (int j = 0; j < 3; ++j) {
+    const Mat3& gj = g[static_cast<std::size_t>(j)];
+    for (int i = 0; i < 3; ++i) {
+      const Mat3 block = rows[static_cast<std::size_t>(i)] * gj;
+      t.block<3, 3>(6 * i + 3, 6 * j) -= block;
+      t.block<3, 3>(6 * j, 6 * i + 3) -= block.transpose();
+      t.block<3, 3>(6 * i, 6 * j) += g[static_cast<std::size_t>(i)].transpose() * all * gj;
+    }
+  }
+}
+
+/// What chord strain and rotation vectors add to the geometric stiffness: n are the corners' forces, m their moments.
+void add_corotational_stiffness(const ShellElement& element, const Kinematics& now, const std::array<Vec3, 3>& n,
+                                const std::array<Vec3, 3>& local_moment, const std::array<Mat3, 3>& h,
+                                const std::array<Mat3, 3>& g, const Mat23& current_gradients, const Vec3& total,
+                                const std::array<Vec3, 3>& force, const std::array<Vec3, 3>& moment, Matrix18& t) {
+  const Frame& frame = now.frame;
+  // The derivative of H, where spins of the frame count against those of the corners.
+  Mat3 all = Mat3::Zero();
+  for (int k = 0; k < 3; ++k) {
+    const auto s = static_cast<std::size_t>(k);
+    const Mat3 change = spin_to_rate_derivative(now.rotation(k), local_moment[s]) * h[s];
+    all += change;
+    t.block<3, 3>(6 * k + 3, 6 * k + 3) += change;
+    for (int j = 0; j < 3; ++j) {
+      t.block<3, 3>(6 * k + 3, 6 * j) -= change * g[static_cast<std::size_t>(j)];
+      t.block<3, 3>(6 * j, 6 * k + 3) -= g[static_cast<std::size_t>(j)].transpose() * change;
+    }
+  }
+  // Of the levers q, of G, and of the frame in which the force is expressed.
+  Mat3 levers = all;
+  for (int k = 0; k < 3; ++k) {
+    levers += skew(n[static_cast<std::size_t>(k)]) * skew(Vec3(frame.plane(0, k), frame.plane(1, k), 0));
+  }
+  const Vec2 swapped(-total.y(), total.x());
+  const double in_plane = total.z() / (frame.trace * frame.trace);
+  for (int i = 0; i < 3; ++i) {
+    const auto si = static_cast<std::size_t>(i);
+    const Vec2 gi = current_gradients.col(i);
+    const Mat3 spun_force = skew(force[si]);
+    const Mat3 spun_moment = skew(moment[si]);
+    for (int j = 0; j < 3; ++j) {
+      const auto sj = static_cast<std::size_t>(j);
+      auto block = t.block<3, 3>(6 * i, 6 * j);
+      block += g[si].transpose() * (skew(n[sj]) + levers * g[sj]) - spun_force * g[sj];
+      block.block<1, 2>(2, 0) += swapped.dot(current_gradients.col(j)) * gi.transpose();
+      block.row(2) += (gi.x() * swapped.y() - gi.y() * swapped.x()) * g[sj].row(2);
+      block.block<2, 2>(0, 0) +=
+          in_plane * Vec2(-element.gradients(1, i), element.gradients(0, i)) * element.gradients.col(j).transpose();
+      t.block<3, 3>(6 * i + 3, 6 * j) -= spun_moment * g[sj];
+    }
+  }
+}
+
+/// Second derivative of e.(R v) for a vector v carried by the end of an edge.
+void add_edge_stiffness(const EdgeNow& edge, int start, int carrier, const Vec3& carried, Matrix18& t) {
+  const Vec3& e = edge.direction;
+  const int stop = next_corner(start);
+  const double value = e.dot(carried);
+  const Vec3 p = (carried - e * value) / edge.length;
+  const Mat3 across = (Mat3::Identity() - e * e.transpose()) / edge.length;
+  const Mat3 of_length = (value * across + e * p.transpose() + p * e.transpose()) / edge.length;
+  t.block<3, 3>(6 * stop, 6 * stop) -= of_length;
+  t.block<3, 3>(6 * start, 6 * start) -= of_length;
+  t.block<3, 3>(6 * stop, 6 * start) += of_length;
+  t.block<3, 3>(6 * start, 6 * stop) += of_length;
+  const Mat3 turned = skew(carried) * across;  // its transpose is -across skew(carried)
+  const int spin = 6 * carrier + 3;
+  t.block<3, 3>(6 * stop, spin) += turned.transpose();
+  t.block<3, 3>(6 * start, spin) -= turned.transpose();
+  t.block<3, 3>(spin, 6 * stop) += turned;
+  t.block<3, 3>(spin, 6 * start) -= turned;
+  t.block<3, 3>(spin, spin) += carried * e.transpose() - value * Mat3::Identity();
+}
+
+/// Mean of w_p w_q products of the patch's gradient as quadratic forms of the slopes at the ends of the edges, and what
+/// a bulging edge adds where it moves in the plane.
+void find_bulging(ShellElement& element) {
+  std::array<Vec3, 3> vectors;
+  for (int k = 0; k < 3; ++k) {
+    vectors[static_cast<std::size_t>(k)] << element.plane.col(next_corner(k)) - element.plane.col(k), 0;
+  }
+  // Dunavant's six points, exact to degree 4: gradients are quadratic.
+  constexpr std::array<std::array<double, 2>, 2> orbits{
+      {{0.445948490915965, 0.223381589678011}, {0.091576213509771, 0.109951743655322}}};
+  for (Matrix6& form : element.bulging) {
+    form.setZero();
+  }
+  // Ordinates of every unit slope; in Deflection's order the edge ordinates follow the corners.
+  Eigen::Matrix<double, 6, 6> ordinates = Eigen::Matrix<double, 6, 6>::Zero();
+  Vector6 centre;
+  for (int k = 0; k < 3; ++k) {
+    const double third = vectors[static_cast<std::size_t>(k)].norm() / 3;
+    ordinates(2 * k, 2 * k) = third;
+    ordinates(2 * k + 1, 2 * k + 1) = -third;
+  }
+  for (int column = 0; column < 6; ++column) {
+    std::array<double, 10> all{};
+    for (int i = 0; i < 6; ++i) {
+      all[static_cast<std::size_t>(3 + i)] = ordinates(i, column);
+    }
+    centre[column] = averaged_centre(vectors, all);
+    element.height_weights[column] =
+        (ordinates(column, column) + centre[column]) / (10 * vectors[static_cast<std::size_t>(column / 2)].norm());
+  }
+  for (const auto& [near, weight] : orbits) {
+    for (int point = 0; point < 3; ++point) {
+      std::array<double, 3> l{near, near, near};
+      l[static_cast<std::size_t>(point)] = 1 - 2 * near;
+      Eigen::Matrix<double, 2, 6> slope = Eigen::Matrix<double, 2, 6>::Zero();
+      for (int k = 0; k < 3; ++k) {
+        const int j = next_corner(k);
+        const double lk = l[static_cast<std::size_t>(k)], lj = l[static_cast<std::size_t>(j)];
+        slope +=
+            3 * (2 * lk * lj * element.gradients.col(k) + lk * lk * element.gradients.col(j)) * ordinates.row(2 * k);
+        slope += 3 * (2 * lk * lj * element.gradients.col(j) + lj * lj * element.gradients.col(k)) *
+                 ordinates.row(2 * k + 1);
+        const int other = next_corner(j);
+        slope += 6 * lk * lj * element.gradients.col(other) * centre.transpose();
+      }
+      element.bulging[0] += weight * slope.row(0).transpose() * slope.row(0);
+      element.bulging[1] += weight * slope.row(1).transpose() * slope.row(1);
+      element.bulging[2] +=
+          weight * (slope.row(0).transpose() * slope.row(1) + slope.row(1).transpose() * slope.row(0));
+    }
+  }
+  element.sideways.setZero();
+  for (Matrix6& form : element.tilting) {
+    form.setZero();
+  }
+  for (int k = 0; k < 3; ++k) {
+    const Vec2 edge = element.plane.col(next_corner(k)) - element.plane.col(k);
+    const Vec2 out = Vec2(edge.y(), -edge.x()).normalized();
+    const double tilt = element.edge_normals.col(k).head<2>().dot(out);
+    const Vec3 strain =
+        edge.squaredNorm() / (12 * element.area) * Vec3(out.x() * out.x(), out.y() * out.y(), 2 * out.x() * out.y());
+    element.sideways.col(2 * k) = tilt * strain;
+    element.sideways.col(2 * k + 1) = -tilt * strain;
+    for (int i = 0; i < 3; ++i) {
+      for (const int corner : {k, next_corner(k)}) {
+        auto row = element.tilting[static_cast<std::size_t>(i)].block<2, 2>(2 * k, 2 * corner);
+        row.row(0) = 0.5 * strain[i] * edge.normalized().transpose();
+        row.row(1) = -row.row(0);
+      }
+    }
+  }
+}
+
+/// The edges' directions, and what the corners' normals make of the slopes along them.
+void find_edges(const ShellSurface& surface, ShellElement& element) {
+  for (int k = 0; k < 3; ++k) {
+    Vec3 direction;
+    direction << element.plane.col(next_corner(k)) - element.plane.col(k), 0;
+    direction.normalize();
+    const std::array<Vec3, 2> normals{element.axes * surface.normals[static_cast<std::size_t>(k)],
+                                      element.axes * surface.normals[static_cast<std::size_t>(next_corner(k))]};
+    Vec3 m = normals[0] + normals[1];
+    m = (m - direction * direction.dot(m)).normalized();
+    element.edge_normals.col(k) = m;
+    element.edge_sides.col(k) = m.cross(direction);
+    for (int end = 0; end < 2; ++end) {
+      const double sine = normals[static_cast<std::size_t>(end)].dot(direction);
+      element.slopes[2 * k + end] = -sine / std::sqrt(1 - sine * sine);
+    }
+  }
+}
+
+/// Bending, and the higher-order membrane part: corners drill about the mean of their own and the facet's normal, as
+/// the turn of a surface that only bends has no part about the normal halfway.
+void find_rotational(const ShellSurface& surface, const PlaneStiffness& bending, const Mat3& higher_order,
+                     ShellElement& element) {
+  Matrix39 drilling = Matrix39::Zero();
+  element.curvature.setZero();
+  element.rotational.setZero();
+  for (int i = 0; i < 3; ++i) {
+    const Vec3 normal =
+        surface.curved ? Vec3(element.axes * surface.normals[static_cast<std::size_t>(i)]) : Vec3(Vec3::UnitZ());
+    drilling.block<1, 3>(i, 3 * i) << 0.5 * normal.x() / normal.z(), 0.5 * normal.y() / normal.z(), 1;
+    element.curvature.middleCols<2>(3 * i) = bending.mean_strain.middleCols<2>(3 * i + 1);
+    for (int j = 0; j < 3; ++j) {
+      element.rotational.block<2, 2>(3 * i, 3 * j) = bending.stiffness.block<2, 2>(3 * i + 1, 3 * j + 1);
+    }
+  }
+  element.rotational += drilling.transpose() * higher_order * drilling;
+}
+
 }  // namespace
 
-ShellElement make_shell_element(const std::array<Vec3, 3>& corners, const Material& material, double thickness,
-                                Membrane membrane, Bending bending, double higher_order_scale) {
+ShellElement make_shell_element(const std::array<Vec3, 3>& corners, const ShellSurface& surface,
+                                const Material& material, double thickness, Membrane membrane, Bending bending,
+                                double higher_order_scale) {
   ShellElement element;
   element.thickness = thickness;
   const Vec3 first = corners[1] - corners[0];
@@ -118,11 +461,21 @@ ShellElement make_shell_element(const std::array<Vec3, 3>& corners, const Materi
   find_frame(element.from_centroid, element.gradients, frame);
   element.axes = frame.axes;
   element.plane = frame.plane;
+  double spread = 1;  // area of the patch to that of the facet
+  element.curved = surface.curved;
+  if (surface.curved) {
+    find_edges(surface, element);
+    find_bulging(element);
+    for (int i = 0; i < 2; ++i) {
+      spread += element.slopes.dot(0.5 * element.bulging[static_cast<std::size_t>(i)] * element.slopes +
+                                   element.sideways.row(i).transpose());
+    }
+  }
 
   const Mat3 elasticity = plane_stress(material);
-  const PlaneStiffness in_plane = membrane == Membrane::cst
-                                      ? membrane_cst(triangle, elasticity, thickness)
-                                      : membrane_opt(triangle, elasticity, thickness, higher_order_scale);
+  const MembraneStiffness in_plane = membrane == Membrane::cst
+                                         ? membrane_cst(triangle, elasticity, thickness)
+                                         : membrane_opt(triangle, elasticity, thickness, higher_order_scale);
   PlaneStiffness out_of_plane;
   switch (bending) {
     case Bending::comas:
@@ -135,150 +488,189 @@ ShellElement make_shell_element(const std::array<Vec3, 3>& corners, const Materi
       out_of_plane = bending_dkt(triangle, elasticity, thickness);
       break;
   }
-  element.membrane = in_plane.stiffness;
-  element.membrane_strain = in_plane.mean_strain;
-  element.bending = out_of_plane.stiffness;
-  element.curvature = out_of_plane.mean_strain;
+  element.membrane = spread * in_plane.basic;
+  element.bow = in_plane.bow;
+  find_rotational(surface, out_of_plane, in_plane.higher_order, element);
+
+  element.rotational *= spread;
+  element.area *= spread;
+  if (surface.curved) {
+    element.rest_normals.setZero();
+    element.rest_sides.setZero();
+    Kinematics rest;
+    find_kinematics(element, still, rest);
+    for (int i = 0; i < 6; ++i) {
+      const EdgeNow& edge = rest.edges[static_cast<std::size_t>(i / 2)];
+      element.rest_normals[i] = edge.direction.dot(edge.normal[static_cast<std::size_t>(i % 2)]);
+      element.rest_sides[i] = edge.direction.dot(edge.side[static_cast<std::size_t>(i % 2)]);
+    }
+  }
   return element;
 }
 
-bool deformation(const ShellElement& element, const CornerMotion& motion, Vector18& result) {
-  Frame frame;
-  if (!find_frame(current_from_centroid(element, motion), element.gradients, frame)) {
+bool deformation(const ShellElement& element, const CornerMotion& motion, ElementState& result) {
+  Kinematics now;
+  if (!find_kinematics(element, motion, now)) {
     return false;
   }
-  result = deformation_in(element, motion, frame);
+  result = now.state;
   return true;
 }
 
-Vector18 element_force(const ShellElement& element, const Vector18& deformation) {
-  const Vector9 in_plane = element.membrane * gather(deformation, membrane_rows);
-  const Vector9 out_of_plane = element.bending * gather(deformation, bending_rows);
-  Vector18 force;
-  for (int i = 0; i < 9; ++i) {
-    force[membrane_rows[static_cast<std::size_t>(i)]] = in_plane[i];
-    force[bending_rows[static_cast<std::size_t>(i)]] = out_of_plane[i];
-  }
+ElementState element_force(const ShellElement& element, const ElementState& deformation) {
+  ElementState force;
+  force.head<3>().noalias() = element.membrane * deformation.head<3>();
+  force.tail<9>().noalias() = element.rotational * deformation.tail<9>();
   return force;
 }
 
-double strain_energy(const ShellElement& element, const Vector18& deformation) {
+double strain_energy(const ShellElement& element, const ElementState& deformation) {
   return 0.5 * deformation.dot(element_force(element, deformation));
 }
 
+namespace {
+
+/// What the derivatives need at the reference.
+struct Reference {
+  Derivatives derivatives;
+  std::array<Mat3, 3> h{Mat3::Identity(), Mat3::Identity(), Mat3::Identity()};
+  std::array<Mat3, 3> g;
+};
+
+Reference find_reference(const ShellElement& element) {
+  Kinematics now;
+  find_kinematics(element, still, now);
+  Mat23 gradients;
+  Reference reference;
+  reference.g = frame_spin(element, now.frame, gradients);
+  find_derivatives(element, now, reference.h, reference.g, reference.derivatives);
+  return reference;
+}
+
+}  // namespace
+
+ElementState linear_deformation(const ShellElement& element, const Vector18& motion) {
+  const Reference reference = find_reference(element);
+  Vector18 local;
+  for (int k = 0; k < 6; ++k) {
+    local.segment<3>(3 * k) = element.axes * motion.segment<3>(3 * k);
+  }
+  Vec3 spin = Vec3::Zero();
+  for (int k = 0; k < 3; ++k) {
+    spin += reference.g[static_cast<std::size_t>(k)] * local.segment<3>(6 * k);
+  }
+  ElementState state;
+  state.head<3>() = reference.derivatives.strain * local;
+  for (int k = 0; k < 3; ++k) {
+    state.segment<3>(3 + 3 * k) = local.segment<3>(6 * k + 3) - spin;
+  }
+  return state;
+}
+
 Matrix18 linear_stiffness(const ShellElement& element) {
-  Matrix18 stiffness;
-  fill(element, 1, stiffness);
+  const Reference reference = find_reference(element);
+  Matrix18 stiffness = Matrix18::Zero();
+  add_material(element, 1, reference.h, reference.g, reference.derivatives, stiffness);
   rotate_to_world(element.axes, stiffness);
   return stiffness;
 }
 
 bool corotational_response(const ShellElement& element, const CornerMotion& motion, const Viscous& viscous,
                            ElementResponse& response, Matrix18* tangent) {
-  Frame frame;
-  if (!find_frame(current_from_centroid(element, motion), element.gradients, frame)) {
+  Kinematics now;
+  if (!find_kinematics(element, motion, now)) {
     return false;
   }
-  response.deformation = deformation_in(element, motion, frame);
-  Vector18 local = element_force(element, response.deformation);
-  response.energy = 0.5 * response.deformation.dot(local);
+  response.deformation = now.state;
+  ElementState stress = element_force(element, now.state);
+  response.energy = 0.5 * now.state.dot(stress);
   if (viscous.factor > 0) {
-    local += viscous.factor * element_force(element, response.deformation - *viscous.previous);
+    stress += viscous.factor * element_force(element, now.state - *viscous.previous);
+  }
+  // What the membrane force does on slopes and rotations.
+  Vector6 on_slopes = Vector6::Zero();
+  Matrix6 slope_stiffness = Matrix6::Zero();
+  Matrix6 tilt_stiffness = Matrix6::Zero();
+  const Vec3 on_bows = element.bow.transpose() * stress.head<3>();
+  if (element.curved) {
+    for (int i = 0; i < 3; ++i) {
+      slope_stiffness += stress[i] * element.bulging[static_cast<std::size_t>(i)];
+      tilt_stiffness += stress[i] * element.tilting[static_cast<std::size_t>(i)];
+      on_slopes += stress[i] * element.sideways.row(i).transpose();
+    }
+    on_slopes += slope_stiffness * now.slopes + tilt_stiffness * now.bending();
+    const Vector6 on_bending = tilt_stiffness.transpose() * now.slopes;
+    for (int k = 0; k < 3; ++k) {
+      stress.segment<2>(3 + 3 * k) += on_bending.segment<2>(2 * k);
+    }
+  } else {
+    for (int k = 0; k < 3; ++k) {
+      stress[5 + 3 * k] += on_bows[(k + 2) % 3] - on_bows[k];
+    }
   }
 
-  // q: corners in the frame; n, m: forces and moments there; H: spin to rate of the rotation vector.
-  // Spin of the frame: sum of G_k times the (frame) displacement of corner k.
-  std::array<Vec3, 3> q, n, moment;
-  std::array<Mat3, 3> h, g;
-  Vec3 total = Vec3::Zero();
   Mat23 current_gradients;
+  const std::array<Mat3, 3> g = frame_spin(element, now.frame, current_gradients);
+  // Chord strain and rotation vectors: forces n and moments in the frame, and what keeps them in balance.
+  std::array<Vec3, 3> n, local_moment, moment, force;
+  std::array<Mat3, 3> h;
+  Vec3 total = Vec3::Zero();
   for (int k = 0; k < 3; ++k) {
     const auto s = static_cast<std::size_t>(k);
-    const Vec2 opposite = frame.plane.col((k + 1) % 3) - frame.plane.col((k + 2) % 3);
-    current_gradients.col(k) = Vec2(opposite.y(), -opposite.x()) / frame.twice_area;
-    q[s] << frame.plane.col(k), 0;
-    n[s] = local.segment<3>(6 * k);
-    h[s] = spin_to_rate(response.deformation.segment<3>(6 * k + 3));
-    moment[s] = h[s].transpose() * local.segment<3>(6 * k + 3);
-    total += q[s].cross(n[s]) + moment[s];
-    g[s] << 0, 0, current_gradients(1, k), 0, 0, -current_gradients(0, k), -element.gradients(1, k) / frame.trace,
-        element.gradients(0, k) / frame.trace, 0;
+    const Vec2 gk = element.gradients.col(k);
+    n[s] << stress[0] * gk.x() + stress[2] * gk.y(), stress[1] * gk.y() + stress[2] * gk.x(), 0;
+    local_moment[s] = stress.segment<3>(3 + 3 * k);
+    h[s] = spin_to_rate(now.rotation(k));
+    moment[s] = h[s].transpose() * local_moment[s];
+    total += Vec3(0, 0, now.frame.plane(0, k) * n[s].y() - now.frame.plane(1, k) * n[s].x()) + moment[s];
   }
-  Vector18 force;
+  Vector18 result;
   for (int k = 0; k < 3; ++k) {
     const auto s = static_cast<std::size_t>(k);
-    force.segment<3>(6 * k) = n[s] - g[s].transpose() * total;
-    force.segment<3>(6 * k + 3) = moment[s];
+    force[s] = n[s] - g[s].transpose() * total;
+    result.segment<3>(6 * k) = force[s];
+    result.segment<3>(6 * k + 3) = moment[s];
+  }
+  // Slopes and bows: one carried vector per end of an edge collects what works on both.
+  std::array<std::array<Vec3, 2>, 3> carried;
+  for (int k = 0; k < 3 && element.curved; ++k) {
+    const EdgeNow& edge = now.edges[static_cast<std::size_t>(k)];
+    for (int end = 0; end < 2; ++end) {
+      const auto e = static_cast<std::size_t>(end);
+      Vec3& v = carried[static_cast<std::size_t>(k)][e];
+      v = -on_slopes[2 * k + end] * edge.normal[e] - (end == 0 ? -on_bows[k] : on_bows[k]) * edge.side[e];
+      const Vec3 p = (v - edge.direction * edge.direction.dot(v)) / edge.length;
+      result.segment<3>(6 * next_corner(k)) += p;
+      result.segment<3>(6 * k) -= p;
+      result.segment<3>(6 * corner_at(k, end) + 3) += v.cross(edge.direction);
+    }
   }
   for (int k = 0; k < 6; ++k) {
-    response.force.segment<3>(3 * k) = frame.axes.transpose() * force.segment<3>(3 * k);
+    response.force.segment<3>(3 * k) = now.frame.axes.transpose() * result.segment<3>(3 * k);
   }
   if (tangent == nullptr) {
     return true;
   }
 
-  // Material part and the derivative of H.
+  Derivatives d;
+  find_derivatives(element, now, h, g, d);
   Matrix18& t = *tangent;
-  fill(element, 1 + viscous.factor, t);
-  for (int k = 0; k < 3; ++k) {
-    const auto s = static_cast<std::size_t>(k);
-    const Eigen::Matrix<double, 18, 3> columns = t.middleCols<3>(6 * k + 3) * h[s];
-    t.middleCols<3>(6 * k + 3) = columns;
-  }
-  for (int k = 0; k < 3; ++k) {
-    const auto s = static_cast<std::size_t>(k);
-    const Eigen::Matrix<double, 3, 18> rows = h[s].transpose() * t.middleRows<3>(6 * k + 3);
-    t.middleRows<3>(6 * k + 3) = rows;
-    t.block<3, 3>(6 * k + 3, 6 * k + 3) +=
-        spin_to_rate_derivative(response.deformation.segment<3>(6 * k + 3), local.segment<3>(6 * k + 3)) * h[s];
-  }
-  // The projector: deformations are what is left when the motion of the frame is taken away.
-  std::array<Mat3, 3> skew_q;
-  Eigen::Matrix<double, 18, 3> y = Eigen::Matrix<double, 18, 3>::Zero();
-  for (int k = 0; k < 3; ++k) {
-    const auto s = static_cast<std::size_t>(k);
-    skew_q[s] = skew(q[s]);
-    y += t.middleCols<3>(6 * k + 3);
-    y.noalias() -= t.middleCols<3>(6 * k) * skew_q[s];
-  }
-  for (int k = 0; k < 3; ++k) {
-    t.middleCols<3>(6 * k).noalias() -= y * g[static_cast<std::size_t>(k)];
-  }
-  Eigen::Matrix<double, 3, 18> z = Eigen::Matrix<double, 3, 18>::Zero();
-  for (int k = 0; k < 3; ++k) {
-    z += t.middleRows<3>(6 * k + 3);
-    z.noalias() += skew_q[static_cast<std::size_t>(k)] * t.middleRows<3>(6 * k);
-  }
-  for (int k = 0; k < 3; ++k) {
-    t.middleRows<3>(6 * k).noalias() -= g[static_cast<std::size_t>(k)].transpose() * z;
-  }
-  // Change of the projector: of the levers q, of G, and of the frame in which the force is expressed.
-  Mat3 levers = Mat3::Zero();
-  for (std::size_t k = 0; k < 3; ++k) {
-    levers += skew(n[k]) * skew_q[k];
-  }
-  const Vec2 swapped(-total.y(), total.x());
-  const double in_plane = total.z() / (frame.trace * frame.trace);
-  for (int i = 0; i < 3; ++i) {
-    const auto si = static_cast<std::size_t>(i);
-    const Vec2 gi = current_gradients.col(i);
-    for (int j = 0; j < 3; ++j) {
-      const auto sj = static_cast<std::size_t>(j);
-      auto block = t.block<3, 3>(6 * i, 6 * j);
-      block += g[si].transpose() * (skew(n[sj]) + levers * g[sj]);
-      block.block<1, 2>(2, 0) += swapped.dot(current_gradients.col(j)) * gi.transpose();
-      block.row(2) += (gi.x() * swapped.y() - gi.y() * swapped.x()) * g[sj].row(2);
-      block.block<2, 2>(0, 0) +=
-          in_plane * Vec2(-element.gradients(1, i), element.gradients(0, i)) * element.gradients.col(j).transpose();
+  t.setZero();
+  add_material(element, 1 + viscous.factor, h, g, d, t);
+  add_corotational_stiffness(element, now, n, local_moment, h, g, current_gradients, total, force, moment, t);
+  if (element.curved) {
+    const Matrix6x18 on_slope_changes = slope_stiffness * d.slopes + tilt_stiffness * d.bending;
+    const Matrix6x18 on_bending_changes = tilt_stiffness.transpose() * d.slopes;
+    t.noalias() += d.slopes.transpose() * on_slope_changes;
+    t.noalias() += d.bending.transpose() * on_bending_changes;
+    for (int k = 0; k < 3; ++k) {
+      for (int end = 0; end < 2; ++end) {
+        add_edge_stiffness(now.edges[static_cast<std::size_t>(k)], k, corner_at(k, end),
+                           carried[static_cast<std::size_t>(k)][static_cast<std::size_t>(end)], t);
+      }
     }
   }
-  for (int i = 0; i < 6; ++i) {
-    const Mat3 spun = skew(force.segment<3>(3 * i));
-    for (int j = 0; j < 3; ++j) {
-      t.block<3, 3>(3 * i, 6 * j) -= spun * g[static_cast<std::size_t>(j)];
-    }
-  }
-  rotate_to_world(frame.axes, t);
+  rotate_to_world(now.frame.axes, t);
   return true;
 }
 

@@ -120,10 +120,13 @@ void add_area_load(const ShellSystem& system, std::size_t element, const Vec3& p
   const Vec3 normal = e.axes.row(2).transpose();
   const double across = normal.dot(per_area);
   const Vec3 in_plane = (per_area - across * normal) * (e.area / 3);
-  const PlateLoad plate = plate_load(reference_corners(e));
+  const auto corners = reference_corners(e);
+  const PlateLoad plate = plate_load(corners);
+  // The patch has more area than its facet.
+  const double spread = 2 * e.area / (corners[1] - corners[0]).cross(corners[2] - corners[0]).norm();
   for (std::size_t k = 0; k < 3; ++k) {
-    load.force.segment<3>(at(e.nodes[k])) += in_plane + across * plate.force[k] * normal;
-    load.director[e.nodes[k]] += across * normal * plate.director[k].transpose();
+    load.force.segment<3>(at(e.nodes[k])) += in_plane + spread * across * plate.force[k] * normal;
+    load.director[e.nodes[k]] += spread * across * normal * plate.director[k].transpose();
   }
 }
 
@@ -234,14 +237,11 @@ void add_stiffness_norms(ShellSystem& system) {
   double translation = 0;
   double rotation = 0;
   for (const ShellElement& element : system.elements) {
-    for (int row = 0; row < 9; ++row) {
-      const bool membrane_moment = row % 3 == 2;
-      const bool bending_moment = row % 3 != 0;
-      for (int column = 0; column < 9; ++column) {
-        const double m = element.membrane(row, column) / (membrane_moment ? system.length : 1);
-        const double b = element.bending(row, column) / (bending_moment ? system.length : 1);
-        (column % 3 == 2 ? rotation : translation) += m * m;
-        rotation += column % 3 == 0 ? 0 : b * b;
+    const Matrix18 stiffness = linear_stiffness(element);
+    for (int row = 0; row < 18; ++row) {
+      for (int column = 0; column < 18; ++column) {
+        const double entry = stiffness(row, column) / (row % 6 < 3 ? 1 : system.length);
+        (column % 6 < 3 ? translation : rotation) += entry * entry;
       }
     }
   }
@@ -267,22 +267,26 @@ ShellSystem make_system(const Model& model) {
     for (std::size_t t = 0; t < body.mesh.triangles.size(); ++t) {
       const auto& v = body.mesh.triangles[t];
       const std::array<Vec3, 3> corners{body.mesh.vertices[v[0]], body.mesh.vertices[v[1]], body.mesh.vertices[v[2]]};
+      const Vec3 facet = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalized();
       const double thickness = mean_thickness(body, v);
-      const double scale =
-          body.membrane == Membrane::adapt
-              ? adapted_scale(corners, {at_vertices[v[0]], at_vertices[v[1]], at_vertices[v[2]]}, thickness)
-              : 1;
-      ShellElement element = make_shell_element(corners, body.material, thickness, body.membrane, body.bending, scale);
+      ShellSurface surface;
+      surface.curved = curved && body.membrane == Membrane::adapt;
+      std::array<Vec3, 3> bulge;  // the normals that tell how far the shell bulges over an edge
+      for (std::size_t k = 0; k < 3; ++k) {
+        surface.normals[k] = curved ? body.mesh.normal(t, static_cast<int>(k)) : facet;
+        bulge[k] = curved ? surface.normals[k] : at_vertices[v[k]];
+      }
+      const double scale = body.membrane == Membrane::adapt ? adapted_scale(corners, bulge, thickness) : 1;
+      ShellElement element =
+          make_shell_element(corners, surface, body.material, thickness, body.membrane, body.bending, scale);
       element.body = b;
-      std::array<Vec3, 3> normals;
       for (std::size_t k = 0; k < 3; ++k) {
         element.nodes[k] = v[k] + offset;
         system.used[element.nodes[k]] = 1;
-        normals[k] = curved ? body.mesh.normal(t, static_cast<int>(k)) : Vec3(element.axes.row(2).transpose());
         edges += (corners[(k + 1) % 3] - corners[k]).norm();
       }
-      system.normals.push_back(normals);
-      system.heights.push_back(patch_height(corners, normals));
+      system.normals.push_back(surface.normals);
+      system.heights.push_back(patch_height(corners, surface.normals));
       system.elements.push_back(element);
     }
     system.first_element.push_back(system.elements.size());
@@ -369,6 +373,7 @@ void evaluate(const ShellSystem& system, const Model& model, const Configuration
     parallel_for_blocks(colour.size(), grain, [&](std::size_t begin, std::size_t end) {
       ElementResponse response;
       Matrix18 stiffness;
+      Vector18 pushed;
       Vector9 load;
       Matrix9 load_stiffness;
       for (std::size_t i = begin; i < end; ++i) {
@@ -391,6 +396,16 @@ void evaluate(const ShellSystem& system, const Model& model, const Configuration
         }
         const double p = pressure[element.body];
         if (p == 0) {
+          continue;
+        }
+        if (element.curved) {
+          unit_pressure(element, motion, pushed, tangent == nullptr ? nullptr : &stiffness);
+          for (int k = 0; k < 3; ++k) {
+            forces.external.segment<6>(at(element.nodes[static_cast<std::size_t>(k)])) += p * pushed.segment<6>(6 * k);
+          }
+          if (tangent != nullptr) {
+            scatter(system.placement[e], stiffness, -p, *tangent);
+          }
           continue;
         }
         std::array<Vec3, 3> corners;

@@ -79,16 +79,16 @@ std::vector<double> load_factors(const Model& model, bool is_static, double time
 double factor_of(const Ramp& ramp, bool is_static, double time);
 
 struct ViscousState {
-  double factor = 0;                                ///< beta / dt
-  const std::vector<Vector18>* previous = nullptr;  ///< deformations at the start of the step
+  double factor = 0;                                    ///< beta / dt
+  const std::vector<ElementState>* previous = nullptr;  ///< deformations at the start of the step
 };
 
 struct Forces {
   VectorX internal;  ///< 6 per node: force, moment
   VectorX external;
   double energy = 0;
-  std::vector<Vector18> deformation;  ///< per element
-  bool valid = false;                 ///< false: an element has collapsed or folded by more than the normals allow
+  std::vector<ElementState> deformation;  ///< per element
+  bool valid = false;                     ///< false: an element has collapsed or folded by more than the normals allow
 };
 
 /// Internal and external forces, and d(internal - external)/d(displacement, spin) where `tangent` is given (its

@@ -26,7 +26,7 @@ State make_state(const ShellSystem& system, const Model& model, const Configurat
       motion.displacement.col(k) = configuration.displacement[node];
       motion.rotation[static_cast<std::size_t>(k)] = configuration.rotation[node].toRotationMatrix();
     }
-    Vector18 d;
+    ElementState d;
     if (deformation(element, motion, d)) {
       state.strain_energy += strain_energy(element, d);
     }
@@ -122,13 +122,15 @@ ElementFields ElementFieldEvaluator::operator()(const State& state) const {
     return Vec2(mean + radius, mean - radius);
   };
   for (const ShellElement& element : system.elements) {
-    Vector18 d = Vector18::Zero();
+    ElementState d = ElementState::Zero();
     if (state.linear) {
+      Vector18 moved;
       for (int k = 0; k < 3; ++k) {
         const Index node = element.nodes[static_cast<std::size_t>(k)];
-        d.segment<3>(6 * k) = element.axes * state.displacement[node];
-        d.segment<3>(6 * k + 3) = element.axes * state.rotation[node];
+        moved.segment<3>(6 * k) = state.displacement[node];
+        moved.segment<3>(6 * k + 3) = state.rotation[node];
       }
+      d = linear_deformation(element, moved);
     } else {
       CornerMotion motion;
       for (int k = 0; k < 3; ++k) {
@@ -138,15 +140,10 @@ ElementFields ElementFieldEvaluator::operator()(const State& state) const {
       }
       deformation(element, motion, d);
     }
-    Vector9 in_plane, out_of_plane;
-    for (int k = 0; k < 3; ++k) {
-      in_plane.segment<3>(3 * k) << d[6 * k], d[6 * k + 1], d[6 * k + 5];
-      out_of_plane.segment<3>(3 * k) << d[6 * k + 2], d[6 * k + 3], d[6 * k + 4];
-    }
     const double t = element.thickness;
     const Mat3 elasticity = plane_stress(model.shells[element.body].material);
-    const Vec3 strain = element.membrane_strain * in_plane;
-    const Vec3 curvature = element.curvature * out_of_plane;
+    const Vec3 strain = d.head<3>();
+    const Vec3 curvature = element.curvature * d.tail<9>();
     const Vec3 force = t * elasticity * strain;
     const Vec3 moment = t * t * t / 12 * elasticity * curvature;
     fields.membrane_force.push_back(force);

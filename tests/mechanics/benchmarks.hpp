@@ -17,7 +17,7 @@ namespace tunica::benchmarks {
 
 inline constexpr double pi = std::numbers::pi;
 
-enum class Diagonals { one, alternating, random };
+enum class Diagonals { one, alternating, random, other };
 
 struct Grid {
   std::vector<Vec2> parameters;  ///< in the unit square
@@ -27,7 +27,8 @@ struct Grid {
   [[nodiscard]] Index node(std::size_t i, std::size_t j) const { return static_cast<Index>(i * columns + j); }
 };
 
-/// nx x ny cells over the unit square, mapped. `random` moves the inner nodes by up to 0.15 of a cell, and draws
+/// nx x ny cells over the unit square, mapped. `one` cuts every cell from its first corner on, `other` across that;
+/// `random` moves the inner nodes by up to 0.15 of a cell, and draws
 /// diagonals and first vertices.
 inline Grid make_grid(std::size_t nx, std::size_t ny, const std::function<Vec3(double u, double v)>& map,
                       Diagonals diagonals = Diagonals::one) {

@@ -23,9 +23,16 @@ private:
   std::uniform_real_distribution<double> uniform_{-1, 1};
 };
 
+/// A triangle of a surface that curves.
 ShellElement some_element(Membrane membrane = Membrane::opt, Bending bending = Bending::dkt) {
-  return make_shell_element({Vec3(0.1, 0.2, 0.3), Vec3(1.3, 0.1, 0.5), Vec3(0.4, 1.1, -0.2)}, {1000, 0.3, {}}, 0.1,
-                            membrane, bending, 0.7);
+  const std::array<Vec3, 3> corners{Vec3(0.1, 0.2, 0.3), Vec3(1.3, 0.1, 0.5), Vec3(0.4, 1.1, -0.2)};
+  const Vec3 n = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalized();
+  Random random;
+  ShellSurface surface{{}, true};
+  for (Vec3& normal : surface.normals) {
+    normal = (n + random.vector(0.3)).normalized();
+  }
+  return make_shell_element(corners, surface, {1000, 0.3, {}}, 0.1, membrane, bending, 0.7);
 }
 
 /// A large rigid motion and a deformation of some 20 %.
@@ -72,9 +79,9 @@ TEST(Corotation, TangentIsTheGradientOfTheForce) {
   const CornerMotion motion = large_motion(element, random);
   ElementResponse response, plus, minus;
   Matrix18 tangent;
-  Vector18 previous;
-  for (int i = 0; i < 18; ++i) {
-    previous[i] = i % 6 == 2 ? 0 : random(0.1);
+  ElementState previous;
+  for (int i = 0; i < 12; ++i) {
+    previous[i] = random(0.1);
   }
   for (const double damping : {0.0, 0.7}) {
     const Viscous viscous{damping, &previous};
@@ -230,6 +237,64 @@ TEST(Pressure, PartOfThePatchIsInBalanceByItself) {
     moment += corners[static_cast<std::size_t>(k)].cross(difference);
   }
   EXPECT_LT(force.norm(), 1e-15);
+  EXPECT_LT(moment.norm(), 1e-14);
+}
+
+/// Volume between the facet and the origin, and between patch and facet.
+double volume_of(const ShellElement& element, const CornerMotion& motion) {
+  Vector18 force;
+  double patch = 0;
+  unit_pressure(element, motion, force, nullptr, &patch);
+  return patch;
+}
+
+TEST(Pressure, OnSlopesThatCountForceIsTheGradientOfTheVolume) {
+  Random random;
+  const ShellElement element = some_element();
+  const CornerMotion motion = large_motion(element, random);
+  Vector18 force;
+  unit_pressure(element, motion, force, nullptr);
+  const Mat3 x = element.from_centroid + motion.displacement;
+  const Vec3 facet = (x.col(1) - x.col(0)).cross(x.col(2) - x.col(0)) / 6;
+  constexpr double step = 1e-5;
+  for (int i = 0; i < 18; ++i) {
+    const double gradient =
+        (volume_of(element, moved(motion, i, step)) - volume_of(element, moved(motion, i, -step))) / (2 * step);
+    EXPECT_NEAR(force[i] - (i % 6 < 3 ? facet[i % 6] : 0), gradient, 1e-9) << i;
+  }
+}
+
+TEST(Pressure, OnSlopesThatCountStiffnessIsTheGradientOfTheForce) {
+  Random random;
+  const ShellElement element = some_element();
+  const CornerMotion motion = large_motion(element, random);
+  Vector18 force, plus, minus;
+  Matrix18 stiffness;
+  unit_pressure(element, motion, force, &stiffness);
+  constexpr double step = 1e-5;
+  for (int i = 0; i < 18; ++i) {
+    unit_pressure(element, moved(motion, i, step), plus, nullptr);
+    unit_pressure(element, moved(motion, i, -step), minus, nullptr);
+    EXPECT_LT(((plus - minus) / (2 * step) - stiffness.col(i)).norm(), 1e-9) << i;
+  }
+}
+
+TEST(Pressure, OnSlopesThatCountIsInBalance) {
+  Random random;
+  const ShellElement element = some_element();
+  const CornerMotion motion = large_motion(element, random);
+  Vector18 force;
+  unit_pressure(element, motion, force, nullptr);
+  const Mat3 x = element.from_centroid + motion.displacement;
+  const Vec3 facet = (x.col(1) - x.col(0)).cross(x.col(2) - x.col(0)) / 6;
+  Vec3 sum = Vec3::Zero();
+  Vec3 moment = Vec3::Zero();
+  for (int k = 0; k < 3; ++k) {
+    const Vec3 f = force.segment<3>(6 * k) - facet;
+    sum += f;
+    moment += x.col(k).cross(f) + force.segment<3>(6 * k + 3);
+  }
+  EXPECT_LT(sum.norm(), 1e-15);
   EXPECT_LT(moment.norm(), 1e-14);
 }
 

@@ -57,8 +57,11 @@ std::size_t zero_modes(const Eigen::MatrixXd& stiffness) {
 TEST(Laws, ExactlySixZeroModes) {
   for (const Choice& choice : choices) {
     for (const double scale : {1.0, 1e-4}) {
-      const ShellElement element = make_shell_element({Vec3(0.1, 0.2, 0.3), Vec3(1.3, 0.1, 0.5), Vec3(0.4, 1.1, -0.2)},
-                                                      {1000, 0.3, {}}, 0.1, choice.membrane, choice.bending, scale);
+      const std::array<Vec3, 3> corners{Vec3(0.1, 0.2, 0.3), Vec3(1.3, 0.1, 0.5), Vec3(0.4, 1.1, -0.2)};
+      const Vec3 n = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalized();
+      const ShellSurface surface{{n, (n + Vec3(0.1, -0.2, 0.1)).normalized(), n}, true};
+      const ShellElement element =
+          make_shell_element(corners, surface, {1000, 0.3, {}}, 0.1, choice.membrane, choice.bending, scale);
       EXPECT_EQ(zero_modes(linear_stiffness(element)), 6U);
     }
     for (const ShellMesh& mesh : {bumpy(), make_sphere(10, 1)}) {

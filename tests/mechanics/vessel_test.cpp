@@ -66,8 +66,21 @@ std::string message_of(const Model& model, const RunSettings& settings) {
   return "";
 }
 
-TEST(Vessel, TooThinAWallEndsWithTheLimitLoadNamed) {
-  const Model model = vessel(20, 10, 0.1, Membrane::cst);
+TEST(Vessel, ThinWallCarriesTheLoadThatTheMembraneCan) {
+  // Of 13 kPa 0.3 mm carry all; flat facets agree. Drilling moments against the facets made 2.8 kPa of it.
+  for (const Membrane membrane : {Membrane::adapt, Membrane::cst}) {
+    const State state = last_state(vessel(20, 10, 0.3, membrane), nonlinear_run({0.5, 1}));
+    EXPECT_TRUE(state.converged);
+    EXPECT_NEAR(largest(state), 10.2, 0.3);
+  }
+}
+
+class ThinVessel : public testing::TestWithParam<Membrane> {};
+INSTANTIATE_TEST_SUITE_P(Vessel, ThinVessel, testing::Values(Membrane::adapt, Membrane::cst),
+                         [](const auto& p) { return p.param == Membrane::cst ? "cst" : "adapt"; });
+
+TEST_P(ThinVessel, EndsWithTheLimitLoadNamed) {
+  const Model model = vessel(20, 10, 0.1, GetParam());
   for (const RunSettings& settings : {seconds(0.4), nonlinear_run({0.5, 1})}) {
     const std::string message = message_of(model, settings);
     EXPECT_THAT(message, testing::HasSubstr("limit load"));
