@@ -499,6 +499,27 @@ RunIdentity identity_of_run(const cli::Tool& tool, const Scene& scene, const std
   return identity;
 }
 
+// Modes have shapes, but no size: nothing of a deformed state is claimed.
+void report_modes(Json& result, const Summary& summary) {
+  for (const char* key : {"max_displacement_mm", "volume_after_mm3", "strain_energy_mj"}) {
+    result[key] = nullptr;
+  }
+  result["frequencies_hz"] = summary.frequencies;
+  result["buckling_factors"] = summary.buckling_factors;
+}
+
+std::string modes_note(const Summary& summary, std::size_t asked) {
+  const bool vibrates = !summary.frequencies.empty();
+  const std::vector<double>& values = vibrates ? summary.frequencies : summary.buckling_factors;
+  std::string text =
+      fmt::format("{} {}: {:.6g}", values.size(), vibrates ? "frequencies" : "buckling factors", values.front());
+  if (values.size() > 1) {
+    text += fmt::format(" to {:.6g}", values.back());
+  }
+  return fmt::format("{}{}{}", text, vibrates ? " Hz" : "",
+                     values.size() < asked ? fmt::format(", of {} asked for: there are no more", asked) : "");
+}
+
 void simulate(cli::Tool& tool, const Arguments& a) {
   const fs::path out = output_path(tool.arguments(), a);
   std::optional<cli::Tool::Stage> stage(std::in_place, tool, "read");
@@ -510,9 +531,13 @@ void simulate(cli::Tool& tool, const Arguments& a) {
   std::vector<fs::path> inputs;
   const Scene scene = read_scene_of_run(tool, a, journal, inputs);
   const auto* dynamic = std::get_if<DynamicRun>(&scene.run.kind);
+  const auto* frequencies = std::get_if<FrequencyRun>(&scene.run.kind);
+  const auto* buckling = std::get_if<BucklingRun>(&scene.run.kind);
+  const bool modes = frequencies != nullptr || buckling != nullptr;
+  const bool series = dynamic != nullptr || modes;
   // A run that goes on replaces what it has exported itself.
   const bool replace_exports = tool.force() || journal.has_value();
-  const ExportOptions exports{drawing.pvd, drawing.xmf, dynamic != nullptr, drawing.level(), replace_exports};
+  const ExportOptions exports{drawing.pvd, drawing.xmf, series, drawing.level(), replace_exports};
   if (!a.check) {
     tool.output(out);
     for (const fs::path& path : export_paths(out, exports)) {
@@ -545,8 +570,7 @@ void simulate(cli::Tool& tool, const Arguments& a) {
   const RunIdentity& origin = journal->identity();
 
   stage.emplace(tool, "write");
-  ResultFile file(out, model,
-                  {dynamic != nullptr, origin.command, origin.scene, origin.inputs, drawing.level(), tool.force()});
+  ResultFile file(out, model, {series, origin.command, origin.scene, origin.inputs, drawing.level(), tool.force()});
   std::optional<ResultExport> exported;
   if (drawing.pvd || drawing.xmf) {
     exported.emplace(out, model, exports);
@@ -602,6 +626,11 @@ void simulate(cli::Tool& tool, const Arguments& a) {
   }
   file.commit(converged);  // last: what is not renamed can still be resumed
   journal->remove();
+  if (modes) {
+    report_modes(tool.result(), summary);
+    tool.note(modes_note(summary, frequencies != nullptr ? frequencies->count : buckling->count));
+    return;
+  }
   tool.note(fmt::format("{} nodes in {} steps, {}: largest displacement {:.4g} mm", model.node_count(), summary.steps,
                         converged ? "converged" : "not asked to converge", summary.max_displacement));
   if (unresolved > 0) {

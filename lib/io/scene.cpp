@@ -36,13 +36,20 @@ void check_run(const Scene& scene) {
             fmt::format("{:.3g} steps are too many (at most {:.0e}): lengthen step or shorten duration",
                         dynamic->duration / dynamic->step, most_steps));
   }
+  const bool modes = std::holds_alternative<FrequencyRun>(run.kind) || std::holds_alternative<BucklingRun>(run.kind);
+  require(!modes || run.solver != Solver::cg,
+          places.of(places.keys.contains("solver")         ? "solver"
+                    : places.keys.contains("cg_tolerance") ? "cg_tolerance"
+                                                           : "cg_iterations"),
+          "frequencies and buckling factors need the direct solver: remove what asks for cg");
   require(run.cg_tolerance > 0 && run.cg_tolerance < 1, places.of("cg_tolerance"),
           "cg_tolerance must be greater than 0 and less than 1 (100%)");
   require(run.converge > 0 && run.converge < 1, places.of("converge"),
           "converge must be greater than 0 and less than 1");
 }
 
-void check_shell(const SceneShell& shell, bool dynamic) {
+/// @param needs_density  what of the run needs it; empty where nothing does
+void check_shell(const SceneShell& shell, std::string_view needs_density) {
   const Places& places = shell.places;
   require(!shell.name.empty(), places.of("name"), "name is empty");
   require(!shell.mesh.filename().empty(), places.of("mesh"), "mesh names no file");
@@ -54,8 +61,8 @@ void check_shell(const SceneShell& shell, bool dynamic) {
           fmt::format("poisson {} is outside (-1, 0.5)", shell.material.poisson));
   require(!shell.material.density || positive(*shell.material.density), places.of("density"),
           "density must be greater than zero");
-  require(!dynamic || shell.material.density, places.item,
-          fmt::format("[[shell]] \"{}\" has no density: a dynamic run needs it", shell.name));
+  require(needs_density.empty() || shell.material.density, places.item,
+          fmt::format("[[shell]] \"{}\" has no density: {} needs it", shell.name, needs_density));
 }
 
 std::vector<std::string> body_names(const Scene& scene) {
@@ -398,13 +405,16 @@ void settle_solver(Scene& scene) {
 
 void check_scene(const Scene& scene) {
   check_run(scene);
-  const bool dynamic = std::holds_alternative<DynamicRun>(scene.run.kind);
+  const std::string_view needs_density = std::holds_alternative<DynamicRun>(scene.run.kind) ? "a dynamic run"
+                                         : std::holds_alternative<FrequencyRun>(scene.run.kind)
+                                             ? "a run for frequencies"
+                                             : "";
   if (scene.shells.empty()) {
     throw InputError(scene.run_places.item.text + ": the scene has no [[shell]]: add one");
   }
   std::set<std::string> names;
   for (const SceneShell& shell : scene.shells) {
-    check_shell(shell, dynamic);
+    check_shell(shell, needs_density);
     require(names.insert(shell.name).second, shell.places.of("name"),
             fmt::format("there are two bodies named \"{}\"", shell.name));
   }

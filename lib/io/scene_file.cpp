@@ -18,6 +18,7 @@ namespace {
 constexpr std::size_t most_bytes = std::size_t{64} << 20;
 constexpr std::int64_t most_steps = 1'000'000'000;
 constexpr std::int64_t most_load_steps = 1'000'000;
+constexpr std::int64_t most_modes = 10'000;
 
 using Keys = std::span<const std::string_view>;
 
@@ -333,12 +334,17 @@ std::array<bool, 3> read_components(const Table& item, std::string_view key) {
   return held;
 }
 
-void read_static(const Table& run, StaticRun& settings) {
-  for (const std::string_view key : {"duration", "step", "damping", "integrator"}) {
+// Which kinds of run a key belongs to; `kind` is none of them.
+void refuse_keys(const Table& run, std::string_view kind, std::string_view owners,
+                 std::initializer_list<std::string_view> keys) {
+  for (const std::string_view key : keys) {
     if (run.has(key)) {
-      run.place(key).fail(fmt::format("{} belongs to a dynamic run, and kind is \"static\": remove it", key));
+      run.place(key).fail(fmt::format("{} belongs to a {} run, and kind is \"{}\": remove it", key, owners, kind));
     }
   }
+}
+
+void read_static(const Table& run, StaticRun& settings) {
   run.choice<bool>("geometry", settings.linear, {{"nonlinear", false}, {"linear", true}});
   if (run.has("load_steps") && run.has("load_factors")) {
     run.place("load_factors").fail("load_steps and load_factors contradict each other: give one");
@@ -362,11 +368,6 @@ void read_static(const Table& run, StaticRun& settings) {
 }
 
 void read_dynamic(const Table& run, DynamicRun& settings) {
-  for (const std::string_view key : {"load_steps", "load_factors", "control"}) {
-    if (run.has(key)) {
-      run.place(key).fail(fmt::format("{} belongs to a static run, and kind is \"dynamic\": remove it", key));
-    }
-  }
   bool linear = false;
   run.choice<bool>("geometry", linear, {{"nonlinear", false}, {"linear", true}});
   if (linear) {
@@ -402,28 +403,59 @@ double read_cg_tolerance(const Table& run) {
 }
 
 void read_run(const toml::table& table, const std::string& file, Scene& scene) {
-  constexpr std::array<std::string_view, 15> keys{
-      "kind",       "geometry", "load_steps",   "load_factors",  "control",  "duration",   "step", "damping",
-      "integrator", "solver",   "cg_tolerance", "cg_iterations", "converge", "newton_max", "every"};
-  constexpr std::array<std::string_view, 4> later{"max_steps", "max_factor", "until", "count"};
+  constexpr std::array<std::string_view, 16> keys{
+      "kind",       "geometry", "load_steps",   "load_factors",  "control",  "duration",   "step",  "damping",
+      "integrator", "solver",   "cg_tolerance", "cg_iterations", "converge", "newton_max", "every", "count"};
+  constexpr std::array<std::string_view, 3> later{"max_steps", "max_factor", "until"};
   const Table run(table, file, "[run]", keys, later);
   scene.run_places = run.places();
 
-  const std::string kind = run.text("kind");
-  if (kind == "frequencies" || kind == "buckling") {
-    throw UsageError(fmt::format("{}: kind = \"{}\": not available yet", run.place("kind").text, kind));
+  enum class Kind { is_static, dynamic, frequencies, buckling } kind = Kind::is_static;
+  const std::string name = run.text("kind");
+  run.choice<Kind>("kind", kind,
+                   {{"static", Kind::is_static},
+                    {"dynamic", Kind::dynamic},
+                    {"frequencies", Kind::frequencies},
+                    {"buckling", Kind::buckling}});
+  if (kind != Kind::dynamic) {
+    refuse_keys(run, name, "dynamic", {"duration", "step", "damping", "integrator"});
   }
-  bool dynamic = false;
-  run.choice<bool>("kind", dynamic, {{"static", false}, {"dynamic", true}});
-  if (dynamic) {
-    read_dynamic(run, scene.run.kind.emplace<DynamicRun>());
-  } else {
-    if (run.optional_text("control") == "arc-length") {
-      throw UsageError(fmt::format("{}: control = \"arc-length\": not available yet", run.place("control").text));
+  if (kind != Kind::frequencies && kind != Kind::buckling) {
+    refuse_keys(run, name, "frequencies or buckling", {"count"});
+  }
+  const auto read_count = [&](std::size_t& count) {
+    if (run.has("count")) {
+      count = run.count("count", most_modes);
     }
-    bool load_control = true;
-    run.choice<bool>("control", load_control, {{"load", true}});
-    read_static(run, scene.run.kind.emplace<StaticRun>());
+  };
+  switch (kind) {
+    case Kind::is_static: {
+      if (run.optional_text("control") == "arc-length") {
+        throw UsageError(fmt::format("{}: control = \"arc-length\": not available yet", run.place("control").text));
+      }
+      bool load_control = true;
+      run.choice<bool>("control", load_control, {{"load", true}});
+      read_static(run, scene.run.kind.emplace<StaticRun>());
+      break;
+    }
+    case Kind::dynamic:
+      refuse_keys(run, name, "static", {"load_steps", "load_factors", "control"});
+      read_dynamic(run, scene.run.kind.emplace<DynamicRun>());
+      break;
+    case Kind::frequencies: {
+      refuse_keys(run, name, "static", {"control"});
+      auto& frequencies = scene.run.kind.emplace<FrequencyRun>();
+      read_static(run, frequencies.preload);
+      if (frequencies.preload.linear) {
+        refuse_keys(run, name, "nonlinear", {"load_steps", "load_factors"});
+      }
+      read_count(frequencies.count);
+      break;
+    }
+    case Kind::buckling:
+      refuse_keys(run, name, "static", {"geometry", "load_steps", "load_factors", "control"});
+      read_count(scene.run.kind.emplace<BucklingRun>().count);
+      break;
   }
 
   run.choice<Solver>("solver", scene.run.solver,

@@ -82,34 +82,55 @@ private:
   std::string text_;
 };
 
+void write_load_factors(const std::vector<double>& factors, Text& text) {
+  const std::size_t steps = factors.size();
+  if (factors == equal_load_factors(steps)) {
+    text.line("load_steps", std::to_string(steps));
+    return;
+  }
+  std::vector<std::string> numbers;
+  for (const double factor : factors) {
+    numbers.push_back(number(factor));
+  }
+  text.line("load_factors", fmt::format("[{}]", fmt::join(numbers, ", ")));
+}
+
+void write_kind_of_run(const StaticRun& run, Text& text) {
+  text.word("kind", "static");
+  text.word("geometry", run.linear ? "linear" : "nonlinear");
+  text.word("control", "load");
+  write_load_factors(run.load_factors, text);
+}
+
+void write_kind_of_run(const DynamicRun& run, Text& text) {
+  text.word("kind", "dynamic");
+  text.word("geometry", "nonlinear");
+  text.value("duration", run.duration, "s", dimension::time);
+  text.value("step", run.step, "s", dimension::time);
+  text.line("damping",
+            fmt::format("{{mass = {}, stiffness = {}}}", toml_string(quantity(run.damping.mass, "/s", dimension::rate)),
+                        toml_string(quantity(run.damping.stiffness, "s", dimension::time))));
+  text.word("integrator", "backward-euler");
+}
+
+void write_kind_of_run(const FrequencyRun& run, Text& text) {
+  text.word("kind", "frequencies");
+  text.line("count", std::to_string(run.count));
+  text.word("geometry", run.preload.linear ? "linear" : "nonlinear");
+  if (!run.preload.linear) {
+    write_load_factors(run.preload.load_factors, text);
+  }
+}
+
+void write_kind_of_run(const BucklingRun& run, Text& text) {
+  text.word("kind", "buckling");
+  text.line("count", std::to_string(run.count));
+}
+
 void write_run(const Scene& scene, Text& text) {
   const RunSettings& run = scene.run;
   text.section("[run]");
-  if (const auto* dynamic = std::get_if<DynamicRun>(&run.kind)) {
-    text.word("kind", "dynamic");
-    text.word("geometry", "nonlinear");
-    text.value("duration", dynamic->duration, "s", dimension::time);
-    text.value("step", dynamic->step, "s", dimension::time);
-    text.line("damping", fmt::format("{{mass = {}, stiffness = {}}}",
-                                     toml_string(quantity(dynamic->damping.mass, "/s", dimension::rate)),
-                                     toml_string(quantity(dynamic->damping.stiffness, "s", dimension::time))));
-    text.word("integrator", "backward-euler");
-  } else {
-    const auto& statics = std::get<StaticRun>(run.kind);
-    text.word("kind", "static");
-    text.word("geometry", statics.linear ? "linear" : "nonlinear");
-    text.word("control", "load");
-    const std::size_t steps = statics.load_factors.size();
-    if (statics.load_factors == equal_load_factors(steps)) {
-      text.line("load_steps", std::to_string(steps));
-    } else {
-      std::vector<std::string> factors;
-      for (const double factor : statics.load_factors) {
-        factors.push_back(number(factor));
-      }
-      text.line("load_factors", fmt::format("[{}]", fmt::join(factors, ", ")));
-    }
-  }
+  std::visit([&](const auto& kind) { write_kind_of_run(kind, text); }, run.kind);
   text.word("solver", run.solver == Solver::cg ? "cg" : run.solver == Solver::direct ? "direct" : "auto");
   if (scene.cg_tolerance_stated) {
     text.line("cg_tolerance", number(run.cg_tolerance));

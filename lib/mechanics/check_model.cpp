@@ -150,6 +150,46 @@ void check_selections(const Model& model) {
   }
 }
 
+void require_densities(const Model& model, const char* kind) {
+  for (const ShellBody& body : model.shells) {
+    if (!body.material.density) {
+      refuse(body, fmt::format("{} needs its density", kind));
+    }
+  }
+}
+
+void check_load_factors(const StaticRun& run) {
+  double previous = 0;
+  for (const double factor : run.load_factors) {
+    if (!std::isfinite(factor) || factor <= previous) {
+      throw InputError("the load factors must be positive and increase");
+    }
+    previous = factor;
+  }
+  if (run.load_factors.empty()) {
+    throw InputError("a static run needs at least one load factor");
+  }
+}
+
+bool prescribes(const Fix& fix) {
+  for (int c = 0; c < 3; ++c) {
+    if (fix.translation[static_cast<std::size_t>(c)] && fix.displacement[c] != 0) {
+      return true;
+    }
+  }
+  return false;
+}
+
+bool is_loaded(const Model& model) {
+  return !model.loads.empty() || std::any_of(model.fixes.begin(), model.fixes.end(), prescribes);
+}
+
+/// Whether a state of rest is looked for, so that nothing may move freely.
+bool finds_rest(const Model& model, const RunSettings& settings) {
+  return std::holds_alternative<StaticRun>(settings.kind) || std::holds_alternative<BucklingRun>(settings.kind) ||
+         (std::holds_alternative<FrequencyRun>(settings.kind) && is_loaded(model));
+}
+
 void check_run(const Model& model, const RunSettings& settings) {
   const auto positive = [](double value) { return value > 0 && std::isfinite(value); };
   if (const auto* dynamic = std::get_if<DynamicRun>(&settings.kind)) {
@@ -159,23 +199,24 @@ void check_run(const Model& model, const RunSettings& settings) {
     if (!(dynamic->damping.mass >= 0) || !(dynamic->damping.stiffness >= 0)) {
       throw InputError("damping must not be negative");
     }
-    for (const ShellBody& body : model.shells) {
-      if (!body.material.density) {
-        refuse(body, "a dynamic run needs its density");
-      }
+    require_densities(model, "a dynamic run");
+  } else if (const auto* frequencies = std::get_if<FrequencyRun>(&settings.kind)) {
+    require_densities(model, "a run for frequencies");
+    check_load_factors(frequencies->preload);
+  } else if (std::holds_alternative<BucklingRun>(settings.kind)) {
+    if (!is_loaded(model)) {
+      throw InputError("buckling needs a load or a prescribed displacement");
     }
   } else {
-    const auto& factors = std::get<StaticRun>(settings.kind).load_factors;
-    double previous = 0;
-    for (const double factor : factors) {
-      if (!std::isfinite(factor) || factor <= previous) {
-        throw InputError("the load factors must be positive and increase");
-      }
-      previous = factor;
-    }
-    if (factors.empty()) {
-      throw InputError("a static run needs at least one load factor");
-    }
+    check_load_factors(std::get<StaticRun>(settings.kind));
+  }
+  const auto* frequencies = std::get_if<FrequencyRun>(&settings.kind);
+  const auto* buckling = std::get_if<BucklingRun>(&settings.kind);
+  if ((frequencies != nullptr && frequencies->count == 0) || (buckling != nullptr && buckling->count == 0)) {
+    throw InputError("count must be at least 1");
+  }
+  if ((frequencies != nullptr || buckling != nullptr) && settings.solver == Solver::cg) {
+    throw InputError("frequencies and buckling factors need the direct solver: remove what asks for cg");
   }
   if (settings.newton_max == 0 || settings.every == 0 || !positive(settings.converge)) {
     throw InputError("newton_max and every must be at least 1, and converge positive");
@@ -228,7 +269,7 @@ void check_model(const Model& model, const RunSettings& settings) {
   check_run(model, settings);
   const ShellSystem system = make_system(model);
   check_balance(system, model);
-  if (std::holds_alternative<StaticRun>(settings.kind)) {
+  if (finds_rest(model, settings)) {
     for (const Piece& piece : system.pieces) {
       const int motions = free_rigid_motions(system, piece);
       if (motions > 0) {

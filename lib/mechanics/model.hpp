@@ -137,6 +137,19 @@ struct StaticRun {
   std::vector<double> load_factors;  ///< increasing; the last is usually 1
 };
 
+/// Natural frequencies about the reference, or, where there are loads or prescribed displacements, about the state of
+/// rest under them.
+struct FrequencyRun {
+  std::size_t count = 10;
+  StaticRun preload;  ///< how that state is found
+};
+
+/// Factors of the loads (and prescribed displacements) at which the stiffness about the linear solution under them,
+/// growing in proportion, becomes singular.
+struct BucklingRun {
+  std::size_t count = 10;
+};
+
 struct DynamicRun {
   double duration = 0;  ///< s
   double step = 0;      ///< s
@@ -145,7 +158,7 @@ struct DynamicRun {
 };
 
 struct RunSettings {
-  std::variant<StaticRun, DynamicRun> kind;
+  std::variant<StaticRun, DynamicRun, FrequencyRun, BucklingRun> kind;
   Solver solver = Solver::automatic;
   double cg_tolerance = 1e-10;               ///< relative residual at which a CG solve stops
   std::optional<std::size_t> cg_iterations;  ///< at most this many CG iterations in a solve

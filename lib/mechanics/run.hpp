@@ -30,6 +30,19 @@ Summary run_static(ShellSystem& system, const Model& model, const RunSettings& s
 Summary run_linear(ShellSystem& system, const Model& model, const RunSettings& settings, const StaticRun& run,
                    const StateCallback& on_state, const Progress& progress, const Resumption& resumption);
 
+/// Natural frequencies and modes. Masses are lumped as in a dynamic run; bodies held by their rigid motions are free,
+/// and free rigid motions are left out. Errors: RequirementError: no stable state under the loads; the eigenvalues do
+/// not converge.
+Summary run_frequencies(ShellSystem& system, const Model& model, const RunSettings& settings, const FrequencyRun& run,
+                        const StateCallback& on_state, const Progress& progress);
+
+/// The smallest positive factors of the loads at which K0 + factor K1 is singular: K0 the linear stiffness, K1 the
+/// derivative of the whole tangent (stress, change of shape, follower pressure) along the linear solution. Its
+/// unsymmetric part (applied moments, pressure at free edges) is left out.
+/// Errors: RequirementError: the loads buckle nothing before they strain it by 20 %; the eigenvalues do not converge.
+Summary run_buckling(ShellSystem& system, const Model& model, const RunSettings& settings, const BucklingRun& run,
+                     const StateCallback& on_state, const Progress& progress);
+
 /// Time steps by backward Euler. Errors: RequirementError.
 Summary run_dynamic(ShellSystem& system, const Model& model, const RunSettings& settings, const DynamicRun& run,
                     const StateCallback& on_state, const Progress& progress, const Resumption& resumption);

@@ -86,6 +86,12 @@ Summary solve(const Model& model, const RunSettings& settings, const std::functi
   if (const auto* dynamic = std::get_if<DynamicRun>(&settings.kind)) {
     return run_dynamic(system, model, settings, *dynamic, on_state, progress, resumption);
   }
+  if (const auto* frequencies = std::get_if<FrequencyRun>(&settings.kind)) {
+    return run_frequencies(system, model, settings, *frequencies, on_state, progress);
+  }
+  if (const auto* buckling = std::get_if<BucklingRun>(&settings.kind)) {
+    return run_buckling(system, model, settings, *buckling, on_state, progress);
+  }
   const auto& run = std::get<StaticRun>(settings.kind);
   return run.linear ? run_linear(system, model, settings, run, on_state, progress, resumption)
                     : run_static(system, model, settings, run, on_state, progress, resumption);
@@ -110,7 +116,8 @@ ElementFields ElementFieldEvaluator::operator()(const State& state) const {
   std::vector<double> pressure(model.shells.size(), 0);
   for (const Load& load : model.loads) {
     if (const auto* p = std::get_if<PressureLoad>(&load.kind)) {
-      pressure[load.body] += p->value * factor_of(load.ramp, state.velocity.empty(), state.time);
+      pressure[load.body] += p->value * factor_of(load.ramp, state.velocity.empty(),
+                                                  state.velocity.empty() ? state.load_factor : state.time);
     }
   }
   const auto von_mises = [](const Vec3& s) {

@@ -15,7 +15,8 @@ namespace tunica {
 
 /// One state of a run, as handed to the callback; everything is for all nodes of all bodies in global order.
 struct State {
-  double time = 0;                     ///< s; the load factor in a static run
+  /// s; the load factor in a static run, the frequency (Hz) or the buckling factor of a mode.
+  double time = 0;
   double load_factor = 0;              ///< static: of this step; dynamic: of the first load's ramp
   std::vector<Vec3> displacement;      ///< mm, #nodes
   std::vector<Vec3> rotation;          ///< rotation vectors, rad, #nodes
@@ -63,6 +64,8 @@ struct Summary {
   double strain_energy = 0;              ///< mJ
   double max_displacement = 0;           ///< mm, of the last state
   std::vector<double> seconds_per_step;  ///< wall
+  std::vector<double> frequencies;       ///< Hz, increasing
+  std::vector<double> buckling_factors;  ///< increasing
 };
 
 /// Everything a run needs to go on after a step as if nothing had happened: the numbers as they stand in memory, so
@@ -97,7 +100,9 @@ struct Resumption {
 /// Errors: InputError.
 void check_model(const Model& model, const RunSettings& settings);
 
-/// Runs a model. Every `settings.every`-th state, the reference state (time 0) and the last one go to `on_state`.
+/// Runs a model. Every `settings.every`-th state, the reference state (time 0) and the last one go to `on_state`. After
+/// the reference, a run for frequencies or buckling hands over its modes: linear states, their largest displacement 1 %
+/// of the model's longest side.
 /// Errors: InputError as check_model; RequirementError when a step does not converge, has no equilibrium, or becomes
 /// unstable (the last good state has been handed over). With `cg_fixed_count` a run ends normally, `converged` false.
 /// A run that goes on from a checkpoint must have the model and the settings of the run that made it.

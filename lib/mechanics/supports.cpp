@@ -135,19 +135,40 @@ void release_rigid_motion_supports(ShellSystem& system, const Model& model) {
 }
 
 int free_rigid_motions(const ShellSystem& system, const Piece& piece) {
+  return static_cast<int>(free_rigid_modes(system, piece, reference_configuration(system)).size());
+}
+
+std::vector<VectorX> free_rigid_modes(const ShellSystem& system, const Piece& piece,
+                                      const Configuration& configuration) {
   const Vec3 centre = centre_of(system, piece);
   const double size = size_of(system, piece, centre);
+  const auto row_of = [&](Index node, int component) {
+    return rigid_row(system.reference[node] - centre + configuration.displacement[node], size, component);
+  };
   Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
   for (const Index i : piece.nodes) {
     for (int c = 0; c < 6; ++c) {
       if (system.held[6 * std::size_t{i} + static_cast<std::size_t>(c)]) {
-        const Row6 row = rigid_row(system.reference[i] - centre, size, c);
+        const Row6 row = row_of(i, c);
         normal += row.transpose() * row;
       }
     }
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> eigen(normal, Eigen::EigenvaluesOnly);
-  return static_cast<int>((eigen.eigenvalues().array() < 1e-10).count());
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> eigen(normal);
+  std::vector<VectorX> modes;
+  for (int k = 0; k < 6; ++k) {
+    if (eigen.eigenvalues()[k] < 1e-10) {
+      VectorX mode = VectorX::Zero(6 * static_cast<Eigen::Index>(system.node_count()));
+      for (const Index i : piece.nodes) {
+        for (int c = 0; c < 6; ++c) {
+          const double motion = row_of(i, c) * eigen.eigenvectors().col(k);
+          mode[6 * static_cast<Eigen::Index>(i) + c] = c < 3 ? motion : motion / size;
+        }
+      }
+      modes.push_back(mode);
+    }
+  }
+  return modes;
 }
 
 double imbalance(const ShellSystem& system, const Piece& piece, const VectorX& external) {

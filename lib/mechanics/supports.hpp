@@ -12,6 +12,11 @@ void make_supports(ShellSystem& system, const Model& model);
 /// Number of rigid motions of a piece that its held freedoms leave free (0 ... 6).
 int free_rigid_motions(const ShellSystem& system, const Piece& piece);
 
+/// The rigid motions of a piece, displaced as in `configuration`, that its held freedoms leave free: 6 per node, of all
+/// nodes; lengths of order one.
+std::vector<VectorX> free_rigid_modes(const ShellSystem& system, const Piece& piece,
+                                      const Configuration& configuration);
+
 /// Net force and moment of all loads at their full value on a piece, relative to the sum of their magnitudes.
 double imbalance(const ShellSystem& system, const Piece& piece, const VectorX& external);
 
