@@ -66,6 +66,45 @@ inline Grid make_grid(std::size_t nx, std::size_t ny, const std::function<Vec3(d
   return grid;
 }
 
+/// Icosahedron, every face cut into frequency^2 triangles, on the sphere: 20 x frequency^2, with the sphere's normals.
+inline ShellMesh make_geodesic(double radius, std::size_t frequency) {
+  const double g = (1 + std::sqrt(5.0)) / 2;
+  const std::vector<Vec3> corners{{-1, g, 0},  {1, g, 0},  {-1, -g, 0}, {1, -g, 0}, {0, -1, g},  {0, 1, g},
+                                  {0, -1, -g}, {0, 1, -g}, {g, 0, -1},  {g, 0, 1},  {-g, 0, -1}, {-g, 0, 1}};
+  const std::vector<std::array<Index, 3>> faces{{0, 11, 5}, {0, 5, 1},  {0, 1, 7},   {0, 7, 10}, {0, 10, 11},
+                                                {1, 5, 9},  {5, 11, 4}, {11, 10, 2}, {10, 7, 6}, {7, 1, 8},
+                                                {3, 9, 4},  {3, 4, 2},  {3, 2, 6},   {3, 6, 8},  {3, 8, 9},
+                                                {4, 9, 5},  {2, 4, 11}, {6, 2, 10},  {8, 6, 7},  {9, 8, 1}};
+  ShellMesh mesh;
+  // A node by what its corners weigh: shared edges give the same key.
+  std::map<std::map<Index, std::size_t>, Index> nodes;
+  for (const auto& [a, b, c] : faces) {
+    const auto node = [&, a = a, b = b, c = c](std::size_t i, std::size_t j) {
+      std::map<Index, std::size_t> key{{a, frequency - i - j}, {b, i}, {c, j}};
+      std::erase_if(key, [](const auto& entry) { return entry.second == 0; });
+      const auto [place, is_new] = nodes.emplace(key, static_cast<Index>(mesh.vertices.size()));
+      if (is_new) {
+        Vec3 point = Vec3::Zero();
+        for (const auto& [corner, weight] : key) {
+          point += static_cast<double>(weight) * corners[corner];
+        }
+        mesh.normals.push_back(point.normalized());
+        mesh.vertices.emplace_back(radius * point.normalized());
+      }
+      return place->second;
+    };
+    for (std::size_t i = 0; i < frequency; ++i) {
+      for (std::size_t j = 0; i + j < frequency; ++j) {
+        mesh.triangles.push_back({node(i, j), node(i + 1, j), node(i, j + 1)});
+        if (i + j + 1 < frequency) {
+          mesh.triangles.push_back({node(i + 1, j), node(i + 1, j + 1), node(i, j + 1)});
+        }
+      }
+    }
+  }
+  return mesh;
+}
+
 /// Icosahedron split `levels` times onto the sphere: 20 x 4^levels triangles, with the sphere's normals.
 inline ShellMesh make_sphere(double radius, int levels) {
   const double g = (1 + std::sqrt(5.0)) / 2;

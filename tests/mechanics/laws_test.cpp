@@ -226,5 +226,77 @@ TEST(Laws, ManyLoadStepsOfALinearRunAreProportional) {
   EXPECT_LT(difference(states[2], states[1]), 1e-12);
 }
 
+/// An irregular flat patch, 10 x 6, its inner nodes moved and its vertices renamed.
+Model flat_patch(const Choice& choice, Grid& grid) {
+  grid = make_grid(
+      5, 3, [](double u, double v) { return Vec3(10 * u, 6 * v, 0); }, Diagonals::random);
+  Model model;
+  model.shells.push_back(flat_body(grid.mesh, 1000, 0.3, 0.5));
+  model.shells[0].membrane = choice.membrane;
+  model.shells[0].bending = choice.bending;
+  return model;
+}
+
+bool on_boundary(const Vec3& x) { return std::min({x.x(), 10 - x.x(), x.y(), 6 - x.y()}) < 1e-9; }
+
+TEST(Laws, AssembledPatchOfConstantMembraneStrain) {
+  const auto exact = [](const Vec3& x) {
+    return Vec3(1e-3 * (2 * x.x() + 0.5 * x.y()), 1e-3 * (0.5 * x.x() - x.y()), 0);
+  };
+  for (const Choice& choice : choices) {
+    Grid grid;
+    Model model = flat_patch(choice, grid);
+    for (std::size_t i = 0; i < grid.mesh.vertices.size(); ++i) {
+      if (on_boundary(grid.mesh.vertices[i])) {
+        model.fixes.push_back(
+            {0, {static_cast<Index>(i)}, {true, true, true}, {true, true, true}, exact(grid.mesh.vertices[i]), {}});
+      }
+    }
+    const State state = last_state(model, linear_run());
+    for (std::size_t i = 0; i < grid.mesh.vertices.size(); ++i) {
+      EXPECT_LT((state.displacement[i] - exact(grid.mesh.vertices[i])).norm(), 1e-10 * 0.02) << i;
+      EXPECT_LT(state.rotation[i].norm(), 1e-10 * 2e-3) << i;
+    }
+    const ElementFields fields = element_fields(model, state);
+    for (std::size_t t = 0; t < grid.mesh.triangles.size(); ++t) {
+      // The trace of the force is the same in every element's axes: E t / (1 - nu) (e_xx + e_yy).
+      EXPECT_NEAR(fields.membrane_force[t][0] + fields.membrane_force[t][1], 1000 * 0.5 / 0.7 * 1e-3, 1e-10);
+    }
+  }
+}
+
+TEST(Laws, AssembledPatchOfConstantCurvature) {
+  // Moments m along two opposite edges of a plate with nu = 0 bend it to w = m x^2 / (2 D).
+  for (const Choice& choice : choices) {
+    Grid grid;
+    Model model = flat_patch(choice, grid);
+    model.shells[0].material.poisson = 0;
+    hold(
+        model, [](const Vec3& x) { return x.x() < 1e-9; }, "xz", "yz");
+    model.fixes.push_back({0, {grid.node(0, 0)}, {false, true, false}, {false, false, false}, Vec3::Zero(), {}});
+    hold(
+        model, [](const Vec3&) { return true; }, "", "z");
+    const double m = 1e-3;
+    for (std::size_t j = 0; j < 3; ++j) {
+      for (const std::size_t end : {j, j + 1}) {
+        model.loads.push_back({0, MomentLoad{{grid.node(5, end)}, Vec3(0, -m * 2 / 2, 0)}, {}});
+      }
+    }
+    const State state = last_state(model, linear_run());
+    const double rigidity = 1000 * 0.125 / 12;
+    double worst = 0;
+    for (std::size_t i = 0; i < grid.mesh.vertices.size(); ++i) {
+      const double x = grid.mesh.vertices[i].x();
+      worst = std::max(worst, std::abs(state.displacement[i].z() - m * x * x / (2 * rigidity)));
+    }
+    const double largest = m * 100 / (2 * rigidity);
+    if (choice.bending == Bending::comas) {
+      EXPECT_GT(worst, 0.01 * largest);  // the paper's element
+    } else {
+      EXPECT_LT(worst, 1e-10 * largest);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace tunica

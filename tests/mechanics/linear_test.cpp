@@ -101,6 +101,33 @@ double hemisphere(std::size_t n, const Elements& elements, Diagonals diagonals =
   return state.displacement[grid.node(0, 0)].x() / (0.0940 * 0.9945);
 }
 
+/// Without a hole: an octant of the sphere, cut like the face of an octahedron, its pole included.
+double whole_hemisphere(std::size_t n, const Elements& elements) {
+  ShellMesh mesh;
+  const auto node = [&](std::size_t i, std::size_t j) { return static_cast<Index>(i * (2 * n + 3 - i) / 2 + j); };
+  for (std::size_t i = 0; i <= n; ++i) {
+    for (std::size_t j = 0; i + j <= n; ++j) {
+      const Vec3 p(static_cast<double>(n - i - j), static_cast<double>(i), static_cast<double>(j));
+      mesh.vertices.emplace_back(10 * p.normalized());
+      if (i + j < n) {
+        mesh.triangles.push_back({node(i, j), node(i + 1, j), node(i, j + 1)});
+      }
+      if (i + j + 1 < n) {
+        mesh.triangles.push_back({node(i + 1, j), node(i + 1, j + 1), node(i, j + 1)});
+      }
+    }
+  }
+  Model model = one_shell(flat_body(mesh, 6.825e7, 0.3, 0.04), elements, [](const Vec3& p) { return p; });
+  hold(
+      model, [](const Vec3& p) { return std::abs(p.y()) < eps; }, "y", "xz");
+  hold(
+      model, [](const Vec3& p) { return std::abs(p.x()) < eps; }, "x", "yz");
+  model.fixes.push_back({0, {node(0, 0)}, {false, false, true}, {false, false, false}, Vec3::Zero(), {}});
+  model.loads.push_back({0, ForceLoad{{node(0, 0)}, Vec3(1, 0, 0)}, {}});
+  model.loads.push_back({0, ForceLoad{{node(n, 0)}, Vec3(0, -1, 0)}, {}});
+  return last_state(model, linear_run()).displacement[node(0, 0)].x() / 0.0924;
+}
+
 double clamped_plate(std::size_t n, const Elements& elements, Diagonals diagonals = Diagonals::one,
                      bool simply = false) {
   const Grid grid = make_grid(
@@ -202,6 +229,14 @@ TEST(Linear, HemisphereWithHole) {
   }
   // OPT alone locks there.
   EXPECT_LT(hemisphere(8, {Membrane::opt, Bending::dkt, Rest::flat}), 0.55);
+}
+
+TEST(Linear, WholeHemisphere) {
+  for (const Elements& elements : {adapt, curved}) {
+    EXPECT_NEAR(whole_hemisphere(8, elements), 1, 0.05);
+    EXPECT_NEAR(whole_hemisphere(16, elements), 1, 0.015);
+    EXPECT_NEAR(whole_hemisphere(32, elements), 1, 0.005);
+  }
 }
 
 TEST(Linear, ThinTwistedBeam) {
