@@ -1,0 +1,176 @@
+#!/usr/bin/python3
+"""Draws the charts of docs/accuracy.md from the tools' own reports: time against TRUE error.
+
+    TUNICA_BIN=build/release/bin PYTHONPATH=tests/support tests/bench/charts.py OUT_FOLDER [FOLDER_OF_THE_PAPERS_MESHES]
+
+True error: of the elements the largest difference at the probes to a run with 46,000 shells (tunica-chart --reference);
+of solvers the largest difference of any node in any state to the converged run on the same mesh, relative to the
+largest displacement, which is added to the reports as `study`. The paper's meshes aneurysm200.obj ... aneurysm1000.obj
+are in the history of the authors' plugin (SofaDefrost/Shell, June 2010); without them Fig. 6 is left out.
+"""
+import json
+import math
+import os
+import subprocess
+import sys
+import tempfile
+
+import numpy as np
+
+from published import Bench, load, probe, run_lines, shell, vessel, write_ply
+
+CHART = os.path.join(os.environ["TUNICA_BIN"], "tunica-chart")
+ENDS = "[[fix]]\nbody = \"s\"\nwhere = {boundary = true}\ntranslation = \"xyz\"\nrotation = \"xyz\"\n"
+PROBES = (probe("neck", (10 + 10 * math.exp(-2.25), 0.0, 15.0)) + probe("top", (20.0, 0.0, 30.0)) +
+          probe("back", (-10.0, 0.0, 30.0)))
+RAMP = "ramp = [[\"0s\", 0.0], [\"1s\", 1.0]]\n"
+PAPER = {"membrane": "cst", "bending": "comas", "rest": "flat"}
+
+
+class Study(Bench):
+    def __init__(self, folder, out):
+        super().__init__(folder)
+        self.out = out
+        self.failed = []
+
+    def chart(self, name, reports, *options):
+        """Draws the reports; what tunica-chart left out is said."""
+        done = subprocess.run([CHART, *[report + ".json" for report in reports], "-o", os.path.join(self.out, name),
+                               "--force", "--series", "study.series", *options], cwd=self.folder, capture_output=True,
+                              text=True, check=False)
+        print(name, done.stderr.strip())
+        if done.returncode != 0:
+            sys.exit(done.returncode)
+
+    def measured(self, scene, name, series, exact=None, **more):
+        """Runs on one thread; adds the series and, against `exact`, the true error. @return all displacements, or none
+        where the run failed"""
+        result = self.run(scene, name, threads=1, check=False)
+        with open(self.path(name + ".json"), encoding="utf-8") as file:
+            report = json.load(file)
+        report["study"] = {"series": series, **more}
+        u = None
+        if self.code != 0:
+            print(f"{name}: exit {self.code}: {self.error}")
+            self.failed.append(name)
+        else:
+            u = self.displacements(name)
+            if exact is not None:
+                error = 100 * np.linalg.norm(u - exact, axis=2).max() / np.linalg.norm(exact, axis=2).max()
+                report["study"]["true_error_percent"] = error
+                print(f"{name}\t{result['ms_per_step']['median']:.2f} ms\t{error:.3g} %", flush=True)
+        with open(self.path(name + ".json"), "w", encoding="utf-8") as file:
+            json.dump(report, file)
+        return u
+
+
+def elements(study):
+    """1 kPa on a wall of 0.5 mm, nonlinear statics, 128 to 10,000 shells."""
+    kinds = {"cst + comas (the paper's)": PAPER, "cst + dkt, flat": {"membrane": "cst", "rest": "flat"},
+             "adapt + dkt, flat": {"rest": "flat"}, "adapt + dkt, curved (default)": {}}
+
+    def scene(n, more):
+        write_ply(study.path(f"vessel{n}.ply"), *vessel(n, n))
+        return (run_lines(kind="static", load_steps=1, solver="direct") +
+                shell(f"vessel{n}.ply", 0.5, 1.0, 0.45, **more) + ENDS + load("pressure", "1kPa") + PROBES)
+
+    study.measured(scene(152, {}), "finest", "reference")
+    names = []
+    for series, more in kinds.items():
+        for n in (8, 16, 24, 32, 48, 72):
+            names.append(f"e{len(names)}")
+            study.measured(scene(n, more), names[-1], series)
+    study.chart("elements.svg", [name for name in names if name not in study.failed], "--reference", "finest.json",
+                "--lines", "--title", "Vessel, 1 kPa, 128 to 10,368 shells: the error of the elements", "--x",
+                "seconds.solve", "--x-label", "solving, s, one thread", "--csv", os.path.join(study.out, "elements.csv"))
+
+
+def solvers(study):
+    """A ramp to 1 kPa over 1 s in steps of 40 ms, 5,000 shells: what a setting costs and what it leaves."""
+    write_ply(study.path("vessel.ply"), *vessel(50, 50))
+
+    def scene(**keys):
+        return (run_lines(kind="dynamic", duration="1s", step="40ms", **keys) +
+                shell("vessel.ply", 1, 1.0, 0.45, density="1100kg/m3") + ENDS + load("pressure", "1kPa", more=RAMP))
+
+    exact = study.measured(scene(solver="direct"), "exact", "reference")
+    names = []
+    settings = [("CG to a residual", {"cg_tolerance": t, "newton_max": 1}) for t in ("50%", "20%", "5%", "1%", "0.1%")]
+    settings += [("CG, fixed iterations", {"cg_iterations": n}) for n in (10, 30, 100, 300)]
+    settings += [("direct, one linearisation", {"solver": "direct", "newton_max": 1}),
+                 ("direct, Newton to 1e-6", {"solver": "direct", "converge": 1e-6})]
+    for series, keys in settings:
+        names.append(f"s{len(names)}")
+        study.measured(scene(**keys), names[-1], series, exact,
+                       setting=keys.get("cg_tolerance") or str(keys.get("cg_iterations", "")))
+    study.chart("solvers.svg", [name for name in names if name not in study.failed], "--y", "study.true_error_percent",
+                "--label", "study.setting", "--title", "A step of 40 ms on 5,000 shells: what a solver's setting leaves",
+                "--x-label", "time of a step, ms, one thread", "--y-label", "true error, % of the largest displacement",
+                "--csv", os.path.join(study.out, "solvers.csv"))
+
+
+def paper_mesh(folder, count):
+    vertices, triangles = [], []
+    with open(os.path.join(folder, f"aneurysm{count}.obj"), encoding="utf-8") as file:
+        for line in file:
+            words = line.split()
+            if words[:1] == ["v"]:
+                vertices.append([float(x) for x in words[1:4]])
+            elif words[:1] == ["f"]:
+                triangles.append([int(word.split("/")[0]) - 1 for word in words[1:4]])
+    return 1000 * np.array(vertices), np.array(triangles)  # metres
+
+
+def figure_6(study, folder):
+    """The paper's Fig. 6: its meshes, its steps of 40 ms, its settings of CG, its element; E 5 MPa, nu 0.45, t 50 mm and
+    0.3 kg per node as in its scene, a uniform pressure of 10 kPa that grows over 1 s."""
+    names = []
+    for count in (200, 400, 600, 800, 1000):
+        vertices, triangles = paper_mesh(folder, count)
+        write_ply(study.path("aneurysm.ply"), vertices, triangles)
+        sides = vertices[triangles]
+        area = np.linalg.norm(np.cross(sides[:, 1] - sides[:, 0], sides[:, 2] - sides[:, 0]), axis=1).sum() / 2
+        density = f"{0.3 * len(vertices) / (area * 50) * 1e9:.6g}kg/m3"
+        held = "".join(f"[[fix]]\nbody = \"s\"\nwhere = {{box = {json.dumps([[f'{x}mm' for x in corner] for corner in box])}}}\n"
+                       "translation = \"xyz\"\nrotation = \"xyz\"\n"
+                       for box in (((-200, -1000, -200), (200, -800, 200)), ((400, 300, -800), (800, 700, -700))))
+
+        def scene(elements, **keys):
+            return (run_lines(kind="dynamic", duration="1s", step="40ms", **keys) +
+                    shell("aneurysm.ply", 50, 5.0, 0.45, density=density, **elements) + held +
+                    load("pressure", "10kPa", more=RAMP))
+
+        exact = study.measured(scene(PAPER, solver="direct"), f"x{count}", "the paper's element, converged", shells=count)
+        if exact is None:
+            continue
+        for name, series, elements, keys in (
+                ("i", "100 CG iterations (the paper's)", PAPER, {"cg_iterations": 100}),
+                ("c", "CG to 5 % (the paper's)", PAPER, {"cg_tolerance": "5%", "newton_max": 1}),
+                ("n", "direct, one linearisation", PAPER, {"solver": "direct", "newton_max": 1}),
+                ("o", "tunica's default element, converged", {}, {})):
+            study.measured(scene(elements, **keys), f"{name}{count}", series, exact, shells=count)
+            names.append(f"{name}{count}")
+        names.append(f"x{count}")
+    names = [name for name in names if name not in study.failed]
+    common = ("--lines", "--x", "study.shells", "--x-scale", "linear", "--x-label", "shells")
+    study.chart("figure-6-time.svg", names, *common, "--y", "result.ms_per_step.median", "--y-label",
+                "time of a step, ms, one thread", "--title", "The paper's Fig. 6: computation time",
+                "--csv", os.path.join(study.out, "figure-6-time.csv"))
+    study.chart("figure-6-error.svg", [name for name in names if name[0] != "x"], *common, "--y",
+                "study.true_error_percent", "--y-label", "difference to the paper's element, converged, %", "--title",
+                "... and the error that its settings leave", "--csv", os.path.join(study.out, "figure-6-error.csv"))
+
+
+def main():
+    if len(sys.argv) not in (2, 3):
+        sys.exit(__doc__)
+    with tempfile.TemporaryDirectory() as folder:
+        study = Study(folder, os.path.abspath(sys.argv[1]))
+        elements(study)
+        solvers(study)
+        if len(sys.argv) == 3:
+            figure_6(study, sys.argv[2])
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,238 @@
+"""Where elements, solvers and integrators fail: every row of docs/limits.md is reproduced here, and what tunica does
+instead stands beside it. The names of the tests are the rows' names."""
+import math
+import os
+import re
+import shutil
+import tempfile
+import unittest
+
+import numpy as np
+
+from published import LINEAR, Bench, fix, grid, load, probe, run_lines, shell, vessel, write_ply
+
+PAPER = {"membrane": "cst", "bending": "comas", "rest": "flat"}
+FLAT = {"rest": "flat"}
+HELD = "[[fix]]\nbody = \"s\"\nwhere = {boundary = true}\ntranslation = \"xyz\"\nrotation = \"xyz\"\n"
+
+
+def largest(u):
+    return np.linalg.norm(u, axis=-1).max()
+
+
+class Limit(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.mkdtemp(prefix="tunica-limits-")
+        self.addCleanup(shutil.rmtree, folder, ignore_errors=True)
+        self.bench = Bench(folder)
+
+    def vessel(self, thickness, pressure, around=25, along=20, more="", check=True, elements=None, **run):
+        """The vessel of 1 MPa with both ends held."""
+        write_ply(self.bench.path("mesh.ply"), *vessel(around, along))
+        scene = run_lines(**run) + shell("mesh.ply", thickness, 1.0, 0.45, density="1100kg/m3", **(elements or {}))
+        return self.bench.run(scene + HELD + load("pressure", pressure, more=more), check=check)
+
+    def refused(self, code, *words):
+        self.assertEqual(self.bench.code, code, self.bench.error)
+        self.assertEqual(self.bench.error.count("\n"), 0)
+        for word in words:
+            self.assertIn(word, self.bench.error)
+
+
+class Elements(Limit):
+    def test_comas_converges_to_a_wrong_plate(self):
+        """+23 % clamped and +26 % simply supported, however fine the mesh; the two others converge."""
+        for simply, limit in ((False, 0.233), (True, 0.263)):
+            errors = [self.bench.plate(n, simply=simply, **PAPER) - 1 for n in (16, 32)]
+            self.assertAlmostEqual(errors[1], limit, delta=0.003)
+            self.assertLess(abs(errors[1] - errors[0]), 0.02)  # it has converged, and not to the plate
+            for bending in ("comas-consistent", "dkt"):
+                coarse, fine = [abs(self.bench.plate(n, simply=simply, bending=bending, **FLAT) - 1) for n in (16, 32)]
+                self.assertLess(fine, 0.0021)
+                self.assertAlmostEqual(math.log2(coarse / fine), 2, delta=0.4)
+
+    def test_comas_depends_on_which_vertex_comes_first(self):
+        """The same plate with the corners of every triangle renamed: +23 % becomes +0.1 %."""
+        def spread(n, **elements):
+            ratios = [self.bench.plate(n, first=first, **elements) for first in (0, 1, 2)]
+            return max(ratios) - min(ratios)
+
+        self.assertAlmostEqual(spread(32, **PAPER), 0.232, delta=0.005)
+        for bending in ("comas-consistent", "dkt"):
+            self.assertLess(spread(16, bending=bending, **FLAT), 1e-8)
+
+    def test_comas_fails_the_patch_test_of_bending(self):
+        """A constant moment on irregular triangles: the exact answer is in reach of every element but this."""
+        self.assertGreater(self.bench.bending_patch(**PAPER), 0.1)
+        for bending in ("comas-consistent", "dkt"):
+            self.assertLess(self.bench.bending_patch(bending=bending), 1e-7)
+
+    def test_comas_never_closes_a_strip_into_a_ring(self):
+        """The moment that bends a strip into a full circle leaves a gap of a third of its length."""
+        gap = self.bench.roll_up(membrane="opt", bending="comas")
+        self.assertGreater(gap, 0.2)
+        for bending in ("comas-consistent", "dkt"):
+            self.assertLess(self.bench.roll_up(bending=bending), 0.01)
+
+    def test_cst_is_far_too_stiff_on_coarse_curved_shells(self):
+        """13 % low on the Scordelis-Lo roof and 21 % on the twisted beam; it converges, slowly."""
+        coarse, fine = self.bench.roof(8, membrane="cst", **FLAT), self.bench.roof(32, membrane="cst", **FLAT)
+        self.assertAlmostEqual(coarse, 0.87, delta=0.02)
+        self.assertAlmostEqual(fine, 0.99, delta=0.01)
+        self.assertLess(self.bench.beam(12, membrane="cst", **FLAT), 0.85)
+        self.assertAlmostEqual(self.bench.roof(8), 1, delta=0.012)
+        self.assertAlmostEqual(self.bench.beam(12), 1, delta=0.005)
+
+    def test_cst_loses_a_strip_that_rolls_up(self):
+        """Exit 4 at two thirds of the moment that closes it: a limit load that the strip does not have."""
+        self.assertIsNone(self.bench.roll_up(membrane="cst"))
+        self.refused(4, "limit load")
+        self.assertAlmostEqual(float(re.search(r"load factor ([0-9.]+)", self.bench.error)[1]), 0.667, delta=0.05)
+        self.assertLess(self.bench.roll_up(), 0.01)
+
+    def test_opt_locks_on_thin_doubly_curved_shells(self):
+        """Half of the hemisphere's deflection and a twentieth of the twisted beam's."""
+        self.assertAlmostEqual(self.bench.hemisphere(8, membrane="opt", **FLAT), 0.51, delta=0.03)
+        self.assertLess(self.bench.beam(12, membrane="opt", **FLAT), 0.1)
+        self.assertAlmostEqual(self.bench.hemisphere(8), 1, delta=0.04)
+        self.assertAlmostEqual(self.bench.beam(12), 1, delta=0.005)
+
+    def test_opt_gives_way_under_tension_before_the_wall_does(self):
+        """A thin vessel under pressure: a limit load that the structure does not have, said so with exit 4."""
+        self.vessel(0.3, "13kPa", kind="static", elements={"membrane": "opt", "rest": "flat"}, check=False)
+        self.refused(4, "limit load", "0.3 mm thick")
+        self.assertGreater(self.vessel(0.3, "13kPa", kind="static")["max_displacement_mm"], 5)
+
+    def test_loads_times_a_millionth_stay_proportional(self):
+        """The paper's code takes rotations below 1e-6 for zero: loads times 1e-4 give 15 times the displacement."""
+        whole = self.vessel(1, "100Pa", kind="static", load_steps=1)["max_displacement_mm"]
+        small = self.vessel(1, "1e-4Pa", kind="static", load_steps=1)["max_displacement_mm"]
+        self.assertAlmostEqual(small / whole * 1e6, 1, delta=0.2)  # the nonlinear part of the larger load
+        smaller = self.vessel(1, "1e-6Pa", kind="static", load_steps=1)["max_displacement_mm"]
+        self.assertAlmostEqual(smaller / small * 1e2, 1, delta=1e-6)
+
+    def test_nothing_moves_without_a_load(self):
+        """With 10 % of the triangles flipped the paper's code moves by 0.9 mm; ours names the first one."""
+        self.assertLess(self.vessel(1, "0kPa", kind="static", load_steps=1)["max_displacement_mm"], 1e-12)
+        points, triangles, normals = vessel(25, 20)
+        triangles[::10] = triangles[::10, ::-1]
+        write_ply(self.bench.path("mesh.ply"), points, triangles, normals)
+        self.bench.run(LINEAR + shell("mesh.ply", 1, 1.0, 0.45) + HELD + load("pressure", "0kPa"), check=False)
+        self.refused(3, "elements 0 and 1", "inconsistent orientation")
+
+    def test_a_ring_of_slivers_changes_little(self):
+        """Triangles a thousand times longer than high: NaN in the paper's code."""
+        def deflection(points, triangles):
+            u = self.bench.solve((points, triangles, None),
+                                 LINEAR + shell("mesh.ply", 1, 1.0, 0.45) + HELD + load("pressure", "100Pa"))
+            self.assertTrue(np.isfinite(u).all())
+            return largest(u)
+
+        points, triangles, _ = vessel(24, 24)
+        regular = deflection(points, triangles)
+        angle = 2 * math.pi * np.arange(24) / 24
+        z = 60 * (5 + 1e-3) / 24  # row 6, moved down to a thousandth of a row above row 5
+        r = 10 + 10 * math.exp(-((z - 30) / 10)**2) * ((1 + np.cos(angle)) / 2)**2
+        points[24 * 6:24 * 7] = np.stack([r * np.cos(angle), r * np.sin(angle), 0 * r + z], axis=1)
+        self.assertAlmostEqual(deflection(points, triangles) / regular, 1, delta=0.05)
+
+
+class Solvers(Limit):
+    def linear(self, **keys):
+        result = self.vessel(1, "1kPa", kind="static", geometry="linear", load_steps=1, **keys)
+        return result, self.bench.displacements()[-1]
+
+    def test_five_percent_of_residual_is_another_error(self):
+        """CG to 5 % leaves an error that its residual does not tell; the error itself is reported, within a factor of 2."""
+        _, exact = self.linear(solver="direct")
+        for tolerance in ("20%", "5%"):
+            result, u = self.linear(cg_tolerance=tolerance)
+            error = 100 * largest(u - exact) / largest(exact)
+            self.assertGreater(error, 3)
+            self.assertFalse(result["algebraic_error_is_lower_bound"])
+            # In the energy norm, of the displacements' kind but not the same.
+            self.assertLess(error / 6, result["algebraic_error_percent"])
+            self.assertGreater(6 * error, result["algebraic_error_percent"])
+        self.assertLess(self.linear()[0]["algebraic_error_percent"], 1e-6)
+
+    def test_a_fixed_count_of_iterations_claims_nothing(self):
+        """30 iterations end with exit 0, `converged` false, and a lower bound of the error."""
+        _, exact = self.linear(solver="direct")
+        result, u = self.linear(cg_iterations=30)
+        self.assertGreater(largest(u - exact) / largest(exact), 0.1)
+        self.assertFalse(result["converged"])
+        self.assertTrue(result["algebraic_error_is_lower_bound"])
+        self.assertGreater(result["algebraic_error_percent"], 1)
+
+    def test_a_hundred_iterations_say_less_on_finer_meshes(self):
+        """The paper's count: what is enough for 1,000 shells leaves most of the answer out at 20,000."""
+        errors = []
+        for around, along in ((25, 20), (100, 100)):
+            solved = {}
+            for keys in ({"solver": "direct"}, {"cg_iterations": 100}):
+                self.vessel(1, "1kPa", around, along, kind="static", geometry="linear", load_steps=1, **keys)
+                solved[len(solved)] = self.bench.displacements()[-1]
+            errors.append(largest(solved[1] - solved[0]) / largest(solved[0]))
+        self.assertLess(errors[0], 0.01)
+        self.assertGreater(errors[1], 0.2)
+
+    def test_load_control_ends_at_a_limit_point(self):
+        """A wall of 0.1 mm has no equilibrium at 13 kPa: NaN in the paper's code, exit 4 and the limit load here."""
+        result = self.vessel(0.1, "13kPa", kind="static", check=False)
+        self.refused(4, "kPa of 13 kPa", "0.1 mm thick", "limit load")
+        self.assertGreater(result["max_displacement_mm"], 1)
+        self.assertTrue(os.path.exists(self.bench.path("run.hdf.part")))  # the last good state
+
+    def test_suction_on_a_thin_tube_buckles_it(self):
+        """NaN in the paper's code; exit 4 and the load at which it buckles here."""
+        self.vessel(0.1, "-1kPa", kind="static", check=False)
+        self.refused(4, "of -1 kPa", "limit load")
+
+
+class Integrators(Limit):
+    STEP = {"kind": "dynamic", "duration": "2s", "step": "40ms"}
+
+    def test_one_linearisation_fails_where_a_step_is_far_from_linear(self):
+        """13 kPa at once, 40 ms, no damping: NaN in the paper's code. One linearisation ends with exit 4 here; Newton's
+        method converges, to the static answer."""
+        self.vessel(1, "13kPa", check=False, newton_max=1, solver="direct", **self.STEP)
+        self.refused(4, "did not converge", "0.04 s")
+        moving = self.vessel(1, "13kPa", **self.STEP)["max_displacement_mm"]
+        static = self.vessel(1, "13kPa", kind="static")["max_displacement_mm"]
+        self.assertAlmostEqual(moving / static, 1, delta=1e-4)
+
+    def test_backward_euler_eats_the_energy_of_a_vibration(self):
+        """A strip let go: with 20 steps per period 39 % of the amplitude is left after one period, as the scheme's own
+        damping 1 / sqrt(1 + (w h)^2) per step says; with 320 steps 94 %."""
+        length, thickness, young, density = 100.0, 1.0, 1000.0, 1.1e-9
+        write_ply(self.bench.path("mesh.ply"), *grid(20, 2, lambda u, v: (length * u, 10 * v, 0 * u)))
+        # The first mode of a cantilever, under its weight-like load let in at once: it swings about the rest.
+        omega = 1.8751**2 / length**2 * math.sqrt(young * thickness**2 / 12 / density)
+        period = 2 * math.pi / omega
+        ends = []
+        for steps in (20, 80, 320):
+            scene = (run_lines(kind="dynamic", duration=f"{period!r}s", step=f"{period / steps!r}s") +
+                     shell("mesh.ply", thickness, young, 0.0, density="1100kg/m3") + fix([0, 1, 2]) +
+                     load("area", (0.0, 0.0, 1e-9), "MPa") + probe("tip", (length, 5.0, 0.0)))
+            path = np.array(self.bench.run(scene)["probes"]["tip"]["displacement_mm"])[:, 2]
+            rest = 1e-9 * length**4 / (8 * young * thickness**3 / 12)
+            # Without damping it is back at zero, having swung by `rest` to both sides.
+            amplitude = (rest - path[-1]) / rest
+            ends.append(amplitude)
+            expected = (1 + (omega * period / steps)**2)**(-steps / 2)
+            self.assertAlmostEqual(amplitude, expected, delta=0.12)
+        self.assertLess(ends[0], 0.45)
+        self.assertGreater(ends[2], 0.85)
+
+
+class Table(unittest.TestCase):
+    def test_every_row_has_its_test_and_every_test_its_row(self):
+        with open(os.path.join(os.environ["TUNICA_SOURCE"], "docs", "limits.md"), encoding="utf-8") as file:
+            rows = re.findall(r"`(\w+\.test_\w+)`", file.read())
+        tests = [f"{case.__name__}.{name}" for case in (Elements, Solvers, Integrators) for name in dir(case)
+                 if name.startswith("test_")]
+        self.assertEqual(sorted(rows), sorted(tests))
+
+
+if __name__ == "__main__":
+    unittest.main()
