@@ -347,6 +347,7 @@ void prepare_result(Json& result, const Model& model) {
             {"nodes", model.node_count()},
             {"dof", nullptr},
             {"steps", 0},
+            {"step_parts", 0},
             {"converged", false},
             {"max_displacement_mm", nullptr},
             {"volume_before_mm3", nullptr},
@@ -396,6 +397,7 @@ void report_state(Json& result, const Model& model, const State& state, bool dyn
 void report_summary(Json& result, const Summary& summary, bool converged, std::optional<double> duration) {
   result["dof"] = summary.dof;
   result["steps"] = summary.steps;
+  result["step_parts"] = summary.parts;
   result["converged"] = converged;
   result["max_displacement_mm"] = summary.max_displacement;
   result["volume_before_mm3"] = or_null(summary.volume_before);

@@ -176,10 +176,10 @@ void state_members(Archive& archive, AnyState& state) {
 template <typename Archive, typename AnyCheckpoint>
 void checkpoint_members(Archive& archive, AnyCheckpoint& checkpoint) {
   auto& [summary, position, displacement, rotation, memory] = checkpoint;
-  auto& [dof, steps, converged, residual, newton_iterations, cg_iterations, error, error_is_bound, volume_before,
+  auto& [dof, steps, parts, converged, residual, newton_iterations, cg_iterations, error, error_is_bound, volume_before,
          volume_after, strain, largest, seconds_per_step, frequencies, factors] = summary;
-  each(archive, dof, steps, converged, residual, newton_iterations, cg_iterations, error, error_is_bound, volume_before,
-       volume_after, strain, largest, seconds_per_step, frequencies, factors);
+  each(archive, dof, steps, parts, converged, residual, newton_iterations, cg_iterations, error, error_is_bound,
+       volume_before, volume_after, strain, largest, seconds_per_step, frequencies, factors);
   each(archive, position, displacement, rotation, memory);
 }
 

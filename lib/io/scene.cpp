@@ -35,6 +35,8 @@ void check_run(const Scene& scene) {
     require(dynamic->duration / dynamic->step <= most_steps, places.of("step"),
             fmt::format("{:.3g} steps are too many (at most {:.0e}): lengthen step or shorten duration",
                         dynamic->duration / dynamic->step, most_steps));
+    require(dynamic->spectral_radius >= 0 && dynamic->spectral_radius <= 1, places.of("spectral_radius"),
+            fmt::format("spectral_radius {} is outside [0, 1]: 1 damps nothing, 0 the most", dynamic->spectral_radius));
   }
   const bool modes = std::holds_alternative<FrequencyRun>(run.kind) || std::holds_alternative<BucklingRun>(run.kind);
   require(!modes || run.solver != Solver::cg,

@@ -376,7 +376,23 @@ void read_dynamic(const Table& run, DynamicRun& settings) {
   }
   settings.duration = run.quantity("duration", dimension::time, " (a dynamic run needs it)");
   settings.step = run.quantity("step", dimension::time, " (a dynamic run needs it)");
-  run.choice<Integrator>("integrator", settings.integrator, {{"backward-euler", Integrator::backward_euler}});
+  run.choice<Integrator>(
+      "integrator", settings.integrator,
+      {{"backward-euler", Integrator::backward_euler}, {"generalised-alpha", Integrator::generalised_alpha}});
+  if (run.has("spectral_radius")) {
+    if (settings.integrator != Integrator::generalised_alpha) {
+      run.place("spectral_radius")
+          .fail("spectral_radius belongs to integrator = \"generalised-alpha\": remove it, or choose that integrator");
+    }
+    settings.spectral_radius = run.number("spectral_radius");
+  }
+  if (run.has("adaptive")) {
+    try {
+      settings.adaptive = parse_length_tolerance(run.text("adaptive"));
+    } catch (const UsageError& error) {
+      run.place("adaptive").fail(fmt::format("adaptive: {}", error.what()));
+    }
+  }
   if (run.has("damping")) {
     constexpr std::array<std::string_view, 2> keys{"mass", "stiffness"};
     const Table damping(run.table("damping", R"({mass = "0.1/s", stiffness = "2ms"})"), run.file(), "damping", keys);
@@ -403,9 +419,10 @@ double read_cg_tolerance(const Table& run) {
 }
 
 void read_run(const toml::table& table, const std::string& file, Scene& scene) {
-  constexpr std::array<std::string_view, 16> keys{
-      "kind",       "geometry", "load_steps",   "load_factors",  "control",  "duration",   "step",  "damping",
-      "integrator", "solver",   "cg_tolerance", "cg_iterations", "converge", "newton_max", "every", "count"};
+  constexpr std::array<std::string_view, 18> keys{
+      "kind",     "geometry",   "load_steps", "load_factors", "control",         "duration",
+      "step",     "damping",    "integrator", "solver",       "cg_tolerance",    "cg_iterations",
+      "converge", "newton_max", "every",      "count",        "spectral_radius", "adaptive"};
   constexpr std::array<std::string_view, 3> later{"max_steps", "max_factor", "until"};
   const Table run(table, file, "[run]", keys, later);
   scene.run_places = run.places();
@@ -418,7 +435,7 @@ void read_run(const toml::table& table, const std::string& file, Scene& scene) {
                     {"frequencies", Kind::frequencies},
                     {"buckling", Kind::buckling}});
   if (kind != Kind::dynamic) {
-    refuse_keys(run, name, "dynamic", {"duration", "step", "damping", "integrator"});
+    refuse_keys(run, name, "dynamic", {"duration", "step", "damping", "integrator", "spectral_radius", "adaptive"});
   }
   if (kind != Kind::frequencies && kind != Kind::buckling) {
     refuse_keys(run, name, "frequencies or buckling", {"count"});

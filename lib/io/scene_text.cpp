@@ -110,7 +110,16 @@ void write_kind_of_run(const DynamicRun& run, Text& text) {
   text.line("damping",
             fmt::format("{{mass = {}, stiffness = {}}}", toml_string(quantity(run.damping.mass, "/s", dimension::rate)),
                         toml_string(quantity(run.damping.stiffness, "s", dimension::time))));
-  text.word("integrator", "backward-euler");
+  if (run.integrator == Integrator::generalised_alpha) {
+    text.word("integrator", "generalised-alpha");
+    text.line("spectral_radius", number(run.spectral_radius));
+  } else {
+    text.word("integrator", "backward-euler");
+  }
+  if (run.adaptive) {
+    text.word("adaptive", run.adaptive->relative ? number(1e2 * run.adaptive->value) + "%"
+                                                 : quantity(run.adaptive->value, "m", dimension::length));
+  }
 }
 
 void write_kind_of_run(const FrequencyRun& run, Text& text) {

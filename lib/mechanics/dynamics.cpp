@@ -3,6 +3,7 @@
 #include "mechanics/run.hpp"
 #include "mechanics/settle.hpp"
 #include "mechanics/supports.hpp"
+#include "mechanics/time_scheme.hpp"
 
 #include <fmt/format.h>
 
@@ -21,31 +22,56 @@ using Clock = std::chrono::steady_clock;
 constexpr double largest_unchecked_residual = 0.5;
 /// Smallest part of a step's change that is tried on its own.
 constexpr double smallest_part = 1.0 / 256;
+/// Smallest part of a step's time that error control may ask for.
+constexpr double shortest_part = 1.0 / 4096;
 
 Eigen::Index at(std::size_t node) { return 6 * static_cast<Eigen::Index>(node); }
 
+/// Whether a step's result may stand.
+bool is_solved(const RunSettings& settings, const NewtonResult& result) {
+  if (!result.valid) {
+    return false;
+  }
+  if (settings.cg_fixed_count) {
+    return true;
+  }
+  return settings.newton_max == 1 ? result.linear_converged && result.residual <= largest_unchecked_residual
+                                  : result.converged && result.stable;
+}
+
 struct Motion {
   Configuration configuration;
-  VectorX velocity;  ///< 6 per node: velocity, angular velocity in world axes
+  Rates rates;
 };
 
-/// Backward Euler: M (v1 - v0) / h + C v1 + f_int(x1) = f_ext(x1, t1) with v1 = (x1 - x0) / h, rotations by the vector
-/// of the rotation from 0 to 1. Masses are lumped; rotary inertia is rho t^3 / 12 per area about every axis (that of a
-/// plate about the axes in its plane), so it needs no gyroscopic term. Damping is alpha M and, in each element's own
-/// frame, beta K: a rigid motion is not damped by beta.
-class BackwardEuler {
+/// M a1 + alpha M v1 + f_int(x1) = f_ext(x1, t1), with velocity and acceleration at the end of a step as the scheme
+/// says. Masses are lumped; rotary inertia is rho t^3 / 12 per area about every axis (that of a plate about the axes in
+/// its plane), so it needs no gyroscopic term. Damping is alpha M and, in each element's own frame, beta K times the
+/// rate of its deformation: a rigid motion is not damped by beta.
+class TimeStepper {
 public:
-  BackwardEuler(const ShellSystem& system, const Model& model, const RunSettings& settings, const DynamicRun& run)
+  TimeStepper(const ShellSystem& system, const Model& model, const RunSettings& settings, const DynamicRun& run)
       : system_(system),
         model_(model),
         settings_(settings),
         run_(run),
+        scheme_(run),
         solver_(system, settings),
         matrix_(system.pattern),
-        mass_(VectorX::Zero(at(system.node_count()))) {
+        mass_(VectorX::Zero(at(system.node_count()))),
+        part_(run.step) {
     for (std::size_t i = 0; i < system.node_count(); ++i) {
       mass_.segment<3>(at(i)).setConstant(system.mass[static_cast<Eigen::Index>(i)]);
       mass_.segment<3>(at(i) + 3).setConstant(system.inertia[static_cast<Eigen::Index>(i)]);
+    }
+    if (run.adaptive) {
+      Vec3 low = system.reference.front();
+      Vec3 high = low;
+      for (const Vec3& x : system.reference) {
+        low = low.cwiseMin(x);
+        high = high.cwiseMax(x);
+      }
+      tolerance_ = run.adaptive->millimetres((high - low).norm());
     }
   }
 
@@ -53,39 +79,108 @@ public:
     NewtonResult newton;
     double reached = 1;  ///< part of the step's change of load up to which solutions were found
     bool ran_away = false;
+    std::size_t parts = 1;
+    bool precise = true;  ///< false: no part is short enough for the tolerance
   };
 
-  /// One step. Where Newton's method does not lead from the state before to the end of the step at once, the step's
-  /// change (of loads, prescribed displacements, and what inertia leaves unbalanced at the start) is put on in parts;
-  /// where that path loses its stability the shell is let go, and creeps to where the step's forces are in balance.
-  StepResult step(double time, double step, Motion& motion) {
-    Step s{motion.configuration, motion.velocity, step, {}, load_factors(model_, false, time + step), {}, {}, {}};
-    // A load that is there from time 0 on comes onto a shell at rest without load.
-    s.factors_before = time > 0 ? load_factors(model_, false, time) : std::vector<double>(model_.loads.size(), 0.0);
-    if (deformation_.empty()) {
-      evaluate(system_, model_, s.start, s.factors_before, {}, forces_, nullptr);
-      deformation_ = forces_.deformation;
+  /// The accelerations with which a second-order scheme begins: those of the loads of time 0.
+  void start(Motion& motion) {
+    if (!scheme_.second_order()) {
+      return;
     }
-    s.held = VectorX::Zero(motion.velocity.size());
-    for (const PrescribedFreedom& p : system_.prescribed) {
-      const Ramp& ramp = model_.fixes[p.fix].ramp;
-      s.held[static_cast<Eigen::Index>(p.freedom)] =
-          p.value * ramp.at(time + step) -
-          s.start.displacement[p.freedom / 6][static_cast<Eigen::Index>(p.freedom % 6)];
+    evaluate(system_, model_, motion.configuration, load_factors(model_, false, 0), {}, forces_, nullptr);
+    for (Eigen::Index i = 0; i < mass_.size(); ++i) {
+      const bool moves = !system_.held[static_cast<std::size_t>(i)] && mass_[i] > 0;
+      motion.rates.acceleration[i] = moves ? (forces_.external[i] - forces_.internal[i]) / mass_[i] : 0;
     }
-    StepResult result;
-    result.newton = run(s, 0, 1, motion.configuration);
-    if (settings_.newton_max > 1 && !settings_.cg_fixed_count && !acceptable(result.newton)) {
-      follow(s, result, motion.configuration);
+    motion.rates.auxiliary = motion.rates.acceleration;
+  }
+
+  /// One step, with error control in as many parts as it takes.
+  StepResult advance(double time, double length, Motion& motion) {
+    if (tolerance_ == 0) {
+      const StepResult result = step(time, length, true, motion);
+      keep_deformation(length);
+      return result;
     }
-    velocity_between(s.start, motion.configuration, step, motion.velocity);
-    for (const Piece& piece : system_.pieces) {
-      if (held_by_rigid_motions(model_, piece.body)) {
-        stop_rigid_motion(piece, step, motion);
+    StepResult total;
+    total.parts = 0;
+    std::size_t iterations = 0;
+    std::size_t cg_iterations = 0;
+    for (double done = 0; done < length * (1 - 1e-12);) {
+      const double left = length - done;
+      // No tiny rest: what is between one and two parts is halved.
+      const double h = part_ >= left * (1 - 1e-9) ? left : part_ > left / 2 ? left / 2 : part_;
+      const bool shortest = h <= length * shortest_part;
+      Motion attempt = motion;
+      StepResult result = step(time + done, h, shortest, attempt);
+      iterations += result.newton.iterations;
+      cg_iterations += result.newton.cg_iterations;
+      const bool solved = is_solved(settings_, result.newton);
+      const double error = increment_size(system_, scheme_.local_error(h, motion.rates, attempt.rates)) / tolerance_;
+      const double wanted = h * std::clamp(0.9 * std::pow(error, -1 / scheme_.local_order()), 0.2, 2.0);
+      if (solved && error <= 1) {
+        motion = std::move(attempt);
+        keep_deformation(h);
+        done = h == left ? length : done + h;
+        part_ = std::min(h < part_ && wanted >= h ? std::max(wanted, part_) : wanted, run_.step);
+        ++total.parts;
+      } else if (shortest) {
+        motion = std::move(attempt);
+        total.reached = (done + result.reached * h) / length;
+        total.ran_away = result.ran_away;
+        total.precise = !solved;
+        total.newton = result.newton;
+        break;
+      } else {
+        part_ = std::max(solved && std::isfinite(wanted) ? std::min(wanted, h / 2) : h / 4, length * shortest_part);
+        continue;
       }
+      total.newton = result.newton;
     }
-    deformation_ = forces_.deformation;
+    total.newton.iterations = iterations;
+    total.newton.cg_iterations = cg_iterations;
+    return total;
+  }
+
+  /// What a run must keep between its steps to go on as if nothing had happened, beyond the configuration.
+  [[nodiscard]] std::map<std::string, std::vector<double>, std::less<>> memory(const Motion& motion) const {
+    const auto values = [](const VectorX& v) { return std::vector<double>(v.begin(), v.end()); };
+    std::map<std::string, std::vector<double>, std::less<>> result{{"velocity", values(motion.rates.velocity)},
+                                                                   {"acceleration", values(motion.rates.acceleration)},
+                                                                   {"auxiliary", values(motion.rates.auxiliary)},
+                                                                   {"part", {part_}},
+                                                                   {"at_rest", {at_rest_ ? 1.0 : 0.0}}};
+    if (!before_.empty()) {
+      std::vector<double>& before = result["deformation_before"];
+      for (const ElementState& d : before_) {
+        before.insert(before.end(), d.begin(), d.end());
+      }
+      result["length_before"] = {length_before_};
+    }
     return result;
+  }
+
+  void recall(const std::map<std::string, std::vector<double>, std::less<>>& memory, Motion& motion) {
+    for (auto [name, vector] :
+         {std::pair{"velocity", &motion.rates.velocity}, std::pair{"acceleration", &motion.rates.acceleration},
+          std::pair{"auxiliary", &motion.rates.auxiliary}}) {
+      const std::vector<double>& values = memory.at(name);
+      TUNICA_ASSERT(values.size() == static_cast<std::size_t>(vector->size()));
+      std::copy(values.begin(), values.end(), vector->begin());
+    }
+    part_ = memory.at("part").at(0);
+    at_rest_ = memory.at("at_rest").at(0) != 0;
+    if (const auto found = memory.find("deformation_before"); found != memory.end()) {
+      TUNICA_ASSERT(found->second.size() ==
+                    static_cast<std::size_t>(ElementState::SizeAtCompileTime) * system_.elements.size());
+      before_.resize(system_.elements.size());
+      for (std::size_t e = 0; e < before_.size(); ++e) {
+        before_[e] = Eigen::Map<const ElementState>(found->second.data() +
+                                                    ElementState::SizeAtCompileTime * static_cast<std::ptrdiff_t>(e));
+      }
+      length_before_ = memory.at("length_before").at(0);
+    }
   }
 
   [[nodiscard]] double kinetic_energy(const VectorX& velocity) const {
@@ -93,36 +188,104 @@ public:
   }
   [[nodiscard]] std::size_t freedom_count() const { return solver_.freedom_count(); }
   void tell_direct_error(bool tell) { solver_.tell_direct_error(tell); }
-  [[nodiscard]] bool at_rest() const { return at_rest_; }
-  void go_on(bool at_rest) { at_rest_ = at_rest; }
+  [[nodiscard]] double tolerance() const { return tolerance_; }
 
 private:
   struct Step {
     Configuration start;
-    VectorX velocity_before;
+    Rates rates_before;
     double length = 0;  ///< s
     std::vector<double> factors_before;
     std::vector<double> factors;
     VectorX held;           ///< prescribed displacements of the whole step
     VectorX left_at_start;  ///< unbalanced forces of the start, for a path that begins there
-    VectorX velocity;
+    VectorX change;
+    Rates rates;
+    double viscosity = 0;  ///< beta / s: of the deformation's rate by the deformation
   };
+
+  /// One step or part of one. Where Newton's method does not lead from the state before to the end at once, and it
+  /// may_follow, the change (of loads, prescribed displacements, and what inertia leaves unbalanced at the start) is
+  /// put on in parts; where that path loses its stability the shell is let go, and creeps to where the step's forces
+  /// are in balance.
+  StepResult step(double time, double length, bool may_follow, Motion& motion) {
+    Step s;
+    s.start = motion.configuration;
+    s.rates_before = motion.rates;
+    s.length = length;
+    s.factors = load_factors(model_, false, time + length);
+    // A load that is there from time 0 on comes onto a shell at rest without load.
+    s.factors_before = time > 0 ? load_factors(model_, false, time) : std::vector<double>(model_.loads.size(), 0.0);
+    if (deformation_.empty()) {
+      evaluate(system_, model_, s.start, s.factors_before, {}, forces_, nullptr);
+      deformation_ = forces_.deformation;
+    }
+    s.viscosity = find_viscosity(length);
+    s.held = VectorX::Zero(motion.rates.velocity.size());
+    for (const PrescribedFreedom& p : system_.prescribed) {
+      const Ramp& ramp = model_.fixes[p.fix].ramp;
+      s.held[static_cast<Eigen::Index>(p.freedom)] =
+          p.value * ramp.at(time + length) -
+          s.start.displacement[p.freedom / 6][static_cast<Eigen::Index>(p.freedom % 6)];
+    }
+    StepResult result;
+    result.newton = run(s, 0, 1, motion.configuration);
+    if (may_follow && settings_.newton_max > 1 && !settings_.cg_fixed_count && !acceptable(result.newton)) {
+      follow(s, result, motion.configuration);
+    }
+    find_change(s.start, motion.configuration, s.change);
+    scheme_.end_rates(length, system_.held, s.rates_before, s.change, motion.rates);
+    for (const Piece& piece : system_.pieces) {
+      if (held_by_rigid_motions(model_, piece.body)) {
+        stop_rigid_motion(piece, length, motion);
+      }
+    }
+    return result;
+  }
+
+  /// Beta times the derivative of the rate of deformation, and `viscous_zero_`, from which on it resists: the backward
+  /// difference, or that of second order through the step before.
+  double find_viscosity(double length) {
+    if (run_.damping.stiffness == 0) {
+      return 0;
+    }
+    if (!scheme_.second_order() || before_.empty()) {
+      viscous_zero_ = deformation_;
+      return run_.damping.stiffness / length;
+    }
+    const double r = length / length_before_;
+    const double leading = (1 + 2 * r) / (1 + r);
+    viscous_zero_.resize(deformation_.size());
+    for (std::size_t e = 0; e < deformation_.size(); ++e) {
+      viscous_zero_[e] = ((1 + r) * deformation_[e] - r * r / (1 + r) * before_[e]) / leading;
+    }
+    return run_.damping.stiffness * leading / length;
+  }
+
+  /// The step is done: its end is where the next one starts.
+  void keep_deformation(double length) {
+    if (run_.damping.stiffness > 0 && scheme_.second_order()) {
+      before_.swap(deformation_);
+      length_before_ = length;
+    }
+    deformation_ = forces_.deformation;
+  }
 
   static bool acceptable(const NewtonResult& result) { return result.converged && result.valid && result.stable; }
 
   /// Balance of the step with a part of its change; 1: the equation of the step itself.
   Balance balance(Step& s, double part, const Configuration& c, BlockMatrix* tangent) {
-    const ViscousState viscous{run_.damping.stiffness / s.length, &deformation_};
+    const ViscousState viscous{s.viscosity, s.viscosity > 0 ? &viscous_zero_ : nullptr};
     std::vector<double> factors = s.factors;
     for (std::size_t l = 0; part < 1 && l < factors.size(); ++l) {
       factors[l] = s.factors_before[l] + part * (s.factors[l] - s.factors_before[l]);
     }
     evaluate(system_, model_, c, factors, viscous, forces_, tangent);
-    velocity_between(s.start, c, s.length, s.velocity);
-    const VectorX inertia =
-        mass_.cwiseProduct((s.velocity - s.velocity_before) / s.length + run_.damping.mass * s.velocity);
+    find_change(s.start, c, s.change);
+    scheme_.end_rates(s.length, system_.held, s.rates_before, s.change, s.rates);
+    const VectorX inertia = mass_.cwiseProduct(s.rates.acceleration + run_.damping.mass * s.rates.velocity);
     if (tangent != nullptr) {
-      add_inertia(s.start, c, s.length, *tangent);
+      add_inertia(s.change, s.length, *tangent);
     }
     Balance result;
     result.valid = forces_.valid;
@@ -196,54 +359,69 @@ private:
     result.newton.cg_iterations += settled.cg_iterations;
   }
 
-  static void velocity_between(const Configuration& start, const Configuration& end, double step, VectorX& velocity) {
-    velocity.resize(at(start.displacement.size()));
+  static void find_change(const Configuration& start, const Configuration& end, VectorX& change) {
+    change.resize(at(start.displacement.size()));
     for (std::size_t i = 0; i < start.displacement.size(); ++i) {
-      velocity.segment<3>(at(i)) = (end.displacement[i] - start.displacement[i]) / step;
-      velocity.segment<3>(at(i) + 3) = logarithm(end.rotation[i] * start.rotation[i].conjugate()) / step;
+      change.segment<3>(at(i)) = end.displacement[i] - start.displacement[i];
+      change.segment<3>(at(i) + 3) = logarithm(end.rotation[i] * start.rotation[i].conjugate());
     }
   }
 
-  void add_inertia(const Configuration& start, const Configuration& end, double step, BlockMatrix& tangent) const {
-    const double factor = 1 / (step * step) + run_.damping.mass / step;
+  void add_inertia(const VectorX& change, double length, BlockMatrix& tangent) const {
+    const double factor = scheme_.acceleration_factor(length) + run_.damping.mass * scheme_.velocity_factor(length);
     for (std::size_t i = 0; i < system_.node_count(); ++i) {
       auto block = tangent.block(tangent.find(static_cast<Index>(i), static_cast<Index>(i)));
       block.diagonal().head<3>() += factor * mass_.segment<3>(at(i));
-      const Vec3 turned = logarithm(end.rotation[i] * start.rotation[i].conjugate());
-      block.block<3, 3>(3, 3) += factor * mass_[at(i) + 3] * spin_to_rate(turned);
+      block.block<3, 3>(3, 3) += factor * mass_[at(i) + 3] * spin_to_rate(change.segment<3>(at(i) + 3));
     }
   }
 
-  /// Takes linear and angular momentum out of a piece. The loads are in balance, so there is only what the solver's
-  /// tolerance left.
-  void stop_rigid_motion(const Piece& piece, double step, Motion& motion) const {
+  /// The rigid motion with the linear and angular momentum of a piece whose nodes have these velocities.
+  struct RigidMotion {
+    Vec3 velocity, turn, centre;
+
+    [[nodiscard]] Vec3 at(const Vec3& position) const { return velocity + turn.cross(position - centre); }
+  };
+
+  RigidMotion rigid_motion(const Piece& piece, const Configuration& c, const VectorX& velocities) const {
     double mass = 0;
     Vec3 centre = Vec3::Zero();
     Vec3 momentum = Vec3::Zero();
-    const auto position = [&](Index i) -> Vec3 { return system_.reference[i] + motion.configuration.displacement[i]; };
     for (const Index i : piece.nodes) {
       mass += system_.mass[i];
-      centre += system_.mass[i] * position(i);
-      momentum += system_.mass[i] * motion.velocity.segment<3>(at(i));
+      centre += system_.mass[i] * (system_.reference[i] + c.displacement[i]);
+      momentum += system_.mass[i] * velocities.segment<3>(at(i));
     }
     centre /= mass;
     Vec3 spin = Vec3::Zero();
     Mat3 inertia = Mat3::Zero();
     for (const Index i : piece.nodes) {
-      const Vec3 arm = position(i) - centre;
-      spin += system_.mass[i] * arm.cross(motion.velocity.segment<3>(at(i))) +
-              system_.inertia[i] * motion.velocity.segment<3>(at(i) + 3);
+      const Vec3 arm = system_.reference[i] + c.displacement[i] - centre;
+      spin += system_.mass[i] * arm.cross(velocities.segment<3>(at(i))) +
+              system_.inertia[i] * velocities.segment<3>(at(i) + 3);
       inertia += system_.mass[i] * (arm.squaredNorm() * Mat3::Identity() - arm * arm.transpose()) +
                  system_.inertia[i] * Mat3::Identity();
     }
-    const Vec3 velocity = momentum / mass;
-    const Vec3 turn = inertia.ldlt().solve(spin);
-    for (const Index i : piece.nodes) {
-      const Vec3 change = velocity + turn.cross(position(i) - centre);
-      motion.velocity.segment<3>(at(i)) -= change;
-      motion.velocity.segment<3>(at(i) + 3) -= turn;
-      motion.configuration.displacement[i] -= step * change;
-      motion.configuration.rotation[i] = (exponential(-step * turn) * motion.configuration.rotation[i]).normalized();
+    return {momentum / mass, inertia.ldlt().solve(spin), centre};
+  }
+
+  /// Takes linear and angular momentum out of a piece. The loads are in balance, so there is only what the solver's
+  /// tolerance left.
+  void stop_rigid_motion(const Piece& piece, double length, Motion& motion) const {
+    Configuration& c = motion.configuration;
+    const Configuration moved = c;
+    for (VectorX* rates : {&motion.rates.velocity, &motion.rates.acceleration, &motion.rates.auxiliary}) {
+      const RigidMotion rigid = rigid_motion(piece, moved, *rates);
+      const bool velocity = rates == &motion.rates.velocity;
+      for (const Index i : piece.nodes) {
+        const Vec3 change = rigid.at(system_.reference[i] + moved.displacement[i]);
+        rates->segment<3>(at(i)) -= change;
+        rates->segment<3>(at(i) + 3) -= rigid.turn;
+        if (velocity) {
+          c.displacement[i] -= length * change;
+          c.rotation[i] = (exponential(-length * rigid.turn) * c.rotation[i]).normalized();
+        }
+      }
     }
   }
 
@@ -251,12 +429,18 @@ private:
   const Model& model_;
   const RunSettings& settings_;
   const DynamicRun& run_;
+  const TimeScheme scheme_;
   TangentSolver solver_;
   BlockMatrix matrix_;
   VectorX mass_;
   Forces forces_;
-  bool at_rest_ = false;                   ///< the last step changed nothing
-  std::vector<ElementState> deformation_;  ///< at the start of the step
+  std::vector<ElementState> deformation_;   ///< at the start of the step
+  std::vector<ElementState> before_;        ///< at the start of the step before, where damping asks for it
+  std::vector<ElementState> viscous_zero_;  ///< the deformation at which damping by beta K vanishes
+  double length_before_ = 0;                ///< s
+  double tolerance_ = 0;                    ///< mm, of error control; 0: none
+  double part_ = 0;                         ///< s: length of the next part under error control
+  bool at_rest_ = false;                    ///< the last step changed nothing
 };
 
 double first_load_factor(const Model& model, double time) {
@@ -269,16 +453,16 @@ Summary run_dynamic(ShellSystem& system, const Model& model, const RunSettings& 
                     const StateCallback& on_state, const Progress& progress, const Resumption& resumption) {
   release_rigid_motion_supports(system, model);
   Summary summary;
-  BackwardEuler integrator(system, model, settings, run);
-  Motion motion{reference_configuration(system), VectorX::Zero(at(system.node_count()))};
+  TimeStepper integrator(system, model, settings, run);
+  Motion motion{reference_configuration(system), Rates::zero(at(system.node_count()))};
   const auto hand_over = [&](State& state) {
     state.load_factor = first_load_factor(model, state.time);
-    state.kinetic_energy = integrator.kinetic_energy(motion.velocity);
+    state.kinetic_energy = integrator.kinetic_energy(motion.rates.velocity);
     state.velocity.resize(system.node_count());
     state.angular_velocity.resize(system.node_count());
     for (std::size_t i = 0; i < system.node_count(); ++i) {
-      state.velocity[i] = motion.velocity.segment<3>(at(i));
-      state.angular_velocity[i] = motion.velocity.segment<3>(at(i) + 3);
+      state.velocity[i] = motion.rates.velocity.segment<3>(at(i));
+      state.angular_velocity[i] = motion.rates.velocity.segment<3>(at(i) + 3);
     }
     on_state(state);
   };
@@ -288,12 +472,10 @@ Summary run_dynamic(ShellSystem& system, const Model& model, const RunSettings& 
     summary = resumption.from->summary;
     time = resumption.from->position;
     motion.configuration = {resumption.from->displacement, resumption.from->rotation};
-    const std::vector<double>& velocity = resumption.from->memory.at("velocity");
-    TUNICA_ASSERT(velocity.size() == static_cast<std::size_t>(motion.velocity.size()));
-    std::copy(velocity.begin(), velocity.end(), motion.velocity.begin());
-    integrator.go_on(resumption.from->memory.at("at_rest").at(0) != 0);
+    integrator.recall(resumption.from->memory, motion);
   } else {
     summary.dof = integrator.freedom_count();
+    integrator.start(motion);
     state = make_state(system, model, motion.configuration, 0);
     state.converged = true;
     hand_over(state);
@@ -308,13 +490,15 @@ Summary run_dynamic(ShellSystem& system, const Model& model, const RunSettings& 
     const bool last = s + 1 == steps;
     const double end = last ? run.duration : static_cast<double>(s + 1) * run.step;
     integrator.tell_direct_error(s == 0 || last);
-    const auto [result, reached, ran_away] = integrator.step(time, end - time, motion);
+    const auto [result, reached, ran_away, parts, precise] = integrator.advance(time, end - time, motion);
     const bool one_linearisation = settings.newton_max == 1;
-    const bool accepted = one_linearisation
-                              ? (result.linear_converged || settings.cg_fixed_count) &&
-                                    (result.residual <= largest_unchecked_residual || settings.cg_fixed_count)
-                              : (result.converged && result.stable) || settings.cg_fixed_count;
-    if (!result.valid || !accepted) {
+    if (!precise) {
+      throw RequirementError(fmt::format(
+          "the step from {:.6g} s to {:.6g} s adds more than the tolerance of {:.3g} mm to the error however "
+          "short its parts are: allow a larger one (adaptive), or put the load on by a ramp",
+          time, end, integrator.tolerance()));
+    }
+    if (!is_solved(settings, result)) {
       const std::vector<double> wanted_factors = load_factors(model, false, end);
       std::vector<double> carried =
           time > 0 ? load_factors(model, false, time) : std::vector<double>(wanted_factors.size(), 0.0);
@@ -346,14 +530,11 @@ Summary run_dynamic(ShellSystem& system, const Model& model, const RunSettings& 
     if (wanted) {
       hand_over(state);
     }
+    summary.parts += parts;
     record_step(state, seconds, summary);
     resumption.offer([&] {
-      return Checkpoint{summary,
-                        time,
-                        motion.configuration.displacement,
-                        motion.configuration.rotation,
-                        {{"velocity", {motion.velocity.begin(), motion.velocity.end()}},
-                         {"at_rest", {integrator.at_rest() ? 1.0 : 0.0}}}};
+      return Checkpoint{summary, time, motion.configuration.displacement, motion.configuration.rotation,
+                        integrator.memory(motion)};
     });
     advance(progress, static_cast<double>(s + 1) / static_cast<double>(steps));
   }

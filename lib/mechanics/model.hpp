@@ -1,5 +1,6 @@
 #pragma once
 
+#include "core/quantity.hpp"
 #include "shell/shell_mesh.hpp"
 
 #include <optional>
@@ -125,7 +126,10 @@ enum class Solver {
   automatic,
 };
 
-enum class Integrator { backward_euler };
+enum class Integrator {
+  backward_euler,     ///< the paper's: first order, strong numerical damping
+  generalised_alpha,  ///< second order, damping of what is too fast for the step as chosen
+};
 
 struct Damping {
   double mass = 0;       ///< 1 / s
@@ -155,6 +159,10 @@ struct DynamicRun {
   double step = 0;      ///< s
   Damping damping;
   Integrator integrator = Integrator::backward_euler;
+  double spectral_radius = 0.8;  ///< generalised_alpha, 0 ... 1: what a step keeps of what is too fast for it
+  /// Steps are cut into parts that each add at most this much to the error: root mean square over the nodes,
+  /// rotations times the mean edge; relative to the diagonal of the model's bounding box.
+  std::optional<LengthTolerance> adaptive{};
 };
 
 struct RunSettings {

@@ -43,7 +43,7 @@ Summary run_frequencies(ShellSystem& system, const Model& model, const RunSettin
 Summary run_buckling(ShellSystem& system, const Model& model, const RunSettings& settings, const BucklingRun& run,
                      const StateCallback& on_state, const Progress& progress);
 
-/// Time steps by backward Euler. Errors: RequirementError.
+/// Time steps. Errors: RequirementError.
 Summary run_dynamic(ShellSystem& system, const Model& model, const RunSettings& settings, const DynamicRun& run,
                     const StateCallback& on_state, const Progress& progress, const Resumption& resumption);
 

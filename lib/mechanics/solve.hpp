@@ -50,6 +50,7 @@ struct ElementFields {
 struct Summary {
   std::size_t dof = 0;    ///< free degrees of freedom
   std::size_t steps = 0;  ///< steps done (not only handed over)
+  std::size_t parts = 0;  ///< dynamic: parts of steps that were accepted; without `adaptive` as many as steps
   bool converged = false;
   double residual = 0;  ///< of the last step
   std::size_t newton_iterations = 0;

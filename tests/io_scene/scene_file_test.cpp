@@ -198,7 +198,7 @@ TEST_F(SceneTest, probesTakeTheNearestNode) {
 TEST_F(SceneTest, theResolvedTextReadsAsTheSameScene) {
   const std::string text =
       "[run]\nkind = \"dynamic\"\nduration = \"0.3s\"\nstep = \"7ms\"\ndamping = {stiffness = \"3us\"}\n"
-      "cg_iterations = 70\n" +
+      "integrator = \"generalised-alpha\"\nspectral_radius = 0.3\nadaptive = \"0.07%\"\ncg_iterations = 70\n" +
       std::string(plate) + "density = \"1.06g/cm3\"\n" + ball + "density = \"3t/mm3\"\n" + clamped +
       "[[fix]]\nbody = \"ball\"\nwhere = {sphere = {centre = [\"0.1mm\", \"10mm\", \"0.7mm\"], radius = \"3mm\"}}\n"
       "translation = \"x\"\nrotation = \"\"\ndisplacement = [\"0.123456789mm\", \"0mm\", \"0mm\"]\n"
@@ -217,6 +217,9 @@ TEST_F(SceneTest, theResolvedTextReadsAsTheSameScene) {
   EXPECT_EQ(second.shells[0].material.density, first.shells[0].material.density);
   EXPECT_EQ(second.shells[0].material.young, first.shells[0].material.young);
   EXPECT_EQ(std::get<DynamicRun>(second.run.kind).step, std::get<DynamicRun>(first.run.kind).step);
+  EXPECT_EQ(std::get<DynamicRun>(second.run.kind).integrator, Integrator::generalised_alpha);
+  EXPECT_EQ(std::get<DynamicRun>(second.run.kind).spectral_radius, 0.3);
+  EXPECT_NEAR(std::get<DynamicRun>(second.run.kind).adaptive.value().value, 7e-4, 1e-18);
   EXPECT_NEAR(std::get<PressureLoad>(second.loads[0].kind).value, std::get<PressureLoad>(first.loads[0].kind).value,
               1e-18);
   EXPECT_THAT(resolved, HasSubstr("young = \"1e+06Pa\""));
@@ -343,6 +346,13 @@ const std::vector<Wrong> wrongs{
     {"densityMissing", dynamic_with("duration = \"1s\"\nstep = \"1s\""), ":5:1: ", "density"},
     {"integrator", dynamic_with("duration = \"1s\"\nstep = \"1s\"\nintegrator = \"euler\""),
      ":5:14: ", "backward-euler"},
+    {"spectralRadiusLarge",
+     dynamic_with("duration = \"1s\"\nstep = \"1s\"\nintegrator = \"generalised-alpha\"\nspectral_radius = 1.5"),
+     ":6:19: ", "[0, 1]"},
+    {"spectralRadiusOfEuler", dynamic_with("duration = \"1s\"\nstep = \"1s\"\nspectral_radius = 0.5"),
+     ":5:", "generalised-alpha"},
+    {"adaptiveBare", dynamic_with("duration = \"1s\"\nstep = \"1s\"\nadaptive = \"0.1\""), ":5:12: ", "adaptive"},
+    {"adaptiveInAStaticRun", run_with("adaptive = \"1%\""), ":3:12: ", "dynamic"},
     {"convergeZero", run_with("converge = 0"), ":3:12: ", "greater than 0"},
     {"convergeNan", run_with("converge = nan"), ":3:12: ", "finite"},
     {"cgToleranceBare", run_with("cg_tolerance = \"0.05\""), ":3:16: ", "percent"},

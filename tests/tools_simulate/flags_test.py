@@ -16,7 +16,7 @@ PRESSED = MATERIAL + ["--pressure", "100Pa"]
 HELD = PRESSED + ["--fix", "rigid-motions", "--static"]
 DYNAMIC = PRESSED + ["--density", "1100kg/m3", "--duration", "0.1s", "--step", "10ms"]
 
-RESULT_KEYS = ["shells", "tetrahedra", "nodes", "dof", "steps", "converged", "max_displacement_mm", "volume_before_mm3",
+RESULT_KEYS = ["shells", "tetrahedra", "nodes", "dof", "steps", "step_parts", "converged", "max_displacement_mm", "volume_before_mm3",
                "volume_after_mm3", "strain_energy_mj", "residual", "algebraic_error_percent",
                "algebraic_error_is_lower_bound", "newton_iterations",
                "cg_iterations", "ms_per_step", "real_time_factor", "probes", "frequencies_hz", "buckling_factors"]
