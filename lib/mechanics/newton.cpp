@@ -94,6 +94,7 @@ NewtonResult newton(const ShellSystem& system, const RunSettings& settings, Tang
   Balance now = balance(configuration, likely_at_rest ? nullptr : &matrix);
   bool tangent_is_current = !likely_at_rest;
   double largest_solution = 0;
+  double previous_residual = 0;
   VectorX increment;
   VectorX whole = VectorX::Zero(held_increment.size());
   const auto residual_of = [&](const Balance& b) {
@@ -121,7 +122,6 @@ NewtonResult newton(const ShellSystem& system, const RunSettings& settings, Tang
     if (!tangent_is_current) {
       now = balance(configuration, &matrix);
     }
-    tangent_is_current = false;
     VectorX right = now.unbalanced;
     if (moving) {
       VectorX product;
@@ -153,13 +153,19 @@ NewtonResult newton(const ShellSystem& system, const RunSettings& settings, Tang
       result.predicted = increment_size(system, increment);
     }
 
+    // Where another iteration will follow, judged by quadratic convergence, its tangent is made with the forces.
+    const double expected =
+        result.iterations > 1 ? std::pow(result.residual, 3) / (previous_residual * previous_residual) : 1;
+    const bool more = result.iterations < settings.newton_max && expected > settings.converge;
+    previous_residual = result.residual;
     const Configuration before = configuration;
     double length = 1;
     Balance next;
     for (int trial = 0;; ++trial) {
       configuration = before;
       advance_configuration(configuration, length * increment);
-      next = balance(configuration, nullptr);
+      tangent_is_current = more && trial == 0;
+      next = balance(configuration, tangent_is_current ? &matrix : nullptr);
       if (moving || trial == 6) {
         break;
       }
@@ -186,6 +192,7 @@ NewtonResult newton(const ShellSystem& system, const RunSettings& settings, Tang
       return result;
     }
     moving = false;
+    now = next;
     result.residual = residual_of(next);
     if (!std::isfinite(result.residual)) {
       result.valid = false;
