@@ -70,13 +70,11 @@ struct Kinematics {
   Frame frame;
   std::array<EdgeNow, 3> edges;
   Vector6 slopes;
+  Vec3 bulges;  ///< of the edges: slope at the start less that at the end
+  Vec3 tilts;
   ElementState state;
 
   [[nodiscard]] Vec3 rotation(int corner) const { return state.segment<3>(3 + 3 * corner); }
-  /// Of the corners about the axes in the plane.
-  [[nodiscard]] Vector6 bending() const {
-    return (Vector6() << state.segment<2>(3), state.segment<2>(6), state.segment<2>(9)).finished();
-  }
 };
 
 /// What the curved patch adds to the chord strain. Fills the edges and slopes.
@@ -101,11 +99,16 @@ Vec3 curved_strain(const ShellElement& element, const std::array<Mat3, 3>& relat
   }
   now.slopes = element.slopes + change;
   const Vector6 middle = 0.5 * (now.slopes + element.slopes);
-  const Vector6 bending = now.bending();
   for (int i = 0; i < 3; ++i) {
-    const auto s = static_cast<std::size_t>(i);
-    strain[i] += change.dot(element.bulging[s] * middle + element.sideways.row(i).transpose()) +
-                 now.slopes.dot(element.tilting[s] * bending);
+    strain[i] += change.dot(element.bulging[static_cast<std::size_t>(i)].lazyProduct(middle));
+  }
+  for (int k = 0; k < 3; ++k) {
+    const Vec3 turned = 0.5 * (now.rotation(k) + now.rotation(next_corner(k)));
+    const double turn = element.edge_directions.col(k).dot(turned.head<2>());
+    now.tilts[k] = element.tilts[k] + turn;
+    now.bulges[k] = now.slopes[2 * k] - now.slopes[2 * k + 1];
+    // As differences, so that the reference is free of strain to the last bit.
+    strain += element.sideways.col(k) * ((change[2 * k] - change[2 * k + 1]) * element.tilts[k] + now.bulges[k] * turn);
   }
   return strain;
 }
@@ -136,18 +139,24 @@ bool find_kinematics(const ShellElement& element, const CornerMotion& motion, Ki
 
 const CornerMotion still{Mat3::Zero(), {Mat3::Identity(), Mat3::Identity(), Mat3::Identity()}};
 
-using Matrix3x18 = Eigen::Matrix<double, 3, 18>;
-using Matrix6x18 = Eigen::Matrix<double, 6, 18>;
+// Rows are contiguous, so that products with a transpose are sums of columns.
+using Matrix3x18 = Eigen::Matrix<double, 3, 18, Eigen::RowMajor>;
+using Matrix6x18 = Eigen::Matrix<double, 6, 18, Eigen::RowMajor>;
+using Matrix3x6 = Eigen::Matrix<double, 3, 6, Eigen::RowMajor>;
 
-/// Derivatives with respect to displacements and spins, in the frame's axes. Slopes: of a curved element only.
+/// Derivatives with respect to displacements and spins, in the frame's axes. All but the strain: of a curved element
+/// only.
 struct Derivatives {
   Matrix3x18 strain;
   Matrix6x18 slopes;
-  Matrix6x18 bending;
+  Matrix3x18 bulges;
+  Matrix3x18 tilts;
 };
 
-void add_curved_derivatives(const ShellElement& element, const Kinematics& now, Derivatives& d) {
+void add_curved_derivatives(const ShellElement& element, const Kinematics& now, const std::array<Mat3, 3>& h,
+                            const std::array<Mat3, 3>& g, Derivatives& d) {
   d.slopes.setZero();
+  d.tilts.setZero();
   for (int k = 0; k < 3; ++k) {
     const EdgeNow& edge = now.edges[static_cast<std::size_t>(k)];
     const auto across = [&](const Vec3& carried) {
@@ -167,23 +176,34 @@ void add_curved_derivatives(const ShellElement& element, const Kinematics& now, 
         element.bow.col(k) * edge.side[1].cross(edge.direction).transpose();
     d.strain.block<3, 3>(0, 6 * k + 3) += element.bow.col(k) * edge.side[0].cross(edge.direction).transpose();
   }
-  const Vector6 bending = now.bending();
-  Matrix36 of_slopes, of_bending;
+  Matrix3x6 of_slopes;
   for (int i = 0; i < 3; ++i) {
-    const auto s = static_cast<std::size_t>(i);
-    of_slopes.row(i) =
-        (element.bulging[s] * now.slopes + element.tilting[s] * bending).transpose() + element.sideways.row(i);
-    of_bending.row(i).noalias() = now.slopes.transpose() * element.tilting[s];
+    of_slopes.row(i) = element.bulging[static_cast<std::size_t>(i)].lazyProduct(now.slopes).transpose();
   }
-  d.strain.noalias() += of_slopes * d.slopes;
-  d.strain.noalias() += of_bending * d.bending;
+  d.strain += of_slopes.lazyProduct(d.slopes);
+  for (int k = 0; k < 3; ++k) {
+    d.bulges.row(k) = d.slopes.row(2 * k) - d.slopes.row(2 * k + 1);
+    // Bending rotations follow the spins of the corners less that of the frame.
+    Eigen::RowVector3d of_frame = Eigen::RowVector3d::Zero();
+    for (const int corner : {k, next_corner(k)}) {
+      const Eigen::RowVector3d of_spin =
+          0.5 * element.edge_directions.col(k).transpose() * h[static_cast<std::size_t>(corner)].topRows<2>();
+      d.tilts.block<1, 3>(k, 6 * corner + 3) = of_spin;
+      of_frame += of_spin;
+    }
+    for (int j = 0; j < 3; ++j) {
+      d.tilts.block<1, 3>(k, 6 * j) -= of_frame * g[static_cast<std::size_t>(j)];
+    }
+  }
+  const Mat3 of_bulges = element.sideways * now.tilts.asDiagonal();
+  const Mat3 of_tilts = element.sideways * now.bulges.asDiagonal();
+  d.strain += of_bulges.lazyProduct(d.bulges) + of_tilts.lazyProduct(d.tilts);
 }
 
 /// H: spin to rate of the rotation vector; G_k: spin of the frame from the displacement of corner k.
 void find_derivatives(const ShellElement& element, const Kinematics& now, const std::array<Mat3, 3>& h,
                       const std::array<Mat3, 3>& g, Derivatives& d) {
   d.strain.setZero();
-  d.bending.setZero();
   // Chord strain: the corners' motion less the turn of the frame about its normal.
   Vec3 of_turn = Vec3::Zero();
   for (int k = 0; k < 3; ++k) {
@@ -193,14 +213,9 @@ void find_derivatives(const ShellElement& element, const Kinematics& now, const 
   }
   for (int k = 0; k < 3; ++k) {
     d.strain.block<3, 3>(0, 6 * k) += of_turn * g[static_cast<std::size_t>(k)].row(2);
-    const Mat23 rate = h[static_cast<std::size_t>(k)].topRows<2>();
-    d.bending.block<2, 3>(2 * k, 6 * k + 3) = rate;
-    for (int j = 0; j < 3; ++j) {
-      d.bending.block<2, 3>(2 * k, 6 * j) -= rate * g[static_cast<std::size_t>(j)];
-    }
   }
   if (element.curved) {
-    add_curved_derivatives(element, now, d);
+    add_curved_derivatives(element, now, h, g, d);
     return;
   }
   for (int k = 0; k < 3; ++k) {
@@ -235,11 +250,25 @@ void rotate_to_world(const Mat3& axes, Matrix18& matrix) {
   }
 }
 
+/// t += a'b where the sum is symmetric: half of it is computed.
+template <typename Rows>
+void add_symmetric_product(const Rows& a, const Rows& b, Matrix18& t) {
+  for (int j = 0; j < 18; j += 6) {
+    for (int i = 0; i <= j; i += 6) {
+      const Matrix6 block = a.template middleCols<6>(i).transpose().lazyProduct(b.template middleCols<6>(j));
+      t.block<6, 6>(i, j) += block;
+      if (i != j) {
+        t.block<6, 6>(j, i) += block.transpose();
+      }
+    }
+  }
+}
+
 /// The part with the stiffness of the element itself.
 void add_material(const ShellElement& element, double factor, const std::array<Mat3, 3>& h,
                   const std::array<Mat3, 3>& g, const Derivatives& d, Matrix18& t) {
-  const Matrix3x18 stress = (factor * element.membrane) * d.strain;
-  t.noalias() += d.strain.transpose() * stress;
+  const Matrix3x18 stress = (factor * element.membrane).lazyProduct(d.strain);
+  add_symmetric_product(d.strain, stress, t);
   // Rotation vectors: H_i'K_ij H_j between spins, where spins of the frame count against those of the corners.
   Mat3 all = Mat3::Zero();
   std::array<Mat3, 3> rows{Mat3::Zero(), Mat3::Zero(), Mat3::Zero()};
@@ -378,25 +407,14 @@ void find_bulging(ShellElement& element) {
           weight * (slope.row(0).transpose() * slope.row(1) + slope.row(1).transpose() * slope.row(0));
     }
   }
-  element.sideways.setZero();
-  for (Matrix6& form : element.tilting) {
-    form.setZero();
-  }
   for (int k = 0; k < 3; ++k) {
     const Vec2 edge = element.plane.col(next_corner(k)) - element.plane.col(k);
     const Vec2 out = Vec2(edge.y(), -edge.x()).normalized();
-    const double tilt = element.edge_normals.col(k).head<2>().dot(out);
-    const Vec3 strain =
+    element.edge_directions.col(k) = edge.normalized();
+    element.tilts[k] = element.edge_normals.col(k).head<2>().dot(out);
+    // The mean of the cubic with these slopes and zero ends is length x (a_start - a_end) / 12.
+    element.sideways.col(k) =
         edge.squaredNorm() / (12 * element.area) * Vec3(out.x() * out.x(), out.y() * out.y(), 2 * out.x() * out.y());
-    element.sideways.col(2 * k) = tilt * strain;
-    element.sideways.col(2 * k + 1) = -tilt * strain;
-    for (int i = 0; i < 3; ++i) {
-      for (const int corner : {k, next_corner(k)}) {
-        auto row = element.tilting[static_cast<std::size_t>(i)].block<2, 2>(2 * k, 2 * corner);
-        row.row(0) = 0.5 * strain[i] * edge.normalized().transpose();
-        row.row(1) = -row.row(0);
-      }
-    }
   }
 }
 
@@ -467,8 +485,10 @@ ShellElement make_shell_element(const std::array<Vec3, 3>& corners, const ShellS
     find_edges(surface, element);
     find_bulging(element);
     for (int i = 0; i < 2; ++i) {
-      spread += element.slopes.dot(0.5 * element.bulging[static_cast<std::size_t>(i)] * element.slopes +
-                                   element.sideways.row(i).transpose());
+      spread += 0.5 * element.slopes.dot(element.bulging[static_cast<std::size_t>(i)] * element.slopes);
+      for (int k = 0; k < 3; ++k) {
+        spread += element.sideways(i, k) * (element.slopes[2 * k] - element.slopes[2 * k + 1]) * element.tilts[k];
+      }
     }
   }
 
@@ -590,18 +610,19 @@ bool corotational_response(const ShellElement& element, const CornerMotion& moti
   // What the membrane force does on slopes and rotations.
   Vector6 on_slopes = Vector6::Zero();
   Matrix6 slope_stiffness = Matrix6::Zero();
-  Matrix6 tilt_stiffness = Matrix6::Zero();
   const Vec3 on_bows = element.bow.transpose() * stress.head<3>();
+  const Vec3 on_sides = element.curved ? Vec3(element.sideways.transpose() * stress.head<3>()) : Vec3(Vec3::Zero());
   if (element.curved) {
     for (int i = 0; i < 3; ++i) {
       slope_stiffness += stress[i] * element.bulging[static_cast<std::size_t>(i)];
-      tilt_stiffness += stress[i] * element.tilting[static_cast<std::size_t>(i)];
-      on_slopes += stress[i] * element.sideways.row(i).transpose();
     }
-    on_slopes += slope_stiffness * now.slopes + tilt_stiffness * now.bending();
-    const Vector6 on_bending = tilt_stiffness.transpose() * now.slopes;
+    on_slopes = slope_stiffness.lazyProduct(now.slopes);
     for (int k = 0; k < 3; ++k) {
-      stress.segment<2>(3 + 3 * k) += on_bending.segment<2>(2 * k);
+      on_slopes[2 * k] += on_sides[k] * now.tilts[k];
+      on_slopes[2 * k + 1] -= on_sides[k] * now.tilts[k];
+      const Vec2 on_bending = 0.5 * on_sides[k] * now.bulges[k] * element.edge_directions.col(k);
+      stress.segment<2>(3 + 3 * k) += on_bending;
+      stress.segment<2>(3 + 3 * next_corner(k)) += on_bending;
     }
   } else {
     for (int k = 0; k < 3; ++k) {
@@ -659,10 +680,11 @@ bool corotational_response(const ShellElement& element, const CornerMotion& moti
   add_material(element, 1 + viscous.factor, h, g, d, t);
   add_corotational_stiffness(element, now, n, local_moment, h, g, current_gradients, total, force, moment, t);
   if (element.curved) {
-    const Matrix6x18 on_slope_changes = slope_stiffness * d.slopes + tilt_stiffness * d.bending;
-    const Matrix6x18 on_bending_changes = tilt_stiffness.transpose() * d.slopes;
-    t.noalias() += d.slopes.transpose() * on_slope_changes;
-    t.noalias() += d.bending.transpose() * on_bending_changes;
+    const Matrix6x18 on_slope_changes = slope_stiffness.lazyProduct(d.slopes);
+    add_symmetric_product(d.slopes, on_slope_changes, t);
+    const Matrix3x18 on_bulge_changes = on_sides.asDiagonal() * d.tilts;
+    const Matrix18 coupling = d.bulges.transpose().lazyProduct(on_bulge_changes);
+    t += coupling + coupling.transpose();
     for (int k = 0; k < 3; ++k) {
       for (int end = 0; end < 2; ++end) {
         add_edge_stiffness(now.edges[static_cast<std::size_t>(k)], k, corner_at(k, end),

@@ -64,11 +64,13 @@ struct ShellElement {
   bool curved = false;  ///< the slopes count: in the strain by bulging, in the height of the patch
   /// Mean height of the patch over the facet: sum of weight x length of the edge x slope.
   Vector6 height_weights;
-  /// Strain by bulging: component i is a'H_i a / 2 + a'(s_i + T_i theta), less the same in the reference, for slopes a
-  /// and bending rotations theta (x and y of every corner).
+  /// Strain by bulging, less the same in the reference, for slopes a and bending rotations theta:
+  ///   a'H_i a / 2 (component i) + sum over edges k of sideways_k (a_start - a_end) x tilt,
+  ///   tilt = tilt_k + direction_k.(theta_start + theta_end) / 2.
   std::array<Matrix6, 3> bulging;  ///< H
-  Matrix36 sideways;               ///< rows: s
-  std::array<Matrix6, 3> tilting;  ///< T
+  Mat3 sideways;                   ///< columns: of the edges
+  Vec3 tilts;                      ///< of m against the facet's normal, outward, in the reference
+  Mat23 edge_directions;           ///< columns, in the reference frame
   Mat3 membrane;                   ///< stiffness to the mean strain (N mm)
   Matrix9 rotational;              ///< stiffness to the rotation vectors (N mm): bending, higher-order membrane
   Matrix39 curvature;              ///< mean, from the rotation vectors

@@ -202,10 +202,39 @@ CornerMotion corner_motion(const ShellElement& element, const Configuration& con
   return motion;
 }
 
-void scatter(const std::array<std::size_t, 9>& places, const Matrix18& matrix, double factor, BlockMatrix& target) {
+/// Unit pressure on an element: on its slopes where they count, else on the facet and its patch's frozen height.
+void push(const ShellElement& element, const PatchHeight& height, const CornerMotion& motion, Vector18& force,
+          Matrix18* stiffness) {
+  if (element.curved) {
+    unit_pressure(element, motion, force, stiffness);
+    return;
+  }
+  std::array<Vec3, 3> corners;
+  for (int k = 0; k < 3; ++k) {
+    corners[static_cast<std::size_t>(k)] =
+        element.from_centroid.col(k) + (motion.displacement.col(k) - motion.displacement.col(0));
+  }
+  Vector9 on_corners;
+  Matrix9 between_corners;
+  unit_pressure(corners, height, on_corners, stiffness == nullptr ? nullptr : &between_corners);
+  force.setZero();
+  for (int k = 0; k < 3; ++k) {
+    force.segment<3>(6 * k) = on_corners.segment<3>(3 * k);
+  }
+  if (stiffness != nullptr) {
+    stiffness->setZero();
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) {
+        stiffness->block<3, 3>(6 * i, 6 * j) = between_corners.block<3, 3>(3 * i, 3 * j);
+      }
+    }
+  }
+}
+
+void scatter(const std::array<std::size_t, 9>& places, const Matrix18& matrix, BlockMatrix& target) {
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) {
-      target.block(places[static_cast<std::size_t>(3 * i + j)]) += factor * matrix.block<6, 6>(6 * i, 6 * j);
+      target.block(places[static_cast<std::size_t>(3 * i + j)]) += matrix.block<6, 6>(6 * i, 6 * j);
     }
   }
 }
@@ -372,10 +401,8 @@ void evaluate(const ShellSystem& system, const Model& model, const Configuration
   for (const std::vector<Index>& colour : system.colours) {
     parallel_for_blocks(colour.size(), grain, [&](std::size_t begin, std::size_t end) {
       ElementResponse response;
-      Matrix18 stiffness;
+      Matrix18 stiffness, push_stiffness;
       Vector18 pushed;
-      Vector9 load;
-      Matrix9 load_stiffness;
       for (std::size_t i = begin; i < end; ++i) {
         const std::size_t e = colour[i];
         const ShellElement& element = system.elements[e];
@@ -391,39 +418,18 @@ void evaluate(const ShellSystem& system, const Model& model, const Configuration
           forces.internal.segment<6>(at(element.nodes[static_cast<std::size_t>(k)])) +=
               response.force.segment<6>(6 * k);
         }
-        if (tangent != nullptr) {
-          scatter(system.placement[e], stiffness, 1, *tangent);
-        }
         const double p = pressure[element.body];
-        if (p == 0) {
-          continue;
-        }
-        if (element.curved) {
-          unit_pressure(element, motion, pushed, tangent == nullptr ? nullptr : &stiffness);
+        if (p != 0) {
+          push(element, system.heights[e], motion, pushed, tangent == nullptr ? nullptr : &push_stiffness);
           for (int k = 0; k < 3; ++k) {
             forces.external.segment<6>(at(element.nodes[static_cast<std::size_t>(k)])) += p * pushed.segment<6>(6 * k);
           }
           if (tangent != nullptr) {
-            scatter(system.placement[e], stiffness, -p, *tangent);
+            stiffness -= p * push_stiffness;
           }
-          continue;
-        }
-        std::array<Vec3, 3> corners;
-        for (int k = 0; k < 3; ++k) {
-          corners[static_cast<std::size_t>(k)] =
-              element.from_centroid.col(k) + (motion.displacement.col(k) - motion.displacement.col(0));
-        }
-        unit_pressure(corners, system.heights[e], load, tangent == nullptr ? nullptr : &load_stiffness);
-        for (int k = 0; k < 3; ++k) {
-          forces.external.segment<3>(at(element.nodes[static_cast<std::size_t>(k)])) += p * load.segment<3>(3 * k);
         }
         if (tangent != nullptr) {
-          for (int r = 0; r < 3; ++r) {
-            for (int c = 0; c < 3; ++c) {
-              tangent->block(system.placement[e][static_cast<std::size_t>(3 * r + c)]).topLeftCorner<3, 3>() -=
-                  p * load_stiffness.block<3, 3>(3 * r, 3 * c);
-            }
-          }
+          scatter(system.placement[e], stiffness, *tangent);
         }
       }
     });
@@ -438,7 +444,7 @@ void linear_stiffness(const ShellSystem& system, BlockMatrix& matrix) {
   for (const std::vector<Index>& colour : system.colours) {
     parallel_for_blocks(colour.size(), grain, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
-        scatter(system.placement[colour[i]], linear_stiffness(system.elements[colour[i]]), 1, matrix);
+        scatter(system.placement[colour[i]], linear_stiffness(system.elements[colour[i]]), matrix);
       }
     });
   }
