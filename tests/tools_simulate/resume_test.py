@@ -122,6 +122,42 @@ value = "1Pa"
         self.run_tool("--scene", "scene.toml", "out.hdf", "--resume", "out.hdf.part")
         self.assert_same("whole.hdf", "out.hdf")
 
+    def test_second_order_run_with_adaptive_steps_killed(self):
+        """What these remember from step to step (accelerations, the length of the last part) is in the checkpoint."""
+        for more in ("integrator = \"generalised-alpha\"\n", "adaptive = \"0.02%\"\n",
+                     "integrator = \"generalised-alpha\"\nadaptive = \"0.02%\"\n"):
+            self.write("scene.toml", f"""
+[run]
+kind = "dynamic"
+duration = "0.1s"
+step = "2ms"
+solver = "direct"
+{more}
+[[shell]]
+name = "plate"
+mesh = "plate.ply"
+thickness = "0.5mm"
+young = "1MPa"
+poisson = 0.3
+density = "1100kg/m3"
+[[fix]]
+body = "plate"
+where = {{boundary = true}}
+translation = "xyz"
+rotation = "xyz"
+[[load]]
+body = "plate"
+kind = "pressure"
+value = "200Pa"
+ramp = [["0s", 0.0], ["20ms", 1.0]]
+""")
+            self.run_tool("--scene", "scene.toml", "whole.hdf", "--force")
+            self.assertTrue(self.stop(signal.SIGKILL, "--scene", "scene.toml", "out.hdf", states=60_000))
+            self.run_tool("--resume", "out.hdf.part")
+            self.assertIn("goes on after step", self.done.stderr)
+            self.assert_same("whole.hdf", "out.hdf")
+            os.remove(self.path("out.hdf"))
+
     def test_damped_run_terminated_and_continued_beside_its_command(self):
         words = ["--scene", "scene.toml", "out.hdf"]
         self.write("scene.toml", """
