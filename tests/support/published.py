@@ -61,6 +61,44 @@ def vessel(around, along):
     return point(angle, z), np.array(triangles), normals / np.linalg.norm(normals, axis=1)[:, None]
 
 
+def organ(frequency):
+    """A closed bumpy organ of mean radius 10 over a geodesic sphere, 20 x frequency^2 triangles, with its normals."""
+    golden = (1 + math.sqrt(5)) / 2
+    corners = np.array([(-1, golden, 0), (1, golden, 0), (-1, -golden, 0), (1, -golden, 0), (0, -1, golden),
+                        (0, 1, golden), (0, -1, -golden), (0, 1, -golden), (golden, 0, -1), (golden, 0, 1),
+                        (-golden, 0, -1), (-golden, 0, 1)])
+    faces = [(0, 11, 5), (0, 5, 1), (0, 1, 7), (0, 7, 10), (0, 10, 11), (1, 5, 9), (5, 11, 4), (11, 10, 2), (10, 7, 6),
+             (7, 1, 8), (3, 9, 4), (3, 4, 2), (3, 2, 6), (3, 6, 8), (3, 8, 9), (4, 9, 5), (2, 4, 11), (6, 2, 10),
+             (8, 6, 7), (9, 8, 1)]
+    nodes, points, triangles = {}, [], []
+
+    def node(face, i, j):
+        weights = tuple(sorted((c, w) for c, w in zip(face, (frequency - i - j, i, j)) if w))
+        if weights not in nodes:
+            nodes[weights] = len(points)
+            points.append(sum(w * corners[c] for c, w in weights))
+        return nodes[weights]
+
+    for face in faces:
+        for i in range(frequency):
+            for j in range(frequency - i):
+                triangles.append((node(face, i, j), node(face, i + 1, j), node(face, i, j + 1)))
+                if i + j + 1 < frequency:
+                    triangles.append((node(face, i + 1, j), node(face, i + 1, j + 1), node(face, i, j + 1)))
+
+    def surface(directions):
+        d = directions / np.linalg.norm(directions, axis=1)[:, None]
+        x, y, z = d.T
+        return d * (10 * (1 + 0.12 * np.sin(3 * x + 1) * np.cos(4 * y) + 0.08 * np.sin(5 * z + 2 * x)))[:, None]
+
+    d = np.array(points) / np.linalg.norm(points, axis=1)[:, None]
+    a = np.cross(d, np.where(np.abs(d[:, :1]) < 0.7, [(1.0, 0, 0)], [(0, 1.0, 0)]))
+    a *= 1e-5 / np.linalg.norm(a, axis=1)[:, None]
+    b = np.cross(d, a)
+    normals = np.cross(surface(d + a) - surface(d - a), surface(d + b) - surface(d - b))
+    return surface(d), np.array(triangles), normals / np.linalg.norm(normals, axis=1)[:, None]
+
+
 def run_lines(**keys):
     return "[run]\n" + "".join(f"{key} = {json.dumps(value)}\n" for key, value in keys.items())
 
@@ -189,6 +227,13 @@ class Bench:
                            fix(np.flatnonzero(mesh[0][:, 0] < 1e-9)) + load("force", force, "N", [tip]))
             ratios.append(u[tip, axis] / reference)
         return max(ratios, key=lambda ratio: abs(ratio - 1))
+
+    def organ_energy(self, frequency, thickness, **elements):
+        """Strain energy of the closed bumpy organ under a small pressure."""
+        write_ply(self.path("mesh.ply"), *organ(frequency))
+        return self.run(LINEAR + shell("mesh.ply", thickness, 1.0, 0.3, **elements) +
+                        "[[fix]]\nbody = \"s\"\nwhere = {rigid_motions = true}\n" +
+                        load("pressure", "1e-3Pa"))["strain_energy_mj"]
 
     def bending_patch(self, **elements):
         """A rectangle of irregular triangles bent by a constant moment, its exact deflection a parabola: the largest
