@@ -1,5 +1,5 @@
 #include "core/error.hpp"
-#include "mechanics/solve.hpp"
+#include "mechanics/run.hpp"
 #include "mechanics/supports.hpp"
 #include "shell/curved_surface.hpp"
 
@@ -257,7 +257,7 @@ void check_balance(const ShellSystem& system, const Model& model) {
 
 }  // namespace
 
-void check_model(const Model& model, const RunSettings& settings) {
+ShellSystem make_checked_system(const Model& model, const RunSettings& settings) {
   if (model.shells.empty()) {
     throw InputError("the model has no shell");
   }
@@ -267,7 +267,7 @@ void check_model(const Model& model, const RunSettings& settings) {
   }
   check_selections(model);
   check_run(model, settings);
-  const ShellSystem system = make_system(model);
+  ShellSystem system = make_system(model);
   check_balance(system, model);
   if (finds_rest(model, settings)) {
     for (const Piece& piece : system.pieces) {
@@ -282,6 +282,9 @@ void check_model(const Model& model, const RunSettings& settings) {
       }
     }
   }
+  return system;
 }
+
+void check_model(const Model& model, const RunSettings& settings) { (void)make_checked_system(model, settings); }
 
 }  // namespace tunica

@@ -8,6 +8,9 @@ namespace tunica {
 
 using StateCallback = std::function<void(const State&)>;
 
+/// check_model(), and what it needs made ready anyway. Errors: InputError.
+ShellSystem make_checked_system(const Model& model, const RunSettings& settings);
+
 /// Everything of a state that follows from the configuration.
 State make_state(const ShellSystem& system, const Model& model, const Configuration& configuration, double time);
 

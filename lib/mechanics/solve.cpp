@@ -81,8 +81,7 @@ void record_step(const State& state, double seconds, Summary& summary) {
 
 Summary solve(const Model& model, const RunSettings& settings, const std::function<void(const State&)>& on_state,
               const Progress& progress, const Resumption& resumption) {
-  check_model(model, settings);
-  ShellSystem system = make_system(model);
+  ShellSystem system = make_checked_system(model, settings);
   if (const auto* dynamic = std::get_if<DynamicRun>(&settings.kind)) {
     return run_dynamic(system, model, settings, *dynamic, on_state, progress, resumption);
   }
