@@ -362,7 +362,9 @@ void prepare_result(Json& result, const Model& model) {
             {"real_time_factor", nullptr},
             {"probes", Json::object()},
             {"frequencies_hz", Json::array()},
-            {"buckling_factors", Json::array()}};
+            {"buckling_factors", Json::array()},
+            {"limit_load_factors", Json::array()},
+            {"branch_load_factors", Json::array()}};
   for (const Probe& probe : model.probes) {
     result["probes"][probe.name] = {{"time_s", Json::array()},
                                     {"load_factor", Json::array()},
@@ -407,6 +409,8 @@ void report_summary(Json& result, const Summary& summary, bool converged, std::o
   result["algebraic_error_percent"] = summary.algebraic_error ? Json(1e2 * *summary.algebraic_error) : Json();
   result["algebraic_error_is_lower_bound"] = summary.algebraic_error_is_bound;
   result["newton_iterations"] = summary.newton_iterations;
+  result["limit_load_factors"] = summary.limit_factors;
+  result["branch_load_factors"] = summary.branch_factors;
   result["cg_iterations"] = summary.cg_iterations;
   const std::vector<double>& seconds = summary.seconds_per_step;
   if (!seconds.empty()) {
@@ -536,7 +540,8 @@ void simulate(cli::Tool& tool, const Arguments& a) {
   const auto* frequencies = std::get_if<FrequencyRun>(&scene.run.kind);
   const auto* buckling = std::get_if<BucklingRun>(&scene.run.kind);
   const bool modes = frequencies != nullptr || buckling != nullptr;
-  const bool series = dynamic != nullptr || modes;
+  const bool by_arc_length = std::holds_alternative<ArcLengthRun>(scene.run.kind);
+  const bool series = dynamic != nullptr || modes || by_arc_length;
   // A run that goes on replaces what it has exported itself.
   const bool replace_exports = tool.force() || journal.has_value();
   const ExportOptions exports{drawing.pvd, drawing.xmf, series, drawing.level(), replace_exports};

@@ -38,14 +38,21 @@ void check_run(const Scene& scene) {
     require(dynamic->spectral_radius >= 0 && dynamic->spectral_radius <= 1, places.of("spectral_radius"),
             fmt::format("spectral_radius {} is outside [0, 1]: 1 damps nothing, 0 the most", dynamic->spectral_radius));
   }
-  const bool modes = std::holds_alternative<FrequencyRun>(run.kind) || std::holds_alternative<BucklingRun>(run.kind);
-  require(!modes || run.solver != Solver::cg,
+  const bool needs_direct = std::holds_alternative<FrequencyRun>(run.kind) ||
+                            std::holds_alternative<BucklingRun>(run.kind) ||
+                            std::holds_alternative<ArcLengthRun>(run.kind);
+  require(!needs_direct || run.solver != Solver::cg,
           places.of(places.keys.contains("solver")         ? "solver"
                     : places.keys.contains("cg_tolerance") ? "cg_tolerance"
                                                            : "cg_iterations"),
-          "frequencies and buckling factors need the direct solver: remove what asks for cg");
+          "frequencies, buckling and arc length need the direct solver: remove what asks for cg");
   require(run.cg_tolerance > 0 && run.cg_tolerance < 1, places.of("cg_tolerance"),
           "cg_tolerance must be greater than 0 and less than 1 (100%)");
+  if (const auto* path = std::get_if<ArcLengthRun>(&run.kind)) {
+    require(!path->max_factor || positive(*path->max_factor), places.of("max_factor"),
+            "max_factor must be greater than 0");
+    require(!path->until || path->until->reaches != 0, places.of("until"), "until reaches 0: the path begins there");
+  }
   require(run.converge > 0 && run.converge < 1, places.of("converge"),
           "converge must be greater than 0 and less than 1");
 }
@@ -405,6 +412,20 @@ void settle_solver(Scene& scene) {
   }
 }
 
+void settle_until(Scene& scene) {
+  auto* path = std::get_if<ArcLengthRun>(&scene.run.kind);
+  if (path == nullptr || !path->until) {
+    return;
+  }
+  const auto found = std::find_if(scene.probes.begin(), scene.probes.end(),
+                                  [&](const SceneProbe& probe) { return probe.name == scene.until_probe; });
+  if (found == scene.probes.end()) {
+    scene.run_places.of("until").fail(
+        fmt::format("there is no [[probe]] \"{}\": add it, or name another", scene.until_probe));
+  }
+  path->until->probe = static_cast<std::size_t>(found - scene.probes.begin());
+}
+
 void check_scene(const Scene& scene) {
   check_run(scene);
   const std::string_view needs_density = std::holds_alternative<DynamicRun>(scene.run.kind) ? "a dynamic run"
@@ -423,7 +444,16 @@ void check_scene(const Scene& scene) {
   for (const SceneFix& fix : scene.fixes) {
     check_fix(scene, fix);
   }
+  const bool finds_factor = std::holds_alternative<ArcLengthRun>(scene.run.kind);
+  const auto refuse_ramp = [&](const Ramp& ramp, const Places& places) {
+    require(!finds_factor || ramp.points.empty(), places.of("ramp"),
+            "arc length finds the load factor, so that nothing can have a ramp over it: remove the ramp");
+  };
+  for (const SceneFix& fix : scene.fixes) {
+    refuse_ramp(fix.ramp, fix.places);
+  }
   for (const SceneLoad& load : scene.loads) {
+    refuse_ramp(load.ramp, load.places);
     const SceneShell& shell = scene.shells[body_index(scene, load.body, load.places)];
     require(!std::holds_alternative<GravityLoad>(load.kind) || shell.material.density, shell.places.item,
             fmt::format("[[shell]] \"{}\" has no density: its gravity load needs it", shell.name));

@@ -102,6 +102,7 @@ struct SceneProbe {
 struct Scene {
   RunSettings run;
   bool cg_tolerance_stated = false;
+  std::string until_probe;  ///< of an arc-length run, whose `until` names it; empty where it has none
   Places run_places;
   std::vector<SceneShell> shells;
   std::vector<SceneFix> fixes;
@@ -116,6 +117,9 @@ std::vector<double> equal_load_factors(std::size_t steps);
 /// Decides what the statements about CG mean together: a tolerance or a count asks for CG; a count alone is a fixed
 /// count without a requirement (the paper's setting). Errors: a contradiction with solver = "direct".
 void settle_solver(Scene& scene);
+
+/// Finds the probe that `until` of an arc-length run names. Errors: there is none of that name.
+void settle_until(Scene& scene);
 
 /// Checks all that can be checked without a mesh: ranges, signs, required densities, names, duplicates.
 /// Errors: InputError or UsageError that starts with the place.

@@ -2,6 +2,7 @@
 
 #include "core/quantity.hpp"
 #include "io/output_file.hpp"
+#include "io/suggestion.hpp"
 #include "io/toml_depth.hpp"
 
 #include <fmt/format.h>
@@ -21,41 +22,6 @@ constexpr std::int64_t most_load_steps = 1'000'000;
 constexpr std::int64_t most_modes = 10'000;
 
 using Keys = std::span<const std::string_view>;
-
-// Insertions, deletions, replacements and swaps of neighbours that turn one word into the other.
-std::size_t edit_distance(std::string_view a, std::string_view b) {
-  std::vector<std::vector<std::size_t>> d(a.size() + 1, std::vector<std::size_t>(b.size() + 1));
-  for (std::size_t i = 0; i <= a.size(); ++i) {
-    for (std::size_t j = 0; j <= b.size(); ++j) {
-      if (i == 0 || j == 0) {
-        d[i][j] = i + j;
-        continue;
-      }
-      const std::size_t replaced = d[i - 1][j - 1] + (a[i - 1] == b[j - 1] ? 0 : 1);
-      d[i][j] = std::min({replaced, d[i - 1][j] + 1, d[i][j - 1] + 1});
-      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) {
-        d[i][j] = std::min(d[i][j], d[i - 2][j - 2] + 1);
-      }
-    }
-  }
-  return d[a.size()][b.size()];
-}
-
-// "did you mean 'x'?", or the list of what there is.
-std::string suggestion(std::string_view word, Keys known) {
-  constexpr std::size_t longest = 64;  // more is no slip of the keyboard, but may be an attempt to take our memory
-  word = word.substr(0, longest);
-  const auto closest = std::min_element(known.begin(), known.end(), [&](std::string_view a, std::string_view b) {
-    return edit_distance(word, a) < edit_distance(word, b);
-  });
-  const auto near = [&](std::string_view name) {
-    return edit_distance(word, name) <= std::min(name.size() - 1, 1 + name.size() / 4);
-  };
-  if (closest != known.end() && near(*closest)) {
-    return fmt::format("did you mean '{}'?", *closest);
-  }
-  return fmt::format("known are {}", fmt::join(known, ", "));
-}
 
 // One table of the file, and what it may hold.
 class Table {
@@ -367,6 +333,39 @@ void read_static(const Table& run, StaticRun& settings) {
   }
 }
 
+void read_arc_length(const Table& run, Scene& scene) {
+  auto& settings = scene.run.kind.emplace<ArcLengthRun>();
+  bool linear = false;
+  run.choice<bool>("geometry", linear, {{"nonlinear", false}, {"linear", true}});
+  if (linear) {
+    run.place("geometry").fail("a linear run has no path to follow: remove control = \"arc-length\"");
+  }
+  if (run.has("load_factors")) {
+    run.place("load_factors").fail("arc length finds the load factors: remove load_factors");
+  }
+  if (run.has("load_steps")) {
+    settings.first_factor = 1 / static_cast<double>(run.count("load_steps", most_load_steps));
+  }
+  if (run.has("max_steps")) {
+    settings.max_steps = run.count("max_steps", most_load_steps);
+  }
+  if (run.has("max_factor")) {
+    settings.max_factor = run.number("max_factor");
+  }
+  if (run.has("until")) {
+    constexpr std::array<std::string_view, 3> keys{"probe", "axis", "reaches"};
+    const Table until(run.table("until", R"({probe = "tip", axis = "z", reaches = "30mm"})"), run.file(), "until",
+                      keys);
+    scene.until_probe = until.text("probe");
+    ArcLengthRun::Until& goal = settings.until.emplace();
+    (void)until.required("axis");
+    until.choice<int>("axis", goal.axis, {{"x", 0}, {"y", 1}, {"z", 2}});
+    goal.reaches = until.quantity("reaches", dimension::length);
+  } else if (!settings.max_factor && !run.has("max_steps")) {
+    settings.max_factor = 1;
+  }
+}
+
 void read_dynamic(const Table& run, DynamicRun& settings) {
   bool linear = false;
   run.choice<bool>("geometry", linear, {{"nonlinear", false}, {"linear", true}});
@@ -419,12 +418,11 @@ double read_cg_tolerance(const Table& run) {
 }
 
 void read_run(const toml::table& table, const std::string& file, Scene& scene) {
-  constexpr std::array<std::string_view, 18> keys{
-      "kind",     "geometry",   "load_steps", "load_factors", "control",         "duration",
-      "step",     "damping",    "integrator", "solver",       "cg_tolerance",    "cg_iterations",
-      "converge", "newton_max", "every",      "count",        "spectral_radius", "adaptive"};
-  constexpr std::array<std::string_view, 3> later{"max_steps", "max_factor", "until"};
-  const Table run(table, file, "[run]", keys, later);
+  constexpr std::array<std::string_view, 21> keys{
+      "kind",    "geometry",   "load_steps",      "load_factors", "control",       "duration",   "step",
+      "damping", "integrator", "solver",          "cg_tolerance", "cg_iterations", "converge",   "newton_max",
+      "every",   "count",      "spectral_radius", "adaptive",     "max_steps",     "max_factor", "until"};
+  const Table run(table, file, "[run]", keys);
   scene.run_places = run.places();
 
   enum class Kind { is_static, dynamic, frequencies, buckling } kind = Kind::is_static;
@@ -437,6 +435,9 @@ void read_run(const toml::table& table, const std::string& file, Scene& scene) {
   if (kind != Kind::dynamic) {
     refuse_keys(run, name, "dynamic", {"duration", "step", "damping", "integrator", "spectral_radius", "adaptive"});
   }
+  if (kind != Kind::is_static) {
+    refuse_keys(run, name, "control = \"arc-length\"", {"max_steps", "max_factor", "until"});
+  }
   if (kind != Kind::frequencies && kind != Kind::buckling) {
     refuse_keys(run, name, "frequencies or buckling", {"count"});
   }
@@ -447,12 +448,14 @@ void read_run(const toml::table& table, const std::string& file, Scene& scene) {
   };
   switch (kind) {
     case Kind::is_static: {
-      if (run.optional_text("control") == "arc-length") {
-        throw UsageError(fmt::format("{}: control = \"arc-length\": not available yet", run.place("control").text));
+      bool by_arc_length = false;
+      run.choice<bool>("control", by_arc_length, {{"load", false}, {"arc-length", true}});
+      if (by_arc_length) {
+        read_arc_length(run, scene);
+      } else {
+        refuse_keys(run, name, "control = \"arc-length\"", {"max_steps", "max_factor", "until"});
+        read_static(run, scene.run.kind.emplace<StaticRun>());
       }
-      bool load_control = true;
-      run.choice<bool>("control", load_control, {{"load", true}});
-      read_static(run, scene.run.kind.emplace<StaticRun>());
       break;
     }
     case Kind::dynamic:
@@ -683,6 +686,7 @@ Scene parse_scene(const std::string& text, const fs::path& name) {
     scene.probes.push_back({table.text("name"), table.text("body"),
                             table.vector("nearest", dimension::length, like_point), table.places()});
   }
+  settle_until(scene);
   settle_solver(scene);
   check_scene(scene);
   return scene;

@@ -5,6 +5,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <cmath>
+
 namespace tunica {
 namespace {
 
@@ -131,15 +133,37 @@ void write_kind_of_run(const FrequencyRun& run, Text& text) {
   }
 }
 
+void write_kind_of_run(const ArcLengthRun&, Text&) { TUNICA_ASSERT(false && "needs the probe's name"); }
+
 void write_kind_of_run(const BucklingRun& run, Text& text) {
   text.word("kind", "buckling");
   text.line("count", std::to_string(run.count));
 }
 
+void write_path(const ArcLengthRun& run, const std::string& probe, Text& text) {
+  text.word("kind", "static");
+  text.word("geometry", "nonlinear");
+  text.word("control", "arc-length");
+  text.line("load_steps", std::to_string(std::lround(1 / run.first_factor)));
+  text.line("max_steps", std::to_string(run.max_steps));
+  if (run.max_factor) {
+    text.line("max_factor", number(*run.max_factor));
+  }
+  if (run.until) {
+    text.line("until", fmt::format("{{probe = {}, axis = \"{}\", reaches = {}}}", toml_string(probe),
+                                   "xyz"[static_cast<std::size_t>(run.until->axis)],
+                                   toml_string(quantity(run.until->reaches, "m", dimension::length))));
+  }
+}
+
 void write_run(const Scene& scene, Text& text) {
   const RunSettings& run = scene.run;
   text.section("[run]");
-  std::visit([&](const auto& kind) { write_kind_of_run(kind, text); }, run.kind);
+  if (const auto* path = std::get_if<ArcLengthRun>(&run.kind)) {
+    write_path(*path, scene.until_probe, text);
+  } else {
+    std::visit([&](const auto& kind) { write_kind_of_run(kind, text); }, run.kind);
+  }
   text.word("solver", run.solver == Solver::cg ? "cg" : run.solver == Solver::direct ? "direct" : "auto");
   if (scene.cg_tolerance_stated) {
     text.line("cg_tolerance", number(run.cg_tolerance));

@@ -187,7 +187,26 @@ bool is_loaded(const Model& model) {
 /// Whether a state of rest is looked for, so that nothing may move freely.
 bool finds_rest(const Model& model, const RunSettings& settings) {
   return std::holds_alternative<StaticRun>(settings.kind) || std::holds_alternative<BucklingRun>(settings.kind) ||
+         std::holds_alternative<ArcLengthRun>(settings.kind) ||
          (std::holds_alternative<FrequencyRun>(settings.kind) && is_loaded(model));
+}
+
+void check_path(const Model& model, const ArcLengthRun& run) {
+  if (!is_loaded(model)) {
+    throw InputError("arc length needs a load or a prescribed displacement");
+  }
+  const auto ramped = [](const auto& item) { return !item.ramp.points.empty(); };
+  if (std::any_of(model.loads.begin(), model.loads.end(), ramped) ||
+      std::any_of(model.fixes.begin(), model.fixes.end(), ramped)) {
+    throw InputError("arc length finds the load factor, so that no load can have a ramp over it: remove the ramps");
+  }
+  if (run.max_steps == 0 || !(run.first_factor > 0) || (run.max_factor && !(*run.max_factor > 0))) {
+    throw InputError("arc length: max_steps must be at least 1, the first step and max_factor positive");
+  }
+  if (run.until && (run.until->probe >= model.probes.size() || run.until->axis < 0 || run.until->axis > 2 ||
+                    !std::isfinite(run.until->reaches) || run.until->reaches == 0)) {
+    throw InputError("arc length: until names a probe, an axis and a displacement other than zero");
+  }
 }
 
 void check_run(const Model& model, const RunSettings& settings) {
@@ -207,6 +226,8 @@ void check_run(const Model& model, const RunSettings& settings) {
     if (!is_loaded(model)) {
       throw InputError("buckling needs a load or a prescribed displacement");
     }
+  } else if (const auto* path = std::get_if<ArcLengthRun>(&settings.kind)) {
+    check_path(model, *path);
   } else {
     check_load_factors(std::get<StaticRun>(settings.kind));
   }
@@ -215,8 +236,9 @@ void check_run(const Model& model, const RunSettings& settings) {
   if ((frequencies != nullptr && frequencies->count == 0) || (buckling != nullptr && buckling->count == 0)) {
     throw InputError("count must be at least 1");
   }
-  if ((frequencies != nullptr || buckling != nullptr) && settings.solver == Solver::cg) {
-    throw InputError("frequencies and buckling factors need the direct solver: remove what asks for cg");
+  if ((frequencies != nullptr || buckling != nullptr || std::holds_alternative<ArcLengthRun>(settings.kind)) &&
+      settings.solver == Solver::cg) {
+    throw InputError("frequencies, buckling and arc length need the direct solver: remove what asks for cg");
   }
   if (settings.newton_max == 0 || settings.every == 0 || !positive(settings.converge)) {
     throw InputError("newton_max and every must be at least 1, and converge positive");

@@ -141,6 +141,19 @@ struct StaticRun {
   std::vector<double> load_factors;  ///< increasing; the last is usually 1
 };
 
+/// The whole path of equilibria from the reference on, through limit points: the load factor is found, not given.
+struct ArcLengthRun {
+  std::size_t max_steps = 200;
+  double first_factor = 0.1;         ///< change of the load factor in the first step; the others find their length
+  std::optional<double> max_factor;  ///< the path ends where the load factor reaches this, up or down
+  struct Until {
+    std::size_t probe = 0;  ///< of the model's
+    int axis = 0;
+    double reaches = 0;  ///< mm, its displacement
+  };
+  std::optional<Until> until;  ///< the path ends there, and must get there
+};
+
 /// Natural frequencies about the reference, or, where there are loads or prescribed displacements, about the state of
 /// rest under them.
 struct FrequencyRun {
@@ -166,7 +179,7 @@ struct DynamicRun {
 };
 
 struct RunSettings {
-  std::variant<StaticRun, DynamicRun, FrequencyRun, BucklingRun> kind;
+  std::variant<StaticRun, DynamicRun, FrequencyRun, BucklingRun, ArcLengthRun> kind;
   Solver solver = Solver::automatic;
   double cg_tolerance = 1e-10;               ///< relative residual at which a CG solve stops
   std::optional<std::size_t> cg_iterations;  ///< at most this many CG iterations in a solve

@@ -25,6 +25,13 @@ void set_algebraic_error(const std::optional<AlgebraicError>& error, State& stat
 /// last) adds its counts only.
 void record_step(const State& state, double seconds, Summary& summary);
 
+/// Prescribed displacements at a load factor (6 per node).
+VectorX prescribed_positions(const ShellSystem& system, const Model& model, double factor);
+
+/// What keeps a configuration from static equilibrium at a load factor.
+Balance static_balance(const ShellSystem& system, const Model& model, const Configuration& configuration, double factor,
+                       Forces& forces, BlockMatrix* tangent);
+
 /// Load steps, each with Newton's method until it converges. Errors: RequirementError.
 Summary run_static(ShellSystem& system, const Model& model, const RunSettings& settings, const StaticRun& run,
                    const StateCallback& on_state, const Progress& progress, const Resumption& resumption);
@@ -32,6 +39,16 @@ Summary run_static(ShellSystem& system, const Model& model, const RunSettings& s
 /// One linear solve about the reference configuration. Errors: RequirementError.
 Summary run_linear(ShellSystem& system, const Model& model, const RunSettings& settings, const StaticRun& run,
                    const StateCallback& on_state, const Progress& progress, const Resumption& resumption);
+
+/// The path of equilibria by arc length: a tangent predictor and Newton's method in the plane across it, on the factor
+/// of the tangent stiffness (follower pressure included) bordered by the constraint. Steps are cut and stretched so
+/// that straight lines between the states follow the path. Limit points are where the load factor turns (from the cubic
+/// through the states around); other changes of the number of negative pivots are branches, which are not followed.
+/// Source: Riks 1979, "An incremental approach to the solution of snapping and buckling problems"; Keller 1977.
+/// Errors: RequirementError: the path does not go on, or ends before what it should reach.
+/// Cost: three to six factorisations per step.
+Summary run_arc_length(ShellSystem& system, const Model& model, const RunSettings& settings, const ArcLengthRun& run,
+                       const StateCallback& on_state, const Progress& progress);
 
 /// Natural frequencies and modes. Masses are lumped as in a dynamic run; bodies held by their rigid motions are free,
 /// and free rigid motions are left out. Errors: RequirementError: no stable state under the loads; the eigenvalues do

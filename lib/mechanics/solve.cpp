@@ -91,6 +91,9 @@ Summary solve(const Model& model, const RunSettings& settings, const std::functi
   if (const auto* buckling = std::get_if<BucklingRun>(&settings.kind)) {
     return run_buckling(system, model, settings, *buckling, on_state, progress);
   }
+  if (const auto* path = std::get_if<ArcLengthRun>(&settings.kind)) {
+    return run_arc_length(system, model, settings, *path, on_state, progress);
+  }
   const auto& run = std::get<StaticRun>(settings.kind);
   return run.linear ? run_linear(system, model, settings, run, on_state, progress, resumption)
                     : run_static(system, model, settings, run, on_state, progress, resumption);

@@ -15,7 +15,8 @@ namespace tunica {
 
 /// One state of a run, as handed to the callback; everything is for all nodes of all bodies in global order.
 struct State {
-  /// s; the load factor in a static run, the frequency (Hz) or the buckling factor of a mode.
+  /// s; the load factor in a static run, the number of the step on a path by arc length, the frequency (Hz) or the
+  /// buckling factor of a mode.
   double time = 0;
   double load_factor = 0;              ///< static: of this step; dynamic: of the first load's ramp
   std::vector<Vec3> displacement;      ///< mm, #nodes
@@ -67,6 +68,8 @@ struct Summary {
   std::vector<double> seconds_per_step;  ///< wall
   std::vector<double> frequencies;       ///< Hz, increasing
   std::vector<double> buckling_factors;  ///< increasing
+  std::vector<double> limit_factors;     ///< load factors at which a path by arc length turns, in its order
+  std::vector<double> branch_factors;    ///< and near which other paths leave it
 };
 
 /// Everything a run needs to go on after a step as if nothing had happened: the numbers as they stand in memory, so

@@ -12,24 +12,6 @@
 #include <limits>
 
 namespace tunica {
-namespace {
-
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
-
-/// Smallest part of a load step that is tried before the load counts as one without equilibrium.
-constexpr double smallest_part = 1.0 / 1024;
-/// A step whose change is more than this times its linear prediction has left the path: up to a limit point a quadratic
-/// fold gives at most 2.
-constexpr double largest_departure = 3;
-/// A shell that gives way by less than this part of its thickness (root mean square) has branched off its path, not
-/// jumped.
-constexpr double largest_branch = 0.25;
-/// Part of the thickness by which a shell is pushed off a path that it may leave.
-constexpr double nudge = 0.01;
-/// Net load that the supports of a body held by its rigid motions may carry, relative to the load.
-constexpr double largest_imbalance = 1e-3;
 
 VectorX prescribed_positions(const ShellSystem& system, const Model& model, double factor) {
   VectorX positions = VectorX::Zero(static_cast<Eigen::Index>(6 * system.node_count()));
@@ -55,6 +37,25 @@ Balance static_balance(const ShellSystem& system, const Model& model, const Conf
   balance.floor = round_off(system, configuration);
   return balance;
 }
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+/// Smallest part of a load step that is tried before the load counts as one without equilibrium.
+constexpr double smallest_part = 1.0 / 1024;
+/// A step whose change is more than this times its linear prediction has left the path: up to a limit point a quadratic
+/// fold gives at most 2.
+constexpr double largest_departure = 3;
+/// A shell that gives way by less than this part of its thickness (root mean square) has branched off its path, not
+/// jumped.
+constexpr double largest_branch = 0.25;
+/// Part of the thickness by which a shell is pushed off a path that it may leave.
+constexpr double nudge = 0.01;
+/// Net load that the supports of a body held by its rigid motions may carry, relative to the load.
+constexpr double largest_imbalance = 1e-3;
 
 /// One load step to equilibrium, bodies held by their rigid motions included: their mean displacement and rotation are
 /// taken out, and equilibrium found again, until both hold.

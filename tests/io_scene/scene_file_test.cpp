@@ -227,6 +227,30 @@ TEST_F(SceneTest, theResolvedTextReadsAsTheSameScene) {
   EXPECT_THAT(resolved, HasSubstr("mesh = \"" + (folder_ / "plate.ply").string()));
 }
 
+TEST_F(SceneTest, pathsAreReadAndWrittenAgain) {
+  const std::string more = std::string(plate) +
+                           "[[probe]]\nname = \"a\"\nbody = \"plate\"\nnearest = [\"0mm\", \"0mm\", \"0mm\"]\n" +
+                           "[[probe]]\nname = \"tip\"\nbody = \"plate\"\nnearest = [\"9mm\", \"9mm\", \"0mm\"]\n";
+  const auto run_of = [&](const std::string& lines) {
+    const Scene scene = read("[run]\nkind = \"static\"\ncontrol = \"arc-length\"\n" + lines + "\n" + more);
+    EXPECT_EQ(scene_text(read(scene_text(scene))), scene_text(scene));
+    return std::get<ArcLengthRun>(scene.run.kind);
+  };
+  const ArcLengthRun whole = run_of(
+      "load_steps = 40\nmax_steps = 70\nmax_factor = 1.5\nuntil = {probe = \"tip\", axis = "
+      "\"y\", reaches = \"-30um\"}");
+  EXPECT_EQ(whole.first_factor, 1.0 / 40);
+  EXPECT_EQ(whole.max_steps, 70U);
+  EXPECT_EQ(whole.max_factor, 1.5);
+  ASSERT_TRUE(whole.until);
+  EXPECT_EQ(whole.until->probe, 1U);
+  EXPECT_EQ(whole.until->axis, 1);
+  EXPECT_DOUBLE_EQ(whole.until->reaches, -0.03);
+  EXPECT_EQ(run_of("").max_factor, 1.0);
+  EXPECT_FALSE(run_of("max_steps = 5").max_factor);
+  EXPECT_FALSE(run_of("max_steps = 5").until);
+}
+
 TEST_F(SceneTest, modesAreReadAndWrittenAgain) {
   const std::string dense = std::string(plate) + "density = \"1g/cm3\"\n";
   const auto run_of = [&](const std::string& lines) {
@@ -304,7 +328,31 @@ std::string modes_with(const std::string& kind, const std::string& lines) {
   return "[run]\nkind = \"" + kind + "\"\n" + lines + "\n" + plate;  // `lines` begin in line 3
 }
 
+std::string path_with(const std::string& line) {
+  return run_with("control = \"arc-length\"\n" + line);  // `line` is line 4
+}
+
 const std::vector<Wrong> wrongs{
+    {"maxStepsUnderLoadControl", run_with("max_steps = 3"), ":3:13: ", "arc-length"},
+    {"maxFactorOfBuckling", modes_with("buckling", "max_factor = 3"), ":3:14: ", "arc-length"},
+    {"linearPath", path_with("geometry = \"linear\""), ":4:12: ", "no path"},
+    {"loadFactorsOfPath", path_with("load_factors = [1]"), ":4:16: ", "finds the load factors"},
+    {"maxFactorZero", path_with("max_factor = 0"), ":4:14: ", "greater than 0"},
+    {"maxStepsZero", path_with("max_steps = 0"), ":4:13: ", "from 1"},
+    {"untilNumber", path_with("until = 3"), ":4:9: ", "table"},
+    {"untilOfNoProbe", path_with("until = {probe = \"tip\", axis = \"z\", reaches = \"3mm\"}"),
+     ":4:9: ", "no [[probe]] \"tip\""},
+    {"untilWithoutAxis", path_with("until = {probe = \"tip\", reaches = \"3mm\"}"), ":4:9: ", "no 'axis'"},
+    {"untilOfAngle", path_with("until = {probe = \"tip\", axis = \"a\", reaches = \"3mm\"}"), ":4:32: ", "not known"},
+    {"untilZero",
+     path_with("until = {probe = \"tip\", axis = \"z\", reaches = \"0mm\"}") +
+         "[[probe]]\nname = \"tip\"\nbody = \"plate\"\nnearest = [\"0mm\", \"0mm\", \"0mm\"]\n",
+     ":4:9: ", "begins there"},
+    {"pathByCg", path_with("solver = \"cg\""), ":4:10: ", "direct solver"},
+    {"rampOnPath",
+     path_with("every = 1") +
+         "[[load]]\nbody = \"plate\"\nkind = \"pressure\"\nvalue = \"1kPa\"\nramp = [[0, 0], [1, 1]]\n",
+     ":15:8: ", "finds the load factor"},
     {"countInStatic", run_with("count = 3"), ":3:9: ", "frequencies or buckling"},
     {"countZero", modes_with("buckling", "count = 0"), ":3:9: ", "from 1"},
     {"durationOfFrequencies", modes_with("frequencies", "duration = \"1s\""), ":3:12: ", "dynamic"},
@@ -515,8 +563,6 @@ const std::vector<Wrong> laters{
     {"rigid", basic("[[rigid]]\nname = \"x\"\n"), ":9:3: ", ""},
     {"attach", basic("[[attach]]\nbody = \"x\"\n"), ":9:3: ", ""},
     {"contact", basic("[[contact]]\nfriction = 0.2\n"), ":9:3: ", ""},
-    {"arcLength", run_with("control = \"arc-length\""), ":3:11: ", ""},
-    {"maxSteps", run_with("max_steps = 3"), ":3:1: ", ""},
 };
 
 INSTANTIATE_TEST_SUITE_P(all, LaterScene, ::testing::ValuesIn(laters),

@@ -19,7 +19,8 @@ DYNAMIC = PRESSED + ["--density", "1100kg/m3", "--duration", "0.1s", "--step", "
 RESULT_KEYS = ["shells", "tetrahedra", "nodes", "dof", "steps", "step_parts", "converged", "max_displacement_mm", "volume_before_mm3",
                "volume_after_mm3", "strain_energy_mj", "residual", "algebraic_error_percent",
                "algebraic_error_is_lower_bound", "newton_iterations",
-               "cg_iterations", "ms_per_step", "real_time_factor", "probes", "frequencies_hz", "buckling_factors"]
+               "cg_iterations", "ms_per_step", "real_time_factor", "probes", "frequencies_hz", "buckling_factors",
+               "limit_load_factors", "branch_load_factors"]
 
 
 class Flags(SimulateTest):
