@@ -289,7 +289,9 @@ ShellSystem make_checked_system(const Model& model, const RunSettings& settings)
   }
   check_selections(model);
   check_run(model, settings);
-  ShellSystem system = make_system(model);
+  const bool spectrum =
+      std::holds_alternative<FrequencyRun>(settings.kind) || std::holds_alternative<BucklingRun>(settings.kind);
+  ShellSystem system = make_system(model, spectrum ? 1 : 0);
   check_balance(system, model);
   if (finds_rest(model, settings)) {
     for (const Piece& piece : system.pieces) {

@@ -103,6 +103,7 @@ Vec3 curved_strain(const ShellElement& element, const std::array<Mat3, 3>& relat
     const double turn = element.edge_directions.col(k).dot(turned.head<2>());
     now.tilts[k] = element.tilts[k] + turn;
     now.bulges[k] = now.slopes[2 * k] - now.slopes[2 * k + 1];
+    now.state[12 + k] = 0.5 * (change[2 * k] + change[2 * k + 1]);
     // As differences, so that the reference is free of strain to the last bit.
     strain += element.sideways.col(k) * ((change[2 * k] - change[2 * k + 1]) * element.tilts[k] + now.bulges[k] * turn);
   }
@@ -122,6 +123,7 @@ bool find_kinematics(const ShellElement& element, const CornerMotion& motion, Ki
   const Mat23 stretch = now.frame.plane - element.plane;
   const Eigen::Matrix2d chord = stretch * element.gradients.transpose();
   Vec3 strain(chord(0, 0), chord(1, 1), chord(0, 1) + chord(1, 0));
+  now.state.tail<3>().setZero();
   if (element.curved) {
     strain += curved_strain(element, relative, now);
   } else {
@@ -265,6 +267,14 @@ void add_material(const ShellElement& element, double factor, const std::array<M
                   const std::array<Mat3, 3>& g, const Derivatives& d, Matrix18& t) {
   const Matrix3x18 stress = (factor * element.membrane).lazyProduct(d.strain);
   add_symmetric_product(d.strain, stress, t);
+  if (element.curved) {
+    Matrix3x18 skewness;
+    for (int k = 0; k < 3; ++k) {
+      skewness.row(k) = 0.5 * (d.slopes.row(2 * k) + d.slopes.row(2 * k + 1));
+    }
+    const Matrix3x18 on_skewness = factor * element.skewing * skewness;
+    add_symmetric_product(skewness, on_skewness, t);
+  }
   // Rotation vectors: H_i'K_ij H_j between spins, where spins of the frame count against those of the corners.
   Mat3 all = Mat3::Zero();
   std::array<Mat3, 3> rows{Mat3::Zero(), Mat3::Zero(), Mat3::Zero()};
@@ -356,7 +366,7 @@ void add_edge_stiffness(const EdgeNow& edge, int start, int carrier, const Vec3&
 
 ShellElement make_shell_element(const std::array<Vec3, 3>& corners, const ShellSurface& surface,
                                 const Material& material, double thickness, Membrane membrane, Bending bending,
-                                double higher_order_scale) {
+                                double higher_order_scale, double skewing) {
   ShellElement element;
   element.thickness = thickness;
   const Vec3 first = corners[1] - corners[0];
@@ -409,6 +419,9 @@ ShellElement make_shell_element(const std::array<Vec3, 3>& corners, const ShellS
   find_rotational(surface, out_of_plane, in_plane.higher_order, element);
 
   element.rotational *= spread;
+  if (surface.curved) {
+    element.skewing = skewing * material.young * thickness * element.area * element.slopes.squaredNorm() / 6;
+  }
   element.area *= spread;
   if (surface.curved) {
     element.rest_normals.setZero();
@@ -436,7 +449,8 @@ bool deformation(const ShellElement& element, const CornerMotion& motion, Elemen
 ElementState element_force(const ShellElement& element, const ElementState& deformation) {
   ElementState force;
   force.head<3>().noalias() = element.membrane * deformation.head<3>();
-  force.tail<9>().noalias() = element.rotational * deformation.tail<9>();
+  force.segment<9>(3).noalias() = element.rotational * deformation.segment<9>(3);
+  force.tail<3>() = element.skewing * deformation.tail<3>();
   return force;
 }
 
@@ -475,8 +489,14 @@ ElementState linear_deformation(const ShellElement& element, const Vector18& mot
   for (int k = 0; k < 3; ++k) {
     spin += reference.g[static_cast<std::size_t>(k)] * local.segment<3>(6 * k);
   }
-  ElementState state;
+  ElementState state = ElementState::Zero();
   state.head<3>() = reference.derivatives.strain * local;
+  if (element.curved) {
+    const Vector6 slopes = reference.derivatives.slopes * local;
+    for (int k = 0; k < 3; ++k) {
+      state[12 + k] = 0.5 * (slopes[2 * k] + slopes[2 * k + 1]);
+    }
+  }
   for (int k = 0; k < 3; ++k) {
     state.segment<3>(3 + 3 * k) = local.segment<3>(6 * k + 3) - spin;
   }
@@ -514,8 +534,8 @@ bool corotational_response(const ShellElement& element, const CornerMotion& moti
     }
     on_slopes = slope_stiffness.lazyProduct(now.slopes);
     for (int k = 0; k < 3; ++k) {
-      on_slopes[2 * k] += on_sides[k] * now.tilts[k];
-      on_slopes[2 * k + 1] -= on_sides[k] * now.tilts[k];
+      on_slopes[2 * k] += on_sides[k] * now.tilts[k] + 0.5 * stress[12 + k];
+      on_slopes[2 * k + 1] += -on_sides[k] * now.tilts[k] + 0.5 * stress[12 + k];
       const Vec2 on_bending = 0.5 * on_sides[k] * now.bulges[k] * element.edge_directions.col(k);
       stress.segment<2>(3 + 3 * k) += on_bending;
       stress.segment<2>(3 + 3 * next_corner(k)) += on_bending;

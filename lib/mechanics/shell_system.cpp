@@ -280,7 +280,7 @@ void add_stiffness_norms(ShellSystem& system) {
 
 }  // namespace
 
-ShellSystem make_system(const Model& model) {
+ShellSystem make_system(const Model& model, double skewing) {
   ShellSystem system;
   const std::size_t nodes = model.node_count();
   system.reference.reserve(nodes);
@@ -307,7 +307,7 @@ ShellSystem make_system(const Model& model) {
       }
       const double scale = body.membrane == Membrane::adapt ? adapted_scale(corners, bulge, thickness) : 1;
       ShellElement element =
-          make_shell_element(corners, surface, body.material, thickness, body.membrane, body.bending, scale);
+          make_shell_element(corners, surface, body.material, thickness, body.membrane, body.bending, scale, skewing);
       element.body = b;
       for (std::size_t k = 0; k < 3; ++k) {
         element.nodes[k] = v[k] + offset;

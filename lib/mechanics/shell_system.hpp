@@ -64,9 +64,10 @@ struct ShellSystem {
   [[nodiscard]] std::size_t node_count() const { return reference.size(); }
 };
 
+/// `skewing`: make_shell_element(); 1 for frequencies and buckling, whose answers are the spectrum itself.
 /// Errors: InputError for what only shows when loads and supports are put on the nodes (a load on a node without
 /// triangles, an edge load on an edge that is not there).
-ShellSystem make_system(const Model& model);
+ShellSystem make_system(const Model& model, double skewing = 0);
 
 /// The configuration without displacements and rotations.
 Configuration reference_configuration(const ShellSystem& system);

@@ -152,7 +152,7 @@ ElementFields ElementFieldEvaluator::operator()(const State& state) const {
     const double t = element.thickness;
     const Mat3 elasticity = plane_stress(model.shells[element.body].material);
     const Vec3 strain = d.head<3>();
-    const Vec3 curvature = element.curvature * d.tail<9>();
+    const Vec3 curvature = element.curvature * d.segment<9>(3);
     const Vec3 force = t * elasticity * strain;
     const Vec3 moment = t * t * t / 12 * elasticity * curvature;
     fields.membrane_force.push_back(force);

@@ -80,7 +80,7 @@ TEST(Corotation, TangentIsTheGradientOfTheForce) {
   ElementResponse response, plus, minus;
   Matrix18 tangent;
   ElementState previous;
-  for (int i = 0; i < 12; ++i) {
+  for (int i = 0; i < previous.size(); ++i) {
     previous[i] = random(0.1);
   }
   for (const double damping : {0.0, 0.7}) {
