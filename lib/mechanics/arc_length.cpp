@@ -30,12 +30,6 @@ constexpr std::size_t most_iterations = 10;
 
 Eigen::Index at(std::size_t node) { return 6 * static_cast<Eigen::Index>(node); }
 
-FreeMask free_mask(const ShellSystem& system) {
-  FreeMask free = system.held;
-  free.flip();
-  return free;
-}
-
 double largest_rotation(const VectorX& increment) {
   double largest = 0;
   for (Eigen::Index i = 3; i < increment.size(); i += 6) {
@@ -63,7 +57,7 @@ public:
       : system_(system),
         model_(model),
         settings_(settings),
-        free_(free_mask(system)),
+        free_(free_freedoms(system)),
         matrix_(system.pattern),
         solver_(system.pattern, free_),
         prescribed_(prescribed_positions(system, model, 1)),

@@ -36,12 +36,6 @@ constexpr double near_part = 0.2;
 
 Eigen::Index at(std::size_t node) { return 6 * static_cast<Eigen::Index>(node); }
 
-FreeMask free_of(const ShellSystem& system) {
-  FreeMask free = system.held;
-  free.flip();
-  return free;
-}
-
 double longest_side(const ShellSystem& system) {
   Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity());
   Vec3 high = -low;
@@ -369,7 +363,7 @@ Summary run_frequencies(ShellSystem& system, const Model& model, const RunSettin
   BlockMatrix stiffness = stiffness_at_rest(system, model, settings, run, configuration);
   advance(progress, 0.3);
   release_rigid_motion_supports(system, model);
-  const FreeMask free = free_of(system);
+  const FreeMask free = free_freedoms(system);
   summary.dof = static_cast<std::size_t>(std::count(free.begin(), free.end(), true));
 
   const std::vector<VectorX> rigid = idle_rigid_modes(system, configuration, stiffness);
@@ -416,7 +410,7 @@ Summary run_buckling(ShellSystem& system, const Model& model, const RunSettings&
   const auto start = Clock::now();
   Summary summary;
   on_state(reference_state(system, model, summary));
-  const FreeMask free = free_of(system);
+  const FreeMask free = free_freedoms(system);
   summary.dof = static_cast<std::size_t>(std::count(free.begin(), free.end(), true));
   require_freedoms(run.count, summary.dof);
 

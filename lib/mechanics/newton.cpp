@@ -25,11 +25,14 @@ bool uses_cg(const RunSettings& settings) { return settings.solver == Solver::cg
 
 }  // namespace
 
-TangentSolver::TangentSolver(const ShellSystem& system, const RunSettings& settings) : settings_(settings) {
-  free_.resize(system.held.size());
-  for (std::size_t i = 0; i < free_.size(); ++i) {
-    free_[i] = !system.held[i];
-  }
+FreeMask free_freedoms(const ShellSystem& system) {
+  FreeMask free = system.held;
+  free.flip();
+  return free;
+}
+
+TangentSolver::TangentSolver(const ShellSystem& system, const RunSettings& settings)
+    : settings_(settings), free_(free_freedoms(system)) {
   if (!uses_cg(settings)) {
     direct_.emplace(system.pattern, free_);
   }

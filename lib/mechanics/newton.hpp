@@ -7,6 +7,9 @@
 
 namespace tunica {
 
+/// Which freedoms no support holds.
+FreeMask free_freedoms(const ShellSystem& system);
+
 /// One linear system after another with the same pattern, by the solver that the settings ask for.
 class TangentSolver {
 public:

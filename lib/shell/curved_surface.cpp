@@ -269,7 +269,15 @@ void require_fit(const ShellMesh& shell, const std::string& name) {
     const double agreement = normal_agreement(shell, t);
     if (!(agreement >= least_normal_agreement)) {
       const Vec3 at = (corners[0] + corners[1] + corners[2]) / 3;
-      throw InputError(agreement == -1
+      const bool has_area =
+          (corners[1] - corners[0]).cross(corners[2] - corners[0]).stableNormalized().squaredNorm() > 0.5;
+      if (has_area && agreement < 0) {
+        throw InputError(
+            fmt::format("{}: triangle {} at ({:.6g}, {:.6g}, {:.6g}) mm has a normal N that opposes it "
+                        "(N·n = {:.3g}); turn the normal or the triangle round",
+                        name, t, at.x(), at.y(), at.z(), agreement));
+      }
+      throw InputError(!has_area
                            ? fmt::format("{}: triangle {} at ({:.6g}, {:.6g}, {:.6g}) mm has no area; remove it", name,
                                          t, at.x(), at.y(), at.z())
                            : fmt::format("{}: triangle {} at ({:.6g}, {:.6g}, {:.6g}) mm has a normal N nearly in its "

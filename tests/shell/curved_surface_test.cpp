@@ -318,6 +318,10 @@ TEST(CurvedSurface, UnfitShellMeshesAreRefusedWithTheirPlace) {
   bad = good;
   bad.triangles[5][1] = bad.triangles[5][0];
   expect_unfit(bad, "triangle 5");
+  expect_unfit(bad, "has no area");
+  bad = {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}, {3, Vec3(0, 0, 1)}, {}, Patch::comas};
+  bad.normals[1] = Vec3(0, 0, -1);
+  expect_unfit(bad, "opposes it");
   for (const double agreement : {0.19, 0.21}) {
     bad = {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}, {3, Vec3(0, 0, 1)}, {}, Patch::comas};
     bad.normals[1] = Vec3(0, std::sqrt(1 - agreement * agreement), agreement);
