@@ -165,7 +165,7 @@ Mask::Mask(const std::array<std::size_t, 3>& dims, const Eigen::Matrix<double, 3
   if (!affine.allFinite() || determinant == 0 || !std::isfinite(determinant)) {
     throw InputError("the volume's orientation matrix has no inverse: its voxels have no extent in some direction");
   }
-  words_.assign(words_per_row_ * dims[1] * dims[2], 0);
+  words_ = decltype(words_)(words_per_row_ * dims[1] * dims[2]);
 }
 
 double Mask::voxel_volume() const { return std::abs(affine_.leftCols<3>().determinant()); }

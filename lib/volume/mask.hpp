@@ -1,5 +1,6 @@
 #pragma once
 
+#include "volume/fresh_memory.hpp"
 #include "volume/volume.hpp"
 
 #include <cstdint>
@@ -53,7 +54,7 @@ private:
   std::array<std::size_t, 3> dims_;
   std::size_t words_per_row_;
   Eigen::Matrix<double, 3, 4> affine_;
-  std::vector<std::uint64_t> words_;
+  std::vector<std::uint64_t, ZeroedAllocator<std::uint64_t>> words_;
 };
 
 /// The voxels that are inside by `rule`. Exact: integers are compared as integers where the volume has no scaling, and

@@ -1,0 +1,588 @@
+// W. E. Lorensen, H. E. Cline: Marching cubes: a high resolution 3D surface construction algorithm. SIGGRAPH 1987.
+// W. Schroeder, R. Maynard, B. Geveci: Flying edges: a high-performance scalable isocontouring algorithm. LDAV 2015.
+#include "volume/cell_layers.hpp"
+
+#include "core/error.hpp"
+#include "volume/cube_cases.hpp"
+
+#include <Eigen/LU>
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <utility>
+
+namespace tunica::cell_layers {
+namespace {
+
+/// A crossing nearer than this to a sample (a fraction of the voxel) counts as being at the sample.
+constexpr double at_sample = 1e-6;
+/// Where such crossings cannot be joined to one vertex they are kept this far from the sample, so that the triangles
+/// between them have an area.
+constexpr double beside_sample = 1e-3;
+
+constexpr std::size_t most_triangles = 5;  // of one cell
+
+std::size_t ones(Word word) { return static_cast<std::size_t>(std::popcount(word)); }
+Word shifted(const Word* row, std::size_t w) { return row[w] >> 1 | row[w + 1] << (word_bits - 1); }
+
+/// The cases in 16 bytes each: corner after corner of the triangles, and how many triangles.
+struct PackedCase {
+  std::array<std::uint8_t, 3 * most_triangles> edges;
+  std::uint8_t count;
+};
+
+std::array<PackedCase, 256> pack_cases(bool mirrored) {
+  std::array<PackedCase, 256> packed{};
+  for (std::size_t which = 0; which < packed.size(); ++which) {
+    const CubeCase& cube = cube_cases()[which];
+    packed[which].count = static_cast<std::uint8_t>(cube.count);
+    for (std::size_t t = 0; t < cube.count; ++t) {
+      for (std::size_t corner = 0; corner < 3; ++corner) {
+        packed[which].edges[3 * t + corner] = cube.triangles[t][mirrored ? (3 - corner) % 3 : corner];
+      }
+    }
+  }
+  return packed;
+}
+
+const std::array<PackedCase, 256>& packed_cases(bool mirrored) {
+  static const std::array<std::array<PackedCase, 256>, 2> packed{pack_cases(false), pack_cases(true)};
+  return packed[mirrored ? 1 : 0];
+}
+
+/// A slice of padded rows, with a copy of the last one after it, so that no edge towards it is crossed.
+class Plane {
+public:
+  explicit Plane(const PaddedGrid& grid)
+      : rows_(grid.size(1)), stride_(grid.words() + 1), words_((rows_ + 1) * stride_), inside_(rows_ + 1) {}
+
+  void load(const PaddedGrid& grid, std::size_t slice) {
+    for (std::size_t r = 0; r < rows_; ++r) {
+      inside_[r] = grid.load(r, slice, words_.data() + r * stride_) ? 1 : 0;
+    }
+    std::copy_n(row(rows_ - 1), stride_, words_.data() + rows_ * stride_);
+    inside_[rows_] = inside_[rows_ - 1];
+  }
+  [[nodiscard]] const Word* row(std::size_t r) const { return words_.data() + r * stride_; }
+  /// Whether anything in rows r and r + 1 is inside.
+  [[nodiscard]] bool any_inside(std::size_t r) const { return (inside_[r] | inside_[r + 1]) != 0; }
+
+private:
+  std::size_t rows_;
+  std::size_t stride_;
+  std::vector<Word> words_;
+  std::vector<std::uint8_t> inside_;
+};
+
+/// The bits around 64 cells, and which of the edges there are crossed.
+struct CellWord {
+  Word a0, a0s, a1, a1s, b0, b0s, b1, b1s;  // corners in the order of their numbers
+  Word x0, x1, x2, x3;                      // edges 0 to 3
+  Word y0, y1;                              // edges 4 and 6
+  Word z0, z1;                              // edges 8 and 10
+
+  CellWord(const PaddedGrid& grid, const Plane& a, const Plane& b, std::size_t row, std::size_t w)
+      : a0(a.row(row)[w]),
+        a0s(shifted(a.row(row), w)),
+        a1(a.row(row + 1)[w]),
+        a1s(shifted(a.row(row + 1), w)),
+        b0(b.row(row)[w]),
+        b0s(shifted(b.row(row), w)),
+        b1(b.row(row + 1)[w]),
+        b1s(shifted(b.row(row + 1), w)),
+        x0((a0 ^ a0s) & grid.edges(w)),
+        x1((a1 ^ a1s) & grid.edges(w)),
+        x2((b0 ^ b0s) & grid.edges(w)),
+        x3((b1 ^ b1s) & grid.edges(w)),
+        y0((a0 ^ a1) & grid.samples(w)),
+        y1((b0 ^ b1) & grid.samples(w)),
+        z0((a0 ^ b0) & grid.samples(w)),
+        z1((a1 ^ b1) & grid.samples(w)) {}
+
+  [[nodiscard]] std::size_t case_of(int bit) const {
+    return (a0 >> bit & 1) | (a0s >> bit & 1) << 1 | (a1 >> bit & 1) << 2 | (a1s >> bit & 1) << 3 |
+           (b0 >> bit & 1) << 4 | (b0s >> bit & 1) << 5 | (b1 >> bit & 1) << 6 | (b1s >> bit & 1) << 7;
+  }
+};
+
+/// The words of a layer in which some cell is neither all inside nor all outside; crossed edges of its rows are in no
+/// others. Where the grid ends, b is a itself.
+class ActiveWords {
+public:
+  explicit ActiveWords(std::size_t words) : any_(2 * (words + 1)), all_(any_), union_(words + 1), common_(words + 1) {}
+
+  /// Calls visit(w, bits of the active cells) for each such word of a row; rows in increasing order from 0.
+  template <typename Visit>
+  void visit_row(const Plane& a, const Plane& b, std::size_t row, const Visit& visit) {
+    const std::size_t stride = union_.size();
+    ready_ = ready_ && row > 0;
+    if (!a.any_inside(row) && !b.any_inside(row)) {
+      ready_ = false;
+      return;
+    }
+    if (!ready_) {
+      combine(a.row(row), b.row(row), 0);
+      ready_ = true;
+    } else {
+      std::swap(here_, next_);
+    }
+    combine(a.row(row + 1), b.row(row + 1), stride);
+    const Word* const any0 = any_.data() + here_ * stride;
+    const Word* const any1 = any_.data() + next_ * stride;
+    const Word* const all0 = all_.data() + here_ * stride;
+    const Word* const all1 = all_.data() + next_ * stride;
+    for (std::size_t w = 0; w < stride; ++w) {
+      union_[w] = any0[w] | any1[w];
+      common_[w] = all0[w] & all1[w];
+    }
+    for (std::size_t w = 0; w + 1 < stride; ++w) {
+      const Word active = (union_[w] | shifted(union_.data(), w)) & ~(common_[w] & shifted(common_.data(), w));
+      if (active != 0) {
+        visit(w, active);
+      }
+    }
+  }
+
+private:
+  /// Into the place of this row (0) or the next.
+  void combine(const Word* a, const Word* b, std::size_t which) {
+    const std::size_t stride = union_.size();
+    Word* const any = any_.data() + (which == 0 ? here_ : next_) * stride;
+    Word* const all = all_.data() + (which == 0 ? here_ : next_) * stride;
+    for (std::size_t w = 0; w < stride; ++w) {
+      any[w] = a[w] | b[w];
+      all[w] = a[w] & b[w];
+    }
+  }
+
+  std::vector<Word> any_;
+  std::vector<Word> all_;
+  std::vector<Word> union_;
+  std::vector<Word> common_;
+  std::size_t here_ = 0;
+  std::size_t next_ = 1;
+  bool ready_ = false;
+};
+
+/// Triangles of the cells: a loop around n crossed edges makes n - 2.
+std::size_t count_triangles(const CellWord& c, Word cells) {
+  const Word y0s = c.a0s ^ c.a1s;
+  const Word y1s = c.b0s ^ c.b1s;
+  const Word z0s = c.a0s ^ c.b0s;
+  const Word z1s = c.a1s ^ c.b1s;
+  const std::size_t crossed = ones(c.x0 & cells) + ones(c.x1 & cells) + ones(c.x2 & cells) + ones(c.x3 & cells) +
+                              ones(c.y0 & cells) + ones(y0s & cells) + ones(c.y1 & cells) + ones(y1s & cells) +
+                              ones(c.z0 & cells) + ones(z0s & cells) + ones(c.z1 & cells) + ones(z1s & cells);
+  std::size_t triangles = crossed - 2 * ones(cells);
+  // More than one loop: only with two inside corners across the diagonal of a face, or with two opposite corners that
+  // differ from all their neighbours.
+  const Word face = (c.x0 & c.x1 & c.y0) | (c.x2 & c.x3 & c.y1) | (c.x0 & c.x2 & c.z0) | (c.x1 & c.x3 & c.z1) |
+                    (c.y0 & c.y1 & c.z0) | (y0s & y1s & z0s);
+  const Word opposite = (c.x0 & c.y0 & c.z0 & c.x3 & y1s & z1s) | (c.x0 & y0s & z0s & c.x3 & c.y1 & c.z1) |
+                        (c.x1 & c.y0 & c.z1 & c.x2 & y1s & z0s) | (c.x1 & y0s & z1s & c.x2 & c.y1 & c.z0);
+  for (Word several = (face | opposite) & cells; several != 0; several &= several - 1) {
+    const int bit = std::countr_zero(several);
+    const auto crossed_here = [bit](auto... words) { return (static_cast<std::size_t>(words >> bit & 1) + ...); };
+    triangles += packed_cases(false)[c.case_of(bit)].count + 2;
+    triangles -= crossed_here(c.x0, c.x1, c.x2, c.x3, c.y0, y0s, c.y1, y1s, c.z0, z0s, c.z1, z1s);
+  }
+  return triangles;
+}
+
+LayerCounts count_layer(const PaddedGrid& grid, const Plane& a, const Plane& b, bool with_cells) {
+  ActiveWords active(grid.words());
+  LayerCounts sum;
+  for (std::size_t row = 0; row < grid.size(1); ++row) {
+    const bool cells = with_cells && row + 1 < grid.size(1);
+    active.visit_row(a, b, row, [&](std::size_t w, Word bits) {
+      const CellWord c(grid, a, b, row, w);
+      sum.along_x += ones(c.x0);
+      sum.along_y += ones(c.y0);
+      sum.upright += ones(c.z0);
+      if (cells) {
+        sum.triangles += count_triangles(c, bits & grid.edges(w));
+      }
+    });
+  }
+  return sum;
+}
+
+/// Appends the set bits of a word. Four at a time without a branch: most words have fewer.
+/// @return one past the last one; up to four places beyond it are overwritten
+CrossedEdge* append(CrossedEdge* out, std::size_t row, std::size_t w, Word bits) {
+  const std::size_t count = ones(bits);
+  const auto r = static_cast<std::uint32_t>(row);
+  const auto column = static_cast<std::uint32_t>(w * word_bits);
+  CrossedEdge* const end = out + count;
+  do {
+    for (int i = 0; i < 4; ++i) {
+      out[i] = {r, column + static_cast<std::uint32_t>(std::countr_zero(bits))};
+      bits &= bits - 1;
+    }
+    out += 4;
+  } while (bits != 0);
+  return end;
+}
+
+/// Positions of the samples, as sums of a term of the column and one of row and slice.
+class Places {
+public:
+  explicit Places(const PaddedGrid& grid) : grid_(grid), column_(grid.size(0)), row_(grid.size(1)) {
+    for (std::size_t i = 0; i < column_.size(); ++i) {
+      column_[i] = grid.affine().col(0) * grid.coordinate(i, 0);
+    }
+  }
+  void move_to(std::size_t slice) {
+    const Vec3 origin = grid_.affine().col(3) + grid_.affine().col(2) * grid_.coordinate(slice, 2);
+    for (std::size_t j = 0; j < row_.size(); ++j) {
+      row_[j] = origin + grid_.affine().col(1) * grid_.coordinate(j, 1);
+    }
+  }
+  [[nodiscard]] Vec3 operator()(const CrossedEdge& edge) const { return column_[edge.column] + row_[edge.row]; }
+
+private:
+  const PaddedGrid& grid_;
+  std::vector<Vec3> column_;
+  std::vector<Vec3> row_;
+};
+
+class LayerWriter {
+public:
+  LayerWriter(const PaddedGrid& grid, const Output& out, const Crossings* crossings,
+              std::vector<PinchedVertex>& pinched)
+      : grid_(grid),
+        cases_(packed_cases(grid.affine().leftCols<3>().determinant() < 0)),
+        crossings_(crossings),
+        pinched_(pinched),
+        vertices_(out.vertices),
+        triangles_(out.triangles),
+        first_(out.first_vertex),
+        places_(grid),
+        a_(grid),
+        b_(grid),
+        rows_a_(grid.size(1) + 1),
+        rows_b_(grid.size(1) + 1) {}
+
+  void write(std::size_t begin, std::size_t end, const LayerCounts* counts) {
+    a_.load(grid_, begin);
+    number_rows(counts[0]);
+    for (std::size_t slice = begin; slice < end; ++slice, ++counts) {
+      write_layer(slice, counts);
+      std::swap(a_, b_);
+      std::swap(rows_a_, rows_b_);
+      vertices_ += counts->vertices();
+      triangles_ += counts->triangles;
+      first_ += counts->vertices();
+    }
+  }
+
+private:
+  /// Numbers of the first vertices on edges along x and y of a row, and upright from it.
+  struct RowStart {
+    std::size_t x;
+    std::size_t y;
+    std::size_t z;
+  };
+
+  /// Of the first slice; those of the others are found when they are next to the slice before them.
+  void number_rows(const LayerCounts& counts) {
+    ActiveWords active(grid_.words());
+    RowStart next{first_, first_ + counts.along_x, 0};
+    for (std::size_t row = 0; row < grid_.size(1); ++row) {
+      rows_a_[row] = next;
+      active.visit_row(a_, a_, row, [&](std::size_t w, Word) {
+        const Word word = a_.row(row)[w];
+        next.x += ones((word ^ shifted(a_.row(row), w)) & grid_.edges(w));
+        next.y += ones((word ^ a_.row(row + 1)[w]) & grid_.samples(w));
+      });
+    }
+    rows_a_.back() = next;
+  }
+
+  void write_layer(std::size_t slice, const LayerCounts* counts) {
+    const bool last = slice + 1 == grid_.size(2);
+    if (!last) {
+      b_.load(grid_, slice + 1);
+    }
+    const Plane& b = last ? a_ : b_;
+    find_words(b, first_ + counts->vertices(), last ? LayerCounts{} : counts[1], *counts);
+    edges_.resize(counts->vertices() + 3 * spare_edges);
+    CrossedEdge* const x = edges_.data();
+    CrossedEdge* const y = x + counts->along_x + spare_edges;
+    CrossedEdge* const z = y + counts->along_y + spare_edges;
+    corners_.resize(3 * (counts->triangles + most_triangles));
+    CrossedEdge* x_end = x;
+    CrossedEdge* y_end = y;
+    CrossedEdge* z_end = z;
+    Index* corner = corners_.data();
+    for (std::size_t row = 0, next = 0; row < grid_.size(1); ++row) {
+      const bool cells = !last && row + 1 < grid_.size(1);
+      const std::size_t end = word_rows_[row];
+      if (next == end) {
+        continue;
+      }
+      // Of the next vertex on each of the cell's edges 0 to 3 along x, 4 and 6 along y, 8 and 10 along z.
+      std::array<std::size_t, 8> number{rows_a_[row].x, rows_a_[row + 1].x, rows_b_[row].x, rows_b_[row + 1].x,
+                                        rows_a_[row].y, rows_b_[row].y,     rows_a_[row].z, rows_a_[row + 1].z};
+      for (; next < end; ++next) {
+        const std::size_t w = words_[next].word;
+        const CellWord c(grid_, a_, b, row, w);
+        x_end = append(x_end, row, w, c.x0);
+        y_end = append(y_end, row, w, c.y0);
+        z_end = append(z_end, row, w, c.z0);
+        if (cells) {
+          corner = write_cells(c, words_[next].cells & grid_.edges(w), number, corner);
+        }
+        number[0] += ones(c.x0);
+        number[1] += ones(c.x1);
+        number[2] += ones(c.x2);
+        number[3] += ones(c.x3);
+        number[4] += ones(c.y0);
+        number[5] += ones(c.y1);
+        number[6] += ones(c.z0);
+        number[7] += ones(c.z1);
+      }
+    }
+    TUNICA_ASSERT(x_end - x == static_cast<std::ptrdiff_t>(counts->along_x) &&
+                  y_end - y == static_cast<std::ptrdiff_t>(counts->along_y) &&
+                  z_end - z == static_cast<std::ptrdiff_t>(counts->upright) &&
+                  corner - corners_.data() == static_cast<std::ptrdiff_t>(3 * counts->triangles));
+    std::memcpy(static_cast<void*>(triangles_), corners_.data(), 3 * counts->triangles * sizeof(Index));
+    places_.move_to(slice);
+    write_vertices(x, counts->along_x, slice, 0, 0);
+    write_vertices(y, counts->along_y, slice, 1, counts->along_x);
+    write_vertices(z, counts->upright, slice, 2, counts->along_x + counts->along_y);
+  }
+
+  /// Lists the active words of the layer, and numbers the rows of the next slice and the upright edges.
+  void find_words(const Plane& b, std::size_t first_of_b, const LayerCounts& counts_b, const LayerCounts& counts) {
+    words_.clear();
+    word_rows_.resize(grid_.size(1));
+    ActiveWords active(grid_.words());
+    RowStart next_b{first_of_b, first_of_b + counts_b.along_x, 0};
+    std::size_t upright = first_ + counts.along_x + counts.along_y;
+    for (std::size_t row = 0; row < grid_.size(1); ++row) {
+      rows_b_[row] = next_b;
+      rows_a_[row].z = upright;
+      active.visit_row(a_, b, row, [&](std::size_t w, Word cells) {
+        words_.push_back({static_cast<std::uint32_t>(w), cells});
+        const Word word = b.row(row)[w];
+        next_b.x += ones((word ^ shifted(b.row(row), w)) & grid_.edges(w));
+        next_b.y += ones((word ^ b.row(row + 1)[w]) & grid_.samples(w));
+        upright += ones((a_.row(row)[w] ^ word) & grid_.samples(w));
+      });
+      word_rows_[row] = words_.size();
+    }
+    rows_b_.back() = next_b;
+    rows_a_.back().z = upright;
+  }
+
+  Index* write_cells(const CellWord& c, Word cells, const std::array<std::size_t, 8>& number, Index* corner) const {
+    for (; cells != 0; cells &= cells - 1) {
+      const int bit = std::countr_zero(cells);
+      const Word before = (Word{1} << bit) - 1;
+      const auto id = [&](std::size_t e, Word crossed) {
+        return static_cast<Index>(number[e] + ones(crossed & before));
+      };
+      const auto and_next = [&](Index first, Word crossed) { return first + static_cast<Index>(crossed >> bit & 1); };
+      std::array<Index, 16> edge;
+      edge[0] = id(0, c.x0);
+      edge[1] = id(1, c.x1);
+      edge[2] = id(2, c.x2);
+      edge[3] = id(3, c.x3);
+      edge[4] = id(4, c.y0);
+      edge[5] = and_next(edge[4], c.y0);
+      edge[6] = id(5, c.y1);
+      edge[7] = and_next(edge[6], c.y1);
+      edge[8] = id(6, c.z0);
+      edge[9] = and_next(edge[8], c.z0);
+      edge[10] = id(7, c.z1);
+      edge[11] = and_next(edge[10], c.z1);
+      const PackedCase& cube = cases_[c.case_of(bit)];
+      // As if there were as many as can be: the next cell writes over what is too much.
+      for (std::size_t i = 0; i < 3 * (most_triangles - 1); ++i) {
+        corner[i] = edge[cube.edges[i]];
+      }
+      if (cube.count == most_triangles) {
+        for (std::size_t i = 3 * (most_triangles - 1); i < 3 * most_triangles; ++i) {
+          corner[i] = edge[cube.edges[i]];
+        }
+      }
+      corner += 3 * cube.count;
+    }
+    return corner;
+  }
+
+  void write_vertices(const CrossedEdge* edges, std::size_t count, std::size_t slice, int axis, std::size_t offset) {
+    const Vec3 along = grid_.affine().col(axis);
+    Vec3* const out = vertices_ + offset;
+    if (crossings_ == nullptr) {
+      const Vec3 half = 0.5 * along;
+      for (std::size_t i = 0; i < count; ++i) {
+        out[i] = places_(edges[i]) + half;
+      }
+      return;
+    }
+    constexpr std::size_t batch = 256;
+    std::array<std::size_t, batch> from;
+    std::array<std::size_t, batch> to;
+    std::array<double, batch> fractions;
+    for (std::size_t begin = 0; begin < count; begin += batch) {
+      const std::size_t size = std::min(batch, count - begin);
+      for (std::size_t i = 0; i < size; ++i) {
+        std::array<std::size_t, 3> sample{edges[begin + i].column, edges[begin + i].row, slice};
+        from[i] = grid_.at_hand(sample);
+        ++sample[axis];
+        to[i] = grid_.at_hand(sample);
+      }
+      crossings_->place(from.data(), to.data(), size, fractions.data());
+      for (std::size_t i = 0; i < size; ++i) {
+        const CrossedEdge& edge = edges[begin + i];
+        const std::array<std::size_t, 3> first{edge.column, edge.row, slice};
+        place_vertex(first, axis, fractions[i], places_(edge), along, out[begin + i], first_ + offset + begin + i);
+      }
+    }
+  }
+
+  void place_vertex(const std::array<std::size_t, 3>& first, int axis, double t, const Vec3& start, const Vec3& along,
+                    Vec3& vertex, std::size_t number) {
+    std::array<std::size_t, 3> second = first;
+    ++second[axis];
+    // Between a sample and the padding there is nothing to interpolate.
+    if (grid_.is_padding(first[axis], axis) || grid_.is_padding(second[axis], axis)) {
+      t = 0.5;
+    }
+    if (t >= at_sample && t <= 1 - at_sample) {
+      vertex = start + t * along;
+      return;
+    }
+    const bool low = t < 0.5;
+    vertex = start + (low ? at_sample : 1 - at_sample) * along;
+    // Numbered with the padding: with an open border a sample there has the same value as the border's.
+    pinched_.push_back({static_cast<Index>(number), grid_.number(low ? first : second),
+                        start + (low ? beside_sample : 1 - beside_sample) * along});
+  }
+
+  struct ActiveWord {
+    std::uint32_t word;
+    Word cells;
+  };
+
+  static constexpr std::size_t spare_edges = 4;  // that append() may overwrite
+
+  const PaddedGrid& grid_;
+  const std::array<PackedCase, 256>& cases_;
+  const Crossings* crossings_;
+  std::vector<PinchedVertex>& pinched_;
+  Vec3* vertices_;                   // of the slice
+  std::array<Index, 3>* triangles_;  // of the layer above it
+  std::size_t first_;                // number of the slice's first vertex
+  Places places_;
+  Plane a_;
+  Plane b_;
+  std::vector<RowStart> rows_a_;
+  std::vector<RowStart> rows_b_;
+  std::vector<ActiveWord> words_;
+  std::vector<std::size_t> word_rows_;  // one past each row's last in words_
+  std::vector<CrossedEdge> edges_;
+  std::vector<Index> corners_;
+};
+
+}  // namespace
+
+PaddedGrid::PaddedGrid(const Mask& mask, const Window& window, bool open) : mask_(mask), window_(window) {
+  for (int axis = 0; axis < 3; ++axis) {
+    size_[axis] = window.box[axis] + 2;
+    open_[axis] = {open && window.box_first[axis] == 0,
+                   open && window.box_first[axis] + window.box[axis] == window.image[axis]};
+    TUNICA_ASSERT(axis == 2 || mask.dims()[axis] == window.box[axis]);
+  }
+  const auto first_bits = [](std::size_t count, std::size_t w) {
+    const std::size_t before = w * word_bits;
+    return count >= before + word_bits ? ~Word{0} : count <= before ? Word{0} : (Word{1} << (count - before)) - 1;
+  };
+  const std::size_t words = (size_[0] + word_bits - 1) / word_bits;
+  for (std::size_t w = 0; w < words; ++w) {
+    samples_.push_back(first_bits(size_[0], w));
+    edges_.push_back(first_bits(size_[0] - 1, w));
+  }
+}
+
+bool PaddedGrid::load(std::size_t row, std::size_t slice, Word* out) const {
+  const auto beyond = [&](std::size_t at, int axis) {
+    return (at == 0 && !open_[axis][0]) || (at == size_[axis] - 1 && !open_[axis][1]);
+  };
+  const std::size_t words = samples_.size();
+  if (beyond(row, 1) || beyond(slice, 2)) {
+    std::fill_n(out, words + 1, Word{0});
+    return false;
+  }
+  const Word* const in = mask_.row(unpadded(row, 1), unpadded(slice, 2) - window_.first_slice);
+  const std::size_t given = mask_.words_per_row();
+  Word any = in[0];
+  out[0] = in[0] << 1;
+  for (std::size_t w = 1; w < given; ++w) {
+    out[w] = in[w] << 1 | in[w - 1] >> (word_bits - 1);
+    any |= in[w];
+  }
+  out[given] = in[given - 1] >> (word_bits - 1);
+  out[words] = 0;
+  if (open_[0][0]) {
+    out[0] |= in[0] & 1;
+  }
+  if (open_[0][1]) {
+    const std::size_t last = size_[0] - 1;
+    const Word end = out[(last - 1) / word_bits] >> ((last - 1) % word_bits) & 1;
+    out[last / word_bits] |= end << (last % word_bits);
+  }
+  return any != 0;
+}
+
+std::size_t PaddedGrid::at_hand(const std::array<std::size_t, 3>& padded) const {
+  return unpadded(padded[0], 0) +
+         window_.box[0] * (unpadded(padded[1], 1) + window_.box[1] * (unpadded(padded[2], 2) - window_.first_slice));
+}
+
+std::size_t PaddedGrid::number(const std::array<std::size_t, 3>& padded) const {
+  const auto in_image = [&](int axis) { return padded[axis] + window_.box_first[axis]; };
+  return in_image(0) + (window_.image[0] + 2) * (in_image(1) + (window_.image[1] + 2) * in_image(2));
+}
+
+double PaddedGrid::coordinate(std::size_t padded, int axis) const {
+  const double first = static_cast<double>(window_.box_first[axis]) - 1;
+  if (padded == 0 && open_[axis][0]) {
+    return -0.5;
+  }
+  if (padded == size_[axis] - 1 && open_[axis][1]) {
+    return static_cast<double>(window_.image[axis]) - 0.5;
+  }
+  return first + static_cast<double>(padded);
+}
+
+LayerCounts count_plane(const PaddedGrid& grid, std::size_t slice) {
+  Plane plane(grid);
+  plane.load(grid, slice);
+  return count_layer(grid, plane, plane, false);
+}
+
+void count_layers(const PaddedGrid& grid, std::size_t begin, std::size_t end, LayerCounts* counts) {
+  Plane a(grid);
+  Plane b(grid);
+  a.load(grid, begin);
+  for (std::size_t slice = begin; slice < end; ++slice, ++counts) {
+    const bool last = slice + 1 == grid.size(2);
+    if (!last) {
+      b.load(grid, slice + 1);
+    }
+    *counts = count_layer(grid, a, last ? a : b, !last);
+    std::swap(a, b);
+  }
+}
+
+void write_layers(const PaddedGrid& grid, std::size_t begin, std::size_t end, const LayerCounts* counts,
+                  const Output& out, const Crossings* crossings, std::vector<PinchedVertex>& pinched) {
+  LayerWriter(grid, out, crossings, pinched).write(begin, end, counts);
+}
+
+}  // namespace tunica::cell_layers

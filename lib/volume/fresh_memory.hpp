@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace tunica {
+
+/// Asks for large pages in [begin, begin + bytes), which has not been written yet: the system then clears and maps it
+/// in far fewer steps. A hint: nothing changes but time.
+void prefer_large_pages(void* begin, std::size_t bytes);
+
+/// Writes to every page of [begin, begin + bytes), by all threads, so that the system maps them now.
+/// Errors: none; the contents are undefined afterwards.
+void touch_pages(void* begin, std::size_t bytes);
+
+/// Makes an empty vector hold `size` elements, as resize() does, where the memory is likely new to the process: mapped
+/// in large pages and by all threads.
+template <typename T>
+void resize_fresh(std::vector<T>& vector, std::size_t size) {
+  vector.reserve(size);
+  prefer_large_pages(vector.data(), size * sizeof(T));
+  touch_pages(vector.data(), size * sizeof(T));
+  vector.resize(size);
+}
+
+/// Memory that is zero without being written: for large vectors of words that begin as zeros, `std::vector<Word,
+/// ZeroedAllocator<Word>>(size)`. Elements given a value are constructed as usual.
+template <typename T>
+class ZeroedAllocator {
+public:
+  using value_type = T;
+  ZeroedAllocator() = default;
+  template <typename U>
+  explicit ZeroedAllocator(const ZeroedAllocator<U>&) {}
+
+  [[nodiscard]] T* allocate(std::size_t size);
+  void deallocate(T* memory, std::size_t) noexcept;
+  template <typename U>
+  void construct(U*) noexcept {}
+  template <typename U, typename Arg>
+  void construct(U* place, Arg&& value) {
+    ::new (static_cast<void*>(place)) U(static_cast<Arg&&>(value));
+  }
+  friend bool operator==(const ZeroedAllocator&, const ZeroedAllocator&) { return true; }
+};
+
+extern template class ZeroedAllocator<std::uint64_t>;
+
+}  // namespace tunica

@@ -1,0 +1,42 @@
+// Times the extraction of surfaces from a volume in memory to an indexed mesh in memory, one run per line of its input,
+// so that tests/bench/extract_bench.py can run a peer in turn with it.
+//
+//   bench_extract VOLUME < requests       a request: label|above|below VALUE THREADS
+//   each answer: wall ms, processor ms, vertices, triangles
+#include "core/threads.hpp"
+#include "io/volume_file.hpp"
+#include "volume/marching_cubes.hpp"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cstdio>
+#include <ctime>
+#include <iostream>
+#include <map>
+#include <string>
+
+int main(int argc, char** argv) {
+  using namespace tunica;
+  if (argc != 2) {
+    fmt::print(stderr, "usage: bench_extract VOLUME < requests; a request: label|above|below VALUE THREADS\n");
+    return 2;
+  }
+  const Volume volume = read_volume(argv[1]).volume;
+  const std::map<std::string, Inside::Rule> rules{
+      {"label", Inside::Rule::label}, {"above", Inside::Rule::above}, {"below", Inside::Rule::below}};
+  std::string rule;
+  double value = 0;
+  std::size_t threads = 1;
+  while (std::cin >> rule >> value >> threads) {
+    set_thread_count(threads);
+    const std::clock_t cpu = std::clock();
+    const auto wall = std::chrono::steady_clock::now();
+    const TriangleMesh mesh = marching_cubes(volume, {rules.at(rule), value});
+    const std::chrono::duration<double, std::milli> elapsed = std::chrono::steady_clock::now() - wall;
+    fmt::print("{:.3f} {:.3f} {} {}\n", elapsed.count(), 1e3 * static_cast<double>(std::clock() - cpu) / CLOCKS_PER_SEC,
+               mesh.vertices.size(), mesh.triangles.size());
+    std::fflush(stdout);
+  }
+  return 0;
+}
