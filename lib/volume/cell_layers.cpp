@@ -12,6 +12,10 @@
 #include <cstring>
 #include <utility>
 
+#ifdef __AVX2__
+#include <immintrin.h>
+#endif
+
 namespace tunica::cell_layers {
 namespace {
 
@@ -21,26 +25,35 @@ constexpr double at_sample = 1e-6;
 /// between them have an area.
 constexpr double beside_sample = 1e-3;
 
-constexpr std::size_t most_triangles = 5;  // of one cell
-
 std::size_t ones(Word word) { return static_cast<std::size_t>(std::popcount(word)); }
+Index bits_of(Word word) { return static_cast<Index>(std::popcount(word)); }
 Word shifted(const Word* row, std::size_t w) { return row[w] >> 1 | row[w + 1] << (word_bits - 1); }
 
-/// The cases in 16 bytes each: corner after corner of the triangles, and how many triangles.
-struct PackedCase {
-  std::array<std::uint8_t, 3 * most_triangles> edges;
-  std::uint8_t count;
+/// A cell's edges as places in sixteen numbers: the first eight are those of the next vertices on edges 0 to 3 along x,
+/// 4 and 6 along y, 8 and 10 along z when the walk along the row comes to the cell, the others those after it.
+constexpr std::array<std::uint8_t, 12> place_of_edge{0, 1, 2, 3, 4, 12, 5, 13, 6, 14, 7, 15};
+constexpr std::array<std::uint8_t, 8> edge_of_place{0, 1, 2, 3, 4, 6, 8, 10};
+
+/// A case as the writer wants it.
+struct alignas(32) PackedCase {
+  std::array<std::uint8_t, 16> corners{};  ///< places of the triangles' corners, one after the other
+  std::array<std::uint8_t, 8> crossed{};   ///< 1 for each edge of edge_of_place that is crossed
+  std::uint32_t count = 0;                 ///< triangles
 };
 
 std::array<PackedCase, 256> pack_cases(bool mirrored) {
-  std::array<PackedCase, 256> packed{};
+  std::array<PackedCase, 256> packed;
   for (std::size_t which = 0; which < packed.size(); ++which) {
     const CubeCase& cube = cube_cases()[which];
-    packed[which].count = static_cast<std::uint8_t>(cube.count);
+    packed[which].count = static_cast<std::uint32_t>(cube.count);
     for (std::size_t t = 0; t < cube.count; ++t) {
       for (std::size_t corner = 0; corner < 3; ++corner) {
-        packed[which].edges[3 * t + corner] = cube.triangles[t][mirrored ? (3 - corner) % 3 : corner];
+        packed[which].corners[3 * t + corner] = place_of_edge[cube.triangles[t][mirrored ? (3 - corner) % 3 : corner]];
       }
+    }
+    for (std::size_t place = 0; place < edge_of_place.size(); ++place) {
+      const auto [first, second] = cube_edges[edge_of_place[place]];
+      packed[which].crossed[place] = static_cast<std::uint8_t>((which >> first ^ which >> second) & 1);
     }
   }
   return packed;
@@ -50,6 +63,52 @@ const std::array<PackedCase, 256>& packed_cases(bool mirrored) {
   static const std::array<std::array<PackedCase, 256>, 2> packed{pack_cases(false), pack_cases(true)};
   return packed[mirrored ? 1 : 0];
 }
+
+/// Numbers of the next vertices on the eight edges of edge_of_place, as a walk along a row of cells comes by.
+class RunningNumbers {
+public:
+#ifdef __AVX2__
+  explicit RunningNumbers(const std::array<Index, 8>& start)
+      : before_(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(start.data()))) {}
+
+  /// Writes the triangles of a cell and steps over it. Whatever their number, sixteen corners are written.
+  Index* write(const PackedCase& cube, Index* corner) {
+    const auto bytes = [](const std::uint8_t* from) {
+      return _mm256_cvtepu8_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(from)));
+    };
+    const __m256i after = _mm256_add_epi32(before_, bytes(cube.crossed.data()));
+    for (int half = 0; half < 2; ++half) {
+      const __m256i place = bytes(cube.corners.data() + 8 * half);
+      const __m256 from_before = _mm256_castsi256_ps(_mm256_permutevar8x32_epi32(before_, place));
+      const __m256 from_after = _mm256_castsi256_ps(_mm256_permutevar8x32_epi32(after, place));
+      // Bit 3 of the place says which, as the sign.
+      const __m256 which = _mm256_castsi256_ps(_mm256_slli_epi32(place, 28));
+      _mm256_storeu_ps(reinterpret_cast<float*>(corner + 8 * half), _mm256_blendv_ps(from_before, from_after, which));
+    }
+    before_ = after;
+    return corner + 3 * cube.count;
+  }
+
+private:
+  __m256i before_;
+#else
+  explicit RunningNumbers(const std::array<Index, 8>& start) { std::ranges::copy(start, numbers_.begin()); }
+
+  Index* write(const PackedCase& cube, Index* corner) {
+    for (std::size_t i = 0; i < 8; ++i) {
+      numbers_[8 + i] = numbers_[i] + cube.crossed[i];
+    }
+    for (std::size_t i = 0; i < 16; ++i) {
+      corner[i] = numbers_[cube.corners[i]];
+    }
+    std::copy_n(numbers_.begin() + 8, 8, numbers_.begin());
+    return corner + 3 * cube.count;
+  }
+
+private:
+  std::array<Index, 16> numbers_{};
+#endif
+};
 
 /// A slice of padded rows, with a copy of the last one after it, so that no edge towards it is crossed.
 class Plane {
@@ -101,8 +160,16 @@ struct CellWord {
         z1((a1 ^ b1) & grid.samples(w)) {}
 
   [[nodiscard]] std::size_t case_of(int bit) const {
-    return (a0 >> bit & 1) | (a0s >> bit & 1) << 1 | (a1 >> bit & 1) << 2 | (a1s >> bit & 1) << 3 |
-           (b0 >> bit & 1) << 4 | (b0s >> bit & 1) << 5 | (b1 >> bit & 1) << 6 | (b1s >> bit & 1) << 7;
+    if (bit == word_bits - 1) {
+      return pairs(bit, 1) | (a0s >> bit & 1) << 1 | (a1s >> bit & 1) << 3 | (b0s >> bit & 1) << 5 |
+             (b1s >> bit & 1) << 7;
+    }
+    return pairs(bit, 3);
+  }
+
+private:
+  [[nodiscard]] std::size_t pairs(int bit, Word mask) const {
+    return (a0 >> bit & mask) | (a1 >> bit & mask) << 2 | (b0 >> bit & mask) << 4 | (b1 >> bit & mask) << 6;
   }
 };
 
@@ -225,26 +292,31 @@ CrossedEdge* append(CrossedEdge* out, std::size_t row, std::size_t w, Word bits)
   return end;
 }
 
-/// Positions of the samples, as sums of a term of the column and one of row and slice.
+/// Positions of the samples, as sums of a term of the column and one of row and slice; in four numbers, the last one
+/// without meaning, which is what the processor adds at once.
 class Places {
 public:
+  using Place = Eigen::Vector4d;
+
   explicit Places(const PaddedGrid& grid) : grid_(grid), column_(grid.size(0)), row_(grid.size(1)) {
     for (std::size_t i = 0; i < column_.size(); ++i) {
-      column_[i] = grid.affine().col(0) * grid.coordinate(i, 0);
+      column_[i] = padded(grid.affine().col(0) * grid.coordinate(i, 0));
     }
   }
   void move_to(std::size_t slice) {
     const Vec3 origin = grid_.affine().col(3) + grid_.affine().col(2) * grid_.coordinate(slice, 2);
     for (std::size_t j = 0; j < row_.size(); ++j) {
-      row_[j] = origin + grid_.affine().col(1) * grid_.coordinate(j, 1);
+      row_[j] = padded(origin + grid_.affine().col(1) * grid_.coordinate(j, 1));
     }
   }
-  [[nodiscard]] Vec3 operator()(const CrossedEdge& edge) const { return column_[edge.column] + row_[edge.row]; }
+  [[nodiscard]] Place operator()(const CrossedEdge& edge) const { return column_[edge.column] + row_[edge.row]; }
+
+  static Place padded(const Vec3& p) { return {p[0], p[1], p[2], 0}; }
 
 private:
   const PaddedGrid& grid_;
-  std::vector<Vec3> column_;
-  std::vector<Vec3> row_;
+  std::vector<Place> column_;
+  std::vector<Place> row_;
 };
 
 class LayerWriter {
@@ -257,7 +329,7 @@ public:
         pinched_(pinched),
         vertices_(out.vertices),
         triangles_(out.triangles),
-        first_(out.first_vertex),
+        first_(static_cast<Index>(out.first_vertex)),
         places_(grid),
         a_(grid),
         b_(grid),
@@ -273,28 +345,28 @@ public:
       std::swap(rows_a_, rows_b_);
       vertices_ += counts->vertices();
       triangles_ += counts->triangles;
-      first_ += counts->vertices();
+      first_ += static_cast<Index>(counts->vertices());
     }
   }
 
 private:
   /// Numbers of the first vertices on edges along x and y of a row, and upright from it.
   struct RowStart {
-    std::size_t x;
-    std::size_t y;
-    std::size_t z;
+    Index x;
+    Index y;
+    Index z;
   };
 
   /// Of the first slice; those of the others are found when they are next to the slice before them.
   void number_rows(const LayerCounts& counts) {
     ActiveWords active(grid_.words());
-    RowStart next{first_, first_ + counts.along_x, 0};
+    RowStart next{first_, first_ + static_cast<Index>(counts.along_x), 0};
     for (std::size_t row = 0; row < grid_.size(1); ++row) {
       rows_a_[row] = next;
       active.visit_row(a_, a_, row, [&](std::size_t w, Word) {
         const Word word = a_.row(row)[w];
-        next.x += ones((word ^ shifted(a_.row(row), w)) & grid_.edges(w));
-        next.y += ones((word ^ a_.row(row + 1)[w]) & grid_.samples(w));
+        next.x += bits_of((word ^ shifted(a_.row(row), w)) & grid_.edges(w));
+        next.y += bits_of((word ^ a_.row(row + 1)[w]) & grid_.samples(w));
       });
     }
     rows_a_.back() = next;
@@ -306,12 +378,12 @@ private:
       b_.load(grid_, slice + 1);
     }
     const Plane& b = last ? a_ : b_;
-    find_words(b, first_ + counts->vertices(), last ? LayerCounts{} : counts[1], *counts);
+    find_words(b, first_ + static_cast<Index>(counts->vertices()), last ? LayerCounts{} : counts[1], *counts);
     edges_.resize(counts->vertices() + 3 * spare_edges);
     CrossedEdge* const x = edges_.data();
     CrossedEdge* const y = x + counts->along_x + spare_edges;
     CrossedEdge* const z = y + counts->along_y + spare_edges;
-    corners_.resize(3 * (counts->triangles + most_triangles));
+    corners_.resize(3 * counts->triangles + spare_corners);
     CrossedEdge* x_end = x;
     CrossedEdge* y_end = y;
     CrossedEdge* z_end = z;
@@ -322,26 +394,17 @@ private:
       if (next == end) {
         continue;
       }
-      // Of the next vertex on each of the cell's edges 0 to 3 along x, 4 and 6 along y, 8 and 10 along z.
-      std::array<std::size_t, 8> number{rows_a_[row].x, rows_a_[row + 1].x, rows_b_[row].x, rows_b_[row + 1].x,
-                                        rows_a_[row].y, rows_b_[row].y,     rows_a_[row].z, rows_a_[row + 1].z};
+      RunningNumbers numbers({rows_a_[row].x, rows_a_[row + 1].x, rows_b_[row].x, rows_b_[row + 1].x, rows_a_[row].y,
+                              rows_b_[row].y, rows_a_[row].z, rows_a_[row + 1].z});
       for (; next < end; ++next) {
         const std::size_t w = words_[next].word;
         const CellWord c(grid_, a_, b, row, w);
         x_end = append(x_end, row, w, c.x0);
         y_end = append(y_end, row, w, c.y0);
         z_end = append(z_end, row, w, c.z0);
-        if (cells) {
-          corner = write_cells(c, words_[next].cells & grid_.edges(w), number, corner);
+        for (Word active = cells ? words_[next].cells & grid_.edges(w) : 0; active != 0; active &= active - 1) {
+          corner = numbers.write(cases_[c.case_of(std::countr_zero(active))], corner);
         }
-        number[0] += ones(c.x0);
-        number[1] += ones(c.x1);
-        number[2] += ones(c.x2);
-        number[3] += ones(c.x3);
-        number[4] += ones(c.y0);
-        number[5] += ones(c.y1);
-        number[6] += ones(c.z0);
-        number[7] += ones(c.z1);
       }
     }
     TUNICA_ASSERT(x_end - x == static_cast<std::ptrdiff_t>(counts->along_x) &&
@@ -356,21 +419,21 @@ private:
   }
 
   /// Lists the active words of the layer, and numbers the rows of the next slice and the upright edges.
-  void find_words(const Plane& b, std::size_t first_of_b, const LayerCounts& counts_b, const LayerCounts& counts) {
+  void find_words(const Plane& b, Index first_of_b, const LayerCounts& counts_b, const LayerCounts& counts) {
     words_.clear();
     word_rows_.resize(grid_.size(1));
     ActiveWords active(grid_.words());
-    RowStart next_b{first_of_b, first_of_b + counts_b.along_x, 0};
-    std::size_t upright = first_ + counts.along_x + counts.along_y;
+    RowStart next_b{first_of_b, first_of_b + static_cast<Index>(counts_b.along_x), 0};
+    Index upright = first_ + static_cast<Index>(counts.along_x + counts.along_y);
     for (std::size_t row = 0; row < grid_.size(1); ++row) {
       rows_b_[row] = next_b;
       rows_a_[row].z = upright;
       active.visit_row(a_, b, row, [&](std::size_t w, Word cells) {
         words_.push_back({static_cast<std::uint32_t>(w), cells});
         const Word word = b.row(row)[w];
-        next_b.x += ones((word ^ shifted(b.row(row), w)) & grid_.edges(w));
-        next_b.y += ones((word ^ b.row(row + 1)[w]) & grid_.samples(w));
-        upright += ones((a_.row(row)[w] ^ word) & grid_.samples(w));
+        next_b.x += bits_of((word ^ shifted(b.row(row), w)) & grid_.edges(w));
+        next_b.y += bits_of((word ^ b.row(row + 1)[w]) & grid_.samples(w));
+        upright += bits_of((a_.row(row)[w] ^ word) & grid_.samples(w));
       });
       word_rows_[row] = words_.size();
     }
@@ -378,49 +441,14 @@ private:
     rows_a_.back().z = upright;
   }
 
-  Index* write_cells(const CellWord& c, Word cells, const std::array<std::size_t, 8>& number, Index* corner) const {
-    for (; cells != 0; cells &= cells - 1) {
-      const int bit = std::countr_zero(cells);
-      const Word before = (Word{1} << bit) - 1;
-      const auto id = [&](std::size_t e, Word crossed) {
-        return static_cast<Index>(number[e] + ones(crossed & before));
-      };
-      const auto and_next = [&](Index first, Word crossed) { return first + static_cast<Index>(crossed >> bit & 1); };
-      std::array<Index, 16> edge;
-      edge[0] = id(0, c.x0);
-      edge[1] = id(1, c.x1);
-      edge[2] = id(2, c.x2);
-      edge[3] = id(3, c.x3);
-      edge[4] = id(4, c.y0);
-      edge[5] = and_next(edge[4], c.y0);
-      edge[6] = id(5, c.y1);
-      edge[7] = and_next(edge[6], c.y1);
-      edge[8] = id(6, c.z0);
-      edge[9] = and_next(edge[8], c.z0);
-      edge[10] = id(7, c.z1);
-      edge[11] = and_next(edge[10], c.z1);
-      const PackedCase& cube = cases_[c.case_of(bit)];
-      // As if there were as many as can be: the next cell writes over what is too much.
-      for (std::size_t i = 0; i < 3 * (most_triangles - 1); ++i) {
-        corner[i] = edge[cube.edges[i]];
-      }
-      if (cube.count == most_triangles) {
-        for (std::size_t i = 3 * (most_triangles - 1); i < 3 * most_triangles; ++i) {
-          corner[i] = edge[cube.edges[i]];
-        }
-      }
-      corner += 3 * cube.count;
-    }
-    return corner;
-  }
-
   void write_vertices(const CrossedEdge* edges, std::size_t count, std::size_t slice, int axis, std::size_t offset) {
     const Vec3 along = grid_.affine().col(axis);
     Vec3* const out = vertices_ + offset;
     if (crossings_ == nullptr) {
-      const Vec3 half = 0.5 * along;
+      const Places::Place half = Places::padded(0.5 * along);
       for (std::size_t i = 0; i < count; ++i) {
-        out[i] = places_(edges[i]) + half;
+        const Places::Place place = places_(edges[i]) + half;
+        out[i] = place.head<3>();
       }
       return;
     }
@@ -440,7 +468,8 @@ private:
       for (std::size_t i = 0; i < size; ++i) {
         const CrossedEdge& edge = edges[begin + i];
         const std::array<std::size_t, 3> first{edge.column, edge.row, slice};
-        place_vertex(first, axis, fractions[i], places_(edge), along, out[begin + i], first_ + offset + begin + i);
+        place_vertex(first, axis, fractions[i], places_(edge).head<3>(), along, out[begin + i],
+                     first_ + offset + begin + i);
       }
     }
   }
@@ -469,7 +498,8 @@ private:
     Word cells;
   };
 
-  static constexpr std::size_t spare_edges = 4;  // that append() may overwrite
+  static constexpr std::size_t spare_edges = 4;     // that append() may overwrite
+  static constexpr std::size_t spare_corners = 16;  // that RunningNumbers::write() may
 
   const PaddedGrid& grid_;
   const std::array<PackedCase, 256>& cases_;
@@ -477,7 +507,7 @@ private:
   std::vector<PinchedVertex>& pinched_;
   Vec3* vertices_;                   // of the slice
   std::array<Index, 3>* triangles_;  // of the layer above it
-  std::size_t first_;                // number of the slice's first vertex
+  Index first_;                      // number of the slice's first vertex
   Places places_;
   Plane a_;
   Plane b_;
