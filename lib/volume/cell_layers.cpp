@@ -177,59 +177,36 @@ private:
 /// others. Where the grid ends, b is a itself.
 class ActiveWords {
 public:
-  explicit ActiveWords(std::size_t words) : any_(2 * (words + 1)), all_(any_), union_(words + 1), common_(words + 1) {}
+  explicit ActiveWords(std::size_t words) : active_(words) {}
 
-  /// Calls visit(w, bits of the active cells) for each such word of a row; rows in increasing order from 0.
+  /// Calls visit(w, bits of the active cells) for each such word of a row.
   template <typename Visit>
   void visit_row(const Plane& a, const Plane& b, std::size_t row, const Visit& visit) {
-    const std::size_t stride = union_.size();
-    ready_ = ready_ && row > 0;
     if (!a.any_inside(row) && !b.any_inside(row)) {
-      ready_ = false;
       return;
     }
-    if (!ready_) {
-      combine(a.row(row), b.row(row), 0);
-      ready_ = true;
-    } else {
-      std::swap(here_, next_);
+    const Word* const a0 = a.row(row);
+    const Word* const a1 = a.row(row + 1);
+    const Word* const b0 = b.row(row);
+    const Word* const b1 = b.row(row + 1);
+    Word* const active = active_.data();
+    const std::size_t words = active_.size();
+    for (std::size_t w = 0; w < words; ++w) {
+      const Word any = a0[w] | a1[w] | b0[w] | b1[w];
+      const Word all = a0[w] & a1[w] & b0[w] & b1[w];
+      const Word any_next = a0[w + 1] | a1[w + 1] | b0[w + 1] | b1[w + 1];
+      const Word all_next = a0[w + 1] & a1[w + 1] & b0[w + 1] & b1[w + 1];
+      active[w] = (any | any >> 1 | any_next << (word_bits - 1)) & ~(all & (all >> 1 | all_next << (word_bits - 1)));
     }
-    combine(a.row(row + 1), b.row(row + 1), stride);
-    const Word* const any0 = any_.data() + here_ * stride;
-    const Word* const any1 = any_.data() + next_ * stride;
-    const Word* const all0 = all_.data() + here_ * stride;
-    const Word* const all1 = all_.data() + next_ * stride;
-    for (std::size_t w = 0; w < stride; ++w) {
-      union_[w] = any0[w] | any1[w];
-      common_[w] = all0[w] & all1[w];
-    }
-    for (std::size_t w = 0; w + 1 < stride; ++w) {
-      const Word active = (union_[w] | shifted(union_.data(), w)) & ~(common_[w] & shifted(common_.data(), w));
-      if (active != 0) {
-        visit(w, active);
+    for (std::size_t w = 0; w < words; ++w) {
+      if (active[w] != 0) {
+        visit(w, active[w]);
       }
     }
   }
 
 private:
-  /// Into the place of this row (0) or the next.
-  void combine(const Word* a, const Word* b, std::size_t which) {
-    const std::size_t stride = union_.size();
-    Word* const any = any_.data() + (which == 0 ? here_ : next_) * stride;
-    Word* const all = all_.data() + (which == 0 ? here_ : next_) * stride;
-    for (std::size_t w = 0; w < stride; ++w) {
-      any[w] = a[w] | b[w];
-      all[w] = a[w] & b[w];
-    }
-  }
-
-  std::vector<Word> any_;
-  std::vector<Word> all_;
-  std::vector<Word> union_;
-  std::vector<Word> common_;
-  std::size_t here_ = 0;
-  std::size_t next_ = 1;
-  bool ready_ = false;
+  std::vector<Word> active_;
 };
 
 /// Triangles of the cells: a loop around n crossed edges makes n - 2.
@@ -362,7 +339,8 @@ private:
     ActiveWords active(grid_.words());
     RowStart next{first_, first_ + static_cast<Index>(counts.along_x), 0};
     for (std::size_t row = 0; row < grid_.size(1); ++row) {
-      rows_a_[row] = next;
+      rows_a_[row].x = next.x;
+      rows_a_[row].y = next.y;
       active.visit_row(a_, a_, row, [&](std::size_t w, Word) {
         const Word word = a_.row(row)[w];
         next.x += bits_of((word ^ shifted(a_.row(row), w)) & grid_.edges(w));
@@ -426,7 +404,8 @@ private:
     RowStart next_b{first_of_b, first_of_b + static_cast<Index>(counts_b.along_x), 0};
     Index upright = first_ + static_cast<Index>(counts.along_x + counts.along_y);
     for (std::size_t row = 0; row < grid_.size(1); ++row) {
-      rows_b_[row] = next_b;
+      rows_b_[row].x = next_b.x;
+      rows_b_[row].y = next_b.y;
       rows_a_[row].z = upright;
       active.visit_row(a_, b, row, [&](std::size_t w, Word cells) {
         words_.push_back({static_cast<std::uint32_t>(w), cells});
