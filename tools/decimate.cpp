@@ -20,6 +20,7 @@ struct Arguments {
   fs::path in, out;
   std::optional<std::string> triangles;
   std::optional<LengthTolerance> max_error;
+  std::optional<std::string> min_angle;
   std::optional<std::string> mesh_unit;
 };
 
@@ -34,7 +35,10 @@ void declare(cli::Tool& tool, Arguments& given) {
       "the exit code is 4 when both cannot hold");
   app.add_option("--mesh-unit", given.mesh_unit, "unit of OBJ, STL and OFF files: mm, cm, m or um")
       ->type_name("mm|cm|m|um");
-  tool.not_yet("--min-angle");
+  app.add_option("--min-angle", given.min_angle,
+                 "well-shaped triangles for a larger error: no angle below DEG degrees (e.g. 20, at most 40) but where "
+                 "IN's own corners are sharper; exit code 4 when that cannot be held")
+      ->type_name("DEG");
   tool.not_yet("--repair");
 }
 
@@ -50,6 +54,18 @@ std::optional<std::size_t> wanted_triangles(const Arguments& given) {
     throw UsageError(fmt::format("--triangles: '{}' is not a whole number from 1 to {}", *given.triangles, max_index));
   }
   return static_cast<std::size_t>(*number);
+}
+
+std::optional<double> wanted_angle(const Arguments& given) {
+  if (!given.min_angle) {
+    return std::nullopt;
+  }
+  const auto number = parse_number(*given.min_angle);
+  if (!number || !(*number > 0 && *number <= 40)) {
+    throw UsageError(
+        fmt::format("--min-angle: '{}' is not a number of degrees above 0 and at most 40", *given.min_angle));
+  }
+  return number;
 }
 
 MeshFile read_surface(const fs::path& path, const std::optional<double>& unit_mm, bool require_unit) {
@@ -74,6 +90,10 @@ std::optional<std::string> what_failed(const Arguments& given, const DecimateRes
     return fmt::format("the error asked for by --max-error is below what double precision can certify ({:.3g} mm)",
                        result.error->upper);
   }
+  if (!result.angle_held) {
+    return fmt::format("the smallest angle that could be reached is {:.3g} degrees; lower --min-angle or allow more {}",
+                       result.smallest_angle, given.max_error ? "error" : "triangles");
+  }
   if (!result.count_reached && given.max_error) {
     return fmt::format("{} triangles are the fewest found that keep --max-error; raise one of the two", count);
   }
@@ -85,6 +105,7 @@ std::optional<std::string> what_failed(const Arguments& given, const DecimateRes
 
 void run(cli::Tool& tool, const Arguments& given) {
   const auto triangles = wanted_triangles(given);
+  const auto min_angle = wanted_angle(given);
   std::optional<double> unit_mm;
   if (given.mesh_unit) {
     unit_mm = parse_length_unit(*given.mesh_unit);
@@ -104,6 +125,7 @@ void run(cli::Tool& tool, const Arguments& given) {
     const auto stage = tool.stage("decimate");
     DecimateOptions options;
     options.triangles = triangles;
+    options.min_angle = min_angle;
     if (given.max_error) {
       options.max_error = given.max_error->millimetres(diagonal_mm);
     }
@@ -162,7 +184,8 @@ int main(int argc, char** argv) {
                  "Quadric edge collapse: fewer triangles for the same surface. Boundaries and topology are kept, no "
                  "triangle is flipped or degenerate, and the two-sided distance to the input is certified.",
                  "tunica-decimate surface.ply coarse.ply --triangles 800\n"
-                 "  tunica-decimate surface.ply coarse.ply --max-error 0.5% --report decimate.json");
+                 "  tunica-decimate surface.ply coarse.ply --max-error 0.5% --report decimate.json\n"
+                 "  tunica-decimate surface.ply coarse.ply --triangles 800 --min-angle 20");
   Arguments given;
   declare(tool, given);
   tool.stages({"read", "decimate", "measure", "write"});

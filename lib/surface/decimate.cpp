@@ -5,9 +5,11 @@
 #include "surface/edge_collapse.hpp"
 #include "surface/hausdorff.hpp"
 #include "surface/measure.hpp"
+#include "surface/shaping.hpp"
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numeric>
 
@@ -116,6 +118,97 @@ private:
   std::optional<Interval> error_;
 };
 
+// Well-shaped meshes of the counts that are asked for, or that an error needs.
+class ShapedSearch {
+public:
+  ShapedSearch(const TriangleMesh& mesh, const DecimateOptions& options)
+      : mesh_(mesh), options_(options), tree_(mesh), collapse_(mesh, EdgeCollapse::Aim::good_shape) {
+    distance_.width = 1e-3 * options.max_error.value_or(0);
+    distance_.samples = 0;
+    distance_.max_splits = 2'000'000;
+  }
+
+  DecimateResult run() {
+    collapse_.run(options_.max_error ? 0 : *options_.triangles, {});
+    advance(options_.progress, 0.1);
+    std::size_t count = options_.triangles.value_or(0);
+    if (count > 0) {
+      DecimateResult found = attempt(std::min(count, mesh_.triangles.size()));
+      if (!options_.max_error || found.error_kept) {
+        return found;
+      }
+      count = grown(count, *found.error);
+    } else {
+      count = std::max<std::size_t>(64, collapse_.history().empty() ? 0 : collapse_.history().back().triangles_left);
+    }
+    return search(count);
+  }
+
+private:
+  // The error falls as one over the count, or slower: the step is bounded both ways.
+  [[nodiscard]] std::size_t grown(std::size_t count, const Interval& error) const {
+    const double factor = std::clamp(1.02 * error.upper / *options_.max_error, 0.25, 4.0);
+    return static_cast<std::size_t>(factor * static_cast<double>(count));
+  }
+
+  // The fewest triangles that keep the error and the angle, to some percent.
+  DecimateResult search(std::size_t count) {
+    std::optional<DecimateResult> best;
+    DecimateResult found;
+    std::size_t fails = 0;
+    std::size_t holds = mesh_.triangles.size() + 1;
+    for (int step = 0; step < 14; ++step) {
+      count = std::clamp(count, fails + 1, std::max(fails + 1, holds - 1));
+      found = attempt(std::min(count, mesh_.triangles.size()));
+      advance(options_.progress, 0.1 + 0.9 * (step + 1) / 14);
+      if (found.error_kept && found.angle_held) {
+        holds = std::min(count, found.mesh.triangles.size());
+        best = found;
+      } else {
+        fails = count;
+      }
+      if (static_cast<double>(holds) < 1.04 * static_cast<double>(fails) || fails >= mesh_.triangles.size()) {
+        break;
+      }
+      count = grown(count, *found.error);
+      if (fails > 0 && (count <= fails || count >= holds)) {
+        count = static_cast<std::size_t>(std::sqrt(static_cast<double>(fails) * static_cast<double>(holds)));
+      }
+    }
+    return best ? *best : found;
+  }
+
+  DecimateResult attempt(std::size_t count) {
+    const auto& history = collapse_.history();
+    const auto enough =
+        std::find_if(history.begin(), history.end(), [&](const Collapse& c) { return c.triangles_left <= count; });
+    const auto steps = static_cast<std::size_t>(std::min(enough + 1, history.end()) - history.begin());
+    const bool all_of_it = count >= mesh_.triangles.size();
+    ShapingOptions shape;
+    shape.min_angle = *options_.min_angle;
+    shape.triangles = count;
+    if (!options_.max_error) {
+      shape.progress = [&](double fraction) { advance(options_.progress, 0.1 + 0.9 * fraction); };
+    }
+    DecimateResult found;
+    found.mesh = shaped(replay(mesh_, history, all_of_it ? 0 : steps), mesh_, tree_, shape);
+    found.smallest_angle = smallest_free_angle(found.mesh, mesh_, *options_.min_angle);
+    found.angle_held = found.smallest_angle >= *options_.min_angle;
+    found.count_reached = !options_.triangles || found.mesh.triangles.size() <= *options_.triangles;
+    if (options_.max_error) {
+      found.error = hausdorff(ClosestPoint(found.mesh), tree_, distance_).both;
+      found.error_kept = found.error->upper <= *options_.max_error;
+    }
+    return found;
+  }
+
+  const TriangleMesh& mesh_;
+  const DecimateOptions& options_;
+  ClosestPoint tree_;
+  EdgeCollapse collapse_;
+  HausdorffOptions distance_;
+};
+
 }  // namespace
 
 DecimateResult decimate(const TriangleMesh& mesh, const DecimateOptions& options) {
@@ -124,6 +217,9 @@ DecimateResult decimate(const TriangleMesh& mesh, const DecimateOptions& options
   }
   if (!(diagonal(mesh) > 0)) {
     throw InputError("all its vertices lie in one point");
+  }
+  if (options.min_angle) {
+    return ShapedSearch(mesh, options).run();
   }
   const auto part = [&](double begin, double end) -> Progress {
     if (!options.progress) {

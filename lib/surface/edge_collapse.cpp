@@ -17,6 +17,10 @@ constexpr double least_cosine = 0.2;
 /// edge of the thinnest triangle (0.08 leaves no angle below 4.6 degrees), unless they were worse before. The next
 /// limits count when the ones before leave nothing to collapse.
 constexpr std::array<ShapeLimits, 3> shape_limits{{{0, 0.08}, {-0.5, 0.06}, {-0.9, 0.01}}};
+constexpr std::array<ShapeLimits, 3> good_shape_limits{{{0, 0.25}, {-0.5, 0.15}, {-0.9, 0.01}}};
+/// Uncertainty of the planes' normals, squared, where shape counts: vertices are drawn to the middle of the area that
+/// they stand for (Trettner, Kobbelt, Fast and robust QEF minimization using probabilistic quadrics, 2020).
+constexpr double normal_variance = 0.02;
 /// Weight of the planes that stand on boundary edges. New boundary vertices lie on the curve, so all of their error is
 /// on one side of it; and a ragged rim is seen before a rough surface.
 constexpr double boundary_weight = 30;
@@ -45,7 +49,7 @@ Vec3 EdgeCollapse::Curve::at(double place) const {
   return fraction == 0 ? points[i] : Vec3(points[i] + fraction * (points[(i + 1) % points.size()] - points[i]));
 }
 
-EdgeCollapse::EdgeCollapse(const TriangleMesh& mesh) : heap_(0), triangles_(mesh.triangles.size()) {
+EdgeCollapse::EdgeCollapse(const TriangleMesh& mesh, Aim aim) : aim_(aim), heap_(0), triangles_(mesh.triangles.size()) {
   const Box box = bounding_box(mesh);
   TUNICA_ASSERT(box.diagonal() > 0);
   centre_ = 0.5 * (box.lower + box.upper);
@@ -150,7 +154,11 @@ void EdgeCollapse::sum_quadrics() {
       continue;
     }
     const Vec3 unit = normal / doubled_area;
-    const Quadric plane = Quadric::plane(unit, a, doubled_area);
+    Quadric plane = Quadric::plane(unit, a, doubled_area);
+    if (aim_ == Aim::good_shape) {
+      const Vec3 centre = (a + position_[corners_[h + 1]] + position_[corners_[h + 2]]) / 3;
+      plane += Quadric::point(centre, normal_variance * doubled_area);
+    }
     for (HalfEdge k = h; k < h + 3; ++k) {
       quadric_[corners_[k]] += plane;
       area_[corners_[k]] += doubled_area;
@@ -187,7 +195,7 @@ std::size_t EdgeCollapse::run(std::size_t triangles, const Progress& progress) {
   const std::size_t start = triangles_;
   const double work = static_cast<double>(start - std::min(start, triangles));
   for (std::size_t limits = 0; triangles_ > triangles && limits < shape_limits.size();) {
-    limits_ = shape_limits[limits];
+    limits_ = aim_ == Aim::good_shape ? good_shape_limits[limits] : shape_limits[limits];
     bool progressed = false;
     for (std::size_t step = 0; triangles_ > triangles && !heap_.empty(); ++step) {
       if (step % 4096 == 0) {
@@ -443,7 +451,7 @@ void EdgeCollapse::collapse(HalfEdge h, const Target& chosen) {
   if (b != none) {
     set_outgoing(b, leaving(b, edge_[next(o)]));
   }
-  history_.push_back({u, v, centre_ + scale_ * chosen.position});
+  history_.push_back({u, v, static_cast<Index>(triangles_), centre_ + scale_ * chosen.position});
   around(u, [&](HalfEdge spoke) {
     evaluate(edge_[spoke], Placement::best);
     if (twin_[previous(spoke)] == none) {

@@ -17,6 +17,7 @@ struct ShapeLimits {
 struct Collapse {
   Index kept;
   Index removed;
+  Index triangles_left;  // after it
   Vec3 position;
 };
 
@@ -25,8 +26,11 @@ struct Collapse {
 /// Works in a frame of its own in which the mesh has diagonal 1.
 class EdgeCollapse {
 public:
+  enum class Aim { least_error, good_shape };
+
   /// @param mesh  an oriented manifold, with boundary or without (see why_unfit)
-  explicit EdgeCollapse(const TriangleMesh& mesh);
+  /// @param aim   good_shape spends error on triangles that are nowhere thin
+  explicit EdgeCollapse(const TriangleMesh& mesh, Aim aim = Aim::least_error);
 
   /// Collapses edges until at most `triangles` are left or none can be collapsed. @return triangles left.
   std::size_t run(std::size_t triangles, const Progress& progress);
@@ -91,6 +95,7 @@ private:
   std::vector<Curve> curves_;
   std::vector<Index> mark_;  // #V stamp of the last link check
   Index stamp_ = 0;
+  Aim aim_;
   ShapeLimits limits_;
   EdgeHeap heap_;
   std::size_t triangles_ = 0;

@@ -24,6 +24,12 @@ struct Quadric {
             w.z() * n.z(), w.x() * d,     w.y() * d,     w.z() * d,     weight * d * d};
   }
 
+  /// The squared distance to a point.
+  static Quadric point(const Vec3& p, double weight) {
+    const Vec3 b = -weight * p;
+    return {weight, 0, 0, weight, 0, weight, b.x(), b.y(), b.z(), weight * p.squaredNorm()};
+  }
+
   Quadric& operator+=(const Quadric& o) {
     xx += o.xx;
     xy += o.xy;

@@ -44,6 +44,39 @@ class Decimate(WholeTool):
         self.assertEqual(self.run_tool("in.ply", "b.ply", "--max-error", mm)["result"]["triangles"], percent["triangles"])
         self.assertLess(percent["triangles"], 400)
 
+    def test_min_angle(self):
+        self.surface()
+        result = self.run_tool("in.ply", "out.ply", "--triangles", 300, "--min-angle", 20)["result"]
+        self.assertGreaterEqual(result["min_angle_deg"], 20)
+        self.assertGreaterEqual(result["mean_quality"], 0.85)
+        self.assertLessEqual(result["triangles"], 300)
+        self.assertTrue(result["manifold"])
+        plain = self.run_tool("in.ply", "plain.ply", "--triangles", 300)["result"]
+        self.assertLessEqual(result["hausdorff_percent"]["upper"], 2.5 * plain["hausdorff_percent"]["upper"])
+        both = self.run_tool("in.ply", "both.ply", "--max-error", "1%", "--min-angle", 20)["result"]
+        self.assertGreaterEqual(both["min_angle_deg"], 20)
+        self.assertLessEqual(both["hausdorff_percent"]["upper"], 1)
+        self.assertLess(both["triangles"], 500)
+
+    def test_min_angle_that_cannot_be_held(self):
+        strip = [(float(x), y, 0.0) for x in range(11) for y in (0.0, 0.2)]
+        triangles = [t for i in range(0, 20, 2) for t in ((i, i + 2, i + 3), (i, i + 3, i + 1))]
+        meshes.write_ply(self.path("in.ply"), strip, triangles)
+        report = self.run_tool("in.ply", "out.ply", "--triangles", 2, "--min-angle", 20, code=4, says="smallest angle")
+        self.assertLess(report["result"]["min_angle_deg"], 20)
+        self.assertTrue(self.exists("out.ply.part"))
+        self.assertFalse(self.exists("out.ply"))
+
+    @unittest.skipUnless(os.path.isdir(os.path.join(DATA, "meshes")), "the real meshes are absent: skipped")
+    def test_min_angle_on_real_organs(self):
+        for name, count in [("gca_colon_90_20k.obj", 1500), ("sofaenv_gallbladder.stl", 500), ("vmtk_aorta_open.stl", 800)]:
+            given = os.path.join(DATA, "meshes", name)
+            result = self.run_tool(given, "out.ply", "--triangles", count, "--min-angle", 20, "--mesh-unit", "mm",
+                                   "--force")["result"]
+            self.assertGreaterEqual(result["min_angle_deg"], 20, name)
+            self.assertGreaterEqual(result["mean_quality"], 0.85, name)
+            self.assertTrue(result["manifold"], name)
+
     def test_threads_change_nothing(self):
         self.surface()
         self.run_tool("in.ply", "a.ply", "--max-error", "0.8%", "--threads", 1)
@@ -96,8 +129,10 @@ class Decimate(WholeTool):
                           ["--max-error", "1"], ["--max-error", "0%"], ["--max-error", "-1mm"], ["--nonsense"],
                           ["--triangles", "9", "--mesh-unit", "inch"]]:
             self.run_tool("in.ply", "out.ply", *arguments, code=2)
-        for flag in [["--min-angle", "20"], ["--repair"]]:
-            self.run_tool("in.ply", "out.ply", "--triangles", 100, *flag, code=2, says="not available yet")
+        for angle in ["0", "-3", "45", "x", "20deg"]:
+            self.run_tool("in.ply", "out.ply", "--triangles", 100, "--min-angle", angle, code=2, says="--min-angle")
+        self.run_tool("in.ply", "out.ply", "--min-angle", 20, code=2, says="--triangles")
+        self.run_tool("in.ply", "out.ply", "--triangles", 100, "--repair", code=2, says="not available yet")
         self.assertFalse(self.exists("out.ply"))
 
     def test_bad_input(self):

@@ -1,0 +1,485 @@
+#include "surface/shape_patch.hpp"
+
+#include "surface/incidence.hpp"
+#include "surface/measure.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+namespace tunica {
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr std::size_t samples_per_triangle = 40;
+constexpr std::size_t most_in_patch = 64;  // triangles of a change; larger ones are refused
+constexpr double fold_cosine = -0.5;       // neighbours may not fold more sharply, unless they did before
+
+Vec3 area_vector(const std::array<Vec3, 3>& c) { return (c[1] - c[0]).cross(c[2] - c[0]); }
+
+double cosine(const Vec3& a, const Vec3& b) {
+  const double lengths = a.norm() * b.norm();
+  return lengths > 0 ? a.dot(b) / lengths : 1;
+}
+
+// Weights of the corners at the point of a triangle closest to p.
+Vec3 barycentric(const Vec3& point, const std::array<Vec3, 3>& c) {
+  const Vec3 n = area_vector(c);
+  const double squared = n.squaredNorm();
+  if (!(squared > 0)) {
+    return Vec3::Constant(1.0 / 3);
+  }
+  return {n.dot((c[1] - point).cross(c[2] - point)) / squared, n.dot((c[2] - point).cross(c[0] - point)) / squared,
+          n.dot((c[0] - point).cross(c[1] - point)) / squared};
+}
+
+}  // namespace
+
+ShapedMesh::ShapedMesh(const TriangleMesh& mesh, const TriangleMesh& target, const ClosestPoint& tree,
+                       const BoundaryCurves& curves)
+    : mesh_(mesh), tree_(tree), curves_(curves), states_(mesh.triangles.size()) {
+  target_normal_.reserve(target.triangles.size());
+  for (const auto& [i, j, k] : target.triangles) {
+    target_normal_.push_back(area_vector({target.vertices[i], target.vertices[j], target.vertices[k]}).normalized());
+  }
+  // The target's vertices, every n-th in the order of its tree; with few of them the triangles' centres as well.
+  const std::size_t wanted = samples_per_triangle * mesh.triangles.size();
+  const double per_triangle = static_cast<double>(wanted) / static_cast<double>(target.triangles.size());
+  std::vector<bool> taken(target.vertices.size(), false);
+  double due = 0;
+  for (const Index t : tree.spatial_order()) {
+    due = std::min(due + per_triangle, 4.0);
+    const auto& c = target.triangles[t];
+    if (per_triangle >= 3 && due >= 1) {
+      sample_.push_back((target.vertices[c[0]] + target.vertices[c[1]] + target.vertices[c[2]]) / 3);
+      due -= 1;
+    }
+    for (const Index v : c) {
+      if (due >= 1 && !taken[v]) {
+        taken[v] = true;
+        sample_.push_back(target.vertices[v]);
+        due -= 1;
+      }
+    }
+  }
+  attach_samples(mesh);
+  find_places();
+}
+
+void ShapedMesh::attach_samples(const TriangleMesh& mesh) {
+  const ClosestPoint own(mesh);
+  std::optional<Index> guess;
+  for (std::size_t s = 0; s < sample_.size(); ++s) {
+    const auto hit = guess ? own.closest(sample_[s], *guess) : own.closest(sample_[s]);
+    guess = hit.triangle;
+    states_[hit.triangle].samples.push_back(static_cast<Index>(s));
+  }
+}
+
+void ShapedMesh::find_places() {
+  places_.resize(mesh_.positions.size());
+  if (curves_.empty()) {
+    return;
+  }
+  for (const auto& loop : boundary_loops({mesh_.positions, mesh_.triangles})) {
+    std::vector<Vec3> points;
+    points.reserve(loop.size());
+    for (const Index v : loop) {
+      points.push_back(mesh_.positions[v]);
+    }
+    const Index curve = curves_.curve_of(points);
+    for (const Index v : loop) {
+      places_[v] = curves_.nearest(mesh_.positions[v], curve);
+    }
+  }
+}
+
+void ShapedMesh::set_weights(const ShapeWeights& weights) {
+  weights_ = weights;
+  for (std::size_t t = 0; t < states_.size(); ++t) {
+    if (mesh_.is_alive(static_cast<Index>(t))) {
+      refresh(static_cast<Index>(t));
+    }
+  }
+}
+
+std::array<Vec3, 3> ShapedMesh::corners(const std::array<Index, 3>& triangle, const PatchTrial& trial) const {
+  std::array<Vec3, 3> result;
+  for (std::size_t k = 0; k < 3; ++k) {
+    result[k] = triangle[k] == trial.moved ? trial.position : mesh_.positions[triangle[k]];
+  }
+  return result;
+}
+
+double ShapedMesh::smallest_angle(Index t) const {
+  const auto c = corners(mesh_.triangles[t], {});
+  return smallest_angle_degrees(c[0], c[1], c[2]);
+}
+
+double ShapedMesh::shape_cost(const std::array<Vec3, 3>& c) const {
+  const double quality = radius_ratio(c[0], c[1], c[2]);
+  double cost = weights_.quality * (1 - quality);
+  // A ratio of 0.9 leaves no angle below 40 degrees: the isosceles triangle has 0.8999 there.
+  if (quality < 0.9 && weights_.angle_wanted > 0) {
+    const double lack = 1 - smallest_angle_degrees(c[0], c[1], c[2]) / weights_.angle_wanted;
+    cost += lack > 0 ? weights_.angle * lack * lack : 0;
+  }
+  return cost;
+}
+
+double ShapedMesh::error_cost(double error) const {
+  const double squared = error * error / (weights_.error * weights_.error);
+  return squared * squared;
+}
+
+double ShapedMesh::distance_to_target(const std::array<Vec3, 3>& c, Index& guess, bool& faces_away) const {
+  const Vec3 centre = (c[0] + c[1] + c[2]) / 3;
+  const auto hit = tree_.closest(centre, guess);
+  guess = hit.triangle;
+  faces_away = area_vector(c).dot(target_normal_[hit.triangle]) < 0;
+  double squared = hit.squared_distance;
+  for (std::size_t k = 0; k < 3; ++k) {
+    squared = std::max(squared, tree_.closest(c[k], guess).squared_distance);
+    squared = std::max(squared, tree_.closest(0.5 * (c[k] + c[(k + 1) % 3]), guess).squared_distance);
+  }
+  return std::sqrt(squared);
+}
+
+void ShapedMesh::refresh(Index t) {
+  const auto c = corners(mesh_.triangles[t], {});
+  bool faces_away = false;
+  double error = distance_to_target(c, states_[t].guess, faces_away);
+  for (const Index s : states_[t].samples) {
+    error = std::max(error, (sample_[s] - closest_point_on_triangle(sample_[s], c[0], c[1], c[2])).norm());
+  }
+  states_[t].error = error;
+  states_[t].cost = shape_cost(c) + error_cost(error);
+}
+
+void ShapedMesh::make_move(Index vertex, const Vec3& position, PatchTrial& trial) const {
+  trial.removed = mesh_.around[vertex];
+  trial.corners.clear();
+  for (const Index t : trial.removed) {
+    trial.corners.push_back(mesh_.triangles[t]);
+  }
+  trial.moved = vertex;
+  trial.position = position;
+}
+
+bool ShapedMesh::make_flip(Index u, Index v, PatchTrial& trial) const {
+  if (!mesh_.may_flip(u, v)) {
+    return false;
+  }
+  const auto on = mesh_.on_edge(u, v);
+  const Index c = mesh_.apex(on[0], u, v);
+  const Index d = mesh_.apex(on[1], u, v);
+  trial.removed = {on[0], on[1]};
+  trial.corners = {{u, d, c}, {d, v, c}};
+  trial.moved = EditMesh::none;
+  return true;
+}
+
+bool ShapedMesh::make_collapse(Index u, Index v, PatchTrial& trial) const {
+  if (!mesh_.may_collapse(u, v)) {
+    return false;
+  }
+  const bool v_is_kept = mesh_.on_boundary[v] != 0 && mesh_.on_boundary[u] == 0;
+  const Index kept = v_is_kept ? v : u;
+  const Index gone = v_is_kept ? u : v;
+  trial.removed = mesh_.around[kept];
+  trial.corners.clear();
+  for (const Index t : mesh_.around[gone]) {
+    if (!mesh_.has(t, kept)) {
+      trial.removed.push_back(t);
+    }
+  }
+  for (const Index t : trial.removed) {
+    auto c = mesh_.triangles[t];
+    if (mesh_.has(t, kept) && mesh_.has(t, gone)) {
+      continue;
+    }
+    std::replace(c.begin(), c.end(), gone, kept);
+    trial.corners.push_back(c);
+  }
+  trial.moved = kept;
+  trial.position = mesh_.on_boundary[u] == mesh_.on_boundary[v] ? middle(u, v) : mesh_.positions[kept];
+  return true;
+}
+
+void ShapedMesh::make_split(Index u, Index v, PatchTrial& trial) const {
+  trial.removed.clear();
+  trial.corners.clear();
+  trial.moved = static_cast<Index>(mesh_.positions.size());
+  trial.position = middle(u, v);
+  for (const Index t : mesh_.on_edge(u, v)) {
+    if (t != EditMesh::none) {
+      trial.removed.push_back(t);
+      for (const Index replaced : {u, v}) {
+        auto c = mesh_.triangles[t];
+        std::replace(c.begin(), c.end(), replaced, trial.moved);
+        trial.corners.push_back(c);
+      }
+    }
+  }
+}
+
+bool ShapedMesh::folds(const PatchTrial& trial) const {
+  // Sharpest fold of the old patch with its surroundings, and whether the new one has a sharper one.
+  const auto normal_of = [&](Index t) { return area_vector(corners(mesh_.triangles[t], {})); };
+  double before = 1;
+  for (const Index t : trial.removed) {
+    const auto& c = mesh_.triangles[t];
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Index across = mesh_.on_edge(c[k], c[(k + 1) % 3])[1];
+      if (across != EditMesh::none) {
+        before = std::min(before, cosine(normal_of(t), normal_of(across)));
+      }
+    }
+  }
+  const double limit = std::min(fold_cosine, before);
+  std::array<Vec3, most_in_patch> normals;
+  const std::size_t count = trial.corners.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    normals[i] = area_vector(corners(trial.corners[i], trial));
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Index from = trial.corners[i][k];
+      const Index to = trial.corners[i][(k + 1) % 3];
+      bool inner = false;
+      for (std::size_t j = 0; j < count && !inner; ++j) {
+        for (std::size_t l = 0; l < 3; ++l) {
+          if (trial.corners[j][l] == to && trial.corners[j][(l + 1) % 3] == from) {
+            inner = true;
+            if (cosine(normals[i], normals[j]) < limit) {
+              return true;
+            }
+          }
+        }
+      }
+      if (inner || from >= mesh_.around.size() || to >= mesh_.around.size()) {
+        continue;
+      }
+      const Index across = mesh_.on_edge(from, to)[1];
+      if (across != EditMesh::none &&
+          std::find(trial.removed.begin(), trial.removed.end(), across) == trial.removed.end() &&
+          cosine(normals[i], normal_of(across)) < limit) {
+        return true;
+      }
+    }
+  }
+  return false;
+}
+
+double ShapedMesh::evaluate(PatchTrial& trial, double limit) const {
+  double before = 0;
+  double most_error = weights_.most_error;
+  bool faced_away = false;
+  trial.samples.clear();
+  for (const Index t : trial.removed) {
+    before += states_[t].cost;
+    most_error = std::max(most_error, states_[t].error);
+    trial.samples.insert(trial.samples.end(), states_[t].samples.begin(), states_[t].samples.end());
+    faced_away = faced_away || area_vector(corners(mesh_.triangles[t], {})).dot(target_normal_[states_[t].guess]) < 0;
+  }
+  const double allowed = before + limit;
+  double total = 0;
+  const std::size_t count = trial.corners.size();
+  if (count > most_in_patch) {
+    return infinity;
+  }
+  trial.cost.assign(count, 0);
+  trial.error.assign(count, 0);
+  trial.guess.assign(count, states_[trial.removed[0]].guess);
+  for (std::size_t i = 0; i < count; ++i) {
+    trial.cost[i] = shape_cost(corners(trial.corners[i], trial));
+    total += trial.cost[i];
+  }
+  if (total >= allowed || folds(trial)) {
+    return infinity;
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    bool faces_away = false;
+    trial.error[i] = distance_to_target(corners(trial.corners[i], trial), trial.guess[i], faces_away);
+    if (faces_away && !faced_away) {
+      return infinity;
+    }
+    total += error_cost(trial.error[i]);
+    if (total >= allowed || trial.error[i] > most_error) {
+      return infinity;
+    }
+  }
+  // Every sample goes to the nearest of the new triangles. The two-sided error cost of a triangle grows with the
+  // farther one of the two sides.
+  std::array<std::array<Vec3, 3>, most_in_patch> c;
+  for (std::size_t i = 0; i < count; ++i) {
+    c[i] = corners(trial.corners[i], trial);
+  }
+  trial.owner.resize(trial.samples.size());
+  for (std::size_t s = 0; s < trial.samples.size(); ++s) {
+    const Vec3& p = sample_[trial.samples[s]];
+    double least = infinity;
+    for (std::size_t i = 0; i < count; ++i) {
+      const double squared = (p - closest_point_on_triangle(p, c[i][0], c[i][1], c[i][2])).squaredNorm();
+      if (squared < least) {
+        least = squared;
+        trial.owner[s] = static_cast<Index>(i);
+      }
+    }
+    double& error = trial.error[trial.owner[s]];
+    if (least > error * error) {
+      total -= error_cost(error);
+      error = std::sqrt(least);
+      total += error_cost(error);
+      if (total >= allowed || error > most_error) {
+        return infinity;
+      }
+    }
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    trial.cost[i] += error_cost(trial.error[i]);
+  }
+  return total - before;
+}
+
+void ShapedMesh::commit(const PatchTrial& trial) {
+  const bool is_new = trial.moved == mesh_.positions.size();
+  if (is_new) {
+    const auto& first = trial.corners[0];
+    // Of a boundary edge only one triangle was cut.
+    const bool boundary = trial.removed.size() == 1;
+    mesh_.add_vertex(trial.position, boundary);
+    BoundaryCurves::Place place;
+    if (boundary) {
+      for (const Index v : first) {
+        if (v != trial.moved && mesh_.on_boundary[v] != 0) {
+          place = curves_.nearest(trial.position, places_[v].curve);
+        }
+      }
+    }
+    places_.push_back(place);
+  } else if (trial.moved != EditMesh::none) {
+    mesh_.positions[trial.moved] = trial.position;
+    if (mesh_.on_boundary[trial.moved] != 0) {
+      places_[trial.moved] = curves_.nearest(trial.position, places_[trial.moved].curve);
+    }
+  }
+  for (const Index t : trial.removed) {
+    mesh_.remove_triangle(t);
+    states_[t] = {};
+  }
+  std::vector<Index> made;
+  for (std::size_t i = 0; i < trial.corners.size(); ++i) {
+    const Index t = mesh_.add_triangle(trial.corners[i]);
+    made.push_back(t);
+    states_.resize(std::max(states_.size(), mesh_.triangles.size()));
+    states_[t].error = trial.error[i];
+    states_[t].cost = trial.cost[i];
+    states_[t].guess = trial.guess[i];
+  }
+  for (std::size_t s = 0; s < trial.samples.size(); ++s) {
+    states_[made[trial.owner[s]]].samples.push_back(trial.samples[s]);
+  }
+}
+
+struct ShapedMesh::LeastSquares {
+  Mat3 matrix = Mat3::Zero();
+  Vec3 right = Vec3::Zero();
+  Vec3 centre = Vec3::Zero();
+  double area = 0;
+
+  // A triangle with the vertex at corner k.
+  void add_triangle(const std::array<Vec3, 3>& c) {
+    const double weight = area_vector(c).norm();
+    centre += weight * (c[0] + c[1] + c[2]) / 3;
+    area += weight;
+  }
+
+  void add_sample(const Vec3& p, const std::array<Vec3, 3>& c, std::size_t k, double large) {
+    const Vec3 x = closest_point_on_triangle(p, c[0], c[1], c[2]);
+    const double share = barycentric(x, c)[static_cast<Eigen::Index>(k)];
+    const Vec3 residual = p - x;
+    const Vec3 normal = area_vector(c).normalized();
+    const double off = residual.norm();
+    // Beside the triangle's plane only by its edge: then the direction is that of the residual.
+    const Vec3 direction = std::abs(normal.dot(residual)) > 0.5 * off ? normal : Vec3(residual / off);
+    const double relative = off / large;
+    const double weight = share * (0.05 + relative * relative);
+    matrix += weight * share * direction * direction.transpose();
+    right += weight * direction.dot(residual) * direction;
+  }
+
+  [[nodiscard]] Vec3 solve(const Vec3& from, double pull) const {
+    if (!(area > 0)) {
+      return from;
+    }
+    const double shift = pull * std::max(matrix.trace(), std::numeric_limits<double>::min());
+    const Mat3 shifted = matrix + shift * Mat3::Identity();
+    const Vec3 step = shifted.ldlt().solve(right + shift * (centre / area - from));
+    return step.allFinite() ? Vec3(from + step) : from;
+  }
+};
+
+Vec3 ShapedMesh::proposal(Index vertex, double pull) const {
+  LeastSquares fit;
+  for (const Index t : mesh_.around[vertex]) {
+    const auto c = corners(mesh_.triangles[t], {});
+    fit.add_triangle(c);
+    for (const Index s : states_[t].samples) {
+      fit.add_sample(sample_[s], c, mesh_.corner_of(t, vertex), weights_.error);
+    }
+  }
+  return fit.solve(mesh_.positions[vertex], pull);
+}
+
+Vec3 ShapedMesh::proposal(const PatchTrial& trial, double pull) const {
+  LeastSquares fit;
+  const auto corner = [&](std::size_t i) {
+    const auto& c = trial.corners[i];
+    return static_cast<std::size_t>(std::find(c.begin(), c.end(), trial.moved) - c.begin());
+  };
+  for (const auto& triangle : trial.corners) {
+    fit.add_triangle(corners(triangle, trial));
+  }
+  for (std::size_t s = 0; s < trial.samples.size(); ++s) {
+    const std::size_t i = trial.owner[s];
+    if (corner(i) < 3) {
+      fit.add_sample(sample_[trial.samples[s]], corners(trial.corners[i], trial), corner(i), weights_.error);
+    }
+  }
+  return fit.solve(trial.position, pull);
+}
+
+Vec3 ShapedMesh::slide(Index vertex, double fraction) const {
+  Index before = EditMesh::none;
+  Index after = EditMesh::none;
+  for (const Index t : mesh_.around[vertex]) {
+    const auto& c = mesh_.triangles[t];
+    const std::size_t k = mesh_.corner_of(t, vertex);
+    if (mesh_.on_edge(vertex, c[(k + 1) % 3])[1] == EditMesh::none) {
+      after = c[(k + 1) % 3];
+    }
+    if (mesh_.on_edge(c[(k + 2) % 3], vertex)[1] == EditMesh::none) {
+      before = c[(k + 2) % 3];
+    }
+  }
+  if (before == EditMesh::none || after == EditMesh::none) {
+    return mesh_.positions[vertex];
+  }
+  return curves_.point(curves_.between(places_[before], places_[after], fraction));
+}
+
+Vec3 ShapedMesh::middle(Index u, Index v) const {
+  const auto on = mesh_.on_edge(u, v);
+  if (on[0] != EditMesh::none && on[1] != EditMesh::none) {
+    const Vec3 x = 0.5 * (mesh_.positions[u] + mesh_.positions[v]);
+    return tree_.closest(x, states_[on[0]].guess).point;
+  }
+  const bool forward = on[0] != EditMesh::none;  // the triangle, and so the curve, runs from u to v
+  return curves_.point(curves_.between(places_[forward ? u : v], places_[forward ? v : u], 0.5));
+}
+
+}  // namespace tunica

@@ -1,0 +1,185 @@
+// Decimation beside CGAL's Garland-Heckbert planes (with its bound on the change of normals, as its manual has it):
+// error, shape and CPU time at the same counts, in one run, one thread, the two taking turns.
+//
+//   build/release/tests/bench/bench_decimate aneurysm_tube.ply:772,1200 bumpy.ply:100000 [--angle 20] [--rounds 3]
+//   [--alone]
+//
+// Prints a line per mesh and count: two-sided certified distance in % of the diagonal, smallest angle, mean quality,
+// triangles facing away from both neighbours' side, median CPU milliseconds, and the ratios.
+#include "core/error.hpp"
+#include "core/threads.hpp"
+#include "io/mesh_file.hpp"
+#include "surface/checks.hpp"
+#include "surface/decimate.hpp"
+#include "surface/hausdorff.hpp"
+#include "surface/measure.hpp"
+
+#include <CGAL/Simple_cartesian.h>
+#include <CGAL/Surface_mesh.h>
+#include <CGAL/Surface_mesh_simplification/Policies/Edge_collapse/Bounded_normal_change_placement.h>
+#include <CGAL/Surface_mesh_simplification/Policies/Edge_collapse/GarlandHeckbert_plane_policies.h>
+#include <CGAL/Surface_mesh_simplification/edge_collapse.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <ctime>
+#include <functional>
+
+using namespace tunica;
+namespace sms = CGAL::Surface_mesh_simplification;
+using Kernel = CGAL::Simple_cartesian<double>;
+using CgalMesh = CGAL::Surface_mesh<Kernel::Point_3>;
+
+namespace {
+
+struct StopAtFaces {
+  std::size_t faces;
+  template <typename Cost, typename Profile>
+  bool operator()(const Cost& /*cost*/, const Profile& profile, std::size_t /*first*/, std::size_t /*edges*/) const {
+    return profile.surface_mesh().number_of_faces() <= faces;
+  }
+};
+
+CgalMesh to_cgal(const TriangleMesh& mesh) {
+  CgalMesh result;
+  for (const Vec3& v : mesh.vertices) {
+    result.add_vertex({v.x(), v.y(), v.z()});
+  }
+  const auto vertex = [](Index i) { return CgalMesh::Vertex_index(i); };
+  for (const auto& [i, j, k] : mesh.triangles) {
+    result.add_face(vertex(i), vertex(j), vertex(k));
+  }
+  return result;
+}
+
+TriangleMesh from_cgal(CgalMesh& mesh) {
+  mesh.collect_garbage();
+  TriangleMesh result;
+  for (const auto v : mesh.vertices()) {
+    const auto& p = mesh.point(v);
+    result.vertices.emplace_back(p.x(), p.y(), p.z());
+  }
+  for (const auto f : mesh.faces()) {
+    std::array<Index, 3> corners{};
+    std::size_t k = 0;
+    for (const auto v : mesh.vertices_around_face(mesh.halfedge(f))) {
+      corners[k++] = static_cast<Index>(v);
+    }
+    result.triangles.push_back(corners);
+  }
+  return result;
+}
+
+TriangleMesh garland_heckbert(CgalMesh mesh, std::size_t triangles) {
+  using Policies = sms::GarlandHeckbert_plane_policies<CgalMesh, Kernel>;
+  const Policies policies(mesh);
+  const auto& cost = policies.get_cost();
+  const sms::Bounded_normal_change_placement<typename Policies::Get_placement> placement(policies.get_placement());
+  sms::edge_collapse(mesh, StopAtFaces{triangles}, CGAL::parameters::get_cost(cost).get_placement(placement));
+  return from_cgal(mesh);
+}
+
+double cpu_milliseconds(const std::function<void()>& work) {
+  const std::clock_t start = std::clock();
+  work();
+  return 1000.0 * static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
+}
+
+double median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  return values[values.size() / 2];
+}
+
+struct Measured {
+  TriangleMesh mesh;
+  std::vector<double> milliseconds;
+  double percent = 0;
+};
+
+void finish(Measured& m, const ClosestPoint& target, double diagonal_mm) {
+  HausdorffOptions options;
+  options.width = 1e-5 * diagonal_mm;
+  options.samples = 0;
+  m.percent = 100 * hausdorff(ClosestPoint(m.mesh), target, options).both.upper / diagonal_mm;
+}
+
+void print(const char* who, const Measured& m) {
+  const MeshFacts facts = examine(m.mesh);
+  fmt::print("  {:8} {:8} triangles {:9.5f} % {:6.2f} deg {:5.3f} quality {:10.1f} ms{}\n", who,
+             m.mesh.triangles.size(), m.percent, min_angle_degrees(m.mesh), mean_quality(m.mesh),
+             median(m.milliseconds), facts.manifold && facts.oriented ? "" : " NOT MANIFOLD");
+}
+
+void compare(const std::string& path, std::size_t count, std::size_t rounds, const std::optional<double>& angle,
+             bool with_peer) {
+  const TriangleMesh mesh = read_mesh(path, 1.0, false).mesh;
+  const CgalMesh given = to_cgal(mesh);
+  Measured own, shaped, peer;
+  DecimateOptions options;
+  options.triangles = count;
+  for (std::size_t i = 0; i < rounds; ++i) {
+    own.milliseconds.push_back(cpu_milliseconds([&] { own.mesh = decimate(mesh, options).mesh; }));
+    if (with_peer) {
+      peer.milliseconds.push_back(cpu_milliseconds([&] { peer.mesh = garland_heckbert(given, count); }));
+    }
+  }
+  const ClosestPoint target(mesh);
+  const double diagonal_mm = diagonal(mesh);
+  finish(own, target, diagonal_mm);
+  fmt::print("{}: {} triangles to {}\n", path, mesh.triangles.size(), count);
+  print("tunica", own);
+  if (with_peer) {
+    finish(peer, target, diagonal_mm);
+    print("CGAL", peer);
+    fmt::print("  error {:.3f} x CGAL's, speed {:.1f} x CGAL's\n", own.percent / peer.percent,
+               median(peer.milliseconds) / median(own.milliseconds));
+  }
+  if (angle) {
+    options.min_angle = angle;
+    shaped.milliseconds.push_back(cpu_milliseconds([&] { shaped.mesh = decimate(mesh, options).mesh; }));
+    finish(shaped, target, diagonal_mm);
+    print("shaped", shaped);
+    fmt::print("  error of the well-shaped mesh {:.3f} x the plain one's\n", shaped.percent / own.percent);
+  }
+  std::fflush(stdout);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  set_thread_count(1);
+  std::size_t rounds = 3;
+  std::optional<double> angle;
+  bool with_peer = true;
+  std::vector<std::pair<std::string, std::size_t>> cases;
+  for (int i = 1; i < argc; ++i) {
+    const std::string argument = argv[i];
+    if (argument == "--rounds" && i + 1 < argc) {
+      rounds = std::strtoul(argv[++i], nullptr, 10);
+    } else if (argument == "--angle" && i + 1 < argc) {
+      angle = std::strtod(argv[++i], nullptr);
+    } else if (argument == "--alone") {
+      with_peer = false;
+    } else if (const auto colon = argument.rfind(':'); colon != std::string::npos) {
+      std::string counts = argument.substr(colon + 1);
+      while (!counts.empty()) {
+        const auto comma = counts.find(',');
+        cases.emplace_back(argument.substr(0, colon), std::strtoul(counts.c_str(), nullptr, 10));
+        counts = comma == std::string::npos ? "" : counts.substr(comma + 1);
+      }
+    }
+  }
+  if (cases.empty()) {
+    fmt::print(stderr, "bench_decimate MESH:COUNT[,COUNT...]... [--angle DEGREES] [--rounds N] [--alone]\n");
+    return 2;
+  }
+  try {
+    for (const auto& [path, count] : cases) {
+      compare(path, count, rounds, angle, with_peer);
+    }
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "bench_decimate: {}\n", error.what());
+    return 3;
+  }
+}

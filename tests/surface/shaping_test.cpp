@@ -1,0 +1,180 @@
+#include "surface/shaping.hpp"
+
+#include "surface/checks.hpp"
+#include "surface/decimate.hpp"
+#include "surface/hausdorff.hpp"
+#include "surface/incidence.hpp"
+#include "surface/measure.hpp"
+#include "surface/shapes.hpp"
+
+#include <gtest/gtest.h>
+
+namespace tunica {
+namespace {
+
+double distance(const TriangleMesh& a, const TriangleMesh& b) {
+  HausdorffOptions options;
+  options.width = 1e-5 * diagonal(b);
+  options.samples = 0;
+  return hausdorff(a, b, options).both.upper;
+}
+
+DecimateResult well_shaped(const TriangleMesh& mesh, std::size_t triangles, double angle) {
+  DecimateOptions options;
+  options.triangles = triangles;
+  options.min_angle = angle;
+  return decimate(mesh, options);
+}
+
+void expect_same_topology(const TriangleMesh& before, const TriangleMesh& after) {
+  const MeshFacts was = examine(before);
+  const MeshFacts is = examine(after);
+  EXPECT_TRUE(is.manifold && is.oriented);
+  EXPECT_EQ(is.euler, was.euler);
+  EXPECT_EQ(is.components, was.components);
+  EXPECT_EQ(is.boundary_loops, was.boundary_loops);
+  EXPECT_EQ(is.degenerate_triangles, 0U);
+}
+
+TEST(Shaping, GoodTrianglesForALittleErrorOnSmoothSurfaces) {
+  const TriangleMesh waves = [] {
+    TriangleMesh mesh = shapes::sphere(5, 10);
+    for (Vec3& v : mesh.vertices) {
+      v *= 1 + 0.08 * std::sin(0.6 * v.x()) * std::cos(0.5 * v.y() + 0.4 * v.z());
+    }
+    return mesh;
+  }();
+  for (const TriangleMesh& mesh : {shapes::sphere(5), shapes::torus(120, 60), shapes::tube(80, 60), waves}) {
+    for (const std::size_t count : {std::size_t{900}, std::size_t{250}}) {
+      const DecimateResult good = well_shaped(mesh, count, 20);
+      DecimateOptions plain;
+      plain.triangles = count;
+      EXPECT_TRUE(good.angle_held && good.count_reached);
+      EXPECT_LE(good.mesh.triangles.size(), count);
+      EXPECT_GE(good.mesh.triangles.size() + 4, count);
+      EXPECT_GE(min_angle_degrees(good.mesh), 20);
+      EXPECT_GE(mean_quality(good.mesh), 0.85);
+      const double error = distance(good.mesh, mesh);
+      if (examine(mesh).closed) {
+        EXPECT_LE(error, 2.5 * distance(decimate(mesh, plain).mesh, mesh));
+      } else {
+        // On a straight tube needles cost nothing: what counts is what good triangles can do. Of edge h, h^2 / 8 off.
+        const double squared_edge = area(mesh) / static_cast<double>(count) * 4 / std::sqrt(3.0);
+        EXPECT_LE(error, 1.5 * squared_edge / 8);
+      }
+      expect_same_topology(mesh, good.mesh);
+    }
+  }
+}
+
+TEST(Shaping, RoughSurfacesKeepTheirTopologyAndFaceOutward) {
+  for (const std::uint32_t seed : {1U, 2U}) {
+    const TriangleMesh mesh = shapes::shaken(shapes::sphere(5), 0.01, seed);
+    const DecimateResult good = well_shaped(mesh, 800, 20);
+    EXPECT_TRUE(good.angle_held);
+    expect_same_topology(mesh, good.mesh);
+    for (const auto& [i, j, k] : good.mesh.triangles) {
+      const Vec3& a = good.mesh.vertices[i];
+      const Vec3 normal = (good.mesh.vertices[j] - a).cross(good.mesh.vertices[k] - a);
+      EXPECT_GT(normal.dot(a + good.mesh.vertices[j] + good.mesh.vertices[k]), 0);
+    }
+  }
+}
+
+TEST(Shaping, BoundaryVerticesStayOnTheBoundaryCurve) {
+  const TriangleMesh tube = shapes::tube(64, 40);
+  const DecimateResult good = well_shaped(tube, 300, 20);
+  for (const auto& loop : boundary_loops(good.mesh)) {
+    EXPECT_GE(loop.size(), 3U);
+    for (const Index v : loop) {
+      const Vec3& p = good.mesh.vertices[v];
+      EXPECT_TRUE(std::abs(p.z()) < 1e-12 || std::abs(p.z() - 4) < 1e-12);
+      const double radius = std::hypot(p.x(), p.y());
+      EXPECT_LE(radius, 1 + 1e-12);
+      EXPECT_GE(radius, std::cos(std::numbers::pi / 64) - 1e-12);
+    }
+  }
+}
+
+TEST(Shaping, EdgesOfABoxStaySharp) {
+  // The cube's creases are between its faces: none of its corners may be cut.
+  TriangleMesh cube;
+  for (const int axis : {0, 1, 2}) {
+    for (const double side : {0.0, 1.0}) {
+      TriangleMesh face = shapes::plane(12, 12);
+      for (Vec3& v : face.vertices) {
+        const Vec3 p = v;
+        v[axis] = side;
+        v[(axis + 1) % 3] = p.x();
+        v[(axis + 2) % 3] = p.y();
+      }
+      for (auto& t : face.triangles) {
+        if (side == 0) {
+          std::swap(t[1], t[2]);
+        }
+      }
+      cube = shapes::together(cube, face);
+    }
+  }
+  TriangleMesh welded;
+  std::map<std::array<long, 3>, Index> seen;
+  for (auto t : cube.triangles) {
+    for (Index& v : t) {
+      const Vec3& p = cube.vertices[v];
+      const std::array<long, 3> key{std::lround(24 * p.x()), std::lround(24 * p.y()), std::lround(24 * p.z())};
+      const auto [it, is_new] = seen.try_emplace(key, static_cast<Index>(welded.vertices.size()));
+      if (is_new) {
+        welded.vertices.push_back(p);
+      }
+      v = it->second;
+    }
+    welded.triangles.push_back(t);
+  }
+  ASSERT_TRUE(examine(welded).closed);
+  const DecimateResult good = well_shaped(welded, 200, 20);
+  EXPECT_TRUE(good.angle_held);
+  EXPECT_LT(distance(good.mesh, welded), 0.03);
+  EXPECT_GE(mean_quality(good.mesh), 0.8);
+}
+
+TEST(Shaping, AngleAndErrorTogether) {
+  const TriangleMesh mesh = shapes::torus(80, 40);
+  DecimateOptions options;
+  options.min_angle = 20;
+  options.max_error = 0.01 * diagonal(mesh);
+  const DecimateResult result = decimate(mesh, options);
+  ASSERT_TRUE(result.error_kept && result.angle_held);
+  EXPECT_LE(result.error->upper, *options.max_error);
+  EXPECT_LE(distance(result.mesh, mesh), *options.max_error + 1.1e-5 * diagonal(mesh));
+  EXPECT_GE(min_angle_degrees(result.mesh), 20);
+  EXPECT_LT(result.mesh.triangles.size(), mesh.triangles.size() / 6);
+}
+
+TEST(Shaping, AnAngleThatCannotBeHeldIsSaid) {
+  // Two triangles cannot fill a narrow strip well.
+  const TriangleMesh strip = shapes::plane(40, 2, 1, 0.02);
+  const DecimateResult result = well_shaped(strip, 2, 20);
+  EXPECT_LT(result.smallest_angle, 20);
+  EXPECT_FALSE(result.angle_held);
+  EXPECT_LT(distance(result.mesh, strip), 0.05);
+}
+
+TEST(Shaping, CornersSharperThanAskedForAreExempt) {
+  // A wedge of 10 degrees as one fan: the tip cannot be better, the other angles are what they are.
+  const double tip = 10 * std::numbers::pi / 180;
+  const TriangleMesh wedge{{{0, 0, 0}, {1, 0, 0}, {std::cos(tip), std::sin(tip), 0}}, {{{0, 1, 2}}}};
+  EXPECT_EQ(smallest_free_angle(wedge, wedge, 20), 60);
+  // The same triangle within a plane has no such excuse.
+  EXPECT_NEAR(smallest_free_angle(wedge, shapes::plane(4, 4), 20), 10, 1e-9);
+}
+
+TEST(Shaping, TheSameMeshEveryTime) {
+  const TriangleMesh mesh = shapes::shaken(shapes::torus(60, 30), 0.01, 5);
+  const TriangleMesh one = well_shaped(mesh, 500, 20).mesh;
+  const TriangleMesh other = well_shaped(mesh, 500, 20).mesh;
+  EXPECT_EQ(one.triangles, other.triangles);
+  EXPECT_TRUE(std::equal(one.vertices.begin(), one.vertices.end(), other.vertices.begin(), other.vertices.end()));
+}
+
+}  // namespace
+}  // namespace tunica
