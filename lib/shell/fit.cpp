@@ -75,7 +75,7 @@ private:
     }
     FitSamples samples(target_, guess(start.mesh.triangles.size() / expected_gain));
     FitState state(samples, prepare_fit(start, target_), {});
-    smooth(state, tolerance);
+    smooth(state, tolerance, tolerance);
     const int rounds = options_.max_iterations.value_or(default_rounds);
     const double limit = margin * tolerance;
     repair(state, limit, most);
@@ -122,7 +122,8 @@ private:
         start_of_fit(coarse_, target_, static_cast<std::size_t>(start_surplus * static_cast<double>(shells)), 0);
     FitSamples samples(target_, guess(static_cast<double>(shells)));
     FitState state(samples, prepare_fit(start, target_), {});
-    smooth(state, 0.1 * start.flat_error);
+    // Few shells for a rough target: normals of their own would fit its ripples, and stay.
+    smooth(state, 0.1 * start.flat_error, 0.5 * start.flat_error);
     constexpr double any = std::numeric_limits<double>::infinity();
     collapse_edges(state, any, shells, {});
     settle(state);
@@ -163,7 +164,8 @@ private:
   static std::size_t guess(double shells) { return static_cast<std::size_t>(std::max(8.0, shells)); }
 
   /// From slivers to triangles that carry patches.
-  static void smooth(FitState& state, double limit) {
+  /// @param creased  mm: patches farther off may get normals of their own
+  static void smooth(FitState& state, double limit, double creased) {
     state.attach();
     state.measure();
     for (int i = 0; i < 3; ++i) {
@@ -171,7 +173,7 @@ private:
       state.solve(2, 3);
       place_worst(state, std::max(limit, 0.3 * state.error()));
       if (i > 0) {
-        detach_worst(state, limit);
+        detach_worst(state, creased);
       }
       state.attach();
       state.measure();
@@ -259,7 +261,7 @@ private:
   bool certify(const FitState& state, std::optional<double> tolerance) {
     ShellMesh shell = state.mesh.shell();
     ShellDistanceOptions measuring;
-    measuring.width = std::max(width_, state.error() / 50);
+    measuring.width = std::max(width_, state.error() / 20);
     measuring.limit = tolerance;
     ShellDistance distance = shell_distance(shell, target_, measuring);
     const bool holds = tolerance && distance.both.upper <= *tolerance;
@@ -322,7 +324,7 @@ private:
     last_ = std::chrono::steady_clock::now();
     ShellMesh shell = state.mesh.shell();
     ShellDistanceOptions measuring;
-    measuring.width = std::max(width_, state.error() / 4);
+    measuring.width = std::max(width_, state.error() / 2);
     iteration.hausdorff = shell_distance(shell, target_, measuring).both;
     result_.iterations.push_back(iteration);
     if (options_.on_iteration) {

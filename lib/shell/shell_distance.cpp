@@ -1,6 +1,7 @@
 #include "shell/shell_distance.hpp"
 
 #include "core/threads.hpp"
+#include "shell/curved_hausdorff.hpp"
 #include "shell/curved_surface.hpp"
 #include "surface/hausdorff.hpp"
 #include "surface/incidence.hpp"
@@ -45,30 +46,22 @@ std::vector<Vec3> points_between_patches(const ShellMesh& shell) {
   return points;
 }
 
-ShellDistance distance(const TriangleMesh& mesh, double deviation, double width, const Target& target,
-                       const ShellDistanceOptions& options) {
+}  // namespace
+
+ShellDistance shell_distance(const ShellMesh& shell, const Target& target, const ShellDistanceOptions& options) {
+  return curved_hausdorff(shell, target, options);
+}
+
+ShellDistance flat_distance(const ShellMesh& shell, const Target& target, const ShellDistanceOptions& options) {
   HausdorffOptions hausdorff_options;
-  hausdorff_options.width = width;
-  hausdorff_options.deviation_a = deviation;
+  hausdorff_options.width = options.width;
   hausdorff_options.limit = options.limit;
   if (!options.with_mean) {
     hausdorff_options.samples = 0;
   }
   hausdorff_options.progress = options.progress;
-  const HausdorffResult result = hausdorff(ClosestPoint(mesh), target.tree(), hausdorff_options);
+  const HausdorffResult result = hausdorff(ClosestPoint(flat_facets(shell)), target.tree(), hausdorff_options);
   return {result.both, result.a_to_b, result.b_to_a, result.mean, result.rms};
-}
-
-}  // namespace
-
-ShellDistance shell_distance(const ShellMesh& shell, const Target& target, const ShellDistanceOptions& options) {
-  // An eighth of the width for the tessellation, which widens the interval by twice that.
-  const Tessellation fine = affordable_tessellation(shell, options.width / 8);
-  return distance(fine.mesh, fine.deviation, 0.75 * options.width, target, options);
-}
-
-ShellDistance flat_distance(const ShellMesh& shell, const Target& target, const ShellDistanceOptions& options) {
-  return distance(flat_facets(shell), 0, options.width, target, options);
 }
 
 std::vector<double> shell_errors(const ShellMesh& shell, const Target& target, double deviation) {

@@ -24,9 +24,8 @@ struct ShellDistanceOptions {
   Progress progress;
 };
 
-/// Certified: the curved surface is cut into flat triangles that provably lie within a part of `width`, and the
-/// intervals are widened by that. Where a patch is so wild that this would take more than four million triangles the
-/// intervals come out wider.
+/// Certified, see curved_hausdorff.hpp. Where a patch is so wild that this would take some million cuts the intervals
+/// come out wider.
 ShellDistance shell_distance(const ShellMesh& shell, const Target& target, const ShellDistanceOptions& options);
 
 /// The same of the flat facets.

@@ -1,0 +1,140 @@
+#include "shell/curved_hausdorff.hpp"
+
+#include "core/threads.hpp"
+#include "shell/curved_surface.hpp"
+#include "shell/families.hpp"
+#include "surface/hausdorff.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace tunica {
+namespace {
+
+/// Rough shells: normals tilted this way and that, so that patches bulge and gape.
+ShellMesh rough_shell(int times, double tilt, double move) {
+  ShellMesh shell = testing::sphere_shell(times);
+  for (std::size_t v = 0; v < shell.vertices.size(); ++v) {
+    const double a = 3.7 * static_cast<double>(v);
+    shell.normals[v] = (shell.normals[v] + tilt * Vec3(std::sin(a), std::cos(1.3 * a), std::sin(2.1 * a))).normalized();
+    shell.vertices[v] *= 1 + move * std::sin(5.3 * a);
+  }
+  return shell;
+}
+
+/// The other way to the same: flat triangles so fine that the deviation hardly matters.
+HausdorffResult by_tessellation(const ShellMesh& shell, const TriangleMesh& target, double width) {
+  const Tessellation fine = tessellate(shell, width / 8);
+  HausdorffOptions options;
+  options.width = width / 2;
+  options.deviation_a = fine.deviation;
+  options.samples = 100'000;
+  return hausdorff(fine.mesh, target, options);
+}
+
+void expect_agreement(const ShellMesh& shell, const TriangleMesh& mesh, double part) {
+  const Target target(mesh);
+  ShellDistanceOptions options;
+  options.width = part * target.diagonal();
+  options.with_mean = true;
+  const ShellDistance found = curved_hausdorff(shell, target, options);
+  const HausdorffResult other = by_tessellation(shell, mesh, options.width);
+  for (const auto& [one, two] : {std::pair(found.shell_to_target, other.a_to_b),
+                                 {found.target_to_shell, other.b_to_a},
+                                 {found.both, other.both}}) {
+    EXPECT_LE(one.lower, two.upper);
+    EXPECT_GE(one.upper, two.lower);
+    EXPECT_LE(one.upper - one.lower, 1.3 * options.width);
+  }
+  // The tessellation itself is off by at most an eighth of the width.
+  EXPECT_NEAR(found.mean, other.mean, 0.01 * other.mean + options.width / 8);
+  EXPECT_NEAR(found.rms, other.rms, 0.01 * other.rms + options.width / 8);
+}
+
+TEST(CurvedHausdorff, AgreesWithAFineTessellation) {
+  for (const double part : {1e-2, 1e-3, 1e-4}) {
+    expect_agreement(rough_shell(1, 0.1, 0), testing::sphere(4), part);
+    expect_agreement(rough_shell(2, 0.3, 0.05), testing::sphere(4), part);
+  }
+}
+
+TEST(CurvedHausdorff, OpenShellsAndTargetsCoarserThanTheShells) {
+  ShellMesh open = rough_shell(2, 0.1, 0.02);
+  open.triangles.resize(open.triangles.size() - 20);
+  for (const double part : {1e-2, 1e-3}) {
+    expect_agreement(open, testing::sphere(4), part);
+    expect_agreement(rough_shell(3, 0.05, 0), testing::sphere(1), part);
+    // A normal per corner: neighbours gape widely.
+    ShellMesh creased = rough_shell(1, 0, 0);
+    for (std::size_t t = 0; t < creased.triangles.size(); ++t) {
+      for (int k = 0; k < 3; ++k) {
+        const double a = 2.9 * static_cast<double>(3 * t) + k;
+        creased.corner_normals.resize(t + 1);
+        creased.corner_normals[t][static_cast<std::size_t>(k)] =
+            (creased.normals[creased.triangles[t][static_cast<std::size_t>(k)]] +
+             0.2 * Vec3(std::sin(a), std::cos(a), std::sin(2 * a)))
+                .normalized();
+      }
+    }
+    expect_agreement(creased, testing::sphere(4), part);
+  }
+}
+
+TEST(CurvedHausdorff, SpikeOfTheTargetIsFoundWhicheverSideItIs) {
+  TriangleMesh spiked = testing::sphere(4);
+  spiked.vertices[77] *= 1.5;
+  const Target target(spiked);
+  ShellDistanceOptions options;
+  options.width = 1e-4 * target.diagonal();
+  const ShellMesh shell = testing::sphere_shell(2);
+  const ShellDistance found = curved_hausdorff(shell, target, options);
+  EXPECT_LE(found.target_to_shell.lower, 0.5 + 1e-3);
+  EXPECT_GE(found.target_to_shell.upper, 0.5 - 1e-3);
+  EXPECT_LT(found.shell_to_target.upper, 0.1);
+}
+
+TEST(CurvedHausdorff, UpperBoundIsNeverBelowDenseSamples) {
+  const ShellMesh shell = rough_shell(1, 0.25, 0.05);
+  const Target target(testing::sphere(3));
+  const Tessellation fine = tessellate_uniformly(shell, 60);
+  double from_shell = 0;
+  for (const double d : vertex_distances(fine.mesh, target.tree())) {
+    from_shell = std::max(from_shell, d);
+  }
+  const ClosestPoint tree(fine.mesh);
+  double to_shell = 0;
+  for (const auto& [a, b, c] : target.mesh().triangles) {
+    const auto& v = target.mesh().vertices;
+    for (const Vec3& p : {v[a], Vec3((v[a] + v[b]) / 2), Vec3((v[a] + v[b] + v[c]) / 3)}) {
+      to_shell = std::max(to_shell, std::sqrt(tree.closest(p).squared_distance) - fine.deviation);
+    }
+  }
+  for (const double width : {0.3, 0.03, 0.003}) {
+    ShellDistanceOptions options;
+    options.width = width;
+    const ShellDistance found = curved_hausdorff(shell, target, options);
+    EXPECT_GE(found.shell_to_target.upper, from_shell);
+    EXPECT_GE(found.target_to_shell.upper, to_shell);
+    options.limit = 0.9 * std::max(from_shell, to_shell);
+    EXPECT_GT(curved_hausdorff(shell, target, options).both.upper, *options.limit);
+    options.limit = found.both.upper + width;
+    EXPECT_LE(curved_hausdorff(shell, target, options).both.upper, *options.limit);
+  }
+}
+
+TEST(CurvedHausdorff, IsTheSameWithAnyNumberOfThreads) {
+  const ShellMesh shell = rough_shell(2, 0.2, 0.03);
+  const Target target(testing::sphere(4));
+  ShellDistanceOptions options;
+  options.width = 1e-4 * target.diagonal();
+  set_thread_count(1);
+  const ShellDistance one = curved_hausdorff(shell, target, options);
+  set_thread_count(2);
+  const ShellDistance two = curved_hausdorff(shell, target, options);
+  EXPECT_EQ(one.both.lower, two.both.lower);
+  EXPECT_EQ(one.both.upper, two.both.upper);
+}
+
+}  // namespace
+}  // namespace tunica
