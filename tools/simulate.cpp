@@ -67,7 +67,8 @@ void declare(cli::Tool& tool, Arguments& a) {
   tool.quantity("--ramp", a.ramp, dimension::time,
                 "dynamic: the load grows from zero over this time (default: at once)");
   app.add_option("--membrane", a.membrane, "membrane element: cst | opt | adapt (default adapt)")->type_name("NAME");
-  app.add_option("--bending", a.bending, "bending element: comas (the paper's) | comas-consistent | dkt (default dkt)")
+  app.add_option("--bending", a.bending,
+                 "bending element: comas (the paper's) | comas-consistent | dkt | dkt-comas (default dkt-comas)")
       ->type_name("NAME");
   app.add_option("--solver", a.solver, "cg | direct | auto (default auto)")->type_name("NAME");
   app.add_option("--cg-tolerance", a.cg_tolerance, "relative residual at which CG stops, e.g. 5% (the paper's)")
@@ -248,7 +249,10 @@ Scene scene_of_flags(const Arguments& a) {
   choose<Membrane>(a.membrane, "--membrane", shell.membrane,
                    {{"cst", Membrane::cst}, {"opt", Membrane::opt}, {"adapt", Membrane::adapt}});
   choose<Bending>(a.bending, "--bending", shell.bending,
-                  {{"comas", Bending::comas}, {"comas-consistent", Bending::comas_consistent}, {"dkt", Bending::dkt}});
+                  {{"comas", Bending::comas},
+                   {"comas-consistent", Bending::comas_consistent},
+                   {"dkt", Bending::dkt},
+                   {"dkt-comas", Bending::dkt_comas}});
   scene.shells.push_back(shell);
 
   load.kind = PressureLoad{required(a.pressure, "--pressure", "100mmHg"), true};
@@ -409,6 +413,7 @@ void report_summary(Json& result, const Summary& summary, bool converged, std::o
   result["algebraic_error_percent"] = summary.algebraic_error ? Json(1e2 * *summary.algebraic_error) : Json();
   result["algebraic_error_is_lower_bound"] = summary.algebraic_error_is_bound;
   result["newton_iterations"] = summary.newton_iterations;
+  result["short_waves_stiffened_from"] = or_null(summary.stiffened_from);
   result["limit_load_factors"] = summary.limit_factors;
   result["branch_load_factors"] = summary.branch_factors;
   result["cg_iterations"] = summary.cg_iterations;
@@ -640,6 +645,13 @@ void simulate(cli::Tool& tool, const Arguments& a) {
   }
   tool.note(fmt::format("{} nodes in {} steps, {}: largest displacement {:.4g} mm", model.node_count(), summary.steps,
                         converged ? "converged" : "not asked to converge", summary.max_displacement));
+  if (summary.stiffened_from) {
+    tool.warn(
+        fmt::format("{}: the mesh is coarse for so thin a curved shell (h^2 > 3 R t): from {} {:.4g} on, where it "
+                    "would have buckled in waves as short as its elements, these were made stiff",
+                    subject.string(), std::holds_alternative<DynamicRun>(scene.run.kind) ? "second" : "load factor",
+                    *summary.stiffened_from));
+  }
   if (unresolved > 0) {
     tool.warn(
         fmt::format("{}: {} shells bend by more than 30 degrees within themselves: the mesh is too coarse for "

@@ -41,7 +41,7 @@ struct SceneShell {
   std::optional<std::string> thickness_from;  ///< per-vertex property of the mesh file, mm
   Material material;
   Membrane membrane = Membrane::adapt;
-  Bending bending = Bending::dkt;
+  Bending bending = Bending::dkt_comas;
   Rest rest = Rest::curved;
   Places places;
 };

@@ -527,9 +527,11 @@ void read_shell(const Table& table, const fs::path& folder, Scene& scene) {
   }
   table.choice<Membrane>("membrane", shell.membrane,
                          {{"cst", Membrane::cst}, {"opt", Membrane::opt}, {"adapt", Membrane::adapt}});
-  table.choice<Bending>(
-      "bending", shell.bending,
-      {{"comas", Bending::comas}, {"comas-consistent", Bending::comas_consistent}, {"dkt", Bending::dkt}});
+  table.choice<Bending>("bending", shell.bending,
+                        {{"comas", Bending::comas},
+                         {"comas-consistent", Bending::comas_consistent},
+                         {"dkt", Bending::dkt},
+                         {"dkt-comas", Bending::dkt_comas}});
   table.choice<Rest>("rest", shell.rest, {{"curved", Rest::curved}, {"flat", Rest::flat}});
   scene.shells.push_back(std::move(shell));
 }

@@ -196,6 +196,8 @@ std::string_view name_of(Bending bending) {
       return "comas-consistent";
     case Bending::dkt:
       return "dkt";
+    case Bending::dkt_comas:
+      return "dkt-comas";
   }
   return {};
 }

@@ -222,6 +222,10 @@ public:
 
   Summary run(const Progress& progress) {
     summary_.dof = path_.freedom_count();
+    if (has_soft_waves(system_)) {  // else the limit points could be those of the mesh
+      stiffen_short_waves(system_);
+      summary_.stiffened_from = 0;
+    }
     PathState now;
     now.configuration = reference_configuration(system_);
     State state = make_state(system_, model_, now.configuration, 0);

@@ -57,4 +57,13 @@ PlaneStiffness bending_dkt(const PlaneTriangle& triangle, const Mat3& elasticity
   return result;
 }
 
+PlaneStiffness bending_dkt_comas(const PlaneTriangle& triangle, const Mat3& elasticity, double thickness) {
+  constexpr double share = 0.2;
+  PlaneStiffness result = bending_dkt(triangle, elasticity, thickness);
+  const PlaneStiffness cubic = bending_comas_consistent(triangle, elasticity, thickness);
+  result.stiffness = (1 - share) * result.stiffness + share * cubic.stiffness;
+  result.mean_strain = (1 - share) * result.mean_strain + share * cubic.mean_strain;
+  return result;
+}
+
 }  // namespace tunica

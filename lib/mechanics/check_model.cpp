@@ -289,9 +289,10 @@ ShellSystem make_checked_system(const Model& model, const RunSettings& settings)
   }
   check_selections(model);
   check_run(model, settings);
-  const bool spectrum =
-      std::holds_alternative<FrequencyRun>(settings.kind) || std::holds_alternative<BucklingRun>(settings.kind);
-  ShellSystem system = make_system(model, spectrum ? 1 : 0);
+  ShellSystem system = make_system(model);
+  if (std::holds_alternative<FrequencyRun>(settings.kind) || std::holds_alternative<BucklingRun>(settings.kind)) {
+    stiffen_short_waves(system);
+  }
   check_balance(system, model);
   if (finds_rest(model, settings)) {
     for (const Piece& piece : system.pieces) {

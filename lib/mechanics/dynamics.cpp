@@ -17,9 +17,6 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// With one linearisation per step nothing brings the residual down: above this part of the forces the step means
-/// nothing.
-constexpr double largest_unchecked_residual = 0.5;
 /// Smallest part of a step's change that is tried on its own.
 constexpr double smallest_part = 1.0 / 256;
 /// Smallest part of a step's time that error control may ask for.
@@ -169,6 +166,8 @@ public:
       TUNICA_ASSERT(values.size() == static_cast<std::size_t>(vector->size()));
       std::copy(values.begin(), values.end(), vector->begin());
     }
+    deformation_.clear();
+    before_.clear();
     part_ = memory.at("part").at(0);
     at_rest_ = memory.at("at_rest").at(0) != 0;
     if (const auto found = memory.find("deformation_before"); found != memory.end()) {
@@ -470,6 +469,9 @@ Summary run_dynamic(ShellSystem& system, const Model& model, const RunSettings& 
   double time = 0;
   if (resumption.from) {
     summary = resumption.from->summary;
+    if (summary.stiffened_from) {
+      stiffen_short_waves(system);
+    }
     time = resumption.from->position;
     motion.configuration = {resumption.from->displacement, resumption.from->rotation};
     integrator.recall(resumption.from->memory, motion);
@@ -485,12 +487,28 @@ Summary run_dynamic(ShellSystem& system, const Model& model, const RunSettings& 
 
   // The last step may be shorter: the run ends at its duration.
   const auto steps = static_cast<std::size_t>(std::max(1.0, std::ceil(run.duration / run.step - 1e-9)));
+  const bool soft_waves = has_soft_waves(system);
   for (std::size_t s = summary.steps; s < steps; ++s) {
     const auto start = Clock::now();
     const bool last = s + 1 == steps;
     const double end = last ? run.duration : static_cast<double>(s + 1) * run.step;
     integrator.tell_direct_error(s == 0 || last);
-    const auto [result, reached, ran_away, parts, precise] = integrator.advance(time, end - time, motion);
+    TimeStepper::StepResult step;
+    if (!summary.stiffened_from && soft_waves) {
+      const Motion before = motion;
+      const auto memory = integrator.memory(motion);
+      step = integrator.advance(time, end - time, motion);
+      if (!step.precise || !is_solved(settings, step.newton)) {
+        stiffen_short_waves(system);
+        summary.stiffened_from = time;
+        motion = before;
+        integrator.recall(memory, motion);
+        step = integrator.advance(time, end - time, motion);
+      }
+    } else {
+      step = integrator.advance(time, end - time, motion);
+    }
+    const auto& [result, reached, ran_away, parts, precise] = step;
     const bool one_linearisation = settings.newton_max == 1;
     if (!precise) {
       throw RequirementError(fmt::format(

@@ -23,6 +23,7 @@ enum class Bending {
   comas,             ///< the paper's 9-term cubic, faithful: depends on the first vertex, converges to a wrong limit
   comas_consistent,  ///< the same cubic, its mean curvature replaced by the boundary-integral one; isotropic
   dkt,               ///< discrete Kirchhoff triangle
+  dkt_comas,         ///< four fifths dkt, one fifth comas_consistent
 };
 
 enum class Rest {
@@ -45,7 +46,7 @@ struct ShellBody {
   std::vector<double> thickness;  ///< mm: one value for the whole body, or one per vertex
   Material material;
   Membrane membrane = Membrane::adapt;
-  Bending bending = Bending::dkt;
+  Bending bending = Bending::dkt_comas;
   Rest rest = Rest::curved;
 };
 

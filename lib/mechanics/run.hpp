@@ -6,6 +6,10 @@
 /// The kinds of run behind solve(): each takes a system and hands its states over.
 namespace tunica {
 
+/// With one linearisation per step nothing brings the residual down: above this part of the forces the step means
+/// nothing.
+inline constexpr double largest_unchecked_residual = 0.5;
+
 using StateCallback = std::function<void(const State&)>;
 
 /// check_model(), and what it needs made ready anyway. Errors: InputError.

@@ -272,7 +272,7 @@ void add_material(const ShellElement& element, double factor, const std::array<M
     for (int k = 0; k < 3; ++k) {
       skewness.row(k) = 0.5 * (d.slopes.row(2 * k) + d.slopes.row(2 * k + 1));
     }
-    const Matrix3x18 on_skewness = factor * element.skewing * skewness;
+    const Matrix3x18 on_skewness = (factor * element.skewing).asDiagonal() * skewness;
     add_symmetric_product(skewness, on_skewness, t);
   }
   // Rotation vectors: H_i'K_ij H_j between spins, where spins of the frame count against those of the corners.
@@ -366,7 +366,7 @@ void add_edge_stiffness(const EdgeNow& edge, int start, int carrier, const Vec3&
 
 ShellElement make_shell_element(const std::array<Vec3, 3>& corners, const ShellSurface& surface,
                                 const Material& material, double thickness, Membrane membrane, Bending bending,
-                                double higher_order_scale, double skewing) {
+                                double higher_order_scale) {
   ShellElement element;
   element.thickness = thickness;
   const Vec3 first = corners[1] - corners[0];
@@ -413,6 +413,9 @@ ShellElement make_shell_element(const std::array<Vec3, 3>& corners, const ShellS
     case Bending::dkt:
       out_of_plane = bending_dkt(triangle, elasticity, thickness);
       break;
+    case Bending::dkt_comas:
+      out_of_plane = bending_dkt_comas(triangle, elasticity, thickness);
+      break;
   }
   element.membrane = spread * in_plane.basic;
   element.bow = in_plane.bow;
@@ -420,7 +423,7 @@ ShellElement make_shell_element(const std::array<Vec3, 3>& corners, const ShellS
 
   element.rotational *= spread;
   if (surface.curved) {
-    element.skewing = skewing * material.young * thickness * element.area * element.slopes.squaredNorm() / 6;
+    find_short_waves(surface, material.young * thickness, element);
   }
   element.area *= spread;
   if (surface.curved) {
@@ -450,7 +453,7 @@ ElementState element_force(const ShellElement& element, const ElementState& defo
   ElementState force;
   force.head<3>().noalias() = element.membrane * deformation.head<3>();
   force.segment<9>(3).noalias() = element.rotational * deformation.segment<9>(3);
-  force.tail<3>() = element.skewing * deformation.tail<3>();
+  force.tail<3>() = element.skewing.cwiseProduct(deformation.tail<3>());
   return force;
 }
 

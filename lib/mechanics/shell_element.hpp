@@ -28,14 +28,14 @@
 /// surface leaves the mean strain at zero to third order in the element's size, where flat facets are strained in the
 /// second. Beyond, they keep the nodes' rotations stiff in tension and make the patch buckle in compression.
 ///
-/// A mean strain does not see what alternates from node to node: on a shell that is thin against the square of its
-/// elements (h^2 > 3 R t) nodes can move along the normals and turn such that all mean strains vanish, and such
-/// patterns are too soft. Their edges skew: a line that keeps a constant curvature has opposite slopes at its ends. The
-/// skewness can be given the stiffness of a membrane strain that is the mean slope of the reference times as large; of
-/// a smooth deformation it is of third order. With the factor 1 the spectrum is right (a sphere's lowest frequency at
-/// R/t = 500 and 1,280 shells
-/// + 0.1 %, - 42 % without); under static loads that a mesh hardly resolves it costs accuracy (the pinched cylinder
-/// with 8 x 8 cells 25 % instead of 7 %), so that only what asks for the spectrum asks for it.
+/// A mean strain does not see waves as short as the elements: w = W cos(K.x) with |K| = 4 pi / (3 h) sums to zero over
+/// the corners of every triangle of a regular mesh, so that all mean strains vanish and only bending resists, which is
+/// 28 / x^2 of what the membrane should do, x = h^2 b / t, b the shell's curvature. Where a shell is thin against the
+/// square of its elements such waves are too soft. Their edges skew: a line that keeps a constant curvature has
+/// opposite slopes at its ends. So the skewness of an edge has a stiffness, S E t A b^2 h^2 / 4 with b the curvature
+/// ACROSS the edge, as a wave along it stretches the lines across; bending without extension of a cylinder stays free.
+/// S = 4/9 gives the wave above the energy of its membrane strain, E t b^2 W^2 / 4 per area; of a smooth deformation
+/// the skewness is of third order. See ShortWaves for who gets how much.
 ///
 /// Forces are the gradient of the energy to the last term, and the tangent the gradient of the forces.
 /// Source: co-rotation: Nour-Omid, Rankin 1991; Felippa, Haugen 2005; Battini 2007. Strain of shallow shells: Marguerre
@@ -77,14 +77,16 @@ struct ShellElement {
   /// Strain by bulging, less the same in the reference, for slopes a and bending rotations theta:
   ///   a'H_i a / 2 (component i) + sum over edges k of sideways_k (a_start - a_end) x tilt,
   ///   tilt = tilt_k + direction_k.(theta_start + theta_end) / 2.
-  std::array<Matrix6, 3> bulging;  ///< H
-  Mat3 sideways;                   ///< columns: of the edges
-  Vec3 tilts;                      ///< of m against the facet's normal, outward, in the reference
-  Mat23 edge_directions;           ///< columns, in the reference frame
-  Mat3 membrane;                   ///< stiffness to the mean strain (N mm)
-  Matrix9 rotational;              ///< stiffness to the rotation vectors (N mm): bending, higher-order membrane
-  double skewing = 0;              ///< stiffness to the skewness of an edge (N mm)
-  Matrix39 curvature;              ///< mean, from the rotation vectors
+  std::array<Matrix6, 3> bulging;   ///< H
+  Mat3 sideways;                    ///< columns: of the edges
+  Vec3 tilts;                       ///< of m against the facet's normal, outward, in the reference
+  Mat23 edge_directions;            ///< columns, in the reference frame
+  Mat3 membrane;                    ///< stiffness to the mean strain (N mm)
+  Matrix9 rotational;               ///< stiffness to the rotation vectors (N mm): bending, higher-order membrane
+  Vec3 skewing = Vec3::Zero();      ///< stiffness to the skewness of the edges (N mm); zero unless asked for
+  Vec3 short_waves = Vec3::Zero();  ///< what it has to be for waves as short as the elements
+  double thinness = 0;              ///< x: h^2 times the largest curvature, over the thickness
+  Matrix39 curvature;               ///< mean, from the rotation vectors
 };
 
 /// What the three corners do: displacements (columns) and rotations from the reference.
@@ -93,11 +95,10 @@ struct CornerMotion {
   std::array<Mat3, 3> rotation;
 };
 
-/// Geometry, stiffness and strain operators. `higher_order_scale` goes to membrane_opt(); `skewing` scales the
-/// stiffness to the edges' skewness.
+/// Geometry, stiffness and strain operators. `higher_order_scale` goes to membrane_opt().
 ShellElement make_shell_element(const std::array<Vec3, 3>& corners, const ShellSurface& surface,
                                 const Material& material, double thickness, Membrane membrane, Bending bending,
-                                double higher_order_scale, double skewing = 0);
+                                double higher_order_scale);
 
 /// The state y. Zero, to the last bit, at the reference.
 /// @return false when the triangle has collapsed or turned inside out: no frame exists.

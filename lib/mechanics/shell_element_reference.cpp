@@ -84,6 +84,24 @@ void find_edges(const ShellSurface& surface, ShellElement& element) {
   }
 }
 
+void find_short_waves(const ShellSurface& surface, double stretching, ShellElement& element) {
+  Eigen::Matrix2d gradient = Eigen::Matrix2d::Zero();
+  for (int k = 0; k < 3; ++k) {
+    const Vec3 normal = element.axes * surface.normals[static_cast<std::size_t>(k)];
+    gradient += normal.head<2>() * element.gradients.col(k).transpose();
+  }
+  const Eigen::Matrix2d curvature = 0.5 * (gradient + gradient.transpose());
+  const double mean = curvature.trace() / 2;
+  const double largest = std::abs(mean) + std::sqrt(std::max(mean * mean - curvature.determinant(), 0.0));
+  element.thinness = 4 / std::sqrt(3.0) * element.area * largest / element.thickness;
+  for (int k = 0; k < 3; ++k) {
+    const Vec2 edge = element.plane.col(next_corner(k)) - element.plane.col(k);
+    const Vec2 across(edge.y(), -edge.x());
+    const double bulge = across.dot(curvature * across) / across.norm();  // b h
+    element.short_waves[k] = stretching * element.area * bulge * bulge / 9;
+  }
+}
+
 void find_rotational(const ShellSurface& surface, const PlaneStiffness& bending, const Mat3& higher_order,
                      ShellElement& element) {
   Matrix39 drilling = Matrix39::Zero();

@@ -19,6 +19,10 @@ void find_edges(const ShellSurface& surface, ShellElement& element);
 /// edge_directions; needs plane, gradients, edge_normals and the facet's area.
 void find_bulging(ShellElement& element);
 
+/// Stiffness to the skewness of the edges; `stretching` is E t (N/mm). Fills short_waves and thinness; needs plane,
+/// gradients, axes, thickness and the facet's area.
+void find_short_waves(const ShellSurface& surface, double stretching, ShellElement& element);
+
 /// Bending, and the higher-order membrane part: corners drill about the mean of their own and the facet's normal, as
 /// the turn of a surface that only bends has no part about the normal halfway. Fills rotational and curvature.
 void find_rotational(const ShellSurface& surface, const PlaneStiffness& bending, const Mat3& higher_order,

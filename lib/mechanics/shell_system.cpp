@@ -280,7 +280,18 @@ void add_stiffness_norms(ShellSystem& system) {
 
 }  // namespace
 
-ShellSystem make_system(const Model& model, double skewing) {
+void stiffen_short_waves(ShellSystem& system) {
+  for (ShellElement& element : system.elements) {
+    element.skewing = element.short_waves;
+  }
+}
+
+bool has_soft_waves(const ShellSystem& system) {
+  return std::any_of(system.elements.begin(), system.elements.end(),
+                     [](const ShellElement& element) { return element.thinness > 3; });
+}
+
+ShellSystem make_system(const Model& model) {
   ShellSystem system;
   const std::size_t nodes = model.node_count();
   system.reference.reserve(nodes);
@@ -307,7 +318,7 @@ ShellSystem make_system(const Model& model, double skewing) {
       }
       const double scale = body.membrane == Membrane::adapt ? adapted_scale(corners, bulge, thickness) : 1;
       ShellElement element =
-          make_shell_element(corners, surface, body.material, thickness, body.membrane, body.bending, scale, skewing);
+          make_shell_element(corners, surface, body.material, thickness, body.membrane, body.bending, scale);
       element.body = b;
       for (std::size_t k = 0; k < 3; ++k) {
         element.nodes[k] = v[k] + offset;

@@ -64,10 +64,16 @@ struct ShellSystem {
   [[nodiscard]] std::size_t node_count() const { return reference.size(); }
 };
 
-/// `skewing`: make_shell_element(); 1 for frequencies and buckling, whose answers are the spectrum itself.
 /// Errors: InputError for what only shows when loads and supports are put on the nodes (a load on a node without
 /// triangles, an edge load on an edge that is not there).
-ShellSystem make_system(const Model& model, double skewing = 0);
+ShellSystem make_system(const Model& model);
+
+/// Makes the edges' skewness stiff (shell_element.hpp): for frequencies and buckling, whose answers are the spectrum
+/// itself, and for static and dynamic runs where the shell would buckle in waves as short as its elements.
+void stiffen_short_waves(ShellSystem& system);
+
+/// Whether somewhere bending alone does not hold such waves: h^2 > 3 R t.
+bool has_soft_waves(const ShellSystem& system);
 
 /// The configuration without displacements and rotations.
 Configuration reference_configuration(const ShellSystem& system);

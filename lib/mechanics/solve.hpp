@@ -68,8 +68,11 @@ struct Summary {
   std::vector<double> seconds_per_step;  ///< wall
   std::vector<double> frequencies;       ///< Hz, increasing
   std::vector<double> buckling_factors;  ///< increasing
-  std::vector<double> limit_factors;     ///< load factors at which a path by arc length turns, in its order
-  std::vector<double> branch_factors;    ///< and near which other paths leave it
+  /// Load factor (static) or time (s) from which waves as short as the elements were made stiff, because the shell
+  /// would have buckled in them (shell_element.hpp).
+  std::optional<double> stiffened_from;
+  std::vector<double> limit_factors;   ///< load factors at which a path by arc length turns, in its order
+  std::vector<double> branch_factors;  ///< and near which other paths leave it
 };
 
 /// Everything a run needs to go on after a step as if nothing had happened: the numbers as they stand in memory, so

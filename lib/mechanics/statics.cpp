@@ -192,6 +192,9 @@ Summary run_static(ShellSystem& system, const Model& model, const RunSettings& s
   double part = 1;
   if (resumption.from) {
     summary = resumption.from->summary;
+    if (summary.stiffened_from) {
+      stiffen_short_waves(system);
+    }
     configuration = {resumption.from->displacement, resumption.from->rotation};
     factor = resumption.from->position;
     shown = resumption.from->memory.at("shown").at(0);
@@ -221,8 +224,9 @@ Summary run_static(ShellSystem& system, const Model& model, const RunSettings& s
       result = step.run(next, factor, attempt);
       newton_iterations += result.iterations;
       cg_iterations += result.cg_iterations;
-      // With a fixed count of iterations nobody asks for a tolerance.
-      const bool accepted = result.converged || (settings.cg_fixed_count && result.valid);
+      // With a fixed count of iterations, or one linearisation, nobody asks for a tolerance.
+      const bool one_linearisation = settings.newton_max == 1 && result.residual <= largest_unchecked_residual;
+      const bool accepted = result.converged || (result.valid && (settings.cg_fixed_count || one_linearisation));
       const bool left_the_path = result.predicted > 0 && result.reached > largest_departure * result.predicted;
       if (accepted && (settings.cg_fixed_count || (result.stable && !left_the_path))) {
         configuration = std::move(attempt);
@@ -232,6 +236,12 @@ Summary run_static(ShellSystem& system, const Model& model, const RunSettings& s
       }
       part /= 2;
       if (part >= smallest_part) {
+        continue;
+      }
+      if (!summary.stiffened_from && has_soft_waves(system)) {
+        stiffen_short_waves(system);
+        summary.stiffened_from = factor;
+        part = 1;
         continue;
       }
       const double beyond = std::min(target, factor + 4 * smallest_part * whole);

@@ -73,8 +73,8 @@ class Study(Bench):
 
 def elements(study):
     """1 kPa on a wall of 0.5 mm, nonlinear statics, 128 to 10,000 shells."""
-    kinds = {"cst + comas (the paper's)": PAPER, "cst + dkt, flat": {"membrane": "cst", "rest": "flat"},
-             "adapt + dkt, flat": {"rest": "flat"}, "adapt + dkt, curved (default)": {}}
+    kinds = {"cst + comas (the paper's)": PAPER, "cst + dkt-comas, flat": {"membrane": "cst", "rest": "flat"},
+             "adapt + dkt-comas, flat": {"rest": "flat"}, "adapt + dkt-comas, curved (default)": {}}
 
     def scene(n, more):
         write_ply(study.path(f"vessel{n}.ply"), *vessel(n, n))

@@ -43,7 +43,7 @@ TEST_F(SceneTest, defaultsAreThoseOfTheContract) {
   ASSERT_EQ(scene.shells.size(), 1U);
   EXPECT_EQ(scene.shells[0].scale, 1.0);
   EXPECT_EQ(scene.shells[0].membrane, Membrane::adapt);
-  EXPECT_EQ(scene.shells[0].bending, Bending::dkt);
+  EXPECT_EQ(scene.shells[0].bending, Bending::dkt_comas);
   EXPECT_EQ(scene.shells[0].rest, Rest::curved);
   EXPECT_FALSE(scene.shells[0].material.density);
 }

@@ -36,6 +36,7 @@ PlaneStiffness adapt(const PlaneTriangle& t) { return in_freedoms(t, membrane_op
 PlaneStiffness comas(const PlaneTriangle& t) { return bending_comas(t, elasticity, thickness); }
 PlaneStiffness consistent(const PlaneTriangle& t) { return bending_comas_consistent(t, elasticity, thickness); }
 PlaneStiffness dkt(const PlaneTriangle& t) { return bending_dkt(t, elasticity, thickness); }
+PlaneStiffness dkt_comas(const PlaneTriangle& t) { return bending_dkt_comas(t, elasticity, thickness); }
 
 /// Stiffness of a triangle anywhere in the plane, in the axes of that plane. A membrane corner is (vector, scalar), a
 /// bending corner (scalar, vector).
@@ -92,6 +93,7 @@ TEST(Elements, PassThePatchTest) {
   EXPECT_LT(patch_test(adapt, true), 1e-12);
   EXPECT_LT(patch_test(consistent, false), 1e-12);
   EXPECT_LT(patch_test(dkt, false), 1e-12);
+  EXPECT_LT(patch_test(dkt_comas, false), 1e-12);
 }
 
 TEST(Elements, ThePapersBendingElementFailsThePatchTest) {
@@ -118,6 +120,7 @@ TEST(Elements, DoNotDependOnWhichCornerComesFirst) {
   EXPECT_LT(order_dependence(opt, true), 1e-13);
   EXPECT_LT(order_dependence(consistent, false), 1e-13);
   EXPECT_LT(order_dependence(dkt, false), 1e-13);
+  EXPECT_LT(order_dependence(dkt_comas, false), 1e-13);
   EXPECT_GT(order_dependence(comas, false), 0.01);
 }
 

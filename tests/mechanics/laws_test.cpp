@@ -17,7 +17,7 @@ struct Choice {
   Bending bending;
 };
 constexpr std::array choices{Choice{Membrane::cst, Bending::comas}, Choice{Membrane::opt, Bending::comas_consistent},
-                             Choice{Membrane::adapt, Bending::dkt}};
+                             Choice{Membrane::adapt, Bending::dkt}, Choice{Membrane::adapt, Bending::dkt_comas}};
 
 /// An open, bumpy, irregular shell, moderately thin.
 ShellMesh bumpy() {

@@ -9,7 +9,7 @@ import numpy as np
 
 SIMULATE = os.path.join(os.environ["TUNICA_BIN"], "tunica-simulate")
 MEMBRANES = ("cst", "opt", "adapt")
-BENDINGS = ("comas", "comas-consistent", "dkt")
+BENDINGS = ("comas", "comas-consistent", "dkt", "dkt-comas")
 
 
 def write_ply(path, vertices, triangles, normals=None):
@@ -103,7 +103,7 @@ def run_lines(**keys):
     return "[run]\n" + "".join(f"{key} = {json.dumps(value)}\n" for key, value in keys.items())
 
 
-def shell(mesh, thickness, young, poisson, membrane="adapt", bending="dkt", rest="curved", density=None):
+def shell(mesh, thickness, young, poisson, membrane="adapt", bending="dkt-comas", rest="curved", density=None):
     text = (f"[[shell]]\nname = \"s\"\nmesh = \"{mesh}\"\nthickness = \"{thickness}mm\"\nyoung = \"{young!r}MPa\"\n"
             f"poisson = {poisson!r}\nmembrane = \"{membrane}\"\nbending = \"{bending}\"\nrest = \"{rest}\"\n")
     return text + (f"density = \"{density}\"\n" if density else "")

@@ -84,7 +84,7 @@ class Flags(SimulateTest):
         self.assertGreater(by_cg["cg_iterations"], 0)
         self.assertFalse(by_cg["algebraic_error_is_lower_bound"])
         self.assertAlmostEqual(by_cg["max_displacement_mm"] / reference["max_displacement_mm"], 1, places=6)
-        for flag, names in (("--membrane", ["cst", "opt", "adapt"]), ("--bending", ["comas", "comas-consistent", "dkt"])):
+        for flag, names in (("--membrane", ["cst", "opt", "adapt"]), ("--bending", ["comas", "comas-consistent", "dkt", "dkt-comas"])):
             values = set()
             for name in names:
                 result = self.run_tool("plate.ply", "c.hdf", "--force", *PRESSED, "--static", "--fix",
