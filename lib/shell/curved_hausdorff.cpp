@@ -24,6 +24,8 @@ constexpr std::size_t grain = 256;
 constexpr std::size_t most_pieces = 2'000'000;
 constexpr double bulge_share = 0.25;  // of the distance that settles a piece: what the first cut leaves to bulges
 constexpr int most_level = 24;        // pieces per edge of the first cut
+constexpr int most_rounds = 3;
+constexpr double joined_share = 0.6;  // of the distance that settles a piece: wider gaps stay open
 constexpr std::size_t mean_samples = 60'000;
 constexpr std::size_t sharp_points = 200;           // whose distance to the shell is found exactly
 constexpr int sharpest_level = 96;                  // pieces per edge there
@@ -301,20 +303,24 @@ public:
     std::vector<double> sorted = flatness_;
     const auto ninth = sorted.begin() + static_cast<std::ptrdiff_t>(9 * (sorted.size() - 1) / 10);
     std::nth_element(sorted.begin(), ninth, sorted.end());
+    expected_ = expected;
     const double share = bulge_share * aim_.enough(expected);
     int level = static_cast<int>(std::clamp(std::ceil(std::sqrt(*ninth / share)), 1.0, 12.0));
-    std::vector<Piece> live = first_round(flat_pieces(shell_, patches_, across_, chosen, level, true), level);
-    for (int round = 0; round < 8 && !live.empty() && !aim_.decided_above(lower_); ++round) {
+    std::vector<Piece> live =
+        first_round(flat_pieces(shell_, patches_, across_, chosen, level, joined_gap(), true), level);
+    for (int round = 0; round < most_rounds && !live.empty() && !aim_.decided_above(lower_); ++round) {
       check_interrupt();
       chosen = near(live);
-      const double worst = worst_flatness(chosen);
-      const int finest = static_cast<int>(std::clamp(std::ceil(std::sqrt(8 * worst / aim_.width)), 1.0, 200.0));
-      level = std::min(3 * level, finest);
+      // An eighth of what lies between the bound and what it has to be below.
+      const double slack = aim_.enough(lower_) - lower_;
+      const int finest =
+          static_cast<int>(std::clamp(std::ceil(std::sqrt(8 * worst_flatness(chosen) / slack)), 1.0, 200.0));
+      const bool last = 3 * level >= finest || round + 1 == most_rounds;
+      level = last ? finest : 3 * level;
       while (level > 1 && static_cast<double>(level) * level * static_cast<double>(chosen.size()) > most_pieces) {
         --level;
       }
-      const bool last = level >= finest;
-      live = next_round(flat_pieces(shell_, patches_, across_, chosen, level, !last), live, last);
+      live = next_round(flat_pieces(shell_, patches_, across_, chosen, level, joined_gap(), !last), live, last);
       if (last) {
         break;
       }
@@ -325,6 +331,9 @@ public:
     return {std::max(0.0, lower_ - aim_.uncertainty), std::max(lower_, settled_) + aim_.uncertainty};
   }
 
+  /// Where the distance is at least the lower bound, but for rounding.
+  [[nodiscard]] const Vec3& farthest() const { return farthest_; }
+
 private:
   struct Piece {
     Corners corners;
@@ -332,6 +341,7 @@ private:
   };
   struct Block {
     double lower = 0, settled = 0;
+    Vec3 farthest = Vec3::Zero();  // the point that `lower` is of
     std::vector<Piece> live;
     std::vector<std::pair<double, Vec3>> far;  // minus about a corner's distance, the corner
     CoverBound::Visited visited;
@@ -408,9 +418,16 @@ private:
     }
   }
 
+  void raise(double lower, const Vec3& at) {
+    if (lower > lower_) {
+      lower_ = lower;
+      farthest_ = at;
+    }
+  }
+
   std::vector<Piece> collected(const std::vector<Block>& blocks) {
     for (const Block& block : blocks) {
-      lower_ = std::max(lower_, block.lower);
+      raise(block.lower, block.farthest);
       settled_ = std::max(settled_, block.settled);
     }
     const double enough = aim_.enough(lower_);
@@ -463,7 +480,7 @@ private:
     keep_farthest(far);
     for (const auto& [negative, p] : far) {
       if (-negative > lower_) {
-        lower_ = std::max(lower_, sharp_lower(p, -negative));
+        raise(sharp_lower(p, -negative), p);
       }
     }
     parallel_for_blocks(order.size(), 2048, [&](std::size_t begin, std::size_t end) {
@@ -526,6 +543,8 @@ private:
     return std::max({(p[1] - p[0]).norm(), (p[2] - p[1]).norm(), (p[0] - p[2]).norm()});
   }
 
+  [[nodiscard]] double joined_gap() const { return joined_share * aim_.enough(std::max(lower_, expected_)); }
+
   [[nodiscard]] double worst_flatness(const std::vector<Index>& chosen) const {
     double worst = 0;
     for (const Index t : chosen) {
@@ -551,7 +570,10 @@ private:
     const auto measure = [&](Piece& piece, std::size_t k, std::optional<Index> guess, Block& block) {
       look(tree, piece.corners, k, guess);
       // A patch that holds the closest point is among the chosen ones: the distance is true up to the deviation.
-      block.lower = std::max(block.lower, piece.corners.distance[k] - worst);
+      if (piece.corners.distance[k] - worst > block.lower) {
+        block.lower = piece.corners.distance[k] - worst;
+        block.farthest = piece.corners.point[k];
+      }
     };
     live = in_blocks([&](const Piece& given, Block& block) {
       Piece piece = given;
@@ -563,8 +585,8 @@ private:
       bound(flat, tree, cover, piece, block);
     });
     std::size_t cuts = 0;
-    const int most_rounds = last ? 200 : 4;
-    for (int i = 0; i < most_rounds && !live.empty() && cuts + live.size() < most_pieces && !aim_.decided_above(lower_);
+    const int most_cuts = last ? 200 : 4;
+    for (int i = 0; i < most_cuts && !live.empty() && cuts + live.size() < most_pieces && !aim_.decided_above(lower_);
          ++i) {
       cuts += live.size();
       live = in_blocks([&](const Piece& piece, Block& block) {
@@ -600,8 +622,10 @@ private:
   std::vector<std::array<Index, 3>> across_;
   std::vector<Box> boxes_;
   std::vector<double> flatness_;
+  double expected_ = 0;
   double worst_deviation_ = infinity;
   double lower_ = 0, settled_ = 0;
+  Vec3 farthest_ = Vec3::Zero();
 };
 
 /// Mean and root mean square of the distance from the curved surface, by the midpoints of its pieces.
@@ -659,7 +683,9 @@ ShellDistance curved_hausdorff(const ShellMesh& shell, const Target& target, con
   ShellDistance out;
   out.shell_to_target = FromShell(patches, target, aim).run();
   tunica::advance(options.progress, 0.4);
-  out.target_to_shell = FromTarget(shell, patches, target, aim).run(out.shell_to_target.lower);
+  FromTarget from_target(shell, patches, target, aim);
+  out.target_to_shell = from_target.run(out.shell_to_target.lower);
+  out.farthest_of_target = from_target.farthest();
   out.both = {std::max(out.shell_to_target.lower, out.target_to_shell.lower),
               std::max(out.shell_to_target.upper, out.target_to_shell.upper)};
   out.mean = out.rms = std::numeric_limits<double>::quiet_NaN();

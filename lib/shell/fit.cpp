@@ -84,6 +84,10 @@ private:
       advance(options_.progress, static_cast<double>(round) / rounds);
       const std::size_t before = state.mesh.alive;
       collapse_edges(state, limit, 4, {});
+      if (add_missed(samples, state, limit) > 0) {
+        state.attach();
+        state.measure();
+      }
       polish(state, limit, 3);
       repair(state, limit, most);
       note(state);
@@ -102,6 +106,7 @@ private:
         break;
       }
       const std::size_t added = add_missed(samples, state, margin * tolerance);
+      samples.add(farthest_);
       if (i > 0 || added == 0) {
         split_wrong(state, 0.985 * tolerance);
       }
@@ -239,18 +244,31 @@ private:
   std::size_t add_missed(FitSamples& samples, const FitState& state, double limit) const {
     const Tessellation fine = tessellate_uniformly(state.mesh.shell(), checking_level);
     const ClosestPoint tree(fine.mesh);
-    const auto& vertices = target_.mesh().vertices;
-    const std::size_t stride = std::max<std::size_t>(1, vertices.size() / checked_points);
-    std::vector<std::uint8_t> missed(vertices.size() / stride + 1, 0);
-    parallel_for_blocks(vertices.size() / stride, 512, [&](std::size_t begin, std::size_t end) {
+    const TriangleMesh& mesh = target_.mesh();
+    std::vector<Vec3> points = mesh.vertices;
+    if (mesh.triangles.size() < checked_points / 4) {
+      // Few: what lies between them counts too.
+      for (const auto& v : mesh.triangles) {
+        points.emplace_back((mesh.vertices[v[0]] + mesh.vertices[v[1]] + mesh.vertices[v[2]]) / 3);
+        for (std::size_t k = 0; k < 3; ++k) {
+          points.emplace_back((mesh.vertices[v[k]] + mesh.vertices[v[(k + 1) % 3]]) / 2);
+        }
+      }
+    }
+    const std::size_t stride = std::max<std::size_t>(1, points.size() / checked_points);
+    std::vector<std::uint8_t> missed(points.size() / stride + 1, 0);
+    parallel_for_blocks(points.size() / stride, 512, [&](std::size_t begin, std::size_t end) {
+      std::optional<Index> guess;
       for (std::size_t i = begin; i < end; ++i) {
-        missed[i] = tree.closest(vertices[i * stride]).squared_distance > limit * limit;
+        const auto hit = guess ? tree.closest(points[i * stride], *guess) : tree.closest(points[i * stride]);
+        guess = hit.triangle;
+        missed[i] = hit.squared_distance > limit * limit;
       }
     });
     std::size_t added = 0;
-    for (std::size_t i = 0; i * stride < vertices.size(); ++i) {
+    for (std::size_t i = 0; i * stride < points.size(); ++i) {
       if (missed[i] != 0) {
-        samples.add(vertices[i * stride]);
+        samples.add(points[i * stride]);
         ++added;
       }
     }
@@ -264,6 +282,12 @@ private:
     measuring.width = std::max(width_, state.error() / 20);
     measuring.limit = tolerance;
     ShellDistance distance = shell_distance(shell, target_, measuring);
+    if (tolerance && distance.both.lower <= *tolerance && distance.both.upper > *tolerance) {
+      // An open question deserves a closer look.
+      measuring.width = *tolerance / 200;
+      distance = shell_distance(shell, target_, measuring);
+    }
+    farthest_ = distance.farthest_of_target;
     const bool holds = tolerance && distance.both.upper <= *tolerance;
     const bool held = tolerance && !result_.shell.triangles.empty() && result_.distance.both.upper <= *tolerance;
     if (result_.shell.triangles.empty() || (held ? holds && shell.triangles.size() < result_.shell.triangles.size()
@@ -336,6 +360,7 @@ private:
   const Target& target_;
   const RelaxOptions& options_;
   double width_;
+  Vec3 farthest_ = Vec3::Zero();  // of the target, when last certified
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
   RelaxResult result_;
 };

@@ -8,7 +8,7 @@ namespace tunica {
 
 FlatPieces flat_pieces(const ShellMesh& shell, const std::vector<CubicPatch>& patches,
                        const std::vector<std::array<Index, 3>>& across, const std::vector<Index>& chosen, int level,
-                       bool joined) {
+                       double gap, bool joined) {
   FlatPieces out;
   const auto m = static_cast<std::size_t>(level);
   constexpr Index none = 0xffffffff;
@@ -33,6 +33,16 @@ FlatPieces flat_pieces(const ShellMesh& shell, const std::vector<CubicPatch>& pa
       for (std::size_t j = 0; other != no_neighbour && place[other] != none && j < 3; ++j) {
         l = shell.triangles[other][j] == v[(k + 1) % 3] && shell.triangles[other][(j + 1) % 3] == v[k] ? j : l;
       }
+      const auto across_at = [&](double part) -> Vec3 {
+        return patches[other].point(part * corner[l] + (1 - part) * corner[(l + 1) % 3]);
+      };
+      // Curves over the same chord part most about where one of them has bent most.
+      for (const double part : {0.25, 0.5, 0.75}) {
+        if (l < 3 && (patches[t].point((1 - part) * corner[k] + part * corner[(k + 1) % 3]) - across_at(part)).norm() >
+                         2 * gap) {
+          l = 3;
+        }
+      }
       edge.resize(m + 1);
       for (std::size_t s = 0; s <= m; ++s) {
         const bool end = s == 0 || s == m;
@@ -44,7 +54,7 @@ FlatPieces flat_pieces(const ShellMesh& shell, const std::vector<CubicPatch>& pa
         const double part = static_cast<double>(s) / level;
         Vec3 p = end ? shell.vertices[n] : patches[t].point((1 - part) * corner[k] + part * corner[(k + 1) % 3]);
         if (!end && l < 3) {
-          p = (p + patches[other].point(part * corner[l] + (1 - part) * corner[(l + 1) % 3])) / 2;
+          p = (p + across_at(part)) / 2;
         }
         edge[s] = static_cast<Index>(out.mesh.vertices.size());
         out.mesh.vertices.push_back(p);

@@ -14,8 +14,9 @@ struct FlatPieces {
 /// @param across  neighbours of the shells, see incidence.hpp; chosen  shells
 /// @param joined  neighbours share vertices: on their edge points midway between their two curves, which `deviation`
 ///                pays for; without, patches share no vertices
+/// @param gap     mm: curves farther from the middle than this are not joined
 FlatPieces flat_pieces(const ShellMesh& shell, const std::vector<CubicPatch>& patches,
                        const std::vector<std::array<Index, 3>>& across, const std::vector<Index>& chosen, int level,
-                       bool joined);
+                       double gap, bool joined);
 
 }  // namespace tunica

@@ -15,6 +15,7 @@ struct ShellDistance {
   Interval target_to_shell;
   double mean = 0;  ///< of the distance from the curved surface to the target, over its area
   double rms = 0;
+  Vec3 farthest_of_target = Vec3::Zero();  ///< a point of the target that has target_to_shell.lower
 };
 
 struct ShellDistanceOptions {
