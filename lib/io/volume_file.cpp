@@ -33,7 +33,7 @@ std::string other_content(const fs::path& path, std::string_view head) {
          ".mhd), a multi-page TIFF, or a folder of TIFF or PNG slices";
 }
 
-VolumeFile read_any(const fs::path& path, const VolumeOptions& options) {
+VolumeFile read_any(const fs::path& path, const VolumeOptions& options, const SlabSink* sink) {
   const auto refuse_spacing = [&] {
     if (options.spacing) {
       throw UsageError(fmt::format("{}: --spacing is for slice stacks; this file brings its own", path.string()));
@@ -41,7 +41,7 @@ VolumeFile read_any(const fs::path& path, const VolumeOptions& options) {
   };
   std::error_code error;
   if (fs::is_directory(path, error)) {
-    return read_slices(path, options);
+    return read_slices(path, options, sink);
   }
   ByteStream stream(path, 0, coding_of(path));
   std::string head(1024, '\0');
@@ -50,19 +50,19 @@ VolumeFile read_any(const fs::path& path, const VolumeOptions& options) {
     throw InputError(fmt::format("{}: is empty", path.string()));
   }
   if (looks_like_tiff(head) || looks_like_png(head)) {
-    return read_slices(path, options);
+    return read_slices(path, options, sink);
   }
   if (looks_like_nifti(head)) {
     refuse_spacing();
-    return read_nifti(path, options);
+    return read_nifti(path, options, sink);
   }
   if (looks_like_nrrd(head)) {
     refuse_spacing();
-    return read_nrrd(path, options);
+    return read_nrrd(path, options, sink);
   }
   if (looks_like_metaimage(head)) {
     refuse_spacing();
-    return read_metaimage(path, options);
+    return read_metaimage(path, options, sink);
   }
   throw InputError(fmt::format("{}: {}", path.string(), other_content(path, head)));
 }
@@ -70,9 +70,23 @@ VolumeFile read_any(const fs::path& path, const VolumeOptions& options) {
 }  // namespace
 
 VolumeFile read_volume(const fs::path& path, const VolumeOptions& options) {
-  VolumeFile file = read_any(path, options);
+  VolumeFile file = read_any(path, options, nullptr);
   const std::size_t values = std::visit([](const auto& data) { return data.size(); }, file.volume.data);
   TUNICA_ASSERT(values == file.volume.voxels());
+  return file;
+}
+
+VolumeFile read_volume_slabs(const fs::path& path, const VolumeOptions& options, std::size_t slab_bytes,
+                             const SlabVisitor& visit) {
+  std::size_t taken = 0;
+  const SlabSink sink{slab_bytes, [&](const VolumeFile& file, const Volume& slab, std::size_t first_slice) {
+                        TUNICA_ASSERT(first_slice == taken && slab.dims[0] == file.volume.dims[0] &&
+                                      slab.dims[1] == file.volume.dims[1]);
+                        taken += slab.dims[2];
+                        visit(file, slab, first_slice);
+                      }};
+  VolumeFile file = read_any(path, options, &sink);
+  TUNICA_ASSERT(taken == file.volume.dims[2]);
   return file;
 }
 

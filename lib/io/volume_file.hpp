@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -39,6 +40,19 @@ struct VolumeFile {
 /// with more than one frame or layer and none chosen. UsageError: a slice stack without spacing, a spacing for others.
 /// Cost: memory for the voxels of one frame, and never more than the bytes in the file can hold.
 VolumeFile read_volume(const std::filesystem::path& path, const VolumeOptions& options = {});
+
+/// Takes the slices [first_slice, first_slice + slab.dims[2]) of a volume. `file` is what read_volume() returns, but
+/// for the voxels; the slab's affine, slope and intercept are those of the whole volume.
+using SlabVisitor = std::function<void(const VolumeFile& file, const Volume& slab, std::size_t first_slice)>;
+
+/// As read_volume(), giving the voxels slab by slab, in order, each slice once, so that a volume larger than memory can
+/// be read. Compressed streams are inflated on the way.
+/// @param slab_bytes  of voxels in one slab at the most, or one slice (16 slices of a stack)
+/// @return the file without voxels
+/// Errors: as read_volume(); those about the end of the file come after the last slab. What `visit` throws.
+/// Cost: memory for one slab.
+VolumeFile read_volume_slabs(const std::filesystem::path& path, const VolumeOptions& options, std::size_t slab_bytes,
+                             const SlabVisitor& visit);
 
 /// Writes NIfTI-1, gzip-compressed when the name ends in ".gz". World transform as sform (float32), and as qform too
 /// where it has no shear; the same volume gives the same bytes. Errors: OutputError; InputError when a dimension is

@@ -16,6 +16,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <utility>
 
 namespace tunica::volume_format {
 namespace fs = std::filesystem;
@@ -53,11 +54,21 @@ std::optional<std::uint64_t> product(std::span<const Axis> axes, bool picked_onc
                   stream.path().string(), at_least ? "at least " : "", missing, total));
 }
 
-// Copies the wanted elements of an array of `element` bytes from a stream, slab by slab.
+// Where the next bytes go to.
+using Room = std::span<char>;
+
+// Copies the wanted elements of an array of `element` bytes from a stream, slab by slab; `next_room` is asked for room
+// at the start and each time it is full.
 class Picker {
 public:
-  Picker(ByteStream& stream, std::vector<Axis> axes, std::size_t element, std::uint64_t total, char* to)
-      : stream_(stream), element_(element), total_(total), to_(to), start_(stream.position()) {
+  Picker(ByteStream& stream, std::vector<Axis> axes, std::size_t element, std::uint64_t total,
+         std::function<Room()> next_room)
+      : stream_(stream),
+        element_(element),
+        total_(total),
+        next_room_(std::move(next_room)),
+        room_(next_room_()),
+        start_(stream.position()) {
     // Neighbouring axes that are read whole are one axis.
     for (const Axis& axis : axes) {
       if (!axis.pick && !axes_.empty() && !axes_.back().pick) {
@@ -112,12 +123,13 @@ private:
     std::vector<char> buffer(at_once * tuple_bytes);
     for (std::uint64_t done = 0; done < count;) {
       check_interrupt();
-      const std::uint64_t now = std::min(at_once, count - done);
+      const std::uint64_t now = std::min({at_once, count - done, room_.size() / element_});
       require(stream_.read(buffer.data(), now * tuple_bytes), now * tuple_bytes);
       const char* from = buffer.data() + *tuple.pick * element_;
-      for (std::uint64_t i = 0; i < now; ++i, to_ += element_, from += tuple_bytes) {
-        std::memcpy(to_, from, element_);
+      for (std::uint64_t i = 0; i < now; ++i, from += tuple_bytes) {
+        std::memcpy(room_.data() + i * element_, from, element_);
       }
+      advance_by(now * element_);
       done += now;
     }
   }
@@ -125,10 +137,17 @@ private:
   void take(std::uint64_t bytes) {
     while (bytes > 0) {
       check_interrupt();
-      const std::size_t now = std::min<std::uint64_t>(bytes, std::size_t{1} << 24);
-      require(stream_.read(to_, now), now);
-      to_ += now;
+      const std::size_t now = std::min<std::uint64_t>({bytes, std::size_t{1} << 24, room_.size()});
+      require(stream_.read(room_.data(), now), now);
+      advance_by(now);
       bytes -= now;
+    }
+  }
+
+  void advance_by(std::size_t bytes) {
+    room_ = room_.subspan(bytes);
+    if (room_.empty()) {
+      room_ = next_room_();
     }
   }
 
@@ -145,7 +164,8 @@ private:
   std::vector<std::uint64_t> slab_;  // bytes of one step along each axis, and of the whole
   std::size_t element_;
   std::uint64_t total_;
-  char* to_;
+  std::function<Room()> next_room_;
+  Room room_;
   std::uint64_t start_;
 };
 
@@ -169,10 +189,43 @@ Plan plan(const ByteStream& stream, const std::vector<Axis>& axes, std::size_t b
   return {*count, *total};
 }
 
+// The slab that is being filled, given to the sink when it is full.
 template <class T>
-std::vector<T> read_typed(ByteStream& stream, bool big_endian, const std::vector<Axis>& axes, const Plan& sizes) {
-  std::vector<T> values(sizes.count);
-  Picker(stream, axes, sizeof(T), sizes.total * sizeof(T), reinterpret_cast<char*>(values.data())).run();
+class Slab {
+public:
+  Slab(const VolumeFile& file, VoxelType type, const SlabSink& sink)
+      : file_(file), sink_(sink), slices_(sink.slices(file.volume.dims, type)) {
+    volume_.dims = file.volume.dims;
+    volume_.affine = file.volume.affine;
+    volume_.slope = file.volume.slope;
+    volume_.intercept = file.volume.intercept;
+  }
+
+  // The empty next slab, none after the last one.
+  std::vector<T>& next() {
+    volume_.dims[2] = std::min(slices_, file_.volume.dims[2] - first_);
+    auto& values = volume_.data.emplace<std::vector<T>>(std::move(values_));
+    values.resize(volume_.voxels());
+    return values;
+  }
+
+  void give() {
+    sink_.visit(file_, volume_, first_);
+    first_ += volume_.dims[2];
+    values_ = std::move(std::get<std::vector<T>>(volume_.data));
+  }
+
+private:
+  const VolumeFile& file_;
+  const SlabSink& sink_;
+  std::size_t slices_;
+  Volume volume_;
+  std::vector<T> values_;
+  std::size_t first_ = 0;
+};
+
+template <class T>
+void to_native(std::vector<T>& values, bool big_endian) {
   if constexpr (sizeof(T) > 1) {
     if (big_endian != (std::endian::native == std::endian::big)) {
       for (T& value : values) {
@@ -180,7 +233,33 @@ std::vector<T> read_typed(ByteStream& stream, bool big_endian, const std::vector
       }
     }
   }
-  return values;
+}
+
+template <class T>
+void read_typed(VolumeFile& file, ByteStream& stream, VoxelType type, bool big_endian, const std::vector<Axis>& axes,
+                const Plan& sizes, const SlabSink* sink) {
+  const auto room = [](std::vector<T>& values) {
+    return Room(reinterpret_cast<char*>(values.data()), values.size() * sizeof(T));
+  };
+  const std::uint64_t bytes = sizes.total * sizeof(T);
+  if (sink == nullptr) {
+    std::vector<T> values(sizes.count);
+    bool given = false;
+    Picker(stream, axes, sizeof(T), bytes, [&] { return std::exchange(given, true) ? Room{} : room(values); }).run();
+    to_native(values, big_endian);
+    file.volume.data = std::move(values);
+    return;
+  }
+  Slab<T> slab(file, type, *sink);
+  std::vector<T>* filling = nullptr;
+  Picker(stream, axes, sizeof(T), bytes, [&] {
+    if (filling != nullptr) {
+      to_native(*filling, big_endian);
+      slab.give();
+    }
+    filling = &slab.next();
+    return room(*filling);
+  }).run();
 }
 
 // Words of a text stream, separated by white space or commas.
@@ -220,9 +299,15 @@ private:
 };
 
 template <class T>
-std::vector<T> read_text(ByteStream& stream, const std::vector<Axis>& axes, const Plan& sizes) {
-  std::vector<T> values;
-  values.reserve(sizes.count);
+void read_text(VolumeFile& file, ByteStream& stream, VoxelType type, const std::vector<Axis>& axes, const Plan& sizes,
+               const SlabSink* sink) {
+  std::vector<T> whole(sink == nullptr ? sizes.count : 0);
+  std::optional<Slab<T>> slab;
+  if (sink != nullptr) {
+    slab.emplace(file, type, *sink);
+  }
+  std::vector<T>* values = slab ? &slab->next() : &whole;
+  std::size_t filled = 0;
   TextValues text(stream);
   std::string word;
   for (std::uint64_t n = 0; n < sizes.total; ++n) {
@@ -247,13 +332,20 @@ std::vector<T> read_text(ByteStream& stream, const std::vector<Axis>& axes, cons
       throw InputError(fmt::format("{}: voxel {} is '{}', which is no number of the type the header names",
                                    stream.path().string(), n, shown(word.substr(0, 40))));
     }
-    values.push_back(value);
+    (*values)[filled++] = value;
+    if (slab && filled == values->size()) {
+      slab->give();
+      values = &slab->next();
+      filled = 0;
+    }
   }
-  return values;
+  if (!slab) {
+    file.volume.data = std::move(whole);
+  }
 }
 
 template <class Function>
-Volume::Data with_type(VoxelType type, Function function) {
+auto with_type(VoxelType type, Function function) {
   switch (type) {
     case VoxelType::uint8:
       return function(std::uint8_t{});
@@ -436,26 +528,27 @@ Volume::Data make_voxels(VoxelType type, std::size_t count) {
   return with_type(type, [&](auto zero) { return Volume::Data(std::vector<decltype(zero)>(count)); });
 }
 
-Volume::Data read_voxels(ByteStream& stream, VoxelType type, bool big_endian, const std::vector<Axis>& axes,
-                         std::vector<std::string>& warnings) {
-  const Plan sizes = plan(stream, axes, size_of(type));
-  Volume::Data data = with_type(
-      type, [&](auto zero) { return Volume::Data(read_typed<decltype(zero)>(stream, big_endian, axes, sizes)); });
-  stream.finish(warnings);
-  return data;
+std::size_t SlabSink::slices(const std::array<std::size_t, 3>& dims, VoxelType type) const {
+  const std::uint64_t slice = static_cast<std::uint64_t>(dims[0]) * dims[1] * size_of(type);
+  return std::clamp<std::uint64_t>(bytes / slice, 1, dims[2]);
 }
 
-Volume::Data read_text_voxels(ByteStream& stream, VoxelType type, const std::vector<Axis>& axes,
-                              std::vector<std::string>& warnings) {
+void read_voxels(VolumeFile& file, ByteStream& stream, VoxelType type, bool big_endian, const std::vector<Axis>& axes,
+                 const SlabSink* sink) {
+  const Plan sizes = plan(stream, axes, size_of(type));
+  with_type(type, [&](auto zero) { read_typed<decltype(zero)>(file, stream, type, big_endian, axes, sizes, sink); });
+  stream.finish(file.warnings);
+}
+
+void read_text_voxels(VolumeFile& file, ByteStream& stream, VoxelType type, const std::vector<Axis>& axes,
+                      const SlabSink* sink) {
   // A number and what separates it from the next are two bytes at the least, but for the last.
   const Plan sizes = plan(stream, axes, 1);
   if (sizes.total / 2 > stream.most_bytes()) {
     throw_truncated(stream, sizes.total - stream.most_bytes() / 2, sizes.total, true);
   }
-  Volume::Data data =
-      with_type(type, [&](auto zero) { return Volume::Data(read_text<decltype(zero)>(stream, axes, sizes)); });
-  stream.finish(warnings);
-  return data;
+  with_type(type, [&](auto zero) { read_text<decltype(zero)>(file, stream, type, axes, sizes, sink); });
+  stream.finish(file.warnings);
 }
 
 std::size_t choose(const fs::path& path, const char* what, std::uint64_t count, std::optional<std::size_t> chosen,

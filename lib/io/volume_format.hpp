@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -69,15 +70,25 @@ struct Axis {
   std::optional<std::uint64_t> pick;
 };
 
-/// Reads an array whose first axis runs fastest, and checks that the stream holds all of it, before memory is taken.
-/// Trailing bytes become a warning. @param what  the name of the data in messages
+/// Takes the voxels of a volume slab by slab, instead of the file's volume.
+struct SlabSink {
+  std::uint64_t bytes;  ///< of a slab at the most, or of one slice
+  SlabVisitor visit;
+
+  /// Slices of `type` in a slab.
+  [[nodiscard]] std::size_t slices(const std::array<std::size_t, 3>& dims, VoxelType type) const;
+};
+
+/// Reads an array whose first axis runs fastest, and checks that the stream holds all of it, before memory is taken:
+/// into the file's volume, whose dims are those of the array's axes without a pick, or with a sink into that.
+/// Trailing bytes become a warning.
 /// Errors: InputError: overflow, truncated.
-Volume::Data read_voxels(ByteStream& stream, VoxelType type, bool big_endian, const std::vector<Axis>& axes,
-                         std::vector<std::string>& warnings);
+void read_voxels(VolumeFile& file, ByteStream& stream, VoxelType type, bool big_endian, const std::vector<Axis>& axes,
+                 const SlabSink* sink);
 
 /// As read_voxels, for numbers written as text.
-Volume::Data read_text_voxels(ByteStream& stream, VoxelType type, const std::vector<Axis>& axes,
-                              std::vector<std::string>& warnings);
+void read_text_voxels(VolumeFile& file, ByteStream& stream, VoxelType type, const std::vector<Axis>& axes,
+                      const SlabSink* sink);
 
 /// `count` voxels of 0.
 Volume::Data make_voxels(VoxelType type, std::size_t count);
@@ -119,10 +130,11 @@ bool looks_like_metaimage(std::string_view head);
 bool looks_like_tiff(std::string_view head);
 bool looks_like_png(std::string_view head);
 
-/// Each reads a whole file of its format, detached data included. Errors: InputError naming the file.
-VolumeFile read_nifti(const std::filesystem::path& path, const VolumeOptions& options);
-VolumeFile read_nrrd(const std::filesystem::path& path, const VolumeOptions& options);
-VolumeFile read_metaimage(const std::filesystem::path& path, const VolumeOptions& options);
-VolumeFile read_slices(const std::filesystem::path& path, const VolumeOptions& options);
+/// Each reads a whole file of its format, detached data included; the voxels into the sink where there is one.
+/// Errors: InputError naming the file.
+VolumeFile read_nifti(const std::filesystem::path& path, const VolumeOptions& options, const SlabSink* sink);
+VolumeFile read_nrrd(const std::filesystem::path& path, const VolumeOptions& options, const SlabSink* sink);
+VolumeFile read_metaimage(const std::filesystem::path& path, const VolumeOptions& options, const SlabSink* sink);
+VolumeFile read_slices(const std::filesystem::path& path, const VolumeOptions& options, const SlabSink* sink);
 
 }  // namespace tunica::volume_format

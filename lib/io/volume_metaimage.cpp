@@ -191,8 +191,8 @@ std::uint64_t stored_bytes(const std::vector<Axis>& axes, VoxelType type) {
   return bytes;
 }
 
-Volume::Data read_data(VolumeFile& file, const fs::path& path, const Header& header, const std::vector<Axis>& axes,
-                       VoxelType type) {
+void read_data(VolumeFile& file, const fs::path& path, const Header& header, const std::vector<Axis>& axes,
+               VoxelType type, const SlabSink* sink) {
   Place place = voxel_place(path, header);
   if (place.path != path) {
     file.data_files.push_back(place.path);
@@ -214,7 +214,8 @@ Volume::Data read_data(VolumeFile& file, const fs::path& path, const Header& hea
   }
   if (!binary.empty() && !is_true(binary)) {
     ByteStream stream(place.path, place.offset, Coding::plain);
-    return read_text_voxels(stream, type, axes, file.warnings);
+    read_text_voxels(file, stream, type, axes, sink);
+    return;
   }
   if (const std::string_view text = find(header, {"CompressedDataSize"}); compressed && !text.empty() && text != "0") {
     const auto bytes = parse_count(text);
@@ -231,7 +232,7 @@ Volume::Data read_data(VolumeFile& file, const fs::path& path, const Header& hea
   }
   const bool big_endian = is_true(find(header, {"BinaryDataByteOrderMSB", "ElementByteOrderMSB"}));
   ByteStream stream(place.path, place.offset, compressed ? Coding::deflated : Coding::plain);
-  return read_voxels(stream, type, big_endian, axes, file.warnings);
+  read_voxels(file, stream, type, big_endian, axes, sink);
 }
 
 }  // namespace
@@ -243,7 +244,7 @@ bool looks_like_metaimage(std::string_view head) {
          (key == "ObjectType" || key == "NDims" || key == "Comment" || key == "ObjectSubType" || key == "DimSize");
 }
 
-VolumeFile read_metaimage(const fs::path& path, const VolumeOptions& options) {
+VolumeFile read_metaimage(const fs::path& path, const VolumeOptions& options, const SlabSink* sink) {
   const Header header = read_header(path);
   VolumeFile file;
   file.format = "MetaImage";
@@ -274,8 +275,7 @@ VolumeFile read_metaimage(const fs::path& path, const VolumeOptions& options) {
   choose(path, "layer", 1, options.layer);
   file.frames = dimensions == 4 ? sizes[3] : 1;
   const std::size_t frame = choose(path, "frame", file.frames, options.frame);
-  file.volume.data =
-      read_data(file, path, header, {{sizes[0], {}}, {sizes[1], {}}, {sizes[2], {}}, {file.frames, frame}}, type);
+  read_data(file, path, header, {{sizes[0], {}}, {sizes[1], {}}, {sizes[2], {}}, {file.frames, frame}}, type, sink);
   return file;
 }
 

@@ -356,7 +356,7 @@ std::uint64_t voxel_offset(const fs::path& path, const Header& header) {
 
 bool looks_like_nifti(std::string_view head) { return version_of(head, false) != 0 || version_of(head, true) != 0; }
 
-VolumeFile read_nifti(const fs::path& path, const VolumeOptions& options) {
+VolumeFile read_nifti(const fs::path& path, const VolumeOptions& options, const SlabSink* sink) {
   auto stream = std::make_unique<ByteStream>(path, 0, coding_of(path));
   std::string head(size_2, '\0');
   head.resize(stream->read(head.data(), head.size()));
@@ -393,8 +393,8 @@ VolumeFile read_nifti(const fs::path& path, const VolumeOptions& options) {
                     "whole file again",
                     voxels.string(), offset, offset - skipped));
   }
-  file.volume.data = read_voxels(*stream, type, header.big_endian,
-                                 {{sizes[0], {}}, {sizes[1], {}}, {sizes[2], {}}, {sizes[3], frame}}, file.warnings);
+  read_voxels(file, *stream, type, header.big_endian,
+              {{sizes[0], {}}, {sizes[1], {}}, {sizes[2], {}}, {sizes[3], frame}}, sink);
   return file;
 }
 

@@ -498,8 +498,8 @@ Place voxel_place(const fs::path& path, const Header& header) {
   return place;
 }
 
-Volume::Data read_data(VolumeFile& file, const fs::path& path, const Header& header, const std::vector<Axis>& axes,
-                       VoxelType type) {
+void read_data(VolumeFile& file, const fs::path& path, const Header& header, const std::vector<Axis>& axes,
+               VoxelType type, const SlabSink* sink) {
   Place place = voxel_place(path, header);
   if (place.path != path) {
     file.data_files.push_back(place.path);
@@ -514,7 +514,8 @@ Volume::Data read_data(VolumeFile& file, const fs::path& path, const Header& hea
   if (encoding == "ascii" || encoding == "text" || encoding == "txt") {
     ByteStream stream(place.path, place.offset, Coding::plain);
     stream.skip(*skip);
-    return read_text_voxels(stream, type, axes, file.warnings);
+    read_text_voxels(file, stream, type, axes, sink);
+    return;
   }
   const bool gzip = encoding == "gzip" || encoding == "gz";
   if (!gzip && encoding != "raw") {
@@ -543,14 +544,14 @@ Volume::Data read_data(VolumeFile& file, const fs::path& path, const Header& hea
   }
   ByteStream stream(place.path, place.offset, gzip ? Coding::deflated : Coding::plain);
   stream.skip(*skip);
-  return read_voxels(stream, type, big_endian, axes, file.warnings);
+  read_voxels(file, stream, type, big_endian, axes, sink);
 }
 
 }  // namespace
 
 bool looks_like_nrrd(std::string_view head) { return head.starts_with("NRRD000"); }
 
-VolumeFile read_nrrd(const fs::path& path, const VolumeOptions& options) {
+VolumeFile read_nrrd(const fs::path& path, const VolumeOptions& options, const SlabSink* sink) {
   const Header header = read_header(path);
   VolumeFile file;
   file.format = "NRRD";
@@ -588,7 +589,7 @@ VolumeFile read_nrrd(const fs::path& path, const VolumeOptions& options) {
       file.volume.label_names.emplace_back(segment.label, segment.name);
     }
   }
-  file.volume.data = read_data(file, path, header, stored, type);
+  read_data(file, path, header, stored, type, sink);
   return file;
 }
 

@@ -216,7 +216,7 @@ struct Slice {
 
 }  // namespace
 
-VolumeFile read_slices(const fs::path& path, const VolumeOptions& options) {
+VolumeFile read_slices(const fs::path& path, const VolumeOptions& options, const SlabSink* sink) {
   VolumeFile file;
   const bool folder = fs::is_directory(path);
   std::vector<fs::path> paths{path};
@@ -272,14 +272,32 @@ VolumeFile read_slices(const fs::path& path, const VolumeOptions& options) {
   affine.leftCols<3>() = options.spacing->asDiagonal();
   set_affine(file, path, affine);
 
-  file.volume.data = make_voxels(type, file.volume.voxels());
-  char* to = std::visit([](auto& values) { return reinterpret_cast<char*>(values.data()); }, file.volume.data);
   constexpr std::size_t pages_at_once = 16;
+  const auto bytes_of = [](Volume& volume) {
+    return std::visit([](auto& values) { return reinterpret_cast<char*>(values.data()); }, volume.data);
+  };
+  char* to = nullptr;
+  if (sink == nullptr) {
+    file.volume.data = make_voxels(type, file.volume.voxels());
+    to = bytes_of(file.volume);
+  }
+  std::size_t done = 0;
   for (const Slice& slice : slices) {
     for (std::size_t first = 0; first < slice.pages; first += pages_at_once) {
       check_interrupt();
       const std::size_t now = std::min(pages_at_once, slice.pages - first);
-      store(slice.path, first, decode(slice.path, slice.png, first, now), now, *common, to);
+      const std::vector<cv::Mat> pages = decode(slice.path, slice.png, first, now);
+      if (sink == nullptr) {
+        store(slice.path, first, pages, now, *common, to);
+        continue;
+      }
+      Volume slab = file.volume;
+      slab.dims[2] = now;
+      slab.data = make_voxels(type, slab.voxels());
+      char* slab_bytes = bytes_of(slab);
+      store(slice.path, first, pages, now, *common, slab_bytes);
+      sink->visit(file, slab, done);
+      done += now;
     }
   }
   return file;

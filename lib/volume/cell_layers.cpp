@@ -234,11 +234,11 @@ std::size_t count_triangles(const CellWord& c, Word cells) {
   return triangles;
 }
 
-LayerCounts count_layer(const PaddedGrid& grid, const Plane& a, const Plane& b, bool with_cells) {
+LayerCounts count_layer(const PaddedGrid& grid, const Plane& a, const Plane& b, bool last) {
   ActiveWords active(grid.words());
   LayerCounts sum;
   for (std::size_t row = 0; row < grid.size(1); ++row) {
-    const bool cells = with_cells && row + 1 < grid.size(1);
+    const bool cells = !last && row + 1 < grid.size(1);
     active.visit_row(a, b, row, [&](std::size_t w, Word bits) {
       const CellWord c(grid, a, b, row, w);
       sum.along_x += ones(c.x0);
@@ -501,11 +501,11 @@ private:
 }  // namespace
 
 PaddedGrid::PaddedGrid(const Mask& mask, const Window& window, bool open) : mask_(mask), window_(window) {
+  TUNICA_ASSERT(window.first[0] == 0 && window.size[0] == mask.dims()[0]);
   for (int axis = 0; axis < 3; ++axis) {
-    size_[axis] = window.box[axis] + 2;
-    open_[axis] = {open && window.box_first[axis] == 0,
-                   open && window.box_first[axis] + window.box[axis] == window.image[axis]};
-    TUNICA_ASSERT(axis == 2 || mask.dims()[axis] == window.box[axis]);
+    size_[axis] = window.size[axis] + 2;
+    open_[axis] = {open && window.first[axis] == 0,
+                   open && window.first[axis] + window.size[axis] == mask.dims()[axis]};
   }
   const auto first_bits = [](std::size_t count, std::size_t w) {
     const std::size_t before = w * word_bits;
@@ -527,7 +527,7 @@ bool PaddedGrid::load(std::size_t row, std::size_t slice, Word* out) const {
     std::fill_n(out, words + 1, Word{0});
     return false;
   }
-  const Word* const in = mask_.row(unpadded(row, 1), unpadded(slice, 2) - window_.first_slice);
+  const Word* const in = mask_.row(in_image(row, 1), in_image(slice, 2));
   const std::size_t given = mask_.words_per_row();
   Word any = in[0];
   out[0] = in[0] << 1;
@@ -549,30 +549,25 @@ bool PaddedGrid::load(std::size_t row, std::size_t slice, Word* out) const {
 }
 
 std::size_t PaddedGrid::at_hand(const std::array<std::size_t, 3>& padded) const {
-  return unpadded(padded[0], 0) +
-         window_.box[0] * (unpadded(padded[1], 1) + window_.box[1] * (unpadded(padded[2], 2) - window_.first_slice));
+  const auto& dims = mask_.dims();
+  return in_image(padded[0], 0) +
+         dims[0] * (in_image(padded[1], 1) + dims[1] * (in_image(padded[2], 2) - window_.first_slice));
 }
 
 std::size_t PaddedGrid::number(const std::array<std::size_t, 3>& padded) const {
-  const auto in_image = [&](int axis) { return padded[axis] + window_.box_first[axis]; };
-  return in_image(0) + (window_.image[0] + 2) * (in_image(1) + (window_.image[1] + 2) * in_image(2));
+  const auto& dims = mask_.dims();
+  const auto in_padded_image = [&](int axis) { return padded[axis] + window_.first[axis]; };
+  return in_padded_image(0) + (dims[0] + 2) * (in_padded_image(1) + (dims[1] + 2) * in_padded_image(2));
 }
 
 double PaddedGrid::coordinate(std::size_t padded, int axis) const {
-  const double first = static_cast<double>(window_.box_first[axis]) - 1;
   if (padded == 0 && open_[axis][0]) {
     return -0.5;
   }
   if (padded == size_[axis] - 1 && open_[axis][1]) {
-    return static_cast<double>(window_.image[axis]) - 0.5;
+    return static_cast<double>(mask_.dims()[axis]) - 0.5;
   }
-  return first + static_cast<double>(padded);
-}
-
-LayerCounts count_plane(const PaddedGrid& grid, std::size_t slice) {
-  Plane plane(grid);
-  plane.load(grid, slice);
-  return count_layer(grid, plane, plane, false);
+  return static_cast<double>(window_.first[axis]) - 1 + static_cast<double>(padded);
 }
 
 void count_layers(const PaddedGrid& grid, std::size_t begin, std::size_t end, LayerCounts* counts) {
@@ -584,7 +579,7 @@ void count_layers(const PaddedGrid& grid, std::size_t begin, std::size_t end, La
     if (!last) {
       b.load(grid, slice + 1);
     }
-    *counts = count_layer(grid, a, last ? a : b, !last);
+    *counts = count_layer(grid, a, last ? a : b, last);
     std::swap(a, b);
   }
 }

@@ -15,13 +15,11 @@ namespace tunica::cell_layers {
 using Word = std::uint64_t;
 inline constexpr std::size_t word_bits = 64;
 
-/// Where the voxels that are at hand lie in the image.
+/// The part of an image that is looked at: whole rows.
 struct Window {
-  std::array<std::size_t, 3> image;  ///< voxels of the image along each axis
-  std::array<std::size_t, 3> box_first{0, 0,
-                                       0};  ///< outside of the box [box_first, box_first + box) no voxel is inside
-  std::array<std::size_t, 3> box;
-  std::size_t first_slice = 0;  ///< of the box: the mask holds its slices from here on, as many as it has
+  std::array<std::size_t, 3> first{0, 0, 0};  ///< outside of the box [first, first + size) no voxel is inside
+  std::array<std::size_t, 3> size;            ///< along x that of the image
+  std::size_t first_slice = 0;                ///< of the image's values that are at hand
 };
 
 /// A box of samples with one layer of samples around it: outside, or with an open border, where the box ends with the
@@ -29,7 +27,6 @@ struct Window {
 /// sequence of words with one more, for reading one bit ahead.
 class PaddedGrid {
 public:
-  /// The mask's dims are those of the box, but for the slices, of which it may hold some only.
   PaddedGrid(const Mask& mask, const Window& window, bool open);
 
   [[nodiscard]] std::size_t size(int axis) const { return size_[axis]; }
@@ -41,7 +38,7 @@ public:
   /// A padded row, words() + 1 words. @return whether any sample in it is inside
   bool load(std::size_t row, std::size_t slice, Word* out) const;
 
-  /// Index of the sample at hand behind a padded one (the nearest, in the padding), and of the image's.
+  /// Index among the values at hand of the sample behind a padded one (the nearest, in the padding).
   [[nodiscard]] std::size_t at_hand(const std::array<std::size_t, 3>& padded) const;
   [[nodiscard]] bool is_padding(std::size_t padded, int axis) const { return padded == 0 || padded == size_[axis] - 1; }
   /// Number of a padded sample in the padded image.
@@ -52,8 +49,8 @@ public:
   [[nodiscard]] const Eigen::Matrix<double, 3, 4>& affine() const { return mask_.affine(); }
 
 private:
-  [[nodiscard]] std::size_t unpadded(std::size_t padded, int axis) const {
-    return std::clamp<std::size_t>(padded, 1, size_[axis] - 2) - 1;
+  [[nodiscard]] std::size_t in_image(std::size_t padded, int axis) const {
+    return std::clamp<std::size_t>(padded, 1, size_[axis] - 2) - 1 + window_.first[axis];
   }
 
   const Mask& mask_;
@@ -76,9 +73,6 @@ struct LayerCounts {
 
 /// Counts of the padded slices [begin, end) into counts[0], counts[1], …
 void count_layers(const PaddedGrid& grid, std::size_t begin, std::size_t end, LayerCounts* counts);
-
-/// What lies in the plane of one slice: the rest is 0.
-LayerCounts count_plane(const PaddedGrid& grid, std::size_t slice);
 
 /// An edge between two samples that is crossed, by the padded row and column of its first sample.
 struct CrossedEdge {

@@ -10,12 +10,16 @@
 
 #include <cmath>
 #include <type_traits>
+#include <utility>
 
 namespace tunica {
 namespace {
 
 using cell_layers::Crossings;
 using cell_layers::LayerCounts;
+using cell_layers::PaddedGrid;
+
+constexpr std::size_t grain = 8;  // slices in a block
 
 template <typename T>
 class Interpolated final : public Crossings {
@@ -44,56 +48,125 @@ private:
   double value_;
 };
 
-/// @param crossings  null: every edge is crossed half-way, and no two crossings meet at a sample
-TriangleMesh extract(const Mask& mask, const Crossings* crossings, const MarchingCubesOptions& options) {
-  const cell_layers::PaddedGrid grid(mask, {mask.dims(), {0, 0, 0}, mask.dims(), 0}, options.open_border);
-  const std::size_t slices = grid.size(2);
-  constexpr std::size_t grain = 8;
-
-  std::vector<LayerCounts> counts(slices + 1);
-  parallel_for_blocks(slices, grain, [&](std::size_t begin, std::size_t end) {
-    check_interrupt();
-    cell_layers::count_layers(grid, begin, end, counts.data() + begin);
-  });
-  std::vector<std::size_t> first_vertex(slices + 1, 0);
-  std::vector<std::size_t> first_triangle(slices + 1, 0);
-  for (std::size_t slice = 0; slice < slices; ++slice) {
-    first_vertex[slice + 1] = first_vertex[slice] + counts[slice].vertices();
-    first_triangle[slice + 1] = first_triangle[slice] + counts[slice].triangles;
-  }
-  if (first_vertex[slices] > max_index || first_triangle[slices] > max_index) {
-    throw InputError(
-        fmt::format("the surface has {} triangles, a mesh holds at most {}: select less or crop the volume",
-                    first_triangle[slices], max_index));
-  }
-  tunica::advance(options.progress, 0.3);
-
-  TriangleMesh mesh;
-  resize_fresh(mesh.vertices, first_vertex[slices]);
-  resize_fresh(mesh.triangles, first_triangle[slices]);
-  std::vector<std::vector<PinchedVertex>> pinched((slices + grain - 1) / grain);
-  parallel_for_blocks(slices, grain, [&](std::size_t begin, std::size_t end) {
-    check_interrupt();
-    const cell_layers::Output out{first_vertex[begin], mesh.vertices.data() + first_vertex[begin],
-                                  mesh.triangles.data() + first_triangle[begin]};
-    cell_layers::write_layers(grid, begin, end, counts.data() + begin, out, crossings, pinched[begin / grain]);
-  });
-  tunica::advance(options.progress, 0.9);
-  if (crossings != nullptr) {
-    std::vector<PinchedVertex> all;
-    for (const auto& block : pinched) {
-      all.insert(all.end(), block.begin(), block.end());
-    }
-    join_pinched_vertices(mesh, all);
-  }
-  tunica::advance(options.progress, 1.0);
-  return mesh;
-}
-
 }  // namespace
 
+/// The mesh of a selection, counted and laid out at the start, and then written in any parts.
+class SlabMarchingCubes::Writer {
+public:
+  Writer(const Mask& mask, const MarchingCubesOptions& options) : mask_(mask), options_(options) {
+    window_.size = mask.dims();
+    if (const auto& bounds = options.bounds) {
+      window_.first = {0, bounds->rows[0], bounds->slices[0]};
+      window_.size = {mask.dims()[0], bounds->rows[1] - bounds->rows[0], bounds->slices[1] - bounds->slices[0]};
+    }
+    const PaddedGrid grid(mask, window_, options.open_border);
+    const std::size_t slices = grid.size(2);
+    counts_.resize(slices + 1);
+    parallel_for_blocks(slices, grain, [&](std::size_t begin, std::size_t end) {
+      check_interrupt();
+      cell_layers::count_layers(grid, begin, end, counts_.data() + begin);
+    });
+    first_vertex_.resize(slices + 1, 0);
+    first_triangle_.resize(slices + 1, 0);
+    for (std::size_t slice = 0; slice < slices; ++slice) {
+      first_vertex_[slice + 1] = first_vertex_[slice] + counts_[slice].vertices();
+      first_triangle_[slice + 1] = first_triangle_[slice] + counts_[slice].triangles;
+    }
+    if (first_vertex_[slices] > max_index || first_triangle_[slices] > max_index) {
+      throw InputError(
+          fmt::format("the surface has {} triangles, a mesh holds at most {}: select less or crop the volume",
+                      first_triangle_[slices], max_index));
+    }
+    tunica::advance(options.progress, 0.3);
+    resize_fresh(mesh_.vertices, first_vertex_[slices]);
+    resize_fresh(mesh_.triangles, first_triangle_[slices]);
+  }
+
+  [[nodiscard]] std::size_t slices() const { return counts_.size() - 1; }
+
+  /// Writes what belongs to the padded slices [begin, end).
+  /// @param crossings  null: every edge is crossed half-way, and no two crossings meet at a sample
+  /// @param first_slice  of the values that `crossings` looks up
+  void write(std::size_t begin, std::size_t end, const Crossings* crossings, std::size_t first_slice) {
+    cell_layers::Window window = window_;
+    window.first_slice = first_slice;
+    const PaddedGrid grid(mask_, window, options_.open_border);
+    std::vector<std::vector<PinchedVertex>> pinched((end - begin + grain - 1) / grain);
+    parallel_for_blocks(end - begin, grain, [&](std::size_t from, std::size_t to) {
+      check_interrupt();
+      const std::size_t slice = begin + from;
+      const cell_layers::Output out{first_vertex_[slice], mesh_.vertices.data() + first_vertex_[slice],
+                                    mesh_.triangles.data() + first_triangle_[slice]};
+      cell_layers::write_layers(grid, slice, begin + to, counts_.data() + slice, out, crossings, pinched[from / grain]);
+    });
+    for (const auto& block : pinched) {
+      pinched_.insert(pinched_.end(), block.begin(), block.end());
+    }
+    tunica::advance(options_.progress, 0.3 + 0.6 * static_cast<double>(end) / static_cast<double>(slices()));
+  }
+
+  TriangleMesh finish() {
+    join_pinched_vertices(mesh_, pinched_);
+    tunica::advance(options_.progress, 1.0);
+    return std::move(mesh_);
+  }
+
+private:
+  const Mask& mask_;
+  MarchingCubesOptions options_;
+  cell_layers::Window window_;
+  std::vector<LayerCounts> counts_;
+  std::vector<std::size_t> first_vertex_;  // sums over the slices before each
+  std::vector<std::size_t> first_triangle_;
+  TriangleMesh mesh_;
+  std::vector<PinchedVertex> pinched_;
+};
+
+SlabMarchingCubes::SlabMarchingCubes(const Mask& mask, const Inside& rule, const MarchingCubesOptions& options)
+    : writer_(std::make_unique<Writer>(mask, options)), mask_(mask), value_(rule.value) {
+  TUNICA_ASSERT(rule.rule != Inside::Rule::label && !options.bounds);
+}
+
+SlabMarchingCubes::~SlabMarchingCubes() = default;
+
+void SlabMarchingCubes::add(const Volume& slab, std::size_t first_slice) {
+  const auto& dims = mask_.dims();
+  TUNICA_ASSERT(first_slice == next_slice_ && slab.dims[0] == dims[0] && slab.dims[1] == dims[1] && slab.dims[2] >= 1 &&
+                first_slice + slab.dims[2] <= dims[2]);
+  const std::size_t slice_voxels = dims[0] * dims[1];
+  // The last slice of the slab before, for the edges from it to this slab's first one.
+  const std::size_t carried = first_slice > 0 ? 1 : 0;
+  next_slice_ += slab.dims[2];
+  const bool last = next_slice_ == dims[2];
+  std::visit(
+      [&](const auto& values) {
+        using Values = std::decay_t<decltype(values)>;
+        Values window;
+        if (carried > 0) {
+          window = std::move(std::get<Values>(carry_));
+          window.insert(window.end(), values.begin(), values.end());
+        }
+        const Values& at_hand = carried > 0 ? window : values;
+        const Interpolated<typename Values::value_type> crossings(slab, at_hand, value_);
+        // Padded slices are one more; the upright edges of the last one at hand wait for the next slab.
+        writer_->write(first_slice == 0 ? 0 : first_slice, last ? writer_->slices() : next_slice_, &crossings,
+                       first_slice - carried);
+        if (!last) {
+          carry_ = Values(values.end() - static_cast<std::ptrdiff_t>(slice_voxels), values.end());
+        }
+      },
+      slab.data);
+}
+
+TriangleMesh SlabMarchingCubes::finish() {
+  TUNICA_ASSERT(next_slice_ == mask_.dims()[2]);
+  return writer_->finish();
+}
+
 TriangleMesh marching_cubes(const Mask& mask, const MarchingCubesOptions& options) {
-  return extract(mask, nullptr, options);
+  SlabMarchingCubes::Writer writer(mask, options);
+  writer.write(0, writer.slices(), nullptr, 0);
+  return writer.finish();
 }
 
 TriangleMesh marching_cubes(const Volume& volume, const Inside& rule, const Mask& mask,
@@ -102,13 +175,9 @@ TriangleMesh marching_cubes(const Volume& volume, const Inside& rule, const Mask
   if (rule.rule == Inside::Rule::label) {
     return marching_cubes(mask, options);
   }
-  return std::visit(
-      [&](const auto& values) {
-        using T = typename std::decay_t<decltype(values)>::value_type;
-        const Interpolated<T> crossings(volume, values, rule.value);
-        return extract(mask, &crossings, options);
-      },
-      volume.data);
+  SlabMarchingCubes slabs(mask, rule, options);
+  slabs.add(volume, 0);
+  return slabs.finish();
 }
 
 TriangleMesh marching_cubes(const Volume& volume, const Inside& rule, const MarchingCubesOptions& options) {

@@ -170,27 +170,33 @@ Mask::Mask(const std::array<std::size_t, 3>& dims, const Eigen::Matrix<double, 3
 
 double Mask::voxel_volume() const { return std::abs(affine_.leftCols<3>().determinant()); }
 
-Mask select(const Volume& volume, const Inside& rule) {
-  Mask mask(volume.dims, volume.affine);
-  if (!std::isfinite(volume.slope) || volume.slope == 0 || !std::isfinite(volume.intercept)) {
+void select(const Volume& slab, std::size_t first_slice, const Inside& rule, Mask& mask) {
+  TUNICA_ASSERT(slab.dims[0] == mask.dims()[0] && slab.dims[1] == mask.dims()[1] &&
+                first_slice + slab.dims[2] <= mask.dims()[2]);
+  if (!std::isfinite(slab.slope) || slab.slope == 0 || !std::isfinite(slab.intercept)) {
     throw InputError("the volume's scaling (slope, intercept) is zero or not finite");
   }
   std::visit(
       [&](const auto& values) {
         using T = typename std::decay_t<decltype(values)>::value_type;
-        TUNICA_ASSERT(values.size() == volume.voxels());
-        const std::optional<Range<T>> range = stored_range<T>(volume, rule);
+        TUNICA_ASSERT(values.size() == slab.voxels());
+        const std::optional<Range<T>> range = stored_range<T>(slab, rule);
         if (!range || std::isnan(rule.value)) {
           return;
         }
-        parallel_for_blocks(volume.dims[2], 4, [&](std::size_t begin, std::size_t end) {
+        parallel_for_blocks(slab.dims[2], 4, [&](std::size_t begin, std::size_t end) {
           check_interrupt();
-          for (std::size_t row = begin * volume.dims[1]; row < end * volume.dims[1]; ++row) {
-            select_row(values.data() + row * volume.dims[0], volume.dims[0], *range, mask.row(row, 0));
+          for (std::size_t row = begin * slab.dims[1]; row < end * slab.dims[1]; ++row) {
+            select_row(values.data() + row * slab.dims[0], slab.dims[0], *range, mask.row(row, first_slice));
           }
         });
       },
-      volume.data);
+      slab.data);
+}
+
+Mask select(const Volume& volume, const Inside& rule) {
+  Mask mask(volume.dims, volume.affine);
+  select(volume, 0, rule, mask);
   return mask;
 }
 

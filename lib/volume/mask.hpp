@@ -62,6 +62,9 @@ private:
 /// Cost: one pass over the volume.
 Mask select(const Volume& volume, const Inside& rule);
 
+/// The same for the slices [first_slice, first_slice + slab.dims[2]) of a larger volume, into its mask.
+void select(const Volume& slab, std::size_t first_slice, const Inside& rule, Mask& mask);
+
 /// Number of voxels inside.
 std::size_t count_voxels(const Mask& mask);
 
