@@ -6,7 +6,7 @@
 #include "surface/checks.hpp"
 #include "surface/measure.hpp"
 #include "volume/components.hpp"
-#include "volume/labels.hpp"
+#include "volume/label_index.hpp"
 #include "volume/marching_cubes.hpp"
 #include "volume/outward.hpp"
 #include "volume/smoothing.hpp"
@@ -15,8 +15,12 @@
 
 #include <Eigen/LU>
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <utility>
 
 namespace {
 
@@ -36,6 +40,7 @@ struct Arguments {
   std::string smooth = "none";
   std::string space = "lps";
   std::optional<std::string> spacing;
+  std::optional<std::size_t> slab;
   VolumeOptions volume_options;
   bool info = false;
 };
@@ -81,6 +86,12 @@ void declare(CLI::App& app, Arguments& arguments) {
   app.add_flag("--prefer-qform", arguments.volume_options.prefer_qform,
                "NIfTI: take the qform where sform and qform are both set");
   app.add_option("--spacing", arguments.spacing, "mm per column, row and slice of a slice stack")->type_name("X,Y,Z");
+  app.add_option(
+         "--slab", arguments.slab,
+         "read N slices at a time and never hold the whole volume; the same surface (default: labels 64 MiB at a "
+         "time, a grey volume at once unless it is larger than half the memory)")
+      ->check(cli::whole_number(1))
+      ->type_name("N");
   app.add_flag("--info", arguments.info, "print size, spacing, orientation and labels with volumes, and stop");
 }
 
@@ -164,18 +175,19 @@ std::string list_of(const std::vector<Label>& labels) {
   return labels.size() > shown ? fmt::format("{}, and {} more", text, labels.size() - shown) : text;
 }
 
-// A volume is a segmentation when its values are whole numbers, and not too many of them.
-std::optional<std::vector<Label>> labels_of(const Volume& volume) {
-  auto labels = list_labels(volume);
-  const auto whole = [](const Label& label) { return label.value == std::floor(label.value); };
-  if (labels && !std::all_of(labels->begin(), labels->end(), whole)) {
-    labels.reset();
-  }
-  return labels;
+// A volume that is a segmentation has whole numbers for values, and not too many of them.
+bool are_labels(const std::optional<std::vector<Label>>& labels) {
+  return labels && std::all_of(labels->begin(), labels->end(),
+                               [](const Label& label) { return label.value == std::floor(label.value); });
 }
 
-Interval range_of(const Volume& volume) {
-  Interval range{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
+// What the messages about a choice need, of a volume that may not be at hand.
+struct Contents {
+  std::optional<std::vector<Label>> labels;  // none: a grey volume
+  Interval values{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
+};
+
+void widen(Interval& range, const Volume& volume) {
   std::visit(
       [&](const auto& values) {
         for (const auto stored : values) {
@@ -185,17 +197,53 @@ Interval range_of(const Volume& volume) {
         }
       },
       volume.data);
-  return range;
 }
 
-[[noreturn]] void throw_choice(const fs::path& path, const Volume& volume) {
-  const auto labels = labels_of(volume);
-  const Interval range = range_of(volume);
+SlabSize slab_size(const Arguments& arguments) {
+  SlabSize size;
+  size.slices = arguments.slab;
+  return size;
+}
+
+// Reads the volume slab by slab; the visits count as the stage `doing`.
+VolumeFile read_slabs(cli::Tool& tool, const Arguments& arguments, const char* doing, const SlabVisitor& visit) {
+  std::optional<cli::Tool::Stage> reading(std::in_place, tool, "read");
+  return read_volume_slabs(arguments.volume, arguments.volume_options, slab_size(arguments),
+                           [&](const VolumeFile& file, const Volume& slab, std::size_t first_slice) {
+                             reading.reset();
+                             {
+                               const auto stage = tool.stage(doing);
+                               visit(file, slab, first_slice);
+                             }
+                             reading.emplace(tool, "read");
+                           });
+}
+
+Contents contents_of(cli::Tool& tool, const Arguments& arguments) {
+  Contents contents;
+  std::optional<LabelIndex> index;
+  const VolumeFile file =
+      read_slabs(tool, arguments, "read", [&](const VolumeFile& header, const Volume& slab, std::size_t first_slice) {
+        if (!index) {
+          index.emplace(header.volume.dims, header.volume.affine);
+        }
+        index->add(slab, first_slice);
+        widen(contents.values, slab);
+      });
+  contents.labels = index->labels(file.volume.label_names);
+  if (!are_labels(contents.labels)) {
+    contents.labels.reset();
+  }
+  return contents;
+}
+
+[[noreturn]] void throw_choice(const fs::path& path, const Contents& contents) {
+  const auto& labels = contents.labels;
   if (!labels || labels->size() > 100) {
     throw UsageError(
         fmt::format("{}: is a grey volume with values from {:.6g} to {:.6g}: pass --isovalue V, with --inside "
                     "below where the organ is darker",
-                    path.string(), range.lower, range.upper));
+                    path.string(), contents.values.lower, contents.values.upper));
   }
   if (labels->empty()) {
     throw InputError(fmt::format("{}: holds no label: every voxel is 0", path.string()));
@@ -204,20 +252,8 @@ Interval range_of(const Volume& volume) {
                                list_of(*labels)));
 }
 
-// The label asked for, by value or by name.
-Target label_target(const fs::path& path, const Volume& volume, const std::string& text) {
-  const auto labels = labels_of(volume);
-  const auto value = parse_number(text);
-  if (!labels && value) {
-    return {{Inside::Rule::label, *value}, fmt::format("label {}", *value)};
-  }
-  if (labels) {
-    for (const Label& label : *labels) {
-      if (value ? label.value == *value : label.name == text) {
-        return {{Inside::Rule::label, label.value}, "label " + named(label)};
-      }
-    }
-  }
+[[noreturn]] void throw_no_label(const fs::path& path, const Contents& contents, const std::string& text) {
+  const auto& labels = contents.labels;
   throw InputError(
       labels && !labels->empty()
           ? fmt::format("{}: has no voxel with label {}; its labels are {}", path.string(), text, list_of(*labels))
@@ -225,30 +261,23 @@ Target label_target(const fs::path& path, const Volume& volume, const std::strin
                         labels ? "every voxel is 0" : "it is a grey volume; pass --isovalue V"));
 }
 
-std::vector<Target> targets_of(const fs::path& path, const Volume& volume, const Arguments& arguments) {
-  if (arguments.label) {
-    return {label_target(path, volume, *arguments.label)};
+// The label asked for, by value or by its name in the file.
+std::optional<Target> label_target(const VolumeFile& file, const std::string& text) {
+  const auto value = parse_number(text);
+  for (const auto& [label, name] : file.volume.label_names) {
+    if (value ? label == *value : name == text) {
+      return Target{{Inside::Rule::label, label}, "label " + named({label, 0, 0, name})};
+    }
   }
-  if (arguments.isovalue) {
-    const bool below = arguments.inside == "below";
-    const double value = *parse_number(*arguments.isovalue);
-    return {{{below ? Inside::Rule::below : Inside::Rule::above, value},
-             fmt::format("{} {}", below ? "below" : "above", value)}};
-  }
-  if (!arguments.all_labels) {
-    throw_choice(path, volume);
-  }
-  const auto labels = labels_of(volume);
-  if (!labels || labels->empty()) {
-    throw InputError(fmt::format(
-        "{}: {}", path.string(),
-        labels ? "holds no label: every voxel is 0" : "is a grey volume, which has no labels: pass --isovalue V"));
-  }
-  std::vector<Target> targets;
-  for (const Label& label : *labels) {
-    targets.push_back({{Inside::Rule::label, label.value}, "label " + named(label)});
-  }
-  return targets;
+  return value && *value != 0 ? std::optional(Target{{Inside::Rule::label, *value}, fmt::format("label {}", *value)})
+                              : std::nullopt;
+}
+
+Target isovalue_target(const Arguments& arguments) {
+  const bool below = arguments.inside == "below";
+  const double value = *parse_number(*arguments.isovalue);
+  return {{below ? Inside::Rule::below : Inside::Rule::above, value},
+          fmt::format("{} {}", below ? "below" : "above", value)};
 }
 
 fs::path output_path(const fs::path& pattern, const Target& target) {
@@ -288,53 +317,86 @@ void keep_wanted_pieces(Mask& mask, const Arguments& arguments) {
   }
 }
 
-Surface extract(cli::Tool& tool, const fs::path& path, const Volume& volume, const Target& target,
-                const Arguments& arguments, const Smoothing& smoothing) {
-  std::optional<Mask> mask;
+// Voxels that were selected, and how their surface is made of them.
+struct Selection {
+  Target target;
+  Mask mask;
+  std::optional<MaskBounds> bounds;  // where the mask holds anything, if known
+  const Volume* volume = nullptr;    // the values of a grey volume that is at hand
+};
+
+// Values that are not at hand are read a second time.
+TriangleMesh marching_cubes_of(const Selection& selection, const Arguments& arguments,
+                               const MarchingCubesOptions& options) {
+  const Mask& mask = selection.mask;
+  const Inside& inside = selection.target.inside;
+  if (inside.rule == Inside::Rule::label) {
+    return marching_cubes(mask, options);
+  }
+  if (selection.volume != nullptr) {
+    return marching_cubes(*selection.volume, inside, mask, options);
+  }
+  SlabMarchingCubes cubes(mask, inside, options);
+  read_volume_slabs(
+      arguments.volume, arguments.volume_options, slab_size(arguments),
+      [&](const VolumeFile&, const Volume& slab, std::size_t first_slice) { cubes.add(slab, first_slice); });
+  return cubes.finish();
+}
+
+SmoothedField smoothed_field(cli::Tool& tool, const Selection& selection, double sigma) {
+  const auto stage = tool.stage("smooth");
+  const auto progress = tool.progress("smooth");
+  return selection.volume != nullptr
+             ? SmoothedField{smooth_values(*selection.volume, sigma, progress), selection.target.inside}
+             : smooth_mask(selection.mask, sigma, progress);
+}
+
+Surface extract(cli::Tool& tool, Selection selection, const Arguments& arguments, const Smoothing& smoothing) {
   double voxel_volume = 0;
   {
     const auto stage = tool.stage("extract");
-    mask.emplace(select(volume, target.inside));
-    voxel_volume = static_cast<double>(count_voxels(*mask)) * mask->voxel_volume();
-    if (voxel_volume == 0) {
-      const Interval range = range_of(volume);
-      throw InputError(fmt::format("{}: no voxel is {}; its values are {:.6g} to {:.6g}", path.string(), target.name,
-                                   range.lower, range.upper));
+    voxel_volume = static_cast<double>(count_voxels(selection.mask)) * selection.mask.voxel_volume();
+    if (voxel_volume > 0) {
+      keep_wanted_pieces(selection.mask, arguments);
     }
-    keep_wanted_pieces(*mask, arguments);
   }
-  SmoothedField smoothed;
+  const Target target = selection.target;
+  if (voxel_volume == 0) {
+    const Contents contents = contents_of(tool, arguments);
+    if (arguments.label) {
+      throw_no_label(arguments.volume, contents, *arguments.label);
+    }
+    throw InputError(fmt::format("{}: no voxel is {}; its values are {:.6g} to {:.6g}", arguments.volume.string(),
+                                 target.name, contents.values.lower, contents.values.upper));
+  }
+  MarchingCubesOptions options;
+  options.open_border = arguments.open_border;
+  options.progress = tool.progress("extract");
+  std::optional<Surface> surface;
   const bool gaussian = smoothing.kind == Smoothing::Kind::gaussian;
   if (gaussian) {
-    const auto stage = tool.stage("smooth");
-    if (target.inside.rule == Inside::Rule::label) {
-      smoothed = smooth_mask(*mask, smoothing.sigma, tool.progress("smooth"));
-    } else {
-      smoothed = {smooth_values(volume, smoothing.sigma, tool.progress("smooth")), target.inside};
-    }
-  }
-  std::optional<Surface> surface;
-  {
+    const SmoothedField smoothed = smoothed_field(tool, selection, smoothing.sigma);
     const auto stage = tool.stage("extract");
-    const MarchingCubesOptions options{arguments.open_border, tool.progress("extract")};
-    if (gaussian) {
-      mask.emplace(select(smoothed.field, smoothed.rule));
-      keep_wanted_pieces(*mask, arguments);
-    }
-    TriangleMesh mesh =
-        marching_cubes(gaussian ? smoothed.field : volume, gaussian ? smoothed.rule : target.inside, *mask, options);
-    surface.emplace(Surface{std::move(mesh), std::move(*mask), voxel_volume, false, {}});
+    Mask mask = select(smoothed.field, smoothed.rule);
+    keep_wanted_pieces(mask, arguments);
+    TriangleMesh mesh = marching_cubes(smoothed.field, smoothed.rule, mask, options);
+    surface.emplace(Surface{std::move(mesh), std::move(mask), voxel_volume, false, {}});
+  } else {
+    const auto stage = tool.stage("extract");
+    options.bounds = selection.bounds;
+    TriangleMesh mesh = marching_cubes_of(selection, arguments, options);
+    surface.emplace(Surface{std::move(mesh), std::move(selection.mask), voxel_volume, false, {}});
   }
   if (surface->mesh.triangles.empty()) {
-    throw InputError(fmt::format("{}: the surface of {} is empty: {}", path.string(), target.name,
+    throw InputError(fmt::format("{}: the surface of {} is empty: {}", arguments.volume.string(), target.name,
                                  gaussian ? "the smoothing removes it; pass a smaller sigma"
                                           : "it fills the whole image; leave out --open-border"));
   }
   surface->outward = faces_outward(surface->mesh, surface->mask, arguments.open_border);
   if (smoothing.kind == Smoothing::Kind::staircase) {
     const auto stage = tool.stage("smooth");
-    const StaircaseOptions options{arguments.open_border, tool.progress("smooth")};
-    surface->staircase = smooth_staircase(surface->mesh, surface->mask, options);
+    const StaircaseOptions staircase{arguments.open_border, tool.progress("smooth")};
+    surface->staircase = smooth_staircase(surface->mesh, surface->mask, staircase);
   }
   return std::move(*surface);
 }
@@ -401,10 +463,10 @@ std::string comment(std::string text) {
   return text;
 }
 
-void print_info(cli::Tool& tool, const fs::path& path, const VolumeFile& file) {
+void print_info(cli::Tool& tool, const fs::path& path, const VolumeFile& file, const Contents& contents) {
   const Volume& volume = file.volume;
-  const auto labels = labels_of(volume);
-  const Interval range = range_of(volume);
+  const auto& labels = contents.labels;
+  const Interval& range = contents.values;
   fmt::print("{}\n", path.string());
   fmt::print("format       {}, {}\n", file.format, file.datatype);
   fmt::print("dims         {} x {} x {}\n", volume.dims[0], volume.dims[1], volume.dims[2]);
@@ -445,16 +507,137 @@ void print_info(cli::Tool& tool, const fs::path& path, const VolumeFile& file) {
   result["labels"] = labels ? list : Json();
 }
 
-VolumeFile read(cli::Tool& tool, const Arguments& arguments) {
-  const auto stage = tool.stage("read");
-  VolumeFile file = read_volume(tool.input(arguments.volume), arguments.volume_options);
+void note_file(cli::Tool& tool, const VolumeFile& file) {
   for (const fs::path& path : file.data_files) {
     tool.input(path);
   }
   for (const std::string& warning : file.warnings) {
     tool.warn(warning);
   }
-  return file;
+  tool.result()["warnings"] = file.warnings;
+}
+
+// Extracts one surface, writes it and returns what the report says of it.
+Json extract_to_file(cli::Tool& tool, Selection selection, const Arguments& arguments, const Smoothing& smoothing) {
+  const Target target = selection.target;
+  Surface surface = extract(tool, std::move(selection), arguments, smoothing);
+  Json result = measured(surface, arguments.open_border);
+  const fs::path out = output_path(arguments.out, target);
+  {
+    const auto stage = tool.stage("write");
+    PlyOptions options;
+    options.comments = {fmt::format("tunica-extract {}", version),
+                        comment("source " + arguments.volume.filename().string()), comment(target.name)};
+    options.space = arguments.space == "ras" ? "RAS" : "LPS";
+    options.overwrite = tool.force();
+    to_space(surface.mesh, arguments.space);
+    write_ply(out, surface.mesh, options);
+  }
+  tool.note(fmt::format("{}: {} triangles, {:.6g} mm2", out.string(), result["triangles"].get<std::size_t>(),
+                        result["area_mm2"].get<double>()));
+  return result;
+}
+
+void set_result(cli::Tool& tool, const Json& result) {
+  for (const auto& [key, value] : result.items()) {
+    tool.result()[key] = value;
+  }
+}
+
+// One pass over the volume, whatever the number of labels.
+void run_all_labels(cli::Tool& tool, const Arguments& arguments, const Smoothing& smoothing) {
+  std::optional<LabelIndex> index;
+  const VolumeFile file = read_slabs(tool, arguments, "extract",
+                                     [&](const VolumeFile& header, const Volume& slab, std::size_t first_slice) {
+                                       if (!index) {
+                                         index.emplace(header.volume.dims, header.volume.affine);
+                                       }
+                                       index->add(slab, first_slice);
+                                     });
+  note_file(tool, file);
+  const auto labels = index->labels(file.volume.label_names);
+  if (!are_labels(labels) || labels->empty()) {
+    throw InputError(fmt::format("{}: {}", arguments.volume.string(),
+                                 are_labels(labels) ? "holds no label: every voxel is 0"
+                                                    : "is a grey volume, which has no labels: pass --isovalue V"));
+  }
+  std::vector<Target> targets;
+  for (const Label& label : *labels) {
+    targets.push_back({{Inside::Rule::label, label.value}, "label " + named(label)});
+    tool.output(output_path(arguments.out, targets.back()), {".ply"});
+  }
+  Json results;
+  for (const Target& target : targets) {
+    std::optional<Selection> selection;
+    {
+      const auto stage = tool.stage("extract");
+      const double value = target.inside.value;
+      selection.emplace(Selection{target, index->mask(value), index->bounds(value)});
+    }
+    results[fmt::format("{}", target.inside.value)] =
+        extract_to_file(tool, std::move(*selection), arguments, smoothing);
+  }
+  set_result(tool, summed(results));
+  tool.result()["labels"] = results;
+}
+
+// The values of a grey volume are held while they leave room for the rest, or where they are smoothed.
+bool hold_values(const Arguments& arguments, const Smoothing& smoothing, const VolumeFile& header) {
+  const auto memory = static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
+  constexpr double most_bytes = 8;  // of a voxel
+  return smoothing.kind == Smoothing::Kind::gaussian ||
+         (!arguments.slab && most_bytes * static_cast<double>(header.volume.voxels()) < 0.5 * memory);
+}
+
+Json run_isovalue(cli::Tool& tool, const Arguments& arguments, const Smoothing& smoothing) {
+  const Target target = isovalue_target(arguments);
+  tool.output(arguments.out, {".ply"});
+  std::optional<VolumeFile> file;
+  std::optional<Mask> mask;
+  {
+    const auto stage = tool.stage("read");
+    if (hold_values(arguments, smoothing, read_volume_header(arguments.volume, arguments.volume_options))) {
+      file = read_volume(arguments.volume, arguments.volume_options);
+    }
+  }
+  const bool held = file.has_value();
+  if (held) {
+    const auto stage = tool.stage("extract");
+    mask.emplace(select(file->volume, target.inside));
+  } else {
+    file = read_slabs(tool, arguments, "extract",
+                      [&](const VolumeFile& header, const Volume& slab, std::size_t first_slice) {
+                        if (!mask) {
+                          mask.emplace(header.volume.dims, header.volume.affine);
+                        }
+                        select(slab, first_slice, target.inside, *mask);
+                      });
+  }
+  note_file(tool, *file);
+  return extract_to_file(tool, {target, std::move(*mask), {}, held ? &file->volume : nullptr}, arguments, smoothing);
+}
+
+Json run_label(cli::Tool& tool, const Arguments& arguments, const Smoothing& smoothing) {
+  std::optional<Target> target;
+  std::optional<Mask> mask;
+  const VolumeFile file = read_slabs(tool, arguments, "extract",
+                                     [&](const VolumeFile& header, const Volume& slab, std::size_t first_slice) {
+                                       if (!mask) {
+                                         mask.emplace(header.volume.dims, header.volume.affine);
+                                         target = label_target(header, *arguments.label);
+                                         if (target) {
+                                           tool.output(output_path(arguments.out, *target), {".ply"});
+                                         }
+                                       }
+                                       if (target) {
+                                         select(slab, first_slice, target->inside, *mask);
+                                       }
+                                     });
+  note_file(tool, file);
+  if (!target) {
+    throw_no_label(arguments.volume, contents_of(tool, arguments), *arguments.label);
+  }
+  return extract_to_file(tool, {*target, std::move(*mask), {}, nullptr}, arguments, smoothing);
 }
 
 void run(cli::Tool& tool, Arguments& arguments) {
@@ -463,41 +646,20 @@ void run(cli::Tool& tool, Arguments& arguments) {
   if (arguments.spacing) {
     arguments.volume_options.spacing = parse_spacing(*arguments.spacing);
   }
-  const VolumeFile file = read(tool, arguments);
+  tool.input(arguments.volume);
   if (arguments.info) {
-    print_info(tool, arguments.volume, file);
-    return;
-  }
-  const std::vector<Target> targets = targets_of(arguments.volume, file.volume, arguments);
-  for (const Target& target : targets) {
-    tool.output(output_path(arguments.out, target), {".ply"});
-  }
-  Json results;
-  for (const Target& target : targets) {
-    Surface surface = extract(tool, arguments.volume, file.volume, target, arguments, smoothing);
-    const Json result = measured(surface, arguments.open_border);
-    const fs::path out = output_path(arguments.out, target);
-    {
-      const auto stage = tool.stage("write");
-      PlyOptions options;
-      options.comments = {fmt::format("tunica-extract {}", version),
-                          comment("source " + arguments.volume.filename().string()), comment(target.name)};
-      options.space = arguments.space == "ras" ? "RAS" : "LPS";
-      options.overwrite = tool.force();
-      to_space(surface.mesh, arguments.space);
-      write_ply(out, surface.mesh, options);
-    }
-    tool.note(fmt::format("{}: {} triangles, {:.6g} mm2", out.string(), result["triangles"].get<std::size_t>(),
-                          result["area_mm2"].get<double>()));
-    results[fmt::format("{}", target.inside.value)] = result;
-  }
-  if (arguments.all_labels) {
-    tool.result() = summed(results);
-    tool.result()["labels"] = results;
+    const VolumeFile header = read_volume_header(arguments.volume, arguments.volume_options);
+    note_file(tool, header);
+    print_info(tool, arguments.volume, header, contents_of(tool, arguments));
+  } else if (arguments.label) {
+    set_result(tool, run_label(tool, arguments, smoothing));
+  } else if (arguments.isovalue) {
+    set_result(tool, run_isovalue(tool, arguments, smoothing));
+  } else if (arguments.all_labels) {
+    run_all_labels(tool, arguments, smoothing);
   } else {
-    tool.result() = results.front();
+    throw_choice(arguments.volume, contents_of(tool, arguments));
   }
-  tool.result()["warnings"] = file.warnings;
 }
 
 }  // namespace

@@ -76,10 +76,10 @@ VolumeFile read_volume(const fs::path& path, const VolumeOptions& options) {
   return file;
 }
 
-VolumeFile read_volume_slabs(const fs::path& path, const VolumeOptions& options, std::size_t slab_bytes,
+VolumeFile read_volume_slabs(const fs::path& path, const VolumeOptions& options, const SlabSize& size,
                              const SlabVisitor& visit) {
   std::size_t taken = 0;
-  const SlabSink sink{slab_bytes, [&](const VolumeFile& file, const Volume& slab, std::size_t first_slice) {
+  const SlabSink sink{size, [&](const VolumeFile& file, const Volume& slab, std::size_t first_slice) {
                         TUNICA_ASSERT(first_slice == taken && slab.dims[0] == file.volume.dims[0] &&
                                       slab.dims[1] == file.volume.dims[1]);
                         taken += slab.dims[2];
@@ -88,6 +88,11 @@ VolumeFile read_volume_slabs(const fs::path& path, const VolumeOptions& options,
   VolumeFile file = read_any(path, options, &sink);
   TUNICA_ASSERT(taken == file.volume.dims[2]);
   return file;
+}
+
+VolumeFile read_volume_header(const fs::path& path, const VolumeOptions& options) {
+  const SlabSink nowhere{};
+  return read_any(path, options, &nowhere);
 }
 
 }  // namespace tunica

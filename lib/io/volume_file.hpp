@@ -45,14 +45,23 @@ VolumeFile read_volume(const std::filesystem::path& path, const VolumeOptions& o
 /// for the voxels; the slab's affine, slope and intercept are those of the whole volume.
 using SlabVisitor = std::function<void(const VolumeFile& file, const Volume& slab, std::size_t first_slice)>;
 
+/// How much is read at a time: as many slices as both allow, one at least (and up to 16 of a slice stack).
+struct SlabSize {
+  std::size_t bytes = std::size_t{64} << 20;
+  std::optional<std::size_t> slices;
+};
+
 /// As read_volume(), giving the voxels slab by slab, in order, each slice once, so that a volume larger than memory can
 /// be read. Compressed streams are inflated on the way.
-/// @param slab_bytes  of voxels in one slab at the most, or one slice (16 slices of a stack)
 /// @return the file without voxels
 /// Errors: as read_volume(); those about the end of the file come after the last slab. What `visit` throws.
 /// Cost: memory for one slab.
-VolumeFile read_volume_slabs(const std::filesystem::path& path, const VolumeOptions& options, std::size_t slab_bytes,
+VolumeFile read_volume_slabs(const std::filesystem::path& path, const VolumeOptions& options, const SlabSize& size,
                              const SlabVisitor& visit);
+
+/// What read_volume() returns, but for the voxels, which are not read. Errors: as read_volume(), but for those about
+/// the voxels themselves and the end of the file.
+VolumeFile read_volume_header(const std::filesystem::path& path, const VolumeOptions& options = {});
 
 /// Writes NIfTI-1, gzip-compressed when the name ends in ".gz". World transform as sform (float32), and as qform too
 /// where it has no shear; the same volume gives the same bytes. Errors: OutputError; InputError when a dimension is

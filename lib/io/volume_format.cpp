@@ -530,12 +530,16 @@ Volume::Data make_voxels(VoxelType type, std::size_t count) {
 
 std::size_t SlabSink::slices(const std::array<std::size_t, 3>& dims, VoxelType type) const {
   const std::uint64_t slice = static_cast<std::uint64_t>(dims[0]) * dims[1] * size_of(type);
-  return std::clamp<std::uint64_t>(bytes / slice, 1, dims[2]);
+  return std::clamp<std::uint64_t>(std::min<std::uint64_t>(size.bytes / slice, size.slices.value_or(dims[2])), 1,
+                                   dims[2]);
 }
 
 void read_voxels(VolumeFile& file, ByteStream& stream, VoxelType type, bool big_endian, const std::vector<Axis>& axes,
                  const SlabSink* sink) {
   const Plan sizes = plan(stream, axes, size_of(type));
+  if (sink != nullptr && !sink->visit) {
+    return;
+  }
   with_type(type, [&](auto zero) { read_typed<decltype(zero)>(file, stream, type, big_endian, axes, sizes, sink); });
   stream.finish(file.warnings);
 }
@@ -546,6 +550,9 @@ void read_text_voxels(VolumeFile& file, ByteStream& stream, VoxelType type, cons
   const Plan sizes = plan(stream, axes, 1);
   if (sizes.total / 2 > stream.most_bytes()) {
     throw_truncated(stream, sizes.total - stream.most_bytes() / 2, sizes.total, true);
+  }
+  if (sink != nullptr && !sink->visit) {
+    return;
   }
   with_type(type, [&](auto zero) { read_text<decltype(zero)>(file, stream, type, axes, sizes, sink); });
   stream.finish(file.warnings);

@@ -72,8 +72,8 @@ struct Axis {
 
 /// Takes the voxels of a volume slab by slab, instead of the file's volume.
 struct SlabSink {
-  std::uint64_t bytes;  ///< of a slab at the most, or of one slice
-  SlabVisitor visit;
+  SlabSize size;
+  SlabVisitor visit;  ///< none: the voxels are not read
 
   /// Slices of `type` in a slab.
   [[nodiscard]] std::size_t slices(const std::array<std::size_t, 3>& dims, VoxelType type) const;

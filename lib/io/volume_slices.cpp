@@ -272,6 +272,9 @@ VolumeFile read_slices(const fs::path& path, const VolumeOptions& options, const
   affine.leftCols<3>() = options.spacing->asDiagonal();
   set_affine(file, path, affine);
 
+  if (sink != nullptr && !sink->visit) {
+    return file;
+  }
   constexpr std::size_t pages_at_once = 16;
   const auto bytes_of = [](Volume& volume) {
     return std::visit([](auto& values) { return reinterpret_cast<char*>(values.data()); }, volume.data);

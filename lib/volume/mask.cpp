@@ -3,6 +3,7 @@
 #include "core/error.hpp"
 #include "core/progress.hpp"
 #include "core/threads.hpp"
+#include "volume/pack_bits.hpp"
 
 #include <Eigen/LU>
 
@@ -12,10 +13,6 @@
 #include <limits>
 #include <optional>
 #include <type_traits>
-
-#ifdef __SSE2__
-#include <emmintrin.h>
-#endif
 
 namespace tunica {
 namespace {
@@ -117,25 +114,6 @@ std::optional<Range<T>> stored_range(const Volume& volume, const Inside& rule) {
   return *end_of_small > lowest ? std::optional(range(lowest, static_cast<Key>(*end_of_small - 1))) : std::nullopt;
 }
 
-/// 64 bytes, each 0 or 1, to 64 bits.
-std::uint64_t pack(const std::uint8_t* flags) {
-#ifdef __SSE2__
-  std::uint64_t word = 0;
-  for (int part = 0; part < 4; ++part) {
-    const __m128i bytes = _mm_load_si128(reinterpret_cast<const __m128i*>(flags + 16 * part));
-    const auto bits = static_cast<unsigned>(_mm_movemask_epi8(_mm_slli_epi16(bytes, 7)));
-    word |= static_cast<std::uint64_t>(bits) << (16 * part);
-  }
-  return word;
-#else
-  std::uint64_t word = 0;
-  for (int bit = 0; bit < 64; ++bit) {
-    word |= static_cast<std::uint64_t>(flags[bit]) << bit;
-  }
-  return word;
-#endif
-}
-
 template <typename T>
 void select_row(const T* values, std::size_t count, const Range<T>& range, std::uint64_t* words) {
   alignas(64) std::uint8_t flags[64] = {};
@@ -144,13 +122,13 @@ void select_row(const T* values, std::size_t count, const Range<T>& range, std::
     for (std::size_t bit = 0; bit < 64; ++bit) {
       flags[bit] = static_cast<std::uint8_t>((values[i + bit] >= range.first) & (values[i + bit] <= range.last));
     }
-    words[i / 64] = pack(flags);
+    words[i / 64] = pack_bits(flags);
   }
   if (i < count) {
     for (std::size_t bit = 0; bit < 64; ++bit) {
       flags[bit] = i + bit < count && values[i + bit] >= range.first && values[i + bit] <= range.last ? 1 : 0;
     }
-    words[i / 64] = pack(flags);
+    words[i / 64] = pack_bits(flags);
   }
 }
 

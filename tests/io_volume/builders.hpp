@@ -63,6 +63,42 @@ inline std::string deflated(std::string bytes, int window_bits = 31) {
   return out;
 }
 
+/// The volume in a file, read whole; fails the test where slabs of one, two or three slices differ from it.
+inline VolumeFile read_both_ways(const std::filesystem::path& path, const VolumeOptions& options = {}) {
+  VolumeFile whole = read_volume(path, options);
+  for (const std::size_t slices : {1, 2, 3}) {
+    std::size_t next = 0;
+    std::size_t taken = 0;
+    const SlabSize size{std::size_t{1} << 20, slices};
+    const VolumeFile file = read_volume_slabs(
+        path, options, size, [&](const VolumeFile& header, const Volume& slab, std::size_t first_slice) {
+          EXPECT_EQ(header.volume.dims, whole.volume.dims);
+          EXPECT_EQ(slab.affine, whole.volume.affine);
+          EXPECT_EQ(slab.slope, whole.volume.slope);
+          EXPECT_EQ(slab.intercept, whole.volume.intercept);
+          EXPECT_EQ(first_slice, next);
+          next += slab.dims[2];
+          std::visit(
+              [&](const auto& values) {
+                const auto& all = std::get<std::decay_t<decltype(values)>>(whole.volume.data);
+                ASSERT_EQ(values.size(), slab.voxels());
+                ASSERT_LE(taken + values.size(), all.size());
+                EXPECT_EQ(std::memcmp(values.data(), all.data() + taken, values.size() * sizeof(values[0])), 0);
+                taken += values.size();
+              },
+              slab.data);
+        });
+    EXPECT_EQ(next, whole.volume.dims[2]);
+    EXPECT_EQ(file.warnings, whole.warnings);
+    EXPECT_EQ(file.volume.label_names, whole.volume.label_names);
+  }
+  const VolumeFile header = read_volume_header(path, options);
+  EXPECT_EQ(header.volume.dims, whole.volume.dims);
+  EXPECT_EQ(header.datatype, whole.datatype);
+  EXPECT_EQ(std::visit([](const auto& data) { return data.size(); }, header.volume.data), 0U);
+  return whole;
+}
+
 /// The error a file gives: its exit code and message; fails the test when it is read without error.
 inline std::string error_of(const std::filesystem::path& path, const VolumeOptions& options = {},
                             ExitCode code = ExitCode::input) {

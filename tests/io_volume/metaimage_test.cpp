@@ -45,7 +45,7 @@ TYPED_TEST(MetaImageType, EveryNameEndianAndCompression) {
         for (const std::string& file :
              {metaimage_header(name, more) + bytes, metaimage_header(name, more + "CompressedData = True\n") + packed,
               metaimage_header(name, more + "CompressedData = True\n" + size) + packed}) {
-          const VolumeFile read = read_volume(folder.file("v.mha", file));
+          const VolumeFile read = read_both_ways(folder.file("v.mha", file));
           EXPECT_EQ(std::get<std::vector<TypeParam>>(read.volume.data), values);
           EXPECT_TRUE(read.volume.affine.isApprox(sample_affine()));
           EXPECT_EQ(read.orientation, "LPS");
@@ -60,7 +60,7 @@ TEST(MetaImage, TheMatrixListsTheDirectionOfEachIndexAxis) {
   const TemporaryFolder folder;
   const std::string header =
       replaced(metaimage_header(), "TransformMatrix = 1 0 0 0 1 0 0 0 1", "TransformMatrix = 0 1 0 0 0 1 1 0 0");
-  const VolumeFile file = read_volume(folder.file("v.mha", header + voxels));
+  const VolumeFile file = read_both_ways(folder.file("v.mha", header + voxels));
   Eigen::Matrix<double, 3, 4> expected;
   expected << 0, 0, 4, 10, 2, 0, 0, 20, 0, 3, 0, 30;
   EXPECT_TRUE(file.volume.affine.isApprox(expected)) << file.volume.affine;
@@ -72,15 +72,15 @@ TEST(MetaImage, DetachedData) {
   folder.file("v.raw", "skipme" + voxels);
   EXPECT_EQ(
       values_of(
-          read_volume(folder.file("a.mhd", metaimage_header("MET_UCHAR", "HeaderSize = 6\n", "v.raw"))).volume)[7],
+          read_both_ways(folder.file("a.mhd", metaimage_header("MET_UCHAR", "HeaderSize = 6\n", "v.raw"))).volume)[7],
       22);
   EXPECT_EQ(
       values_of(
-          read_volume(folder.file("a.mhd", metaimage_header("MET_UCHAR", "HeaderSize = -1\n", "v.raw"))).volume)[7],
+          read_both_ways(folder.file("a.mhd", metaimage_header("MET_UCHAR", "HeaderSize = -1\n", "v.raw"))).volume)[7],
       22);
   folder.file("v.zraw", deflated(voxels, 15));
   const VolumeFile file =
-      read_volume(folder.file("a.mhd", metaimage_header("MET_UCHAR", "CompressedData = True\n", "v.zraw")));
+      read_both_ways(folder.file("a.mhd", metaimage_header("MET_UCHAR", "CompressedData = True\n", "v.zraw")));
   EXPECT_EQ(values_of(file.volume)[7], 22);
   EXPECT_THAT(file.data_files, ElementsAre(folder / "v.zraw"));
   for (const std::string name : {"/etc/passwd", "../v.raw"}) {
@@ -109,7 +109,7 @@ TEST(MetaImage, FramesChannelsAndDimensions) {
   EXPECT_THAT(error_of(path), HasSubstr("has 2 frames: choose one with --frame 0..1"));
   VolumeOptions options;
   options.frame = 1;
-  const VolumeFile file = read_volume(path, options);
+  const VolumeFile file = read_both_ways(path, options);
   EXPECT_EQ(values_of(file.volume)[0], 77);
   EXPECT_TRUE(file.volume.affine.isApprox(sample_affine()));
   EXPECT_THAT(error_of(folder.file("v.mha", metaimage_header("MET_UCHAR", "ElementNumberOfChannels = 3\n") + voxels)),
@@ -125,14 +125,14 @@ TEST(MetaImage, TextVoxels) {
     text += std::to_string(i - 5) + " ";
   }
   const std::string header = replaced(metaimage_header("MET_SHORT"), "BinaryData = True", "BinaryData = False");
-  EXPECT_EQ(values_of(read_volume(folder.file("v.mha", header + text)).volume)[2], -3);
+  EXPECT_EQ(values_of(read_both_ways(folder.file("v.mha", header + text)).volume)[2], -3);
 }
 
 TEST(MetaImage, WithoutSpacingOrMatrixWarns) {
   const TemporaryFolder folder;
   std::string header = replaced(metaimage_header(), "ElementSpacing = 2 3 4\n", "");
   header = replaced(header, "TransformMatrix = 1 0 0 0 1 0 0 0 1\n", "");
-  EXPECT_THAT(read_volume(folder.file("v.mha", header + voxels)).warnings,
+  EXPECT_THAT(read_both_ways(folder.file("v.mha", header + voxels)).warnings,
               ElementsAre(HasSubstr("no ElementSpacing"), HasSubstr("no TransformMatrix")));
 }
 

@@ -25,7 +25,7 @@ TEST(NiftiWriter, WhatIsWrittenIsReadBack) {
     volume.slope = 0.5;
     volume.intercept = -3;
     write_nifti(folder / name, volume, false);
-    const VolumeFile file = read_volume(folder / name);
+    const VolumeFile file = read_both_ways(folder / name);
     EXPECT_EQ(file.volume.dims, volume.dims);
     EXPECT_EQ(file.volume.data, volume.data);
     EXPECT_TRUE(file.volume.affine.isApprox(volume.affine));
@@ -51,7 +51,7 @@ TEST(NiftiWriter, QformAgreesWithSformForRotatedAndMirroredVolumes) {
     write_nifti(folder / "v.nii", volume, true);
     VolumeOptions options;
     options.prefer_qform = true;
-    const VolumeFile file = read_volume(folder / "v.nii", options);
+    const VolumeFile file = read_both_ways(folder / "v.nii", options);
     EXPECT_EQ(file.transform, "qform");
     EXPECT_THAT(file.warnings, IsEmpty());
     EXPECT_LT((file.volume.affine - volume.affine).cwiseAbs().maxCoeff(), 1e-4);
@@ -67,7 +67,7 @@ TEST(NiftiWriter, AShearedVolumeHasNoQform) {
   write_nifti(folder / "v.nii", volume, false);
   VolumeOptions options;
   options.prefer_qform = true;
-  const VolumeFile file = read_volume(folder / "v.nii", options);
+  const VolumeFile file = read_both_ways(folder / "v.nii", options);
   EXPECT_EQ(file.transform, "sform");
   EXPECT_THAT(file.warnings, testing::ElementsAre(HasSubstr("no qform")));
   EXPECT_TRUE(file.volume.affine.isApprox(volume.affine));
@@ -122,7 +122,7 @@ TYPED_TEST(NiftiType, EveryVersionEndianAndCompression) {
         const std::string bytes =
             nifti_header(options, datatype_code<TypeParam>(), 8 * sizeof(TypeParam)) + encoded(values, endian);
         folder.file("v.nii", gzip ? deflated(bytes) : bytes);  // by content, whatever the name
-        const VolumeFile file = read_volume(folder / "v.nii");
+        const VolumeFile file = read_both_ways(folder / "v.nii");
         EXPECT_EQ(std::get<std::vector<TypeParam>>(file.volume.data), values);
         EXPECT_EQ(file.format, version == 1 ? "NIfTI-1" : "NIfTI-2");
         EXPECT_TRUE(file.volume.affine.isApprox(flipped(sample_affine())));
@@ -142,7 +142,7 @@ TEST(Nifti, ThePairOfHeaderAndImage) {
   folder.file("v.hdr", nifti_header(options, 2, 8).substr(0, 348));
   EXPECT_THAT(error_of(folder / "v.hdr"), HasSubstr("v.img is missing"));
   folder.file("v.img.gz", deflated(encoded(values, Endian::little)));
-  EXPECT_EQ(std::get<0>(read_volume(folder / "v.hdr").volume.data), values);
+  EXPECT_EQ(std::get<0>(read_both_ways(folder / "v.hdr").volume.data), values);
   folder.file("v.img", encoded(values, Endian::little).substr(0, 50));
   EXPECT_THAT(error_of(folder / "v.hdr"), AllOf(HasSubstr("v.img"), HasSubstr("10 of the 60 bytes")));
 }
@@ -164,7 +164,7 @@ TEST(NiftiTransform, QformWhenThereIsNoSform) {
   const double half = std::sqrt(0.5);
   options.quatern = {0, 0, half, 5, 6, 7};  // a quarter turn about z
   folder.file("v.nii", nifti_file(options));
-  const VolumeFile file = read_volume(folder / "v.nii");
+  const VolumeFile file = read_both_ways(folder / "v.nii");
   Eigen::Matrix<double, 3, 4> ras;
   ras << 0, -3, 0, 5, 2, 0, 0, 6, 0, 0, -4, 7;
   EXPECT_LT((file.volume.affine - flipped(ras)).cwiseAbs().maxCoeff(), 1e-6);
@@ -178,13 +178,13 @@ TEST(NiftiTransform, BothAndDifferent) {
   options.qform_code = 1;
   options.quatern = {0, 0, 0, 11, 20, 30};
   folder.file("v.nii", nifti_file(options));
-  VolumeFile file = read_volume(folder / "v.nii");
+  VolumeFile file = read_both_ways(folder / "v.nii");
   EXPECT_EQ(file.volume.affine(0, 3), -10);
   EXPECT_THAT(file.warnings, testing::ElementsAre(AllOf(HasSubstr("sform [2 0 0 10]"), HasSubstr("qform [2 0 0 11]"),
                                                         HasSubstr("the sform is used"), HasSubstr("--prefer-qform"))));
   VolumeOptions prefer;
   prefer.prefer_qform = true;
-  file = read_volume(folder / "v.nii", prefer);
+  file = read_both_ways(folder / "v.nii", prefer);
   EXPECT_EQ(file.volume.affine(0, 3), -11);
   EXPECT_THAT(file.warnings, testing::ElementsAre(HasSubstr("the qform is used")));
 }
@@ -195,7 +195,7 @@ TEST(NiftiTransform, NeitherIsASpacingWithAWarning) {
   options.sform_code = 0;
   options.pixdim = {0, -2, 3, 4};
   folder.file("v.nii", nifti_file(options));
-  const VolumeFile file = read_volume(folder / "v.nii");
+  const VolumeFile file = read_both_ways(folder / "v.nii");
   EXPECT_EQ(file.volume.affine(0, 0), -2);
   EXPECT_EQ(file.volume.affine(1, 1), -3);
   EXPECT_EQ(file.volume.affine(2, 2), 4);
@@ -211,7 +211,7 @@ TEST(NiftiTransform, UnitsScaleToMillimetres) {
     NiftiOptions options;
     options.units = units;
     folder.file("v.nii", nifti_file(options));
-    const VolumeFile file = read_volume(folder / "v.nii");
+    const VolumeFile file = read_both_ways(folder / "v.nii");
     EXPECT_TRUE(file.volume.affine.isApprox(scale * flipped(sample_affine()))) << units;
     EXPECT_EQ(file.warnings.size(), units == 0 || units == 5 ? 1U : 0U);
   }
@@ -243,13 +243,13 @@ TEST(Nifti, ScaleIsKeptAndSlopeZeroMeansNone) {
   options.slope = 2;
   options.intercept = -1024;
   folder.file("v.nii", nifti_file(options));
-  EXPECT_EQ(read_volume(folder / "v.nii").volume.slope, 2);
-  EXPECT_EQ(read_volume(folder / "v.nii").volume.intercept, -1024);
+  EXPECT_EQ(read_both_ways(folder / "v.nii").volume.slope, 2);
+  EXPECT_EQ(read_both_ways(folder / "v.nii").volume.intercept, -1024);
   for (const double none : {0.0, std::numeric_limits<double>::quiet_NaN()}) {
     options.slope = none;
     folder.file("v.nii", nifti_file(options));
-    EXPECT_EQ(read_volume(folder / "v.nii").volume.slope, 1);
-    EXPECT_EQ(read_volume(folder / "v.nii").volume.intercept, 0);
+    EXPECT_EQ(read_both_ways(folder / "v.nii").volume.slope, 1);
+    EXPECT_EQ(read_both_ways(folder / "v.nii").volume.intercept, 0);
   }
 }
 
@@ -265,7 +265,7 @@ TEST(Nifti, AFrameHasToBeChosen) {
     for (std::size_t frame = 0; frame < 3; ++frame) {
       VolumeOptions choice;
       choice.frame = frame;
-      const VolumeFile file = read_volume(folder / "v.nii", choice);
+      const VolumeFile file = read_both_ways(folder / "v.nii", choice);
       EXPECT_EQ(file.frames, 3U);
       EXPECT_EQ(std::get<0>(file.volume.data),
                 std::vector<std::uint8_t>(all.begin() + static_cast<long>(frame * 60),
@@ -280,7 +280,7 @@ TEST(Nifti, AFrameHasToBeChosen) {
   }
   options.dims = {3, 4, 5, 1, 1};
   folder.file("v.nii", nifti_file(options));
-  EXPECT_NO_THROW(read_volume(folder / "v.nii"));
+  EXPECT_NO_THROW(read_both_ways(folder / "v.nii"));
   options.dims = {3, 4, 5, 1, 3};
   folder.file("v.nii", nifti_file(options));
   EXPECT_THAT(error_of(folder / "v.nii"), HasSubstr("3 values per voxel"));
@@ -341,13 +341,14 @@ TEST(NiftiDamage, TrailingBytesWarn) {
   const TemporaryFolder folder;
   const std::string bytes = nifti_file();
   folder.file("v.nii", bytes + "more");
-  EXPECT_THAT(read_volume(folder / "v.nii").warnings, testing::ElementsAre(HasSubstr("4 bytes follow the voxels")));
+  EXPECT_THAT(read_both_ways(folder / "v.nii").warnings, testing::ElementsAre(HasSubstr("4 bytes follow the voxels")));
   folder.file("v.nii", deflated(bytes + "more"));
-  EXPECT_THAT(read_volume(folder / "v.nii").warnings, testing::ElementsAre(HasSubstr("4 bytes follow the voxels")));
+  EXPECT_THAT(read_both_ways(folder / "v.nii").warnings, testing::ElementsAre(HasSubstr("4 bytes follow the voxels")));
   folder.file("v.nii", deflated(bytes) + "more");
-  EXPECT_THAT(read_volume(folder / "v.nii").warnings, testing::ElementsAre(HasSubstr("follow its compressed stream")));
+  EXPECT_THAT(read_both_ways(folder / "v.nii").warnings,
+              testing::ElementsAre(HasSubstr("follow its compressed stream")));
   folder.file("v.nii", deflated(bytes.substr(0, 380)) + deflated(bytes.substr(380)));
-  EXPECT_THAT(read_volume(folder / "v.nii").warnings, IsEmpty());
+  EXPECT_THAT(read_both_ways(folder / "v.nii").warnings, IsEmpty());
 }
 
 TEST(NiftiDamage, HostileSizesAreRefusedBeforeMemoryIsTaken) {

@@ -47,7 +47,7 @@ TYPED_TEST(NrrdType, EveryNameEndianAndEncoding) {
       for (const std::string& file : {nrrd_header(name, more + "encoding: raw\n") + bytes,
                                       nrrd_header(name, more + "encoding: gzip\n") + deflated(bytes),
                                       nrrd_header(name, more + "encoding: ascii\n") + text}) {
-        const VolumeFile read = read_volume(folder.file("v.nrrd", file));
+        const VolumeFile read = read_both_ways(folder.file("v.nrrd", file));
         EXPECT_EQ(std::get<std::vector<TypeParam>>(read.volume.data), values);
         EXPECT_TRUE(read.volume.affine.isApprox(sample_affine()));
         EXPECT_EQ(read.orientation, "LPS");
@@ -66,20 +66,20 @@ TEST(Nrrd, EverySpace) {
                                      {"LAS", {1, -1, 1}},
                                      {"left-anterior-superior", {1, -1, 1}}}) {
     const std::string header = replaced(nrrd_header(), "left-posterior-superior", space);
-    const VolumeFile file = read_volume(folder.file("v.nrrd", header + voxels));
+    const VolumeFile file = read_both_ways(folder.file("v.nrrd", header + voxels));
     EXPECT_TRUE(file.volume.affine.isApprox(signs.asDiagonal() * sample_affine())) << space;
     EXPECT_THAT(file.warnings, IsEmpty());
   }
   for (const std::string space : {"3D-right-handed", "scanner-xyz"}) {
     const std::string header = replaced(nrrd_header(), "left-posterior-superior", space);
-    EXPECT_THAT(read_volume(folder.file("v.nrrd", header + voxels)).warnings, ElementsAre(HasSubstr(space)));
+    EXPECT_THAT(read_both_ways(folder.file("v.nrrd", header + voxels)).warnings, ElementsAre(HasSubstr(space)));
   }
 }
 
 TEST(Nrrd, SpacingsWhenThereAreNoDirections) {
   const TemporaryFolder folder;
   const std::string header = "NRRD0001\ntype: uint8\ndimension: 3\nsizes: 3 4 5\nspacings: 2 3 4\nencoding: raw\n\n";
-  const VolumeFile file = read_volume(folder.file("v.nrrd", header + voxels));
+  const VolumeFile file = read_both_ways(folder.file("v.nrrd", header + voxels));
   EXPECT_EQ(file.spacing, Vec3(2, 3, 4));
   EXPECT_THAT(file.warnings, ElementsAre(HasSubstr("no space directions")));
 }
@@ -87,7 +87,7 @@ TEST(Nrrd, SpacingsWhenThereAreNoDirections) {
 TEST(Nrrd, UnitsOfLength) {
   const TemporaryFolder folder;
   const std::string more = "space units: \"um\" \"um\" \"um\"\nencoding: raw\n";
-  EXPECT_TRUE(read_volume(folder.file("v.nrrd", nrrd_header("uint8", more) + voxels))
+  EXPECT_TRUE(read_both_ways(folder.file("v.nrrd", nrrd_header("uint8", more) + voxels))
                   .volume.affine.isApprox(0.001 * sample_affine()));
   const std::string mixed = "space units: \"um\" \"mm\" \"um\"\nencoding: raw\n";
   EXPECT_THAT(error_of(folder.file("v.nrrd", nrrd_header("uint8", mixed) + voxels)), HasSubstr("units"));
@@ -98,7 +98,7 @@ TEST(Nrrd, DetachedData) {
   const std::string header = nrrd_header("uint8", "encoding: raw\ndata file: v.raw\n");
   folder.file("v.raw", voxels);
   for (const std::string& text : {header, header.substr(0, header.size() - 1), header.substr(0, header.size() - 2)}) {
-    const VolumeFile file = read_volume(folder.file("v.nhdr", text));
+    const VolumeFile file = read_both_ways(folder.file("v.nhdr", text));
     EXPECT_EQ(values_of(file.volume)[7], 22);
     EXPECT_THAT(file.data_files, ElementsAre(folder / "v.raw"));
   }
@@ -119,7 +119,7 @@ TEST(Nrrd, DetachedData) {
 TEST(Nrrd, SkippedLinesAndBytes) {
   const TemporaryFolder folder;
   const auto read = [&](const std::string& more, const std::string& data) {
-    return values_of(read_volume(folder.file("v.nrrd", nrrd_header("uint8", more) + data)).volume);
+    return values_of(read_both_ways(folder.file("v.nrrd", nrrd_header("uint8", more) + data)).volume);
   };
   const auto expected = read("encoding: raw\n", voxels);
   EXPECT_EQ(read("encoding: raw\nline skip: 2\nbyte skip: 3\n", "a\nb\nxyz" + voxels), expected);
@@ -154,7 +154,7 @@ TEST(Nrrd, OverlappingSegmentsNeedALayer) {
   for (std::size_t layer = 0; layer < 2; ++layer) {
     VolumeOptions options;
     options.layer = layer;
-    const VolumeFile file = read_volume(path, options);
+    const VolumeFile file = read_both_ways(path, options);
     for (std::size_t i = 0; i < 60; ++i) {
       EXPECT_EQ(values_of(file.volume)[i], static_cast<double>(2 * i + layer));
     }
@@ -179,10 +179,10 @@ TEST(Nrrd, TimeNeedsAFrame) {
   EXPECT_THAT(error_of(path), HasSubstr("has 2 frames: choose one with --frame 0..1"));
   VolumeOptions options;
   options.frame = 1;
-  EXPECT_EQ(values_of(read_volume(path, options).volume)[0], 77);
+  EXPECT_EQ(values_of(read_both_ways(path, options).volume)[0], 77);
   const std::string bare =
       "NRRD0004\ntype: uint8\ndimension: 4\nsizes: 3 4 5 2\nspacings: 2 3 4 nan\nencoding: raw\n\n";
-  EXPECT_EQ(values_of(read_volume(folder.file("v.nrrd", bare + both), options).volume)[0], 77);
+  EXPECT_EQ(values_of(read_both_ways(folder.file("v.nrrd", bare + both), options).volume)[0], 77);
 }
 
 TEST(Nrrd, WhatIsNoScalarVolumeIsRefused) {

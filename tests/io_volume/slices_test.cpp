@@ -41,7 +41,8 @@ TYPED_TEST(TiffType, EveryEndianSizeAndCompression) {
         options.big_tiff = big_tiff;
         options.compression = compression;
         options.format = std::is_floating_point_v<T> ? 3 : std::is_signed_v<T> ? 2 : 1;
-        const VolumeFile file = read_volume(folder.file("v.tif", tiff_file<T>(7, 5, pages, options)), with_spacing());
+        const VolumeFile file =
+            read_both_ways(folder.file("v.tif", tiff_file<T>(7, 5, pages, options)), with_spacing());
         EXPECT_EQ(std::get<std::vector<T>>(file.volume.data), sample_values<T>(700));
         EXPECT_EQ(file.volume.dims, (std::array<std::size_t, 3>{7, 5, 20}));
         EXPECT_EQ(file.spacing, Vec3(0.5, 0.25, 2));
@@ -59,7 +60,7 @@ TEST(Tiff, All256GreyValuesComeAsTheyAre) {
     page[i] = static_cast<std::uint8_t>(i);
   }
   const VolumeFile file =
-      read_volume(folder.file("v.tif", tiff_file<std::uint8_t>(16, 16, {page, page})), with_spacing());
+      read_both_ways(folder.file("v.tif", tiff_file<std::uint8_t>(16, 16, {page, page})), with_spacing());
   for (std::size_t i = 0; i < 512; ++i) {
     EXPECT_EQ(std::get<0>(file.volume.data)[i], i % 256);
   }
@@ -148,7 +149,7 @@ TEST(Folder, SlicesInNaturalOrder) {
       folder.file("stack/slice" + std::to_string(i) + extension,
                   extension == ".png" ? png_file(7, 5, pixels) : tiff_file<std::uint16_t>(7, 5, {pixels}));
     }
-    const VolumeFile file = read_volume(stack, with_spacing());
+    const VolumeFile file = read_both_ways(stack, with_spacing());
     EXPECT_EQ(file.volume.dims, (std::array<std::size_t, 3>{7, 5, 4}));
     for (std::size_t k = 0; k < 4; ++k) {
       EXPECT_EQ(std::get<std::vector<std::uint16_t>>(file.volume.data)[35 * k + 3], 1000 * (8 + k));
@@ -157,7 +158,7 @@ TEST(Folder, SlicesInNaturalOrder) {
     EXPECT_THAT(file.warnings, IsEmpty());
     folder.file("stack/notes.txt", "x");
     std::filesystem::remove(stack / ("slice9" + extension));
-    EXPECT_THAT(read_volume(stack, with_spacing()).warnings,
+    EXPECT_THAT(read_both_ways(stack, with_spacing()).warnings,
                 ElementsAre(HasSubstr("1 files that are no slices"), HasSubstr("between slice8")));
   }
 }
@@ -190,7 +191,7 @@ TEST(Png, EveryTruncationIsNoticed) {
   for (std::size_t size = 8; size < bytes.size(); ++size) {
     EXPECT_THAT(error_of(folder.file("v.png", bytes.substr(0, size)), with_spacing()), HasSubstr("bytes are missing"));
   }
-  EXPECT_THAT(read_volume(folder.file("v.png", bytes), with_spacing()).warnings,
+  EXPECT_THAT(read_both_ways(folder.file("v.png", bytes), with_spacing()).warnings,
               ElementsAre(HasSubstr("single slice")));
 }
 

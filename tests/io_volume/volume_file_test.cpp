@@ -70,7 +70,7 @@ TEST(VolumeFile, ThreeHundredDamagesOfEachFormat) {
         options.spacing = Vec3(1, 1, 1);
       }
       try {
-        const VolumeFile file = read_volume(folder.file(name, mutate(bytes, seed)), options);
+        const VolumeFile file = read_both_ways(folder.file(name, mutate(bytes, seed)), options);
         EXPECT_LE(file.volume.voxels(), 1000000U);
         ++read;
       } catch (const InputError& error) {
@@ -106,13 +106,13 @@ TEST(SharedVolumes, HeadersAreUnderstood) {
            {"sio_thorax_10mm.seg.nrrd", "RAS", "uint8", {128, 128, 34}, 92.83},
            {"vmtk_aorta_levelset.mha", "RAS", "float32", {157, 393, 34}, 1.159},
        }) {
-    const VolumeFile file = read_volume(folder / fact.name);
+    const VolumeFile file = read_both_ways(folder / fact.name);
     EXPECT_EQ(file.orientation, fact.orientation) << fact.name;
     EXPECT_EQ(file.datatype, fact.datatype) << fact.name;
     EXPECT_EQ(file.volume.dims, fact.dims) << fact.name;
     EXPECT_NEAR(file.volume.affine.leftCols<3>().determinant(), fact.determinant, 1e-3 * fact.determinant) << fact.name;
   }
-  EXPECT_EQ(read_volume(folder / "sio_thorax_10mm.seg.nrrd").volume.label_names.size(), 7U);
+  EXPECT_EQ(read_both_ways(folder / "sio_thorax_10mm.seg.nrrd").volume.label_names.size(), 7U);
   EXPECT_THAT(error_of(folder / "sio_thorax_overlapping_4d.seg.nrrd"),
               HasSubstr("has 2 layers: choose one with --layer 0..1"));
 }

@@ -334,6 +334,54 @@ class Choices(ExtractTest):
                 files.append(self.out.read_bytes())
             self.assertEqual(*files)
 
+    def test_same_bytes_slab_by_slab(self):
+        rng = numpy.random.default_rng(8)
+        grey = numpy.round(20 * rng.random((19, 21, 23)) + 9 * ball((19, 21, 23), 8)).astype(numpy.int16)
+        labels = self.two_labels()
+        for path, selection in ((self.nifti(grey, name="grey.nii.gz"), ["--isovalue", 17]),
+                                (self.nifti(grey, name="grey.nii.gz"), ["--isovalue", 15, "--largest", "--open-border"]),
+                                (self.nifti(labels, name="labels.nii.gz"), ["--label", 7]),
+                                (self.nifti(labels, name="labels.nii.gz"), ["--label", 1, "--smooth", "staircase"]),
+                                (self.nifti(labels, name="labels.nii.gz"), ["--all-labels", "--fill-cavities"])):
+            out = self.folder / "organ-{label}.ply"
+            whole, _ = self.run_tool(path, out, *selection)
+            written = [pathlib.Path(output).read_bytes() for output in whole["outputs"]]
+            self.assertGreaterEqual(len(written), 1)
+            for slices in (1, 3, 1000):
+                record, _ = self.run_tool(path, out, *selection, "--slab", slices)
+                self.assertEqual([pathlib.Path(output).read_bytes() for output in record["outputs"]], written)
+                self.assertEqual(record["result"], whole["result"])
+        self.refuse(2, path, self.out, "--label", 1, "--slab", 0, saying="--slab")
+
+    def test_memory_is_the_output_and_an_eighth_of_the_voxels(self):
+        shape = (64, 640, 640)
+        organ = numpy.zeros(shape[::-1], numpy.int16)
+        organ[200:400, 150:450, 10:50] = 3
+        voxels_mib = organ.nbytes / 2 ** 20
+        path = self.nifti(organ)
+        bits_mib = organ.size / 8 / 2 ** 20
+        for selection, input_mib in ((["--label", 3, "--slab", 4], 0), (["--all-labels", "--slab", 4], 0),
+                                     (["--isovalue", 1, "--slab", 4], 0), (["--isovalue", 1], voxels_mib)):
+            # Of the program, without a volume.
+            own_mib = self.run_tool(self.nifti(organ[::40, ::40], name="small.nii.gz"), self.folder / "o-{label}.ply",
+                                    *selection)[0]["peak_mib"]
+            record, _ = self.run_tool(path, self.folder / "o-{label}.ply", *selection, "--threads", 1)
+            # The mesh, and what is measured on it for the report.
+            mesh_mib = 4 * (24 * record["result"]["vertices"] + 12 * record["result"]["triangles"]) / 2 ** 20
+            self.assertLess(record["peak_mib"], own_mib + input_mib + 2 * bits_mib + mesh_mib + 16, selection)
+
+    def test_an_atlas_of_300_labels_takes_one_pass(self):
+        blocks = numpy.arange(343).reshape(7, 7, 7)
+        atlas = numpy.kron(numpy.where(blocks < 300, blocks + 1, 0), numpy.ones((20, 20, 20), int)).astype(numpy.uint16)
+        path = self.nifti(atlas)
+        record, _ = self.run_tool(path, self.folder / "a-{label}.ply", "--all-labels", "--threads", 1)
+        self.assertEqual(len(record["result"]["labels"]), 300)
+        for label in (1, 57, 300):
+            self.run_tool(path, self.out, "--label", label, "--threads", 1)
+            self.assertEqual((self.folder / f"a-{label}.ply").read_bytes().partition(b"end_header")[2],
+                             self.out.read_bytes().partition(b"end_header")[2])
+            self.out.unlink()
+
     def test_noise_is_a_closed_manifold(self):
         generator = numpy.random.default_rng(7)
         for density in (0.05, 0.3, 0.5, 0.7, 0.95):

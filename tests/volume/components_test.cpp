@@ -1,7 +1,6 @@
 #include "volume/components.hpp"
 
 #include "mesh_check.hpp"
-#include "volume/labels.hpp"
 #include "volume/marching_cubes.hpp"
 #include "volumes.hpp"
 
@@ -90,35 +89,6 @@ TEST(Components, NothingInsideIsNoPiece) {
   EXPECT_TRUE(piece_sizes(mask).empty());
   EXPECT_EQ(keep_largest_piece(mask), 0U);
   EXPECT_EQ(fill_cavities(mask), 0U);
-}
-
-TEST(Labels, AreListedWithTheirVolumes) {
-  Volume volume =
-      make_volume<std::int16_t>({4, 4, 4}, [](auto i, auto, auto) { return i == 3 ? -2 : (i == 1 ? 7 : 0); });
-  volume.affine(0, 0) = -2;
-  volume.label_names = {{7, "bladder"}};
-  const auto labels = list_labels(volume);
-  ASSERT_TRUE(labels);
-  ASSERT_EQ(labels->size(), 2U);
-  EXPECT_EQ((*labels)[0].value, -2);
-  EXPECT_EQ((*labels)[1].voxels, 16U);
-  EXPECT_EQ((*labels)[1].volume_mm3, 32);
-  EXPECT_EQ((*labels)[1].name, "bladder");
-  volume.slope = 0.5;
-  volume.intercept = 1;
-  const auto scaled = list_labels(volume);
-  ASSERT_EQ(scaled->size(), 2U);  // -2 now means 0, 0 means 1
-  EXPECT_EQ((*scaled)[0].value, 1);
-  EXPECT_EQ((*scaled)[1].value, 4.5);
-}
-
-TEST(Labels, AnImageIsNotASegmentation) {
-  Random random(24);
-  const Volume image = make_volume<float>({20, 20, 20}, [&](auto...) { return random.uniform(); });
-  EXPECT_FALSE(list_labels(image, 1000));
-  EXPECT_TRUE(list_labels(image, 8000));
-  const Volume nan = make_volume<double>({4, 4, 4}, [](auto...) { return std::nan(""); });
-  EXPECT_TRUE(list_labels(nan)->empty());
 }
 
 }  // namespace
