@@ -4,6 +4,7 @@
 #include "surface/checks.hpp"
 #include "surface/hausdorff.hpp"
 #include "surface/measure.hpp"
+#include "surface/repair.hpp"
 
 #include <fmt/format.h>
 
@@ -21,6 +22,7 @@ struct Arguments {
   std::optional<std::string> triangles;
   std::optional<LengthTolerance> max_error;
   std::optional<std::string> min_angle;
+  bool repair = false;
   std::optional<std::string> mesh_unit;
 };
 
@@ -39,7 +41,10 @@ void declare(cli::Tool& tool, Arguments& given) {
                  "well-shaped triangles for a larger error: no angle below DEG degrees (e.g. 20, at most 40) but where "
                  "IN's own corners are sharper; exit code 4 when that cannot be held")
       ->type_name("DEG");
-  tool.not_yet("--repair");
+  app.add_flag(
+      "--repair", given.repair,
+      "mend an IN that is no oriented manifold: drop double and degenerate triangles, turn those that face the "
+      "wrong way, take apart what meets at too many; holes stay");
 }
 
 std::optional<std::size_t> wanted_triangles(const Arguments& given) {
@@ -68,13 +73,23 @@ std::optional<double> wanted_angle(const Arguments& given) {
   return number;
 }
 
-MeshFile read_surface(const fs::path& path, const std::optional<double>& unit_mm, bool require_unit) {
+MeshFile read_surface(const fs::path& path, const std::optional<double>& unit_mm, bool require_unit,
+                      std::optional<Repairs>& repairs) {
   MeshFile file = read_mesh(path, unit_mm, require_unit);
   require_no_other_unit(file, unit_mm, path);
+  if (repairs) {
+    try {
+      Repaired result = repaired(file.mesh);
+      file.mesh = std::move(result.mesh);
+      repairs = result.repairs;
+    } catch (const InputError& error) {
+      throw InputError(fmt::format("{}: {}", path.string(), error.what()));
+    }
+  }
   if (const auto reason = why_unfit(examine(file.mesh))) {
     throw InputError(fmt::format(
         "{}: {}; decimation needs a surface where every edge has at most two triangles that face the same way: mend it "
-        "first",
+        "with --repair",
         path.string(), *reason));
   }
   if (!(diagonal(file.mesh) > 0)) {
@@ -113,10 +128,14 @@ void run(cli::Tool& tool, const Arguments& given) {
   tool.output(given.out, {".ply"});
 
   MeshFile in;
+  std::optional<Repairs> repairs;
+  if (given.repair) {
+    repairs.emplace();
+  }
   {
     const auto stage = tool.stage("read");
     const bool in_millimetres = given.max_error && !given.max_error->relative;
-    in = read_surface(tool.input(given.in), unit_mm, in_millimetres);
+    in = read_surface(tool.input(given.in), unit_mm, in_millimetres, repairs);
   }
   const double diagonal_mm = diagonal(in.mesh);
 
@@ -158,6 +177,13 @@ void run(cli::Tool& tool, const Arguments& given) {
         {"boundary_loops", facts.boundary_loops},
         {"diagonal_mm", diagonal_mm},
     };
+    if (repairs) {
+      tool.result()["repairs"] = {{"dropped_triangles", repairs->dropped_triangles},
+                                  {"turned_triangles", repairs->turned_triangles},
+                                  {"opened_edges", repairs->opened_edges},
+                                  {"split_vertices", repairs->split_vertices},
+                                  {"cut_edges", repairs->cut_edges}};
+    }
     tool.note(fmt::format("{} of {} triangles, at most {:.4g} % ({:.4g} mm) from the input",
                           coarse.mesh.triangles.size(), in.mesh.triangles.size(), 100 * distance.upper / diagonal_mm,
                           distance.upper));

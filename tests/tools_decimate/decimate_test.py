@@ -132,7 +132,6 @@ class Decimate(WholeTool):
         for angle in ["0", "-3", "45", "x", "20deg"]:
             self.run_tool("in.ply", "out.ply", "--triangles", 100, "--min-angle", angle, code=2, says="--min-angle")
         self.run_tool("in.ply", "out.ply", "--min-angle", 20, code=2, says="--triangles")
-        self.run_tool("in.ply", "out.ply", "--triangles", 100, "--repair", code=2, says="not available yet")
         self.assertFalse(self.exists("out.ply"))
 
     def test_bad_input(self):
@@ -152,6 +151,33 @@ class Decimate(WholeTool):
         meshes.write_ply(self.path("point.ply"), [(1, 1, 1)] * 3, [(0, 1, 2)])
         self.run_tool("point.ply", "out.ply", "--triangles", 100, code=3, says="point.ply")
         self.assertFalse(self.exists("out.ply"))
+
+    def test_repair(self):
+        vertices, triangles = self.surface()
+        broken = [triangles[0][::-1]] + triangles[1:] + [triangles[7], (0, 0, 1),
+                                                         (triangles[9][0], triangles[9][1], len(vertices))]
+        fin = tuple(1.1 * x for x in vertices[triangles[9][0]])
+        meshes.write_ply(self.path("broken.ply"), vertices + [fin], broken)
+        self.run_tool("broken.ply", "out.ply", "--triangles", 300, code=3, says="--repair")
+        result = self.run_tool("broken.ply", "out.ply", "--triangles", 300, "--repair")["result"]
+        self.assertTrue(result["manifold"])
+        self.assertEqual(result["triangles_in"], len(triangles) + 1)  # the fin stays, as a piece of its own
+        self.assertEqual(result["repairs"]["dropped_triangles"], 2)
+        self.assertEqual(result["repairs"]["turned_triangles"], 1)
+        self.assertLess(result["hausdorff_percent"]["upper"], 3)
+        meshes.write_ply(self.path("none.ply"), [(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 1)])
+        self.run_tool("none.ply", "none_out.ply", "--triangles", 300, "--repair", code=3, says="no triangle is left")
+
+    @unittest.skipUnless(os.path.isdir(os.path.join(DATA, "meshes")), "the real meshes are absent: skipped")
+    def test_repair_of_real_meshes(self):
+        for name in ["awkward_colon_VHF_nonmanifold.obj", "awkward_liver_pieces.stl", "awkward_skull_polys.obj",
+                     "awkward_aorta_3pieces.obj"]:
+            given = os.path.join(DATA, "meshes", name)
+            result = self.run_tool(given, "out.ply", "--triangles", 3000, "--repair", "--mesh-unit", "mm",
+                                   "--force")["result"]
+            self.assertTrue(result["manifold"], name)
+            self.assertLessEqual(result["triangles"], 3000, name)
+            self.assertLess(result["hausdorff_percent"]["upper"], 2, name)
 
     def test_count_below_the_topology(self):
         a, triangles = meshes.sphere(2)
