@@ -136,14 +136,15 @@ Map make_map(const Surface& a, const ClosestPoint& b, double diagonal_mm) {
   return map;
 }
 
-void write_outputs(const cli::Tool& tool, const Arguments& given, const Surface& a, const ClosestPoint& b,
-                   const HausdorffResult& distance, double diagonal_mm) {
+void write_files(const cli::Tool& tool, const Arguments& given, const Surface& a, const ClosestPoint& b,
+                 const HausdorffResult& distance, double diagonal_mm, std::vector<fs::path>& written) {
   PlyOptions options;
   options.comments = {"made by " + tool.command()};
   options.space = a.space;
   options.overwrite = tool.force();
   if (given.curved) {
     write_ply(*given.curved, tessellate(*a.shell, curved_deviation * diagonal_mm).mesh, options);
+    written.push_back(*given.curved);
   }
   if (!given.map && !given.picture) {
     return;
@@ -151,6 +152,7 @@ void write_outputs(const cli::Tool& tool, const Arguments& given, const Surface&
   const Map map = make_map(a, b, diagonal_mm);
   if (given.map) {
     write_ply(*given.map, map.mesh, map.distances, options);
+    written.push_back(*given.map);
   }
   if (given.picture) {
     PictureOptions look;
@@ -163,6 +165,21 @@ void write_outputs(const cli::Tool& tool, const Arguments& given, const Surface&
     look.lines = map.edges;
     look.overwrite = tool.force();
     write_error_map_picture(*given.picture, map.mesh, map.distances, look);
+  }
+}
+
+// All of the files, or none: a run that fails leaves nothing behind that looks finished.
+void write_outputs(const cli::Tool& tool, const Arguments& given, const Surface& a, const ClosestPoint& b,
+                   const HausdorffResult& distance, double diagonal_mm) {
+  std::vector<fs::path> written;
+  try {
+    write_files(tool, given, a, b, distance, diagonal_mm, written);
+  } catch (...) {
+    for (const fs::path& path : written) {
+      std::error_code ignored;
+      fs::remove(path, ignored);
+    }
+    throw;
   }
 }
 

@@ -6,18 +6,19 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace tunica {
 namespace {
 
-constexpr Index none = 0xffffffff;
 /// A triangle may turn by at most acos(0.2) = 78 degrees in one collapse.
 constexpr double least_cosine = 0.2;
-/// What a collapse may make of the triangles: cosine of the sharpest fold between neighbours, and height over longest
-/// edge of the thinnest triangle (0.08 leaves no angle below 4.6 degrees), unless they were worse before. The next
-/// limits count when the ones before leave nothing to collapse.
-constexpr std::array<ShapeLimits, 3> shape_limits{{{0, 0.08}, {-0.5, 0.06}, {-0.9, 0.01}}};
-constexpr std::array<ShapeLimits, 3> good_shape_limits{{{0, 0.25}, {-0.5, 0.15}, {-0.9, 0.01}}};
+/// What a collapse may make of the triangles: cosine of the sharpest fold between neighbours, height over longest edge
+/// of the thinnest triangle, and the height below which it has to be worth it (0.08 leaves no angle below 4.6 degrees),
+/// unless they were worse before. The next limits count when the ones before leave nothing to collapse.
+constexpr std::array<ShapeLimits, 3> shape_limits{{{0, 0.002, 0.08}, {-0.5, 0.002, 0.06}, {-0.9, 0.001, 0.01}}};
+constexpr std::array<ShapeLimits, 3> good_shape_limits{{{0, 0.25, 0.25}, {-0.5, 0.15, 0.15}, {-0.9, 0.01, 0.01}}};
+constexpr double forbidden = std::numeric_limits<double>::infinity();
 /// Uncertainty of the planes' normals, squared, where shape counts: vertices are drawn to the middle of the area that
 /// they stand for (Trettner, Kobbelt, Fast and robust QEF minimization using probabilistic quadrics, 2020).
 constexpr double normal_variance = 0.02;
@@ -27,12 +28,16 @@ constexpr double boundary_weight = 30;
 /// How strongly a new vertex is held near the middle of its edge where the quadric is flat.
 constexpr double pull = 1e-5;
 /// Weight of an edge's squared length times its quadric's weight: on flat ground short edges go first.
-constexpr double length_weight = 1e-7;
+constexpr double length_weight = 1e-9;
 
 // A quadric sums squared distance times area. Divided by all of its area it would be a mean squared distance, which is
 // closer to the largest distance but knows nothing of size; this power in between gave the least largest errors.
-double per_area(double area) { return area > 0 ? 1 / std::sqrt(area * std::sqrt(area)) : 1; }     // area^-0.75
-double length_to_quadric(double squared_length) { return std::sqrt(std::sqrt(squared_length)); }  // (length^2)^0.25
+double per_area(double area) {  // area^-0.875
+  return area > 0 ? 1 / std::sqrt(area * std::sqrt(area * std::sqrt(area))) : 1;
+}
+double length_to_quadric(double squared_length) {  // (length^2)^0.125
+  return std::sqrt(std::sqrt(std::sqrt(squared_length)));
+}
 
 double height_over_longest(const Vec3& normal, const Vec3& a, const Vec3& b, const Vec3& c) {
   const double squared_longest = std::max({(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()});
@@ -54,10 +59,7 @@ EdgeCollapse::EdgeCollapse(const TriangleMesh& mesh, Aim aim) : aim_(aim), heap_
   TUNICA_ASSERT(box.diagonal() > 0);
   centre_ = 0.5 * (box.lower + box.upper);
   scale_ = box.diagonal();
-  position_.reserve(mesh.vertices.size());
-  for (const Vec3& v : mesh.vertices) {
-    position_.push_back((v - centre_) / scale_);
-  }
+  number_vertices(mesh);
   connect(mesh);
   find_boundary(mesh);
   sum_quadrics();
@@ -67,11 +69,11 @@ EdgeCollapse::EdgeCollapse(const TriangleMesh& mesh, Aim aim) : aim_(aim), heap_
 /// Calls visit(h) for every half-edge that leaves the vertex, counter-clockwise.
 template <typename Visit>
 void EdgeCollapse::around(Index vertex, const Visit& visit) const {
-  const HalfEdge first = outgoing_[vertex];
+  const HalfEdge first = vertex_[vertex].outgoing;
   HalfEdge h = first;
   do {
     visit(h);
-    h = twin_[previous(h)];
+    h = half_[previous(h)].twin;
   } while (h != none && h != first);
 }
 
@@ -82,73 +84,82 @@ void EdgeCollapse::neighbours_of(Index vertex, const Visit& visit) const {
     visit(to(h));
     last = h;
   });
-  if (twin_[previous(last)] == none) {
+  if (half_[previous(last)].twin == none) {
     visit(from(previous(last)));
   }
 }
 
+/// Vertices in the order in which the triangles name them: what is near in space is then near in memory.
+void EdgeCollapse::number_vertices(const TriangleMesh& mesh) {
+  number_.assign(mesh.vertices.size(), none);
+  vertex_.reserve(mesh.vertices.size());
+  given_.reserve(mesh.vertices.size());
+  for (const auto& triangle : mesh.triangles) {
+    for (const Index v : triangle) {
+      if (number_[v] == none) {
+        number_[v] = static_cast<Index>(vertex_.size());
+        given_.push_back(v);
+        vertex_.push_back({});
+        vertex_.back().position = (mesh.vertices[v] - centre_) / scale_;
+      }
+    }
+  }
+}
+
 void EdgeCollapse::connect(const TriangleMesh& mesh) {
-  const std::size_t half_edges = 3 * mesh.triangles.size();
-  corners_.resize(half_edges);
-  twin_.assign(half_edges, none);
-  edge_.assign(half_edges, none);
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    std::copy(mesh.triangles[t].begin(), mesh.triangles[t].end(),
-              corners_.begin() + static_cast<std::ptrdiff_t>(3 * t));
+  half_.resize(3 * mesh.triangles.size());
+  for (HalfEdge h = 0; h < half_.size(); ++h) {
+    half_[h].from = number_[mesh.triangles[h / 3][h % 3]];
   }
   const Incidence triangles = incidence(mesh);
-  for (HalfEdge h = 0; h < half_edges; ++h) {
-    if (edge_[h] != none) {
+  half_of_.reserve(half_.size() / 2);
+  for (HalfEdge h = 0; h < half_.size(); ++h) {
+    if (half_[h].edge != none) {
       continue;
     }
     const auto edge = static_cast<Index>(half_of_.size());
     half_of_.push_back(h);
-    edge_[h] = edge;
-    for (const Index t : triangles.of(to(h))) {
+    half_[h].edge = edge;
+    for (const Index t : triangles.of(mesh.triangles[h / 3][next(h) % 3])) {
       for (HalfEdge other = 3 * t; other < 3 * t + 3; ++other) {
         if (from(other) == to(h) && to(other) == from(h)) {
-          twin_[h] = other;
-          twin_[other] = h;
-          edge_[other] = edge;
+          half_[h].twin = other;
+          half_[other].twin = h;
+          half_[other].edge = edge;
         }
       }
     }
   }
   placement_.assign(half_of_.size(), Placement::best);
-  mark_.assign(mesh.vertices.size(), 0);
-  outgoing_.assign(mesh.vertices.size(), none);
-  for (HalfEdge h = 0; h < half_edges; ++h) {
-    if (outgoing_[from(h)] == none || twin_[h] == none) {
-      outgoing_[from(h)] = h;
+  for (HalfEdge h = 0; h < half_.size(); ++h) {
+    if (vertex_[from(h)].outgoing == none || half_[h].twin == none) {
+      vertex_[from(h)].outgoing = h;
     }
   }
 }
 
 void EdgeCollapse::find_boundary(const TriangleMesh& mesh) {
-  curve_of_.assign(mesh.vertices.size(), none);
-  curve_place_.assign(mesh.vertices.size(), 0);
-  if (std::find(twin_.begin(), twin_.end(), none) == twin_.end()) {
+  curve_place_.assign(vertex_.size(), 0);
+  if (std::all_of(half_.begin(), half_.end(), [](const Half& half) { return half.twin != none; })) {
     return;
   }
   for (const auto& loop : boundary_loops(mesh)) {
     Curve curve;
-    for (const Index v : loop) {
-      curve_of_[v] = static_cast<Index>(curves_.size());
+    for (const Index given : loop) {
+      const Index v = number_[given];
+      vertex_[v].curve = static_cast<Index>(curves_.size());
       curve_place_[v] = static_cast<double>(curve.points.size());
-      curve.points.push_back(position_[v]);
+      curve.points.push_back(vertex_[v].position);
     }
     curves_.push_back(std::move(curve));
   }
 }
 
 void EdgeCollapse::sum_quadrics() {
-  quadric_.assign(position_.size(), {});
-  area_.assign(position_.size(), 0);
-  facing_.assign(position_.size(), Vec3::Zero());
-  wall_.assign(curves_.empty() ? 0 : position_.size(), {});
-  for (HalfEdge h = 0; h < corners_.size(); h += 3) {
-    const Vec3& a = position_[corners_[h]];
-    const Vec3 normal = (position_[corners_[h + 1]] - a).cross(position_[corners_[h + 2]] - a);
+  wall_.assign(curves_.empty() ? 0 : vertex_.size(), {});
+  for (HalfEdge h = 0; h < half_.size(); h += 3) {
+    const Vec3& a = vertex_[half_[h].from].position;
+    const Vec3 normal = (vertex_[half_[h + 1].from].position - a).cross(vertex_[half_[h + 2].from].position - a);
     const double doubled_area = normal.norm();
     if (!(doubled_area > 0)) {
       continue;
@@ -156,18 +167,18 @@ void EdgeCollapse::sum_quadrics() {
     const Vec3 unit = normal / doubled_area;
     Quadric plane = Quadric::plane(unit, a, doubled_area);
     if (aim_ == Aim::good_shape) {
-      const Vec3 centre = (a + position_[corners_[h + 1]] + position_[corners_[h + 2]]) / 3;
+      const Vec3 centre = (a + vertex_[half_[h + 1].from].position + vertex_[half_[h + 2].from].position) / 3;
       plane += Quadric::point(centre, normal_variance * doubled_area);
     }
     for (HalfEdge k = h; k < h + 3; ++k) {
-      quadric_[corners_[k]] += plane;
-      area_[corners_[k]] += doubled_area;
-      facing_[corners_[k]] += normal;
-      if (twin_[k] == none) {
-        const Vec3 edge = position_[to(k)] - position_[from(k)];
+      vertex_[half_[k].from].quadric += plane;
+      vertex_[half_[k].from].area += doubled_area;
+      vertex_[half_[k].from].facing += normal;
+      if (half_[k].twin == none) {
+        const Vec3 edge = vertex_[to(k)].position - vertex_[from(k)].position;
         const Vec3 outward = edge.cross(unit);
         if (outward.norm() > 0) {
-          const Quadric wall = Quadric::plane(outward.normalized(), position_[from(k)],
+          const Quadric wall = Quadric::plane(outward.normalized(), vertex_[from(k)].position,
                                               boundary_weight * length_to_quadric(edge.squaredNorm()));
           wall_[from(k)] += wall;
           wall_[to(k)] += wall;
@@ -185,7 +196,7 @@ void EdgeCollapse::fill_heap() {
       continue;
     }
     if (const auto found = target(half_of_[edge], Placement::best)) {
-      heap_.append(edge, found->cost);
+      heap_.append(edge, found->cost());
     }
   }
   heap_.order();
@@ -212,16 +223,19 @@ std::size_t EdgeCollapse::run(std::size_t triangles, const Progress& progress) {
   return triangles_;
 }
 
+/// What its shapes make dearer is found out only when its turn comes.
 bool EdgeCollapse::collapse_cheapest() {
   const Index edge = heap_.top();
   const HalfEdge h = half_of_[edge];
+  const double known = heap_.top_key() * (1 + 1e-12);
   const auto chosen = target(h, placement_[edge]);
   TUNICA_ASSERT(chosen.has_value());
   if (!keeps_topology(h)) {
     heap_.remove(edge);
     return false;
   }
-  if (!keeps_shape(h, chosen->position)) {
+  const double penalty = shape_penalty(h, chosen->position);
+  if (penalty == forbidden) {
     if (placement_[edge] == Placement::best) {
       evaluate(edge, Placement::end);
     } else {
@@ -229,12 +243,16 @@ bool EdgeCollapse::collapse_cheapest() {
     }
     return false;
   }
+  if (chosen->cost(penalty) > known) {
+    heap_.set(edge, chosen->cost(penalty));
+    return false;
+  }
   collapse(h, *chosen);
   return true;
 }
 
 Quadric EdgeCollapse::cost_of(Index u, Index v) const {
-  Quadric q = (quadric_[u] + quadric_[v]).times(per_area(area_[u] + area_[v]));
+  Quadric q = (vertex_[u].quadric + vertex_[v].quadric).times(per_area(vertex_[u].area + vertex_[v].area));
   if (!wall_.empty()) {
     q += wall_[u];
     q += wall_[v];
@@ -245,38 +263,39 @@ Quadric EdgeCollapse::cost_of(Index u, Index v) const {
 std::optional<EdgeCollapse::Target> EdgeCollapse::target(HalfEdge h, Placement placement) const {
   const Index u = from(h);
   const Index v = to(h);
-  const Quadric q = cost_of(u, v);
-  const Vec3& p = position_[u];
-  const Vec3& r = position_[v];
-  const double penalty = length_weight * q.trace() * (p - r).squaredNorm();
-  const bool u_on_boundary = curve_of_[u] != none;
-  const bool v_on_boundary = curve_of_[v] != none;
-  const auto at = [&](const Vec3& x) { return std::max(0.0, q(x)) + penalty; };
-  if (u_on_boundary && v_on_boundary && twin_[h] != none) {
+  const bool u_on_boundary = vertex_[u].curve != none;
+  const bool v_on_boundary = vertex_[v].curve != none;
+  if (u_on_boundary && v_on_boundary && half_[h].twin != none) {
     return std::nullopt;  // would pinch the surface
   }
+  const Quadric q = cost_of(u, v);
+  const Vec3& p = vertex_[u].position;
+  const Vec3& r = vertex_[v].position;
+  const auto at = [&](const Vec3& x) { return std::max(0.0, q(x)); };
+  Target found;
   if (u_on_boundary != v_on_boundary) {
-    return Target{u_on_boundary ? p : r, at(u_on_boundary ? p : r), curve_place_[u_on_boundary ? u : v]};
-  }
-  if (placement == Placement::end) {
+    const Vec3& fixed = u_on_boundary ? p : r;
+    found = {fixed, at(fixed), curve_place_[u_on_boundary ? u : v]};
+  } else if (placement == Placement::end) {
     const double at_p = at(p);
     const double at_r = at(r);
-    return at_p <= at_r ? Target{p, at_p, curve_place_[u]} : Target{r, at_r, curve_place_[v]};
+    found = at_p <= at_r ? Target{p, at_p, curve_place_[u]} : Target{r, at_r, curve_place_[v]};
+  } else if (u_on_boundary) {
+    found = best_on_curve(h, q);
+    found.error = std::max(0.0, found.error);
+  } else {
+    const Vec3 middle = 0.5 * (p + r);
+    const auto minimum = q.minimum(middle, pull);
+    const Vec3 best = minimum && (*minimum - middle).squaredNorm() <= 4 * (p - r).squaredNorm() ? *minimum : middle;
+    found = {best, at(best)};
   }
-  if (u_on_boundary) {
-    Target found = best_on_curve(h, q);
-    found.cost = std::max(0.0, found.cost) + penalty;
-    return found;
-  }
-  const Vec3 middle = 0.5 * (p + r);
-  const auto minimum = q.minimum(middle, pull);
-  const Vec3 best = minimum && (*minimum - middle).squaredNorm() <= 4 * (p - r).squaredNorm() ? *minimum : middle;
-  return Target{best, at(best), 0};
+  found.length_cost = length_weight * q.trace() * (p - r).squaredNorm();
+  return found;
 }
 
 /// The place on the boundary curve between the ends of a boundary edge where the quadric is least.
 EdgeCollapse::Target EdgeCollapse::best_on_curve(HalfEdge h, const Quadric& q) const {
-  const Curve& curve = curves_[curve_of_[from(h)]];
+  const Curve& curve = curves_[vertex_[from(h)].curve];
   const auto n = static_cast<double>(curve.points.size());
   const double begin = curve_place_[from(h)];
   double end = curve_place_[to(h)];
@@ -288,7 +307,7 @@ EdgeCollapse::Target EdgeCollapse::best_on_curve(HalfEdge h, const Quadric& q) c
   const auto try_place = [&](double place) {
     const Vec3 x = curve.at(wrapped(place));
     const double cost = q(x);
-    if (cost < best.cost) {
+    if (cost < best.error) {
       best = {x, cost, wrapped(place)};
     }
   };
@@ -315,7 +334,7 @@ EdgeCollapse::Target EdgeCollapse::best_on_curve(HalfEdge h, const Quadric& q) c
 void EdgeCollapse::evaluate(Index edge, Placement placement) {
   placement_[edge] = placement;
   if (const auto found = target(half_of_[edge], placement)) {
-    heap_.set(edge, found->cost);
+    heap_.set(edge, found->cost());
   } else {
     heap_.remove(edge);
   }
@@ -327,39 +346,42 @@ void EdgeCollapse::evaluate(Index edge, Placement placement) {
 bool EdgeCollapse::keeps_topology(HalfEdge h) {
   const Index u = from(h);
   const Index v = to(h);
-  const std::size_t expected = twin_[h] == none ? 1 : 2;
+  const std::size_t expected = half_[h].twin == none ? 1 : 2;
   ++stamp_;
-  neighbours_of(u, [&](Index w) { mark_[w] = stamp_; });
+  neighbours_of(u, [&](Index w) { vertex_[w].mark = stamp_; });
   std::size_t common = 0;
-  neighbours_of(v, [&](Index w) { common += mark_[w] == stamp_ ? 1 : 0; });
+  neighbours_of(v, [&](Index w) { common += vertex_[w].mark == stamp_ ? 1 : 0; });
   if (common != expected) {
     return false;
   }
   const auto keeps_enough = [&](Index apex) {
     std::size_t valence = 0;
     neighbours_of(apex, [&](Index) { ++valence; });
-    return valence > (curve_of_[apex] == none ? 3U : 2U);
+    return valence > (vertex_[apex].curve == none ? 3U : 2U);
   };
-  return keeps_enough(from(previous(h))) && (twin_[h] == none || keeps_enough(from(previous(twin_[h]))));
+  return keeps_enough(from(previous(h))) && (half_[h].twin == none || keeps_enough(from(previous(half_[h].twin))));
 }
 
-bool EdgeCollapse::keeps_shape(HalfEdge h, const Vec3& position) const {
-  return fan_keeps_shape(from(h), to(h), position) && fan_keeps_shape(to(h), from(h), position);
+/// How many times dearer the triangles' shapes make a collapse; `forbidden` where it would fold or flatten any.
+double EdgeCollapse::shape_penalty(HalfEdge h, const Vec3& position) const {
+  const double one = fan_penalty(from(h), to(h), position);
+  return one == forbidden ? forbidden : std::max(one, fan_penalty(to(h), from(h), position));
 }
 
-/// Whether the triangles around `vertex` that do not hold `other` stay well when `vertex` moves to `position`.
-bool EdgeCollapse::fan_keeps_shape(Index vertex, Index other, const Vec3& position) const {
+/// The same for the triangles around `vertex` that do not hold `other`, when `vertex` moves to `position`.
+double EdgeCollapse::fan_penalty(Index vertex, Index other, const Vec3& position) const {
+  double penalty = 1;
   bool good = true;
-  const Vec3& old_position = position_[vertex];
-  const Vec3 facing = facing_[vertex] + facing_[other];
+  const Vec3& old_position = vertex_[vertex].position;
+  const Vec3 facing = vertex_[vertex].facing + vertex_[other].facing;
   around(vertex, [&](HalfEdge h) {
     const Index i = to(h);
     const Index j = to(next(h));
     if (!good || i == other || j == other) {
       return;
     }
-    const Vec3& a = position_[i];
-    const Vec3& b = position_[j];
+    const Vec3& a = vertex_[i].position;
+    const Vec3& b = vertex_[j].position;
     const Vec3 before = (a - old_position).cross(b - old_position);
     const Vec3 after = (a - position).cross(b - position);
     const double lengths = before.norm() * after.norm();
@@ -367,35 +389,39 @@ bool EdgeCollapse::fan_keeps_shape(Index vertex, Index other, const Vec3& positi
     const double new_height = height_over_longest(after, position, a, b);
     const bool was_flat = !(old_height > 1e-9);
     // Many small turns may add up: the given surface that the three corners stand for must be faced as well.
-    const Vec3 given = facing + facing_[i] + facing_[j];
+    const Vec3 given = facing + vertex_[i].facing + vertex_[j].facing;
     good = (was_flat || before.dot(after) > least_cosine * lengths) &&
            (after.dot(given) > 0 || before.dot(given) <= 0) &&
            new_height > std::min(limits_.least_height, 0.7 * old_height) && after.squaredNorm() > 0;
-    const HalfEdge across = twin_[next(h)];
+    const double wanted = std::min(limits_.good_height, 0.7 * old_height);
+    if (new_height < wanted) {
+      penalty = std::max(penalty, wanted / new_height);
+    }
+    const HalfEdge across = half_[next(h)].twin;
     if (good && across != none) {
       // The triangle on the outer side stays: the new one must not lie back on it.
-      const Vec3& c = position_[from(previous(across))];
+      const Vec3& c = vertex_[from(previous(across))].position;
       const Vec3 outer = (a - b).cross(c - b);
       const double limit = limits_.fold_cosine * outer.norm();
       good = after.dot(outer) > limit * after.norm() || before.dot(outer) <= limit * before.norm();
     }
   });
-  return good;
+  return good ? penalty : forbidden;
 }
 
 /// Makes the twins of two edges of a dying triangle each other's twins. The spoke's edge lives on, the rim's is gone.
 void EdgeCollapse::unlink(HalfEdge spoke, HalfEdge rim) {
-  const HalfEdge one = twin_[spoke];
-  const HalfEdge other = twin_[rim];
-  const Index edge = edge_[spoke];
-  heap_.remove(edge_[rim]);
-  half_of_[edge_[rim]] = none;
+  const HalfEdge one = half_[spoke].twin;
+  const HalfEdge other = half_[rim].twin;
+  const Index edge = half_[spoke].edge;
+  heap_.remove(half_[rim].edge);
+  half_of_[half_[rim].edge] = none;
   if (one != none) {
-    twin_[one] = other;
+    half_[one].twin = other;
   }
   if (other != none) {
-    twin_[other] = one;
-    edge_[other] = edge;
+    half_[other].twin = one;
+    half_[other].edge = edge;
   }
   half_of_[edge] = one != none ? one : other;
 }
@@ -403,25 +429,25 @@ void EdgeCollapse::unlink(HalfEdge spoke, HalfEdge rim) {
 /// Stores a half-edge that leaves the vertex: of a boundary vertex the one that lies on the boundary.
 void EdgeCollapse::set_outgoing(Index vertex, HalfEdge any) {
   HalfEdge h = any;
-  while (twin_[h] != none) {
-    h = next(twin_[h]);
+  while (half_[h].twin != none) {
+    h = next(half_[h].twin);
     if (h == any) {
       break;
     }
   }
-  outgoing_[vertex] = h;
+  vertex_[vertex].outgoing = h;
 }
 
 void EdgeCollapse::collapse(HalfEdge h, const Target& chosen) {
   const Index u = from(h);
   const Index v = to(h);
-  const HalfEdge o = twin_[h];
-  const bool v_on_boundary = curve_of_[v] != none;
-  around(v, [&](HalfEdge spoke) { corners_[spoke] = u; });
+  const HalfEdge o = half_[h].twin;
+  const bool v_on_boundary = vertex_[v].curve != none;
+  around(v, [&](HalfEdge spoke) { half_[spoke].from = u; });
   // Triangle u v a dies: spoke a-u stays, rim v-a goes.
   const Index a = from(previous(h));
-  heap_.remove(edge_[h]);
-  half_of_[edge_[h]] = none;
+  heap_.remove(half_[h].edge);
+  half_of_[half_[h].edge] = none;
   unlink(previous(h), next(h));
   triangles_ -= 1;
   Index b = none;
@@ -430,15 +456,15 @@ void EdgeCollapse::collapse(HalfEdge h, const Target& chosen) {
     unlink(next(o), previous(o));
     triangles_ -= 1;
   }
-  position_[u] = chosen.position;
-  quadric_[u] += quadric_[v];
-  area_[u] += area_[v];
-  facing_[u] += facing_[v];
+  vertex_[u].position = chosen.position;
+  vertex_[u].quadric += vertex_[v].quadric;
+  vertex_[u].area += vertex_[v].area;
+  vertex_[u].facing += vertex_[v].facing;
   if (!wall_.empty()) {
     wall_[u] += wall_[v];
   }
   if (v_on_boundary) {
-    curve_of_[u] = curve_of_[v];
+    vertex_[u].curve = vertex_[v].curve;
   }
   curve_place_[u] = chosen.curve;
   // The spokes' edges live on, so their half-edges lie in living triangles.
@@ -446,16 +472,16 @@ void EdgeCollapse::collapse(HalfEdge h, const Target& chosen) {
     const HalfEdge half = half_of_[edge];
     return from(half) == vertex ? half : next(half);
   };
-  set_outgoing(u, leaving(u, edge_[previous(h)]));
-  set_outgoing(a, leaving(a, edge_[previous(h)]));
+  set_outgoing(u, leaving(u, half_[previous(h)].edge));
+  set_outgoing(a, leaving(a, half_[previous(h)].edge));
   if (b != none) {
-    set_outgoing(b, leaving(b, edge_[next(o)]));
+    set_outgoing(b, leaving(b, half_[next(o)].edge));
   }
-  history_.push_back({u, v, static_cast<Index>(triangles_), centre_ + scale_ * chosen.position});
+  history_.push_back({given_[u], given_[v], static_cast<Index>(triangles_), centre_ + scale_ * chosen.position});
   around(u, [&](HalfEdge spoke) {
-    evaluate(edge_[spoke], Placement::best);
-    if (twin_[previous(spoke)] == none) {
-      evaluate(edge_[previous(spoke)], Placement::best);
+    evaluate(half_[spoke].edge, Placement::best);
+    if (half_[previous(spoke)].twin == none) {
+      evaluate(half_[previous(spoke)].edge, Placement::best);
     }
   });
 }

@@ -11,6 +11,7 @@ namespace tunica {
 struct ShapeLimits {
   double fold_cosine = -1;  ///< of the angle between neighbours' normals
   double least_height = 0;  ///< height over longest edge
+  double good_height = 0;   ///< thinner ones must be worth it
 };
 
 /// One step of a decimation: vertex `removed` becomes `kept`, which moves to `position` (of the given mesh's frame).
@@ -43,8 +44,11 @@ private:
   enum class Placement : unsigned char { best, end };
   struct Target {
     Vec3 position;
-    double cost;
-    double curve = 0;  // place on the boundary curve
+    double error;            // squared distances, as weighted
+    double curve = 0;        // place on the boundary curve
+    double length_cost = 0;  // what lets short edges go first
+    // What it counts for when shape makes the error dearer.
+    [[nodiscard]] double cost(double factor = 1) const { return factor * error + length_cost; }
   };
   // A boundary loop of the given mesh, as a closed polyline; places on it are segment number + fraction.
   struct Curve {
@@ -52,15 +56,33 @@ private:
     [[nodiscard]] Vec3 at(double place) const;
   };
 
+  static constexpr Index none = 0xffffffff;
+  // What is looked at together lies together.
+  struct Vertex {
+    Quadric quadric;  // of the planes of the triangles, weighted by area
+    double area = 0;  // sum of those weights
+    Vec3 position = Vec3::Zero();
+    Vec3 facing = Vec3::Zero();  // sum of the given triangles' normals times area that the vertex stands for
+    HalfEdge outgoing = none;    // a half-edge from it; at a boundary the one without a twin
+    Index curve = none;          // boundary curve
+    Index mark = 0;              // stamp of the last link check
+  };
+  struct Half {
+    Index from = 0;
+    HalfEdge twin = none;
+    Index edge = none;
+  };
+
   static HalfEdge next(HalfEdge h) { return h % 3 == 2 ? h - 2 : h + 1; }
   static HalfEdge previous(HalfEdge h) { return h % 3 == 0 ? h + 2 : h - 1; }
-  [[nodiscard]] Index from(HalfEdge h) const { return corners_[h]; }
-  [[nodiscard]] Index to(HalfEdge h) const { return corners_[next(h)]; }
+  [[nodiscard]] Index from(HalfEdge h) const { return half_[h].from; }
+  [[nodiscard]] Index to(HalfEdge h) const { return half_[next(h)].from; }
   template <typename Visit>
   void around(Index vertex, const Visit& visit) const;
   template <typename Visit>
   void neighbours_of(Index vertex, const Visit& visit) const;
 
+  void number_vertices(const TriangleMesh& mesh);
   void connect(const TriangleMesh& mesh);
   void find_boundary(const TriangleMesh& mesh);
   void sum_quadrics();
@@ -71,29 +93,22 @@ private:
   [[nodiscard]] Quadric cost_of(Index u, Index v) const;
   void evaluate(Index edge, Placement placement);
   [[nodiscard]] bool keeps_topology(HalfEdge h);
-  [[nodiscard]] bool keeps_shape(HalfEdge h, const Vec3& position) const;
-  [[nodiscard]] bool fan_keeps_shape(Index vertex, Index other, const Vec3& position) const;
+  [[nodiscard]] double shape_penalty(HalfEdge h, const Vec3& position) const;
+  [[nodiscard]] double fan_penalty(Index vertex, Index other, const Vec3& position) const;
   void collapse(HalfEdge h, const Target& target);
   void unlink(HalfEdge spoke, HalfEdge rim);
   void set_outgoing(Index vertex, HalfEdge any);
 
   Vec3 centre_ = Vec3::Zero();
   double scale_ = 1;
-  std::vector<Vec3> position_;
-  std::vector<Quadric> quadric_;      // #V of the planes of the triangles, weighted by area
-  std::vector<double> area_;          // #V sum of those weights
-  std::vector<Vec3> facing_;          // #V sum of the given triangles' normals times area that a vertex stands for
-  std::vector<Quadric> wall_;         // #V of the planes on the boundary edges; empty when there is no boundary
-  std::vector<Index> corners_;        // #3F vertex of each corner; the half-edge starts there
-  std::vector<HalfEdge> twin_;        // #3F or none
-  std::vector<Index> edge_;           // #3F edge of each half-edge
+  std::vector<Vertex> vertex_;        // #V of those that a triangle uses
+  std::vector<Half> half_;            // #3F
   std::vector<HalfEdge> half_of_;     // #E one half-edge of each edge, none when the edge is gone
   std::vector<Placement> placement_;  // #E
-  std::vector<HalfEdge> outgoing_;    // #V a half-edge from each vertex; at a boundary the one without a twin
-  std::vector<Index> curve_of_;       // #V boundary curve, or none
+  std::vector<Quadric> wall_;         // #V of the planes on the boundary edges; empty when there is no boundary
   std::vector<double> curve_place_;   // #V
   std::vector<Curve> curves_;
-  std::vector<Index> mark_;  // #V stamp of the last link check
+  std::vector<Index> number_, given_;  // of the given mesh's vertices here, and back
   Index stamp_ = 0;
   Aim aim_;
   ShapeLimits limits_;

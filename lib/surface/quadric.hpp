@@ -75,7 +75,8 @@ struct Quadric {
     const double c01 = xz * yz - xy * f;
     const double c02 = xy * yz - xz * d;
     const double determinant = a * c00 + xy * c01 + xz * c02;
-    if (!(determinant > 1e-18 * std::pow(trace(), 3))) {
+    const double size = trace();
+    if (!(determinant > 1e-18 * size * size * size)) {
       return std::nullopt;
     }
     const double c11 = a * f - xz * xz;

@@ -287,7 +287,12 @@ private:
       const PatchTrial split = trial_;
       const auto [u, v] = next->edge;
       ++next;
-      if (evaluate_collapse(u, v, most_loss, trial_) < most_loss && !share_triangles(split, trial_)) {
+      // At a boundary a collapse takes away only one triangle.
+      const auto fits = [&](const PatchTrial& collapse) {
+        return mesh().alive + split.corners.size() + collapse.corners.size() <=
+               options_.triangles + split.removed.size() + collapse.removed.size();
+      };
+      if (evaluate_collapse(u, v, most_loss, trial_) < most_loss && !share_triangles(split, trial_) && fits(trial_)) {
         const PatchTrial collapse = trial_;
         touch(split);
         touch(collapse);

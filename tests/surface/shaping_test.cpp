@@ -96,6 +96,14 @@ TEST(Shaping, BoundaryVerticesStayOnTheBoundaryCurve) {
   }
 }
 
+TEST(Shaping, TheCountHoldsAtBoundariesToo) {
+  // Collapses at a rim take one triangle away, splits inside add two.
+  const TriangleMesh sheet = shapes::shaken(shapes::plane(40, 40), 0.004, 9);
+  for (std::size_t count = 95; count < 101; ++count) {
+    EXPECT_LE(well_shaped(sheet, count, 20).mesh.triangles.size(), count);
+  }
+}
+
 TEST(Shaping, EdgesOfABoxStaySharp) {
   // The cube's creases are between its faces: none of its corners may be cut.
   TriangleMesh cube;
