@@ -43,6 +43,16 @@ File open_input(const fs::path& path) {
   return file;
 }
 
+// Where a name that is a symbolic link leads: renaming onto the link would replace the link, not the file it stands
+// for.
+fs::path behind_links(fs::path path) {
+  std::error_code error;
+  for (int link = 0; link < 40 && fs::is_symlink(fs::symlink_status(path, error)); ++link) {
+    path = path.parent_path() / fs::read_symlink(path, error);
+  }
+  return path;
+}
+
 void flush_to_disk(const fs::path& path) {
   const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
   if (fd < 0) {
@@ -99,7 +109,7 @@ OutputFile::~OutputFile() {
 void OutputFile::commit() {
   TUNICA_ASSERT(!done_);
   flush_to_disk(partial_);
-  if (std::rename(partial_.c_str(), path_.c_str()) != 0) {
+  if (std::rename(partial_.c_str(), behind_links(path_).c_str()) != 0) {
     throw OutputError(fmt::format("{}: cannot be written: {}", path_.string(), reason()));
   }
   done_ = true;

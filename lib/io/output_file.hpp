@@ -7,7 +7,8 @@
 namespace tunica {
 
 /// An output that is whole or not there: everything goes to `NAME.part`, which commit() flushes to the disk and
-/// renames to NAME. Without commit() the destructor removes the .part file, unless keep_partial() was called.
+/// renames to NAME (or to the file behind it, when NAME is a symbolic link). Without commit() the destructor removes
+/// the .part file, unless keep_partial() was called.
 class OutputFile {
 public:
   /// Errors: OutputError when NAME exists and `overwrite` is false, or when NAME.part cannot be created.

@@ -409,9 +409,8 @@ HausdorffResult hausdorff(const ClosestPoint& a, const ClosestPoint& b, const Ha
 
 HausdorffResult hausdorff(const TriangleMesh& a, const TriangleMesh& b, const HausdorffOptions& options) {
   std::optional<ClosestPoint> tree_a, tree_b;
-  parallel_for_blocks(2, 1, [&](std::size_t which, std::size_t) {
-    (which == 0 ? tree_a : tree_b).emplace(which == 0 ? a : b);
-  });
+  parallel_for_blocks(
+      2, 1, [&](std::size_t which, std::size_t) { (which == 0 ? tree_a : tree_b).emplace(which == 0 ? a : b); });
   return hausdorff(*tree_a, *tree_b, options);
 }
 

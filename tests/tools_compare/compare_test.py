@@ -1,5 +1,6 @@
 """tunica-compare as its users run it: analytic distances, maps, curved shells, each exit code."""
 import math
+import os
 import unittest
 
 import meshes
@@ -123,6 +124,12 @@ class Compare(WholeTool):
         self.run_tool("plane.ply", "offset.ply", "--map", "map.ply", code=5, says="map.ply")
         with open(self.path("map.ply")) as file:
             self.assertEqual(file.read(), "mine")
+
+
+    def test_nothing_that_looks_finished_is_left_when_a_later_output_fails(self):
+        os.mkdir(self.path("map.png.part"))  # where the picture would be written
+        self.run_tool("plane.ply", "offset.ply", "--map", "map.ply", "--picture", "map.png", code=5, says="map.png")
+        self.assertFalse(self.exists("map.ply"))
 
 
 if __name__ == "__main__":

@@ -204,6 +204,18 @@ class Decimate(WholeTool):
         self.assertEqual(len(meshes.read_ply(self.path("out.ply"))[2]), 50)
         self.run_tool("in.ply", "absent/out.ply", "--triangles", 50, code=5)
 
+    def test_output_through_a_symbolic_link(self):
+        self.surface()
+        os.mkdir(self.path("store"))
+        for name, there in [("store/coarse.ply", True), ("store/new.ply", False)]:
+            if there:
+                self.run_tool("in.ply", name, "--triangles", 100)
+            link = "link%d.ply" % there
+            os.symlink(name, self.path(link))
+            self.run_tool("in.ply", link, "--triangles", 50, "--force")
+            self.assertTrue(os.path.islink(self.path(link)))
+            self.assertEqual(len(meshes.read_ply(self.path(name))[2]), 50)
+
 
 if __name__ == "__main__":
     unittest.main()
