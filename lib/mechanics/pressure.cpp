@@ -169,16 +169,15 @@ void unit_pressure(const ShellElement& element, const CornerMotion& motion, Vect
           area * end.weight * (edge.dot(end.carried) * Mat3::Identity() - end.carried * edge.transpose());
     }
   }
-  for (int i = 0; i < 3; ++i) {
-    t.middleRows<3>(6 * i).noalias() += area_gradient.col(i) * height_gradient.transpose();
-    t.middleCols<3>(6 * i).noalias() += height_gradient * area_gradient.col(i).transpose();
-    for (int j = 0; j < 3; ++j) {
-      Mat3 second = 0.25 / area * (opposite.col(i).dot(opposite.col(j)) * n * n.transpose());
-      if (i != j) {
-        const double sign = j == (i + 1) % 3 ? -0.5 : 0.5;
-        second += sign * skew(n);
-      }
-      t.block<3, 3>(6 * i, 6 * j) += skew(opposite.col(j)) / 6 + height * second;
+  // height x d2A/dx_i dx_j + d(2A n / 6)/dx_j + what the gradients of area and height make together.
+  const Mat3 across = 0.25 * height / area * n * n.transpose();
+  for (int j = 0; j < 3; ++j) {
+    t.middleRows<3>(6 * j).noalias() += area_gradient.col(j) * height_gradient.transpose();
+    t.middleCols<3>(6 * j).noalias() += height_gradient * area_gradient.col(j).transpose();
+    for (int i = 0; i < 3; ++i) {
+      const double sign = i == j ? 0 : j == (i + 1) % 3 ? -0.5 : 0.5;
+      const Vec3 axis = opposite.col(j) / 6 + sign * height * n;
+      t.block<3, 3>(6 * i, 6 * j) += opposite.col(i).dot(opposite.col(j)) * across + skew(axis);
     }
   }
 }
