@@ -267,7 +267,7 @@ void add_material(const ShellElement& element, double factor, const std::array<M
                   const std::array<Mat3, 3>& g, const Derivatives& d, Matrix18& t) {
   const Matrix3x18 stress = (factor * element.membrane).lazyProduct(d.strain);
   add_symmetric_product(d.strain, stress, t);
-  if (element.curved) {
+  if (!element.skewing.isZero(0)) {
     Matrix3x18 skewness;
     for (int k = 0; k < 3; ++k) {
       skewness.row(k) = 0.5 * (d.slopes.row(2 * k) + d.slopes.row(2 * k + 1));

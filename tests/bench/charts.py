@@ -116,6 +116,27 @@ def solvers(study):
                 "--csv", os.path.join(study.out, "solvers.csv"))
 
 
+def sizes(study):
+    """One linear solve to 1e-8 from scratch: time and memory against the number of shells."""
+    names = []
+    for series, keys, most in (("direct", {"solver": "direct"}, 500_000),
+                               ("CG to 1e-8", {"solver": "cg", "cg_tolerance": 1e-8}, 20_000)):
+        for shells in (1000, 2000, 5000, 10_000, 20_000, 50_000, 100_000, 250_000, 500_000):
+            if shells > most:
+                break
+            n = round(math.sqrt(shells / 2))
+            write_ply(study.path("vessel.ply"), *vessel(n, n))
+            names.append(f"n{len(names)}")
+            study.measured(run_lines(kind="static", geometry="linear", load_steps=1, **keys) +
+                           shell("vessel.ply", 1, 1.0, 0.45) + ENDS + load("pressure", "1kPa"), names[-1], series)
+    names = [name for name in names if name not in study.failed]
+    common = ("--lines", "--x", "result.shells", "--x-label", "shells")
+    study.chart("sizes-time.svg", names, *common, "--y", "study.seconds", "--y-label", "assembly and solve, s, one thread",
+                "--title", "One linear static solve: time", "--csv", os.path.join(study.out, "sizes-time.csv"))
+    study.chart("sizes-memory.svg", names, *common, "--y", "peak_mib", "--y-label", "largest memory of the process, MiB",
+                "--title", "One linear static solve: memory", "--csv", os.path.join(study.out, "sizes-memory.csv"))
+
+
 def paper_mesh(folder, count):
     vertices, triangles = [], []
     with open(os.path.join(folder, f"aneurysm{count}.obj"), encoding="utf-8") as file:
@@ -200,6 +221,7 @@ def main():
         study = Study(folder, os.path.abspath(sys.argv[1]))
         elements(study)
         solvers(study)
+        sizes(study)
         if len(sys.argv) == 3:
             figure_6(study, sys.argv[2])
 
