@@ -1,6 +1,7 @@
 #include "mechanics/direct_solver.hpp"
 
 #include "core/error.hpp"
+#include "core/fresh_memory.hpp"
 #include "core/progress.hpp"
 #include "core/threads.hpp"
 
@@ -62,6 +63,12 @@ struct Front {
 
   [[nodiscard]] Eigen::Index left() const { return rows - columns; }
 };
+
+/// Has the system map memory now, not in the first factorisation, whose step then takes longer than the others.
+void map_now(double* memory, std::size_t size) {
+  prefer_large_pages(memory, size * sizeof(double));
+  touch_pages(memory, size * sizeof(double));
+}
 
 /// Fronts that are eliminated one after the other, and memory for the update matrices between them.
 struct Arena {
@@ -280,6 +287,7 @@ void DirectSolver::Implementation::make_fronts(const cholmod_factor& symbolic, c
     }
   }
   factor.reset(new double[storage]);
+  map_now(factor.get(), storage);
   signs = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(freedoms.size()));
   negative.resize(fronts.size());
 }
@@ -332,6 +340,7 @@ void DirectSolver::Implementation::make_arenas() {
       top += size;
     }
     arenas[a].memory.reset(new double[arenas[a].size]);
+    map_now(arenas[a].memory.get(), arenas[a].size);
   }
 }
 

@@ -57,8 +57,8 @@ struct Summary {
   std::size_t newton_iterations = 0;
   std::size_t cg_iterations = 0;
   /// What the linear solver's error leaves of a step's change, relative, in the energy norm of the tangent; the largest
-  /// of all steps with cg, of the first and the last with the direct solver. None where no system was solved, or where
-  /// the tangent was not positive definite.
+  /// of all steps with cg, of an early one and the last with the direct solver. None where no system was solved, or
+  /// where the tangent was not positive definite.
   std::optional<double> algebraic_error;
   bool algebraic_error_is_bound = false;  ///< some step's solve ended before its tolerance: at least this
   std::optional<double> volume_before;    ///< mm^3; none when a body is open

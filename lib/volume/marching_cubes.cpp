@@ -1,9 +1,9 @@
 #include "volume/marching_cubes.hpp"
 
 #include "core/error.hpp"
+#include "core/fresh_memory.hpp"
 #include "core/threads.hpp"
 #include "volume/cell_layers.hpp"
-#include "volume/fresh_memory.hpp"
 #include "volume/pinched_vertices.hpp"
 
 #include <fmt/format.h>

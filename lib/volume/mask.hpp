@@ -1,6 +1,6 @@
 #pragma once
 
-#include "volume/fresh_memory.hpp"
+#include "core/fresh_memory.hpp"
 #include "volume/volume.hpp"
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-#include "volume/fresh_memory.hpp"
+#include "core/fresh_memory.hpp"
 
 #include "core/threads.hpp"
 
