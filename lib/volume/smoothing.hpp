@@ -45,13 +45,17 @@ struct StaircaseResult {
 /// Every point of the result lies within half a voxel, per axis, of the corresponding point of the input, and the other
 /// way round: corners move by less than half a voxel, and points within a triangle move by means of the corners'
 /// moves. Each component of 100 voxels or more keeps its volume to 0.1 %, by an offset along the normals that respects
-/// the same limits. Triangles stay as they are, and none is turned over or flattened.
+/// the same limits; where that does not reach, its moves are taken back. Triangles stay as they are, and none is turned
+/// over or flattened. All of this is asserted on the result.
 /// The result is the same to the bit whatever the number of threads.
 /// @param mesh  the marching-cubes surface of a selection, in world mm; changed in place
 /// @param grid  the selection (its dims and affine are used)
 /// Source: Gibson, Constrained elastic surface nets, MICCAI 1998, with a thin plate's energy in place of springs;
 /// Nesterov's accelerated projected gradient with restarts (O'Donoghue and Candes 2015).
 /// Cost: some 200 passes over the mesh.
+/// Limits: the mean error to the true surface falls to a quarter or a third where the organ's features are ten voxels
+/// across or more, and to 0.5 to 0.9 of the staircase's below: there marching cubes itself lies some 0.05 voxels too
+/// far inside, which keeping its volume keeps, and creases are rounded.
 StaircaseResult smooth_staircase(TriangleMesh& mesh, const Mask& grid, const StaircaseOptions& options = {});
 
 }  // namespace tunica

@@ -22,6 +22,8 @@ constexpr std::size_t grain = 4096;
 /// Vertices move by at most this many voxels along each axis: a little less than half, so that two walls one voxel
 /// apart cannot meet.
 constexpr double reach = 0.49;
+/// A component of 100 voxels or more keeps its volume to this fraction.
+constexpr double most_volume_change = 1e-3;
 /// A triangle is spoilt when its normal turns by more than the angle with this cosine, or its shape falls below this
 /// ratio of twice its area to its longest edge squared.
 constexpr double least_cosine = 0.1;
@@ -184,12 +186,16 @@ public:
         break;
       }
     }
-    while (hold_back_spoilt() > 0) {
-    }
+    do {
+      while (hold_back_spoilt() > 0) {
+      }
+    } while (hold_back_volume());
     for (std::size_t v = 0; v < start_.size(); ++v) {
       result.largest_move = std::max(result.largest_move, (now_[v] - start_[v]).cwiseAbs().maxCoeff());
     }
-    result.volume_change = largest_volume_change();
+    const std::vector<double> changes = volume_changes();
+    result.volume_change = changes.empty() ? 0 : *std::ranges::max_element(changes);
+    TUNICA_ASSERT(result.largest_move < 0.5 && result.volume_change <= most_volume_change);
     advance(progress, 1.0);
     return result;
   }
@@ -368,19 +374,33 @@ private:
            shape(u, v, after) < std::min(least_shape, 0.5 * shape(p, q, before));
   }
 
-  [[nodiscard]] double largest_volume_change() const {
+  /// Where offsets within the limits could not keep a component's volume, takes half of its moves back: in the end it
+  /// is as it was. @return whether there was any such component
+  bool hold_back_volume() {
+    const std::vector<double> changes = volume_changes();
+    if (std::ranges::none_of(changes, [](double change) { return change > most_volume_change; })) {
+      return false;
+    }
+    for (std::size_t v = 0; v < now_.size(); ++v) {
+      if (changes[component_[v]] > most_volume_change) {
+        const Vec3 half = 0.5 * (now_[v] - start_[v]);
+        now_[v] = half.norm() > 1e-6 ? Vec3(start_[v] + half) : start_[v];
+      }
+    }
+    return true;
+  }
+
+  /// Of each component, as a fraction of its volume; 0 of those below 100 voxels.
+  [[nodiscard]] std::vector<double> volume_changes() const {
     std::vector<double> volume(components_, 0.0);
     for (const auto& [a, b, c] : mesh_.triangles) {
       volume[component_[a]] += start_[a].dot(start_[b].cross(start_[c])) / 6;
     }
-    const std::vector<double> change = swept();
-    double largest = 0;
+    std::vector<double> change = swept();
     for (std::size_t c = 0; c < components_; ++c) {
-      if (std::abs(volume[c]) >= 100) {
-        largest = std::max(largest, std::abs(change[c] / volume[c]));
-      }
+      change[c] = std::abs(volume[c]) >= 100 ? std::abs(change[c] / volume[c]) : 0;
     }
-    return largest;
+    return change;
   }
 
   const TriangleMesh& mesh_;

@@ -62,7 +62,15 @@ INSTANTIATE_TEST_SUITE_P(
     Phantoms, StaircaseOf,
     testing::Values(Case{"sphere", 48, Vec3(1, 1, 1), 0.5}, Case{"aneurysm", 96, Vec3(1, 1, 1), 0.5},
                     Case{"tube", 64, Vec3(0.7, 0.7, 2), 0.5}, Case{"capsule", 64, Vec3(1, 1, 1), 0.5},
-                    Case{"bladder", 64, Vec3(0.8, 0.8, 3), 0.5}, Case{"colon", 80, Vec3(1, 1, 1), 0.7}));
+                    Case{"bladder", 64, Vec3(0.8, 0.8, 3), 0.5}, Case{"colon", 80, Vec3(1, 1, 1), 0.7},
+                    Case{"sphere", 32, Vec3(1, 1, 1), 0.3}, Case{"sphere", 96, Vec3(0.78, 0.78, 5), 0.45},
+                    Case{"tube", 32, Vec3(1, 1, 1), 0.45}, Case{"tube", 128, Vec3(1, 1, 1), 0.35},
+                    Case{"tube", 128, Vec3(1, 1, 5), 0.45}, Case{"aneurysm", 48, Vec3(1, 1, 1), 0.75},
+                    Case{"aneurysm", 64, Vec3(1, 1, 2), 0.45}, Case{"aneurysm", 128, Vec3(1, 1, 1), 0.4},
+                    Case{"aneurysm", 128, Vec3(1, 1, 5), 0.5}, Case{"capsule", 128, Vec3(1, 1, 1), 0.4},
+                    Case{"capsule", 96, Vec3(0.78, 0.78, 5), 0.45}, Case{"bladder", 128, Vec3(1, 1, 1), 0.35},
+                    Case{"bladder", 128, Vec3(1, 1, 5), 0.5}, Case{"colon", 128, Vec3(1, 1, 1), 0.5},
+                    Case{"colon", 48, Vec3(1, 1, 1), 0.9}, Case{"colon", 96, Vec3(0.8, 0.8, 3), 0.95}));
 
 TEST_P(StaircaseOf, StaysWithinHalfAVoxelKeepsTheVolumeAndComesCloserToTheTruth) {
   PhantomOptions options;
@@ -90,6 +98,43 @@ TEST_P(StaircaseOf, StaysWithinHalfAVoxelKeepsTheVolumeAndComesCloserToTheTruth)
   const ClosestPoint tree(truth);
   EXPECT_LT(mean_distance(after, tree), GetParam().gain * mean_distance(before, tree));
   EXPECT_NEAR(area(after), area(truth), 0.03 * area(truth));
+}
+
+TEST(Staircase, TheErrorOfAVesselOf256VoxelsIsMoreThanHalved) {
+  PhantomOptions options;
+  options.shape = PhantomShape::aneurysm;
+  options.size = 256;
+  const Mask mask = select(make_phantom(options).volume, label_one);
+  MarchingCubesOptions open;
+  open.open_border = true;
+  TriangleMesh mesh = marching_cubes(mask, open);
+  const TriangleMesh truth = phantom_surface(options);
+  const ClosestPoint tree(truth);
+  EXPECT_GT(mean_distance(mesh, tree), 0.00040 * diagonal(truth));
+  StaircaseOptions smoothing;
+  smoothing.open_border = true;
+  smooth_staircase(mesh, mask, smoothing);
+  EXPECT_LT(mean_distance(mesh, tree), 0.00020 * diagonal(truth));
+}
+
+TEST(Staircase, ThickSlicesMoveAlongTheirOwnAxisOnly) {
+  // Slices of 5 mm: up to 2.5 mm across the slices, and no more than 0.4 mm within.
+  PhantomOptions options;
+  options.shape = PhantomShape::bladder;
+  options.size = 96;
+  options.spacing = Vec3(0.8, 0.8, 5);
+  const Mask mask = select(make_phantom(options).volume, label_one);
+  const TriangleMesh before = marching_cubes(mask);
+  TriangleMesh after = before;
+  smooth_staircase(after, mask);
+  Vec3 largest = Vec3::Zero();
+  for (std::size_t v = 0; v < before.vertices.size(); ++v) {
+    largest = largest.cwiseMax((after.vertices[v] - before.vertices[v]).cwiseAbs());
+  }
+  EXPECT_LE(largest[0], 0.4);
+  EXPECT_LE(largest[1], 0.4);
+  EXPECT_LE(largest[2], 2.5);
+  EXPECT_GT(largest[2], 1);
 }
 
 TEST(Staircase, AnInclinedPlaneBecomesFlat) {
