@@ -7,6 +7,8 @@
 #include <fmt/format.h>
 #include <Eigen/Geometry>
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -162,6 +164,23 @@ Eigen::Matrix<double, 3, 4> centred_affine(const std::array<std::size_t, 3>& dim
   return affine;
 }
 
+void refuse_what_memory_cannot_hold(const std::array<std::size_t, 3>& dims, const PhantomOptions& options) {
+  constexpr double gib = 1024.0 * 1024 * 1024;
+  const double copies = options.noise > 0 ? 2 : 1;
+  const double wanted =
+      copies * static_cast<double>(dims[0]) * static_cast<double>(dims[1]) * static_cast<double>(dims[2]) / gib;
+  const double present =
+      static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE)) / gib;
+  if (wanted > present) {
+    throw UsageError(
+        fmt::format("a phantom of {} x {} x {} voxels takes {:.1f} GiB, and this machine has {:.1f} GiB of memory: "
+                    "choose a smaller "
+                    "--size, at most {} here",
+                    dims[0], dims[1], dims[2], wanted, present,
+                    static_cast<std::size_t>(static_cast<double>(options.size) * std::cbrt(0.9 * present / wanted))));
+  }
+}
+
 /// Calls visit(row, i, distance, count) for runs of voxels along i: `distance` is that of the first, and all `count`
 /// have its sign and, but for the first, are at least `clearance` from the surface.
 template <typename Visit>
@@ -244,6 +263,7 @@ std::optional<PhantomShape> phantom_shape(std::string_view name) {
 
 Phantom make_phantom(const PhantomOptions& options) {
   const Scene scene = make_scene(options);
+  refuse_what_memory_cannot_hold(scene.dims, options);
   Phantom phantom;
   phantom.volume.dims = scene.dims;
   phantom.volume.affine = centred_affine(scene.dims, options.spacing);

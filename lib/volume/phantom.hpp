@@ -39,7 +39,7 @@ struct Phantom {
 
 /// A segmented volume whose true surface is known: a voxel is inside when its centre is. The shape fills the image up
 /// to two voxels at each side (the ends of tube and aneurysm: none).
-/// Errors: UsageError for options out of range.
+/// Errors: UsageError for options out of range, and for more voxels than the machine's memory holds.
 /// Cost: one byte per voxel; the time grows with the surface, not with the volume.
 Phantom make_phantom(const PhantomOptions& options);
 

@@ -9,7 +9,10 @@
 #include "volume/marching_cubes.hpp"
 #include "volumes.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include <unistd.h>
 
 #include <cmath>
 #include <ostream>
@@ -151,6 +154,23 @@ TEST(Phantom, NoiseFlipsTheShareOfBorderVoxelsAskedFor) {
   EXPECT_NE(make_phantom(options).volume.data, noisy.volume.data);
   options.seed = 1;
   EXPECT_EQ(make_phantom(options).volume.data, noisy.volume.data);
+}
+
+TEST(Phantom, MoreVoxelsThanTheMemoryHoldsAreRefusedAtOnce) {
+  PhantomOptions options;
+  options.size = 4096;
+  options.noise = 0.1;
+  const double gib = static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE)) / 0x1p30;
+  if (gib > 127) {
+    GTEST_SKIP() << "this machine has memory for the largest phantom";
+  }
+  try {
+    make_phantom(options);
+    FAIL() << "128 GiB were taken";
+  } catch (const UsageError& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr("takes 128.0 GiB"));
+    EXPECT_THAT(error.what(), testing::HasSubstr("choose a smaller --size"));
+  }
 }
 
 TEST(Phantom, OptionsOutOfRangeAreUsageErrors) {
