@@ -3,6 +3,10 @@
     cmake --build --preset release --target bench_extract
     /usr/bin/python3 tests/bench/extract_bench.py build/release [ROUNDS]
 
+On one thread the processor time is compared, which other programs on the machine disturb less than the wall time. The
+gain by a second thread is given twice: by the wall, for a machine that is idle, and by the processor time of the calling
+thread, which takes part in the work and waits for nothing but its end.
+
 Both start with the voxels in memory and end with an indexed mesh in memory. VTK's time is that of Update() on a new
 filter; its mesh has float coordinates and no closed ends, tunica's double ones. Debian's python3-vtk9 brings VTK."""
 import os
@@ -42,8 +46,8 @@ class Tunica:
     def run(self, rule, value, threads):
         self.child.stdin.write(f"{rule} {value} {threads}\n")
         self.child.stdin.flush()
-        wall, cpu, _, triangles = self.child.stdout.readline().split()
-        return float(wall), float(cpu), int(triangles)
+        wall, cpu, calling, _, triangles = self.child.stdout.readline().split()
+        return float(wall), float(cpu), int(triangles), float(calling)
 
     def close(self):
         self.child.stdin.close()
@@ -74,7 +78,8 @@ def run_vtk(image, rule, value, threads):
 def main():
     build = sys.argv[1]
     rounds = int(sys.argv[2]) if len(sys.argv) > 2 else 7
-    print(f"{'case':<22}{'triangles':>10}{'threads':>8}{'tunica ms':>11}{'VTK ms':>9}{'VTK / tunica':>14}{'two / one':>11}")
+    print(f"{'case':<20}{'triangles':>10}{'tunica ms':>11}{'VTK ms':>9}{'VTK / tunica':>14}"
+          f"{'2 threads: VTK / tunica':>25}{'gain by wall':>14}{'by thread':>11}")
     for name, kind, n, rule, value in (("sphere 128 labels", "sphere", 128, "label", 1),
                                        ("sphere 256 labels", "sphere", 256, "label", 1),
                                        ("sphere 512 labels", "sphere", 512, "label", 1),
@@ -94,19 +99,17 @@ def main():
             tunica = Tunica(build, path)
             tunica.run(rule, value, 1)  # reads the volume
         image = vtk_image(values)
-        one = None
+        medians = {}
         for threads in (1, 2):
             ours, theirs = [], []
             for _ in range(rounds):
                 ours.append(tunica.run(rule, value, threads))
                 theirs.append(run_vtk(image, rule, value, threads))
-            # One thread: processor time, which other programs on the machine disturb less.
-            column = 1 if threads == 1 else 0
-            a = statistics.median(run[column] for run in ours)
-            b = statistics.median(run[column] for run in theirs)
-            gain = "" if threads == 1 else f"{one / statistics.median(run[0] for run in ours):>11.2f}"
-            one = statistics.median(run[0] for run in ours) if threads == 1 else one
-            print(f"{name:<22}{ours[0][2]:>10}{threads:>8}{a:>11.1f}{b:>9.1f}{b / a:>14.1f}{gain}", flush=True)
+            medians[threads] = [[statistics.median(run[column] for run in runs) for column in range(len(runs[0]))]
+                                for runs in (ours, theirs)]
+        (one, peer), (two, peer_two) = medians[1], medians[2]
+        print(f"{name:<20}{one[2]:>10}{one[1]:>11.1f}{peer[1]:>9.1f}{peer[1] / one[1]:>14.1f}"
+              f"{peer_two[0] / two[0]:>25.1f}{one[0] / two[0]:>14.2f}{one[1] / two[3]:>11.2f}", flush=True)
         tunica.close()
 
 
