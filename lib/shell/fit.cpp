@@ -3,6 +3,7 @@
 #include "core/threads.hpp"
 #include "shell/curved_surface.hpp"
 #include "shell/fit_edit.hpp"
+#include "shell/fit_shape.hpp"
 #include "shell/fit_start.hpp"
 #include "surface/closest_point.hpp"
 #include "surface/decimate.hpp"
@@ -19,6 +20,8 @@ namespace {
 constexpr double default_width = 1e-4;  // of the diagonal
 constexpr int default_rounds = 8;
 constexpr double start_error = 3;  // tolerances: flat error of the mesh that the search starts from
+constexpr std::size_t few = 600;   // triangles: from so few slivers hardly any good ones come, and more cost little
+constexpr double finer_start_error = 1.5;
 constexpr double limited_by_target =
     0.6;                               // of its triangles: a start that needs more follows its facets, not its shape
 constexpr double expected_gain = 3;    // shells of the start per shell of the result
@@ -28,6 +31,7 @@ constexpr double worth_it = 0.985;     // a round that leaves more than this of 
 constexpr int patience = 3;            // rounds that bring nothing
 constexpr int most_settling = 20;
 constexpr int most_repairs = 12;
+constexpr double clearly_below = 0.975;
 constexpr int certificates = 10;
 constexpr std::size_t checked_points = 200'000;  // of the target, for places that the samples miss
 constexpr int checking_level = 6;                // pieces per edge of the patches there
@@ -64,7 +68,10 @@ public:
 
 private:
   void to_tolerance(double tolerance) {
-    const FitStart start = start_of_fit(coarse_, target_, {}, start_error * tolerance);
+    FitStart start = start_of_fit(coarse_, target_, {}, start_error * tolerance);
+    if (!start.own_topology && start.mesh.triangles.size() < few) {
+      start = start_of_fit(coarse_, target_, {}, finer_start_error * tolerance);
+    }
     // Flat errors fall as 1 / count. Where curved shells need as many, flat facets are the answer.
     const double flat_count = static_cast<double>(start.mesh.triangles.size()) * start.flat_error / tolerance;
     const std::size_t most = static_cast<std::size_t>(std::clamp(flat_count, 64.0, 1e9));
@@ -79,6 +86,7 @@ private:
     const int rounds = options_.max_iterations.value_or(default_rounds);
     const double limit = margin * tolerance;
     repair(state, limit, most);
+    mend_angles(state, limit);
     FitState best = state;
     for (int round = 0; round < rounds; ++round) {
       advance(options_.progress, static_cast<double>(round) / rounds);
@@ -90,9 +98,10 @@ private:
       }
       polish(state, limit, 3);
       repair(state, limit, most);
+      mend_angles(state, limit);
       note(state);
       const bool fits = state.error() <= limit;
-      if (fits && (state.mesh.alive < best.mesh.alive || best.error() > limit)) {
+      if (fits && (price(state) < price(best) || best.error() > limit)) {
         best = state;
       }
       if (static_cast<double>(state.mesh.alive) > worth_it * static_cast<double>(before)) {
@@ -101,6 +110,7 @@ private:
     }
     // What the samples miss is found now, added to them, and mended.
     state = std::move(best);
+    split_thin(state, limit, most);
     for (int i = 0; i < certificates; ++i) {
       if (certify(state, tolerance)) {
         break;
@@ -114,6 +124,7 @@ private:
       state.measure();
       polish(state, limit, 2);
       repair(state, limit, most);
+      mend_angles(state, limit);
       if (state.error() > 2 * limit) {
         certify(state, tolerance);
         break;  // a place that more shells do not mend
@@ -132,6 +143,7 @@ private:
     constexpr double any = std::numeric_limits<double>::infinity();
     collapse_edges(state, any, shells, {});
     settle(state);
+    mend_angles(state, 0.97 * state.error());
     note(state);
     FitState best = state;
     const int rounds = options_.max_iterations.value_or(default_rounds);
@@ -165,6 +177,9 @@ private:
     result_.stopped = fruitless < patience ? "the limit of rounds was reached" : "further rounds bring nothing";
     no_worse_than_flat({}, shells, start);
   }
+
+  /// A thin triangle is worth the two shells that a further node costs.
+  static std::size_t price(const FitState& state) { return state.mesh.alive + 2 * count_thin(state); }
 
   static std::size_t guess(double shells) { return static_cast<std::size_t>(std::max(8.0, shells)); }
 
@@ -282,9 +297,9 @@ private:
     measuring.width = std::max(width_, state.error() / 20);
     measuring.limit = tolerance;
     ShellDistance distance = shell_distance(shell, target_, measuring);
-    if (tolerance && distance.both.lower <= *tolerance && distance.both.upper > *tolerance) {
-      // An open question deserves a closer look.
-      measuring.width = *tolerance / 200;
+    if (tolerance && distance.both.lower <= clearly_below * *tolerance && distance.both.upper > *tolerance) {
+      // An open question deserves a closer look, but where the answer would be a narrow one shells are mended sooner.
+      measuring.width = *tolerance / 100;
       distance = shell_distance(shell, target_, measuring);
     }
     farthest_ = distance.farthest_of_target;

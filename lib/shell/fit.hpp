@@ -10,19 +10,20 @@ namespace tunica {
 /// It starts from a quadric decimation of the target, which keeps thin branches and rims (from COARSE where its
 /// topology differs from the target's: then COARSE's is meant). Then in turn: edges collapse, cheapest first by the
 /// curved error that their placed node would have; edges turn; all nodes and normals move at once by Gauss-Newton on
-/// powers of the residuals; patches that are too far off are split. Where the target has a sharp crease, shells carry a
+/// powers of the residuals; patches that are too far off are split; nodes slide where
+/// angles are small. Where the target has a sharp crease, shells carry a
 /// normal per corner. A certified distance ends it.
 ///
 /// With `tolerance` the fewest shells found whose certified distance holds; without, the least distance found with at
 /// most `shells` (none: as many as COARSE has). Never more shells, or a larger distance, than plain decimation: where
 /// that wins, its flat facets are the result (flat shells: corner normals are the facets').
 /// @param coarse  an oriented manifold; its count, and its topology, may matter; @param target  likewise
-/// Keeps: topology of the start, boundary loops (on the target's boundary to the same tolerance). No triangle is made
-/// with an angle below 20 degrees but where the start's are smaller or an error needs a split. Deterministic,
-/// independent of the number of threads. Errors: Interrupted. Source: error-driven collapse as in Hoppe et al., Mesh
-/// optimization, SIGGRAPH 1993, with cubic patches (Comas, Duriez, Cotin 2010, eq. 1-2) in place of facets. Cost: n log
-/// n for the target, then about 10 ms per shell of the result. Limits: a greedy search; where its facets, not its
-/// shape, decide (a target hardly denser than the shells needed) plain decimation is the answer.
+/// Keeps: topology of the start, boundary loops (on the target's boundary to the same tolerance). Angles are at least
+/// 20 degrees but where folds, rims or creases of the target would cost the tolerance (or, to a count, error).
+/// Deterministic, independent of the number of threads. Errors: Interrupted. Source: error-driven collapse as in Hoppe
+/// et al., Mesh optimization, SIGGRAPH 1993, with cubic patches (Comas, Duriez, Cotin 2010, eq. 1-2) in place of
+/// facets. Cost: n log n for the target, then about 10 ms per shell of the result. Limits: a greedy search; where its
+/// facets, not its shape, decide (a target hardly denser than the shells needed) plain decimation is the answer.
 RelaxResult fit(const TriangleMesh& coarse, const Target& target, const RelaxOptions& options);
 
 }  // namespace tunica

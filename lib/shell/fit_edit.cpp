@@ -13,7 +13,6 @@ namespace tunica {
 namespace {
 
 constexpr int placing_steps = 3;
-constexpr double kept_angle = 0.98;      // of an angle below the limit
 constexpr double least_split_angle = 3;  // degrees, where nothing better can be had
 constexpr double worth_a_crease = 0.6;   // of its error a patch may keep when it gets normals of its own
 
@@ -38,7 +37,7 @@ void gather(const FitState& state, Index t, Trial& trial) {
 
 /// What was worse before may stay so.
 void ease_limits(const FitState& state, Index t, FitLimits& limits) {
-  limits.angle = std::min(limits.angle, kept_angle * smallest_angle(state, t));
+  limits.angle = std::min(limits.angle, least_angle(state.limits.angle, smallest_angle(state, t)));
   limits.agreement =
       std::min(limits.agreement, normal_agreement(state.mesh.corners(t), state.mesh.corner_normals(t)) - 1e-9);
   limits.agreement = std::max(limits.agreement, least_normal_agreement + 1e-6);
@@ -407,8 +406,6 @@ std::size_t flip_edges(FitState& state, double limit) {
   return flips;
 }
 
-namespace {
-
 bool split_edge(FitState& state, Index u, Index v, double limit) {
   FitMesh& mesh = state.mesh;
   const auto pair = mesh.on_edge(u, v);
@@ -494,8 +491,6 @@ bool split_edge(FitState& state, Index u, Index v, double limit) {
   return true;
 }
 
-}  // namespace
-
 std::size_t split_worst(FitState& state, double limit, std::size_t most) {
   FitMesh& mesh = state.mesh;
   std::vector<std::pair<double, Index>> worst;
@@ -535,6 +530,45 @@ std::size_t split_worst(FitState& state, double limit, std::size_t most) {
   return splits;
 }
 
+bool move_node(FitState& state, Index v, const Vec3& start, double angle, double limit) {
+  FitMesh& mesh = state.mesh;
+  Trial trial;
+  trial.limits = state.limits;
+  std::vector<Index> own;
+  mesh.slots_of(v, own);
+  trial.node.position = start;
+  for (const Index s : own) {
+    trial.node.normals.push_back(mesh.normals[s]);
+  }
+  std::vector<std::array<Index, 3>> nodes_around;
+  for (const Index t : mesh.around[v]) {
+    gather(state, t, trial);
+    ease_limits(state, t, trial.limits);
+    PlacedPatch p = placed(state, t);
+    p.corner = mesh.corner_of(t, v);
+    p.slot = static_cast<std::size_t>(std::find(own.begin(), own.end(), mesh.slots[t][p.corner]) - own.begin());
+    trial.patches.push_back(std::move(p));
+    trial.triangles.push_back(t);
+    nodes_around.push_back(mesh.triangles[t]);
+  }
+  trial.limits.angle = std::max(trial.limits.angle, angle);
+  link(state, nodes_around, trial.triangles, trial);
+  place_node(state.samples(), trial.patches, trial.points, trial.limits, limit, placing_steps + 1, trial.node);
+  if (!(trial.node.error < limit)) {
+    return false;
+  }
+  place_node(state.samples(), trial.patches, trial.points, trial.limits, limit, 0, trial.node);
+  mesh.positions[v] = trial.node.position;
+  for (std::size_t s = 0; s < own.size(); ++s) {
+    mesh.normals[own[s]] = trial.node.normals[s];
+  }
+  for (std::size_t i = 0; i < trial.triangles.size(); ++i) {
+    PlacedPatch& p = trial.patches[i];
+    state.patches[trial.triangles[i]] = {std::move(p.guesses), std::move(p.attached), std::move(p.residuals), p.error};
+  }
+  return true;
+}
+
 std::size_t place_worst(FitState& state, double limit) {
   FitMesh& mesh = state.mesh;
   std::vector<std::pair<double, Index>> nodes;
@@ -550,45 +584,7 @@ std::size_t place_worst(FitState& state, double limit) {
   std::sort(nodes.begin(), nodes.end());
   std::size_t better = 0;
   for (const auto& [negative, v] : nodes) {
-    Trial trial;
-    trial.limits = state.limits;
-    std::vector<Index> own;
-    mesh.slots_of(v, own);
-    trial.node.position = mesh.positions[v];
-    for (const Index s : own) {
-      trial.node.normals.push_back(mesh.normals[s]);
-    }
-    double before = 0;
-    for (const Index t : mesh.around[v]) {
-      gather(state, t, trial);
-      ease_limits(state, t, trial.limits);
-      PlacedPatch p = placed(state, t);
-      p.corner = mesh.corner_of(t, v);
-      p.slot = static_cast<std::size_t>(std::find(own.begin(), own.end(), mesh.slots[t][p.corner]) - own.begin());
-      trial.patches.push_back(std::move(p));
-      trial.triangles.push_back(t);
-      before = std::max(before, state.patches[t].error);
-    }
-    std::vector<std::array<Index, 3>> nodes_around;
-    for (const Index t : trial.triangles) {
-      nodes_around.push_back(mesh.triangles[t]);
-    }
-    link(state, nodes_around, trial.triangles, trial);
-    place_node(state.samples(), trial.patches, trial.points, trial.limits, limit, placing_steps + 1, trial.node);
-    if (!(trial.node.error < 0.99 * before)) {
-      continue;
-    }
-    place_node(state.samples(), trial.patches, trial.points, trial.limits, limit, 0, trial.node);
-    mesh.positions[v] = trial.node.position;
-    for (std::size_t s = 0; s < own.size(); ++s) {
-      mesh.normals[own[s]] = trial.node.normals[s];
-    }
-    for (std::size_t i = 0; i < trial.triangles.size(); ++i) {
-      PlacedPatch& p = trial.patches[i];
-      state.patches[trial.triangles[i]] = {std::move(p.guesses), std::move(p.attached), std::move(p.residuals),
-                                           p.error};
-    }
-    ++better;
+    better += move_node(state, v, mesh.positions[v], 0, 0.99 * -negative) ? 1 : 0;
   }
   return better;
 }

@@ -19,6 +19,13 @@ std::size_t flip_edges(FitState& state, double limit);
 /// `most` edges. @return how many
 std::size_t split_worst(FitState& state, double limit, std::size_t most);
 
+/// Cuts an edge by a node of its own, placed where the patches come closest. @return whether that was possible
+bool split_edge(FitState& state, Index u, Index v, double limit);
+
+/// Places a node anew, from `start`, with no angle around it below `angle` (degrees; 0: as they are), and keeps that
+/// when the largest error around is then below `limit` (mm). @return whether it did
+bool move_node(FitState& state, Index node, const Vec3& start, double angle, double limit);
+
 /// Places the nodes around patches with an error above `limit` anew, one by one. @return how many got better
 std::size_t place_worst(FitState& state, double limit);
 

@@ -13,6 +13,7 @@ namespace {
 
 constexpr double largest_tilt = 0.4;  // rad
 constexpr double largest_move = 0.3;  // of the mean edge
+constexpr double kept_angle = 0.98;   // of an angle below the limit
 constexpr double hopeless = 8;        // times give_up after the first step
 
 struct Measured {
@@ -99,6 +100,8 @@ std::array<Vec3, 2> tilt_axes(const Vec3& normal) {
 Vec3 facing_of(const std::array<Vec3, 3>& corners) {
   return (corners[1] - corners[0]).cross(corners[2] - corners[0]).stableNormalized();
 }
+
+double least_angle(double limit, double now) { return now >= limit ? limit : kept_angle * now; }
 
 bool is_sound(const PatchShape& shape, double agreement, double angle) {
   const auto& c = shape.corners;

@@ -13,6 +13,9 @@ struct FitLimits {
   double angle = 20;       ///< degrees
 };
 
+/// The angle, degrees, that a facet must keep whose smallest angle is `now`: the limit, or nearly what it has.
+double least_angle(double limit, double now);
+
 /// How the ten control points of a patch follow its corners (x, y, z of each: columns 0..8) and the tilts of its
 /// normals along tilt_axes() (two of each: columns 9..14). Rows: x, y, z of control point 0, then of 1, ...
 using PatchJacobian = Eigen::Matrix<double, 30, 15>;

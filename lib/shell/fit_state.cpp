@@ -23,7 +23,6 @@ constexpr double least_weight = 0.1;  // residuals below this part of the larges
 constexpr double largest_tilt = 0.3;  // rad
 constexpr double largest_move = 0.3;  // of the mean edge at the node
 constexpr int trials = 6;
-constexpr double kept_angle = 0.98;  // of an angle below the limit
 
 using Vector15 = Eigen::Matrix<double, 15, 1>;
 using Matrix15 = Eigen::Matrix<double, 15, 15>;
@@ -334,9 +333,9 @@ double FitState::solve(double power, double smoothing) {
         if (!mesh.is_alive(i)) {
           continue;
         }
-        broken[t] = !is_sound(i, std::min(limits.agreement, old_agreement[t]),
-                              std::min(limits.angle, kept_angle * old_angle[t])) ||
-                    facing_of(mesh.corners(i)).dot(old_facing[t]) < 0.3;
+        broken[t] =
+            !is_sound(i, std::min(limits.agreement, old_agreement[t]), least_angle(limits.angle, old_angle[t])) ||
+            facing_of(mesh.corners(i)).dot(old_facing[t]) < 0.3;
         if (broken[t] == 0) {
           measure(i);
           new_costs[t] = cost_of(patches[t], power, scale);

@@ -3,9 +3,11 @@
 #include "shell/curved_surface.hpp"
 #include "shell/families.hpp"
 #include "shell/fit_edit.hpp"
+#include "shell/fit_shape.hpp"
 #include "shell/fit_start.hpp"
 #include "surface/checks.hpp"
 #include "surface/decimate.hpp"
+#include "surface/incidence.hpp"
 #include "surface/measure.hpp"
 #include "surface/self_intersections.hpp"
 
@@ -170,7 +172,7 @@ TEST(Fit, KeepsTopologyAndAngles) {
     EXPECT_EQ(after.components, before.components);
     EXPECT_EQ(after.boundary_loops, before.boundary_loops);
     EXPECT_EQ(after.euler, before.euler);
-    EXPECT_GE(min_angle_degrees(flat_facets(shell)), 12);
+    EXPECT_GE(min_angle_degrees(flat_facets(shell)), 20);
     const Tessellation fine = tessellate_uniformly(shell, 4);
     EXPECT_EQ(count_self_intersections(fine.mesh, fine.shell, shell.triangles), 0U);
   }
@@ -265,6 +267,30 @@ TEST(Fit, SolveLessensTheCostAndTheError) {
     state.measure();
   }
   EXPECT_LT(state.error(), before / 20);
+}
+
+TEST(Fit, ThinTrianglesAreMendedWithoutALargerError) {
+  const Target target(testing::sphere(5));
+  FitStart start;
+  start.mesh = testing::sphere(2);
+  start.flat_error = 0.05;
+  for (const Index v : {20U, 70U, 110U}) {
+    const Index to = start.mesh.triangles[incidence(start.mesh).of(v)[0]][0] == v
+                         ? start.mesh.triangles[incidence(start.mesh).of(v)[0]][1]
+                         : start.mesh.triangles[incidence(start.mesh).of(v)[0]][0];
+    start.mesh.vertices[v] = (0.15 * start.mesh.vertices[v] + 0.85 * start.mesh.vertices[to]).normalized();
+  }
+  const FitSamples samples(target, 320);
+  FitState state(samples, prepare_fit(start, target), {});
+  state.attach();
+  state.measure();
+  EXPECT_GT(count_thin(state), 3U);
+  const double before = state.error();
+  EXPECT_EQ(mend_angles(state, 0), 0U);
+  EXPECT_EQ(count_thin(state), 0U);
+  EXPECT_LE(state.error(), 1.001 * before);
+  EXPECT_EQ(state.mesh.alive, start.mesh.triangles.size());
+  EXPECT_FALSE(why_unfit(examine(flat_facets(state.mesh.shell()))));
 }
 
 TEST(Fit, SaysWhenTheToleranceNeedsMoreShellsThanAllowed) {
