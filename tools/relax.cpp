@@ -134,14 +134,16 @@ std::size_t curved_self_intersections(const ShellMesh& shell) {
 }
 
 /// Distances at the vertices of a surface fine enough to be looked at, with the edges of the shells.
+/// @param written  outputs that are finished: what joins them
 void write_maps(cli::Tool& tool, const Arguments& given, const ShellMesh& shell, const Target& target,
-                const ShellDistance& distance, const PlyOptions& ply) {
+                const ShellDistance& distance, const PlyOptions& ply, std::vector<fs::path>& written) {
   const double per_shell = static_cast<double>(map_triangles) / static_cast<double>(shell.triangles.size());
   const int level = std::clamp(static_cast<int>(std::sqrt(per_shell)), 4, 24);
   const Tessellation fine = tessellate_uniformly(shell, level);
   const auto distances = vertex_distances(fine.mesh, target.tree());
   if (given.map) {
     write_ply(*given.map, fine.mesh, distances, ply);
+    written.push_back(*given.map);
   }
   if (given.picture) {
     PictureOptions options;
@@ -291,12 +293,24 @@ void run(cli::Tool& tool, const Arguments& given) {
                                            : "Add --refine, or take a coarse mesh with more triangles"));
   }
   require_fit(relaxed.shell, given.out.string());
-  write_ply(given.out, relaxed.shell, ply);
-  if (given.curved) {
-    write_ply(*given.curved, tessellate(relaxed.shell, curved_deviation * diagonal).mesh, ply);
-  }
-  if (given.map || given.picture) {
-    write_maps(tool, given, relaxed.shell, *target, distance, ply);
+  std::vector<fs::path> written;
+  try {
+    write_ply(given.out, relaxed.shell, ply);
+    written.push_back(given.out);
+    if (given.curved) {
+      write_ply(*given.curved, tessellate(relaxed.shell, curved_deviation * diagonal).mesh, ply);
+      written.push_back(*given.curved);
+    }
+    if (given.map || given.picture) {
+      write_maps(tool, given, relaxed.shell, *target, distance, ply, written);
+    }
+  } catch (...) {
+    // Of a run that failed nothing looks finished.
+    for (const fs::path& path : written) {
+      std::error_code ignored;
+      fs::remove(path, ignored);
+    }
+    throw;
   }
 }
 

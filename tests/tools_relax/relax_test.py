@@ -227,6 +227,14 @@ class Contract(Case):
         self.relax(self.coarse, self.target, self.out, "--force")
         self.relax(self.coarse, self.target, self.path("no/such/folder.ply"), expect=5)
 
+    def test_when_a_later_output_fails_no_finished_one_stays(self):
+        names = [self.path(name) for name in ("curved.ply", "map.ply", "picture.png")]
+        os.mkdir(names[2] + ".part")  # nothing can be written there
+        self.relax(self.coarse, self.target, self.out, "--max-iterations", 1, "--curved", names[0], "--map", names[1],
+                   "--picture", names[2], expect=5)
+        for name in (self.out, *names):
+            self.assertFalse(os.path.exists(name), name)
+
     def test_a_mismatch_of_boundaries_is_said(self):
         write_ply(self.coarse, *sphere(1, 12))
         _, error = self.relax(self.coarse, self.target, self.out, "--max-iterations", 1)
