@@ -1,6 +1,7 @@
 #include "surface/closest_point.hpp"
 
 #include "core/error.hpp"
+#include "core/threads.hpp"
 #include "surface/measure.hpp"
 
 #include <Eigen/Geometry>
@@ -83,6 +84,7 @@ struct Bounds {
 };
 
 constexpr std::size_t leaf_size = 4;
+constexpr std::size_t parallel_from = 20'000;  // triangles: below, threads cost more than they bring
 
 }  // namespace
 
@@ -121,6 +123,13 @@ Vec3 closest_point_on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, cons
 struct ClosestPoint::Builder {
   ClosestPoint& tree;
   std::vector<Primitive> primitives;
+
+  // A part of the hierarchy, numbered from zero: parts are built side by side.
+  struct Part {
+    std::vector<Node> nodes;
+    std::vector<Leaf> leaves;
+    std::vector<Index> order;
+  };
 
   struct Range {
     std::size_t begin, end;
@@ -197,9 +206,9 @@ struct ClosestPoint::Builder {
     return static_cast<std::size_t>(middle - primitives.begin());
   }
 
-  std::int32_t make_leaf(const Range& content) {
-    const std::size_t index = tree.leaves_.size();
-    Leaf& leaf = tree.leaves_.emplace_back();
+  std::int32_t make_leaf(const Range& content, Part& part) const {
+    const std::size_t index = part.leaves.size();
+    Leaf& leaf = part.leaves.emplace_back();
     for (std::size_t lane = 0; lane < leaf_size; ++lane) {
       // A leaf with fewer triangles repeats its last one.
       const Index t = primitives[std::min(content.begin + lane, content.end - 1)].triangle;
@@ -213,16 +222,14 @@ struct ClosestPoint::Builder {
       leaf.triangle[lane] = t;
     }
     for (std::size_t i = content.begin; i < content.end; ++i) {
-      tree.order_.push_back(primitives[i].triangle);
+      part.order.push_back(primitives[i].triangle);
     }
     return ~static_cast<std::int32_t>(index);
   }
 
-  std::int32_t make_node(const Range& whole) {
-    if (whole.size() <= leaf_size) {
-      return make_leaf(whole);
-    }
-    std::array<Range, 4> parts{whole};
+  // Up to four parts of a range.
+  std::size_t divide(const Range& whole, std::array<Range, 4>& parts) {
+    parts = {whole};
     std::size_t count = 1;
     while (count < 4) {
       // The part that costs most is divided next.
@@ -247,20 +254,85 @@ struct ClosestPoint::Builder {
       parts[widest + 1] = range(middle, end);
       ++count;
     }
-    const auto index = static_cast<std::int32_t>(tree.nodes_.size());
-    tree.nodes_.emplace_back();
+    return count;
+  }
+
+  static void set_child(Node& node, std::size_t lane, const Range* content, std::int32_t child) {
+    node.child[lane] = child;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto i = static_cast<Eigen::Index>(axis);
+      node.lower[axis][lane] = content != nullptr ? content->bounds.lower[i] : std::numeric_limits<double>::infinity();
+      node.upper[axis][lane] = content != nullptr ? content->bounds.upper[i] : -std::numeric_limits<double>::infinity();
+    }
+  }
+
+  std::int32_t make_node(const Range& whole, Part& part) {
+    if (whole.size() <= leaf_size) {
+      return make_leaf(whole, part);
+    }
+    std::array<Range, 4> parts;
+    const std::size_t count = divide(whole, parts);
+    const auto index = static_cast<std::int32_t>(part.nodes.size());
+    part.nodes.emplace_back();
     for (std::size_t lane = 0; lane < 4; ++lane) {
-      const bool used = lane < count;
-      const std::int32_t child = used ? make_node(parts[lane]) : 0;
-      Node& node = tree.nodes_[static_cast<std::size_t>(index)];
-      node.child[lane] = child;
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        const auto i = static_cast<Eigen::Index>(axis);
-        node.lower[axis][lane] = used ? parts[lane].bounds.lower[i] : std::numeric_limits<double>::infinity();
-        node.upper[axis][lane] = used ? parts[lane].bounds.upper[i] : -std::numeric_limits<double>::infinity();
-      }
+      const std::int32_t child = lane < count ? make_node(parts[lane], part) : 0;
+      set_child(part.nodes[static_cast<std::size_t>(index)], lane, lane < count ? &parts[lane] : nullptr, child);
     }
     return index;
+  }
+
+  // Appends a part and numbers its nodes and leaves on. @return the number of its root
+  std::int32_t append(Part& part, std::int32_t root) {
+    const auto first_node = static_cast<std::int32_t>(tree.nodes_.size());
+    const auto first_leaf = static_cast<std::int32_t>(tree.leaves_.size());
+    const auto moved = [&](std::int32_t child) { return child < 0 ? child - first_leaf : child + first_node; };
+    for (Node& node : part.nodes) {
+      for (std::size_t lane = 0; lane < 4; ++lane) {
+        const bool used = node.lower[0][lane] <= node.upper[0][lane];
+        node.child[lane] = used ? moved(node.child[lane]) : 0;
+      }
+    }
+    tree.nodes_.insert(tree.nodes_.end(), part.nodes.begin(), part.nodes.end());
+    tree.leaves_.insert(tree.leaves_.end(), part.leaves.begin(), part.leaves.end());
+    tree.order_.insert(tree.order_.end(), part.order.begin(), part.order.end());
+    return moved(root);
+  }
+
+  // The whole tree: sixteen parts side by side under two levels of nodes.
+  std::int32_t build() {
+    const Range whole = range(0, primitives.size());
+    if (whole.size() < parallel_from) {
+      Part part;
+      const std::int32_t root = make_node(whole, part);
+      return append(part, root);
+    }
+    std::array<Range, 4> quarters;
+    const std::size_t count = divide(whole, quarters);
+    std::array<std::array<Range, 4>, 4> ranges;
+    std::array<std::size_t, 4> counts{};
+    parallel_for_blocks(count, 1, [&](std::size_t i, std::size_t) { counts[i] = divide(quarters[i], ranges[i]); });
+    std::array<Part, 16> parts;
+    std::array<std::int32_t, 16> roots{};
+    parallel_for_blocks(16, 1, [&](std::size_t i, std::size_t) {
+      if (i / 4 < count && i % 4 < counts[i / 4]) {
+        roots[i] = make_node(ranges[i / 4][i % 4], parts[i]);
+      }
+    });
+    tree.nodes_.emplace_back();
+    for (std::size_t i = 0; i < 4; ++i) {
+      set_child(tree.nodes_[0], i, i < count ? &quarters[i] : nullptr, 0);
+      if (i >= count) {
+        continue;
+      }
+      const std::size_t index = tree.nodes_.size();
+      tree.nodes_[0].child[i] = static_cast<std::int32_t>(index);
+      tree.nodes_.emplace_back();
+      for (std::size_t j = 0; j < 4; ++j) {
+        const std::int32_t child = j < counts[i] ? append(parts[4 * i + j], roots[4 * i + j]) : 0;
+        set_child(tree.nodes_[index], j, j < counts[i] ? &ranges[i][j] : nullptr, child);
+      }
+    }
+    return 0;
   }
 };
 
@@ -284,7 +356,7 @@ ClosestPoint::ClosestPoint(const TriangleMesh& mesh) : vertices_(mesh.vertices),
   order_.reserve(triangles_.size());
   leaves_.reserve(triangles_.size() / 2);
   nodes_.reserve(triangles_.size() / 4);
-  const std::int32_t root = builder.make_node(builder.range(0, triangles_.size()));
+  const std::int32_t root = builder.build();
   if (root < 0) {  // a single leaf: searches start at a node all the same
     Node& node = nodes_.emplace_back();
     const Bounds bounds = builder.range(0, triangles_.size()).bounds;

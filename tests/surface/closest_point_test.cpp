@@ -1,5 +1,6 @@
 #include "surface/closest_point.hpp"
 
+#include "core/threads.hpp"
 #include "surface/shapes.hpp"
 
 #include <gtest/gtest.h>
@@ -118,6 +119,35 @@ TEST(ClosestPoint, SpatialOrderHoldsEachTriangleOnce) {
   ASSERT_EQ(order.size(), mesh.triangles.size());
   for (Index t = 0; t < order.size(); ++t) {
     EXPECT_EQ(order[t], t);
+  }
+}
+
+TEST(ClosestPoint, LargeTreesAreTheSameOnAnyNumberOfThreads) {
+  const TriangleMesh mesh = shapes::together(shapes::shaken(shapes::sphere(6), 0.02, 3), shapes::soup(300, 4));
+  const std::size_t before = thread_count();
+  set_thread_count(1);
+  const ClosestPoint one(mesh);
+  set_thread_count(4);
+  const ClosestPoint four(mesh);
+  set_thread_count(before);
+  EXPECT_EQ(one.spatial_order(), four.spatial_order());
+  auto sorted = one.spatial_order();
+  std::sort(sorted.begin(), sorted.end());
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    ASSERT_EQ(sorted[t], t);
+  }
+  std::mt19937 random(7);
+  for (int i = 0; i < 60; ++i) {
+    const auto coordinate = [&] { return 4 * static_cast<double>(random()) / 4294967295.0 - 2; };
+    const Vec3 p(coordinate(), coordinate(), coordinate());
+    double least = std::numeric_limits<double>::infinity();
+    for (const auto& [a, b, c] : mesh.triangles) {
+      least = std::min(
+          least,
+          (p - closest_point_on_triangle(p, mesh.vertices[a], mesh.vertices[b], mesh.vertices[c])).squaredNorm());
+    }
+    EXPECT_NEAR(four.closest(p).squared_distance, least, 1e-12);
+    EXPECT_EQ(one.closest(p).triangle, four.closest(p).triangle);
   }
 }
 
