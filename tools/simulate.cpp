@@ -368,7 +368,8 @@ void prepare_result(Json& result, const Model& model) {
             {"frequencies_hz", Json::array()},
             {"buckling_factors", Json::array()},
             {"limit_load_factors", Json::array()},
-            {"branch_load_factors", Json::array()}};
+            {"branch_load_factors", Json::array()},
+            {"short_waves_stiffened_from", nullptr}};
   for (const Probe& probe : model.probes) {
     result["probes"][probe.name] = {{"time_s", Json::array()},
                                     {"load_factor", Json::array()},
@@ -641,6 +642,12 @@ void simulate(cli::Tool& tool, const Arguments& a) {
   if (modes) {
     report_modes(tool.result(), summary);
     tool.note(modes_note(summary, frequencies != nullptr ? frequencies->count : buckling->count));
+    if (summary.stiffened_from && buckling != nullptr) {
+      tool.warn(
+          fmt::format("{}: the mesh is coarse for so thin a curved shell (h^2 > 3 R t): buckles shorter than its "
+                      "elements are not seen, and the factors may be too high: refine it",
+                      subject.string()));
+    }
     return;
   }
   tool.note(fmt::format("{} nodes in {} steps, {}: largest displacement {:.4g} mm", model.node_count(), summary.steps,
@@ -648,9 +655,17 @@ void simulate(cli::Tool& tool, const Arguments& a) {
   if (summary.stiffened_from) {
     tool.warn(
         fmt::format("{}: the mesh is coarse for so thin a curved shell (h^2 > 3 R t): from {} {:.4g} on, where it "
-                    "would have buckled in waves as short as its elements, these were made stiff",
+                    "would have buckled in waves as short as its elements, these were made stiff; whether the shell "
+                    "itself buckles this mesh does not resolve: refine it",
                     subject.string(), std::holds_alternative<DynamicRun>(scene.run.kind) ? "second" : "load factor",
                     *summary.stiffened_from));
+  }
+  constexpr double notable_residual = 1e-3;
+  if (scene.run.newton_max == 1 && summary.residual > notable_residual) {
+    tool.warn(
+        fmt::format("{}: one linearisation per step left {:.2g} of the forces unbalanced in the last one: take "
+                    "smaller steps, or leave newton_max at its default",
+                    subject.string(), summary.residual));
   }
   if (unresolved > 0) {
     tool.warn(

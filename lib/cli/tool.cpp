@@ -227,6 +227,7 @@ int Tool::run(int argc, char** argv, const std::function<void()>& body) {
   }
   std::signal(SIGINT, on_signal);
   std::signal(SIGTERM, on_signal);
+  std::signal(SIGXFSZ, SIG_IGN);  // writing past a limit on file sizes is then an error like a full disk
   try {
     if (!report_.empty()) {
       const std::filesystem::path report = std::exchange(report_, {});

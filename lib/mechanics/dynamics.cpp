@@ -488,6 +488,7 @@ Summary run_dynamic(ShellSystem& system, const Model& model, const RunSettings& 
   // The last step may be shorter: the run ends at its duration.
   const auto steps = static_cast<std::size_t>(std::max(1.0, std::ceil(run.duration / run.step - 1e-9)));
   const bool soft_waves = has_soft_waves(system);
+  std::size_t shown = summary.steps / settings.every * settings.every;  // steps done at the last state handed over
   for (std::size_t s = summary.steps; s < steps; ++s) {
     const auto start = Clock::now();
     const bool last = s + 1 == steps;
@@ -495,8 +496,8 @@ Summary run_dynamic(ShellSystem& system, const Model& model, const RunSettings& 
     // Not of the first step, which is the longest without.
     integrator.tell_direct_error(s == 1 || last);
     TimeStepper::StepResult step;
+    const Motion before = motion;
     if (!summary.stiffened_from && soft_waves) {
-      const Motion before = motion;
       const auto memory = integrator.memory(motion);
       step = integrator.advance(time, end - time, motion);
       if (!step.precise || !is_solved(settings, step.newton)) {
@@ -518,6 +519,12 @@ Summary run_dynamic(ShellSystem& system, const Model& model, const RunSettings& 
           time, end, integrator.tolerance()));
     }
     if (!is_solved(settings, result)) {
+      if (s > shown) {  // the last good state, also where it is none of every `every` steps
+        motion = before;
+        state = make_state(system, model, motion.configuration, time);
+        state.converged = true;
+        hand_over(state);
+      }
       const std::vector<double> wanted_factors = load_factors(model, false, end);
       std::vector<double> carried =
           time > 0 ? load_factors(model, false, time) : std::vector<double>(wanted_factors.size(), 0.0);
@@ -525,7 +532,7 @@ Summary run_dynamic(ShellSystem& system, const Model& model, const RunSettings& 
         carried[l] += reached * (wanted_factors[l] - carried[l]);
       }
       throw RequirementError(
-          reached < 1
+          reached < 1 && carried != wanted_factors
               ? fmt::format(
                     "no equilibrium in the step from {:.6g} s to {:.6g} s: the limit load is reached at "
                     "{:.3g} of its change of load ({}); beyond it {}; the last good state is at {:.6g} s",
@@ -548,6 +555,7 @@ Summary run_dynamic(ShellSystem& system, const Model& model, const RunSettings& 
     state.converged = one_linearisation ? result.linear_converged : result.converged;
     if (wanted) {
       hand_over(state);
+      shown = s + 1;
     }
     summary.parts += parts;
     record_step(state, seconds, summary);

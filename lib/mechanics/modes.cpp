@@ -124,6 +124,9 @@ State reference_state(const ShellSystem& system, const Model& model, Summary& su
   state.converged = true;
   state.linear = true;
   summary.volume_before = state.volume;
+  if (has_soft_waves(system)) {
+    summary.stiffened_from = 0;
+  }
   return state;
 }
 

@@ -170,7 +170,7 @@ std::string why(const NewtonResult& result, const SettleResult& let_go) {
   }
   if (let_go.settled) {
     return "limit load: beyond it the shell jumps to a distant shape (snap-through or buckling), which a dynamic run "
-           "follows";
+           "may follow";
   }
   if (!result.stable) {
     return "limit load: the stiffness is no longer positive, and no state was found in which the shell could rest";

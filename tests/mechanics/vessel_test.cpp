@@ -91,6 +91,24 @@ TEST_P(ThinVessel, EndsWithTheLimitLoadNamed) {
   }
 }
 
+TEST(Vessel, LastGoodStateIsHandedOverWhateverIsWanted) {
+  Model model = vessel(10, 10, 0.1);
+  model.loads[0].ramp = Ramp{{{0, 0}, {1, 1}}};
+  RunSettings settings = seconds(1);
+  settings.every = 1000;
+  double last = -1;
+  std::string message;
+  try {
+    solve(model, settings, [&](const State& state) { last = state.time; });
+  } catch (const RequirementError& error) {
+    message = error.what();
+  }
+  std::smatch found;
+  ASSERT_TRUE(std::regex_search(message, found, std::regex("last good state is at ([0-9.]+) s"))) << message;
+  EXPECT_GT(last, 0);
+  EXPECT_NEAR(std::stod(found[1]), last, 1e-6);
+}
+
 TEST(Vessel, NoThicknessEndsInNonsense) {
   for (const double thickness : {0.1, 0.01}) {
     EXPECT_THAT(message_of(vessel(10, 10, thickness), seconds(0.08)), testing::HasSubstr("limit load")) << thickness;
