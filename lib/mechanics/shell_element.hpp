@@ -35,7 +35,9 @@
 /// opposite slopes at its ends. So the skewness of an edge has a stiffness, S E t A b^2 h^2 / 4 with b the curvature
 /// ACROSS the edge, as a wave along it stretches the lines across; bending without extension of a cylinder stays free.
 /// S = 4/9 gives the wave above the energy of its membrane strain, E t b^2 W^2 / 4 per area; of a smooth deformation
-/// the skewness is of third order. See ShortWaves for who gets how much.
+/// the skewness is of third order. With it the spectrum is right on coarse meshes (`Frequencies.VeryThinSphere*`);
+/// under a point load that the mesh does not resolve it costs accuracy, so that only what needs it asks for it:
+/// stiffen_short_waves().
 ///
 /// Forces are the gradient of the energy to the last term, and the tangent the gradient of the forces.
 /// Source: co-rotation: Nour-Omid, Rankin 1991; Felippa, Haugen 2005; Battini 2007. Strain of shallow shells: Marguerre

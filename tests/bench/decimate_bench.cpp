@@ -6,6 +6,7 @@
 //
 // Prints a line per mesh and count: two-sided certified distance in % of the diagonal, smallest angle, mean quality,
 // triangles facing away from both neighbours' side, median CPU milliseconds, and the ratios.
+#include "cgal_mesh.hpp"
 #include "core/error.hpp"
 #include "core/threads.hpp"
 #include "io/mesh_file.hpp"
@@ -15,7 +16,6 @@
 #include "surface/measure.hpp"
 
 #include <CGAL/Simple_cartesian.h>
-#include <CGAL/Surface_mesh.h>
 #include <CGAL/Surface_mesh_simplification/Policies/Edge_collapse/Bounded_normal_change_placement.h>
 #include <CGAL/Surface_mesh_simplification/Policies/Edge_collapse/GarlandHeckbert_plane_policies.h>
 #include <CGAL/Surface_mesh_simplification/edge_collapse.h>
@@ -40,18 +40,6 @@ struct StopAtFaces {
     return profile.surface_mesh().number_of_faces() <= faces;
   }
 };
-
-CgalMesh to_cgal(const TriangleMesh& mesh) {
-  CgalMesh result;
-  for (const Vec3& v : mesh.vertices) {
-    result.add_vertex({v.x(), v.y(), v.z()});
-  }
-  const auto vertex = [](Index i) { return CgalMesh::Vertex_index(i); };
-  for (const auto& [i, j, k] : mesh.triangles) {
-    result.add_face(vertex(i), vertex(j), vertex(k));
-  }
-  return result;
-}
 
 TriangleMesh from_cgal(CgalMesh& mesh) {
   mesh.collect_garbage();
@@ -114,7 +102,7 @@ void print(const char* who, const Measured& m) {
 void compare(const std::string& path, std::size_t count, std::size_t rounds, const std::optional<double>& angle,
              bool with_peer) {
   const TriangleMesh mesh = read_mesh(path, 1.0, false).mesh;
-  const CgalMesh given = to_cgal(mesh);
+  const CgalMesh given = to_cgal<CgalMesh>(mesh);
   Measured own, shaped, peer;
   DecimateOptions options;
   options.triangles = count;

@@ -2,6 +2,7 @@
 // one run, taking turns. Both include building their search trees.
 //
 //   build/release/tests/bench/bench_hausdorff coarse.ply fine.ply [--width 1e-4] [--rounds 3]
+#include "cgal_mesh.hpp"
 #include "core/error.hpp"
 #include "core/threads.hpp"
 #include "io/mesh_file.hpp"
@@ -10,7 +11,6 @@
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/Polygon_mesh_processing/distance.h>
-#include <CGAL/Surface_mesh.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -24,18 +24,6 @@ using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using CgalMesh = CGAL::Surface_mesh<Kernel::Point_3>;
 
 namespace {
-
-CgalMesh to_cgal(const TriangleMesh& mesh) {
-  CgalMesh result;
-  for (const Vec3& v : mesh.vertices) {
-    result.add_vertex({v.x(), v.y(), v.z()});
-  }
-  const auto vertex = [](Index i) { return CgalMesh::Vertex_index(i); };
-  for (const auto& [i, j, k] : mesh.triangles) {
-    result.add_face(vertex(i), vertex(j), vertex(k));
-  }
-  return result;
-}
 
 struct Seconds {
   double cpu, wall;
@@ -57,8 +45,8 @@ double median(std::vector<double> values) {
 void compare(const std::string& path_a, const std::string& path_b, double width, std::size_t rounds, bool with_peer) {
   const TriangleMesh a = read_mesh(path_a, 1.0, false).mesh;
   const TriangleMesh b = read_mesh(path_b, 1.0, false).mesh;
-  const CgalMesh cgal_a = to_cgal(a);
-  const CgalMesh cgal_b = to_cgal(b);
+  const CgalMesh cgal_a = to_cgal<CgalMesh>(a);
+  const CgalMesh cgal_b = to_cgal<CgalMesh>(b);
   const double diagonal_mm = diagonal(b);
   std::vector<double> own, own_without_mean, two, peer;
   HausdorffResult result;
