@@ -2,6 +2,8 @@
 #include "io/mesh_file.hpp"
 #include "io/picture.hpp"
 #include "shell/curved_surface.hpp"
+#include "shell/shell_distance.hpp"
+#include "shell/target.hpp"
 #include "surface/hausdorff.hpp"
 #include "surface/measure.hpp"
 #include "surface/subdivide.hpp"
@@ -63,25 +65,50 @@ Surface surface_of(MeshFile file, const Arguments& given) {
   return a;
 }
 
-HausdorffResult measure(const Surface& a, const ClosestPoint& b, double width, const std::optional<double>& limit,
-                        const Progress& progress) {
-  HausdorffOptions options;
-  options.limit = limit;
-  options.progress = progress;
-  if (!a.shell) {
-    options.width = width;
-    return hausdorff(ClosestPoint(a.flat), b, options);
+// B, with what is asked of it.
+struct Other {
+  explicit Other(TriangleMesh mesh, bool for_shells) {
+    if (for_shells) {
+      target.emplace(std::move(mesh));
+    } else {
+      flat.emplace(mesh);
+    }
   }
-  // The curved surface in flat triangles: what they may be off by takes a part of the interval.
-  const Tessellation fine = tessellate(*a.shell, width / 8, 20'000'000);
-  options.deviation_a = fine.deviation;
-  options.width = width - 2 * fine.deviation;
-  return hausdorff(ClosestPoint(fine.mesh), b, options);
+  [[nodiscard]] const ClosestPoint& tree() const { return target ? target->tree() : *flat; }
+
+  std::optional<Target> target;
+  std::optional<ClosestPoint> flat;
+};
+
+HausdorffResult measure(const Surface& a, const Other& b, double width, const std::optional<double>& limit,
+                        const Progress& progress) {
+  if (!a.shell) {
+    HausdorffOptions options;
+    options.width = width;
+    options.limit = limit;
+    options.progress = progress;
+    return hausdorff(ClosestPoint(a.flat), b.tree(), options);
+  }
+  ShellDistanceOptions options;
+  options.width = width;
+  options.limit = limit;
+  options.with_mean = true;
+  options.progress = progress;
+  const ShellDistance found = shell_distance(*a.shell, *b.target, options);
+  HausdorffResult result{found.both, found.shell_to_target, found.target_to_shell, found.mean, found.rms};
+  if (found.shell_to_target.lower >= found.target_to_shell.lower) {
+    result.worst_a = found.farthest_of_shell;
+    result.worst_b = b.tree().closest(result.worst_a).point;
+  } else {
+    result.worst_b = found.farthest_of_target;
+    result.worst_a = found.closest_to_farthest_of_target;
+  }
+  return result;
 }
 
 // The interval, narrowed as far as it takes to decide whether the distance is at most `limit`.
-HausdorffResult measure_and_decide(const Surface& a, const ClosestPoint& b, double width,
-                                   const std::optional<double>& limit, double narrowest, const Progress& progress) {
+HausdorffResult measure_and_decide(const Surface& a, const Other& b, double width, const std::optional<double>& limit,
+                                   double narrowest, const Progress& progress) {
   HausdorffResult result = measure(a, b, width, {}, progress);
   while (limit && result.both.lower <= *limit && result.both.upper > *limit && width > narrowest) {
     width = std::max(narrowest, width / 8);
@@ -136,7 +163,7 @@ Map make_map(const Surface& a, const ClosestPoint& b, double diagonal_mm) {
   return map;
 }
 
-void write_files(const cli::Tool& tool, const Arguments& given, const Surface& a, const ClosestPoint& b,
+void write_files(const cli::Tool& tool, const Arguments& given, const Surface& a, const Other& b,
                  const HausdorffResult& distance, double diagonal_mm, std::vector<fs::path>& written) {
   PlyOptions options;
   options.comments = {"made by " + tool.command()};
@@ -149,7 +176,7 @@ void write_files(const cli::Tool& tool, const Arguments& given, const Surface& a
   if (!given.map && !given.picture) {
     return;
   }
-  const Map map = make_map(a, b, diagonal_mm);
+  const Map map = make_map(a, b.tree(), diagonal_mm);
   if (given.map) {
     write_ply(*given.map, map.mesh, map.distances, options);
     written.push_back(*given.map);
@@ -169,7 +196,7 @@ void write_files(const cli::Tool& tool, const Arguments& given, const Surface& a
 }
 
 // All of the files, or none: a run that fails leaves nothing behind that looks finished.
-void write_outputs(const cli::Tool& tool, const Arguments& given, const Surface& a, const ClosestPoint& b,
+void write_outputs(const cli::Tool& tool, const Arguments& given, const Surface& a, const Other& b,
                    const HausdorffResult& distance, double diagonal_mm) {
   std::vector<fs::path> written;
   try {
@@ -226,7 +253,8 @@ void run(cli::Tool& tool, const Arguments& given) {
   }
 
   const auto stage = tool.stage("compare");
-  const ClosestPoint b(target);
+  const std::size_t triangles_b = target.triangles.size();
+  const Other b(std::move(target), given.shell);
   const HausdorffResult distance =
       measure_and_decide(a, b, width, limit, std::min(width, narrowest_width * diagonal_mm), tool.progress("compare"));
   const double percent = 100 / diagonal_mm;
@@ -239,7 +267,7 @@ void run(cli::Tool& tool, const Arguments& given) {
       {"rms_percent", distance.rms * percent},
       {"diagonal_mm", diagonal_mm},
       {"triangles_a", a.flat.triangles.size()},
-      {"triangles_b", target.triangles.size()},
+      {"triangles_b", triangles_b},
       {"farthest_mm",
        {{"a", {distance.worst_a.x(), distance.worst_a.y(), distance.worst_a.z()}},
         {"b", {distance.worst_b.x(), distance.worst_b.y(), distance.worst_b.z()}}}},

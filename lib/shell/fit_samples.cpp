@@ -16,7 +16,9 @@ constexpr std::size_t most_grid_points = 30'000;  // of all patches: few large p
 constexpr int coarsest_grid = 4;
 constexpr int finest_grid = 8;
 constexpr double other_wall = 4;  // times as far: beyond that a closest point that faces away is one around a rim
-constexpr double beside = 0.7;    // cosine: farther off the normal than this, a distance counts along itself
+constexpr double arrival = 1e-6;  // in a patch's parameters: a step to the foot that is the last
+constexpr int gauss_newton_steps = 2;
+constexpr double beside = 0.7;  // cosine: farther off the normal than this, a distance counts along itself
 
 Vec2 on_edge(std::size_t from, std::size_t to, double s) {
   const std::array<Vec2, 3> corners{Vec2(0, 0), Vec2(1, 0), Vec2(0, 1)};
@@ -46,13 +48,28 @@ PatchFoot foot_on_patch(const CubicPatch& patch, const Vec3& q) {
   const Vec3 u = c[1] - c[0], v = c[2] - c[0], w = q - c[0];
   const double uu = u.dot(u), uv = u.dot(v), vv = v.dot(v), wu = w.dot(u), wv = w.dot(v);
   const double determinant = std::max(uu * vv - uv * uv, 1e-300);
-  Vec2 at = inside(Vec2((vv * wu - uv * wv) / determinant, (uu * wv - uv * wu) / determinant));
+  return foot_on_patch(patch, q, inside(Vec2((vv * wu - uv * wv) / determinant, (uu * wv - uv * wu) / determinant)), 2);
+}
+
+PatchFoot foot_on_patch(const CubicPatch& patch, const Vec3& q, Vec2 start, int steps) {
+  Vec2 at = start;
   PatchFoot best{at, patch.point(at), 0};
   best.squared_distance = (q - best.point).squaredNorm();
-  for (int i = 0; i < 2; ++i) {
+  for (int i = 0; i < steps; ++i) {
     const auto d = patch.tangents(at);
     const Vec3 r = q - best.point;
-    const double a = d[0].dot(d[0]), b = d[0].dot(d[1]), e = d[1].dot(d[1]), f = d[0].dot(r), g = d[1].dot(r);
+    double a = d[0].dot(d[0]), b = d[0].dot(d[1]), e = d[1].dot(d[1]);
+    const double f = d[0].dot(r), g = d[1].dot(r);
+    if (i >= gauss_newton_steps) {
+      // What is left after these is the curvature's doing.
+      const auto h = patch.second_derivatives(at);
+      const double a2 = a - h[0].dot(r), b2 = b - h[1].dot(r), e2 = e - h[2].dot(r);
+      if (a2 > 0 && a2 * e2 - b2 * b2 > 1e-3 * (a * e - b * b)) {
+        a = a2;
+        b = b2;
+        e = e2;
+      }
+    }
     const double det = a * e - b * b;
     if (!(det > 1e-14 * a * e)) {
       break;
@@ -71,8 +88,12 @@ PatchFoot foot_on_patch(const CubicPatch& patch, const Vec3& q) {
     if (squared >= best.squared_distance) {
       break;
     }
+    const bool arrived = (next - at).squaredNorm() < arrival * arrival;
     at = next;
     best = {next, p, squared};
+    if (arrived) {
+      break;
+    }
   }
   return best;
 }

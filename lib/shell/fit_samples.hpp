@@ -28,8 +28,11 @@ struct PatchFoot {
   double squared_distance;
 };
 
-/// The point of a patch closest to q, nearly: the foot on the facet, then two Newton steps.
+/// The point of a patch closest to q, nearly: the foot on the facet, then two Gauss-Newton steps.
 PatchFoot foot_on_patch(const CubicPatch& patch, const Vec3& q);
+
+/// The same from another start, by at most so many steps, Newton's from the third on.
+PatchFoot foot_on_patch(const CubicPatch& patch, const Vec3& q, Vec2 start, int steps);
 
 /// The points at 1/4, 1/2, 3/4 of a patch's edge between two corners.
 std::array<Vec3, 3> edge_points(const CubicPatch& patch, std::size_t from, std::size_t to);

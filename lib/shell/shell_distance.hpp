@@ -15,7 +15,9 @@ struct ShellDistance {
   Interval target_to_shell;
   double mean = 0;  ///< of the distance from the curved surface to the target, over its area
   double rms = 0;
-  Vec3 farthest_of_target = Vec3::Zero();  ///< a point of the target that has target_to_shell.lower
+  Vec3 farthest_of_shell = Vec3::Zero();              ///< a point of the curved surface that has shell_to_target.lower
+  Vec3 farthest_of_target = Vec3::Zero();             ///< a point of the target that has target_to_shell.lower
+  Vec3 closest_to_farthest_of_target = Vec3::Zero();  ///< of the curved surface
 };
 
 struct ShellDistanceOptions {

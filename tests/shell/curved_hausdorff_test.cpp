@@ -123,6 +123,52 @@ TEST(CurvedHausdorff, UpperBoundIsNeverBelowDenseSamples) {
   }
 }
 
+TEST(CurvedHausdorff, IntervalsOfAMillionthOfTheDiagonal) {
+  for (const auto& [shell, mesh] : {std::pair(rough_shell(2, 0.1, 0.01), testing::sphere(3)),
+                                    std::pair(rough_shell(1, 0.2, 0.03), testing::sphere(4))}) {
+    const Target target(mesh);
+    ShellDistanceOptions options;
+    options.width = 1e-3 * target.diagonal();
+    const ShellDistance wide = curved_hausdorff(shell, target, options);
+    options.width = 1e-6 * target.diagonal();
+    const ShellDistance narrow = curved_hausdorff(shell, target, options);
+    for (const auto& [one, other] : {std::pair(narrow.shell_to_target, wide.shell_to_target),
+                                     {narrow.target_to_shell, wide.target_to_shell},
+                                     {narrow.both, wide.both}}) {
+      EXPECT_LE(one.upper - one.lower, 1.01 * options.width);
+      EXPECT_LE(one.lower, other.upper);
+      EXPECT_GE(one.upper, other.lower);
+    }
+    // The points named have the distances named.
+    EXPECT_NEAR(std::sqrt(target.tree().closest(narrow.farthest_of_shell).squared_distance),
+                narrow.shell_to_target.lower, options.width);
+    EXPECT_NEAR((narrow.farthest_of_target - narrow.closest_to_farthest_of_target).norm(), narrow.target_to_shell.lower,
+                options.width);
+  }
+}
+
+TEST(CurvedHausdorff, OffsetPlanesAreMeasuredExactly) {
+  // Two triangles that face upward, 0.3 above a target that reaches 0.4 farther on one side.
+  ShellMesh shell;
+  shell.vertices = {Vec3(0, 0, 0.3), Vec3(1, 0, 0.3), Vec3(1, 1, 0.3), Vec3(0, 1, 0.3)};
+  shell.triangles = {{0, 1, 2}, {0, 2, 3}};
+  shell.normals.assign(4, Vec3::UnitZ());
+  TriangleMesh plane;
+  plane.vertices = {Vec3(0, 0, 0), Vec3(1.4, 0, 0), Vec3(1.4, 1, 0), Vec3(0, 1, 0)};
+  plane.triangles = {{0, 1, 2}, {0, 2, 3}};
+  const Target target(plane);
+  for (const double part : {1e-2, 1e-4, 1e-6}) {
+    ShellDistanceOptions options;
+    options.width = part * target.diagonal();
+    const ShellDistance found = curved_hausdorff(shell, target, options);
+    EXPECT_LE(found.shell_to_target.lower, 0.3);
+    EXPECT_GE(found.shell_to_target.upper, 0.3);
+    EXPECT_LE(found.target_to_shell.lower, 0.5);
+    EXPECT_GE(found.target_to_shell.upper, 0.5);
+    EXPECT_LE(found.both.upper - found.both.lower, 1.01 * options.width);
+  }
+}
+
 TEST(CurvedHausdorff, IsTheSameWithAnyNumberOfThreads) {
   const ShellMesh shell = rough_shell(2, 0.2, 0.03);
   const Target target(testing::sphere(4));
