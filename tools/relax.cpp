@@ -28,7 +28,7 @@ struct Arguments {
   fs::path coarse, target, out;
   std::optional<fs::path> map, picture, curved;
   std::optional<LengthTolerance> tolerance;
-  std::string method = "barycentre";
+  std::string method = "fit";
   std::string surface = "comas";
   std::optional<std::string> mesh_unit;
   bool refine = false;
@@ -46,14 +46,14 @@ void declare(cli::Tool& tool, Arguments& given) {
                  "exit code 4 when it cannot be reached");
   app.add_option(
          "--method", given.method,
-         "barycentre (the paper's rule; the default) or fit (least error: positions, normals and connectivity are "
-         "chosen together)")
+         "fit (least error: positions, normals and connectivity are chosen together; the default) or barycentre (the "
+         "paper's rule: keeps COARSE's triangles)")
       ->check(CLI::IsMember({"barycentre", "fit"}));
   app.add_option("--surface", given.surface, "the patch: comas (the paper's 9-term cubic)")
       ->check(CLI::IsMember({"comas", "watertight"}));
   app.add_flag("--refine", given.refine,
-               "barycentre: split shells where the distance is above the tolerance; without one, all 1:4 "
-               "(fit chooses the number of shells itself)");
+               "keep COARSE's triangles and split them where the distance is above the tolerance (without one: four "
+               "times as many); without --refine, fit looks for the fewest shells, whatever COARSE has");
   app.add_option("--shells", given.shells,
                  "fit: at most N shells instead of as many as COARSE has (with --tolerance: as few as it takes)")
       ->check(cli::whole_number(1))
@@ -282,6 +282,14 @@ void run(cli::Tool& tool, const Arguments& given) {
                         relaxed.stopped));
 
   const auto stage = tool.stage("write");
+  const auto most = given.shells ? given.shells : given.max_shells;
+  if (most && relaxed.shell.triangles.size() > *most) {
+    keep_partial(relaxed.shell);
+    throw RequirementError(
+        fmt::format("{}: {} shells are the fewest found that keep its pieces, holes and handles without folds, {} are "
+                    "allowed; the best mesh is in {}.part",
+                    given.target.string(), relaxed.shell.triangles.size(), *most, given.out.string()));
+  }
   if (options.tolerance && !*relaxed.reached) {
     keep_partial(relaxed.shell);
     throw RequirementError(fmt::format(

@@ -51,7 +51,12 @@ public:
   RelaxResult run() {
     const std::optional<std::size_t> most = options_.shells ? options_.shells : options_.max_shells;
     if (!options_.tolerance) {
-      to_count(most.value_or(coarse_.triangles.size()));
+      to_count(most.value_or((options_.refine ? 4 : 1) * coarse_.triangles.size()));
+      return std::move(result_);
+    }
+    if (options_.refine && coarse_refined(*options_.tolerance, most.value_or(max_index))) {
+      result_.reached = true;
+      result_.stopped = "the tolerance holds";
       return std::move(result_);
     }
     // When the shells allowed do not do, nothing has to be said about fewer.
@@ -108,12 +113,36 @@ private:
         break;
       }
     }
-    // What the samples miss is found now, added to them, and mended.
     state = std::move(best);
     split_thin(state, limit, most);
+    make_certain(samples, state, tolerance, most);
+    no_worse_than_flat(tolerance, max_index, start);
+  }
+
+  /// COARSE's triangles, placed anew, and split where they are too far off. @return whether the tolerance holds
+  bool coarse_refined(double tolerance, std::size_t most) {
+    const FitStart start{coarse_, 0, true};
+    FitSamples samples(target_, guess(static_cast<double>(coarse_.triangles.size())));
+    FitState state(samples, prepare_fit(start, target_), {});
+    smooth(state, tolerance, tolerance);
+    const double limit = margin * tolerance;
+    polish(state, limit, 3);
+    if (add_missed(samples, state, limit) > 0) {
+      state.attach();
+      state.measure();
+    }
+    repair(state, limit, most);
+    mend_angles(state, limit);
+    note(state);
+    return make_certain(samples, state, tolerance, most);
+  }
+
+  /// What the samples miss is found, added to them, and mended. @return whether the tolerance holds
+  bool make_certain(FitSamples& samples, FitState& state, double tolerance, std::size_t most) {
+    const double limit = margin * tolerance;
     for (int i = 0; i < certificates; ++i) {
       if (certify(state, tolerance)) {
-        break;
+        return true;
       }
       const std::size_t added = add_missed(samples, state, margin * tolerance);
       samples.add(farthest_);
@@ -126,22 +155,33 @@ private:
       repair(state, limit, most);
       mend_angles(state, limit);
       if (state.error() > 2 * limit) {
-        certify(state, tolerance);
-        break;  // a place that more shells do not mend
+        return certify(state, tolerance);  // a place that more shells do not mend
       }
     }
-    no_worse_than_flat(tolerance, max_index, start);
+    return false;
   }
 
   void to_count(std::size_t shells) {
-    FitStart start =
-        start_of_fit(coarse_, target_, static_cast<std::size_t>(start_surplus * static_cast<double>(shells)), 0);
+    const bool all = shells >= target_.mesh().triangles.size();
+    FitStart start = start_of_fit(
+        coarse_, target_, all ? shells : static_cast<std::size_t>(start_surplus * static_cast<double>(shells)), 0);
+    if (all && !start.own_topology) {
+      result_.stopped = "the target has no more triangles than shells are allowed";
+      no_worse_than_flat({}, shells, start);
+      return;
+    }
     FitSamples samples(target_, guess(static_cast<double>(shells)));
     FitState state(samples, prepare_fit(start, target_), {});
     // Few shells for a rough target: normals of their own would fit its ripples, and stay.
     smooth(state, 0.1 * start.flat_error, 0.5 * start.flat_error);
     constexpr double any = std::numeric_limits<double>::infinity();
     collapse_edges(state, any, shells, {});
+    if (state.mesh.alive > shells && !start.own_topology) {
+      // So near the smallest mesh there is only decimation knows the way.
+      start = start_of_fit(coarse_, target_, shells, 0);
+      state = FitState(samples, prepare_fit(start, target_), {});
+      smooth(state, 0.1 * start.flat_error, 0.5 * start.flat_error);
+    }
     settle(state);
     mend_angles(state, 0.97 * state.error());
     note(state);

@@ -14,9 +14,11 @@ namespace tunica {
 /// angles are small. Where the target has a sharp crease, shells carry a
 /// normal per corner. A certified distance ends it.
 ///
-/// With `tolerance` the fewest shells found whose certified distance holds; without, the least distance found with at
-/// most `shells` (none: as many as COARSE has). Never more shells, or a larger distance, than plain decimation: where
-/// that wins, its flat facets are the result (flat shells: corner normals are the facets').
+/// With `tolerance` the fewest shells found whose certified distance holds, or with `refine` COARSE's triangles, placed
+/// anew and split where that is needed; without, the least distance found with at most `shells` (none: as many as
+/// COARSE has, with `refine` four times as many; more where the topology needs more). Never more shells, or a larger
+/// distance, than plain decimation: where that wins, its flat facets are the result (flat shells: corner normals are
+/// the facets').
 /// @param coarse  an oriented manifold; its count, and its topology, may matter; @param target  likewise
 /// Keeps: topology of the start, boundary loops (on the target's boundary to the same tolerance). Angles are at least
 /// 20 degrees but where folds, rims or creases of the target would cost the tolerance (or, to a count, error).

@@ -33,6 +33,12 @@ bool faces_other_way(const TriangleMesh& mesh, const Target& target) {
   return agreement < 0;
 }
 
+void turn_around(std::vector<std::array<Index, 3>>& triangles) {
+  for (auto& v : triangles) {
+    std::swap(v[1], v[2]);
+  }
+}
+
 ShellMesh without_unused(const TriangleMesh& mesh) {
   constexpr Index unused = 0xffffffff;
   ShellMesh out;
@@ -60,9 +66,7 @@ public:
     current_ = without_unused(coarse);
     if (faces_other_way(coarse, target)) {
       result_.turned_around = true;
-      for (auto& v : current_.triangles) {
-        std::swap(v[1], v[2]);
-      }
+      turn_around(current_.triangles);
     }
   }
 
@@ -118,13 +122,7 @@ private:
     TriangleMesh mesh = flat_facets(current_);
     const double off_target = std::min(default_off_target * target_.diagonal(),
                                        options_.tolerance.value_or(std::numeric_limits<double>::infinity()) / 4);
-    switch (options_.method) {
-      case RelaxMethod::barycentre:
-        iteration.moves = move_by_barycentre(target_, mesh, off_target);
-        break;
-      case RelaxMethod::fit:  // chooses its own mesh: see relax()
-        break;
-    }
+    iteration.moves = move_by_barycentre(target_, mesh, off_target);
     result_.flips += flip_upright_triangles(target_, mesh);
     const Mending mending = mend(target_, mesh, off_target, mend_limits());
     result_.flips += mending.turned;
@@ -213,7 +211,17 @@ private:
 }  // namespace
 
 RelaxResult relax(const TriangleMesh& coarse, const Target& target, const RelaxOptions& options) {
-  return options.method == RelaxMethod::fit ? fit(coarse, target, options) : Relaxation(coarse, target, options).run();
+  if (options.method == RelaxMethod::barycentre) {
+    return Relaxation(coarse, target, options).run();
+  }
+  if (!faces_other_way(coarse, target)) {
+    return fit(coarse, target, options);
+  }
+  TriangleMesh turned = coarse;
+  turn_around(turned.triangles);
+  RelaxResult result = fit(turned, target, options);
+  result.turned_around = true;
+  return result;
 }
 
 }  // namespace tunica

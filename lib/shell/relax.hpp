@@ -13,10 +13,10 @@
 
 namespace tunica {
 
-/// How the nodes are moved; normals and measuring are the same for all.
+/// How the nodes are moved.
 enum class RelaxMethod {
   barycentre,  ///< the paper's rule
-  fit,         ///< the least-error fit, see fit.hpp
+  fit,         ///< the least-error fit, see fit.hpp; normals and measuring are its own
 };
 
 /// One iteration: nodes moved, normals chosen, distance measured.
@@ -29,8 +29,9 @@ struct RelaxIteration {
 
 struct RelaxOptions {
   RelaxMethod method = RelaxMethod::barycentre;
-  std::optional<double> tolerance;        ///< mm: done when the two-sided distance is certainly at most this
-  bool refine = false;                    ///< split where the distance is above the tolerance; without one, everywhere
+  std::optional<double> tolerance;  ///< mm: done when the two-sided distance is certainly at most this
+  /// Split where the distance is above the tolerance; without one, everywhere. For fit: keep COARSE's triangles.
+  bool refine = false;
   std::optional<std::size_t> max_shells;  ///< for refine and fit
   std::optional<std::size_t> shells;      ///< for fit: at most this many instead of as many as COARSE has
   std::optional<int> max_iterations;      ///< none: 20, with refine 60

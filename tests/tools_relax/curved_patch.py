@@ -13,7 +13,7 @@ def read_ply(path):
         data = file.read()
     end = data.index(b"end_header\n") + len(b"end_header\n")
     types = {"double": "<f8", "float": "<f4", "int": "<i4", "uint": "<u4", "uchar": "u1"}
-    comments, fields, counts, element, list_types = [], [], {}, None, None
+    comments, fields, counts, element, face = [], [], {}, None, []
     for line in data[:end].decode("ascii").splitlines():
         words = line.split()
         if words[0] == "comment":
@@ -26,12 +26,12 @@ def read_ply(path):
         elif words[0] == "property" and element == "vertex":
             fields.append((words[2], types[words[1]]))
         elif words[0] == "property" and words[1] == "list":
-            list_types = types[words[2]], types[words[3]]
+            length = 9 if words[4] == "corner_normals" else 3
+            face += [("n_" + words[4], types[words[2]]), (words[4], types[words[3]], length)]
     vertices = np.frombuffer(data, np.dtype(fields), counts["vertex"], end)
-    face = np.dtype([("n", list_types[0]), ("v", list_types[1], 3)])
-    faces = np.frombuffer(data, face, counts["face"], end + vertices.nbytes)
-    assert (faces["n"] == 3).all()
-    return vertices, faces["v"].astype(int), comments
+    faces = np.frombuffer(data, np.dtype(face), counts["face"], end + vertices.nbytes)
+    assert (faces["n_vertex_indices"] == 3).all()
+    return vertices, faces["vertex_indices"].astype(int), comments
 
 
 def columns(vertices, names):

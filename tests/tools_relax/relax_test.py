@@ -110,7 +110,7 @@ class Contract(Case):
         for key in ("shells", "hausdorff_mm", "hausdorff_percent", "one_sided_percent", "mean_percent", "rms_percent",
                     "flat_hausdorff_percent", "iterations", "min_angle_deg", "self_intersections", "reached"):
             self.assertIn(key, result)
-        self.assertEqual(result["shells"], 48)
+        self.assertIn(result["shells"], range(46, 49))
         self.assertIsNone(result["reached"])
         self.assertEqual(result["self_intersections"], 0)
         diagonal = np.linalg.norm([20, 20, 30])
@@ -150,7 +150,7 @@ class Contract(Case):
 
     def test_tolerance_out_of_reach_is_4_and_the_best_mesh_stays(self):
         record, error = self.relax(self.coarse, self.target, self.out, "--tolerance", "0.0001%", "--max-iterations", 2,
-                                   expect=4)
+                                   "--method", "barycentre", expect=4)
         self.assertIn("not reached", error)
         self.assertFalse(os.path.exists(self.out))
         vertices, triangles, _ = read_ply(self.out + ".part")
@@ -165,13 +165,14 @@ class Contract(Case):
 
     def test_wrong_usage_is_2(self):
         for extra in (["--tolerance", "0.5"], ["--tolerance", "-1mm"], ["--method", "nonsense"],
-                      ["--surface", "watertight"], ["--shells", "100"], ["--refine"], ["--max-shells", "10"],
+                      ["--surface", "watertight"], ["--refine"], ["--max-shells", "10"],
                       ["--max-iterations", "0"], ["--mesh-unit", "parsec"], ["--unknown"]):
             self.relax(self.coarse, self.target, self.out, *extra, expect=2)
-        fit = ["--method", "fit"]
-        for extra in (["--tolerance", "0.5"], ["--refine"], ["--max-shells", "10"], ["--shells", "0"],
-                      ["--shells", "100", "--max-shells", "100", "--refine"]):
-            self.relax(self.coarse, self.target, self.out, *fit, *extra, expect=2)
+        for extra in (["--shells", "0"], ["--shells", "100", "--max-shells", "100", "--refine"]):
+            self.relax(self.coarse, self.target, self.out, *extra, expect=2)
+        barycentre = ["--method", "barycentre"]
+        for extra in (["--refine"], ["--max-shells", "10"], ["--shells", "100"]):
+            self.relax(self.coarse, self.target, self.out, *barycentre, *extra, expect=2)
         self.assertIn("not available yet",
                       self.relax(self.coarse, self.target, self.out, "--surface", "watertight", expect=2)[1])
         self.relax(self.coarse, self.target, expect=2)
@@ -258,7 +259,7 @@ class Contract(Case):
 
 
 class Fit(Case):
-    method = ["--method", "fit"]
+    """The default method."""
 
     def setUp(self):
         super().setUp()
@@ -283,6 +284,54 @@ class Fit(Case):
         self.relax(self.target, self.target, other, "--shells", 60, "--max-iterations", 1, "--threads", 2)
         first, second = read_ply(self.out), read_ply(other)
         self.assertTrue((first[0] == second[0]).all() and (first[1] == second[1]).all())
+
+    def test_refine_keeps_coarse_and_splits_it_where_the_tolerance_asks(self):
+        coarse = self.path("coarse.ply")
+        write_ply(coarse, *cylinder(12, 6, radius=10.1))
+        record, _ = self.relax(coarse, self.target, self.out, "--tolerance", "1%", "--refine")
+        self.assertEqual(record["result"]["shells"], 144)
+        self.assertLess(record["result"]["hausdorff_percent"]["upper"], 0.2)
+        self.assertGreaterEqual(record["result"]["min_angle_deg"], 20)
+        record, _ = self.relax(coarse, self.target, self.out, "--tolerance", "0.05%", "--refine", "--force")
+        self.assertGreaterEqual(record["result"]["shells"], 144)
+        self.assertLessEqual(record["result"]["hausdorff_percent"]["upper"], 0.05)
+
+    def test_coarse_that_faces_the_other_way_is_turned_around(self):
+        vertices, triangles = cylinder(12, 6, radius=10.1)
+        write_ply(self.path("coarse.ply"), vertices, triangles[:, ::-1])
+        record, error = self.relax(self.path("coarse.ply"), self.target, self.out, "--tolerance", "1%", "--refine")
+        self.assertIn("turned around", error)
+        self.assertLess(record["result"]["hausdorff_percent"]["upper"], 0.2)
+
+    def test_fewer_shells_than_the_topology_needs_are_4(self):
+        _, error = self.relax(self.target, self.target, self.out, "--shells", 3, expect=4)
+        self.assertIn("pieces, holes and handles", error)
+        self.assertEqual(len(read_ply(self.out + ".part")[1]), 6)
+
+    def test_more_shells_than_the_target_has_triangles_are_the_target(self):
+        record, _ = self.relax(self.target, self.target, self.out, "--shells", 100000)
+        self.assertEqual(record["result"]["shells"], 5120)
+        self.assertLess(record["result"]["hausdorff_percent"]["upper"], 0.01)  # the width of the interval
+
+    def test_pieces_sheets_and_crumbs_are_kept(self):
+        ball, faces = sphere(3)
+        crumb = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]]) + [30, 0, 0]
+        sheet = np.array([[30, 10, 0], [34, 10, 0], [30, 14, 1], [34, 14, 0.0]])
+        write_ply(self.path("pieces.ply"), np.vstack([ball, crumb, sheet]),
+                  np.vstack([faces, np.array([(0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)]) + len(ball),
+                             np.array([(0, 1, 2), (1, 3, 2)]) + len(ball) + 4]))
+        record, _ = self.relax(self.path("pieces.ply"), self.path("pieces.ply"), self.out, "--tolerance", "0.5%")
+        self.assertLessEqual(record["result"]["hausdorff_percent"]["upper"], 0.5)
+        self.assertLess(record["result"]["shells"], 120)
+        triangles = read_ply(self.out)[1]
+        self.assertEqual(len(triangles), record["result"]["shells"])
+
+    def test_a_surface_of_another_topology_is_covered_as_far_as_it_can_be(self):
+        write_ply(self.path("closed.ply"), *sphere(1, 12))
+        record, error = self.relax(self.path("closed.ply"), self.target, self.out, "--tolerance", "1%", expect=4)
+        self.assertIn("boundary loop", error)
+        self.assertIn("not reached", error)
+        self.assertTrue(os.path.exists(self.out + ".part"))
 
     def test_tolerance_that_the_count_does_not_allow_is_4(self):
         record, error = self.relax(self.target, self.target, self.out, "--tolerance", "0.001%", "--shells", 20,
@@ -332,6 +381,10 @@ class Patch(Case):
 
 @unittest.skipUnless(os.path.isdir(PAPER), f"no paper meshes in {PAPER}")
 class PaperTargets(Case):
+    """By the paper's rule."""
+
+    method = ["--method", "barycentre"]
+
     def decimated(self, target, count):
         out = self.path("coarse.ply")
         subprocess.run([os.path.join(BIN, "tunica-decimate"), target, out, "--triangles", str(count), "--mesh-unit", "mm",
