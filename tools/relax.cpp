@@ -49,7 +49,8 @@ void declare(cli::Tool& tool, Arguments& given) {
          "fit (least error: positions, normals and connectivity are chosen together; the default) or barycentre (the "
          "paper's rule: keeps COARSE's triangles)")
       ->check(CLI::IsMember({"barycentre", "fit"}));
-  app.add_option("--surface", given.surface, "the patch: comas (the paper's 9-term cubic)")
+  app.add_option("--surface", given.surface,
+                 "the patch: comas (the paper's 9-term cubic; the default) or watertight (cubics that meet exactly)")
       ->check(CLI::IsMember({"comas", "watertight"}));
   app.add_flag("--refine", given.refine,
                "keep COARSE's triangles and split them where the distance is above the tolerance (without one: four "
@@ -78,9 +79,6 @@ void refuse_contradictions(const Arguments& given) {
   }
   if (given.shells && given.max_shells) {
     throw UsageError("--shells and --max-shells say the same to --method fit; give one of them");
-  }
-  if (given.surface == "watertight") {
-    throw UsageError("--surface watertight is not available yet; use comas");
   }
   if (given.max_shells && !given.refine) {
     throw UsageError("--max-shells limits --refine; without it the number of shells does not change");
@@ -204,6 +202,7 @@ void run(cli::Tool& tool, const Arguments& given) {
   ShellMesh best;
   RelaxOptions options;
   options.method = given.method == "fit" ? RelaxMethod::fit : RelaxMethod::barycentre;
+  options.surface = given.surface == "watertight" ? Patch::watertight : Patch::comas;
   options.refine = given.refine;
   options.shells = given.shells;
   options.max_shells = given.max_shells;

@@ -75,13 +75,14 @@ ResultGrid::ResultGrid(const Model& model, int level) : model_(model) {
   for (std::size_t b = 0; b < model.shells.size(); ++b) {
     const ShellBody& body = model.shells[b];
     const Tessellation& surface = bodies_.emplace_back(tessellate_uniformly(body.mesh, level));
+    const auto patches = curved_patches(body.mesh);
     const std::size_t first = points();
     TUNICA_ASSERT(first + surface.mesh.vertices.size() <= max_index);
     for (std::size_t v = 0; v < surface.mesh.vertices.size(); ++v) {
       const Vec3& p = surface.mesh.vertices[v];
       coordinates_.insert(coordinates_.end(), p.data(), p.data() + 3);
       const Index shell = surface.vertex_shell[v];
-      add(normals, curved_patch(body.mesh, shell).normal(surface.barycentric[v]));
+      add(normals, patches[shell].normal(surface.barycentric[v]));
       add(thicknesses, body.thickness.size() == 1
                            ? body.thickness.front()
                            : between(body.mesh.triangles[shell], surface.barycentric[v], body.thickness.data()));

@@ -61,21 +61,35 @@ std::optional<Motion> motion_of(const ShellMesh& mesh, std::size_t triangle, std
   return motion;
 }
 
-// The patch after the motion. Its slopes are those of the reference plus what the element's own rotations add, as in
+// The surface after the motion. Its slopes are those of the reference plus what the element's own rotations add, as in
 // its bending energy; the tangent of a turned normal would overshoot where a coarse mesh bends far within one shell.
-CubicPatch moved_patch(const ShellMesh& mesh, std::size_t triangle, const Motion& motion) {
-  ShellMesh corner;
-  corner.vertices.resize(3);
-  corner.triangles = {{0, 1, 2}};
-  corner.corner_normals.resize(1);
-  corner.patch = mesh.patch;
-  for (std::size_t k = 0; k < 3; ++k) {
-    const Vec3 normal = mesh.normal(triangle, static_cast<int>(k));
-    const Vec3 slope = motion.normal - normal / normal.dot(motion.normal) + motion.normal.cross(motion.bending[k]);
-    corner.vertices[k] = mesh.vertices[mesh.triangles[triangle][k]] + motion.displacement[k];
-    corner.corner_normals[0][k] = motion.frame * (motion.normal - slope).normalized();
+// Every triangle has its own normals at its corners then; where they differ the patch knows how to meet its neighbour.
+ShellMesh moved_mesh(const ShellMesh& mesh, std::size_t first, const State& state,
+                     std::vector<std::uint8_t>& collapsed) {
+  ShellMesh moved{mesh.vertices, mesh.triangles, {}, {}, mesh.patch};
+  for (std::size_t v = 0; v < moved.vertices.size(); ++v) {
+    moved.vertices[v] += state.displacement[first + v];
   }
-  return curved_patch(corner, 0);
+  moved.corner_normals.resize(mesh.triangles.size());
+  collapsed.assign(mesh.triangles.size(), 0);
+  parallel_for_blocks(mesh.triangles.size(), 256, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t t = begin; t < end; ++t) {
+      const bool moves = !at_rest(mesh, t, first, state);
+      const auto motion = moves ? motion_of(mesh, t, first, state) : std::nullopt;
+      collapsed[t] = moves && !motion ? 1 : 0;
+      for (std::size_t k = 0; k < 3; ++k) {
+        const Vec3& normal = mesh.normal(t, static_cast<int>(k));
+        if (motion) {
+          const Vec3 slope =
+              motion->normal - normal / normal.dot(motion->normal) + motion->normal.cross(motion->bending[k]);
+          moved.corner_normals[t][k] = motion->frame * (motion->normal - slope).normalized();
+        } else {
+          moved.corner_normals[t][k] = normal;
+        }
+      }
+    }
+  });
+  return moved;
 }
 
 }  // namespace
@@ -84,25 +98,16 @@ std::vector<Vec3> curved_displacement(const Model& model, std::size_t body, cons
                                       const Tessellation& surface) {
   const ShellMesh& mesh = model.shells[body].mesh;
   const std::size_t first = model.first_node(body);
+  std::vector<std::uint8_t> collapsed;
+  const auto before = curved_patches(mesh);
+  const auto after = curved_patches(moved_mesh(mesh, first, state, collapsed));
   std::vector<Vec3> result(surface.mesh.vertices.size());
   parallel_for_blocks(result.size(), vertices_per_block, [&](std::size_t begin, std::size_t end) {
-    std::size_t triangle = mesh.triangles.size();
-    CubicPatch reference;
-    std::optional<CubicPatch> deformed;
     for (std::size_t v = begin; v < end; ++v) {
-      if (surface.vertex_shell[v] != triangle) {
-        triangle = surface.vertex_shell[v];
-        reference = curved_patch(mesh, triangle);
-        deformed.reset();
-        if (at_rest(mesh, triangle, first, state)) {
-          deformed = reference;  // zero to the last bit
-        } else if (const auto motion = motion_of(mesh, triangle, first, state)) {
-          deformed = moved_patch(mesh, triangle, *motion);
-        }
-      }
+      const Index triangle = surface.vertex_shell[v];
       const Vec2& b = surface.barycentric[v];
-      if (deformed) {
-        result[v] = deformed->point(b) - reference.point(b);
+      if (collapsed[triangle] == 0) {
+        result[v] = after[triangle].point(b) - before[triangle].point(b);
       } else {
         const auto& nodes = mesh.triangles[triangle];
         result[v] = (1 - b.x() - b.y()) * state.displacement[first + nodes[0]] +

@@ -71,12 +71,7 @@ std::pair<double, double> means(const std::vector<CubicPatch>& patches, const Ta
 }  // namespace
 
 ShellDistance curved_hausdorff(const ShellMesh& shell, const Target& target, const ShellDistanceOptions& options) {
-  std::vector<CubicPatch> patches(shell.triangles.size());
-  parallel_for_blocks(patches.size(), grain, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t t = begin; t < end; ++t) {
-      patches[t] = curved_patch(shell, t);
-    }
-  });
+  const std::vector<CubicPatch> patches = curved_patches(shell);
   const Aim aim{options.width, options.limit, rounding_of(shell, target)};
   ShellDistance out;
   const OneSided from_shell = shell_to_target(patches, target, aim);

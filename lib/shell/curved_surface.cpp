@@ -5,6 +5,7 @@
 #include "core/error.hpp"
 #include "core/threads.hpp"
 #include "shell/shape_function.hpp"
+#include "surface/incidence.hpp"
 
 #include <fmt/core.h>
 #include <Eigen/Geometry>
@@ -17,6 +18,7 @@ namespace tunica {
 namespace {
 
 constexpr std::size_t patches_per_block = 64;
+constexpr double crease_squared = 0.12061475842818326;  // (2 sin 10 degrees)^2: normals 20 degrees apart
 
 // Cubic Bernstein polynomials and derivatives in the order of CubicPatch::control, l = (l1, l2, l3).
 using Basis = std::array<double, 10>;
@@ -152,14 +154,29 @@ Tessellation tessellate_by(const ShellMesh& shell, const std::vector<CubicPatch>
   return out;
 }
 
-std::vector<CubicPatch> all_patches(const ShellMesh& shell) {
-  std::vector<CubicPatch> patches(shell.triangles.size());
-  parallel_for_blocks(patches.size(), patches_per_block, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t t = begin; t < end; ++t) {
-      patches[t] = curved_patch(shell, t);
+/// As if nothing lay across the edges, or the same normals.
+std::array<std::array<Vec3, 2>, 3> own_normals_across(const std::array<Vec3, 3>& n) {
+  return {{{n[0], n[1]}, {n[1], n[2]}, {n[2], n[0]}}};
+}
+
+/// What a patch of a closed surface adds to its volume: a third of the flux of the position, about `origin`. The
+/// integrand is of degree 7; five Gauss points each way on the square that collapses to the triangle are exact to 8
+/// and 9.
+double flux_volume(const CubicPatch& patch, const Vec3& origin) {
+  constexpr std::array<double, 5> points{-0.9061798459386640, -0.5384693101056831, 0, 0.5384693101056831,
+                                         0.9061798459386640};
+  constexpr std::array<double, 5> weights{0.2369268850561891, 0.4786286704993665, 0.5688888888888889,
+                                          0.4786286704993665, 0.2369268850561891};
+  double sum = 0;
+  for (std::size_t i = 0; i < 5; ++i) {
+    for (std::size_t j = 0; j < 5; ++j) {
+      const double u = (1 + points[i]) / 2, v = (1 + points[j]) / 2;
+      const Vec2 at(u, v * (1 - u));
+      const auto [along_2, along_3] = patch.tangents(at);
+      sum += weights[i] * weights[j] / 4 * (1 - u) * (patch.point(at) - origin).dot(along_2.cross(along_3)) / 3;
     }
-  });
-  return patches;
+  }
+  return sum;
 }
 
 }  // namespace
@@ -226,11 +243,82 @@ CubicPatch comas_patch(const std::array<Vec3, 3>& corners, const std::array<Vec3
   return patch;
 }
 
-CubicPatch curved_patch(const ShellMesh& shell, std::size_t triangle) {
-  if (shell.patch != Patch::comas) {
-    throw UsageError("surface=watertight is not available yet; use comas");
+Vec3 watertight_edge_point(const Vec3& here, const Vec3& there, const std::array<Vec3, 2>& normals) {
+  const Vec3 edge = there - here;
+  const double squared_length = edge.squaredNorm();
+  const Vec3 mean = (normals[0] + normals[1]).normalized();
+  Vec3 tangent = edge - mean.dot(edge) * mean;
+  const Vec3 difference = normals[0] - normals[1];
+  if (const double squared = difference.squaredNorm(); squared > 0) {
+    // Its direction is at right angles to the mean's: one after the other is the projection on both planes.
+    const double along = difference.dot(edge);
+    const double across = along * along / (squared * squared_length);
+    const double share = std::min(1.0, squared / crease_squared) * std::clamp(2 - 4 * across, 0.0, 1.0);
+    tangent -= share * along / squared * difference;
   }
-  return comas_patch(corners_of(shell, triangle), normals_of(shell, triangle));
+  const double cosine = std::clamp(tangent.norm() / std::sqrt(squared_length), 1e-9, 1.0);
+  return here + 2 / (3 * (1 + cosine) * cosine) * tangent;
+}
+
+CubicPatch watertight_patch(const std::array<Vec3, 3>& corners, const std::array<Vec3, 3>& normals,
+                            const std::array<std::array<Vec3, 2>, 3>& across) {
+  CubicPatch patch;
+  auto& p = patch.control;
+  std::array<Vec3, 3> edges;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::size_t next = (i + 1) % 3;
+    p[i] = corners[i];
+    p[3 + 2 * i] = watertight_edge_point(corners[i], corners[next], {normals[i], across[i][0]});
+    p[4 + 2 * i] = watertight_edge_point(corners[next], corners[i], {normals[next], across[i][1]});
+    edges[i] = corners[next] - corners[i];
+  }
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    std::array<double, 10> coordinate{};
+    for (std::size_t i = 0; i < 9; ++i) {
+      coordinate[i] = p[i][axis] - corners[0][axis];
+    }
+    p[9][axis] = corners[0][axis] + averaged_centre(edges, coordinate);
+  }
+  return patch;
+}
+
+CubicPatch smooth_patch(Patch kind, const std::array<Vec3, 3>& corners, const std::array<Vec3, 3>& normals) {
+  return kind == Patch::comas ? comas_patch(corners, normals)
+                              : watertight_patch(corners, normals, own_normals_across(normals));
+}
+
+std::vector<CubicPatch> curved_patches(const ShellMesh& shell) {
+  const bool creased = shell.patch == Patch::watertight && !shell.corner_normals.empty();
+  std::vector<std::array<Index, 3>> beside;
+  if (creased) {
+    const TriangleMesh flat = flat_facets(shell);
+    beside = neighbours(flat, incidence(flat));
+  }
+  std::vector<CubicPatch> patches(shell.triangles.size());
+  parallel_for_blocks(patches.size(), patches_per_block, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t t = begin; t < end; ++t) {
+      const auto corners = corners_of(shell, t);
+      const auto normals = normals_of(shell, t);
+      if (!creased) {
+        patches[t] = smooth_patch(shell.patch, corners, normals);
+        continue;
+      }
+      auto across = own_normals_across(normals);
+      for (std::size_t k = 0; k < 3; ++k) {
+        const Index other = beside[t][k];
+        for (std::size_t l = 0; other != no_neighbour && l < 3; ++l) {
+          const Index v = shell.triangles[other][l];
+          if (v == shell.triangles[t][k]) {
+            across[k][0] = shell.normal(other, static_cast<int>(l));
+          } else if (v == shell.triangles[t][(k + 1) % 3]) {
+            across[k][1] = shell.normal(other, static_cast<int>(l));
+          }
+        }
+      }
+      patches[t] = watertight_patch(corners, normals, across);
+    }
+  });
+  return patches;
 }
 
 double normal_agreement(const std::array<Vec3, 3>& corners, const std::array<Vec3, 3>& normals) {
@@ -293,15 +381,15 @@ double flatness(const CubicPatch& patch, int level) {
 
 double tessellation_size(const ShellMesh& shell, double deviation) {
   double total = 0;
-  for (std::size_t t = 0; t < shell.triangles.size(); ++t) {
-    total += std::pow(level_for(curved_patch(shell, t), deviation), 2);
+  for (const CubicPatch& patch : curved_patches(shell)) {
+    total += std::pow(level_for(patch, deviation), 2);
   }
   return total;
 }
 
 Tessellation tessellate(const ShellMesh& shell, double deviation, std::size_t most_triangles) {
   TUNICA_ASSERT(deviation > 0);
-  const auto patches = all_patches(shell);
+  const auto patches = curved_patches(shell);
   std::vector<int> levels(patches.size());
   double total = 0;
   for (std::size_t t = 0; t < patches.size(); ++t) {
@@ -320,7 +408,7 @@ Tessellation tessellate(const ShellMesh& shell, double deviation, std::size_t mo
 
 Tessellation tessellate_uniformly(const ShellMesh& shell, int level) {
   TUNICA_ASSERT(level >= 1 && level <= 10000);
-  const auto patches = all_patches(shell);
+  const auto patches = curved_patches(shell);
   return tessellate_by(shell, patches, std::vector<int>(patches.size(), level));
 }
 
@@ -338,17 +426,24 @@ double curved_volume(const ShellMesh& shell) {
   const Vec3 origin = shell.vertices[shell.triangles[0][0]];
   std::unordered_map<std::uint64_t, Side> half_edges;
   half_edges.reserve(3 * shell.triangles.size());
+  const std::vector<CubicPatch> watertight =
+      shell.patch == Patch::watertight ? curved_patches(shell) : std::vector<CubicPatch>{};
   double volume = 0;
   const auto key = [](Index from, Index to) { return (std::uint64_t{from} << 32) | to; };
   for (std::size_t t = 0; t < shell.triangles.size(); ++t) {
-    const auto corners = corners_of(shell, t);
-    const Deflection w = comas_deflection(corners, normals_of(shell, t));
-    const Vec3 p1 = corners[0] - origin, p2 = corners[1] - origin, p3 = corners[2] - origin;
-    double mean = 0;
-    for (const double b : w.ordinates) {
-      mean += b / 10;
+    Deflection w{};  // between watertight patches there is no gap
+    if (!watertight.empty()) {
+      volume += flux_volume(watertight[t], origin);
+    } else {
+      const auto corners = corners_of(shell, t);
+      w = comas_deflection(corners, normals_of(shell, t));
+      const Vec3 p1 = corners[0] - origin, p2 = corners[1] - origin, p3 = corners[2] - origin;
+      double mean = 0;
+      for (const double b : w.ordinates) {
+        mean += b / 10;
+      }
+      volume += p1.dot(p2.cross(p3)) / 6 + mean * (p2 - p1).cross(p3 - p1).norm() / 2;
     }
-    volume += p1.dot(p2.cross(p3)) / 6 + mean * (p2 - p1).cross(p3 - p1).norm() / 2;
     for (std::size_t i = 0; i < 3; ++i) {
       const Side side{w.ordinates[3 + 2 * i], w.ordinates[4 + 2 * i], w.normal};
       if (!half_edges.emplace(key(shell.triangles[t][i], shell.triangles[t][(i + 1) % 3]), side).second) {

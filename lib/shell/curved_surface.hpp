@@ -44,8 +44,32 @@ struct Deflection {
 double averaged_centre(const std::array<Vec3, 3>& edges, const std::array<double, 10>& ordinates);
 Deflection comas_deflection(const std::array<Vec3, 3>& corners, const std::array<Vec3, 3>& normals);
 
-/// The curved patch of one triangle, as shell.patch says. Errors: UsageError for a patch that does not exist yet.
-CubicPatch curved_patch(const ShellMesh& shell, std::size_t triangle);
+/// The control point next to `here` on the curve of an edge from `here` to `there`: towards t, the direction of the
+/// edge without its part along the normal, by 2 |edge| / (3 (1 + cos(t, edge))), which meets circular arcs to the sixth
+/// order. It does not depend on the order of the normals, so that both triangles at an edge find the same point.
+/// @param normals  unit, at `here`: of the two triangles at the edge. Where they agree that is the normal; where they
+/// differ by 20 degrees or more, a crease, t lies in both tangent planes; in between, it moves from the plane of their
+/// mean towards that. Where a crease ends across the edge (t nearly at right angles to it) the mean alone counts.
+/// Limits: the normals are not opposite, and neither is along the edge.
+Vec3 watertight_edge_point(const Vec3& here, const Vec3& there, const std::array<Vec3, 2>& normals);
+
+/// The watertight patch over a facet: edge curves by watertight_edge_point(), so that neighbours meet exactly; the
+/// centre follows the edges as in the comas patch, coordinate by coordinate (a plane is kept, what is quadratic over
+/// the facet met to the fourth order).
+/// @param corners, normals  as for comas_patch()
+/// @param across  for the edges 1-2, 2-3, 3-1: the normals that the triangle across has at the start and the end of
+/// the edge; where they are this triangle's own, or there is none, the edge is smooth
+/// Source: the layout of Vlachos et al., Curved PN triangles, I3D 2001, with lengths of the tangents for arcs (theirs
+/// err 2 to 6 times as much) and the centre of Comas, Duriez, Cotin 2010, eq. 1.
+CubicPatch watertight_patch(const std::array<Vec3, 3>& corners, const std::array<Vec3, 3>& normals,
+                            const std::array<std::array<Vec3, 2>, 3>& across);
+
+/// The patch over a facet all of whose edges are smooth.
+CubicPatch smooth_patch(Patch kind, const std::array<Vec3, 3>& corners, const std::array<Vec3, 3>& normals);
+
+/// The curved patches of all triangles, as shell.patch says. Watertight patches meet exactly along every edge of two
+/// triangles that face the same way. Parallel.
+std::vector<CubicPatch> curved_patches(const ShellMesh& shell);
 
 /// The smallest N·n over the three corners of a triangle, n the facet's normal; -1 when the facet has no area.
 double normal_agreement(const std::array<Vec3, 3>& corners, const std::array<Vec3, 3>& normals);
@@ -57,8 +81,9 @@ double normal_agreement(const ShellMesh& shell, std::size_t triangle);
 /// Errors: InputError that names the first triangle at fault and where it is.
 void require_fit(const ShellMesh& shell, const std::string& name);
 
-/// A fine triangle mesh of the curved surface. Patches share no vertices: those of adjacent triangles do not meet
-/// exactly (gap O(h^3)). Fine triangles and vertices of one patch are consecutive.
+/// A fine triangle mesh of the curved surface. Patches share no vertices: comas patches of adjacent triangles do not
+/// meet exactly (gap O(h^3)), watertight ones do where their numbers of pieces agree. Fine triangles and vertices of
+/// one patch are consecutive.
 struct Tessellation {
   TriangleMesh mesh;
   std::vector<Index> shell;         ///< #F: patch of each fine triangle
@@ -85,8 +110,8 @@ double flatness(const CubicPatch& patch, int level);
 
 /// Volume in mm3 enclosed by the curved surface of a closed shell mesh, positive when its triangles face outward:
 /// exact integrals over the patches, and over the gaps between adjacent ones, closed by the ruled surfaces between
-/// their edge curves. The whole is a closed surface: it does not depend on the origin.
-/// Errors: InputError when an edge does not have exactly two triangles of opposite direction.
+/// their edge curves. The whole is a closed surface: it does not depend on the origin. Watertight patches leave no
+/// gaps. Errors: InputError when an edge does not have exactly two triangles of opposite direction.
 double curved_volume(const ShellMesh& shell);
 
 }  // namespace tunica

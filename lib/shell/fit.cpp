@@ -86,7 +86,7 @@ private:
       return;
     }
     FitSamples samples(target_, guess(start.mesh.triangles.size() / expected_gain));
-    FitState state(samples, prepare_fit(start, target_), {});
+    FitState state(samples, prepared(start), {});
     smooth(state, tolerance, tolerance);
     const int rounds = options_.max_iterations.value_or(default_rounds);
     const double limit = margin * tolerance;
@@ -123,7 +123,7 @@ private:
   bool coarse_refined(double tolerance, std::size_t most) {
     const FitStart start{coarse_, 0, true};
     FitSamples samples(target_, guess(static_cast<double>(coarse_.triangles.size())));
-    FitState state(samples, prepare_fit(start, target_), {});
+    FitState state(samples, prepared(start), {});
     smooth(state, tolerance, tolerance);
     const double limit = margin * tolerance;
     polish(state, limit, 3);
@@ -171,7 +171,7 @@ private:
       return;
     }
     FitSamples samples(target_, guess(static_cast<double>(shells)));
-    FitState state(samples, prepare_fit(start, target_), {});
+    FitState state(samples, prepared(start), {});
     // Few shells for a rough target: normals of their own would fit its ripples, and stay.
     smooth(state, 0.1 * start.flat_error, 0.5 * start.flat_error);
     constexpr double any = std::numeric_limits<double>::infinity();
@@ -179,7 +179,7 @@ private:
     if (state.mesh.alive > shells && !start.own_topology) {
       // So near the smallest mesh there is only decimation knows the way.
       start = start_of_fit(coarse_, target_, shells, 0);
-      state = FitState(samples, prepare_fit(start, target_), {});
+      state = FitState(samples, prepared(start), {});
       smooth(state, 0.1 * start.flat_error, 0.5 * start.flat_error);
     }
     settle(state);
@@ -216,6 +216,12 @@ private:
     }
     result_.stopped = fruitless < patience ? "the limit of rounds was reached" : "further rounds bring nothing";
     no_worse_than_flat({}, shells, start);
+  }
+
+  [[nodiscard]] FitMesh prepared(const FitStart& start) const {
+    FitMesh mesh = prepare_fit(start, target_);
+    mesh.kind = options_.surface;
+    return mesh;
   }
 
   /// A thin triangle is worth the two shells that a further node costs.
@@ -379,6 +385,7 @@ private:
     shell.vertices = flat.mesh.vertices;
     shell.triangles = flat.mesh.triangles;
     shell.normals = vertex_normals(flat.mesh);
+    shell.patch = options_.surface;
     for (const Vec3& n : facet_normals(flat.mesh)) {
       shell.corner_normals.push_back({n, n, n});
     }

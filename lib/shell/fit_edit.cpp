@@ -370,6 +370,7 @@ std::size_t flip_edges(FitState& state, double limit) {
         patch.shape.corners[k] = mesh.positions[nodes[i][k]];
         patch.shape.normals[k] = mesh.normals[slots[i][k]];
       }
+      patch.shape.kind = mesh.kind;
       patch.guesses = state.patches[i == 0 ? t1 : t2].guesses;
       trial.patches.push_back(std::move(patch));
     }

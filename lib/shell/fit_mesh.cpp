@@ -105,6 +105,7 @@ std::vector<std::array<Index, 2>> FitMesh::edges() const {
 
 ShellMesh FitMesh::shell(std::vector<Index>* kept) const {
   ShellMesh out;
+  out.patch = kind;
   std::vector<Index> number(positions.size(), no_index), first_slot(positions.size(), no_index);
   bool creased = false;
   if (kept != nullptr) {

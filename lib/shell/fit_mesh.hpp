@@ -22,6 +22,7 @@ struct FitMesh {
   std::vector<std::uint8_t> on_boundary;        ///< #V
   std::vector<Index> free_triangles;
   std::size_t alive = 0;  ///< triangles
+  Patch kind = Patch::comas;
 
   /// One slot per node, with `normals` #V.
   FitMesh(const TriangleMesh& mesh, const std::vector<Vec3>& node_normals);
@@ -35,7 +36,7 @@ struct FitMesh {
     const auto& s = slots[t];
     return {normals[s[0]], normals[s[1]], normals[s[2]]};
   }
-  [[nodiscard]] CubicPatch patch(Index t) const { return comas_patch(corners(t), corner_normals(t)); }
+  [[nodiscard]] CubicPatch patch(Index t) const { return smooth_patch(kind, corners(t), corner_normals(t)); }
 
   /// 0, 1 or 2: where in triangle t the node stands.
   [[nodiscard]] std::size_t corner_of(Index t, Index node) const {

@@ -58,7 +58,7 @@ Measured measure(const FitSamples& samples, std::vector<PlacedPatch>& patches, c
   }
   std::vector<CubicPatch> curved;
   for (const PlacedPatch& p : patches) {
-    curved.push_back(comas_patch(p.shape.corners, p.shape.normals));
+    curved.push_back(p.shape.patch());
   }
   Measured sum{0, 0};
   for (std::size_t i = 0; i < patches.size(); ++i) {
@@ -112,7 +112,7 @@ PatchJacobian patch_jacobian(const PatchShape& shape) {
   const auto flat = [](const CubicPatch& patch) {
     return Eigen::Map<const Eigen::Matrix<double, 30, 1>>(patch.control[0].data());
   };
-  const CubicPatch base = comas_patch(shape.corners, shape.normals);
+  const CubicPatch base = shape.patch();
   const double step = 1e-6 * std::sqrt((shape.corners[1] - shape.corners[0]).squaredNorm() +
                                        (shape.corners[2] - shape.corners[0]).squaredNorm());
   constexpr double tilt = 1e-6;
@@ -121,15 +121,13 @@ PatchJacobian patch_jacobian(const PatchShape& shape) {
   for (std::size_t i = 0; i < 3; ++i) {
     for (Eigen::Index k = 0; k < 3; ++k) {
       changed.corners[i][k] += step;
-      jacobian.col(3 * static_cast<Eigen::Index>(i) + k) =
-          (flat(comas_patch(changed.corners, changed.normals)) - flat(base)) / step;
+      jacobian.col(3 * static_cast<Eigen::Index>(i) + k) = (flat(changed.patch()) - flat(base)) / step;
       changed.corners[i] = shape.corners[i];
     }
     const auto axes = tilt_axes(shape.normals[i]);
     for (std::size_t k = 0; k < 2; ++k) {
       changed.normals[i] = shape.normals[i] + tilt * axes[k];
-      jacobian.col(static_cast<Eigen::Index>(9 + 2 * i + k)) =
-          (flat(comas_patch(changed.corners, changed.normals)) - flat(base)) / tilt;
+      jacobian.col(static_cast<Eigen::Index>(9 + 2 * i + k)) = (flat(changed.patch()) - flat(base)) / tilt;
       changed.normals[i] = shape.normals[i];
     }
   }

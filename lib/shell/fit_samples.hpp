@@ -19,6 +19,10 @@ struct Residual {
 struct PatchShape {
   std::array<Vec3, 3> corners;
   std::array<Vec3, 3> normals;
+  Patch kind = Patch::comas;
+
+  /// As if its edges were smooth: at a crease a watertight patch also heeds the normals across.
+  [[nodiscard]] CubicPatch patch() const { return smooth_patch(kind, corners, normals); }
 };
 
 /// A point of a patch near a given one.

@@ -30,7 +30,7 @@ public:
   void measure();
   void measure(Index t);
 
-  [[nodiscard]] PatchShape shape(Index t) const { return {mesh.corners(t), mesh.corner_normals(t)}; }
+  [[nodiscard]] PatchShape shape(Index t) const { return {mesh.corners(t), mesh.corner_normals(t), mesh.kind}; }
   [[nodiscard]] bool is_sound(Index t, double agreement, double angle) const {
     return tunica::is_sound(shape(t), agreement, angle);
   }

@@ -38,7 +38,8 @@ struct Sample {
   double area;
 };
 
-/// How the deflection of a facet follows its nodes' normals: rows 3..8 of the ordinates by (two turns) x 3 corners.
+/// How the deflection of a facet, nearly the same for both patches, follows its nodes' normals: rows 3..8 of the
+/// ordinates by (two turns) x 3 corners.
 struct Sensitivity {
   std::array<Vector6, 6> edge_ordinates;
   Vector6 centre;
@@ -229,7 +230,7 @@ private:
   }
 
   State evaluate(std::size_t t, const Normals& with) const {
-    const CubicPatch patch = comas_patch(corners(t), with);
+    const CubicPatch patch = smooth_patch(shell_.patch, corners(t), with);
     State state;
     state.samples.reserve(shell_samples + facets_[t].attached.size());
     for (int i = 0; i <= sample_level; ++i) {

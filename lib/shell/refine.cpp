@@ -104,6 +104,7 @@ ShellMesh split_shells(const ShellMesh& shell, const std::vector<Split>& wanted)
     cut_edge(edges.of_triangle[t][longest(shell, edges, t)]);
   }
 
+  const auto patches = curved_patches(shell);
   ShellMesh out{shell.vertices, {}, shell.normals, {}, shell.patch};
   std::vector<Index> middle(edges.ends.size(), none);
   const std::array<Vec2, 3> halfway{Vec2(0.5, 0), Vec2(0.5, 0.5), Vec2(0, 0.5)};
@@ -112,19 +113,19 @@ ShellMesh split_shells(const ShellMesh& shell, const std::vector<Split>& wanted)
       continue;
     }
     Vec3 point = Vec3::Zero(), normal = Vec3::Zero();
-    double patches = 0;
+    double sides = 0;
     for (const Index t : edges.triangles[e]) {
       if (t != none) {
-        const CubicPatch patch = curved_patch(shell, t);
+        const CubicPatch& patch = patches[t];
         const auto k = static_cast<std::size_t>(std::find(edges.of_triangle[t].begin(), edges.of_triangle[t].end(), e) -
                                                 edges.of_triangle[t].begin());
         point += patch.point(halfway[k]);
         normal += patch.normal(halfway[k]);
-        patches += 1;
+        sides += 1;
       }
     }
     middle[e] = static_cast<Index>(out.vertices.size());
-    out.vertices.emplace_back(point / patches);
+    out.vertices.emplace_back(point / sides);
     out.normals.push_back(normal.stableNormalized());
   }
 

@@ -64,6 +64,7 @@ public:
       width_ = std::min(width_, *options.tolerance / 10);
     }
     current_ = without_unused(coarse);
+    current_.patch = options.surface;
     if (faces_other_way(coarse, target)) {
       result_.turned_around = true;
       turn_around(current_.triangles);

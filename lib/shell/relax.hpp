@@ -29,6 +29,7 @@ struct RelaxIteration {
 
 struct RelaxOptions {
   RelaxMethod method = RelaxMethod::barycentre;
+  Patch surface = Patch::comas;     ///< what positions and normals are to stand for
   std::optional<double> tolerance;  ///< mm: done when the two-sided distance is certainly at most this
   /// Split where the distance is above the tolerance; without one, everywhere. For fit: keep COARSE's triangles.
   bool refine = false;

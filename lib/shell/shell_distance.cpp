@@ -24,9 +24,10 @@ Tessellation affordable_tessellation(const ShellMesh& shell, double deviation) {
 /// For each inner edge three points midway between the edge curves of its two patches.
 std::vector<Vec3> points_between_patches(const ShellMesh& shell) {
   const auto across = neighbours(flat_facets(shell), incidence(flat_facets(shell)));
+  const auto patches = curved_patches(shell);
   const auto on_edge = [&](std::size_t t, std::size_t k, double s) {
     const std::array<Vec2, 3> corners{Vec2(0, 0), Vec2(1, 0), Vec2(0, 1)};
-    return curved_patch(shell, t).point((1 - s) * corners[k] + s * corners[(k + 1) % 3]);
+    return patches[t].point((1 - s) * corners[k] + s * corners[(k + 1) % 3]);
   };
   std::vector<Vec3> points;
   for (std::size_t t = 0; t < across.size(); ++t) {

@@ -142,6 +142,46 @@ TEST_F(ResultTest, inflationScalesTheCurvedSurface) {
   }
 }
 
+TEST_F(ResultTest, watertightShellsStayWatertightWhateverTheyDo) {
+  model_.shells[0].mesh.patch = Patch::watertight;
+  const ShellMesh& mesh = model_.shells[0].mesh;
+  const Mat3 turn = Eigen::AngleAxisd(0.7, Vec3(1, -2, 0.5).normalized()).toRotationMatrix();
+  const State rigid = moved(Vec3(0.7 * Vec3(1, -2, 0.5).normalized()), Vec3(3, 1, -7), Vec3(0, 0, 4));
+  const int level = 6;
+  const Tessellation surface = tessellate_uniformly(mesh, level);
+  const std::vector<Vec3> u = curved_displacement(model_, 0, rigid, surface);
+  for (std::size_t v = 0; v < u.size(); ++v) {
+    const Vec3& x = surface.mesh.vertices[v];
+    EXPECT_LT((u[v] - (turn * (x - Vec3(3, 1, -7)) + Vec3(3, 1, -3) - x)).norm(), 1e-11);
+  }
+  State state = moved(Vec3::Zero(), Vec3::Zero(), Vec3::Zero());
+  for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
+    const double k = static_cast<double>(i);
+    state.displacement[i] = 0.3 * Vec3(std::sin(k), std::cos(3 * k), std::sin(5 * k));
+    state.rotation[i] = 0.4 * Vec3(std::cos(2 * k), std::sin(k), std::sin(3 * k));
+  }
+  // On a closed surface every point of an edge, corners left out, belongs to two patches.
+  for (const State& now : {rigid, state}) {
+    const std::vector<Vec3> moves = curved_displacement(model_, 0, now, surface);
+    std::vector<Vec3> on_edges;
+    for (std::size_t v = 0; v < moves.size(); ++v) {
+      const Vec2& b = surface.barycentric[v];
+      const double largest = std::max({b[0], b[1], 1 - b[0] - b[1]});
+      if (std::min({b[0], b[1], 1 - b[0] - b[1]}) < 1e-9 && largest < 1 - 1e-9) {
+        on_edges.push_back(surface.mesh.vertices[v] + moves[v]);
+      }
+    }
+    ASSERT_EQ(on_edges.size(), 3 * (level - 1) * mesh.triangles.size());
+    for (std::size_t i = 0; i < on_edges.size(); ++i) {
+      double nearest = 1e9;
+      for (std::size_t j = 0; j < on_edges.size(); ++j) {
+        nearest = i == j ? nearest : std::min(nearest, (on_edges[i] - on_edges[j]).norm());
+      }
+      EXPECT_LT(nearest, 1e-13 * mesh.vertices[0].norm() + 1e-13);
+    }
+  }
+}
+
 TEST_F(ResultTest, aSmallRotationOfOneNodeMovesLinearAndFiniteSurfacesAlike) {
   const double angle = 1e-5;
   State finite = moved(Vec3::Zero(), Vec3::Zero(), Vec3::Zero());

@@ -81,6 +81,29 @@ TEST(CurvedHausdorff, OpenShellsAndTargetsCoarserThanTheShells) {
   }
 }
 
+TEST(CurvedHausdorff, WatertightPatchesAgreeWithAFineTessellationToo) {
+  for (const double part : {1e-2, 1e-3, 1e-4}) {
+    ShellMesh shell = rough_shell(2, 0.3, 0.05);
+    shell.patch = Patch::watertight;
+    expect_agreement(shell, testing::sphere(4), part);
+    shell.triangles.resize(shell.triangles.size() - 20);
+    expect_agreement(shell, testing::sphere(4), part);
+    ShellMesh creased = rough_shell(1, 0.1, 0);
+    creased.patch = Patch::watertight;
+    for (std::size_t t = 0; t < creased.triangles.size(); ++t) {
+      std::array<Vec3, 3> normals;
+      for (int k = 0; k < 3; ++k) {
+        const double a = 2.9 * static_cast<double>(3 * t) + k;
+        normals[static_cast<std::size_t>(k)] = (creased.normals[creased.triangles[t][static_cast<std::size_t>(k)]] +
+                                                0.4 * Vec3(std::sin(a), std::cos(a), std::sin(2 * a)))
+                                                   .normalized();
+      }
+      creased.corner_normals.push_back(normals);
+    }
+    expect_agreement(creased, testing::sphere(4), part);
+  }
+}
+
 TEST(CurvedHausdorff, SpikeOfTheTargetIsFoundWhicheverSideItIs) {
   TriangleMesh spiked = testing::sphere(4);
   spiked.vertices[77] *= 1.5;
@@ -94,8 +117,11 @@ TEST(CurvedHausdorff, SpikeOfTheTargetIsFoundWhicheverSideItIs) {
   EXPECT_LT(found.shell_to_target.upper, 0.1);
 }
 
-TEST(CurvedHausdorff, UpperBoundIsNeverBelowDenseSamples) {
-  const ShellMesh shell = rough_shell(1, 0.25, 0.05);
+class Bounds : public ::testing::TestWithParam<Patch> {};
+
+TEST_P(Bounds, UpperIsNeverBelowDenseSamples) {
+  ShellMesh shell = rough_shell(1, 0.25, 0.05);
+  shell.patch = GetParam();
   const Target target(testing::sphere(3));
   const Tessellation fine = tessellate_uniformly(shell, 60);
   double from_shell = 0;
@@ -122,6 +148,8 @@ TEST(CurvedHausdorff, UpperBoundIsNeverBelowDenseSamples) {
     EXPECT_LE(curved_hausdorff(shell, target, options).both.upper, *options.limit);
   }
 }
+
+INSTANTIATE_TEST_SUITE_P(CurvedHausdorff, Bounds, ::testing::Values(Patch::comas, Patch::watertight));
 
 TEST(CurvedHausdorff, IntervalsOfAMillionthOfTheDiagonal) {
   for (const auto& [shell, mesh] : {std::pair(rough_shell(2, 0.1, 0.01), testing::sphere(3)),

@@ -116,7 +116,7 @@ double sampled_deviation(const ShellMesh& shell, const Tessellation& fine) {
   double worst = 0;
   for (std::size_t f = 0; f < fine.mesh.triangles.size(); ++f) {
     const auto& v = fine.mesh.triangles[f];
-    const CubicPatch patch = curved_patch(shell, fine.shell[f]);
+    const CubicPatch patch = curved_patches(shell)[fine.shell[f]];
     for (int i = 0; i <= 10; ++i) {
       for (int j = 0; i + j <= 10; ++j) {
         const double l2 = i / 10.0, l3 = j / 10.0, l1 = 1 - l2 - l3;
@@ -228,7 +228,7 @@ std::vector<std::array<Vec3, 3>> patches_and_gaps(const ShellMesh& shell, int le
   }
   std::map<std::pair<Index, Index>, std::vector<Vec3>> curves;
   for (std::size_t t = 0; t < shell.triangles.size(); ++t) {
-    const CubicPatch patch = curved_patch(shell, t);
+    const CubicPatch patch = curved_patches(shell)[t];
     const std::array<Vec2, 3> at{Vec2(0, 0), Vec2(1, 0), Vec2(0, 1)};
     for (std::size_t i = 0; i < 3; ++i) {
       auto& curve = curves[{shell.triangles[t][i], shell.triangles[t][(i + 1) % 3]}];

@@ -3,6 +3,10 @@
 point = flat point + w n, n the facet's unit normal, w the 9-term cubic c1 + c2 x + c3 y + c4 x^2 + c5 xy + c6 y^2 +
 c7 x^3 + c8 x y^2 + c9 y^3 with w = 0 and slope -(N.e)/(N.n) at the corners, averaged over the three choices of the
 first vertex (x axis along the edge from it to the next).
+
+watertight: a cubic Bezier triangle. An edge's control point next to a corner lies from it along the edge's part in the
+tangent plane, by 2 |edge| / (3 (1 + cos)), cos that between the two; the centre makes the terms x^2 y of every
+coordinate vanish, averaged over the first vertex like w. (Without creases.)
 """
 import numpy as np
 
@@ -68,3 +72,37 @@ def patch_points(corners, normals, barycentric):
     w = sum(deflection(np.roll(corners, -k, 0), np.roll(normals, -k, 0), np.roll(barycentric, -k, 1))
             for k in range(3)) / 3
     return barycentric @ corners + np.outer(w, n)
+
+
+def watertight_points(corners, normals, barycentric):
+    """Points of the watertight patch at rows (b1, b2, b3)."""
+    def beside(i, j):
+        edge = corners[j] - corners[i]
+        along = edge - normals[i] * (normals[i] @ edge)
+        cosine = np.linalg.norm(along) / np.linalg.norm(edge)
+        return corners[i] + along / np.linalg.norm(along) * np.linalg.norm(edge) * 2 / (3 * (1 + cosine))
+
+    control = {}
+    for i in range(3):
+        for j in range(3):
+            power = [0, 0, 0]
+            power[i] += 2
+            power[j] += 1
+            control[tuple(power)] = corners[i] if i == j else beside(i, j)
+    centre = np.zeros(3)
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+
+        def at(a, b, c):
+            power = [0, 0, 0]
+            power[i], power[j], power[k] = a, b, c
+            return control[tuple(power)]
+
+        edge = corners[j] - corners[i]
+        foot = (corners[k] - corners[i]) @ edge / (edge @ edge)
+        centre += (at(2, 0, 1) + at(0, 2, 1) - (1 - foot) * (at(3, 0, 0) - 2 * at(2, 1, 0) + at(1, 2, 0))
+                   - foot * (at(2, 1, 0) - 2 * at(1, 2, 0) + at(0, 3, 0))) / 2
+    control[1, 1, 1] = centre / 3
+    weight = {3: 1, 2: 3, 1: 6}
+    return sum(np.outer(weight[max(power)] * np.prod(barycentric ** np.array(power), axis=1), p)
+               for power, p in control.items())

@@ -9,7 +9,7 @@ import unittest
 
 import numpy as np
 
-from curved_patch import columns, patch_points, read_ply
+from curved_patch import columns, patch_points, read_ply, watertight_points
 
 BIN = os.environ["TUNICA_BIN"]
 PAPER = os.path.join(os.environ.get("TUNICA_SHARED_DATA", ""), "paper")
@@ -148,6 +148,37 @@ class Contract(Case):
         first, second = read_ply(self.out), read_ply(other)
         self.assertTrue((first[0] == second[0]).all() and (first[1] == second[1]).all())
 
+    def test_watertight_patches_are_those_of_the_file_and_meet(self):
+        curved = self.path("curved.ply")
+        for method in (("barycentre",), ("fit",), ("fit", "--refine", "--tolerance", "2%")):
+            record, _ = self.relax(self.coarse, self.target, self.out, "--surface", "watertight", "--method", *method,
+                                   "--curved", curved, "--force")
+            vertices, triangles, comments = read_ply(self.out)
+            self.assertIn("surface=watertight", comments)
+            if "corner_normals" in open(self.out, "rb").read().decode("latin-1"):
+                continue
+            points, normals = columns(vertices, "xyz"), columns(vertices, ("nx", "ny", "nz"))
+            grid = np.array([(4 - i - j, i, j) for i in range(5) for j in range(5 - i)]) / 4
+            fine_vertices, fine_triangles, _ = read_ply(curved)
+            fine = columns(fine_vertices, "xyz")
+            expected = np.concatenate([watertight_points(points[t], normals[t], grid) for t in triangles])
+            some = expected[::31]
+            distances = np.array([np.linalg.norm(fine - p, axis=1).min() for p in some])
+            longest = np.linalg.norm(fine[fine_triangles[:, 0]] - fine[fine_triangles[:, 1]], axis=1).max()
+            self.assertLess(distances.max(), longest)
+            # Points of an edge come from both of its triangles: each of them once only, to the last digits.
+            on_edges = grid.min(axis=1) == 0
+            rounded = {tuple(p) for p in np.round(expected.reshape(len(triangles), -1, 3)[:, on_edges], 9).reshape(-1, 3)}
+            edges = {tuple(sorted(e)) for t in triangles for e in ((t[0], t[1]), (t[1], t[2]), (t[2], t[0]))}
+            self.assertEqual(len(rounded), len(points) + 3 * len(edges))
+            compare = subprocess.run([os.path.join(BIN, "tunica-compare"), self.out, self.target, "--shell",
+                                      "--report", self.path("compare.json"), "--force"], capture_output=True, text=True)
+            self.assertEqual(compare.returncode, 0, compare.stderr)
+            with open(self.path("compare.json")) as file:
+                again = json.load(file)["result"]["hausdorff_percent"]
+            self.assertLessEqual(again["lower"], record["result"]["hausdorff_percent"]["upper"])
+            self.assertGreaterEqual(again["upper"], record["result"]["hausdorff_percent"]["lower"])
+
     def test_tolerance_out_of_reach_is_4_and_the_best_mesh_stays(self):
         record, error = self.relax(self.coarse, self.target, self.out, "--tolerance", "0.0001%", "--max-iterations", 2,
                                    "--method", "barycentre", expect=4)
@@ -165,7 +196,7 @@ class Contract(Case):
 
     def test_wrong_usage_is_2(self):
         for extra in (["--tolerance", "0.5"], ["--tolerance", "-1mm"], ["--method", "nonsense"],
-                      ["--surface", "watertight"], ["--refine"], ["--max-shells", "10"],
+                      ["--surface", "smooth"], ["--refine"], ["--max-shells", "10"],
                       ["--max-iterations", "0"], ["--mesh-unit", "parsec"], ["--unknown"]):
             self.relax(self.coarse, self.target, self.out, *extra, expect=2)
         for extra in (["--shells", "0"], ["--shells", "100", "--max-shells", "100", "--refine"]):
@@ -173,8 +204,6 @@ class Contract(Case):
         barycentre = ["--method", "barycentre"]
         for extra in (["--refine"], ["--max-shells", "10"], ["--shells", "100"]):
             self.relax(self.coarse, self.target, self.out, *barycentre, *extra, expect=2)
-        self.assertIn("not available yet",
-                      self.relax(self.coarse, self.target, self.out, "--surface", "watertight", expect=2)[1])
         self.relax(self.coarse, self.target, expect=2)
 
     def test_a_format_without_a_unit_needs_one(self):
