@@ -97,10 +97,9 @@ private:
       advance(options_.progress, static_cast<double>(round) / rounds);
       const std::size_t before = state.mesh.alive;
       collapse_edges(state, limit, 4, {});
-      if (add_missed(samples, state, limit) > 0) {
-        state.attach();
-        state.measure();
-      }
+      add_missed(samples, state, limit);
+      state.attach();
+      state.measure();
       polish(state, limit, 3);
       repair(state, limit, most);
       mend_angles(state, limit);
@@ -246,10 +245,13 @@ private:
     }
   }
 
+  /// The state must have been attached and measured, and is so in the end.
   static void polish(FitState& state, double limit, int steps) {
     for (int i = 0; i < steps; ++i) {
-      state.attach();
-      state.measure();
+      if (i > 0) {
+        state.attach();
+        state.measure();
+      }
       flip_edges(state, limit);
       state.solve(i == 0 && steps > 1 ? 4 : 8, 1);
     }
@@ -284,6 +286,8 @@ private:
       if (split_worst(state, limit, i < 2 ? std::max<std::size_t>(some, state.mesh.alive / 4) : some) == 0) {
         break;
       }
+      state.attach();
+      state.measure();
       polish(state, limit, 2);
       fruitless = state.error() < worth_it * best ? 0 : fruitless + 1;
       best = std::min(best, state.error());

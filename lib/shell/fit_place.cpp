@@ -74,7 +74,7 @@ Measured measure(const FitSamples& samples, std::vector<PlacedPatch>& patches, c
       }
     }
     const Vec3 facing = facing_of(p.shape.corners);
-    samples.from_patch(patch, facing, p.guesses, p.residuals);
+    samples.from_patch(patch, facing, FitSamples::Search::nearby, p.guesses, p.residuals);
     for (const Index q : p.attached) {
       samples.from_target(patch, facing, q, p.residuals);
     }

@@ -17,6 +17,8 @@ constexpr int coarsest_grid = 4;
 constexpr int finest_grid = 8;
 constexpr double other_wall = 4;  // times as far: beyond that a closest point that faces away is one around a rim
 constexpr double arrival = 1e-6;  // in a patch's parameters: a step to the foot that is the last
+constexpr int most_steps = 48;    // downhill, from triangle to triangle
+constexpr double closer = 1 - 1e-9;
 constexpr int gauss_newton_steps = 2;
 constexpr double beside = 0.7;  // cosine: farther off the normal than this, a distance counts along itself
 
@@ -29,6 +31,37 @@ Vec2 inside(Vec2 b) {
   b = b.cwiseMax(0);
   const double sum = b[0] + b[1];
   return sum > 1 ? Vec2(b / sum) : b;
+}
+
+struct TriangleFoot {
+  Vec3 point;
+  double squared_distance;
+  std::size_t side;  // k: on the edge from corner k to k + 1; 3 + k: corner k; inside
+  static constexpr std::size_t inside = 6;
+};
+
+/// The point of a triangle closest to p.
+TriangleFoot foot_on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
+  const Vec3 ab = b - a, ac = c - a, ap = p - a;
+  const double uu = ab.squaredNorm(), uv = ab.dot(ac), vv = ac.squaredNorm(), pu = ap.dot(ab), pv = ap.dot(ac);
+  const double determinant = uu * vv - uv * uv;
+  const double s = vv * pu - uv * pv, t = uu * pv - uv * pu;
+  if (s > 0 && t > 0 && s + t < determinant) {
+    const Vec3 point = a + (s / determinant) * ab + (t / determinant) * ac;
+    return {point, (p - point).squaredNorm(), TriangleFoot::inside};
+  }
+  TriangleFoot best{a, std::numeric_limits<double>::infinity(), 0};
+  const std::array<const Vec3*, 3> corner{&a, &b, &c};
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Vec3 edge = *corner[(k + 1) % 3] - *corner[k];
+    const double part = std::clamp((p - *corner[k]).dot(edge) / std::max(edge.squaredNorm(), 1e-300), 0.0, 1.0);
+    const Vec3 point = *corner[k] + part * edge;
+    const double squared = (p - point).squaredNorm();
+    if (squared < best.squared_distance) {
+      best = {point, squared, part <= 0 ? 3 + k : part >= 1 ? 3 + (k + 1) % 3 : k};
+    }
+  }
+  return best;
 }
 
 /// Along the given normal, or along the distance itself where it points elsewhere (off an edge, rim or boundary).
@@ -117,7 +150,10 @@ void FitSamples::from_gap(const CubicPatch& patch, std::size_t from, std::size_t
 }
 
 FitSamples::FitSamples(const Target& target, std::size_t shells)
-    : target_(target), facets_(facet_normals(target.mesh())) {
+    : target_(target),
+      around_(incidence(target.mesh())),
+      across_(neighbours(target.mesh(), around_)),
+      facets_(facet_normals(target.mesh())) {
   const auto& mesh = target.mesh();
   std::vector<std::uint8_t> used(mesh.vertices.size(), 0);
   for (const auto& loop : boundary_loops(mesh)) {
@@ -162,7 +198,46 @@ FitSamples::FitSamples(const Target& target, std::size_t shells)
   }
 }
 
-void FitSamples::from_patch(const CubicPatch& patch, const Vec3& facing, std::vector<Index>& guesses,
+ClosestPoint::Hit FitSamples::downhill(const Vec3& p, Index start) const {
+  const TriangleMesh& mesh = target_.mesh();
+  const auto look = [&](Index t) {
+    const auto& v = mesh.triangles[t];
+    return foot_on_triangle(p, mesh.vertices[v[0]], mesh.vertices[v[1]], mesh.vertices[v[2]]);
+  };
+  Index here = start;
+  TriangleFoot foot = look(here);
+  for (int step = 0; step < most_steps; ++step) {
+    if (foot.side == TriangleFoot::inside) {
+      return {foot.point, here, foot.squared_distance};
+    }
+    Index next = no_neighbour;
+    TriangleFoot best = foot;
+    const auto consider = [&](Index other) {
+      const TriangleFoot there = look(other);
+      if (there.squared_distance < closer * best.squared_distance) {
+        best = there;
+        next = other;
+      }
+    };
+    if (foot.side < 3) {
+      if (const Index other = across_[here][foot.side]; other != no_neighbour) {
+        consider(other);
+      }
+    } else {
+      for (const Index other : around_.of(mesh.triangles[here][foot.side - 3])) {
+        consider(other);
+      }
+    }
+    if (next == no_neighbour) {
+      return {foot.point, here, foot.squared_distance};
+    }
+    here = next;
+    foot = best;
+  }
+  return target_.tree().closest(p, here);
+}
+
+void FitSamples::from_patch(const CubicPatch& patch, const Vec3& facing, Search search, std::vector<Index>& guesses,
                             std::vector<Residual>& out) const {
   if (guesses.size() != grid_.size()) {
     guesses.assign(grid_.size(), guesses.empty() ? no_neighbour : guesses[0]);
@@ -171,7 +246,9 @@ void FitSamples::from_patch(const CubicPatch& patch, const Vec3& facing, std::ve
   for (std::size_t i = 0; i < grid_.size(); ++i) {
     const Vec3 p = patch.point(grid_[i]);
     const Index guess = guesses[i] == no_neighbour ? last : guesses[i];
-    const auto hit = guess == no_neighbour ? target_.tree().closest(p) : target_.tree().closest(p, guess);
+    const auto hit = guess == no_neighbour          ? target_.tree().closest(p)
+                     : search == Search::everywhere ? target_.tree().closest(p, guess)
+                                                    : downhill(p, guess);
     last = guesses[i] = hit.triangle;
     if (facets_[hit.triangle].dot(facing) > 0) {
       out.push_back(residual(grid_[i], p - hit.point, facets_[hit.triangle]));

@@ -23,6 +23,7 @@ constexpr double least_weight = 0.1;  // residuals below this part of the larges
 constexpr double largest_tilt = 0.3;  // rad
 constexpr double largest_move = 0.3;  // of the mean edge at the node
 constexpr int trials = 6;
+constexpr double doubted = 0.7;  // of the largest error: from there on it is looked at again
 
 using Vector15 = Eigen::Matrix<double, 15, 1>;
 using Matrix15 = Eigen::Matrix<double, 15, 15>;
@@ -59,7 +60,7 @@ void FitState::attach() {
   }
 }
 
-void FitState::measure(Index t) {
+void FitState::measure(Index t, FitSamples::Search search) {
   Patch& p = patches[t];
   p.residuals.clear();
   p.error = 0;
@@ -68,7 +69,7 @@ void FitState::measure(Index t) {
   }
   const CubicPatch patch = mesh.patch(t);
   const Vec3 facing = facing_of(mesh.corners(t));
-  samples_->from_patch(patch, facing, p.guesses, p.residuals);
+  samples_->from_patch(patch, facing, search, p.guesses, p.residuals);
   for (const Index q : p.attached) {
     samples_->from_target(patch, facing, q, p.residuals);
   }
@@ -91,7 +92,16 @@ void FitState::measure() {
   patches.resize(mesh.triangles.size());
   parallel_for_blocks(patches.size(), patches_per_block, [&](std::size_t begin, std::size_t end) {
     for (std::size_t t = begin; t < end; ++t) {
-      measure(static_cast<Index>(t));
+      measure(static_cast<Index>(t), FitSamples::Search::nearby);
+    }
+  });
+  // Downhill from a wrong start a point may seem far that is not.
+  const double far = doubted * error();
+  parallel_for_blocks(patches.size(), patches_per_block, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t t = begin; t < end; ++t) {
+      if (patches[t].error > far) {
+        measure(static_cast<Index>(t), FitSamples::Search::everywhere);
+      }
     }
   });
 }
@@ -128,6 +138,24 @@ Vec3 FitState::middle_of_ring(Index node) const {
     weight += 1;
   }
   return weight > 0 ? Vec3(sum / weight) : mesh.positions[node];
+}
+
+void FitState::changed_patches(const std::vector<std::uint8_t>& moved, std::vector<std::uint8_t>& changed) const {
+  std::fill(changed.begin(), changed.end(), 0);
+  for (std::size_t t = 0; t < changed.size(); ++t) {
+    const auto& v = mesh.triangles[t];
+    if (!mesh.is_alive(static_cast<Index>(t)) || (moved[v[0]] | moved[v[1]] | moved[v[2]]) == 0) {
+      continue;
+    }
+    changed[t] = 1;
+    for (std::size_t k = 0; k < 3; ++k) {
+      for (const Index other : mesh.on_edge(v[k], v[(k + 1) % 3]).triangle) {
+        if (other != no_index) {
+          changed[other] = 1;
+        }
+      }
+    }
+  }
 }
 
 double FitState::solve(double power, double smoothing) {
@@ -300,9 +328,10 @@ double FitState::solve(double power, double smoothing) {
   }
   const std::vector<Patch> old_patches = patches;
   std::vector<double> new_costs(count, 0);
+  std::vector<std::uint8_t> broken(count, 0), moved(nodes, 1), changed(count, 1);
   for (int trial = 0; trial <= trials; ++trial) {
     for (std::size_t v = 0; v < nodes; ++v) {
-      if (mesh.around[v].empty()) {
+      if (mesh.around[v].empty() || moved[v] == 0) {
         continue;
       }
       Vec3 move = length[v] * x.segment<3>(3 * static_cast<Eigen::Index>(v));
@@ -326,18 +355,19 @@ double FitState::solve(double power, double smoothing) {
                                         : old_normals[s];
       }
     }
-    std::vector<std::uint8_t> bad(nodes, 0), broken(count, 0);
+    std::vector<std::uint8_t> bad(nodes, 0);
+    changed_patches(moved, changed);
     parallel_for_blocks(count, patches_per_block, [&](std::size_t begin, std::size_t end) {
       for (std::size_t t = begin; t < end; ++t) {
         const auto i = static_cast<Index>(t);
-        if (!mesh.is_alive(i)) {
+        if (!mesh.is_alive(i) || changed[t] == 0) {
           continue;
         }
         broken[t] =
             !is_sound(i, std::min(limits.agreement, old_agreement[t]), least_angle(limits.angle, old_angle[t])) ||
             facing_of(mesh.corners(i)).dot(old_facing[t]) < 0.3;
         if (broken[t] == 0) {
-          measure(i);
+          measure(i, FitSamples::Search::nearby);
           new_costs[t] = cost_of(patches[t], power, scale);
         } else {
           new_costs[t] = 0;
@@ -365,6 +395,7 @@ double FitState::solve(double power, double smoothing) {
     if (trial == trials) {
       break;
     }
+    moved = bad;
     for (std::size_t v = 0; v < nodes; ++v) {
       if (bad[v] != 0) {
         // First without sliding, which is what spoils angles; then shorter; then not at all.

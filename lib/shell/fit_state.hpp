@@ -28,7 +28,7 @@ public:
 
   /// Measures all patches, or one. Parallel.
   void measure();
-  void measure(Index t);
+  void measure(Index t, FitSamples::Search search = FitSamples::Search::everywhere);
 
   [[nodiscard]] PatchShape shape(Index t) const { return {mesh.corners(t), mesh.corner_normals(t), mesh.kind}; }
   [[nodiscard]] bool is_sound(Index t, double agreement, double angle) const {
@@ -47,6 +47,8 @@ public:
 private:
   struct Step;
   [[nodiscard]] double cost_of(const Patch& patch, double power, double scale) const;
+  /// Patches whose residuals change when these nodes move: theirs, and those that meet them along an edge.
+  void changed_patches(const std::vector<std::uint8_t>& moved, std::vector<std::uint8_t>& changed) const;
   [[nodiscard]] Vec3 middle_of_ring(Index node) const;
 
   const FitSamples* samples_;
