@@ -371,7 +371,9 @@ private:
     for (std::size_t i = 0; i < system_.node_count(); ++i) {
       auto block = tangent.block(tangent.find(static_cast<Index>(i), static_cast<Index>(i)));
       block.diagonal().head<3>() += factor * mass_.segment<3>(at(i));
-      block.block<3, 3>(3, 3) += factor * mass_[at(i) + 3] * spin_to_rate(change.segment<3>(at(i) + 3));
+      const Vec3 turn = change.segment<3>(at(i) + 3);
+      block.block<3, 3>(3, 3) +=
+          factor * mass_[at(i) + 3] * spin_to_rate(turn, spin_coefficients(turn.squaredNorm()).eta);
     }
   }
 

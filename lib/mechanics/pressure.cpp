@@ -1,5 +1,6 @@
 #include "mechanics/pressure.hpp"
 
+#include "mechanics/element_lanes.hpp"
 #include "mechanics/rotation.hpp"
 
 namespace tunica {
@@ -88,37 +89,37 @@ void unit_pressure(const std::array<Vec3, 3>& corners, const PatchHeight& height
   }
 }
 
-void unit_pressure(const ShellElement& element, const CornerMotion& motion, Vector18& force, Matrix18* stiffness,
-                   double* volume) {
-  Mat3 x;
+void unit_pressure(const ElementLanes& element, const MotionLanes& motion, LaneVector18& force, LaneMatrix18* stiffness,
+                   Lanes* volume) {
+  LaneMat3 x;
   for (int k = 0; k < 3; ++k) {
     x.col(k) = element.from_centroid.col(k) - element.from_centroid.col(0) +
                (motion.displacement.col(k) - motion.displacement.col(0));
   }
-  const Vec3 twice = x.col(1).cross(x.col(2));
-  const double twice_area = twice.norm();
-  const double area = twice_area / 2;
-  const Vec3 n = twice / twice_area;
+  const LaneVec3 twice = x.col(1).cross(x.col(2));
+  const Lanes twice_area = twice.norm();
+  const Lanes area = twice_area / 2;
+  const LaneVec3 n = twice / twice_area;
   // Height: sum over the ends of the edges of length x slope x weight / 30, with the sign of the edge's direction.
-  double height = 0;
-  Vector18 height_gradient = Vector18::Zero();
-  Mat3 opposite;
-  Mat3 area_gradient;
+  Lanes height = 0;
+  LaneVector18 height_gradient = LaneVector18::Zero();
+  LaneMat3 opposite;
+  LaneMat3 area_gradient;
   struct End {
     int corner = 0;
-    double weight = 0;
-    Vec3 carried;
+    Lanes weight = 0;
+    LaneVec3 carried;
   };
   std::array<std::array<End, 2>, 3> ends;
-  std::array<double, 3> of_length{};
+  std::array<Lanes, 3> of_length{Lanes(0), Lanes(0), Lanes(0)};
   for (int k = 0; k < 3; ++k) {
     const int next_corner = (k + 1) % 3;
     opposite.col(k) = x.col((k + 2) % 3) - x.col(next_corner);
     area_gradient.col(k) = 0.5 * n.cross(opposite.col(k));
-    const Vec3 edge = x.col(next_corner) - x.col(k);
-    const double length = edge.norm();
-    const Vec3 normal = element.axes.transpose() * element.edge_normals.col(k);
-    Vec3 carried = Vec3::Zero();
+    const LaneVec3 edge = x.col(next_corner) - x.col(k);
+    const Lanes length = edge.norm();
+    const LaneVec3 normal = element.axes.transpose() * element.edge_normals.col(k);
+    LaneVec3 carried = LaneVec3::Zero();
     for (int e = 0; e < 2; ++e) {
       End& end = ends[static_cast<std::size_t>(k)][static_cast<std::size_t>(e)];
       end.corner = e == 0 ? k : next_corner;
@@ -130,7 +131,7 @@ void unit_pressure(const ShellElement& element, const CornerMotion& motion, Vect
       height_gradient.segment<3>(6 * end.corner + 3) -= end.weight * end.carried.cross(edge);
     }
     height += of_length[static_cast<std::size_t>(k)] * length - edge.dot(carried);
-    const Vec3 along = of_length[static_cast<std::size_t>(k)] / length * edge - carried;
+    const LaneVec3 along = of_length[static_cast<std::size_t>(k)] / length * edge - carried;
     height_gradient.segment<3>(6 * next_corner) += along;
     height_gradient.segment<3>(6 * k) -= along;
   }
@@ -144,41 +145,56 @@ void unit_pressure(const ShellElement& element, const CornerMotion& motion, Vect
   if (stiffness == nullptr) {
     return;
   }
-  Matrix18& t = *stiffness;
+  LaneMatrix18& t = *stiffness;
   t.setZero();
   for (int k = 0; k < 3; ++k) {
     const int start = 6 * k;
     const int stop = 6 * ((k + 1) % 3);
-    const Vec3 edge = x.col((k + 1) % 3) - x.col(k);
-    const double length = edge.norm();
-    const Vec3 direction = edge / length;
-    const Mat3 stretch =
-        area * of_length[static_cast<std::size_t>(k)] / length * (Mat3::Identity() - direction * direction.transpose());
+    const LaneVec3 edge = x.col((k + 1) % 3) - x.col(k);
+    const Lanes length = edge.norm();
+    const LaneVec3 direction = edge / length;
+    const LaneMat3 stretch = area * of_length[static_cast<std::size_t>(k)] / length *
+                             (LaneMat3::Identity() - direction * direction.transpose());
     t.block<3, 3>(stop, stop) += stretch;
     t.block<3, 3>(start, start) += stretch;
     t.block<3, 3>(stop, start) -= stretch;
     t.block<3, 3>(start, stop) -= stretch;
     for (const End& end : ends[static_cast<std::size_t>(k)]) {
       const int spin = 6 * end.corner + 3;
-      const Mat3 turned = area * end.weight * skew(end.carried);
+      const LaneMat3 turned = area * end.weight * skew(end.carried);
       t.block<3, 3>(stop, spin) += turned;
       t.block<3, 3>(start, spin) -= turned;
       t.block<3, 3>(spin, stop) -= turned;
       t.block<3, 3>(spin, start) += turned;
       t.block<3, 3>(spin, spin) +=
-          area * end.weight * (edge.dot(end.carried) * Mat3::Identity() - end.carried * edge.transpose());
+          area * end.weight * (edge.dot(end.carried) * LaneMat3::Identity() - end.carried * edge.transpose());
     }
   }
   // height x d2A/dx_i dx_j + d(2A n / 6)/dx_j + what the gradients of area and height make together.
-  const Mat3 across = 0.25 * height / area * n * n.transpose();
+  const LaneMat3 across = 0.25 * height / area * n * n.transpose();
   for (int j = 0; j < 3; ++j) {
     t.middleRows<3>(6 * j).noalias() += area_gradient.col(j) * height_gradient.transpose();
     t.middleCols<3>(6 * j).noalias() += height_gradient * area_gradient.col(j).transpose();
     for (int i = 0; i < 3; ++i) {
       const double sign = i == j ? 0 : j == (i + 1) % 3 ? -0.5 : 0.5;
-      const Vec3 axis = opposite.col(j) / 6 + sign * height * n;
+      const LaneVec3 axis = opposite.col(j) / 6 + sign * height * n;
       t.block<3, 3>(6 * i, 6 * j) += opposite.col(i).dot(opposite.col(j)) * across + skew(axis);
     }
+  }
+}
+
+void unit_pressure(const ShellElement& element, const CornerMotion& motion, Vector18& force, Matrix18* stiffness,
+                   double* volume) {
+  LaneVector18 forces;
+  LaneMatrix18 stiffnesses;
+  Lanes volumes;
+  unit_pressure(same(element), same(motion), forces, stiffness == nullptr ? nullptr : &stiffnesses, &volumes);
+  force = lane(forces, 0);
+  if (stiffness != nullptr) {
+    *stiffness = lane(stiffnesses, 0);
+  }
+  if (volume != nullptr) {
+    *volume = volumes[0];
   }
 }
 

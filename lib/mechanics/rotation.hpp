@@ -10,7 +10,13 @@
 /// Source: Nour-Omid, Rankin 1991; Felippa, Haugen 2005, section 5 and appendix.
 namespace tunica {
 
-inline Mat3 skew(const Vec3& v) { return (Mat3() << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0).finished(); }
+template <typename Vector>
+auto skew(const Eigen::MatrixBase<Vector>& v) {
+  using Scalar = typename Vector::Scalar;
+  Eigen::Matrix<Scalar, 3, 3> s;
+  s << Scalar(0), -v[2], v[1], v[2], Scalar(0), -v[0], -v[1], v[0], Scalar(0);
+  return s;
+}
 
 /// Unit quaternion of a rotation vector.
 inline Eigen::Quaterniond exponential(const Vec3& vector) {
@@ -47,35 +53,50 @@ inline Vec3 logarithm(const Mat3& rotation) {
 }
 
 /// eta = (1 - (t/2) cot(t/2)) / t^2 and mu = (d eta / dt) / t at t = |theta|.
+template <typename Scalar>
 struct SpinCoefficients {
-  double eta = 0;
-  double mu = 0;
+  Scalar eta = 0;
+  Scalar mu = 0;
 };
 
-/// The coefficients for a rotation by `angle` (radians), by their series where it is small.
-inline SpinCoefficients spin_coefficients(double angle) {
-  const double t2 = angle * angle;
-  if (angle < 0.1) {
-    return {1.0 / 12 + t2 / 720 + t2 * t2 / 30240 + t2 * t2 * t2 / 1209600,
-            1.0 / 360 + t2 / 7560 + t2 * t2 / 201600 + t2 * t2 * t2 / 5987520};
+/// Squared angle below which small_spin_coefficients() are exact to round-off (rad^2).
+inline constexpr double small_square = 0.01;
+
+/// The coefficients by their series, for a small squared angle.
+template <typename Scalar>
+SpinCoefficients<Scalar> small_spin_coefficients(const Scalar& t2) {
+  return {1.0 / 12 + t2 * (1.0 / 720 + t2 * (1.0 / 30240 + t2 * (1.0 / 1209600))),
+          1.0 / 360 + t2 * (1.0 / 7560 + t2 * (1.0 / 201600 + t2 * (1.0 / 5987520)))};
+}
+
+/// The coefficients for a squared angle (rad^2).
+inline SpinCoefficients<double> spin_coefficients(double t2) {
+  if (t2 < small_square) {
+    return small_spin_coefficients(t2);
   }
+  const double angle = std::sqrt(t2);
   const double sine = std::sin(angle / 2);
   return {(1 - angle / 2 * std::cos(angle / 2) / sine) / t2,
           (angle * (angle + std::sin(angle)) - 8 * sine * sine) / (4 * t2 * t2 * sine * sine)};
 }
 
 /// H(theta): rate of the rotation vector from the spin, both in the fixed frame.
-inline Mat3 spin_to_rate(const Vec3& theta) {
-  const Mat3 s = skew(theta);
-  return Mat3::Identity() - 0.5 * s + spin_coefficients(theta.norm()).eta * s * s;
+template <typename Scalar>
+Eigen::Matrix<Scalar, 3, 3> spin_to_rate(const Eigen::Matrix<Scalar, 3, 1>& theta, const Scalar& eta) {
+  const Eigen::Matrix<Scalar, 3, 3> s = skew(theta);
+  return Eigen::Matrix<Scalar, 3, 3>::Identity() - 0.5 * s + eta * (s * s);
 }
 
 /// Derivative of H(theta)^T m by theta at fixed m.
-inline Mat3 spin_to_rate_derivative(const Vec3& theta, const Vec3& m) {
-  const auto [eta, mu] = spin_coefficients(theta.norm());
-  const Vec3 twice = theta.cross(theta.cross(m));
-  return -0.5 * skew(m) + eta * (theta.dot(m) * Mat3::Identity() + theta * m.transpose() - 2 * m * theta.transpose()) +
-         mu * twice * theta.transpose();
+template <typename Scalar>
+Eigen::Matrix<Scalar, 3, 3> spin_to_rate_derivative(const Eigen::Matrix<Scalar, 3, 1>& theta,
+                                                    const Eigen::Matrix<Scalar, 3, 1>& m,
+                                                    const SpinCoefficients<Scalar>& coefficients) {
+  const Eigen::Matrix<Scalar, 3, 1> twice = theta.cross(theta.cross(m));
+  return -0.5 * skew(m) +
+         coefficients.eta * (theta.dot(m) * Eigen::Matrix<Scalar, 3, 3>::Identity() + theta * m.transpose() -
+                             2 * m * theta.transpose()) +
+         coefficients.mu * (twice * theta.transpose());
 }
 
 }  // namespace tunica

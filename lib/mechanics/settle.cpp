@@ -101,6 +101,7 @@ SettleResult settle(const ShellSystem& system, const RunSettings& settings, Tang
     result.cg_iterations += solved.cg_iterations;
     if (!solved.solved || !solved.positive_definite) {
       positive_without = false;
+      result.lost_stability = true;
       viscosity = std::max(4 * viscosity, 1e-9);
       if (viscosity > largest_viscosity) {
         return result;

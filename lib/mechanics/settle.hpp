@@ -7,7 +7,9 @@ namespace tunica {
 struct SettleResult {
   bool settled = false;   ///< a stable equilibrium was reached
   bool ran_away = false;  ///< the shell left every bound: some displacement passed the size of the model
-  double residual = 0;    ///< relative
+  /// A tangent on the way was not positive definite, however little viscosity is left.
+  bool lost_stability = false;
+  double residual = 0;  ///< relative
   std::size_t iterations = 0;
   std::size_t cg_iterations = 0;
 };

@@ -91,6 +91,9 @@ struct ShellElement {
   Matrix39 curvature;               ///< mean, from the rotation vectors
 };
 
+/// Elements that a run computes at once (element_lanes.hpp).
+inline constexpr std::size_t batch_size = 4;
+
 /// What the three corners do: displacements (columns) and rotations from the reference.
 struct CornerMotion {
   Mat3 displacement;
@@ -108,9 +111,6 @@ bool deformation(const ShellElement& element, const CornerMotion& motion, Elemen
 
 /// The state by the linear theory, of displacements and rotation vectors (6 per corner, world axes).
 ElementState linear_deformation(const ShellElement& element, const Vector18& motion);
-
-/// Stiffness times a state.
-ElementState element_force(const ShellElement& element, const ElementState& deformation);
 
 /// The linear stiffness in world axes, at the reference.
 Matrix18 linear_stiffness(const ShellElement& element);
@@ -130,7 +130,7 @@ struct Viscous {
 
 /// Forces, and the tangent when asked for: d force / d (displacement, spin), not symmetric away from equilibrium.
 /// @return false as deformation() does.
-/// Cost: about 2 us with the tangent, 0.5 us without; no allocation.
+/// For one element, tests and states; runs take several at once: element_lanes.hpp.
 bool corotational_response(const ShellElement& element, const CornerMotion& motion, const Viscous& viscous,
                            ElementResponse& response, Matrix18* tangent);
 

@@ -2,6 +2,7 @@
 
 #include "core/error.hpp"
 #include "core/threads.hpp"
+#include "mechanics/element_lanes.hpp"
 #include "mechanics/pressure.hpp"
 #include "mechanics/rotation.hpp"
 #include "mechanics/supports.hpp"
@@ -19,7 +20,7 @@
 namespace tunica {
 namespace {
 
-constexpr std::size_t grain = 64;
+constexpr std::size_t grain = 16;  // batches
 
 Eigen::Index at(std::size_t node) { return 6 * static_cast<Eigen::Index>(node); }
 
@@ -67,7 +68,13 @@ void colour_elements(ShellSystem& system) {
     if (system.colours.size() <= colour) {
       system.colours.resize(colour + 1);
     }
-    system.colours[colour].push_back(static_cast<Index>(e));
+    std::vector<Batch>& batches = system.colours[colour];
+    if (batches.empty() || batches.back().count == lane_count ||
+        system.elements[batches.back().elements[0]].curved != system.elements[e].curved) {
+      batches.emplace_back();
+      batches.back().elements.fill(static_cast<Index>(e));
+    }
+    batches.back().elements[batches.back().count++] = static_cast<Index>(e);
   }
 }
 
@@ -192,49 +199,81 @@ void make_loads(ShellSystem& system, const Model& model) {
   }
 }
 
-CornerMotion corner_motion(const ShellElement& element, const Configuration& configuration) {
-  CornerMotion motion;
-  for (int k = 0; k < 3; ++k) {
-    const Index node = element.nodes[static_cast<std::size_t>(k)];
-    motion.displacement.col(k) = configuration.displacement[node];
-    motion.rotation[static_cast<std::size_t>(k)] = configuration.rotation[node].toRotationMatrix();
+ElementGroup members(const ShellSystem& system, const Batch& batch) {
+  ElementGroup group{};
+  for (std::size_t k = 0; k < lane_count; ++k) {
+    group[k] = &system.elements[batch.elements[k]];
+  }
+  return group;
+}
+
+MotionLanes corner_motion(const ElementGroup& elements, const Configuration& configuration) {
+  MotionLanes motion;
+  for (std::size_t corner = 0; corner < 3; ++corner) {
+    const auto node = [&](std::size_t k) { return elements[k]->nodes[corner]; };
+    LaneVec3 displacement;
+    set_lanes(
+        displacement, [&](std::size_t k) -> const auto& { return configuration.displacement[node(k)]; });
+    motion.displacement.col(static_cast<Eigen::Index>(corner)) = displacement;
+    Eigen::Matrix<Lanes, 4, 1> coefficients;
+    set_lanes(
+        coefficients, [&](std::size_t k) -> const auto& { return configuration.rotation[node(k)].coeffs(); });
+    const Eigen::Quaternion<Lanes> rotation(coefficients);
+    motion.rotation[corner] = rotation.toRotationMatrix();
   }
   return motion;
 }
 
-/// Unit pressure on an element: on its slopes where they count, else on the facet and its patch's frozen height.
-void push(const ShellElement& element, const PatchHeight& height, const CornerMotion& motion, Vector18& force,
-          Matrix18* stiffness) {
-  if (element.curved) {
-    unit_pressure(element, motion, force, stiffness);
-    return;
-  }
-  std::array<Vec3, 3> corners;
-  for (int k = 0; k < 3; ++k) {
-    corners[static_cast<std::size_t>(k)] =
-        element.from_centroid.col(k) + (motion.displacement.col(k) - motion.displacement.col(0));
-  }
-  Vector9 on_corners;
-  Matrix9 between_corners;
-  unit_pressure(corners, height, on_corners, stiffness == nullptr ? nullptr : &between_corners);
-  force.setZero();
-  for (int k = 0; k < 3; ++k) {
-    force.segment<3>(6 * k) = on_corners.segment<3>(3 * k);
-  }
-  if (stiffness != nullptr) {
-    stiffness->setZero();
+/// Unit pressure on elements whose slopes do not count: on the facet and its patch's frozen height.
+void push_facets(const ShellSystem& system, const Batch& batch, const MotionLanes& motion, LaneVector18& force,
+                 LaneMatrix18* stiffness) {
+  std::array<Vector18, lane_count> forces;
+  std::array<Matrix18, lane_count> stiffnesses;
+  for (std::size_t l = 0; l < lane_count; ++l) {
+    const ShellElement& element = system.elements[batch.elements[l]];
+    const Mat3 displacement = lane(motion.displacement, l);
+    std::array<Vec3, 3> corners;
+    for (int k = 0; k < 3; ++k) {
+      corners[static_cast<std::size_t>(k)] = element.from_centroid.col(k) + (displacement.col(k) - displacement.col(0));
+    }
+    Vector9 on_corners;
+    Matrix9 between_corners;
+    unit_pressure(corners, system.heights[batch.elements[l]], on_corners,
+                  stiffness == nullptr ? nullptr : &between_corners);
+    forces[l].setZero();
+    stiffnesses[l].setZero();
     for (int i = 0; i < 3; ++i) {
-      for (int j = 0; j < 3; ++j) {
-        stiffness->block<3, 3>(6 * i, 6 * j) = between_corners.block<3, 3>(3 * i, 3 * j);
+      forces[l].segment<3>(6 * i) = on_corners.segment<3>(3 * i);
+      for (int j = 0; stiffness != nullptr && j < 3; ++j) {
+        stiffnesses[l].block<3, 3>(6 * i, 6 * j) = between_corners.block<3, 3>(3 * i, 3 * j);
       }
     }
   }
+  set_lanes(
+      force, [&](std::size_t l) -> const auto& { return forces[l]; });
+  if (stiffness != nullptr) {
+    set_lanes(
+        *stiffness, [&](std::size_t l) -> const auto& { return stiffnesses[l]; });
+  }
 }
 
-void scatter(const std::array<std::size_t, 9>& places, const Matrix18& matrix, BlockMatrix& target) {
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) {
-      target.block(places[static_cast<std::size_t>(3 * i + j)]) += matrix.block<6, 6>(6 * i, 6 * j);
+void scatter(const ShellSystem& system, const Batch& batch, const LaneMatrix18& matrices, BlockMatrix& target) {
+  constexpr int width = static_cast<int>(lane_count);
+  for (int j = 0; j < 3; ++j) {
+    for (int i = 0; i < 3; ++i) {
+      const auto place = static_cast<std::size_t>(3 * i + j);
+      for (int first = 0; first < 36; first += width) {
+        std::array<Lanes, lane_count> part;
+        for (int k = 0; k < width; ++k) {
+          part[static_cast<std::size_t>(k)] = matrices(6 * i + (first + k) % 6, 6 * j + (first + k) / 6);
+        }
+        transpose(part);
+        for (std::size_t l = 0; l < batch.count; ++l) {
+          double* const values = target.values.data() + 36 * system.placement[batch.elements[l]][place] + first;
+          (Lanes(values, std::experimental::element_aligned) + part[l])
+              .copy_to(values, std::experimental::element_aligned);
+        }
+      }
     }
   }
 }
@@ -409,38 +448,61 @@ void evaluate(const ShellSystem& system, const Model& model, const Configuration
   }
   std::vector<double> energies(system.elements.size());
   std::atomic<bool> valid{true};
-  for (const std::vector<Index>& colour : system.colours) {
+  for (const std::vector<Batch>& colour : system.colours) {
     parallel_for_blocks(colour.size(), grain, [&](std::size_t begin, std::size_t end) {
-      ElementResponse response;
-      Matrix18 stiffness, push_stiffness;
-      Vector18 pushed;
-      for (std::size_t i = begin; i < end; ++i) {
-        const std::size_t e = colour[i];
-        const ShellElement& element = system.elements[e];
-        const CornerMotion motion = corner_motion(element, configuration);
-        const Viscous damping{viscous.factor, viscous.previous == nullptr ? nullptr : &(*viscous.previous)[e]};
-        if (!corotational_response(element, motion, damping, response, tangent == nullptr ? nullptr : &stiffness)) {
+      ElementLanes elements;
+      ResponseLanes response;
+      ViscousLanes damping;
+      LaneMatrix18 stiffness, push_stiffness;
+      LaneVector18 pushed;
+      for (std::size_t b = begin; b < end; ++b) {
+        const Batch& batch = colour[b];
+        const ElementGroup group = members(system, batch);
+        gather(group, elements);
+        const MotionLanes motion = corner_motion(group, configuration);
+        damping.factor = viscous.previous == nullptr ? 0 : viscous.factor;
+        if (damping.factor > 0) {
+          set_lanes(
+              damping.previous, [&](std::size_t l) -> const auto& { return (*viscous.previous)[batch.elements[l]]; });
+        }
+        const LaneMask whole =
+            corotational_response(elements, motion, damping, response, tangent == nullptr ? nullptr : &stiffness);
+        if (!all_of(whole)) {
           valid = false;
           continue;
         }
-        forces.deformation[e] = response.deformation;
-        energies[e] = response.energy;
-        for (int k = 0; k < 3; ++k) {
-          forces.internal.segment<6>(at(element.nodes[static_cast<std::size_t>(k)])) +=
-              response.force.segment<6>(6 * k);
-        }
-        const double p = pressure[element.body];
-        if (p != 0) {
-          push(element, system.heights[e], motion, pushed, tangent == nullptr ? nullptr : &push_stiffness);
-          for (int k = 0; k < 3; ++k) {
-            forces.external.segment<6>(at(element.nodes[static_cast<std::size_t>(k)])) += p * pushed.segment<6>(6 * k);
+        Lanes p = Lanes([&](auto l) { return pressure[group[l]->body]; });
+        const bool is_pushed = any_of(p != 0);
+        if (is_pushed) {
+          LaneMatrix18* const its_stiffness = tangent == nullptr ? nullptr : &push_stiffness;
+          if (elements.curved) {
+            unit_pressure(elements, motion, pushed, its_stiffness);
+          } else {
+            push_facets(system, batch, motion, pushed, its_stiffness);
           }
-          if (tangent != nullptr) {
-            stiffness -= p * push_stiffness;
+          pushed *= p;
+        }
+        for (std::size_t l = 0; l < batch.count; ++l) {
+          const Index e = batch.elements[l];
+          forces.deformation[e] = lane(response.deformation, l);
+          energies[e] = response.energy[l];
+          const Vector18 internal = lane(response.force, l);
+          for (int k = 0; k < 3; ++k) {
+            forces.internal.segment<6>(at(group[l]->nodes[static_cast<std::size_t>(k)])) += internal.segment<6>(6 * k);
+          }
+          if (is_pushed) {
+            const Vector18 external = lane(pushed, l);
+            for (int k = 0; k < 3; ++k) {
+              forces.external.segment<6>(at(group[l]->nodes[static_cast<std::size_t>(k)])) +=
+                  external.segment<6>(6 * k);
+            }
           }
         }
         if (tangent != nullptr) {
-          scatter(system.placement[e], stiffness, *tangent);
+          if (is_pushed) {
+            stiffness -= p * push_stiffness;
+          }
+          scatter(system, batch, stiffness, *tangent);
         }
       }
     });
@@ -452,10 +514,12 @@ void evaluate(const ShellSystem& system, const Model& model, const Configuration
 
 void linear_stiffness(const ShellSystem& system, BlockMatrix& matrix) {
   std::fill(matrix.values.begin(), matrix.values.end(), 0.0);
-  for (const std::vector<Index>& colour : system.colours) {
+  for (const std::vector<Batch>& colour : system.colours) {
     parallel_for_blocks(colour.size(), grain, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) {
-        scatter(system.placement[colour[i]], linear_stiffness(system.elements[colour[i]]), matrix);
+      ElementLanes elements;
+      for (std::size_t b = begin; b < end; ++b) {
+        gather(members(system, colour[b]), elements);
+        scatter(system, colour[b], linear_stiffness(elements), matrix);
       }
     });
   }

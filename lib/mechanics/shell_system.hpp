@@ -35,13 +35,19 @@ struct Piece {
   std::vector<Index> nodes;  ///< global
 };
 
+/// Elements that are computed at once; those beyond `count` repeat another.
+struct Batch {
+  std::array<Index, batch_size> elements{};
+  std::size_t count = 0;
+};
+
 struct ShellSystem {
   std::vector<Vec3> reference;  ///< #nodes
   std::vector<ShellElement> elements;
   /// Reference normals at the corners of each element: of the curved surface, or the facet's.
   std::vector<std::array<Vec3, 3>> normals;
   std::vector<PatchHeight> heights;                   ///< of the curved patches over the facets, for pressure
-  std::vector<std::vector<Index>> colours;            ///< elements of one colour share no node
+  std::vector<std::vector<Batch>> colours;            ///< elements of one colour share no node
   std::vector<std::array<std::size_t, 9>> placement;  ///< where each element's blocks go in the matrix
   BlockMatrix pattern;
   std::vector<std::size_t> first_element;  ///< per body, and the end

@@ -172,7 +172,7 @@ std::string why(const NewtonResult& result, const SettleResult& let_go) {
     return "limit load: beyond it the shell jumps to a distant shape (snap-through or buckling), which a dynamic run "
            "may follow";
   }
-  if (!result.stable) {
+  if (!result.stable || let_go.lost_stability) {
     return "limit load: the stiffness is no longer positive, and no state was found in which the shell could rest";
   }
   return result.valid ? "Newton's method does not converge although the stiffness is positive"

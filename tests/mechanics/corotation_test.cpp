@@ -1,5 +1,6 @@
 // The co-rotational element: forces are the gradient of the energy, the tangent is the gradient of the forces.
 
+#include "mechanics/element_lanes.hpp"
 #include "mechanics/pressure.hpp"
 #include "mechanics/rotation.hpp"
 #include "mechanics/shell_element.hpp"
@@ -8,6 +9,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <random>
 
 namespace tunica {
@@ -138,6 +140,59 @@ TEST(Corotation, ForcesAreInBalance) {
   }
   EXPECT_LT(force.norm(), 1e-13 * response.force.norm());
   EXPECT_LT(moment.norm(), 2e-14 * 10 * response.force.norm());
+}
+
+// Four at once against one after the other. One lane turns far, so that all take the formulas for large rotations where
+// each alone takes series; one has collapsed, and must not spoil the others.
+TEST(Lanes, DoNotSeeEachOther) {
+  Random random;
+  const ShellElement one = some_element();
+  const ShellElement other = some_element(Membrane::cst, Bending::comas);
+  const std::array<const ShellElement*, lane_count> elements{&one, &other, &one, &other};
+  std::array<CornerMotion, lane_count> motions;
+  for (std::size_t l = 0; l < lane_count; ++l) {
+    motions[l] = large_motion(*elements[l], random);
+    for (int k = 0; k < 3 && l < 2; ++k) {
+      const Mat3 turn = exponential(Vec3(0.3, 2, -1)).toRotationMatrix();
+      motions[l].displacement.col(k) =
+          turn * (elements[l]->from_centroid.col(k) + random.vector(0.01)) - elements[l]->from_centroid.col(k);
+      motions[l].rotation[static_cast<std::size_t>(k)] = exponential(random.vector(0.02)).toRotationMatrix() * turn;
+    }
+  }
+  motions[3].displacement = motions[3].displacement.col(0).rowwise().replicate(3) - other.from_centroid;
+  ElementLanes lanes;
+  gather(elements, lanes);
+  MotionLanes moved;
+  const auto set = [](auto& to, const auto& from) {
+    set_lanes(
+        to, [&](std::size_t l) -> const auto& { return from[l]; });
+  };
+  std::array<Mat3, lane_count> values;
+  std::transform(motions.begin(), motions.end(), values.begin(), [](const auto& m) { return m.displacement; });
+  set(moved.displacement, values);
+  for (std::size_t k = 0; k < 3; ++k) {
+    std::transform(motions.begin(), motions.end(), values.begin(), [&](const auto& m) { return m.rotation[k]; });
+    set(moved.rotation[k], values);
+  }
+  ResponseLanes together;
+  LaneMatrix18 tangents, push_stiffnesses;
+  LaneVector18 pushed;
+  const LaneMask valid = corotational_response(lanes, moved, {}, together, &tangents);
+  unit_pressure(lanes, moved, pushed, &push_stiffnesses);
+  EXPECT_FALSE(valid[3]);
+  for (std::size_t l = 0; l < 3; ++l) {
+    ElementResponse alone;
+    Matrix18 tangent, push_stiffness;
+    Vector18 push;
+    ASSERT_TRUE(valid[l]);
+    ASSERT_TRUE(corotational_response(*elements[l], motions[l], {}, alone, &tangent));
+    unit_pressure(*elements[l], motions[l], push, &push_stiffness);
+    EXPECT_NEAR(together.energy[l], alone.energy, 1e-13 * alone.energy) << l;
+    EXPECT_LT((lane(together.force, l) - alone.force).norm(), 1e-13 * alone.force.norm()) << l;
+    EXPECT_LT((lane(tangents, l) - tangent).norm(), 1e-13 * tangent.norm()) << l;
+    EXPECT_LT((lane(pushed, l) - push).norm(), 1e-13 * push.norm()) << l;
+    EXPECT_LT((lane(push_stiffnesses, l) - push_stiffness).norm(), 1e-13 * push_stiffness.norm()) << l;
+  }
 }
 
 TEST(Corotation, CollapsedTriangleIsReported) {
