@@ -5,10 +5,10 @@
 #include "io/mesh_file.hpp"
 #include "io/picture.hpp"
 #include "shell/curved_surface.hpp"
+#include "shell/fit_cross.hpp"
 #include "surface/checks.hpp"
 #include "surface/hausdorff.hpp"
 #include "surface/measure.hpp"
-#include "surface/self_intersections.hpp"
 
 #include <fmt/core.h>
 
@@ -123,12 +123,6 @@ PlyOptions ply_options(const cli::Tool& tool, const std::string& space) {
   options.space = space;
   options.overwrite = tool.force();
   return options;
-}
-
-/// Pairs of shells without a common vertex whose curved surfaces cross, each drawn by 16 triangles.
-std::size_t curved_self_intersections(const ShellMesh& shell) {
-  const Tessellation fine = tessellate_uniformly(shell, 4);
-  return count_self_intersections(fine.mesh, fine.shell, shell.triangles);
 }
 
 /// Distances at the vertices of a surface fine enough to be looked at, with the edges of the shells.
@@ -270,7 +264,7 @@ void run(cli::Tool& tool, const Arguments& given) {
                                       {"seconds", iteration.seconds}});
     }
     result["min_angle_deg"] = min_angle_degrees(flat_facets(relaxed.shell));
-    result["self_intersections"] = curved_self_intersections(relaxed.shell);
+    result["self_intersections"] = crossing_shells(relaxed.shell).size();
     result["reached"] = relaxed.reached ? Json(*relaxed.reached) : Json();
     result["stopped"] = relaxed.stopped;
     result["edges_turned"] = relaxed.flips;

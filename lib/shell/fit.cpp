@@ -2,11 +2,13 @@
 
 #include "core/threads.hpp"
 #include "shell/curved_surface.hpp"
+#include "shell/fit_cross.hpp"
 #include "shell/fit_edit.hpp"
 #include "shell/fit_shape.hpp"
 #include "shell/fit_start.hpp"
 #include "surface/closest_point.hpp"
 #include "surface/decimate.hpp"
+#include "surface/self_intersections.hpp"
 
 #include <fmt/core.h>
 
@@ -33,6 +35,7 @@ constexpr int most_settling = 20;
 constexpr int most_repairs = 12;
 constexpr double clearly_below = 0.975;
 constexpr int certificates = 10;
+constexpr double least_part = 0.2;               // of the tolerance, to part sheets that cross
 constexpr std::size_t checked_points = 200'000;  // of the target, for places that the samples miss
 constexpr int checking_level = 6;                // pieces per edge of the patches there
 
@@ -65,6 +68,7 @@ public:
     }
     if (!most || result_.distance.both.upper <= *options_.tolerance) {
       to_tolerance(*options_.tolerance);
+      part_sheets(most.value_or(max_index));
     }
     result_.reached = result_.distance.both.upper <= *options_.tolerance;
     result_.stopped = *result_.reached ? "the tolerance holds" : "closer shells were not found";
@@ -72,6 +76,26 @@ public:
   }
 
 private:
+  /// Sheets of the target that are closer to each other than the tolerance may cross everywhere: then only a smaller
+  /// error parts them.
+  void part_sheets(std::size_t most) {
+    std::size_t crossings = crossing_shells(result_.shell).size();
+    if (crossings == 0 || count_self_intersections(target_.mesh()) > 0) {
+      return;
+    }
+    for (double part = 0.5; part >= least_part && crossings > 0; part /= 2) {
+      Fitting closer(coarse_, target_, options_);
+      closer.to_tolerance(part * *options_.tolerance);
+      const std::size_t left = crossing_shells(closer.result_.shell).size();
+      if (left < crossings && closer.result_.shell.triangles.size() <= most &&
+          closer.result_.distance.both.upper <= *options_.tolerance) {
+        result_.shell = std::move(closer.result_.shell);
+        result_.distance = closer.result_.distance;
+        crossings = left;
+      }
+    }
+  }
+
   void to_tolerance(double tolerance) {
     FitStart start = start_of_fit(coarse_, target_, {}, start_error * tolerance);
     if (!start.own_topology && start.mesh.triangles.size() < few) {
@@ -140,6 +164,7 @@ private:
   bool make_certain(FitSamples& samples, FitState& state, double tolerance, std::size_t most) {
     const double limit = margin * tolerance;
     for (int i = 0; i < certificates; ++i) {
+      part_crossings(state, limit, most);
       if (certify(state, tolerance)) {
         return true;
       }
@@ -205,6 +230,7 @@ private:
       }
     }
     for (int i = 0; i < 3; ++i) {
+      part_crossings(best, best.error(), shells);
       certify(best, std::nullopt);
       if (result_.distance.both.lower <= 1.1 * best.error() || add_missed(samples, best, best.error()) == 0) {
         break;

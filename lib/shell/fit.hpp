@@ -20,6 +20,7 @@ namespace tunica {
 /// distance, than plain decimation: where that wins, its flat facets are the result (flat shells: corner normals are
 /// the facets').
 /// @param coarse  an oriented manifold; its count, and its topology, may matter; @param target  likewise
+/// To a tolerance, shells that cross are parted where the target's own triangles do not cross.
 /// Keeps: topology of the start, boundary loops (on the target's boundary to the same tolerance). Angles are at least
 /// 20 degrees but where folds, rims or creases of the target would cost the tolerance (or, to a count, error).
 /// Deterministic, independent of the number of threads. Errors: Interrupted. Source: error-driven collapse as in Hoppe

@@ -34,8 +34,8 @@ bool share_a_corner(const std::array<Index, 3>& one, const std::array<Index, 3>&
 
 }  // namespace
 
-std::size_t count_self_intersections(const TriangleMesh& mesh, const std::vector<Index>& patch,
-                                     const std::vector<std::array<Index, 3>>& patch_corners) {
+std::vector<std::array<Index, 2>> find_self_intersections(const TriangleMesh& mesh, const std::vector<Index>& patch,
+                                                          const std::vector<std::array<Index, 3>>& patch_corners) {
   TUNICA_ASSERT(patch.empty() || patch.size() == mesh.triangles.size());
   std::vector<Kernel::Triangle_3> triangles;
   std::vector<TriangleBox> boxes;
@@ -74,7 +74,17 @@ std::size_t count_self_intersections(const TriangleMesh& mesh, const std::vector
     }
   };
   CGAL::box_self_intersection_d(boxes.begin(), boxes.end(), look_at);
-  return pairs.size();
+  std::vector<std::array<Index, 2>> found;
+  for (const std::uint64_t pair : pairs) {
+    found.push_back({static_cast<Index>(pair >> 32), static_cast<Index>(pair & max_index)});
+  }
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+std::size_t count_self_intersections(const TriangleMesh& mesh, const std::vector<Index>& patch,
+                                     const std::vector<std::array<Index, 3>>& patch_corners) {
+  return find_self_intersections(mesh, patch, patch_corners).size();
 }
 
 }  // namespace tunica

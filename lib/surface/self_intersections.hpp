@@ -4,13 +4,19 @@
 
 namespace tunica {
 
-/// Counts the pairs of triangles that share no vertex (by index) and touch or cross. Exact predicates: no pair is
-/// missed or invented by rounding. Triangles without area are left out.
+/// The pairs of triangles that share no vertex (by index) and touch or cross. Exact predicates: no pair is missed or
+/// invented by rounding. Triangles without area are left out.
 /// @param patch          empty, or #F: the patch (curved shell) that each triangle is a part of; then pairs of patches
-///                       are counted, once each
+///                       are found, once each
 /// @param patch_corners  with `patch`: the corners of each patch; patches that share a corner are not a pair
+/// @return pairs in ascending order, the smaller number first
 /// Errors: Interrupted.
 /// Cost: n log n, about a second for half a million triangles.
+std::vector<std::array<Index, 2>> find_self_intersections(const TriangleMesh& mesh,
+                                                          const std::vector<Index>& patch = {},
+                                                          const std::vector<std::array<Index, 3>>& patch_corners = {});
+
+/// How many they are.
 std::size_t count_self_intersections(const TriangleMesh& mesh, const std::vector<Index>& patch = {},
                                      const std::vector<std::array<Index, 3>>& patch_corners = {});
 

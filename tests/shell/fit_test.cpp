@@ -2,6 +2,7 @@
 
 #include "shell/curved_surface.hpp"
 #include "shell/families.hpp"
+#include "shell/fit_cross.hpp"
 #include "shell/fit_edit.hpp"
 #include "shell/fit_shape.hpp"
 #include "shell/fit_start.hpp"
@@ -176,6 +177,55 @@ TEST(Fit, KeepsTopologyAndAngles) {
     const Tessellation fine = tessellate_uniformly(shell, 4);
     EXPECT_EQ(count_self_intersections(fine.mesh, fine.shell, shell.triangles), 0U);
   }
+}
+
+/// A ball with a wall: two sheets `gap` apart, facing away from each other.
+TriangleMesh walled_ball(int times, double gap) {
+  TriangleMesh mesh = testing::sphere(times, 10);
+  const std::size_t nodes = mesh.vertices.size();
+  const auto outer = mesh.triangles;
+  for (std::size_t v = 0; v < nodes; ++v) {
+    mesh.vertices.emplace_back(mesh.vertices[v] * (1 - gap / 10));
+  }
+  for (const auto& [a, b, c] : outer) {
+    const auto n = static_cast<Index>(nodes);
+    mesh.triangles.push_back({a + n, c + n, b + n});
+  }
+  return mesh;
+}
+
+TEST(Fit, CrossingShellsAreParted) {
+  // The sheets are 0.25 apart, so patches with errors of 0.35 cross.
+  const TriangleMesh mesh = walled_ball(4, 0.25);
+  const Target target(mesh);
+  FitStart start;
+  start.mesh = walled_ball(1, 0.25);
+  for (std::size_t v = 0; v < start.mesh.vertices.size() / 2; v += 5) {
+    start.mesh.vertices[v] *= 0.965;
+  }
+  const FitSamples samples(target, 160);
+  FitState state(samples, prepare_fit(start, target), {});
+  state.attach();
+  state.measure();
+  const std::size_t before = crossing_shells(state.mesh.shell()).size();
+  EXPECT_GT(before, 5U);
+  const double error = state.error();
+  EXPECT_EQ(part_crossings(state, 0.35, 1000), 0U);
+  EXPECT_EQ(crossing_shells(state.mesh.shell()).size(), 0U);
+  EXPECT_LE(state.error(), std::max(error, 0.35));
+  EXPECT_FALSE(why_unfit(examine(flat_facets(state.mesh.shell()))));
+}
+
+TEST(Fit, SheetsCloserThanTheToleranceDoNotCross) {
+  const TriangleMesh mesh = walled_ball(3, 0.25);
+  const Target target(mesh);
+  RelaxOptions options = fitting();
+  options.tolerance = 0.35;
+  const RelaxResult result = relax(mesh, target, options);
+  EXPECT_EQ(result.reached, true);
+  EXPECT_LE(result.distance.both.upper, 0.35);
+  EXPECT_EQ(crossing_shells(result.shell).size(), 0U);
+  EXPECT_LT(result.shell.triangles.size(), mesh.triangles.size() / 2);
 }
 
 TEST(Fit, GivenCountIsKeptAndMoreShellsAreCloser) {
