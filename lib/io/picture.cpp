@@ -408,7 +408,10 @@ void paint_lines(cv::Mat target, const Raster& raster, const Camera& camera,
 void draw_colour_bar(Canvas& canvas, const Paint& paint, const PictureOptions& options, double largest) {
   constexpr double left = 1432, right = 1466, top = 190, bottom = 800;
   const double middle = (left + right) / 2;
-  canvas.text(ascii(options.quantity), middle, top - 72, 15, black, Align::centre);
+  const std::string quantity = ascii(options.quantity);
+  constexpr double right_margin = 1590;
+  const double centre = std::min(middle, right_margin - canvas.text_width(quantity, 15) / 2);
+  canvas.text(quantity, centre, top - 72, 15, black, Align::centre);
   for (int i = 0; i < 256; ++i) {
     const double y0 = bottom + (top - bottom) * i / 256;
     const double y1 = bottom + (top - bottom) * (i + 1) / 256;

@@ -72,8 +72,10 @@ std::string tick_text(double tick, double step) {
   if (decimals < 7 && std::abs(tick) < 1e6) {
     return fmt::format("{:.{}f}", tick, decimals);
   }
-  // As many digits as tell the tick from its neighbours.
-  const int digits = 1 + static_cast<int>(std::ceil(std::log10(std::max(1.0, std::abs(tick) / step))));
+  // As many digits as tell the tick from its neighbours; of a step like 2.5e-06 both of its own.
+  const double mantissa = step / std::pow(10, std::floor(std::log10(step)));
+  const int own = std::abs(mantissa - std::round(mantissa)) > 1e-6 ? 2 : 1;
+  const int digits = own + static_cast<int>(std::ceil(std::log10(std::max(1.0, std::abs(tick) / step))));
   return fmt::format("{:.{}g}", tick, std::min(digits, 17));
 }
 

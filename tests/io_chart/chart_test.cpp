@@ -71,6 +71,8 @@ TEST(Ticks, texts_have_the_decimals_of_the_step) {
   EXPECT_EQ(tick_text(0.25, 0.25), "0.25");
   EXPECT_EQ(tick_text(20, 5), "20");
   EXPECT_EQ(tick_text(2e-7, 1e-7), "2e-07");
+  EXPECT_EQ(tick_text(2.5e-6, 2.5e-6), "2.5e-06");
+  EXPECT_EQ(tick_text(1.25e-5, 2.5e-6), "1.25e-05");
   EXPECT_EQ(tick_text(0.01205, 1e-5), "0.01205");
   EXPECT_EQ(tick_text(1.00000001, 1e-8), "1.00000001");
   EXPECT_EQ(tick_text(2500000, 500000), "2.5e+06");

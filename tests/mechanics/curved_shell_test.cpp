@@ -57,6 +57,71 @@ TEST(CurvedShell, BumpyOrganNeedsATenthOfTheElementsOfFlatFacets) {
   }
 }
 
+/// Normals per corner where the surface is smooth say nothing new; at a crease each side curves by itself, and the
+/// rotations of the nodes stay shared.
+TEST(CurvedShell, NormalsPerCornerChangeNothingWhereTheSurfaceIsSmooth) {
+  const auto solved = [](bool per_corner, Patch patch) {
+    Model model;
+    ShellBody body = flat_body(bumpy_organ(6), 1, 0.3, 0.2);
+    body.curved = true;
+    body.rest = Rest::curved;
+    body.mesh.patch = patch;
+    for (std::size_t t = 0; per_corner && t < body.mesh.triangles.size(); ++t) {
+      const auto& [a, b, c] = body.mesh.triangles[t];
+      body.mesh.corner_normals.push_back({body.mesh.normals[a], body.mesh.normals[b], body.mesh.normals[c]});
+    }
+    model.shells.push_back(body);
+    model.rigid_motions.push_back({0});
+    model.loads.push_back({0, PressureLoad{1e-3, true}, {}});
+    return last_state(model, nonlinear_run({1}));
+  };
+  const State shared = solved(false, Patch::comas);
+  for (const State& other : {solved(true, Patch::comas), solved(true, Patch::watertight)}) {
+    double largest = 0, difference = 0;
+    for (std::size_t i = 0; i < shared.displacement.size(); ++i) {
+      largest = std::max(largest, shared.displacement[i].norm());
+      difference = std::max(difference, (shared.displacement[i] - other.displacement[i]).norm());
+    }
+    EXPECT_GT(largest, 1e-3);
+    EXPECT_LT(difference, 1e-9 * largest);
+  }
+}
+
+TEST(CurvedShell, AFoldWithNormalsPerCornerIsAsStiffAsOneOfFlatFacets) {
+  // Two square plates that meet at a right angle, one clamped at its far edge, the other pulled at its own.
+  constexpr std::size_t n = 8;
+  const Grid grid = make_grid(
+      2 * n, n, [](double u, double v) { return u < 0.5 ? Vec3(2 * u - 1, v, 0) : Vec3(0, v, 1 - 2 * u); },
+      Diagonals::alternating);
+  const auto sag = [&](bool curved) {
+    Model model;
+    ShellBody body = flat_body(grid.mesh, 1000, 0.3, 0.02);
+    body.mesh.normals.assign(body.mesh.vertices.size(), Vec3(1, 0, 1).normalized());
+    body.mesh.corner_normals.clear();
+    body.curved = curved;
+    body.rest = curved ? Rest::curved : Rest::flat;
+    for (const auto& v : body.mesh.triangles) {
+      const Vec3& a = body.mesh.vertices[v[0]];
+      const Vec3 normal = (body.mesh.vertices[v[1]] - a).cross(body.mesh.vertices[v[2]] - a).normalized();
+      body.mesh.corner_normals.push_back({normal, normal, normal});
+    }
+    model.shells.push_back(body);
+    Fix clamped;
+    ForceLoad pull;
+    for (std::size_t j = 0; j <= n; ++j) {
+      clamped.nodes.push_back(grid.node(0, j));
+      pull.nodes.push_back(grid.node(2 * n, j));
+    }
+    pull.total = Vec3(1e-5, 0, 0);
+    model.fixes.push_back(clamped);
+    model.loads.push_back({0, pull, {}});
+    return last_state(model, linear_run()).displacement[grid.node(2 * n, n / 2)].x();
+  };
+  const double flat = sag(false);
+  EXPECT_GT(flat, 0);
+  EXPECT_NEAR(sag(true), flat, 1e-3 * flat);  // the corners of curved elements drill about another axis
+}
+
 TEST(CurvedShell, ClampedEndOfACylinderUnderPressure) {
   // w = w_inf (1 - exp(-bx) (cos bx + sin bx)), M = p / (2 b^2) exp(-bx) (cos bx - sin bx), six elements per 1 / b.
   const double radius = 10, thickness = 0.5, young = 1000, poisson = 0.3, pressure = 1e-3;
