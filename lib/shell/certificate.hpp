@@ -40,7 +40,8 @@ OneSided shell_to_target(const std::vector<CubicPatch>& patches, const Target& t
 /// From the target to the curved surface: a piece of a triangle of the target is bounded by the part of one patch
 /// between the feet of its corners, point by point at equal parameters, and cut where that does not do, at first along
 /// the edge between the patches of its corners.
+/// @param expected  mm: roughly what the distance is; how well it is known decides about the time only
 OneSided target_to_shell(const ShellMesh& shell, const std::vector<CubicPatch>& patches, const Target& target,
-                         const Aim& aim);
+                         const Aim& aim, double expected);
 
 }  // namespace tunica

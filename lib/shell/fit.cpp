@@ -8,6 +8,7 @@
 #include "shell/fit_start.hpp"
 #include "surface/closest_point.hpp"
 #include "surface/decimate.hpp"
+#include "surface/hausdorff.hpp"
 #include "surface/self_intersections.hpp"
 
 #include <fmt/core.h>
@@ -168,10 +169,11 @@ private:
       if (certify(state, tolerance)) {
         return true;
       }
-      const std::size_t added = add_missed(samples, state, margin * tolerance);
+      // What more samples alone do not mend gets more shells.
+      const std::size_t added = add_missed(samples, state, margin * tolerance, true);
       samples.add(farthest_);
       if (i > 0 || added == 0) {
-        split_wrong(state, 0.985 * tolerance);
+        split_worst(state, 0.985 * tolerance, state.mesh.alive);
       }
       state.attach();
       state.measure();
@@ -222,11 +224,11 @@ private:
       polish(state, error, 1);
       collapse_edges(state, any, shells, {});
       settle(state);
-      note(state);
       const bool better = state.mesh.alive <= shells && (state.error() < best.error() || best.mesh.alive > shells);
       fruitless = better && state.error() < worth_it * best.error() ? 0 : fruitless + 1;
       if (better) {
         best = state;
+        note(best);
       }
     }
     for (int i = 0; i < 3; ++i) {
@@ -320,21 +322,18 @@ private:
     }
   }
 
-  /// Splits patches that a finer look finds above `limit`.
-  void split_wrong(FitState& state, double limit) const {
+  /// Points of the target farther from the curved surface than `limit` join the samples. @return how many
+  /// @param errors  what is found of each patch's distance, both ways, raises its error
+  std::size_t add_missed(FitSamples& samples, FitState& state, double limit, bool errors = false) const {
     std::vector<Index> triangles;
-    const ShellMesh shell = state.mesh.shell(&triangles);
-    const auto errors = shell_errors(shell, target_, limit / 30);
-    for (std::size_t i = 0; i < errors.size(); ++i) {
-      state.patches[triangles[i]].error = std::max(state.patches[triangles[i]].error, errors[i]);
-    }
-    split_worst(state, limit, state.mesh.alive);
-  }
-
-  /// Points of the target farther from the curved surface than `limit` join the samples.
-  std::size_t add_missed(FitSamples& samples, const FitState& state, double limit) const {
-    const Tessellation fine = tessellate_uniformly(state.mesh.shell(), checking_level);
+    const Tessellation fine = tessellate_uniformly(state.mesh.shell(&triangles), checking_level);
     const ClosestPoint tree(fine.mesh);
+    const auto raise = [&](Index patch, double error) {
+      if (errors) {
+        double& known = state.patches[triangles[patch]].error;
+        known = std::max(known, error);
+      }
+    };
     const TriangleMesh& mesh = target_.mesh();
     std::vector<Vec3> points = mesh.vertices;
     if (mesh.triangles.size() < checked_points / 4) {
@@ -347,20 +346,34 @@ private:
       }
     }
     const std::size_t stride = std::max<std::size_t>(1, points.size() / checked_points);
-    std::vector<std::uint8_t> missed(points.size() / stride + 1, 0);
+    std::vector<ClosestPoint::Hit> hits(points.size() / stride);
     parallel_for_blocks(points.size() / stride, 512, [&](std::size_t begin, std::size_t end) {
       std::optional<Index> guess;
       for (std::size_t i = begin; i < end; ++i) {
         const auto hit = guess ? tree.closest(points[i * stride], *guess) : tree.closest(points[i * stride]);
         guess = hit.triangle;
-        missed[i] = hit.squared_distance > limit * limit;
+        hits[i] = hit;
       }
     });
     std::size_t added = 0;
-    for (std::size_t i = 0; i * stride < points.size(); ++i) {
-      if (missed[i] != 0) {
-        samples.add(points[i * stride]);
+    for (std::size_t i = 0; i < hits.size(); ++i) {
+      if (hits[i].squared_distance <= limit * limit) {
+        continue;
+      }
+      // The flat pieces of the patch may be farther off than the patch.
+      const Vec3& p = points[i * stride];
+      const Index patch = fine.shell[hits[i].triangle];
+      const double distance = std::sqrt(foot_on_patch(state.mesh.patch(triangles[patch]), p).squared_distance);
+      if (distance > limit) {
+        samples.add(p);
         ++added;
+        raise(patch, distance);
+      }
+    }
+    if (errors) {
+      const auto distances = vertex_distances(fine.mesh, target_.tree());
+      for (std::size_t v = 0; v < distances.size(); ++v) {
+        raise(fine.vertex_shell[v], distances[v]);
       }
     }
     return added;
@@ -435,13 +448,12 @@ private:
   void note(const FitState& state) {
     RelaxIteration iteration;
     iteration.shells = state.mesh.alive;
-    iteration.hausdorff = {0, std::numeric_limits<double>::infinity()};
-    iteration.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - last_).count();
-    last_ = std::chrono::steady_clock::now();
     ShellMesh shell = state.mesh.shell();
     ShellDistanceOptions measuring;
     measuring.width = std::max(width_, state.error() / 2);
     iteration.hausdorff = shell_distance(shell, target_, measuring).both;
+    iteration.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - last_).count();
+    last_ = std::chrono::steady_clock::now();
     result_.iterations.push_back(iteration);
     if (options_.on_iteration) {
       options_.on_iteration(iteration, shell);

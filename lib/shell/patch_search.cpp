@@ -116,6 +116,15 @@ SurfaceFoot PatchSearch::on_patch(const Vec3& p, Index patch, const Vec2& start)
   return surface_foot(patch, foot_on_patch(patches_[patch], p, start, newton_steps));
 }
 
+double PatchSearch::bulge(Index patch, const Vec2& a, const Vec2& b, const Vec2& c) const {
+  const auto longest = [](const Vec2& e) { return std::max({std::abs(e[0]), std::abs(e[1]), std::abs(e[0] + e[1])}); };
+  const double reach = std::max({longest(b - a), longest(c - b), longest(a - c)});
+  // flatness() of the whole patch is at least 3/4 of M, the largest second difference along one of its edges. Along
+  // (x, y) it is at most (|x (x + y)| + |y (x + y)| + |x y|) M <= 3 reach^2 M, and the error of interpolation at most
+  // that: the sum of 3 l_i l_j over the edges is at most 1.
+  return 4 * reach * reach * flatness_[patch];
+}
+
 std::size_t PatchSearch::edge_towards(Index patch, Index other) const {
   const auto& across = across_[patch];
   return static_cast<std::size_t>(std::find(across.begin(), across.end(), other) - across.begin());

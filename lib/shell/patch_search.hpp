@@ -40,6 +40,9 @@ public:
   ///         rounding and for patches so wild that they bulge by this from a part in a million of them
   [[nodiscard]] double nearest(const Vec3& p, double tolerance, SurfaceFoot& foot) const;
 
+  /// mm: at equal parameters a flat triangle with its corners on a patch is no farther from it.
+  [[nodiscard]] double bulge(Index patch, const Vec2& a, const Vec2& b, const Vec2& c) const;
+
   /// The edge (corner k to k + 1) of `patch` across which `other` lies; 3: none.
   [[nodiscard]] std::size_t edge_towards(Index patch, Index other) const;
 

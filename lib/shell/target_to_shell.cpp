@@ -70,8 +70,9 @@ double difference(const CubicPatch& patch, const Corners& c) {
 
 class FromTarget {
 public:
-  FromTarget(const ShellMesh& shell, const std::vector<CubicPatch>& patches, const Target& target, const Aim& aim)
-      : patches_(patches), target_(target), aim_(aim), search_(shell, patches) {}
+  FromTarget(const ShellMesh& shell, const std::vector<CubicPatch>& patches, const Target& target, const Aim& aim,
+             double expected)
+      : patches_(patches), target_(target), aim_(aim), expected_(expected), search_(shell, patches) {}
 
   OneSided run() {
     std::vector<Piece> live = first_round();
@@ -143,22 +144,34 @@ private:
     parallel_for_blocks(used.size(), 8 * grain, [&](std::size_t begin, std::size_t end) {
       check_interrupt();
       std::optional<Index> guess;
+      SurfaceFoot last;
       for (std::size_t i = begin; i < end; ++i) {
         const Vec3& p = tree.vertices()[used[i]];
-        corners[used[i]] = {p, search_.near(p, guess)};
+        // Beside the last one's foot there mostly is one that is close enough.
+        SurfaceFoot foot = search_.near(p, last.patch, last.at);
+        if (foot.distance > expected_) {
+          foot = search_.near(p, guess);
+        }
+        corners[used[i]] = {p, foot};
+        last = foot;
       }
     });
     // The farthest first: they say how far is far.
-    std::vector<Index> by_distance = used;
-    std::sort(by_distance.begin(), by_distance.end(), [&](Index a, Index b) {
+    const auto farther = [&](Index a, Index b) {
       return corners[a].foot.distance != corners[b].foot.distance ? corners[a].foot.distance > corners[b].foot.distance
                                                                   : a < b;
-    });
-    for (const Index v : by_distance) {
-      if (corners[v].foot.distance <= aim_.enough(lower_) - sharp_share * aim_.width || aim_.decided_above(lower_)) {
-        break;
+    };
+    const Index first = *std::min_element(used.begin(), used.end(), farther);
+    sharpen(corners[first], lower_, farthest_);
+    std::vector<Index> far;
+    for (const Index v : used) {
+      if (corners[v].foot.distance > aim_.enough(lower_) - sharp_share * aim_.width) {
+        far.push_back(v);
       }
-      sharpen(corners[v], lower_, farthest_);
+    }
+    std::sort(far.begin(), far.end(), farther);
+    for (std::size_t i = 0; i < far.size() && !aim_.decided_above(lower_); ++i) {
+      sharpen(corners[far[i]], lower_, farthest_);
     }
     std::vector<Block> blocks((order.size() + 8 * grain - 1) / (8 * grain));
     parallel_for_blocks(order.size(), 8 * grain, [&](std::size_t begin, std::size_t end) {
@@ -210,7 +223,10 @@ private:
       }
       farthest = std::max(farthest, here[i].foot.distance);
     }
-    if (farthest <= enough) {
+    if (const double bulged = farthest + search_.bulge(patch, here[0].foot.at, here[1].foot.at, here[2].foot.at);
+        bulged <= enough) {
+      piece.upper = std::min(piece.upper, bulged);
+    } else if (farthest <= enough) {
       piece.upper = std::min(piece.upper, difference(patches_[patch], here));
     }
     if (piece.upper <= enough) {
@@ -315,6 +331,7 @@ private:
   const std::vector<CubicPatch>& patches_;
   const Target& target_;
   Aim aim_;
+  double expected_;
   PatchSearch search_;
   double lower_ = 0, settled_ = 0;
   Corner farthest_{Vec3::Zero(), {}};
@@ -323,8 +340,8 @@ private:
 }  // namespace
 
 OneSided target_to_shell(const ShellMesh& shell, const std::vector<CubicPatch>& patches, const Target& target,
-                         const Aim& aim) {
-  return FromTarget(shell, patches, target, aim).run();
+                         const Aim& aim, double expected) {
+  return FromTarget(shell, patches, target, aim, expected).run();
 }
 
 }  // namespace tunica
