@@ -42,6 +42,26 @@ class Result(SimulateTest):
         self.assertLess(distance.min(axis=1).max(), 1e-12)
         return distance.argmin(axis=1)
 
+    def test_a_watertight_shell_stays_closed_as_it_is_drawn_and_measured(self):
+        with open(self.path("ball.ply"), "rb") as file:
+            data = file.read()
+        with open(self.path("tight.ply"), "wb") as file:
+            file.write(data.replace(b"comment units mm\n", b"comment units mm\ncomment surface=watertight\n"))
+        met = {}
+        for name in ("ball", "tight"):
+            result = self.run_tool(name + ".ply", name + ".hdf", *MATERIAL, "--fix", "below z=-8mm", "--static",
+                                   "--tessellation", "4")["result"]
+            self.assertAlmostEqual(result["volume_before_mm3"] / (4 / 3 * np.pi * RADIUS**3), 1, delta=5e-4)
+            with h5py.File(self.path(name + ".hdf")) as file:
+                points = file["VTKHDF/Points"][()] + file["VTKHDF/PointData/displacement"][()]
+            self.assertEqual(len(points), 15 * len(self.triangles))
+            near = [(np.linalg.norm(points - p, axis=1) < 1e-6 * RADIUS).sum() for p in points]
+            met[name] = np.bincount(near, minlength=7)
+        # Per shell 3 inner points, 9 on edges that two shells share, 3 corners that five or six do.
+        count = len(self.triangles)
+        self.assertEqual(met["tight"].tolist(), [0, 3 * count, 9 * count, 0, 0, 12 * 5, 3 * count - 12 * 5])
+        self.assertLess(met["ball"][2], 9 * count)
+
     def test_static_result_is_one_loaded_state_that_vtk_reads(self):
         result = self.run_tool("ball.ply", "out.hdf", *STATIC)["result"]
         grid, messages = read_by_vtk(self.path("out.hdf"))
