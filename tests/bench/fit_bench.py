@@ -2,6 +2,7 @@
 """The least-error fit against its bars: shells, certified error, smallest angle and seconds per case.
 
     TUNICA_BIN=build/release/bin tests/bench/fit_bench.py [--targets targets.py] [--data FOLDER] [--only WORD] [--jobs N]
+    TUNICA_BIN=build/release/bin tests/bench/fit_bench.py --scaling docs/charts/fit-scaling.svg
 
 Cases: the analytic targets (a script that writes them, if given), the paper's meshes and real organs (DATA/paper,
 DATA/volumes, DATA/meshes; what is absent is left out, and said), and shapes of the same kinds that are made here, so
@@ -240,8 +241,40 @@ def organs(cases, data, folder):
             cases.tolerance(name, path, percent, most=cases.flat_count(path, percent, unit), angle=ANGLE, unit=unit)
 
 
+def scaling(folder, chart):
+    """One shape at four densities: processor seconds of a fit to 0.1 % and of its certificate, beside n log n."""
+    reports = []
+
+    def point(series, triangles, seconds):
+        path = folder / f"scaling-{len(reports)}.json"
+        path.write_text(json.dumps({"tool": "tunica-relax", "ok": True, "seconds": {"processor": seconds},
+                                    "result": {"triangles": triangles, "series": series}}))
+        reports.append(path)
+
+    first = None
+    for n in (36, 72, 144, 288):
+        path, out = folder / f"density{n}.ply", folder / f"density{n}-shell.ply"
+        if not path.exists():
+            write_ply(path, *ball(n, bumps(7, 0.06, 6)))
+        triangles = 12 * n * n
+        report, seconds = run(["tunica-relax", path, path, out, "--method", "fit", "--tolerance", "0.1%"])
+        _, certifying = run(["tunica-compare", out, path, "--shell"])
+        result = report.get("result", {})
+        first = first or seconds / (triangles * math.log(triangles))
+        point("fit within 0.1 %", triangles, seconds)
+        point("its certificate, 0.01 % wide", triangles, certifying)
+        point("n log n", triangles, first * triangles * math.log(triangles))
+        print(f"{triangles:9} triangles  shells {result.get('shells')}  fit {seconds:.3g} s  certificate {certifying:.3g} s",
+              flush=True)
+    subprocess.run([os.path.join(BIN, "tunica-chart"), *map(str, reports), "-o", chart, "--x", "result.triangles", "--y",
+                    "seconds.processor", "--series", "result.series", "--x-label", "triangles of the target", "--y-label",
+                    "processor time (s)", "--title", "One shape at four densities", "--x-scale", "log", "--y-scale", "log",
+                    "--lines", "--csv", str(Path(chart).with_suffix(".csv")), "--force", "--quiet"], check=True)
+
+
 def main():
     parser = argparse.ArgumentParser()
+    parser.add_argument("--scaling", metavar="OUT.svg", help="only time against the target's density, as a chart")
     parser.add_argument("--targets")
     parser.add_argument("--data", default="")
     parser.add_argument("--only", default="")
@@ -250,6 +283,9 @@ def main():
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(arguments.folder or scratch)
+        if arguments.scaling:
+            scaling(folder, arguments.scaling)
+            return
         cases = Cases(folder, arguments)
         named_targets(cases, arguments, folder)
         for name in own_shapes(folder):
