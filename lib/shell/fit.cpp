@@ -98,10 +98,7 @@ private:
   }
 
   void to_tolerance(double tolerance) {
-    FitStart start = start_of_fit(coarse_, target_, {}, start_error * tolerance);
-    if (!start.own_topology && start.mesh.triangles.size() < few) {
-      start = start_of_fit(coarse_, target_, {}, finer_start_error * tolerance);
-    }
+    const FitStart start = start_of_fit(coarse_, target_, start_error * tolerance, few, finer_start_error * tolerance);
     // Flat errors fall as 1 / count. Where curved shells need as many, flat facets are the answer.
     const double flat_count = static_cast<double>(start.mesh.triangles.size()) * start.flat_error / tolerance;
     const std::size_t most = static_cast<std::size_t>(std::clamp(flat_count, 64.0, 1e9));
@@ -189,8 +186,8 @@ private:
 
   void to_count(std::size_t shells) {
     const bool all = shells >= target_.mesh().triangles.size();
-    FitStart start = start_of_fit(
-        coarse_, target_, all ? shells : static_cast<std::size_t>(start_surplus * static_cast<double>(shells)), 0);
+    FitStart start = start_of_fit(coarse_, target_,
+                                  all ? shells : static_cast<std::size_t>(start_surplus * static_cast<double>(shells)));
     if (all && !start.own_topology) {
       result_.stopped = "the target has no more triangles than shells are allowed";
       no_worse_than_flat({}, shells, start);
@@ -204,7 +201,7 @@ private:
     collapse_edges(state, any, shells, {});
     if (state.mesh.alive > shells && !start.own_topology) {
       // So near the smallest mesh there is only decimation knows the way.
-      start = start_of_fit(coarse_, target_, shells, 0);
+      start = start_of_fit(coarse_, target_, shells);
       state = FitState(samples, prepared(start), {});
       smooth(state, 0.1 * start.flat_error, 0.5 * start.flat_error);
     }

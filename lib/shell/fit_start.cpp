@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 namespace tunica {
 namespace {
@@ -60,27 +61,37 @@ TriangleMesh decimated(const TriangleMesh& mesh, std::size_t triangles) {
 
 }  // namespace
 
-FitStart start_of_fit(const TriangleMesh& coarse, const Target& target, std::optional<std::size_t> triangles,
-                      double flat_error) {
+FitStart start_of_fit(const TriangleMesh& coarse, const Target& target, std::size_t triangles) {
   if (!same_topology(coarse, target.mesh())) {
     return {coarse, sampled_error(coarse, target), true};
   }
   FitStart start;
-  if (triangles) {
-    start.mesh = decimated(target.mesh(), *triangles);
-    start.flat_error = sampled_error(start.mesh, target);
-    return start;
+  start.mesh = decimated(target.mesh(), triangles);
+  start.flat_error = sampled_error(start.mesh, target);
+  return start;
+}
+
+FitStart start_of_fit(const TriangleMesh& coarse, const Target& target, double flat_error, std::size_t few,
+                      double finer_error) {
+  if (!same_topology(coarse, target.mesh())) {
+    return {coarse, sampled_error(coarse, target), true};
   }
+  FitStart start;
   start.mesh = target.mesh().triangles.size() > ladder_top ? decimated(target.mesh(), ladder_top) : target.mesh();
+  std::optional<FitStart> finer;
+  const auto chosen = [&] { return start.mesh.triangles.size() < few && finer ? std::move(*finer) : std::move(start); };
   while (true) {
     const std::size_t next = start.mesh.triangles.size() * 7 / 10;
     TriangleMesh coarser = decimated(start.mesh, next);
     if (coarser.triangles.size() >= start.mesh.triangles.size()) {
-      return start;
+      return chosen();
     }
     const double error = sampled_error(coarser, target);
+    if (!finer && error > finer_error) {
+      finer = start;
+    }
     if (error > flat_error) {
-      return start;
+      return chosen();
     }
     start.mesh = std::move(coarser);
     start.flat_error = error;

@@ -3,8 +3,6 @@
 #include "shell/fit_mesh.hpp"
 #include "shell/target.hpp"
 
-#include <optional>
-
 namespace tunica {
 
 /// A mesh to start the fit from.
@@ -14,10 +12,13 @@ struct FitStart {
   bool own_topology = false;  ///< it is COARSE, because its topology is not the target's
 };
 
-/// @param flat_error  mm: a decimation of the target with about this distance; or
-/// @param triangles   with this many triangles, when given
-FitStart start_of_fit(const TriangleMesh& coarse, const Target& target, std::optional<std::size_t> triangles,
-                      double flat_error);
+/// A decimation of the target with so many triangles.
+FitStart start_of_fit(const TriangleMesh& coarse, const Target& target, std::size_t triangles);
+
+/// The decimation with about the distance `flat_error` (mm), or where that has fewer than `few` triangles the one with
+/// about `finer_error`.
+FitStart start_of_fit(const TriangleMesh& coarse, const Target& target, double flat_error, std::size_t few,
+                      double finer_error);
 
 /// The start as a mesh under edit, with the target's normals at its nodes: several at a node where sharp creases of the
 /// target meet there. A crease is an edge whose sides, close by, turn by nearly as much as its facets do.

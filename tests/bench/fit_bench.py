@@ -266,10 +266,11 @@ def scaling(folder, chart):
         point("n log n", triangles, first * triangles * math.log(triangles))
         print(f"{triangles:9} triangles  shells {result.get('shells')}  fit {seconds:.3g} s  certificate {certifying:.3g} s",
               flush=True)
-    subprocess.run([os.path.join(BIN, "tunica-chart"), *map(str, reports), "-o", chart, "--x", "result.triangles", "--y",
+    chart = os.path.abspath(chart)
+    subprocess.run([os.path.abspath(os.path.join(BIN, "tunica-chart")), *(path.name for path in reports), "-o", chart, "--x", "result.triangles", "--y",
                     "seconds.processor", "--series", "result.series", "--x-label", "triangles of the target", "--y-label",
                     "processor time (s)", "--title", "One shape at four densities", "--x-scale", "log", "--y-scale", "log",
-                    "--lines", "--csv", str(Path(chart).with_suffix(".csv")), "--force", "--quiet"], check=True)
+                    "--lines", "--csv", str(Path(chart).with_suffix(".csv")), "--force", "--quiet"], check=True, cwd=folder)
 
 
 def main():
