@@ -30,9 +30,9 @@ void put(std::vector<PlacedPatch>& patches, const PlacedNode& node) {
   }
 }
 
-/// @param scale  mm, for the powers of the cost
+/// @param scale  mm, for the powers of the cost; doubted  mm: distances above it are looked for everywhere
 Measured measure(const FitSamples& samples, std::vector<PlacedPatch>& patches, const std::vector<Index>& points,
-                 const FitLimits& limits, double scale) {
+                 const FitLimits& limits, double scale, double doubted) {
   for (const PlacedPatch& p : patches) {
     if (!is_sound(p.shape, limits.agreement, limits.angle)) {
       return {};
@@ -74,7 +74,14 @@ Measured measure(const FitSamples& samples, std::vector<PlacedPatch>& patches, c
       }
     }
     const Vec3 facing = facing_of(p.shape.corners);
+    const std::size_t gaps = p.residuals.size();
     samples.from_patch(patch, facing, FitSamples::Search::nearby, p.guesses, p.residuals);
+    if (std::any_of(p.residuals.begin() + static_cast<std::ptrdiff_t>(gaps), p.residuals.end(),
+                    [&](const Residual& r) { return std::abs(r.distance) > doubted; })) {
+      // Downhill from a wrong start a point may seem far that is not.
+      p.residuals.resize(gaps);
+      samples.from_patch(patch, facing, FitSamples::Search::everywhere, p.guesses, p.residuals);
+    }
     for (const Index q : p.attached) {
       samples.from_target(patch, facing, q, p.residuals);
     }
@@ -150,7 +157,7 @@ void place_node(const FitSamples& samples, std::vector<PlacedPatch>& patches, co
                 const FitLimits& limits, double give_up, int steps, PlacedNode& node) {
   put(patches, node);
   const double scale = samples.target().diagonal();
-  Measured now = measure(samples, patches, points, limits, scale);
+  Measured now = measure(samples, patches, points, limits, scale, give_up);
   node.error = now.error;
   if (!std::isfinite(now.error)) {
     return;
@@ -218,7 +225,7 @@ void place_node(const FitSamples& samples, std::vector<PlacedPatch>& patches, co
         moved.normals[s] = (best.normals[s] + tilt[0] * axes[0] + tilt[1] * axes[1]).normalized();
       }
       put(patches, moved);
-      const Measured then = measure(samples, patches, points, limits, scale);
+      const Measured then = measure(samples, patches, points, limits, scale, give_up);
       if (then.cost < now.cost) {
         now = then;
         moved.error = then.error;
@@ -241,7 +248,7 @@ void turn_normals(const FitSamples& samples, PlacedPatch& patch, const FitLimits
   const std::vector<Index> points = patch.attached;
   std::vector<PlacedPatch> one{patch};
   one[0].corner = PlacedPatch::no_corner;
-  Measured now = measure(samples, one, points, limits, scale);
+  Measured now = measure(samples, one, points, limits, scale, 0);
   PlacedPatch best = one[0];
   for (int step = 0; step < steps && std::isfinite(now.error); ++step) {
     const PatchJacobian jacobian = patch_jacobian(one[0].shape);
@@ -266,7 +273,7 @@ void turn_normals(const FitSamples& samples, PlacedPatch& patch, const FitLimits
       const auto axes = tilt_axes(best.shape.normals[k]);
       one[0].shape.normals[k] = (best.shape.normals[k] + tilt[0] * axes[0] + tilt[1] * axes[1]).normalized();
     }
-    const Measured then = measure(samples, one, points, limits, scale);
+    const Measured then = measure(samples, one, points, limits, scale, 0);
     if (!(then.cost < now.cost)) {
       break;
     }
