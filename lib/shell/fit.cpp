@@ -24,6 +24,8 @@ constexpr double default_width = 1e-4;  // of the diagonal
 constexpr int default_rounds = 8;
 constexpr double start_error = 3;  // tolerances: flat error of the mesh that the search starts from
 constexpr std::size_t few = 600;   // triangles: from so few slivers hardly any good ones come, and more cost little
+constexpr std::size_t affordable = 700;  // triangles of a start: further searches cost little
+constexpr int search_patience = 2;       // rounds that leave as many shells
 constexpr double finer_start_error = 1.5;
 constexpr double limited_by_target =
     0.6;                               // of its triangles: a start that needs more follows its facets, not its shape
@@ -108,6 +110,43 @@ private:
       return;
     }
     FitSamples samples(target_, guess(start.mesh.triangles.size() / expected_gain));
+    const double limit = margin * tolerance;
+    const bool several = !start.own_topology && start.mesh.triangles.size() < affordable;
+    std::vector<FitState> found{search(samples, start, tolerance, most, several ? search_patience : 1)};
+    if (several) {
+      // A greedy search ends elsewhere from elsewhere: from few and from well-shaped triangles.
+      const FitStart fewer = start_of_fit(coarse_, target_, start_error * tolerance, 0, 0);
+      for (const FitStart& other : {fewer, well_shaped(fewer), well_shaped(start)}) {
+        found.push_back(search(samples, other, tolerance, most, search_patience));
+      }
+    }
+    const auto worse = [&](const FitState& a, const FitState& b) {
+      const bool fits_a = a.error() <= limit, fits_b = b.error() <= limit;
+      return fits_a != fits_b ? fits_b : price(a) > price(b);
+    };
+    std::stable_sort(found.begin(), found.end(), [&](const FitState& a, const FitState& b) { return worse(b, a); });
+    for (FitState& state : found) {
+      state.attach();
+      state.measure();
+      split_thin(state, limit, most);
+      if (make_certain(samples, state, tolerance, most)) {
+        break;
+      }
+    }
+    no_worse_than_flat(tolerance, max_index, start);
+  }
+
+  /// As many triangles of the target with better angles.
+  [[nodiscard]] FitStart well_shaped(const FitStart& start) const {
+    DecimateOptions decimating;
+    decimating.triangles = start.mesh.triangles.size();
+    decimating.min_angle = FitLimits{}.angle;
+    return {decimate(target_.mesh(), decimating).mesh, start.flat_error, false};
+  }
+
+  /// The fewest shells found from one start, by collapses, steps of all nodes and splits in turn.
+  /// @param patience_left  rounds that leave as many shells
+  FitState search(FitSamples& samples, const FitStart& start, double tolerance, std::size_t most, int patience_left) {
     FitState state(samples, prepared(start), {});
     smooth(state, tolerance, tolerance);
     const int rounds = options_.max_iterations.value_or(default_rounds);
@@ -115,7 +154,8 @@ private:
     repair(state, limit, most);
     mend_angles(state, limit);
     FitState best = state;
-    for (int round = 0; round < rounds; ++round) {
+    int fruitless = 0;
+    for (int round = 0; round < rounds && fruitless < patience_left; ++round) {
       advance(options_.progress, static_cast<double>(round) / rounds);
       const std::size_t before = state.mesh.alive;
       collapse_edges(state, limit, 4, {});
@@ -127,17 +167,12 @@ private:
       mend_angles(state, limit);
       note(state);
       const bool fits = state.error() <= limit;
+      fruitless = static_cast<double>(state.mesh.alive) > worth_it * static_cast<double>(before) ? fruitless + 1 : 0;
       if (fits && (price(state) < price(best) || best.error() > limit)) {
         best = state;
       }
-      if (static_cast<double>(state.mesh.alive) > worth_it * static_cast<double>(before)) {
-        break;
-      }
     }
-    state = std::move(best);
-    split_thin(state, limit, most);
-    make_certain(samples, state, tolerance, most);
-    no_worse_than_flat(tolerance, max_index, start);
+    return best;
   }
 
   /// COARSE's triangles, placed anew, and split where they are too far off. @return whether the tolerance holds
@@ -248,8 +283,8 @@ private:
     return mesh;
   }
 
-  /// A thin triangle is worth the two shells that a further node costs.
-  static std::size_t price(const FitState& state) { return state.mesh.alive + 2 * count_thin(state); }
+  /// A thin triangle is worth the shells that five further nodes cost.
+  static std::size_t price(const FitState& state) { return state.mesh.alive + 10 * count_thin(state); }
 
   static std::size_t guess(double shells) { return static_cast<std::size_t>(std::max(8.0, shells)); }
 

@@ -90,15 +90,27 @@ bool slide(FitState& state, Index v, double limit) {
   }
   normal.normalize();
   const auto axes = tilt_axes(normal);
+  // Along the edges too: on a crease or rim no other way keeps the fit.
+  std::vector<Vec3> ways;
+  for (int d = 0; d < directions; ++d) {
+    const double a = 2 * 3.14159265358979323846 * d / directions;
+    ways.emplace_back(std::cos(a) * axes[0] + std::sin(a) * axes[1]);
+  }
+  std::vector<Index> ring;
+  mesh.ring(v, ring);
+  for (const Index w : ring) {
+    const Vec3 way = (mesh.positions[w] - mesh.positions[v]).normalized();
+    ways.push_back(way);
+    ways.push_back(-way);
+  }
   const double before = angle_around(state, v, mesh.positions[v]);
   Vec3 best = mesh.positions[v];
   double angle = before;
   double step = first_step * edge;
   for (int halving = 0; halving <= halvings; ++halving, step /= 2) {
     const Vec3 from = best;
-    for (int d = 0; d < directions; ++d) {
-      const double a = 2 * 3.14159265358979323846 * d / directions;
-      Vec3 p = from + step * (std::cos(a) * axes[0] + std::sin(a) * axes[1]);
+    for (const Vec3& way : ways) {
+      Vec3 p = from + step * way;
       if (mesh.on_boundary[v] != 0) {
         p = on_boundary(state.samples().target(), p);
       }
