@@ -9,6 +9,7 @@
 #include <hdf5.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <optional>
 
@@ -25,6 +26,17 @@ constexpr Size history_chunk = 256;
 constexpr Size nodes_chunk_rows = 1;
 
 using Floats = std::vector<float>;
+
+// Before anything of a state is written.
+void require_range(const std::vector<Floats>& fields) {
+  for (const Floats& values : fields) {
+    if (!std::all_of(values.begin(), values.end(), [](float v) { return std::isfinite(v); })) {
+      throw RequirementError(
+          "stresses or displacements pass 3e38, the range of single precision, in which results are kept: check the "
+          "units of loads and materials");
+    }
+  }
+}
 
 std::vector<double> flattened(const std::vector<Vec3>& vectors) {
   std::vector<double> values;
@@ -257,10 +269,12 @@ struct ResultFile::Implementation {
 
   void put_fields(const State& state, const ElementFields& of_elements) {
     const std::vector<Floats> on_grid = grid.values(state, of_elements);
+    const std::vector<Floats> by_element = element_values(of_elements);
+    require_range(on_grid);
+    require_range(by_element);
     for (std::size_t i = 0; i < fields.size(); ++i) {
       fields[i].put(writer, on_grid[i]);
     }
-    const std::vector<Floats> by_element = element_values(of_elements);
     for (std::size_t i = 0; i < elements.size(); ++i) {
       elements[i].append(writer, 1, by_element[i].data());
     }

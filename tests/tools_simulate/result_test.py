@@ -89,6 +89,29 @@ class Result(SimulateTest):
                     self.assertTrue(np.isfinite(values).all())
             self.check_values(grid, points, file, result)
 
+    def test_values_beyond_single_precision_are_refused(self):
+        self.write("scene.toml", """
+[run]
+kind = "static"
+geometry = "linear"
+[[shell]]
+name = "ball"
+mesh = "ball.ply"
+thickness = "0.5mm"
+young = "1MPa"
+poisson = 0.3
+[[load]]
+body = "ball"
+kind = "pressure"
+value = "1e39MPa"
+[[fix]]
+body = "ball"
+where = {rigid_motions = true}
+""")
+        self.run_tool("--scene", "scene.toml", "out.hdf", expect=4)
+        self.assertIn("single precision", self.done.stderr)
+        self.assertFalse(os.path.exists(self.path("out.hdf")))
+
     def check_values(self, grid, points, file, result):
         """Against what is known of the sphere, and against the nodes' own freedoms."""
         u = vtk_to_numpy(grid.GetPointData().GetArray("displacement"))
