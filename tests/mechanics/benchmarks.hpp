@@ -1,5 +1,6 @@
 #pragma once
 
+#include "core/error.hpp"
 #include "mechanics/solve.hpp"
 
 #include <Eigen/Geometry>
@@ -138,6 +139,23 @@ inline ShellMesh make_sphere(double radius, int levels) {
   return mesh;
 }
 
+/// Triangles of a tube: along + 1 rings of `around` vertices, every other ring turned by half a spacing.
+inline void add_tube_triangles(std::size_t around, std::size_t along, ShellMesh& mesh) {
+  for (std::size_t j = 0; j < along; ++j) {
+    for (std::size_t i = 0; i < around; ++i) {
+      const auto a = static_cast<Index>(j * around + i);
+      const auto b = static_cast<Index>(j * around + (i + 1) % around);
+      const auto c = static_cast<Index>(a + around);
+      const auto d = static_cast<Index>(b + around);
+      if (j % 2 == 0) {
+        mesh.triangles.insert(mesh.triangles.end(), {{a, b, c}, {b, d, c}});
+      } else {
+        mesh.triangles.insert(mesh.triangles.end(), {{a, b, d}, {a, d, c}});
+      }
+    }
+  }
+}
+
 /// An open vessel with an aneurysm: radius 10 + 10 exp(-((z - 30) / 10)^2) ((1 + cos angle) / 2)^2 mm, z in [0, 60] mm,
 /// odd rows shifted by half a cell; 2 x around x along triangles, the surface's normals.
 inline ShellMesh make_vessel(std::size_t around, std::size_t along) {
@@ -158,19 +176,7 @@ inline ShellMesh make_vessel(std::size_t around, std::size_t along) {
       mesh.normals.push_back(around_tangent.cross(along_tangent).normalized());
     }
   }
-  for (std::size_t j = 0; j < along; ++j) {
-    for (std::size_t i = 0; i < around; ++i) {
-      const auto a = static_cast<Index>(j * around + i);
-      const auto b = static_cast<Index>(j * around + (i + 1) % around);
-      const auto c = static_cast<Index>(a + around);
-      const auto d = static_cast<Index>(b + around);
-      if (j % 2 == 0) {
-        mesh.triangles.insert(mesh.triangles.end(), {{a, b, c}, {b, d, c}});
-      } else {
-        mesh.triangles.insert(mesh.triangles.end(), {{a, b, d}, {a, d, c}});
-      }
-    }
-  }
+  add_tube_triangles(around, along, mesh);
   return mesh;
 }
 
@@ -183,6 +189,30 @@ inline ShellBody flat_body(ShellMesh mesh, double young, double poisson, double 
   body.thickness = {thickness};
   body.material = {young, poisson, std::nullopt};
   return body;
+}
+
+/// A sphere of radius 10 mm, 1 GPa, under pressure, held by its rigid motions.
+inline Model pressurised_sphere(int level, double thickness, double pressure) {
+  Model model;
+  ShellBody body = flat_body(make_sphere(10, level), 1000, 0.3, thickness);
+  body.curved = true;
+  body.rest = Rest::curved;
+  model.shells.push_back(body);
+  model.rigid_motions.push_back({0});
+  model.loads.push_back({0, PressureLoad{pressure, true}, {}});
+  return model;
+}
+
+/// What a run that must fail says, behind the kind of its error; empty where it does not fail.
+inline std::string error_of(const Model& model, const RunSettings& settings) {
+  try {
+    solve(model, settings, [](const State&) {});
+  } catch (const InputError& error) {
+    return std::string("input: ") + error.what();
+  } catch (const RequirementError& error) {
+    return std::string("requirement: ") + error.what();
+  }
+  return {};
 }
 
 inline std::vector<Index> nodes_where(const ShellMesh& mesh, const std::function<bool(const Vec3&)>& condition) {

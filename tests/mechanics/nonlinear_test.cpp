@@ -86,17 +86,6 @@ TEST(Nonlinear, HingedRoofEndsAtItsLimitLoad) {
   EXPECT_NEAR(reached, 0.741, 0.002);  // the last good state; the limit point is at 0.742
 }
 
-Model pressurised_sphere(int level, double thickness, double pressure) {
-  Model model;
-  ShellBody body = flat_body(make_sphere(10, level), 1000, 0.3, thickness);
-  body.curved = true;
-  body.rest = Rest::curved;
-  model.shells.push_back(body);
-  model.rigid_motions.push_back({0});
-  model.loads.push_back({0, PressureLoad{pressure, true}, {}});
-  return model;
-}
-
 TEST(Nonlinear, ClosedSphereUnderPressureIsInBalance) {
   // The supports of a body held by its rigid motions carry nothing, and the shell does not move as a whole.
   const Model model = pressurised_sphere(1, 1, 0.5);

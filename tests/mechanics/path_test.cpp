@@ -181,14 +181,7 @@ std::string message(const Model& model, const ArcLengthRun& run, Solver solver =
   RunSettings settings;
   settings.kind = run;
   settings.solver = solver;
-  try {
-    solve(model, settings, [](const State&) {});
-  } catch (const InputError& error) {
-    return std::string("input: ") + error.what();
-  } catch (const RequirementError& error) {
-    return std::string("requirement: ") + error.what();
-  }
-  return {};
+  return error_of(model, settings);
 }
 
 TEST(ArcLength, WhatCannotBeIsRefused) {

@@ -128,17 +128,6 @@ TEST(Published, VonKarmansPlate) {
   }
 }
 
-Model pressurised_sphere(int level, double thickness, double pressure) {
-  Model model;
-  ShellBody body = flat_body(make_sphere(10, level), 1000, 0.3, thickness);
-  body.curved = true;
-  body.rest = Rest::curved;
-  model.shells.push_back(body);
-  model.rigid_motions.push_back({0});
-  model.loads.push_back({0, PressureLoad{pressure, true}, {}});
-  return model;
-}
-
 double mean_radial_displacement(const Model& model, const State& state) {
   double mean = 0;
   for (std::size_t i = 0; i < state.displacement.size(); ++i) {
