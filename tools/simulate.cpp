@@ -595,8 +595,8 @@ void simulate(cli::Tool& tool, const Arguments& a) {
     report_state(tool.result(), model, state, dynamic != nullptr);
     const ElementFields of_state = fields(state);
     file.append(state, of_state);
-    if (exported) {
-      exported->append(state, of_state);
+    if (const auto written = exported ? exported->append(state, of_state) : std::nullopt) {
+      tool.wrote(*written);
     }
     unresolved = count_unresolved(model, state, most_bending);
   };

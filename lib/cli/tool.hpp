@@ -62,6 +62,8 @@ public:
   /// Registers an output for the report; OutputError when it exists and --force was not given, or cannot be written;
   /// UsageError when it is also an input, another output or the report, or ends with none of `endings`, where given.
   const std::filesystem::path& output(const std::filesystem::path& path, const std::vector<std::string>& endings = {});
+  /// Names in the report a file whose name follows from an output's, once it is there.
+  void wrote(const std::filesystem::path& path) { outputs_.push_back(path); }
 
   /// Times a stage: the seconds until the returned object dies are added to report key `seconds.<name>`.
   class Stage {

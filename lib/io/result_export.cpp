@@ -85,11 +85,14 @@ struct ResultExport::Implementation {
 
   [[nodiscard]] fs::path vtu(std::size_t state) const { return beside(result, fmt::format("_{:04}.vtu", state)); }
 
-  void append(const State& state, const ElementFields& fields) {
+  std::optional<fs::path> append(const State& state, const ElementFields& fields) {
+    std::optional<fs::path> written;
     if (options.pvd) {
       write_state(state, fields);
+      written = vtu(times.size());
     }
     times.push_back(state.time);
+    return written;
   }
 
   void write_state(const State& state, const ElementFields& fields) const {
@@ -204,7 +207,9 @@ ResultExport::~ResultExport() {
   }
 }
 
-void ResultExport::append(const State& state, const ElementFields& fields) { implementation_->append(state, fields); }
+std::optional<fs::path> ResultExport::append(const State& state, const ElementFields& fields) {
+  return implementation_->append(state, fields);
+}
 
 void ResultExport::commit() {
   implementation_->write("", implementation_->options.overwrite);

@@ -5,6 +5,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <vector>
 
 namespace tunica {
@@ -29,8 +30,8 @@ public:
   ResultExport(const ResultExport&) = delete;
   ResultExport& operator=(const ResultExport&) = delete;
 
-  /// Errors: OutputError.
-  void append(const State& state, const ElementFields& fields);
+  /// @return the .vtu that now holds the state, if any. Errors: OutputError.
+  std::optional<std::filesystem::path> append(const State& state, const ElementFields& fields);
   /// Just before the result file gets its name. Errors: OutputError.
   void commit();
 

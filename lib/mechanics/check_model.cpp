@@ -46,9 +46,24 @@ void check_body(const ShellBody& body) {
     refuse(body, fmt::format("{} thicknesses for {} nodes: give one, or one per node", body.thickness.size(),
                              mesh.vertices.size()));
   }
+  // Bending goes by the cube of the thickness, stretching by the thickness itself.
+  constexpr double least_thinness = 1e-9;
+  Vec3 low = mesh.vertices.front();
+  Vec3 high = low;
+  for (const Vec3& x : mesh.vertices) {
+    low = low.cwiseMin(x);
+    high = high.cwiseMax(x);
+  }
+  const double size = (high - low).maxCoeff();
   for (std::size_t i = 0; i < body.thickness.size(); ++i) {
     if (!(body.thickness[i] > 0) || !std::isfinite(body.thickness[i])) {
       refuse(body, fmt::format("the thickness at node {} is {:.6g} mm: it must be positive", i, body.thickness[i]));
+    }
+    if (body.thickness[i] < least_thinness * size) {
+      refuse(body,
+             fmt::format("the thickness at node {} is {:.6g} mm, less than {:.0e} of the shell's size: its bending "
+                         "stiffness would be lost in round-off",
+                         i, body.thickness[i], least_thinness));
     }
   }
 }

@@ -45,9 +45,10 @@ std::string describe_loads(const Model& model, const std::vector<double>& reache
                           body.thickness.size() > 1 ? " at its thinnest" : "");
     }
   }
-  return text.empty() ? fmt::format("{:.4g} of {:.4g} times the loads", reached.empty() ? 0 : reached.front(),
-                                    wanted.empty() ? 0 : wanted.front())
-                      : text;
+  if (model.loads.empty()) {
+    return "of the prescribed displacements";
+  }
+  return text.empty() ? fmt::format("{:.4g} of {:.4g} times the loads", reached.front(), wanted.front()) : text;
 }
 
 void set_algebraic_error(const std::optional<AlgebraicError>& error, State& state) {

@@ -52,6 +52,8 @@ constexpr double largest_departure = 3;
 /// A shell that gives way by less than this part of its thickness (root mean square) has branched off its path, not
 /// jumped.
 constexpr double largest_branch = 0.25;
+/// Times that a load step may let the shell go to another branch: each moves it on by little, and takes long.
+constexpr std::size_t most_jumps = 16;
 /// Part of the thickness by which a shell is pushed off a path that it may leave.
 constexpr double nudge = 0.01;
 /// Net load that the supports of a body held by its rigid motions may carry, relative to the load.
@@ -102,11 +104,14 @@ public:
     return result;
   }
 
-  /// Where the path has lost its stability: pushes the shell off it, and lets it creep to where it can rest.
-  SettleResult let_go(double factor, double thickness, Configuration& configuration) {
+  /// Where the path has lost its stability: moves what is prescribed, pushes the shell off it, and lets it creep to
+  /// where it can rest.
+  SettleResult let_go(double factor, double previous_factor, double thickness, Configuration& configuration) {
     const auto balance = [&](const Configuration& c, BlockMatrix* tangent) {
       return static_balance(system_, model_, c, factor, forces_, tangent);
     };
+    advance_configuration(configuration, prescribed_positions(system_, model_, factor) -
+                                             prescribed_positions(system_, model_, previous_factor));
     advance_configuration(configuration,
                           nudge * thickness * weakest_direction(system_, solver_, balance, matrix_, configuration));
     return settle(system_, settings_, solver_, balance, matrix_, configuration);
@@ -164,19 +169,30 @@ double distance(const Configuration& a, const Configuration& b) {
   return std::sqrt(sum / static_cast<double>(a.displacement.size()));
 }
 
-std::string why(const NewtonResult& result, const SettleResult& let_go) {
+struct Failure {
+  std::string found;
+  std::string reason;
+};
+
+Failure why(const NewtonResult& result, const SettleResult& let_go, bool prescribed) {
+  // Prescribed displacements hold a shell that loads alone would carry off: what cannot follow them has no limit load.
+  const std::string limit = prescribed ? "limit point" : "limit load";
+  const std::string none = "no stable static equilibrium";
   if (let_go.ran_away) {
-    return "limit load: beyond it there is no equilibrium, the shell yields without bound";
+    return {none, limit + ": beyond it there is no equilibrium, the shell yields without bound"};
   }
   if (let_go.settled) {
-    return "limit load: beyond it the shell jumps to a distant shape (snap-through or buckling), which a dynamic run "
-           "may follow";
+    return {none, limit +
+                      ": beyond it the shell jumps to a distant shape (snap-through or buckling), which a dynamic run "
+                      "may follow"};
   }
   if (!result.stable || let_go.lost_stability) {
-    return "limit load: the stiffness is no longer positive, and no state was found in which the shell could rest";
+    return {none,
+            limit + ": the stiffness is no longer positive, and no state was found in which the shell could rest"};
   }
-  return result.valid ? "Newton's method does not converge although the stiffness is positive"
-                      : "elements collapse or fold";
+  return {"no static equilibrium found", result.valid ? "Newton's method does not converge, although the stiffness is "
+                                                        "positive as far as it came: take more load steps"
+                                                      : "elements collapse or fold"};
 }
 
 }  // namespace
@@ -216,7 +232,17 @@ Summary run_static(ShellSystem& system, const Model& model, const RunSettings& s
     step.tell_direct_error(s == 0 || s + 1 == run.load_factors.size());
     std::size_t newton_iterations = 0;
     std::size_t cg_iterations = 0;
+    std::size_t jumps = 0;
     NewtonResult result;
+    // The last good state, also between two load steps.
+    const auto hand_over_last = [&] {
+      if (factor != shown) {
+        state = make_state(system, model, configuration, factor);
+        state.load_factor = factor;
+        state.converged = true;
+        on_state(state);
+      }
+    };
     while (factor != target) {
       const bool last = part * whole >= target - factor - 1e-12 * whole;
       const double next = last ? target : factor + part * whole;
@@ -244,25 +270,28 @@ Summary run_static(ShellSystem& system, const Model& model, const RunSettings& s
         part = 1;
         continue;
       }
+      if (++jumps > most_jumps) {
+        hand_over_last();
+        throw RequirementError(fmt::format(
+            "no static path beyond load factor {:.6g} of {:.6g}: the shell has lost its stability {} times in one load "
+            "step, and creeps from branch to branch; the last good state is at {:.6g}",
+            factor, run.load_factors.back(), most_jumps, factor));
+      }
       const double beyond = std::min(target, factor + 4 * smallest_part * whole);
       attempt = configuration;
-      const SettleResult let_go = step.let_go(beyond, thickness, attempt);
+      const SettleResult let_go = step.let_go(beyond, factor, thickness, attempt);
       newton_iterations += let_go.iterations;
       cg_iterations += let_go.cg_iterations;
       if (!let_go.settled || distance(attempt, configuration) > largest_branch * thickness) {
-        if (factor != shown) {  // the last good state, also between two load steps
-          state = make_state(system, model, configuration, factor);
-          state.load_factor = factor;
-          state.converged = true;
-          on_state(state);
-        }
+        hand_over_last();
+        const auto [found, reason] = why(result, let_go, !system.prescribed.empty());
         throw RequirementError(
-            fmt::format("no stable static equilibrium beyond load factor {:.6g} of {:.6g} ({}): {}; the last good "
-                        "state is at {:.6g}",
-                        factor, run.load_factors.back(),
+            fmt::format("{} beyond load factor {:.6g} of {:.6g} ({}): {}; the last good state is at "
+                        "{:.6g}",
+                        found, factor, run.load_factors.back(),
                         describe_loads(model, load_factors(model, true, factor),
                                        load_factors(model, true, run.load_factors.back())),
-                        why(result, let_go), factor));
+                        reason, factor));
       }
       configuration = std::move(attempt);
       factor = beyond;

@@ -83,11 +83,13 @@ TEST(CheckModel, AFreePieceIsAllowedInADynamicRun) {
   EXPECT_NO_THROW(check_model(model, settings));
 }
 
-TEST(CheckModel, NamesAThicknessThatIsNotPositive) {
+TEST(CheckModel, NamesAThicknessThatCannotBe) {
   Model model = plate();
   model.shells[0].thickness.assign(16, 0.1);
   model.shells[0].thickness[3] = 0;
   expect_refused(model, "thickness at node 3");
+  model.shells[0].thickness[3] = 1e-300;
+  expect_refused(model, "lost in round-off");
 }
 
 TEST(CheckModel, NamesANormalInItsFacetsPlane) {

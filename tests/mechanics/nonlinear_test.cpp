@@ -86,6 +86,46 @@ TEST(Nonlinear, HingedRoofEndsAtItsLimitLoad) {
   EXPECT_NEAR(reached, 0.741, 0.002);  // the last good state; the limit point is at 0.742
 }
 
+// A run that says it has converged has moved what was prescribed to where it was to go, also over places where the path
+// loses its stability and the shell is let go.
+TEST(Nonlinear, PrescribedDisplacementsAreReachedOrTheRunFails) {
+  const Grid grid = make_grid(4, 4, [](double u, double v) { return Vec3(10 * u, 10 * v, 0); });
+  const Index centre = grid.node(2, 2);
+  std::size_t reached = 0;
+  for (const double lift : {3.0, 6.0, 10.0, 20.0}) {
+    for (const double pressure : {0.0, 1e-6}) {
+      for (const std::size_t steps : {1, 2, 10}) {
+        Model model;
+        model.shells.push_back(flat_body(grid.mesh, 1, 0.3, 1));
+        hold(
+            model,
+            [](const Vec3& p) {
+              return std::min({p.x(), p.y(), 10 - p.x(), 10 - p.y()}) < 1e-9;
+            },
+            "xyz", "xyz");
+        model.fixes.push_back({0, {centre}, {true, true, true}, {false, false, false}, Vec3(0, 0, lift), {}});
+        if (pressure > 0) {
+          model.loads.push_back({0, PressureLoad{pressure, true}, {}});
+        }
+        std::vector<double> factors;
+        for (std::size_t s = 1; s <= steps; ++s) {
+          factors.push_back(static_cast<double>(s) / static_cast<double>(steps));
+        }
+        try {
+          solve(model, nonlinear_run(factors), [&](const State& state) {
+            ASSERT_TRUE(state.converged);
+            EXPECT_NEAR(state.displacement[centre].z(), state.load_factor * lift, 1e-12 * lift) << lift << ' ' << steps;
+          });
+          ++reached;
+        } catch (const RequirementError& error) {
+          EXPECT_THAT(error.what(), testing::HasSubstr("last good state"));
+        }
+      }
+    }
+  }
+  EXPECT_GE(reached, 6U);
+}
+
 TEST(Nonlinear, ClosedSphereUnderPressureIsInBalance) {
   // The supports of a body held by its rigid motions carry nothing, and the shell does not move as a whole.
   const Model model = pressurised_sphere(1, 1, 0.5);
