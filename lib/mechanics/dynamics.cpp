@@ -544,9 +544,9 @@ Summary run_dynamic(ShellSystem& system, const Model& model, const RunSettings& 
               : fmt::format("the step from {:.6g} s to {:.6g} s {} (relative residual {:.3g} after {} "
                             "iterations): take a smaller step, a ramp or damping; the last good state is at {:.6g} s",
                             time, end,
-                            !result.valid    ? "made elements collapse or fold"
-                            : !result.stable ? "leads to a state that is not stable"
-                                             : "did not converge",
+                            !result.valid                        ? "made elements collapse or fold"
+                            : result.converged && !result.stable ? "leads to a state that is not stable"
+                                                                 : "did not converge",
                             result.residual, result.iterations, time));
     }
     time = end;

@@ -129,7 +129,8 @@ private:
       state.attach();
       state.measure();
       split_thin(state, limit, most);
-      if (make_certain(samples, state, tolerance, most)) {
+      // What the certificate asked for may have made triangles thin: then the next best is looked at as well.
+      if (make_certain(samples, state, tolerance, most) && count_thin(state) == 0) {
         break;
       }
     }
@@ -159,7 +160,10 @@ private:
       advance(options_.progress, static_cast<double>(round) / rounds);
       const std::size_t before = state.mesh.alive;
       collapse_edges(state, limit, 4, {});
-      add_missed(samples, state, limit);
+      if (add_missed(samples, state, limit) > 0) {
+        best.attach();  // which may have looked good to fewer samples
+        best.measure();
+      }
       state.attach();
       state.measure();
       polish(state, limit, 3);
@@ -168,7 +172,8 @@ private:
       note(state);
       const bool fits = state.error() <= limit;
       fruitless = static_cast<double>(state.mesh.alive) > worth_it * static_cast<double>(before) ? fruitless + 1 : 0;
-      if (fits && (price(state) < price(best) || best.error() > limit)) {
+      const bool best_fits = best.error() <= limit;
+      if (fits ? !best_fits || price(state) < price(best) : !best_fits && state.error() < best.error()) {
         best = state;
       }
     }
@@ -196,11 +201,13 @@ private:
   /// What the samples miss is found, added to them, and mended. @return whether the tolerance holds
   bool make_certain(FitSamples& samples, FitState& state, double tolerance, std::size_t most) {
     const double limit = margin * tolerance;
+    int stuck = 0;
     for (int i = 0; i < certificates; ++i) {
       part_crossings(state, limit, most);
       if (certify(state, tolerance)) {
         return true;
       }
+      const double before = state.error();
       // What more samples alone do not mend gets more shells.
       const std::size_t added = add_missed(samples, state, margin * tolerance, true);
       samples.add(farthest_);
@@ -212,7 +219,8 @@ private:
       polish(state, limit, 2);
       repair(state, limit, most);
       mend_angles(state, limit);
-      if (state.error() > 2 * limit) {
+      stuck = state.error() > 0.999 * before && state.error() > limit ? stuck + 1 : 0;
+      if (state.error() > 2 * limit || stuck == patience) {
         return certify(state, tolerance);  // a place that more shells do not mend
       }
     }
@@ -426,10 +434,11 @@ private:
     farthest_ = distance.farthest_of_target;
     const bool holds = tolerance && distance.both.upper <= *tolerance;
     const bool held = tolerance && !result_.shell.triangles.empty() && result_.distance.both.upper <= *tolerance;
-    if (result_.shell.triangles.empty() || (held ? holds && shell.triangles.size() < result_.shell.triangles.size()
-                                                 : distance.both.upper < result_.distance.both.upper)) {
+    if (result_.shell.triangles.empty() ||
+        (held ? holds && price(state) < price_ : distance.both.upper < result_.distance.both.upper)) {
       result_.shell = std::move(shell);
       result_.distance = distance;
+      price_ = price(state);
     }
     return holds;
   }
@@ -496,6 +505,7 @@ private:
   const Target& target_;
   const RelaxOptions& options_;
   double width_;
+  std::size_t price_ = 0;         // of the result
   Vec3 farthest_ = Vec3::Zero();  // of the target, when last certified
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
   RelaxResult result_;
