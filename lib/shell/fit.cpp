@@ -31,9 +31,11 @@ constexpr double limited_by_target =
     0.6;                               // of its triangles: a start that needs more follows its facets, not its shape
 constexpr double expected_gain = 3;    // shells of the start per shell of the result
 constexpr double start_surplus = 1.5;  // triangles of the start per shell wanted
-constexpr double margin = 0.97;        // of the tolerance: what samples miss
-constexpr double worth_it = 0.985;     // a round that leaves more than this of the count or error is the last
-constexpr int patience = 3;            // rounds that bring nothing
+constexpr std::array<double, 2> other_surpluses{1.25, 2.0};
+constexpr std::size_t few_shells = 400;  // wanted: several starts cost little
+constexpr double margin = 0.97;          // of the tolerance: what samples miss
+constexpr double worth_it = 0.985;       // a round that leaves more than this of the count or error is the last
+constexpr int patience = 3;              // rounds that bring nothing
 constexpr int most_settling = 20;
 constexpr int most_repairs = 12;
 constexpr double clearly_below = 0.975;
@@ -237,6 +239,36 @@ private:
       return;
     }
     FitSamples samples(target_, guess(static_cast<double>(shells)));
+    int fruitless = 0;
+    FitState best = exchanged(samples, start, shells, fruitless);
+    if (shells < few_shells && !start.own_topology) {
+      // A greedy search ends elsewhere from elsewhere, and with few shells by much.
+      for (const double surplus : other_surpluses) {
+        const FitStart other =
+            start_of_fit(coarse_, target_, static_cast<std::size_t>(surplus * static_cast<double>(shells)));
+        FitState state = exchanged(samples, other, shells, fruitless);
+        if (state.mesh.alive <= shells && (state.error() < best.error() || best.mesh.alive > shells)) {
+          best = std::move(state);
+        }
+      }
+    }
+    for (int i = 0; i < 3; ++i) {
+      part_crossings(best, best.error(), shells);
+      certify(best, std::nullopt);
+      if (result_.distance.both.lower <= 1.1 * best.error() || add_missed(samples, best, best.error()) == 0) {
+        break;
+      }
+      best.attach();
+      best.measure();
+      polish(best, best.error(), 3);
+    }
+    result_.stopped = fruitless < patience ? "the limit of rounds was reached" : "further rounds bring nothing";
+    no_worse_than_flat({}, shells, start);
+  }
+
+  /// The closest that many shells come from one start, by exchanging shells between where they are hardly needed and
+  /// where the error is largest. @param fruitless  rounds at the end that brought nothing
+  FitState exchanged(FitSamples& samples, FitStart start, std::size_t shells, int& fruitless) {
     FitState state(samples, prepared(start), {});
     // Few shells for a rough target: normals of their own would fit its ripples, and stay.
     smooth(state, 0.1 * start.flat_error, 0.5 * start.flat_error);
@@ -253,7 +285,7 @@ private:
     note(state);
     FitState best = state;
     const int rounds = options_.max_iterations.value_or(default_rounds);
-    int fruitless = 0;
+    fruitless = 0;
     for (int round = 1; round < rounds && fruitless < patience; ++round) {
       advance(options_.progress, static_cast<double>(round) / rounds);
       // Exchange: shells from where they are hardly needed to where the error is largest; more or fewer in turn.
@@ -271,18 +303,7 @@ private:
         note(best);
       }
     }
-    for (int i = 0; i < 3; ++i) {
-      part_crossings(best, best.error(), shells);
-      certify(best, std::nullopt);
-      if (result_.distance.both.lower <= 1.1 * best.error() || add_missed(samples, best, best.error()) == 0) {
-        break;
-      }
-      best.attach();
-      best.measure();
-      polish(best, best.error(), 3);
-    }
-    result_.stopped = fruitless < patience ? "the limit of rounds was reached" : "further rounds bring nothing";
-    no_worse_than_flat({}, shells, start);
+    return best;
   }
 
   [[nodiscard]] FitMesh prepared(const FitStart& start) const {
