@@ -7,8 +7,6 @@
 /// linear solver. Theory and names: shell_element.hpp, whose functions on one element are these with equal lanes.
 namespace tunica {
 
-static_assert(lane_count == batch_size);
-
 using LaneState = Eigen::Matrix<Lanes, 15, 1>;
 
 /// The members of ShellElement of the same names.

@@ -1,5 +1,7 @@
 #pragma once
 
+#include "mechanics/shell_element.hpp"
+
 #include <Eigen/Core>
 
 #include <array>
@@ -12,9 +14,6 @@
 /// Several numbers that go through the same arithmetic at once, as the scalar of small Eigen matrices: the same formula
 /// for several elements. What Eigen vectorises within one 3x3 or 6x6 block is little; across elements it is everything.
 namespace tunica {
-
-/// Elements that are computed at once.
-inline constexpr std::size_t lane_count = 4;
 
 using Lanes = std::experimental::simd<double, std::experimental::simd_abi::deduce_t<double, lane_count>>;
 using LaneMask = Lanes::mask_type;

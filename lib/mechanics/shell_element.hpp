@@ -92,7 +92,7 @@ struct ShellElement {
 };
 
 /// Elements that a run computes at once (element_lanes.hpp).
-inline constexpr std::size_t batch_size = 4;
+inline constexpr std::size_t lane_count = 4;
 
 /// What the three corners do: displacements (columns) and rotations from the reference.
 struct CornerMotion {

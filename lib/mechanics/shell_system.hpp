@@ -37,7 +37,7 @@ struct Piece {
 
 /// Elements that are computed at once; those beyond `count` repeat another.
 struct Batch {
-  std::array<Index, batch_size> elements{};
+  std::array<Index, lane_count> elements{};
   std::size_t count = 0;
 };
 

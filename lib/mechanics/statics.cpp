@@ -52,8 +52,6 @@ constexpr double largest_departure = 3;
 /// A shell that gives way by less than this part of its thickness (root mean square) has branched off its path, not
 /// jumped.
 constexpr double largest_branch = 0.25;
-/// Times that a load step may let the shell go to another branch: each moves it on by little, and takes long.
-constexpr std::size_t most_jumps = 16;
 /// Part of the thickness by which a shell is pushed off a path that it may leave.
 constexpr double nudge = 0.01;
 /// Net load that the supports of a body held by its rigid motions may carry, relative to the load.
@@ -232,17 +230,7 @@ Summary run_static(ShellSystem& system, const Model& model, const RunSettings& s
     step.tell_direct_error(s == 0 || s + 1 == run.load_factors.size());
     std::size_t newton_iterations = 0;
     std::size_t cg_iterations = 0;
-    std::size_t jumps = 0;
     NewtonResult result;
-    // The last good state, also between two load steps.
-    const auto hand_over_last = [&] {
-      if (factor != shown) {
-        state = make_state(system, model, configuration, factor);
-        state.load_factor = factor;
-        state.converged = true;
-        on_state(state);
-      }
-    };
     while (factor != target) {
       const bool last = part * whole >= target - factor - 1e-12 * whole;
       const double next = last ? target : factor + part * whole;
@@ -270,20 +258,18 @@ Summary run_static(ShellSystem& system, const Model& model, const RunSettings& s
         part = 1;
         continue;
       }
-      if (++jumps > most_jumps) {
-        hand_over_last();
-        throw RequirementError(fmt::format(
-            "no static path beyond load factor {:.6g} of {:.6g}: the shell has lost its stability {} times in one load "
-            "step, and creeps from branch to branch; the last good state is at {:.6g}",
-            factor, run.load_factors.back(), most_jumps, factor));
-      }
       const double beyond = std::min(target, factor + 4 * smallest_part * whole);
       attempt = configuration;
       const SettleResult let_go = step.let_go(beyond, factor, thickness, attempt);
       newton_iterations += let_go.iterations;
       cg_iterations += let_go.cg_iterations;
       if (!let_go.settled || distance(attempt, configuration) > largest_branch * thickness) {
-        hand_over_last();
+        if (factor != shown) {  // the last good state, also between two load steps
+          state = make_state(system, model, configuration, factor);
+          state.load_factor = factor;
+          state.converged = true;
+          on_state(state);
+        }
         const auto [found, reason] = why(result, let_go, !system.prescribed.empty());
         throw RequirementError(
             fmt::format("{} beyond load factor {:.6g} of {:.6g} ({}): {}; the last good state is at "

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <vector>
 
 /// The two directions of curved_hausdorff().
 namespace tunica {
@@ -29,6 +30,31 @@ struct OneSided {
   Vec3 farthest = Vec3::Zero();  ///< a point whose distance is at least distance.lower
   Vec3 closest = Vec3::Zero();   ///< the point of the other surface closest to it
 };
+
+/// Gathers what blocks of pieces found, in their order: raises the bounds, and keeps the pieces that are not settled.
+/// @param lower  mm: certain distance so far, of the place `farthest`; settled  mm: largest bound of a settled piece
+template <typename Block, typename Place>
+auto collected(const std::vector<Block>& blocks, const Aim& aim, double& lower, double& settled, Place& farthest) {
+  for (const Block& block : blocks) {
+    if (block.lower > lower) {
+      lower = block.lower;
+      farthest = block.farthest;
+    }
+    settled = std::max(settled, block.settled);
+  }
+  const double enough = aim.enough(lower);
+  decltype(Block::live) live;
+  for (const Block& block : blocks) {
+    for (const auto& piece : block.live) {
+      if (piece.upper <= enough) {
+        settled = std::max(settled, piece.upper);
+      } else {
+        live.push_back(piece);
+      }
+    }
+  }
+  return live;
+}
 
 /// How many pieces one direction cuts before it gives up and its interval comes out wider.
 inline constexpr std::size_t most_certified_pieces = 2'000'000;

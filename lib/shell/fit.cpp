@@ -239,17 +239,21 @@ private:
       return;
     }
     FitSamples samples(target_, guess(static_cast<double>(shells)));
-    int fruitless = 0;
-    FitState best = exchanged(samples, start, shells, fruitless);
+    // A greedy search ends elsewhere from elsewhere, and with few shells by much.
+    std::vector<double> surpluses;
     if (shells < few_shells && !start.own_topology) {
-      // A greedy search ends elsewhere from elsewhere, and with few shells by much.
-      for (const double surplus : other_surpluses) {
-        const FitStart other =
-            start_of_fit(coarse_, target_, static_cast<std::size_t>(surplus * static_cast<double>(shells)));
-        FitState state = exchanged(samples, other, shells, fruitless);
-        if (state.mesh.alive <= shells && (state.error() < best.error() || best.mesh.alive > shells)) {
-          best = std::move(state);
-        }
+      surpluses.assign(other_surpluses.begin(), other_surpluses.end());
+    }
+    const double part = 1.0 / static_cast<double>(1 + surpluses.size());
+    auto [best, exhausted] = exchanged(samples, start, shells, {0, part});
+    for (std::size_t i = 0; i < surpluses.size(); ++i) {
+      const FitStart other =
+          start_of_fit(coarse_, target_, static_cast<std::size_t>(surpluses[i] * static_cast<double>(shells)));
+      const double begin = part * static_cast<double>(i + 1);
+      auto [state, its_exhausted] = exchanged(samples, other, shells, {begin, begin + part});
+      if (state.mesh.alive <= shells && (state.error() < best.error() || best.mesh.alive > shells)) {
+        best = std::move(state);
+        exhausted = its_exhausted;
       }
     }
     for (int i = 0; i < 3; ++i) {
@@ -262,13 +266,18 @@ private:
       best.measure();
       polish(best, best.error(), 3);
     }
-    result_.stopped = fruitless < patience ? "the limit of rounds was reached" : "further rounds bring nothing";
+    result_.stopped = exhausted ? "further rounds bring nothing" : "the limit of rounds was reached";
     no_worse_than_flat({}, shells, start);
   }
 
+  struct Exchanged {
+    FitState state;
+    bool exhausted = false;  ///< the last rounds brought nothing
+  };
+
   /// The closest that many shells come from one start, by exchanging shells between where they are hardly needed and
-  /// where the error is largest. @param fruitless  rounds at the end that brought nothing
-  FitState exchanged(FitSamples& samples, FitStart start, std::size_t shells, int& fruitless) {
+  /// where the error is largest. @param done  of the whole fit, before and after
+  Exchanged exchanged(FitSamples& samples, FitStart start, std::size_t shells, const std::array<double, 2>& done) {
     FitState state(samples, prepared(start), {});
     // Few shells for a rough target: normals of their own would fit its ripples, and stay.
     smooth(state, 0.1 * start.flat_error, 0.5 * start.flat_error);
@@ -285,9 +294,9 @@ private:
     note(state);
     FitState best = state;
     const int rounds = options_.max_iterations.value_or(default_rounds);
-    fruitless = 0;
+    int fruitless = 0;
     for (int round = 1; round < rounds && fruitless < patience; ++round) {
-      advance(options_.progress, static_cast<double>(round) / rounds);
+      advance(options_.progress, done[0] + (done[1] - done[0]) * static_cast<double>(round) / rounds);
       // Exchange: shells from where they are hardly needed to where the error is largest; more or fewer in turn.
       state = best;
       const double error = state.error();
@@ -303,7 +312,7 @@ private:
         note(best);
       }
     }
-    return best;
+    return {std::move(best), fruitless >= patience};
   }
 
   [[nodiscard]] FitMesh prepared(const FitStart& start) const {

@@ -19,8 +19,9 @@ namespace tunica {
 /// COARSE has, with `refine` four times as many; more where the topology needs more). Never more shells, or a larger
 /// distance, than plain decimation: where that wins, its flat facets are the result (flat shells: corner normals are
 /// the facets').
+/// Searches that cost little (to a tolerance from few triangles, to few shells) run from several starts, of which the
+/// best is kept. To a tolerance, shells that cross are parted where the target's own triangles do not cross.
 /// @param coarse  an oriented manifold; its count, and its topology, may matter; @param target  likewise
-/// To a tolerance, shells that cross are parted where the target's own triangles do not cross.
 /// Keeps: topology of the start, boundary loops (on the target's boundary to the same tolerance). Angles are at least
 /// 20 degrees but where folds, rims or creases of the target would cost the tolerance (or, to a count, error).
 /// Deterministic, independent of the number of threads. Errors: Interrupted. Source: error-driven collapse as in Hoppe

@@ -115,7 +115,7 @@ private:
         }
       }
     });
-    collected(middles);
+    collected(middles, aim_, lower_, settled_, farthest_);
     const double bulge = bulge_share * aim_.enough(lower_);
     std::vector<Block> blocks((patches_.size() + grain - 1) / grain);
     parallel_for_blocks(patches_.size(), grain, [&](std::size_t begin, std::size_t end) {
@@ -124,7 +124,7 @@ private:
         cut_first(static_cast<Index>(t), bulge, blocks[begin / grain]);
       }
     });
-    return collected(blocks);
+    return collected(blocks, aim_, lower_, settled_, farthest_);
   }
 
   void cut_first(Index t, double bulge, Block& block) const {
@@ -181,28 +181,6 @@ private:
     }
   }
 
-  std::vector<Piece> collected(const std::vector<Block>& blocks) {
-    for (const Block& block : blocks) {
-      if (block.lower > lower_) {
-        lower_ = block.lower;
-        farthest_ = block.farthest;
-      }
-      settled_ = std::max(settled_, block.settled);
-    }
-    const double enough = aim_.enough(lower_);
-    std::vector<Piece> live;
-    for (const Block& block : blocks) {
-      for (const Piece& piece : block.live) {
-        if (piece.upper <= enough) {
-          settled_ = std::max(settled_, piece.upper);
-        } else {
-          live.push_back(piece);
-        }
-      }
-    }
-    return live;
-  }
-
   std::vector<Piece> refined(const std::vector<Piece>& pieces) {
     std::vector<Block> blocks((pieces.size() + grain - 1) / grain);
     parallel_for_blocks(pieces.size(), grain, [&](std::size_t begin, std::size_t end) {
@@ -210,7 +188,7 @@ private:
         cut(pieces[i], blocks[begin / grain]);
       }
     });
-    return collected(blocks);
+    return collected(blocks, aim_, lower_, settled_, farthest_);
   }
 
   void cut(const Piece& piece, Block& block) const {

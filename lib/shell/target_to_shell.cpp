@@ -88,7 +88,7 @@ public:
           cut(live[i], block);
         }
       });
-      live = collected(blocks);
+      live = collected(blocks, aim_, lower_, settled_, farthest_);
     }
     for (const Piece& piece : live) {
       settled_ = std::max(settled_, std::min(piece.upper, by_one_corner(piece.corners)));
@@ -183,29 +183,7 @@ private:
         bound({{corners[v[0]], corners[v[1]], corners[v[2]]}, infinity}, block);
       }
     });
-    return collected(blocks);
-  }
-
-  std::vector<Piece> collected(const std::vector<Block>& blocks) {
-    for (const Block& block : blocks) {
-      if (block.lower > lower_) {
-        lower_ = block.lower;
-        farthest_ = block.farthest;
-      }
-      settled_ = std::max(settled_, block.settled);
-    }
-    const double enough = aim_.enough(lower_);
-    std::vector<Piece> live;
-    for (const Block& block : blocks) {
-      for (const Piece& piece : block.live) {
-        if (piece.upper <= enough) {
-          settled_ = std::max(settled_, piece.upper);
-        } else {
-          live.push_back(piece);
-        }
-      }
-    }
-    return live;
+    return collected(blocks, aim_, lower_, settled_, farthest_);
   }
 
   /// Settles the piece or keeps it.
