@@ -4,6 +4,7 @@
 #include "shell/curved_surface.hpp"
 #include "shell/fit_cross.hpp"
 #include "shell/fit_edit.hpp"
+#include "shell/fit_parts.hpp"
 #include "shell/fit_shape.hpp"
 #include "shell/fit_start.hpp"
 #include "surface/closest_point.hpp"
@@ -101,7 +102,83 @@ private:
     }
   }
 
+  /// Pieces are fitted together, and one by one where all together get no further than flat facets. Crumbs stay flat.
   void to_tolerance(double tolerance) {
+    std::vector<TriangleMesh> parts = parts_of(target_.mesh());
+    if (parts.size() == 1 || !same_topology(coarse_, target_.mesh())) {
+      whole_to_tolerance(tolerance);
+      return;
+    }
+    std::vector<Fitted> done;
+    std::vector<TriangleMesh> rest;
+    for (TriangleMesh& part : parts) {
+      if (const auto crumb = crumb_within(part, tolerance, FitLimits{}.angle)) {
+        ShellDistanceOptions measuring;
+        measuring.width = width_;
+        ShellMesh shell = flat_shells(*crumb, options_.surface);
+        const ShellDistance distance = shell_distance(shell, Target(std::move(part)), measuring);
+        done.push_back({std::move(shell), distance});
+      } else {
+        rest.push_back(std::move(part));
+      }
+    }
+    const std::size_t crumbs = done.size();
+    if (!rest.empty() && !fit_part(crumbs == 0 ? target_.mesh() : joined(rest), tolerance, done) && rest.size() > 1) {
+      done.resize(crumbs);
+      for (const TriangleMesh& part : rest) {
+        fit_part(part, tolerance, done);
+      }
+    }
+    join(done, tolerance);
+  }
+
+  struct Fitted {
+    ShellMesh shell;
+    ShellDistance distance;  ///< to its part of the target
+  };
+
+  /// @return whether it became curved
+  bool fit_part(const TriangleMesh& part, double tolerance, std::vector<Fitted>& done) {
+    const Target target(part);
+    Fitting fitting(part, target, options_);
+    fitting.width_ = width_;
+    fitting.whole_to_tolerance(tolerance);
+    RelaxResult& fitted = fitting.result_;
+    result_.iterations.insert(result_.iterations.end(), fitted.iterations.begin(), fitted.iterations.end());
+    done.push_back({std::move(fitted.shell), fitted.distance});
+    return !fitting.flat_;
+  }
+
+  /// Takes all parts as the result when that is better. What is certain of each part is so of all together.
+  void join(const std::vector<Fitted>& parts, double tolerance) {
+    std::vector<ShellMesh> shells;
+    ShellDistance most;
+    const auto raise = [](double& upper, double by) { upper = std::max(upper, by); };
+    for (const Fitted& part : parts) {
+      shells.push_back(part.shell);
+      raise(most.both.upper, part.distance.both.upper);
+      raise(most.shell_to_target.upper, part.distance.shell_to_target.upper);
+      raise(most.target_to_shell.upper, part.distance.target_to_shell.upper);
+    }
+    ShellMesh shell = joined(shells);
+    ShellDistanceOptions measuring;
+    measuring.width = width_;
+    ShellDistance distance = shell_distance(shell, target_, measuring);
+    const auto lower = [](double& upper, double to) { upper = std::min(upper, to); };
+    lower(distance.both.upper, most.both.upper);
+    lower(distance.shell_to_target.upper, most.shell_to_target.upper);
+    lower(distance.target_to_shell.upper, most.target_to_shell.upper);
+    const bool held = !result_.shell.triangles.empty() && result_.distance.both.upper <= tolerance;
+    const bool better =
+        held ? distance.both.upper <= tolerance && shell.triangles.size() < result_.shell.triangles.size()
+             : result_.shell.triangles.empty() || distance.both.upper < result_.distance.both.upper;
+    if (better) {
+      result_.shell = std::move(shell);
+      result_.distance = distance;
+    }
+  }
+
+  void whole_to_tolerance(double tolerance) {
     const FitStart start = start_of_fit(coarse_, target_, start_error * tolerance, few, finer_start_error * tolerance);
     // Flat errors fall as 1 / count. Where curved shells need as many, flat facets are the answer.
     const double flat_count = static_cast<double>(start.mesh.triangles.size()) * start.flat_error / tolerance;
@@ -495,14 +572,7 @@ private:
       decimating.triangles = most;
     }
     const DecimateResult flat = decimate(target_.mesh(), decimating);
-    ShellMesh shell;
-    shell.vertices = flat.mesh.vertices;
-    shell.triangles = flat.mesh.triangles;
-    shell.normals = vertex_normals(flat.mesh);
-    shell.patch = options_.surface;
-    for (const Vec3& n : facet_normals(flat.mesh)) {
-      shell.corner_normals.push_back({n, n, n});
-    }
+    ShellMesh shell = flat_shells(flat.mesh, options_.surface);
     ShellDistanceOptions measuring;
     measuring.width = width_;
     const ShellDistance distance = shell_distance(shell, target_, measuring);
@@ -513,6 +583,7 @@ private:
     if (better) {
       result_.shell = std::move(shell);
       result_.distance = distance;
+      flat_ = true;
     }
   }
 
@@ -536,6 +607,7 @@ private:
   const RelaxOptions& options_;
   double width_;
   std::size_t price_ = 0;         // of the result
+  bool flat_ = false;             // the result is flat facets
   Vec3 farthest_ = Vec3::Zero();  // of the target, when last certified
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
   RelaxResult result_;

@@ -18,7 +18,7 @@ namespace tunica {
 /// anew and split where that is needed; without, the least distance found with at most `shells` (none: as many as
 /// COARSE has, with `refine` four times as many; more where the topology needs more). Never more shells, or a larger
 /// distance, than plain decimation: where that wins, its flat facets are the result (flat shells: corner normals are
-/// the facets').
+/// the facets'). To a tolerance each piece of the target may be flat by itself, crumbs without being tried.
 /// Searches that cost little (to a tolerance from few triangles, to few shells) run from several starts, of which the
 /// best is kept. To a tolerance, shells that cross are parted where the target's own triangles do not cross.
 /// @param coarse  an oriented manifold; its count, and its topology, may matter; @param target  likewise

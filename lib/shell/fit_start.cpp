@@ -22,11 +22,6 @@ constexpr double crease_cosine = 0.8;         // of the angle between two facets
 constexpr double crease_share = 0.6;          // of that angle is there already close to the edge
 constexpr double close_by = 0.08;             // of the height of the triangle
 
-bool same_topology(const TriangleMesh& a, const TriangleMesh& b) {
-  const MeshFacts x = examine(a), y = examine(b);
-  return x.components == y.components && x.boundary_loops == y.boundary_loops && x.euler == y.euler;
-}
-
 /// Largest sampled distance between flat facets and target, both ways.
 double sampled_error(const TriangleMesh& mesh, const Target& target) {
   const ClosestPoint tree(mesh);
@@ -60,6 +55,11 @@ TriangleMesh decimated(const TriangleMesh& mesh, std::size_t triangles) {
 }
 
 }  // namespace
+
+bool same_topology(const TriangleMesh& a, const TriangleMesh& b) {
+  const MeshFacts x = examine(a), y = examine(b);
+  return x.components == y.components && x.boundary_loops == y.boundary_loops && x.euler == y.euler;
+}
 
 FitStart start_of_fit(const TriangleMesh& coarse, const Target& target, std::size_t triangles) {
   if (!same_topology(coarse, target.mesh())) {

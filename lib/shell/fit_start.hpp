@@ -12,6 +12,9 @@ struct FitStart {
   bool own_topology = false;  ///< it is COARSE, because its topology is not the target's
 };
 
+/// Whether pieces, boundary loops and handles are as many.
+bool same_topology(const TriangleMesh& a, const TriangleMesh& b);
+
 /// A decimation of the target with so many triangles.
 FitStart start_of_fit(const TriangleMesh& coarse, const Target& target, std::size_t triangles);
 
