@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <bit>
 #include <cstring>
+#include <span>
 #include <utility>
 
 #ifdef __AVX2__
@@ -27,99 +28,120 @@ constexpr double beside_sample = 1e-3;
 
 std::size_t ones(Word word) { return static_cast<std::size_t>(std::popcount(word)); }
 Index bits_of(Word word) { return static_cast<Index>(std::popcount(word)); }
-Word shifted(const Word* row, std::size_t w) { return row[w] >> 1 | row[w + 1] << (word_bits - 1); }
+Word shifted(const Word* word) { return word[0] >> 1 | word[1] << (word_bits - 1); }
 
-/// A cell's edges as places in sixteen numbers: the first eight are those of the next vertices on edges 0 to 3 along x,
-/// 4 and 6 along y, 8 and 10 along z when the walk along the row comes to the cell, the others those after it.
-constexpr std::array<std::uint8_t, 12> place_of_edge{0, 1, 2, 3, 4, 12, 5, 13, 6, 14, 7, 15};
-constexpr std::array<std::uint8_t, 8> edge_of_place{0, 1, 2, 3, 4, 6, 8, 10};
+/// A running number for each of these edges of a cell: that of the next vertex on it when the walk along the rows comes
+/// to the cell. The cell's other edges have the number after the one on the parallel edge at its left.
+constexpr std::array<std::uint8_t, 8> running_edges{0, 1, 2, 3, 4, 6, 8, 10};
+
+/// The running number of an edge, and whether it is an edge at the cell's right.
+struct EdgeNumber {
+  std::uint8_t running;
+  bool right;
+};
+constexpr std::array<EdgeNumber, 12> edge_numbers{{{0, false},
+                                                   {1, false},
+                                                   {2, false},
+                                                   {3, false},
+                                                   {4, false},
+                                                   {4, true},
+                                                   {5, false},
+                                                   {5, true},
+                                                   {6, false},
+                                                   {6, true},
+                                                   {7, false},
+                                                   {7, true}}};
 
 /// A case as the writer wants it.
 struct alignas(32) PackedCase {
-  std::array<std::uint8_t, 16> corners{};  ///< places of the triangles' corners, one after the other
-  std::array<std::uint8_t, 8> crossed{};   ///< 1 for each edge of edge_of_place that is crossed
-  std::uint32_t count = 0;                 ///< triangles
+  /// The triangles' corners, one after the other: which running number, and eight if it has just been used at the left.
+  std::array<std::uint8_t, 16> corners{};
+  std::array<std::uint8_t, 8> crossed{};  ///< 1 for each of running_edges that is crossed
+  std::uint32_t count = 0;                ///< triangles
 };
 
-std::array<PackedCase, 256> pack_cases(bool mirrored) {
-  std::array<PackedCase, 256> packed;
-  for (std::size_t which = 0; which < packed.size(); ++which) {
+/// The cases twice: of cells, and of places after the last cell of a row or layer, which have edges but no triangles.
+constexpr std::size_t no_cell = 256;
+using PackedCases = std::array<PackedCase, 2 * no_cell>;
+
+PackedCases pack_cases(bool mirrored) {
+  PackedCases packed;
+  for (std::size_t which = 0; which < no_cell; ++which) {
     const CubeCase& cube = cube_cases()[which];
-    packed[which].count = static_cast<std::uint32_t>(cube.count);
+    PackedCase& cell = packed[which];
+    for (std::size_t i = 0; i < running_edges.size(); ++i) {
+      const auto [first, second] = cube_edges[running_edges[i]];
+      cell.crossed[i] = static_cast<std::uint8_t>((which >> first ^ which >> second) & 1);
+    }
+    packed[which + no_cell].crossed = cell.crossed;
+    cell.count = static_cast<std::uint32_t>(cube.count);
     for (std::size_t t = 0; t < cube.count; ++t) {
       for (std::size_t corner = 0; corner < 3; ++corner) {
-        packed[which].corners[3 * t + corner] = place_of_edge[cube.triangles[t][mirrored ? (3 - corner) % 3 : corner]];
+        const auto [running, right] = edge_numbers[cube.triangles[t][mirrored ? (3 - corner) % 3 : corner]];
+        cell.corners[3 * t + corner] = static_cast<std::uint8_t>(running | (right ? cell.crossed[running] << 3 : 0));
       }
-    }
-    for (std::size_t place = 0; place < edge_of_place.size(); ++place) {
-      const auto [first, second] = cube_edges[edge_of_place[place]];
-      packed[which].crossed[place] = static_cast<std::uint8_t>((which >> first ^ which >> second) & 1);
     }
   }
   return packed;
 }
 
-const std::array<PackedCase, 256>& packed_cases(bool mirrored) {
-  static const std::array<std::array<PackedCase, 256>, 2> packed{pack_cases(false), pack_cases(true)};
+const PackedCases& packed_cases(bool mirrored) {
+  static const std::array<PackedCases, 2> packed{pack_cases(false), pack_cases(true)};
   return packed[mirrored ? 1 : 0];
 }
 
-/// Numbers of the next vertices on the eight edges of edge_of_place, as a walk along a row of cells comes by.
+/// The running numbers, as a walk along the rows of a layer comes by.
 class RunningNumbers {
 public:
 #ifdef __AVX2__
   explicit RunningNumbers(const std::array<Index, 8>& start)
-      : before_(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(start.data()))) {}
+      : numbers_(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(start.data()))) {}
 
   /// Writes the triangles of a cell and steps over it. Whatever their number, sixteen corners are written.
   Index* write(const PackedCase& cube, Index* corner) {
     const auto bytes = [](const std::uint8_t* from) {
       return _mm256_cvtepu8_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(from)));
     };
-    const __m256i after = _mm256_add_epi32(before_, bytes(cube.crossed.data()));
     for (int half = 0; half < 2; ++half) {
-      const __m256i place = bytes(cube.corners.data() + 8 * half);
-      const __m256 from_before = _mm256_castsi256_ps(_mm256_permutevar8x32_epi32(before_, place));
-      const __m256 from_after = _mm256_castsi256_ps(_mm256_permutevar8x32_epi32(after, place));
-      // Bit 3 of the place says which, as the sign.
-      const __m256 which = _mm256_castsi256_ps(_mm256_slli_epi32(place, 28));
-      _mm256_storeu_ps(reinterpret_cast<float*>(corner + 8 * half), _mm256_blendv_ps(from_before, from_after, which));
+      const __m256i packed = bytes(cube.corners.data() + 8 * half);
+      // Of the packed number this looks at the lowest three bits only.
+      const __m256i next = _mm256_permutevar8x32_epi32(numbers_, packed);
+      _mm256_storeu_si256(reinterpret_cast<__m256i*>(corner + 8 * half),
+                          _mm256_add_epi32(next, _mm256_srli_epi32(packed, 3)));
     }
-    before_ = after;
+    numbers_ = _mm256_add_epi32(numbers_, bytes(cube.crossed.data()));
     return corner + 3 * cube.count;
   }
 
 private:
-  __m256i before_;
+  __m256i numbers_;
 #else
-  explicit RunningNumbers(const std::array<Index, 8>& start) { std::ranges::copy(start, numbers_.begin()); }
+  explicit RunningNumbers(const std::array<Index, 8>& start) : numbers_(start) {}
 
   Index* write(const PackedCase& cube, Index* corner) {
-    for (std::size_t i = 0; i < 8; ++i) {
-      numbers_[8 + i] = numbers_[i] + cube.crossed[i];
-    }
     for (std::size_t i = 0; i < 16; ++i) {
-      corner[i] = numbers_[cube.corners[i]];
+      corner[i] = numbers_[cube.corners[i] & 7] + (cube.corners[i] >> 3);
     }
-    std::copy_n(numbers_.begin() + 8, 8, numbers_.begin());
+    for (std::size_t i = 0; i < 8; ++i) {
+      numbers_[i] += cube.crossed[i];
+    }
     return corner + 3 * cube.count;
   }
 
 private:
-  std::array<Index, 16> numbers_{};
+  std::array<Index, 8> numbers_;
 #endif
 };
 
-/// A slice of padded rows, with a copy of the last one after it, so that no edge towards it is crossed.
+/// A slice of padded rows, one after the other, with a copy of the last one after it, so that no edge towards it is
+/// crossed.
 class Plane {
 public:
   explicit Plane(const PaddedGrid& grid)
-      : rows_(grid.size(1)), stride_(grid.words() + 1), words_((rows_ + 1) * stride_), inside_(rows_ + 1) {}
+      : rows_(grid.size(1)), stride_(grid.words()), words_((rows_ + 1) * stride_ + 1), inside_(rows_ + 1) {}
 
   void load(const PaddedGrid& grid, std::size_t slice) {
-    for (std::size_t r = 0; r < rows_; ++r) {
-      inside_[r] = grid.load(r, slice, words_.data() + r * stride_) ? 1 : 0;
-    }
+    grid.load(slice, words_.data(), inside_.data());
     std::copy_n(row(rows_ - 1), stride_, words_.data() + rows_ * stride_);
     inside_[rows_] = inside_[rows_ - 1];
   }
@@ -130,159 +152,261 @@ public:
 private:
   std::size_t rows_;
   std::size_t stride_;
-  std::vector<Word> words_;
+  std::vector<Word> words_;  // and one more, for reading ahead
   std::vector<std::uint8_t> inside_;
 };
 
-/// The bits around 64 cells, and which of the edges there are crossed.
+/// The bits around 64 cells.
 struct CellWord {
   Word a0, a0s, a1, a1s, b0, b0s, b1, b1s;  // corners in the order of their numbers
-  Word x0, x1, x2, x3;                      // edges 0 to 3
-  Word y0, y1;                              // edges 4 and 6
-  Word z0, z1;                              // edges 8 and 10
 
-  CellWord(const PaddedGrid& grid, const Plane& a, const Plane& b, std::size_t row, std::size_t w)
-      : a0(a.row(row)[w]),
-        a0s(shifted(a.row(row), w)),
-        a1(a.row(row + 1)[w]),
-        a1s(shifted(a.row(row + 1), w)),
-        b0(b.row(row)[w]),
-        b0s(shifted(b.row(row), w)),
-        b1(b.row(row + 1)[w]),
-        b1s(shifted(b.row(row + 1), w)),
-        x0((a0 ^ a0s) & grid.edges(w)),
-        x1((a1 ^ a1s) & grid.edges(w)),
-        x2((b0 ^ b0s) & grid.edges(w)),
-        x3((b1 ^ b1s) & grid.edges(w)),
-        y0((a0 ^ a1) & grid.samples(w)),
-        y1((b0 ^ b1) & grid.samples(w)),
-        z0((a0 ^ b0) & grid.samples(w)),
-        z1((a1 ^ b1) & grid.samples(w)) {}
-
-  [[nodiscard]] std::size_t case_of(int bit) const {
-    if (bit == word_bits - 1) {
-      return pairs(bit, 1) | (a0s >> bit & 1) << 1 | (a1s >> bit & 1) << 3 | (b0s >> bit & 1) << 5 |
-             (b1s >> bit & 1) << 7;
-    }
-    return pairs(bit, 3);
-  }
-
-private:
-  [[nodiscard]] std::size_t pairs(int bit, Word mask) const {
-    return (a0 >> bit & mask) | (a1 >> bit & mask) << 2 | (b0 >> bit & mask) << 4 | (b1 >> bit & mask) << 6;
-  }
+  /// From the words of the four rows, each followed by the next word of its row.
+  CellWord(const Word* row_a0, const Word* row_a1, const Word* row_b0, const Word* row_b1)
+      : a0(row_a0[0]),
+        a0s(shifted(row_a0)),
+        a1(row_a1[0]),
+        a1s(shifted(row_a1)),
+        b0(row_b0[0]),
+        b0s(shifted(row_b0)),
+        b1(row_b1[0]),
+        b1s(shifted(row_b1)) {}
+  CellWord(const Plane& a, const Plane& b, std::size_t row, std::size_t w)
+      : CellWord(a.row(row) + w, a.row(row + 1) + w, b.row(row) + w, b.row(row + 1) + w) {}
 };
 
-/// The words of a layer in which some cell is neither all inside nor all outside; crossed edges of its rows are in no
-/// others. Where the grid ends, b is a itself.
+/// Which of their edges are crossed: those along x, and along y and z at the left and at the right.
+struct CellEdges {
+  Word x0, x1, x2, x3;
+  Word y0, y1, y0s, y1s;
+  Word z0, z1, z0s, z1s;
+
+  explicit CellEdges(const CellWord& c)
+      : x0(c.a0 ^ c.a0s),
+        x1(c.a1 ^ c.a1s),
+        x2(c.b0 ^ c.b0s),
+        x3(c.b1 ^ c.b1s),
+        y0(c.a0 ^ c.a1),
+        y1(c.b0 ^ c.b1),
+        y0s(c.a0s ^ c.a1s),
+        y1s(c.b0s ^ c.b1s),
+        z0(c.a0 ^ c.b0),
+        z1(c.a1 ^ c.b1),
+        z0s(c.a0s ^ c.b0s),
+        z1s(c.a1s ^ c.b1s) {}
+};
+
+/// The cells whose crossed edges make more than one loop, and some with one: those with two inside corners across the
+/// diagonal of a face, or with two opposite corners that differ from all their neighbours. Always inlined: a loop that
+/// called it would not be vectorised.
+[[gnu::always_inline]] inline Word several_loops(const CellEdges& e) {
+  const Word face = (e.x0 & e.x1 & e.y0) | (e.x2 & e.x3 & e.y1) | (e.x0 & e.x2 & e.z0) | (e.x1 & e.x3 & e.z1) |
+                    (e.y0 & e.y1 & e.z0) | (e.y0s & e.y1s & e.z0s);
+  const Word opposite = (e.x0 & e.x3 & ((e.y0 & e.z0 & e.y1s & e.z1s) | (e.y0s & e.z0s & e.y1 & e.z1))) |
+                        (e.x1 & e.x2 & ((e.y0 & e.z1 & e.y1s & e.z0s) | (e.y0s & e.z1s & e.y1 & e.z0)));
+  return face | opposite;
+}
+
+/// A word of a row in which not all cells, or places after the last one, are all inside or all outside.
+struct ActiveWord {
+  std::uint32_t row;
+  std::uint32_t word;
+  Word places;
+};
+
+/// Finds the active words of a layer. Crossed edges of its rows are in no others.
 class ActiveWords {
 public:
-  explicit ActiveWords(std::size_t words) : active_(words) {}
+  enum class Look { for_words, also_for_loops };
+  ActiveWords(const PaddedGrid& grid, Look look)
+      : grid_(grid), look_(look), places_(grid.size(1) * grid.words()), found_(places_.size() + 1) {}
 
-  /// Calls visit(w, bits of the active cells) for each such word of a row.
-  template <typename Visit>
-  void visit_row(const Plane& a, const Plane& b, std::size_t row, const Visit& visit) {
-    if (!a.any_inside(row) && !b.any_inside(row)) {
-      return;
-    }
-    const Word* const a0 = a.row(row);
-    const Word* const a1 = a.row(row + 1);
-    const Word* const b0 = b.row(row);
-    const Word* const b1 = b.row(row + 1);
-    Word* const active = active_.data();
-    const std::size_t words = active_.size();
-    for (std::size_t w = 0; w < words; ++w) {
-      const Word any = a0[w] | a1[w] | b0[w] | b1[w];
-      const Word all = a0[w] & a1[w] & b0[w] & b1[w];
-      const Word any_next = a0[w + 1] | a1[w + 1] | b0[w + 1] | b1[w + 1];
-      const Word all_next = a0[w + 1] & a1[w + 1] & b0[w + 1] & b1[w + 1];
-      active[w] = (any | any >> 1 | any_next << (word_bits - 1)) & ~(all & (all >> 1 | all_next << (word_bits - 1)));
-    }
-    for (std::size_t w = 0; w < words; ++w) {
-      if (active[w] != 0) {
-        visit(w, active[w]);
+  /// @return in the order of the rows, valid until the next call
+  std::span<const ActiveWord> find(const Plane& a, const Plane& b) {
+    const std::size_t rows = grid_.size(1);
+    ActiveWord* out = found_.data();
+    several_loops_ = false;
+    for (std::size_t row = 0; row < rows; ++row) {
+      std::size_t end = row;
+      while (end < rows && (a.any_inside(end) || b.any_inside(end))) {
+        ++end;
+      }
+      if (end > row) {
+        if (look_ == Look::for_words) {
+          find_places<false>(a, b, row, end);
+        } else {
+          find_places<true>(a, b, row, end);
+        }
+        out = list(row, end, out);
+        row = end;
       }
     }
+    return {found_.data(), out};
+  }
+
+  /// Whether several_loops() holds for any cell found the last time, if looked for.
+  [[nodiscard]] bool several_loops_found() const { return several_loops_; }
+
+private:
+  template <bool loops>
+  void find_places(const Plane& a, const Plane& b, std::size_t begin, std::size_t end) {
+    const Word* const a0 = a.row(begin);
+    const Word* const a1 = a.row(begin + 1);
+    const Word* const b0 = b.row(begin);
+    const Word* const b1 = b.row(begin + 1);
+    Word* const places = places_.data();
+    Word several = 0;
+    const std::size_t words = (end - begin) * grid_.words();
+    for (std::size_t i = 0; i < words; ++i) {
+      const CellWord c(a0 + i, a1 + i, b0 + i, b1 + i);
+      const CellEdges e(c);
+      // The edges that join all corners: where none is crossed the corners are alike.
+      places[i] = e.x0 | e.x1 | e.x2 | e.x3 | e.y0 | e.y1 | e.z0;
+      if constexpr (loops) {
+        several |= several_loops(e);
+      }
+    }
+    several_loops_ = several_loops_ || several != 0;
+  }
+
+  ActiveWord* list(std::size_t begin, std::size_t end, ActiveWord* out) const {
+    const Word* places = places_.data();
+    for (std::size_t row = begin; row < end; ++row) {
+      for (std::size_t w = 0; w < grid_.words(); ++w, ++places) {
+        *out = {static_cast<std::uint32_t>(row), static_cast<std::uint32_t>(w), *places & grid_.samples(w)};
+        out += out->places != 0 ? 1 : 0;
+      }
+    }
+    return out;
+  }
+
+  const PaddedGrid& grid_;
+  Look look_;
+  std::vector<Word> places_;
+  std::vector<ActiveWord> found_;
+  bool several_loops_ = false;
+};
+
+/// The cases of the cells between two slices: which of their corners are inside.
+class Cases {
+public:
+  Cases(const Plane& a, const Plane& b)
+      : a_(bytes(a.row(0))), b_(bytes(b.row(0))), row_(static_cast<std::size_t>(bytes(a.row(1)) - a_)) {}
+
+  [[nodiscard]] std::size_t operator()(const CrossedEdge& first) const {
+    static_assert(std::endian::native == std::endian::little, "eight columns in a byte");
+    const std::size_t at = first.row * row_ + first.column / 8;
+    const unsigned bit = first.column % 8;
+    const auto pair = [bit](const char* from) {
+      std::uint16_t bits = 0;
+      std::memcpy(&bits, from, sizeof bits);
+      return static_cast<std::size_t>(bits >> bit & 3);
+    };
+    return pair(a_ + at) | pair(a_ + at + row_) << 2 | pair(b_ + at) << 4 | pair(b_ + at + row_) << 6;
   }
 
 private:
-  std::vector<Word> active_;
+  static const char* bytes(const Word* words) { return reinterpret_cast<const char*>(words); }
+
+  const char* a_;
+  const char* b_;
+  std::size_t row_;  // bytes
 };
 
-/// Triangles of the cells: a loop around n crossed edges makes n - 2.
-std::size_t count_triangles(const CellWord& c, Word cells) {
-  const Word y0s = c.a0s ^ c.a1s;
-  const Word y1s = c.b0s ^ c.b1s;
-  const Word z0s = c.a0s ^ c.b0s;
-  const Word z1s = c.a1s ^ c.b1s;
-  const std::size_t crossed = ones(c.x0 & cells) + ones(c.x1 & cells) + ones(c.x2 & cells) + ones(c.x3 & cells) +
-                              ones(c.y0 & cells) + ones(y0s & cells) + ones(c.y1 & cells) + ones(y1s & cells) +
-                              ones(c.z0 & cells) + ones(z0s & cells) + ones(c.z1 & cells) + ones(z1s & cells);
-  std::size_t triangles = crossed - 2 * ones(cells);
-  // More than one loop: only with two inside corners across the diagonal of a face, or with two opposite corners that
-  // differ from all their neighbours.
-  const Word face = (c.x0 & c.x1 & c.y0) | (c.x2 & c.x3 & c.y1) | (c.x0 & c.x2 & c.z0) | (c.x1 & c.x3 & c.z1) |
-                    (c.y0 & c.y1 & c.z0) | (y0s & y1s & z0s);
-  const Word opposite = (c.x0 & c.y0 & c.z0 & c.x3 & y1s & z1s) | (c.x0 & y0s & z0s & c.x3 & c.y1 & c.z1) |
-                        (c.x1 & c.y0 & c.z1 & c.x2 & y1s & z0s) | (c.x1 & y0s & z1s & c.x2 & c.y1 & c.z0);
-  for (Word several = (face | opposite) & cells; several != 0; several &= several - 1) {
-    const int bit = std::countr_zero(several);
-    const auto crossed_here = [bit](auto... words) { return (static_cast<std::size_t>(words >> bit & 1) + ...); };
-    triangles += packed_cases(false)[c.case_of(bit)].count + 2;
-    triangles -= crossed_here(c.x0, c.x1, c.x2, c.x3, c.y0, y0s, c.y1, y1s, c.z0, z0s, c.z1, z1s);
+/// Triangles of a case beyond those of a single loop around its crossed edges.
+std::ptrdiff_t beyond_one_loop(std::size_t which) {
+  std::ptrdiff_t triangles = static_cast<std::ptrdiff_t>(packed_cases(false)[which].count) + 2;
+  for (const auto& [first, second] : cube_edges) {
+    triangles -= static_cast<std::ptrdiff_t>((which >> first ^ which >> second) & 1);
   }
   return triangles;
 }
 
-LayerCounts count_layer(const PaddedGrid& grid, const Plane& a, const Plane& b, bool last) {
-  ActiveWords active(grid.words());
+/// What a layer is counted by is taken as if every slice, row and column had neighbours on both sides. @return how much
+/// less it is where the grid ends at an open border
+LayerCounts count_missing(const PaddedGrid& grid, const Plane& a, const Plane& b, std::span<const ActiveWord> active,
+                          std::size_t slice) {
+  LayerCounts missing;
+  for (const auto& [row, w, places] : active) {
+    const CellEdges e(CellWord(a, b, row, w));
+    const Word ends = grid.ends(w) & places;
+    const bool last_row = row + 1 == grid.size(1);
+    if (row == 0 || last_row) {
+      missing.in_slice += ones(e.x0 & places);
+      missing.in_layer += static_cast<std::ptrdiff_t>(2 * ones(e.z0 & places) - ones(e.z0 & ends));
+    }
+    missing.in_slice += ones(e.y0 & ends);
+    missing.in_layer += static_cast<std::ptrdiff_t>(2 * ones(e.z0 & ends));
+    missing.in_layer -= static_cast<std::ptrdiff_t>(2 * ones(places & ~grid.cells(slice, row, w)));
+  }
+  return missing;
+}
+
+/// A loop around n crossed edges makes n - 2 triangles. Of the cells of one layer two have an edge in one of its slices
+/// in common, and four an upright edge.
+LayerCounts count_layer(const PaddedGrid& grid, const Plane& a, const Plane& b, ActiveWords& active,
+                        std::size_t slice) {
   LayerCounts sum;
-  for (std::size_t row = 0; row < grid.size(1); ++row) {
-    const bool cells = !last && row + 1 < grid.size(1);
-    active.visit_row(a, b, row, [&](std::size_t w, Word bits) {
-      const CellWord c(grid, a, b, row, w);
-      sum.along_x += ones(c.x0);
-      sum.along_y += ones(c.y0);
-      sum.upright += ones(c.z0);
-      if (cells) {
-        sum.triangles += count_triangles(c, bits & grid.edges(w));
+  std::size_t cells = 0;
+  const std::span<const ActiveWord> found = active.find(a, b);
+  for (const auto& [row, w, places] : found) {
+    const Word* const a0 = a.row(row) + w;
+    sum.along_x += ones((a0[0] ^ shifted(a0)) & places);
+    sum.along_y += ones((a0[0] ^ a.row(row + 1)[w]) & places);
+    sum.upright += ones((a0[0] ^ b.row(row)[w]) & places);
+    cells += ones(places);
+  }
+  sum.in_slice = 2 * (sum.along_x + sum.along_y);
+  sum.in_layer = static_cast<std::ptrdiff_t>(4 * sum.upright) - static_cast<std::ptrdiff_t>(2 * cells);
+  if (grid.is_open()) {
+    const LayerCounts missing = count_missing(grid, a, b, found, slice);
+    sum.in_slice -= missing.in_slice;
+    sum.in_layer -= missing.in_layer;
+  }
+  if (active.several_loops_found()) {
+    const Cases case_at(a, b);
+    for (const auto& [row, w, places] : found) {
+      Word several = several_loops(CellEdges(CellWord(a, b, row, w))) & places & grid.cells(slice, row, w);
+      for (; several != 0; several &= several - 1) {
+        const auto column =
+            static_cast<std::uint32_t>(w * word_bits) + static_cast<std::uint32_t>(std::countr_zero(several));
+        sum.in_layer += beyond_one_loop(case_at({row, column}));
       }
-    });
+    }
   }
   return sum;
 }
 
-/// Appends the set bits of a word. Four at a time without a branch: most words have fewer.
+/// Appends the set bits of a word. Four at a time without a branch: most words have no more.
 /// @return one past the last one; up to four places beyond it are overwritten
-CrossedEdge* append(CrossedEdge* out, std::size_t row, std::size_t w, Word bits) {
-  const std::size_t count = ones(bits);
-  const auto r = static_cast<std::uint32_t>(row);
-  const auto column = static_cast<std::uint32_t>(w * word_bits);
-  CrossedEdge* const end = out + count;
+CrossedEdge* append(CrossedEdge* out, const ActiveWord& active) {
+  Word places = active.places;
+  const auto column = static_cast<std::uint32_t>(active.word * word_bits);
+  CrossedEdge* const end = out + ones(places);
   do {
     for (int i = 0; i < 4; ++i) {
-      out[i] = {r, column + static_cast<std::uint32_t>(std::countr_zero(bits))};
-      bits &= bits - 1;
+      out[i] = {active.row, column + static_cast<std::uint32_t>(std::countr_zero(places))};
+      places &= places - 1;
     }
     out += 4;
-  } while (bits != 0);
+  } while (places != 0);
   return end;
 }
 
 /// Positions of the samples, as sums of a term of the column and one of row and slice; in four numbers, the last one
 /// without meaning, which is what the processor adds at once.
-class Places {
+class Samples {
 public:
   using Place = Eigen::Vector4d;
 
-  explicit Places(const PaddedGrid& grid) : grid_(grid), column_(grid.size(0)), row_(grid.size(1)) {
+  explicit Samples(const PaddedGrid& grid) : grid_(grid), column_(grid.size(0)), row_(grid.size(1)) {
     for (std::size_t i = 0; i < column_.size(); ++i) {
       column_[i] = padded(grid.affine().col(0) * grid.coordinate(i, 0));
     }
   }
-  void move_to(std::size_t slice) {
+  /// To the rows [begin, end) of a slice.
+  void move_to(std::size_t slice, std::size_t begin, std::size_t end) {
     const Vec3 origin = grid_.affine().col(3) + grid_.affine().col(2) * grid_.coordinate(slice, 2);
-    for (std::size_t j = 0; j < row_.size(); ++j) {
+    for (std::size_t j = begin; j < end; ++j) {
       row_[j] = padded(origin + grid_.affine().col(1) * grid_.coordinate(j, 1));
     }
   }
@@ -307,126 +431,123 @@ public:
         vertices_(out.vertices),
         triangles_(out.triangles),
         first_(static_cast<Index>(out.first_vertex)),
-        places_(grid),
+        samples_(grid),
+        active_(grid, ActiveWords::Look::for_words),
         a_(grid),
-        b_(grid),
-        rows_a_(grid.size(1) + 1),
-        rows_b_(grid.size(1) + 1) {}
+        b_(grid) {}
 
   void write(std::size_t begin, std::size_t end, const LayerCounts* counts) {
+    for (std::size_t layer = 0; layer < end - begin; ++layer) {
+      triangles_left_ += counts[layer].triangles;
+    }
     a_.load(grid_, begin);
-    number_rows(counts[0]);
     for (std::size_t slice = begin; slice < end; ++slice, ++counts) {
       write_layer(slice, counts);
       std::swap(a_, b_);
-      std::swap(rows_a_, rows_b_);
       vertices_ += counts->vertices();
       triangles_ += counts->triangles;
+      triangles_left_ -= counts->triangles;
       first_ += static_cast<Index>(counts->vertices());
     }
   }
 
 private:
-  /// Numbers of the first vertices on edges along x and y of a row, and upright from it.
-  struct RowStart {
-    Index x;
-    Index y;
-    Index z;
-  };
-
-  /// Of the first slice; those of the others are found when they are next to the slice before them.
-  void number_rows(const LayerCounts& counts) {
-    ActiveWords active(grid_.words());
-    RowStart next{first_, first_ + static_cast<Index>(counts.along_x), 0};
-    for (std::size_t row = 0; row < grid_.size(1); ++row) {
-      rows_a_[row].x = next.x;
-      rows_a_[row].y = next.y;
-      active.visit_row(a_, a_, row, [&](std::size_t w, Word) {
-        const Word word = a_.row(row)[w];
-        next.x += bits_of((word ^ shifted(a_.row(row), w)) & grid_.edges(w));
-        next.y += bits_of((word ^ a_.row(row + 1)[w]) & grid_.samples(w));
-      });
-    }
-    rows_a_.back() = next;
-  }
-
   void write_layer(std::size_t slice, const LayerCounts* counts) {
     const bool last = slice + 1 == grid_.size(2);
     if (!last) {
       b_.load(grid_, slice + 1);
     }
     const Plane& b = last ? a_ : b_;
-    find_words(b, first_ + static_cast<Index>(counts->vertices()), last ? LayerCounts{} : counts[1], *counts);
-    edges_.resize(counts->vertices() + 3 * spare_edges);
+    const std::span<const CrossedEdge> places = find_places(b);
+    if (places.empty()) {
+      return;
+    }
+    grow(edges_, counts->vertices() + 3);
     CrossedEdge* const x = edges_.data();
-    CrossedEdge* const y = x + counts->along_x + spare_edges;
-    CrossedEdge* const z = y + counts->along_y + spare_edges;
-    corners_.resize(3 * counts->triangles + spare_corners);
+    CrossedEdge* const y = x + counts->along_x + 1;
+    CrossedEdge* const z = y + counts->along_y + 1;
     CrossedEdge* x_end = x;
     CrossedEdge* y_end = y;
     CrossedEdge* z_end = z;
-    Index* corner = corners_.data();
-    for (std::size_t row = 0, next = 0; row < grid_.size(1); ++row) {
-      const bool cells = !last && row + 1 < grid_.size(1);
-      const std::size_t end = word_rows_[row];
-      if (next == end) {
-        continue;
+    // Straight to where they belong, but for the last ones, which would overwrite what follows.
+    const bool in_place = counts->triangles + spare_triangles <= triangles_left_;
+    if (!in_place) {
+      grow(triangles_here_, counts->triangles + spare_triangles);
+    }
+    Index* const corners = in_place ? triangles_->data() : triangles_here_.data()->data();
+    Index* corner = corners;
+    RunningNumbers numbers = start(b, *counts, last ? LayerCounts{} : counts[1]);
+    const Cases case_at(a_, b);
+    const PackedCase* const cases = cases_.data();
+    const bool open = grid_.is_open();
+    for (const CrossedEdge& place : places) {
+      std::size_t which = case_at(place);
+      if (open && !grid_.is_cell(slice, place.row, place.column)) {
+        which += no_cell;
       }
-      RunningNumbers numbers({rows_a_[row].x, rows_a_[row + 1].x, rows_b_[row].x, rows_b_[row + 1].x, rows_a_[row].y,
-                              rows_b_[row].y, rows_a_[row].z, rows_a_[row + 1].z});
-      for (; next < end; ++next) {
-        const std::size_t w = words_[next].word;
-        const CellWord c(grid_, a_, b, row, w);
-        x_end = append(x_end, row, w, c.x0);
-        y_end = append(y_end, row, w, c.y0);
-        z_end = append(z_end, row, w, c.z0);
-        for (Word active = cells ? words_[next].cells & grid_.edges(w) : 0; active != 0; active &= active - 1) {
-          corner = numbers.write(cases_[c.case_of(std::countr_zero(active))], corner);
-        }
-      }
+      const PackedCase& cube = cases[which];
+      corner = numbers.write(cube, corner);
+      // Written anyway, kept where crossed.
+      *x_end = *y_end = *z_end = place;
+      x_end += cube.crossed[0];
+      y_end += cube.crossed[4];
+      z_end += cube.crossed[6];
     }
     TUNICA_ASSERT(x_end - x == static_cast<std::ptrdiff_t>(counts->along_x) &&
                   y_end - y == static_cast<std::ptrdiff_t>(counts->along_y) &&
                   z_end - z == static_cast<std::ptrdiff_t>(counts->upright) &&
-                  corner - corners_.data() == static_cast<std::ptrdiff_t>(3 * counts->triangles));
-    std::memcpy(static_cast<void*>(triangles_), corners_.data(), 3 * counts->triangles * sizeof(Index));
-    places_.move_to(slice);
+                  corner - corners == static_cast<std::ptrdiff_t>(3 * counts->triangles));
+    if (!in_place) {
+      std::copy_n(triangles_here_.begin(), counts->triangles, triangles_);
+    }
+    samples_.move_to(slice, places.front().row, places.back().row + 1);
     write_vertices(x, counts->along_x, slice, 0, 0);
     write_vertices(y, counts->along_y, slice, 1, counts->along_x);
     write_vertices(z, counts->upright, slice, 2, counts->along_x + counts->along_y);
   }
 
-  /// Lists the active words of the layer, and numbers the rows of the next slice and the upright edges.
-  void find_words(const Plane& b, Index first_of_b, const LayerCounts& counts_b, const LayerCounts& counts) {
-    words_.clear();
-    word_rows_.resize(grid_.size(1));
-    ActiveWords active(grid_.words());
-    RowStart next_b{first_of_b, first_of_b + static_cast<Index>(counts_b.along_x), 0};
-    Index upright = first_ + static_cast<Index>(counts.along_x + counts.along_y);
-    for (std::size_t row = 0; row < grid_.size(1); ++row) {
-      rows_b_[row].x = next_b.x;
-      rows_b_[row].y = next_b.y;
-      rows_a_[row].z = upright;
-      active.visit_row(a_, b, row, [&](std::size_t w, Word cells) {
-        words_.push_back({static_cast<std::uint32_t>(w), cells});
-        const Word word = b.row(row)[w];
-        next_b.x += bits_of((word ^ shifted(b.row(row), w)) & grid_.edges(w));
-        next_b.y += bits_of((word ^ b.row(row + 1)[w]) & grid_.samples(w));
-        upright += bits_of((a_.row(row)[w] ^ word) & grid_.samples(w));
-      });
-      word_rows_[row] = words_.size();
+  template <typename T>
+  static void grow(std::vector<T>& vector, std::size_t size) {
+    if (vector.size() < size) {
+      vector.resize(size + size / 2);
     }
-    rows_b_.back() = next_b;
-    rows_a_.back().z = upright;
+  }
+
+  std::span<const CrossedEdge> find_places(const Plane& b) {
+    std::size_t found = 0;
+    for (const ActiveWord& active : active_.find(a_, b)) {
+      grow(places_, found + word_bits + spare_edges);
+      CrossedEdge* const out = places_.data() + found;
+      found += static_cast<std::size_t>(append(out, active) - out);
+    }
+    return {places_.data(), found};
+  }
+
+  /// Numbers before the first place of the layer.
+  [[nodiscard]] RunningNumbers start(const Plane& b, const LayerCounts& counts, const LayerCounts& counts_b) const {
+    // Edges 1, 3 and 10 run along the second row: the first one's come before.
+    Index x_a = 0;
+    Index x_b = 0;
+    Index z = 0;
+    for (std::size_t w = 0; w < grid_.words(); ++w) {
+      x_a += bits_of((a_.row(0)[w] ^ shifted(a_.row(0) + w)) & grid_.samples(w));
+      x_b += bits_of((b.row(0)[w] ^ shifted(b.row(0) + w)) & grid_.samples(w));
+      z += bits_of((a_.row(0)[w] ^ b.row(0)[w]) & grid_.samples(w));
+    }
+    const Index first_b = first_ + static_cast<Index>(counts.vertices());
+    const Index y_a = first_ + static_cast<Index>(counts.along_x);
+    const Index y_b = first_b + static_cast<Index>(counts_b.along_x);
+    const Index upright = y_a + static_cast<Index>(counts.along_y);
+    return RunningNumbers({first_, first_ + x_a, first_b, first_b + x_b, y_a, y_b, upright, upright + z});
   }
 
   void write_vertices(const CrossedEdge* edges, std::size_t count, std::size_t slice, int axis, std::size_t offset) {
     const Vec3 along = grid_.affine().col(axis);
     Vec3* const out = vertices_ + offset;
     if (crossings_ == nullptr) {
-      const Places::Place half = Places::padded(0.5 * along);
+      const Samples::Place half = Samples::padded(0.5 * along);
       for (std::size_t i = 0; i < count; ++i) {
-        const Places::Place place = places_(edges[i]) + half;
+        const Samples::Place place = samples_(edges[i]) + half;
         out[i] = place.head<3>();
       }
       return;
@@ -447,7 +568,7 @@ private:
       for (std::size_t i = 0; i < size; ++i) {
         const CrossedEdge& edge = edges[begin + i];
         const std::array<std::size_t, 3> first{edge.column, edge.row, slice};
-        place_vertex(first, axis, fractions[i], places_(edge).head<3>(), along, out[begin + i],
+        place_vertex(first, axis, fractions[i], samples_(edge).head<3>(), along, out[begin + i],
                      first_ + offset + begin + i);
       }
     }
@@ -472,105 +593,30 @@ private:
                         start + (low ? beside_sample : 1 - beside_sample) * along});
   }
 
-  struct ActiveWord {
-    std::uint32_t word;
-    Word cells;
-  };
-
-  static constexpr std::size_t spare_edges = 4;     // that append() may overwrite
-  static constexpr std::size_t spare_corners = 16;  // that RunningNumbers::write() may
+  static constexpr std::size_t spare_edges = 4;      // that append() may overwrite
+  static constexpr std::size_t spare_triangles = 6;  // that RunningNumbers::write() may
 
   const PaddedGrid& grid_;
-  const std::array<PackedCase, 256>& cases_;
+  const PackedCases& cases_;
   const Crossings* crossings_;
   std::vector<PinchedVertex>& pinched_;
   Vec3* vertices_;                   // of the slice
   std::array<Index, 3>* triangles_;  // of the layer above it
+  std::size_t triangles_left_ = 0;   // room from there on
   Index first_;                      // number of the slice's first vertex
-  Places places_;
+  Samples samples_;
+  ActiveWords active_;
   Plane a_;
   Plane b_;
-  std::vector<RowStart> rows_a_;
-  std::vector<RowStart> rows_b_;
-  std::vector<ActiveWord> words_;
-  std::vector<std::size_t> word_rows_;  // one past each row's last in words_
+  std::vector<CrossedEdge> places_;
   std::vector<CrossedEdge> edges_;
-  std::vector<Index> corners_;
+  std::vector<std::array<Index, 3>> triangles_here_;
 };
 
 }  // namespace
 
-PaddedGrid::PaddedGrid(const Mask& mask, const Window& window, bool open) : mask_(mask), window_(window) {
-  TUNICA_ASSERT(window.first[0] == 0 && window.size[0] == mask.dims()[0]);
-  for (int axis = 0; axis < 3; ++axis) {
-    size_[axis] = window.size[axis] + 2;
-    open_[axis] = {open && window.first[axis] == 0,
-                   open && window.first[axis] + window.size[axis] == mask.dims()[axis]};
-  }
-  const auto first_bits = [](std::size_t count, std::size_t w) {
-    const std::size_t before = w * word_bits;
-    return count >= before + word_bits ? ~Word{0} : count <= before ? Word{0} : (Word{1} << (count - before)) - 1;
-  };
-  const std::size_t words = (size_[0] + word_bits - 1) / word_bits;
-  for (std::size_t w = 0; w < words; ++w) {
-    samples_.push_back(first_bits(size_[0], w));
-    edges_.push_back(first_bits(size_[0] - 1, w));
-  }
-}
-
-bool PaddedGrid::load(std::size_t row, std::size_t slice, Word* out) const {
-  const auto beyond = [&](std::size_t at, int axis) {
-    return (at == 0 && !open_[axis][0]) || (at == size_[axis] - 1 && !open_[axis][1]);
-  };
-  const std::size_t words = samples_.size();
-  if (beyond(row, 1) || beyond(slice, 2)) {
-    std::fill_n(out, words + 1, Word{0});
-    return false;
-  }
-  const Word* const in = mask_.row(in_image(row, 1), in_image(slice, 2));
-  const std::size_t given = mask_.words_per_row();
-  Word any = in[0];
-  out[0] = in[0] << 1;
-  for (std::size_t w = 1; w < given; ++w) {
-    out[w] = in[w] << 1 | in[w - 1] >> (word_bits - 1);
-    any |= in[w];
-  }
-  out[given] = in[given - 1] >> (word_bits - 1);
-  out[words] = 0;
-  if (open_[0][0]) {
-    out[0] |= in[0] & 1;
-  }
-  if (open_[0][1]) {
-    const std::size_t last = size_[0] - 1;
-    const Word end = out[(last - 1) / word_bits] >> ((last - 1) % word_bits) & 1;
-    out[last / word_bits] |= end << (last % word_bits);
-  }
-  return any != 0;
-}
-
-std::size_t PaddedGrid::at_hand(const std::array<std::size_t, 3>& padded) const {
-  const auto& dims = mask_.dims();
-  return in_image(padded[0], 0) +
-         dims[0] * (in_image(padded[1], 1) + dims[1] * (in_image(padded[2], 2) - window_.first_slice));
-}
-
-std::size_t PaddedGrid::number(const std::array<std::size_t, 3>& padded) const {
-  const auto& dims = mask_.dims();
-  const auto in_padded_image = [&](int axis) { return padded[axis] + window_.first[axis]; };
-  return in_padded_image(0) + (dims[0] + 2) * (in_padded_image(1) + (dims[1] + 2) * in_padded_image(2));
-}
-
-double PaddedGrid::coordinate(std::size_t padded, int axis) const {
-  if (padded == 0 && open_[axis][0]) {
-    return -0.5;
-  }
-  if (padded == size_[axis] - 1 && open_[axis][1]) {
-    return static_cast<double>(mask_.dims()[axis]) - 0.5;
-  }
-  return static_cast<double>(window_.first[axis]) - 1 + static_cast<double>(padded);
-}
-
 void count_layers(const PaddedGrid& grid, std::size_t begin, std::size_t end, LayerCounts* counts) {
+  ActiveWords active(grid, ActiveWords::Look::also_for_loops);
   Plane a(grid);
   Plane b(grid);
   a.load(grid, begin);
@@ -579,8 +625,15 @@ void count_layers(const PaddedGrid& grid, std::size_t begin, std::size_t end, La
     if (!last) {
       b.load(grid, slice + 1);
     }
-    *counts = count_layer(grid, a, last ? a : b, last);
+    *counts = count_layer(grid, a, last ? a : b, active, slice);
     std::swap(a, b);
+  }
+}
+
+void count_triangles(std::span<LayerCounts> counts) {
+  for (std::size_t slice = 0; slice + 1 < counts.size(); ++slice) {
+    LayerCounts& layer = counts[slice];
+    layer.triangles = layer.in_slice + counts[slice + 1].in_slice + static_cast<std::size_t>(layer.in_layer);
   }
 }
 

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <span>
 #include <type_traits>
 #include <utility>
 
@@ -66,6 +67,7 @@ public:
       check_interrupt();
       cell_layers::count_layers(grid, begin, end, counts_.data() + begin);
     });
+    cell_layers::count_triangles(std::span(counts_).first(slices));
     first_vertex_.resize(slices + 1, 0);
     first_triangle_.resize(slices + 1, 0);
     for (std::size_t slice = 0; slice < slices; ++slice) {

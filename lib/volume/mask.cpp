@@ -116,19 +116,17 @@ std::optional<Range<T>> stored_range(const Volume& volume, const Inside& rule) {
 
 template <typename T>
 void select_row(const T* values, std::size_t count, const Range<T>& range, std::uint64_t* words) {
-  alignas(64) std::uint8_t flags[64] = {};
   std::size_t i = 0;
   for (; i + 64 <= count; i += 64) {
-    for (std::size_t bit = 0; bit < 64; ++bit) {
-      flags[bit] = static_cast<std::uint8_t>((values[i + bit] >= range.first) & (values[i + bit] <= range.last));
-    }
-    words[i / 64] = pack_bits(flags);
+    words[i / 64] = bits_in_range(values + i, range.first, range.last);
   }
   if (i < count) {
-    for (std::size_t bit = 0; bit < 64; ++bit) {
-      flags[bit] = i + bit < count && values[i + bit] >= range.first && values[i + bit] <= range.last ? 1 : 0;
+    std::uint64_t word = 0;
+    for (std::size_t bit = 0; i + bit < count; ++bit) {
+      const T value = values[i + bit];
+      word |= static_cast<std::uint64_t>(value >= range.first && value <= range.last) << bit;
     }
-    words[i / 64] = pack_bits(flags);
+    words[i / 64] = word;
   }
 }
 
