@@ -1,15 +1,14 @@
 #include "shell/fit.hpp"
 
-#include "core/threads.hpp"
 #include "shell/curved_surface.hpp"
 #include "shell/fit_cross.hpp"
 #include "shell/fit_edit.hpp"
 #include "shell/fit_parts.hpp"
 #include "shell/fit_shape.hpp"
+#include "shell/fit_squeeze.hpp"
 #include "shell/fit_start.hpp"
-#include "surface/closest_point.hpp"
+#include "shell/fit_worst.hpp"
 #include "surface/decimate.hpp"
-#include "surface/hausdorff.hpp"
 #include "surface/self_intersections.hpp"
 
 #include <fmt/core.h>
@@ -41,9 +40,7 @@ constexpr int most_settling = 20;
 constexpr int most_repairs = 12;
 constexpr double clearly_below = 0.975;
 constexpr int certificates = 10;
-constexpr double least_part = 0.2;               // of the tolerance, to part sheets that cross
-constexpr std::size_t checked_points = 200'000;  // of the target, for places that the samples miss
-constexpr int checking_level = 6;                // pieces per edge of the patches there
+constexpr double least_part = 0.2;  // of the tolerance, to part sheets that cross
 
 class Fitting {
 public:
@@ -207,7 +204,18 @@ private:
     for (FitState& state : found) {
       state.attach();
       state.measure();
-      split_thin(state, limit, most);
+      if (state.error() > limit && !result_.shell.triangles.empty() && result_.distance.both.upper <= tolerance) {
+        break;
+      }
+      if (join_normals(state, limit) > 0) {
+        state.attach();
+        state.measure();
+      }
+      if (regains(samples, state, limit)) {
+        part_crossings(state, limit, most);
+        squeeze(samples, state, limit);
+      }
+      shape_up(samples, state, limit, most);
       // What the certificate asked for may have made triangles thin: then the next best is looked at as well.
       if (make_certain(samples, state, tolerance, most) && count_thin(state) == 0) {
         break;
@@ -284,6 +292,13 @@ private:
     for (int i = 0; i < certificates; ++i) {
       part_crossings(state, limit, most);
       if (certify(state, tolerance)) {
+        if (count_thin(state) > 0) {
+          FitState shaped = state;
+          shape_up(samples, shaped, limit, most);
+          if (price(shaped) < price(state) && certify(shaped, tolerance)) {
+            state = std::move(shaped);
+          }
+        }
         return true;
       }
       const double before = state.error();
@@ -398,9 +413,6 @@ private:
     return mesh;
   }
 
-  /// A thin triangle is worth the shells that five further nodes cost.
-  static std::size_t price(const FitState& state) { return state.mesh.alive + 10 * count_thin(state); }
-
   static std::size_t guess(double shells) { return static_cast<std::size_t>(std::max(8.0, shells)); }
 
   /// From slivers to triangles that carry patches.
@@ -467,63 +479,6 @@ private:
       fruitless = state.error() < worth_it * best ? 0 : fruitless + 1;
       best = std::min(best, state.error());
     }
-  }
-
-  /// Points of the target farther from the curved surface than `limit` join the samples. @return how many
-  /// @param errors  what is found of each patch's distance, both ways, raises its error
-  std::size_t add_missed(FitSamples& samples, FitState& state, double limit, bool errors = false) const {
-    std::vector<Index> triangles;
-    const Tessellation fine = tessellate_uniformly(state.mesh.shell(&triangles), checking_level);
-    const ClosestPoint tree(fine.mesh);
-    const auto raise = [&](Index patch, double error) {
-      if (errors) {
-        double& known = state.patches[triangles[patch]].error;
-        known = std::max(known, error);
-      }
-    };
-    const TriangleMesh& mesh = target_.mesh();
-    std::vector<Vec3> points = mesh.vertices;
-    if (mesh.triangles.size() < checked_points / 4) {
-      // Few: what lies between them counts too.
-      for (const auto& v : mesh.triangles) {
-        points.emplace_back((mesh.vertices[v[0]] + mesh.vertices[v[1]] + mesh.vertices[v[2]]) / 3);
-        for (std::size_t k = 0; k < 3; ++k) {
-          points.emplace_back((mesh.vertices[v[k]] + mesh.vertices[v[(k + 1) % 3]]) / 2);
-        }
-      }
-    }
-    const std::size_t stride = std::max<std::size_t>(1, points.size() / checked_points);
-    std::vector<ClosestPoint::Hit> hits(points.size() / stride);
-    parallel_for_blocks(points.size() / stride, 512, [&](std::size_t begin, std::size_t end) {
-      std::optional<Index> guess;
-      for (std::size_t i = begin; i < end; ++i) {
-        const auto hit = guess ? tree.closest(points[i * stride], *guess) : tree.closest(points[i * stride]);
-        guess = hit.triangle;
-        hits[i] = hit;
-      }
-    });
-    std::size_t added = 0;
-    for (std::size_t i = 0; i < hits.size(); ++i) {
-      if (hits[i].squared_distance <= limit * limit) {
-        continue;
-      }
-      // The flat pieces of the patch may be farther off than the patch.
-      const Vec3& p = points[i * stride];
-      const Index patch = fine.shell[hits[i].triangle];
-      const double distance = std::sqrt(foot_on_patch(state.mesh.patch(triangles[patch]), p).squared_distance);
-      if (distance > limit) {
-        samples.add(p);
-        ++added;
-        raise(patch, distance);
-      }
-    }
-    if (errors) {
-      const auto distances = vertex_distances(fine.mesh, target_.tree());
-      for (std::size_t v = 0; v < distances.size(); ++v) {
-        raise(fine.vertex_shell[v], distances[v]);
-      }
-    }
-    return added;
   }
 
   /// Takes the mesh as the result when it is better. @return whether the tolerance certainly holds

@@ -11,7 +11,8 @@ namespace tunica {
 /// topology differs from the target's: then COARSE's is meant). Then in turn: edges collapse, cheapest first by the
 /// curved error that their placed node would have; edges turn; all nodes and normals move at once by Gauss-Newton on
 /// powers of the residuals; patches that are too far off are split; nodes slide where
-/// angles are small. Where the target has a sharp crease, shells carry a
+/// angles are small. Last, mergers that no single node makes good are tried with all nodes together (fit_squeeze.hpp).
+/// Where the target has a sharp crease, shells carry a
 /// normal per corner. A certified distance ends it.
 ///
 /// With `tolerance` the fewest shells found whose certified distance holds, or with `refine` COARSE's triangles, placed

@@ -85,7 +85,7 @@ std::size_t part_crossings(FitState& state, double limit, std::size_t most) {
     place_nodes_of(trial, crossing);
     trial.attach();
     trial.measure();
-    split_thin(trial, allowed, most);
+    rid_of_thin(trial, allowed, most);
     std::size_t now = 0;
     crossing = crossing_triangles(trial, now);
     if (now < left && trial.error() <= allowed) {

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <queue>
 
 namespace tunica {
@@ -335,6 +336,15 @@ std::size_t collapse_edges(FitState& state, double limit, std::size_t shells, co
   return gone;
 }
 
+bool merge_edge(FitState& state, Index u, Index v, double limit) {
+  Collapser collapser(state, limit);
+  if (!(collapser.evaluate(u, v) <= limit)) {
+    return false;
+  }
+  collapser.commit(u, v);
+  return true;
+}
+
 std::size_t flip_edges(FitState& state, double limit) {
   FitMesh& mesh = state.mesh;
   std::size_t flips = 0;
@@ -492,102 +502,114 @@ bool split_edge(FitState& state, Index u, Index v, double limit) {
   return true;
 }
 
-std::size_t split_worst(FitState& state, double limit, std::size_t most) {
-  FitMesh& mesh = state.mesh;
-  std::vector<std::pair<double, Index>> worst;
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    if (mesh.is_alive(static_cast<Index>(t)) && state.patches[t].error > limit) {
-      worst.emplace_back(-state.patches[t].error, static_cast<Index>(t));
-    }
-  }
-  std::sort(worst.begin(), worst.end());
-  std::vector<std::uint8_t> touched(mesh.positions.size(), 0);
-  std::size_t splits = 0;
-  for (const auto& [error, t] : worst) {
-    if (splits >= most) {
-      break;
-    }
-    const auto v = mesh.triangles[t];
-    if (!mesh.is_alive(t) ||
-        std::any_of(v.begin(), v.end(), [&](Index i) { return i >= touched.size() || touched[i] != 0; })) {
-      continue;
-    }
-    std::size_t longest = 0;
-    double length = 0;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const double l = (mesh.positions[v[(k + 1) % 3]] - mesh.positions[v[k]]).norm();
-      if (l > length) {
-        length = l;
-        longest = k;
-      }
-    }
-    if (split_edge(state, v[longest], v[(longest + 1) % 3], limit)) {
-      ++splits;
-      for (const Index i : v) {
-        touched[i] = 1;
-      }
-    }
-  }
-  return splits;
-}
+namespace {
 
-bool move_node(FitState& state, Index v, const Vec3& start, double angle, double limit) {
+/// Places a node whose slots become fewer. @param merged  for each of its slots, ascending, which new one it becomes
+bool place_with_slots(FitState& state, Index v, const Vec3& start, const std::vector<Index>& own,
+                      const std::vector<std::size_t>& merged, double angle, double limit) {
   FitMesh& mesh = state.mesh;
   Trial trial;
   trial.limits = state.limits;
-  std::vector<Index> own;
-  mesh.slots_of(v, own);
   trial.node.position = start;
-  for (const Index s : own) {
-    trial.node.normals.push_back(mesh.normals[s]);
+  trial.node.normals.assign(*std::max_element(merged.begin(), merged.end()) + 1, Vec3::Zero());
+  for (std::size_t s = 0; s < own.size(); ++s) {
+    trial.node.normals[merged[s]] += mesh.normals[own[s]];
   }
+  for (Vec3& n : trial.node.normals) {
+    if (!(n.norm() > 1e-3)) {
+      return false;
+    }
+    n.normalize();
+  }
+  const auto slot_of = [&](Index slot) {
+    return merged[static_cast<std::size_t>(std::find(own.begin(), own.end(), slot) - own.begin())];
+  };
   std::vector<std::array<Index, 3>> nodes_around;
   for (const Index t : mesh.around[v]) {
     gather(state, t, trial);
     ease_limits(state, t, trial.limits);
     PlacedPatch p = placed(state, t);
     p.corner = mesh.corner_of(t, v);
-    p.slot = static_cast<std::size_t>(std::find(own.begin(), own.end(), mesh.slots[t][p.corner]) - own.begin());
+    p.slot = slot_of(mesh.slots[t][p.corner]);
     trial.patches.push_back(std::move(p));
     trial.triangles.push_back(t);
     nodes_around.push_back(mesh.triangles[t]);
   }
   trial.limits.angle = std::max(trial.limits.angle, angle);
   link(state, nodes_around, trial.triangles, trial);
+  if (trial.node.normals.size() < own.size()) {
+    make_compatible(trial);
+  }
   place_node(state.samples(), trial.patches, trial.points, trial.limits, limit, placing_steps + 1, trial.node);
   if (!(trial.node.error < limit)) {
     return false;
   }
   place_node(state.samples(), trial.patches, trial.points, trial.limits, limit, 0, trial.node);
   mesh.positions[v] = trial.node.position;
-  for (std::size_t s = 0; s < own.size(); ++s) {
+  for (std::size_t s = 0; s < trial.node.normals.size(); ++s) {
     mesh.normals[own[s]] = trial.node.normals[s];
   }
   for (std::size_t i = 0; i < trial.triangles.size(); ++i) {
     PlacedPatch& p = trial.patches[i];
+    mesh.slots[trial.triangles[i]][p.corner] = own[p.slot];
     state.patches[trial.triangles[i]] = {std::move(p.guesses), std::move(p.attached), std::move(p.residuals), p.error};
   }
   return true;
 }
 
-std::size_t place_worst(FitState& state, double limit) {
-  FitMesh& mesh = state.mesh;
-  std::vector<std::pair<double, Index>> nodes;
-  for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
-    double error = 0;
-    for (const Index t : mesh.around[v]) {
-      error = std::max(error, state.patches[t].error);
-    }
-    if (error > limit) {
-      nodes.emplace_back(-error, static_cast<Index>(v));
+/// All ways to make one of two slots of a node.
+std::vector<std::vector<std::size_t>> pairs_merged(std::size_t count) {
+  std::vector<std::vector<std::size_t>> out;
+  for (std::size_t i = 0; i < count; ++i) {
+    for (std::size_t j = i + 1; j < count; ++j) {
+      std::vector<std::size_t> merged(count);
+      for (std::size_t s = 0; s < count; ++s) {
+        merged[s] = s == j ? i : s > j ? s - 1 : s;
+      }
+      out.push_back(std::move(merged));
     }
   }
-  std::sort(nodes.begin(), nodes.end());
-  std::size_t better = 0;
-  for (const auto& [negative, v] : nodes) {
-    better += move_node(state, v, mesh.positions[v], 0, 0.99 * -negative) ? 1 : 0;
+  return out;
+}
+
+}  // namespace
+
+bool move_node(FitState& state, Index v, const Vec3& start, double angle, double limit) {
+  std::vector<Index> own;
+  state.mesh.slots_of(v, own);
+  std::vector<std::size_t> same(own.size());
+  std::iota(same.begin(), same.end(), 0);
+  return place_with_slots(state, v, start, own, same, angle, limit);
+}
+
+std::size_t join_normals(FitState& state, double limit) {
+  const FitMesh& mesh = state.mesh;
+  std::size_t gone = 0;
+  std::vector<Index> own;
+  for (Index v = 0; v < mesh.positions.size(); ++v) {
+    mesh.slots_of(v, own);
+    if (own.size() < 2) {
+      continue;
+    }
+    const Vec3 start = mesh.positions[v];
+    if (place_with_slots(state, v, start, own, std::vector<std::size_t>(own.size(), 0), 0, limit)) {
+      gone += own.size() - 1;
+      continue;
+    }
+    bool better = own.size() > 2;
+    while (better && own.size() > 1) {
+      better = false;
+      for (const auto& merged : pairs_merged(own.size())) {
+        if (place_with_slots(state, v, mesh.positions[v], own, merged, 0, limit)) {
+          ++gone;
+          mesh.slots_of(v, own);
+          better = true;
+          break;
+        }
+      }
+    }
   }
-  return better;
+  return gone;
 }
 
 std::size_t detach_worst(FitState& state, double limit) {

@@ -11,13 +11,13 @@ namespace tunica {
 /// Cost: about 0.3 ms per edge tried, some five per merger.
 std::size_t collapse_edges(FitState& state, double limit, std::size_t shells, const Progress& progress);
 
+/// Merges two nodes of an edge where topology allows it and the patches around come within `limit` (mm). @return
+/// whether they did
+bool merge_edge(FitState& state, Index u, Index v, double limit);
+
 /// Turns edges where that lessens the larger error of the two patches, or mends angles below the limit without an
 /// error above `limit` (mm) and above those before. @return how many
 std::size_t flip_edges(FitState& state, double limit);
-
-/// Cuts the longest edge (by a node of its own) of the patches whose error is above `limit` (mm), worst first, at most
-/// `most` edges. @return how many
-std::size_t split_worst(FitState& state, double limit, std::size_t most);
 
 /// Cuts an edge by a node of its own, placed where the patches come closest. @return whether that was possible
 bool split_edge(FitState& state, Index u, Index v, double limit);
@@ -26,8 +26,9 @@ bool split_edge(FitState& state, Index u, Index v, double limit);
 /// when the largest error around is then below `limit` (mm). @return whether it did
 bool move_node(FitState& state, Index node, const Vec3& start, double angle, double limit);
 
-/// Places the nodes around patches with an error above `limit` anew, one by one. @return how many got better
-std::size_t place_worst(FitState& state, double limit);
+/// Takes back normals of their own: where several meet at a node they become one, or fewer, as long as the largest
+/// error around stays below `limit` (mm). @return how many went
+std::size_t join_normals(FitState& state, double limit);
 
 /// Gives patches with an error above `limit` normals of their own at their corners where these, from flat, bring the
 /// patch much closer: what no common normal can serve, a crease or a rim. @return how many

@@ -18,7 +18,7 @@ constexpr double worth_it = 0.3;    // degrees
 constexpr double first_step = 0.4;  // of the mean edge
 constexpr int halvings = 4;
 constexpr int directions = 8;
-constexpr int most_splits = 8;
+constexpr int most_tries = 16;
 
 double angle_of(const FitState& state, Index t) {
   const auto c = state.mesh.corners(t);
@@ -160,35 +160,46 @@ std::size_t mend_angles(FitState& state, double limit) {
   return left;
 }
 
-void split_thin(FitState& state, double limit, std::size_t most) {
+namespace {
+
+/// The edges of a triangle, shortest first.
+std::array<std::array<Index, 2>, 3> edges_of(const FitMesh& mesh, Index t) {
+  const auto v = mesh.triangles[t];
+  std::array<std::array<Index, 2>, 3> edges{{{v[0], v[1]}, {v[1], v[2]}, {v[2], v[0]}}};
+  const auto length = [&](const std::array<Index, 2>& e) {
+    return (mesh.positions[e[1]] - mesh.positions[e[0]]).norm();
+  };
+  std::stable_sort(edges.begin(), edges.end(), [&](const auto& a, const auto& b) { return length(a) < length(b); });
+  return edges;
+}
+
+}  // namespace
+
+void rid_of_thin(FitState& state, double limit, std::size_t most) {
   std::size_t left = mend_angles(state, limit);
   int fruitless = 0;
-  for (int i = 0; i < most_splits && left > 0 && state.mesh.alive + 2 <= most; ++i) {
+  for (int i = 0; i < most_tries && left > 0; ++i) {
     const auto thin = thin_triangles(state);
     if (static_cast<std::size_t>(fruitless) >= thin.size()) {
       return;
     }
-    FitState trial = state;
-    const auto v = trial.mesh.triangles[thin[static_cast<std::size_t>(fruitless)]];
-    std::size_t longest = 0;
-    double length = 0;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const double l = (trial.mesh.positions[v[(k + 1) % 3]] - trial.mesh.positions[v[k]]).norm();
-      longest = l > length ? k : longest;
-      length = std::max(length, l);
+    const auto edges = edges_of(state.mesh, thin[static_cast<std::size_t>(fruitless)]);
+    bool better = false;
+    for (const bool merging : {true, false}) {
+      FitState trial = state;
+      const auto [u, v] = merging ? edges[0] : edges[2];
+      if (merging ? !merge_edge(trial, u, v, limit) : state.mesh.alive + 2 > most || !split_edge(trial, u, v, limit)) {
+        continue;
+      }
+      const std::size_t now = mend_angles(trial, limit);
+      if (now < left && trial.error() <= limit) {
+        state = std::move(trial);
+        left = now;
+        better = true;
+        break;
+      }
     }
-    if (!split_edge(trial, v[longest], v[(longest + 1) % 3], limit)) {
-      ++fruitless;
-      continue;
-    }
-    const std::size_t now = mend_angles(trial, limit);
-    if (now < left && trial.error() <= limit) {
-      state = std::move(trial);
-      left = now;
-      fruitless = 0;
-    } else {
-      ++fruitless;
-    }
+    fruitless = better ? 0 : fruitless + 1;
   }
 }
 

@@ -11,8 +11,8 @@ std::size_t count_thin(const FitState& state);
 /// fitted there, as long as no error gets above `limit` (mm) and above what it was. @return how many are left
 std::size_t mend_angles(FitState& state, double limit);
 
-/// The same by means of further nodes: cuts thin triangles, and keeps that where fewer are left and no error is above
-/// `limit` (mm). @param most  shells
-void split_thin(FitState& state, double limit, std::size_t most);
+/// The same by merging the nodes of a thin triangle's shortest edge, or by a further node on its longest: kept where
+/// fewer thin ones are left and no error is above `limit` (mm). @param most  shells
+void rid_of_thin(FitState& state, double limit, std::size_t most);
 
 }  // namespace tunica

@@ -2,12 +2,14 @@
 """The least-error fit against its bars: shells, certified error, smallest angle and seconds per case.
 
     TUNICA_BIN=build/release/bin tests/bench/fit_bench.py [--targets targets.py] [--data FOLDER] [--only WORD] [--jobs N]
+        [--surface watertight] [--peer build/release/tests/bench/bench_decimate]
     TUNICA_BIN=build/release/bin tests/bench/fit_bench.py --scaling docs/charts/fit-scaling.svg
 
 Cases: the analytic targets (a script that writes them, if given), the paper's meshes and real organs (DATA/paper,
 DATA/volumes, DATA/meshes; what is absent is left out, and said), and shapes of the same kinds that are made here, so
-that nothing is tuned to the named ones. Flat counts are those of tunica-decimate, so every factor is against this
-repository's own decimation; where a better one is known its count is the bar. Seconds are the processor's, one thread.
+that nothing is tuned to the named ones. Flat counts are those of tunica-decimate, or with --peer CGAL's (planes of
+Garland and Heckbert) where that needs fewer; where a better one is known its count is the bar. Seconds are the
+processor's, one thread.
 """
 import argparse
 import json
@@ -107,12 +109,60 @@ def torus(u, v):
     return ((30 + 10 * np.cos(a)) * np.cos(b), (30 + 10 * np.cos(a)) * np.sin(b), 10 * np.sin(a))
 
 
+def on_curve(centre, radius, u, v):
+    """A tube around a curve: centre(s) -> x, y, z; radius(s, angle). Its frame turns as little as it can."""
+    s = v[:, 0]
+    line = np.stack(centre(s), axis=-1)
+    tangent = np.gradient(line, s, axis=0, edge_order=2)
+    tangent /= np.linalg.norm(tangent, axis=1)[:, None]
+    side, sides = np.array([0.1, 0.2, 1.0]), []
+    for t in tangent:
+        side = side - t * (side @ t)
+        side /= np.linalg.norm(side)
+        sides.append(side)
+    one = np.array(sides)
+    other = np.cross(tangent, one)
+    a = 2 * np.pi * u
+    r = radius(v, a)[..., None]
+    points = line[:, None] + r * (np.cos(a)[..., None] * one[:, None] + np.sin(a)[..., None] * other[:, None])
+    return points[..., 0], points[..., 1], points[..., 2]
+
+
+def s_tube(u, v):
+    return on_curve(lambda s: (60 * s, 9 * np.sin(2 * np.pi * s), 8 * np.cos(3 * s)),
+                    lambda s, a: 6 + 1.5 * np.sin(7 * s) + 0.8 * np.cos(2 * a + 4 * s), u, v)
+
+
+def half_torus(u, v):
+    a, b = 2 * np.pi * u, np.pi * v
+    r = 9 + 1.5 * np.sin(5 * b) * np.cos(a)
+    return ((30 + r * np.cos(a)) * np.cos(b), (30 + r * np.cos(a)) * np.sin(b), r * np.sin(a))
+
+
+def dumbbell(d):
+    """Two lobes of different sizes and a neck."""
+    x = d[:, 0]
+    return d * (16 + 34 * x ** 2 + 7 * x ** 3 + 2 * np.sin(3 * d[:, 1] + 2 * d[:, 2]))[:, None] * [1.3, 1, 0.9]
+
+
+def kidney(d):
+    """An ellipsoid bent over one side."""
+    p = d * [58, 30, 24]
+    return np.c_[p[:, 0], p[:, 1] + 0.012 * p[:, 0] ** 2, p[:, 2] + 0.1 * p[:, 1] - 0.0015 * p[:, 0] * p[:, 1]]
+
+
 def own_shapes(folder):
     """Shapes of the same kinds as the named targets."""
     shapes = {
         "ellipsoid": lambda: ball(60, lambda d: d * [60, 35, 22]),
         "bumps7": lambda: ball(80, bumps(7, 0.06, 6)),
         "bumps23": lambda: ball(80, bumps(23, 0.03, 14)),
+        "bumps41": lambda: ball(90, bumps(41, 0.045, 9)),
+        "bumpy_ellipsoid": lambda: ball(80, lambda d: bumps(5, 0.04, 7)(d) * [1.3, 0.7, 0.55]),
+        "s_tube": lambda: grid(128, 400, s_tube),
+        "half_torus": lambda: grid(144, 280, half_torus),
+        "dumbbell": lambda: ball(80, dumbbell),
+        "kidney": lambda: ball(80, kidney),
         "torus": lambda: grid(120, 240, torus, closed_rows=True),
         "bent_tube": lambda: grid(96, 240, bent_tube),
         "cylinder_long": lambda: open_cylinder(10, 80, 256, 100),
@@ -155,12 +205,24 @@ class Cases:
         if not cache.exists():
             out = cache.with_suffix(".ply")
             report, _ = run(["tunica-decimate", path, out, "--max-error", f"{percent}%", *options, *unit])
-            cache.write_text(json.dumps(report.get("result", {}).get("triangles")))
+            count = report.get("result", {}).get("triangles")
+            if count and self.arguments.peer and not options:
+                count = min(count, self.peer_count(path, percent, count))
+            cache.write_text(json.dumps(count))
         return json.loads(cache.read_text())
+
+    def peer_count(self, path, percent, count):
+        """The smallest count of a ladder with which CGAL's decimation is within the tolerance."""
+        ladder = sorted({int(count * part / 100) for part in range(60, 125, 4)})
+        said = subprocess.run([self.arguments.peer, f"{path}:{','.join(map(str, ladder))}", "--rounds", "1"],
+                              stdout=subprocess.PIPE, text=True, check=True).stdout
+        lines = [line.split() for line in said.splitlines() if line.split()[:1] == ["CGAL"]]
+        fit = [int(words[1]) for words in lines if float(words[3]) <= percent]
+        return min(fit, default=count)
 
     def shell(self, key, path, options, unit):
         return run(["tunica-relax", path, path, self.folder / f"{key.replace(' ', '_').replace('%', 'p')}.ply",
-                    "--method", "fit", *options, *unit])
+                    "--method", "fit", "--surface", self.arguments.surface, *options, *unit])
 
     def by_tolerance(self, key, path, percent, most, factor, angle, unit):
         if most is None:
@@ -279,6 +341,8 @@ def main():
     parser.add_argument("--targets")
     parser.add_argument("--data", default="")
     parser.add_argument("--only", default="")
+    parser.add_argument("--surface", default="comas")
+    parser.add_argument("--peer", metavar="BENCH_DECIMATE", help="CGAL's decimation for the flat counts, too")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--folder", help="keeps targets and results here")
     arguments = parser.parse_args()

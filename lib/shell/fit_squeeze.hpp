@@ -1,0 +1,28 @@
+#pragma once
+
+#include "shell/fit_state.hpp"
+
+namespace tunica {
+
+/// What a search for few shells lessens: shells, and for each thin triangle what five further nodes cost.
+std::size_t price(const FitState& state);
+
+/// Points of the target farther from the curved surface than `limit` (mm) join the samples; the state has to be
+/// attached and measured anew to heed them. @return how many
+/// @param errors  what is found of each patch's distance, both ways, raises its error
+/// Cost: linear in the target's vertices, of which at most 200,000 are looked at; about 50 ms.
+std::size_t add_missed(FitSamples& samples, FitState& state, double limit, bool errors = false);
+
+/// Moves all nodes until no error, nor that of points that the samples missed, is above `limit` (mm).
+/// @return whether that was possible
+bool regains(FitSamples& samples, FitState& state, double limit);
+
+/// Finds fewer shells by mergers that no single node can make good but all nodes together do: many at once, then ever
+/// fewer. No error gets above `limit` (mm), and no more shells cross. Cost: 12 searches at most, 2 of many shells.
+void squeeze(FitSamples& samples, FitState& state, double limit);
+
+/// Mends thin triangles, if need be by way of larger errors that all nodes together make good, as long as that lowers
+/// the price. @param limit  mm; @param most  shells
+void shape_up(FitSamples& samples, FitState& state, double limit, std::size_t most);
+
+}  // namespace tunica
