@@ -6,9 +6,13 @@
 
 namespace tunica {
 
-/// Asks for large pages in [begin, begin + bytes), which has not been written yet: the system then clears and maps it
-/// in far fewer steps. A hint: nothing changes but time.
+/// Asks for large pages around [begin, begin + bytes), which has not been written yet: the system then clears and maps
+/// it in far fewer steps. A hint: nothing changes but time, and up to one large page (2 MiB) of memory at each end.
 void prefer_large_pages(void* begin, std::size_t bytes);
+
+/// How much to ask the allocator for when `bytes` are needed: a little more where that makes it map whole large pages
+/// (of the address space; memory is taken where it is written).
+std::size_t whole_large_pages(std::size_t bytes);
 
 /// Writes to every page of [begin, begin + bytes), by all threads, so that the system maps them now.
 /// Errors: none; the contents are undefined afterwards.
@@ -18,7 +22,7 @@ void touch_pages(void* begin, std::size_t bytes);
 /// in large pages and by all threads.
 template <typename T>
 void resize_fresh(std::vector<T>& vector, std::size_t size) {
-  vector.reserve(size);
+  vector.reserve(whole_large_pages(size * sizeof(T)) / sizeof(T));
   prefer_large_pages(vector.data(), size * sizeof(T));
   touch_pages(vector.data(), size * sizeof(T));
   vector.resize(size);

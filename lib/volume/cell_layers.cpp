@@ -216,12 +216,12 @@ struct ActiveWord {
 /// Finds the active words of a layer. Crossed edges of its rows are in no others.
 class ActiveWords {
 public:
-  enum class Look { for_words, also_for_loops };
-  ActiveWords(const PaddedGrid& grid, Look look)
-      : grid_(grid), look_(look), places_(grid.size(1) * grid.words()), found_(places_.size() + 1) {}
+  explicit ActiveWords(const PaddedGrid& grid)
+      : grid_(grid), places_(grid.size(1) * grid.words()), found_(places_.size() + 1) {}
 
+  /// @param look_for_loops  so that several_loops_found() is known
   /// @return in the order of the rows, valid until the next call
-  std::span<const ActiveWord> find(const Plane& a, const Plane& b) {
+  std::span<const ActiveWord> find(const Plane& a, const Plane& b, bool look_for_loops) {
     const std::size_t rows = grid_.size(1);
     ActiveWord* out = found_.data();
     several_loops_ = false;
@@ -231,10 +231,10 @@ public:
         ++end;
       }
       if (end > row) {
-        if (look_ == Look::for_words) {
-          find_places<false>(a, b, row, end);
-        } else {
+        if (look_for_loops) {
           find_places<true>(a, b, row, end);
+        } else {
+          find_places<false>(a, b, row, end);
         }
         out = list(row, end, out);
         row = end;
@@ -243,7 +243,7 @@ public:
     return {found_.data(), out};
   }
 
-  /// Whether several_loops() holds for any cell found the last time, if looked for.
+  /// Whether several_loops() holds for any cell found the last time.
   [[nodiscard]] bool several_loops_found() const { return several_loops_; }
 
 private:
@@ -280,7 +280,6 @@ private:
   }
 
   const PaddedGrid& grid_;
-  Look look_;
   std::vector<Word> places_;
   std::vector<ActiveWord> found_;
   bool several_loops_ = false;
@@ -347,7 +346,7 @@ LayerCounts count_layer(const PaddedGrid& grid, const Plane& a, const Plane& b, 
                         std::size_t slice) {
   LayerCounts sum;
   std::size_t cells = 0;
-  const std::span<const ActiveWord> found = active.find(a, b);
+  const std::span<const ActiveWord> found = active.find(a, b, true);
   for (const auto& [row, w, places] : found) {
     const Word* const a0 = a.row(row) + w;
     sum.along_x += ones((a0[0] ^ shifted(a0)) & places);
@@ -420,10 +419,23 @@ private:
   std::vector<Place> row_;
 };
 
+/// What a thread works in.
+struct Workspace {
+  explicit Workspace(const PaddedGrid& grid) : a(grid), b(grid), active(grid), samples(grid) {}
+
+  Plane a;
+  Plane b;
+  ActiveWords active;
+  Samples samples;
+  std::vector<CrossedEdge> places;
+  std::vector<CrossedEdge> edges;
+  std::vector<std::array<Index, 3>> triangles;
+};
+
 class LayerWriter {
 public:
   LayerWriter(const PaddedGrid& grid, const Output& out, const Crossings* crossings,
-              std::vector<PinchedVertex>& pinched)
+              std::vector<PinchedVertex>& pinched, Workspace& workspace)
       : grid_(grid),
         cases_(packed_cases(grid.affine().leftCols<3>().determinant() < 0)),
         crossings_(crossings),
@@ -431,19 +443,16 @@ public:
         vertices_(out.vertices),
         triangles_(out.triangles),
         first_(static_cast<Index>(out.first_vertex)),
-        samples_(grid),
-        active_(grid, ActiveWords::Look::for_words),
-        a_(grid),
-        b_(grid) {}
+        in_(workspace) {}
 
   void write(std::size_t begin, std::size_t end, const LayerCounts* counts) {
     for (std::size_t layer = 0; layer < end - begin; ++layer) {
       triangles_left_ += counts[layer].triangles;
     }
-    a_.load(grid_, begin);
+    in_.a.load(grid_, begin);
     for (std::size_t slice = begin; slice < end; ++slice, ++counts) {
       write_layer(slice, counts);
-      std::swap(a_, b_);
+      std::swap(in_.a, in_.b);
       vertices_ += counts->vertices();
       triangles_ += counts->triangles;
       triangles_left_ -= counts->triangles;
@@ -455,15 +464,15 @@ private:
   void write_layer(std::size_t slice, const LayerCounts* counts) {
     const bool last = slice + 1 == grid_.size(2);
     if (!last) {
-      b_.load(grid_, slice + 1);
+      in_.b.load(grid_, slice + 1);
     }
-    const Plane& b = last ? a_ : b_;
+    const Plane& b = last ? in_.a : in_.b;
     const std::span<const CrossedEdge> places = find_places(b);
     if (places.empty()) {
       return;
     }
-    grow(edges_, counts->vertices() + 3);
-    CrossedEdge* const x = edges_.data();
+    grow(in_.edges, counts->vertices() + 3);
+    CrossedEdge* const x = in_.edges.data();
     CrossedEdge* const y = x + counts->along_x + 1;
     CrossedEdge* const z = y + counts->along_y + 1;
     CrossedEdge* x_end = x;
@@ -472,12 +481,12 @@ private:
     // Straight to where they belong, but for the last ones, which would overwrite what follows.
     const bool in_place = counts->triangles + spare_triangles <= triangles_left_;
     if (!in_place) {
-      grow(triangles_here_, counts->triangles + spare_triangles);
+      grow(in_.triangles, counts->triangles + spare_triangles);
     }
-    Index* const corners = in_place ? triangles_->data() : triangles_here_.data()->data();
+    Index* const corners = in_place ? triangles_->data() : in_.triangles.data()->data();
     Index* corner = corners;
     RunningNumbers numbers = start(b, *counts, last ? LayerCounts{} : counts[1]);
-    const Cases case_at(a_, b);
+    const Cases case_at(in_.a, b);
     const PackedCase* const cases = cases_.data();
     const bool open = grid_.is_open();
     for (const CrossedEdge& place : places) {
@@ -498,9 +507,9 @@ private:
                   z_end - z == static_cast<std::ptrdiff_t>(counts->upright) &&
                   corner - corners == static_cast<std::ptrdiff_t>(3 * counts->triangles));
     if (!in_place) {
-      std::copy_n(triangles_here_.begin(), counts->triangles, triangles_);
+      std::copy_n(in_.triangles.begin(), counts->triangles, triangles_);
     }
-    samples_.move_to(slice, places.front().row, places.back().row + 1);
+    in_.samples.move_to(slice, places.front().row, places.back().row + 1);
     write_vertices(x, counts->along_x, slice, 0, 0);
     write_vertices(y, counts->along_y, slice, 1, counts->along_x);
     write_vertices(z, counts->upright, slice, 2, counts->along_x + counts->along_y);
@@ -515,12 +524,12 @@ private:
 
   std::span<const CrossedEdge> find_places(const Plane& b) {
     std::size_t found = 0;
-    for (const ActiveWord& active : active_.find(a_, b)) {
-      grow(places_, found + word_bits + spare_edges);
-      CrossedEdge* const out = places_.data() + found;
+    for (const ActiveWord& active : in_.active.find(in_.a, b, false)) {
+      grow(in_.places, found + word_bits + spare_edges);
+      CrossedEdge* const out = in_.places.data() + found;
       found += static_cast<std::size_t>(append(out, active) - out);
     }
-    return {places_.data(), found};
+    return {in_.places.data(), found};
   }
 
   /// Numbers before the first place of the layer.
@@ -530,9 +539,9 @@ private:
     Index x_b = 0;
     Index z = 0;
     for (std::size_t w = 0; w < grid_.words(); ++w) {
-      x_a += bits_of((a_.row(0)[w] ^ shifted(a_.row(0) + w)) & grid_.samples(w));
+      x_a += bits_of((in_.a.row(0)[w] ^ shifted(in_.a.row(0) + w)) & grid_.samples(w));
       x_b += bits_of((b.row(0)[w] ^ shifted(b.row(0) + w)) & grid_.samples(w));
-      z += bits_of((a_.row(0)[w] ^ b.row(0)[w]) & grid_.samples(w));
+      z += bits_of((in_.a.row(0)[w] ^ b.row(0)[w]) & grid_.samples(w));
     }
     const Index first_b = first_ + static_cast<Index>(counts.vertices());
     const Index y_a = first_ + static_cast<Index>(counts.along_x);
@@ -547,7 +556,7 @@ private:
     if (crossings_ == nullptr) {
       const Samples::Place half = Samples::padded(0.5 * along);
       for (std::size_t i = 0; i < count; ++i) {
-        const Samples::Place place = samples_(edges[i]) + half;
+        const Samples::Place place = in_.samples(edges[i]) + half;
         out[i] = place.head<3>();
       }
       return;
@@ -568,7 +577,7 @@ private:
       for (std::size_t i = 0; i < size; ++i) {
         const CrossedEdge& edge = edges[begin + i];
         const std::array<std::size_t, 3> first{edge.column, edge.row, slice};
-        place_vertex(first, axis, fractions[i], samples_(edge).head<3>(), along, out[begin + i],
+        place_vertex(first, axis, fractions[i], in_.samples(edge).head<3>(), along, out[begin + i],
                      first_ + offset + begin + i);
       }
     }
@@ -604,30 +613,36 @@ private:
   std::array<Index, 3>* triangles_;  // of the layer above it
   std::size_t triangles_left_ = 0;   // room from there on
   Index first_;                      // number of the slice's first vertex
-  Samples samples_;
-  ActiveWords active_;
-  Plane a_;
-  Plane b_;
-  std::vector<CrossedEdge> places_;
-  std::vector<CrossedEdge> edges_;
-  std::vector<std::array<Index, 3>> triangles_here_;
+  Workspace& in_;
 };
 
 }  // namespace
 
-void count_layers(const PaddedGrid& grid, std::size_t begin, std::size_t end, LayerCounts* counts) {
-  ActiveWords active(grid, ActiveWords::Look::also_for_loops);
-  Plane a(grid);
-  Plane b(grid);
-  a.load(grid, begin);
+struct Layers::Memory : Workspace {
+  using Workspace::Workspace;
+};
+
+Layers::Layers(const PaddedGrid& grid) : grid_(grid), memory_(std::make_unique<Memory>(grid)) {}
+
+Layers::~Layers() = default;
+
+void Layers::count(std::size_t begin, std::size_t end, LayerCounts* counts) {
+  Plane& a = memory_->a;
+  Plane& b = memory_->b;
+  a.load(grid_, begin);
   for (std::size_t slice = begin; slice < end; ++slice, ++counts) {
-    const bool last = slice + 1 == grid.size(2);
+    const bool last = slice + 1 == grid_.size(2);
     if (!last) {
-      b.load(grid, slice + 1);
+      b.load(grid_, slice + 1);
     }
-    *counts = count_layer(grid, a, last ? a : b, active, slice);
+    *counts = count_layer(grid_, a, last ? a : b, memory_->active, slice);
     std::swap(a, b);
   }
+}
+
+void Layers::write(std::size_t begin, std::size_t end, const LayerCounts* counts, const Output& out,
+                   const Crossings* crossings, std::vector<PinchedVertex>& pinched) {
+  LayerWriter(grid_, out, crossings, pinched, *memory_).write(begin, end, counts);
 }
 
 void count_triangles(std::span<LayerCounts> counts) {
@@ -635,11 +650,6 @@ void count_triangles(std::span<LayerCounts> counts) {
     LayerCounts& layer = counts[slice];
     layer.triangles = layer.in_slice + counts[slice + 1].in_slice + static_cast<std::size_t>(layer.in_layer);
   }
-}
-
-void write_layers(const PaddedGrid& grid, std::size_t begin, std::size_t end, const LayerCounts* counts,
-                  const Output& out, const Crossings* crossings, std::vector<PinchedVertex>& pinched) {
-  LayerWriter(grid, out, crossings, pinched).write(begin, end, counts);
 }
 
 }  // namespace tunica::cell_layers

@@ -7,6 +7,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -26,10 +27,6 @@ struct LayerCounts {
   std::ptrdiff_t in_layer = 0;
   [[nodiscard]] std::size_t vertices() const { return along_x + along_y + upright; }
 };
-
-/// Counts of the padded slices [begin, end) into counts[0], counts[1], … but for the triangles, which two slices
-/// decide.
-void count_layers(const PaddedGrid& grid, std::size_t begin, std::size_t end, LayerCounts* counts);
 
 /// The triangles of all layers, from the counts of all padded slices.
 void count_triangles(std::span<LayerCounts> counts);
@@ -56,10 +53,26 @@ struct Output {
   std::array<Index, 3>* triangles = nullptr;
 };
 
-/// Writes vertices and triangles of the padded slices [begin, end), counted before, as slice `end` was in its
-/// plane (counts of 0 where the grid ends).
-/// @param crossings  null: every edge is crossed half-way
-void write_layers(const PaddedGrid& grid, std::size_t begin, std::size_t end, const LayerCounts* counts,
-                  const Output& out, const Crossings* crossings, std::vector<PinchedVertex>& pinched);
+/// A walk along layers, in memory that is kept from one block of slices to the next: one for each thread.
+class Layers {
+public:
+  explicit Layers(const PaddedGrid& grid);
+  ~Layers();
+
+  /// Counts of the padded slices [begin, end) into counts[0], counts[1], … but for the triangles, which two slices
+  /// decide.
+  void count(std::size_t begin, std::size_t end, LayerCounts* counts);
+
+  /// Writes vertices and triangles of the padded slices [begin, end), counted before, as slice `end` was in its
+  /// plane (counts of 0 where the grid ends).
+  /// @param crossings  null: every edge is crossed half-way
+  void write(std::size_t begin, std::size_t end, const LayerCounts* counts, const Output& out,
+             const Crossings* crossings, std::vector<PinchedVertex>& pinched);
+
+private:
+  struct Memory;
+  const PaddedGrid& grid_;
+  std::unique_ptr<Memory> memory_;
+};
 
 }  // namespace tunica::cell_layers

@@ -8,6 +8,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <span>
 #include <type_traits>
@@ -18,9 +20,24 @@ namespace {
 
 using cell_layers::Crossings;
 using cell_layers::LayerCounts;
+using cell_layers::Layers;
 using cell_layers::PaddedGrid;
 
 constexpr std::size_t grain = 8;  // slices in a block
+
+/// Has the layers of [0, size) done in blocks, body(layers, begin, end), by whatever thread is free.
+template <typename Body>
+void for_each_block(const PaddedGrid& grid, std::size_t size, const Body& body) {
+  const std::size_t blocks = (size + grain - 1) / grain;
+  std::atomic<std::size_t> next = 0;
+  parallel_for_blocks(std::min(blocks, thread_count()), 1, [&](std::size_t, std::size_t) {
+    Layers layers(grid);
+    for (std::size_t block = next++; block < blocks; block = next++) {
+      check_interrupt();
+      body(layers, block * grain, std::min(size, (block + 1) * grain));
+    }
+  });
+}
 
 template <typename T>
 class Interpolated final : public Crossings {
@@ -63,9 +80,8 @@ public:
     const PaddedGrid grid(mask, window_, options.open_border);
     const std::size_t slices = grid.size(2);
     counts_.resize(slices + 1);
-    parallel_for_blocks(slices, grain, [&](std::size_t begin, std::size_t end) {
-      check_interrupt();
-      cell_layers::count_layers(grid, begin, end, counts_.data() + begin);
+    for_each_block(grid, slices, [&](Layers& layers, std::size_t begin, std::size_t end) {
+      layers.count(begin, end, counts_.data() + begin);
     });
     cell_layers::count_triangles(std::span(counts_).first(slices));
     first_vertex_.resize(slices + 1, 0);
@@ -94,12 +110,11 @@ public:
     window.first_slice = first_slice;
     const PaddedGrid grid(mask_, window, options_.open_border);
     std::vector<std::vector<PinchedVertex>> pinched((end - begin + grain - 1) / grain);
-    parallel_for_blocks(end - begin, grain, [&](std::size_t from, std::size_t to) {
-      check_interrupt();
+    for_each_block(grid, end - begin, [&](Layers& layers, std::size_t from, std::size_t to) {
       const std::size_t slice = begin + from;
       const cell_layers::Output out{first_vertex_[slice], mesh_.vertices.data() + first_vertex_[slice],
                                     mesh_.triangles.data() + first_triangle_[slice]};
-      cell_layers::write_layers(grid, slice, begin + to, counts_.data() + slice, out, crossings, pinched[from / grain]);
+      layers.write(slice, begin + to, counts_.data() + slice, out, crossings, pinched[from / grain]);
     });
     for (const auto& block : pinched) {
       pinched_.insert(pinched_.end(), block.begin(), block.end());
