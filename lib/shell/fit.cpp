@@ -129,6 +129,14 @@ private:
     join(done, tolerance);
   }
 
+  /// What is certain from elsewhere.
+  static void lower_uppers(ShellDistance& distance, const Interval& both, const Interval& to_target,
+                           const Interval& to_shell) {
+    distance.both.upper = std::min(distance.both.upper, both.upper);
+    distance.shell_to_target.upper = std::min(distance.shell_to_target.upper, to_target.upper);
+    distance.target_to_shell.upper = std::min(distance.target_to_shell.upper, to_shell.upper);
+  }
+
   struct Fitted {
     ShellMesh shell;
     ShellDistance distance;  ///< to its part of the target
@@ -161,10 +169,7 @@ private:
     ShellDistanceOptions measuring;
     measuring.width = width_;
     ShellDistance distance = shell_distance(shell, target_, measuring);
-    const auto lower = [](double& upper, double to) { upper = std::min(upper, to); };
-    lower(distance.both.upper, most.both.upper);
-    lower(distance.shell_to_target.upper, most.shell_to_target.upper);
-    lower(distance.target_to_shell.upper, most.target_to_shell.upper);
+    lower_uppers(distance, most.both, most.shell_to_target, most.target_to_shell);
     const bool held = !result_.shell.triangles.empty() && result_.distance.both.upper <= tolerance;
     const bool better =
         held ? distance.both.upper <= tolerance && shell.triangles.size() < result_.shell.triangles.size()
@@ -530,7 +535,10 @@ private:
     ShellMesh shell = flat_shells(flat.mesh, options_.surface);
     ShellDistanceOptions measuring;
     measuring.width = width_;
-    const ShellDistance distance = shell_distance(shell, target_, measuring);
+    ShellDistance distance = shell_distance(shell, target_, measuring);
+    if (flat.error) {
+      lower_uppers(distance, *flat.error, *flat.error, *flat.error);
+    }
     const bool flat_holds = tolerance && distance.both.upper <= *tolerance;
     const bool better =
         none || (tolerance ? flat_holds && (!holds || shell.triangles.size() < result_.shell.triangles.size())
