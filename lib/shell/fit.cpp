@@ -40,7 +40,8 @@ constexpr int most_settling = 20;
 constexpr int most_repairs = 12;
 constexpr double clearly_below = 0.975;
 constexpr int certificates = 10;
-constexpr double least_part = 0.2;  // of the tolerance, to part sheets that cross
+constexpr double most_tightening = 0.95, least_tightening = 0.985;  // of the limit, where certificates find more
+constexpr double least_part = 0.2;                                  // of the tolerance, to part sheets that cross
 
 class Fitting {
 public:
@@ -292,7 +293,7 @@ private:
 
   /// What the samples miss is found, added to them, and mended. @return whether the tolerance holds
   bool make_certain(FitSamples& samples, FitState& state, double tolerance, std::size_t most) {
-    const double limit = margin * tolerance;
+    double limit = margin * tolerance;
     int stuck = 0;
     for (int i = 0; i < certificates; ++i) {
       part_crossings(state, limit, most);
@@ -308,8 +309,12 @@ private:
       }
       const double before = state.error();
       // What more samples alone do not mend gets more shells.
-      const std::size_t added = add_missed(samples, state, margin * tolerance, true);
+      const std::size_t added = add_missed(samples, state, limit, true);
       samples.add(farthest_);
+      if (i > 0 || added == 0) {
+        // Of what is not seen only less error helps.
+        limit *= std::clamp(tolerance / least_distance_, most_tightening, least_tightening);
+      }
       if (i > 0 || added == 0) {
         split_worst(state, 0.985 * tolerance, state.mesh.alive);
       }
@@ -318,6 +323,13 @@ private:
       polish(state, limit, 2);
       repair(state, limit, most);
       mend_angles(state, limit);
+      for (int look = 0; look < patience && add_missed(samples, state, limit) > 0; ++look) {
+        state.attach();
+        state.measure();
+        polish(state, limit, 1);
+        repair(state, limit, most);
+        mend_angles(state, limit);
+      }
       stuck = state.error() > 0.999 * before && state.error() > limit ? stuck + 1 : 0;
       if (state.error() > 2 * limit || stuck == patience) {
         return certify(state, tolerance);  // a place that more shells do not mend
@@ -499,6 +511,7 @@ private:
       distance = shell_distance(shell, target_, measuring);
     }
     farthest_ = distance.farthest_of_target;
+    least_distance_ = distance.both.lower;
     const bool holds = tolerance && distance.both.upper <= *tolerance;
     const bool held = tolerance && !result_.shell.triangles.empty() && result_.distance.both.upper <= *tolerance;
     if (result_.shell.triangles.empty() ||
@@ -572,6 +585,7 @@ private:
   std::size_t price_ = 0;         // of the result
   bool flat_ = false;             // the result is flat facets
   Vec3 farthest_ = Vec3::Zero();  // of the target, when last certified
+  double least_distance_ = 0;     // mm, certainly, then
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
   RelaxResult result_;
 };

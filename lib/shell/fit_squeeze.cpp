@@ -25,6 +25,37 @@ constexpr int looks = 4;                         // for points that the samples 
 constexpr std::size_t checked_points = 200'000;  // of the target, for places that the samples miss
 constexpr int checking_level = 6;                // pieces per edge of the patches there
 constexpr std::size_t price_of_a_thin_one = 10;  // shells
+constexpr double narrow = 0.05;                  // of the limit: gaps that add nothing
+
+/// Where patches part sideways and are off as well, the target above the gap is farther from both than either measure
+/// says: its points there that are too far off.
+std::vector<Vec3> missed_over_gaps(const FitState& state, double limit) {
+  const FitMesh& mesh = state.mesh;
+  const Target& target = state.samples().target();
+  std::vector<Vec3> found;
+  for (const auto& [u, v] : mesh.edges()) {
+    const auto pair = mesh.on_edge(u, v);
+    if (pair.count() < 2) {
+      continue;
+    }
+    const Index one = pair.triangle[0], other = pair.triangle[1];
+    const CubicPatch here = mesh.patch(one), there = mesh.patch(other);
+    const auto on_here = edge_points(here, mesh.corner_of(one, u), mesh.corner_of(one, v));
+    const auto on_there = edge_points(there, mesh.corner_of(other, u), mesh.corner_of(other, v));
+    for (std::size_t i = 0; i < on_here.size(); ++i) {
+      if ((on_here[i] - on_there[i]).norm() < narrow * limit) {
+        continue;
+      }
+      const Vec3 p = target.closest((on_here[i] + on_there[i]) / 2).point;
+      const double squared =
+          std::min(foot_on_patch(here, p).squared_distance, foot_on_patch(there, p).squared_distance);
+      if (squared > limit * limit) {
+        found.push_back(p);
+      }
+    }
+  }
+  return found;
+}
 
 }  // namespace
 
@@ -75,6 +106,10 @@ std::size_t add_missed(FitSamples& samples, FitState& state, double limit, bool 
       ++added;
       raise(patch, distance);
     }
+  }
+  for (const Vec3& p : missed_over_gaps(state, limit)) {
+    samples.add(p);
+    ++added;
   }
   if (errors) {
     const auto distances = vertex_distances(fine.mesh, samples.target().tree());
