@@ -24,10 +24,11 @@ struct DecimateResult {
 };
 
 /// Fewer triangles for the same surface, by quadric edge collapse with optimal placement (see EdgeCollapse).
-/// With `triangles` only: stops at that count. With `max_error` only: the fewest triangles found whose certified
-/// distance holds. With both: as with `triangles`; when the error does not allow that count, the fewest that it allows.
-/// With `min_angle` triangles are well shaped (mean radius ratio about 0.87), see shaped(); the count stays.
-/// The mesh comes back also when a requirement failed: the best that could be done.
+/// With `triangles` only: stops at that count, then lessens the largest error there (see levelled()). With `max_error`
+/// only: the fewest triangles found whose certified distance holds. With both: as with `triangles`; when the error does
+/// not allow that count, the fewest that it allows. With `min_angle` triangles are well shaped (mean radius ratio about
+/// 0.87), see shaped(); the count stays. The mesh comes back also when a requirement failed: the best that could be
+/// done.
 /// @param mesh  an oriented manifold, closed or with boundary; unused vertices are dropped
 /// Keeps: Euler number, pieces, boundary loops (their vertices stay on the given boundary curve), the side each
 /// triangle faces. Deterministic, independent of the number of threads, of the unit and of the place of the mesh.

@@ -25,6 +25,8 @@ constexpr double normal_variance = 0.02;
 /// Weight of the planes that stand on boundary edges. New boundary vertices lie on the curve, so all of their error is
 /// on one side of it; and a ragged rim is seen before a rough surface.
 constexpr double boundary_weight = 30;
+/// Down to this many times the triangles wanted, edges collapse in sweeps.
+constexpr std::size_t sweep_factor = 8;
 /// How strongly a new vertex is held near the middle of its edge where the quadric is flat.
 constexpr double pull = 1e-5;
 /// Weight of an edge's squared length times its quadric's weight: on flat ground short edges go first.
@@ -63,18 +65,6 @@ EdgeCollapse::EdgeCollapse(const TriangleMesh& mesh, Aim aim) : aim_(aim), heap_
   connect(mesh);
   find_boundary(mesh);
   sum_quadrics();
-  fill_heap();
-}
-
-/// Calls visit(h) for every half-edge that leaves the vertex, counter-clockwise.
-template <typename Visit>
-void EdgeCollapse::around(Index vertex, const Visit& visit) const {
-  const HalfEdge first = vertex_[vertex].outgoing;
-  HalfEdge h = first;
-  do {
-    visit(h);
-    h = half_[previous(h)].twin;
-  } while (h != none && h != first);
 }
 
 template <typename Visit>
@@ -205,19 +195,27 @@ void EdgeCollapse::fill_heap() {
 std::size_t EdgeCollapse::run(std::size_t triangles, const Progress& progress) {
   const std::size_t start = triangles_;
   const double work = static_cast<double>(start - std::min(start, triangles));
-  for (std::size_t limits = 0; triangles_ > triangles && limits < shape_limits.size();) {
-    limits_ = aim_ == Aim::good_shape ? good_shape_limits[limits] : shape_limits[limits];
+  const Progress part = [&](double) { tunica::advance(progress, static_cast<double>(start - triangles_) / work); };
+  const auto& all_limits = aim_ == Aim::good_shape ? good_shape_limits : shape_limits;
+  if (triangles > 0 && triangles_ > sweep_factor * triangles) {
+    limits_ = all_limits[0];
+    sweep(sweep_factor * triangles, part);
+  }
+  while (triangles_ > triangles && limits_used_ < all_limits.size()) {
+    limits_ = all_limits[limits_used_];
+    if (heap_.empty()) {
+      // What was refused may be possible now that the surroundings have changed, or with the next limits.
+      fill_heap();
+    }
     bool progressed = false;
     for (std::size_t step = 0; triangles_ > triangles && !heap_.empty(); ++step) {
       if (step % 4096 == 0) {
-        advance(progress, static_cast<double>(start - triangles_) / work);
+        tunica::advance(part, 0.0);
       }
       progressed = collapse_cheapest() || progressed;
     }
-    if (triangles_ > triangles) {
-      // What was refused may be possible now that the surroundings have changed, or with the next limits.
-      limits += progressed ? 0 : 1;
-      fill_heap();
+    if (triangles_ > triangles && !progressed) {
+      ++limits_used_;
     }
   }
   return triangles_;
@@ -247,7 +245,14 @@ bool EdgeCollapse::collapse_cheapest() {
     heap_.set(edge, chosen->cost(penalty));
     return false;
   }
+  const Index kept = from(h);
   collapse(h, *chosen);
+  around(kept, [&](HalfEdge spoke) {
+    evaluate(half_[spoke].edge, Placement::best);
+    if (half_[previous(spoke)].twin == none) {
+      evaluate(half_[previous(spoke)].edge, Placement::best);
+    }
+  });
   return true;
 }
 
@@ -478,12 +483,6 @@ void EdgeCollapse::collapse(HalfEdge h, const Target& chosen) {
     set_outgoing(b, leaving(b, half_[next(o)].edge));
   }
   history_.push_back({given_[u], given_[v], static_cast<Index>(triangles_), centre_ + scale_ * chosen.position});
-  around(u, [&](HalfEdge spoke) {
-    evaluate(half_[spoke].edge, Placement::best);
-    if (half_[previous(spoke)].twin == none) {
-      evaluate(half_[previous(spoke)].edge, Placement::best);
-    }
-  });
 }
 
 }  // namespace tunica

@@ -77,8 +77,16 @@ private:
   static HalfEdge previous(HalfEdge h) { return h % 3 == 0 ? h + 2 : h - 1; }
   [[nodiscard]] Index from(HalfEdge h) const { return half_[h].from; }
   [[nodiscard]] Index to(HalfEdge h) const { return half_[next(h)].from; }
+  // Calls visit(h) for every half-edge that leaves the vertex, counter-clockwise.
   template <typename Visit>
-  void around(Index vertex, const Visit& visit) const;
+  void around(Index vertex, const Visit& visit) const {
+    const HalfEdge first = vertex_[vertex].outgoing;
+    HalfEdge h = first;
+    do {
+      visit(h);
+      h = half_[previous(h)].twin;
+    } while (h != none && h != first);
+  }
   template <typename Visit>
   void neighbours_of(Index vertex, const Visit& visit) const;
 
@@ -87,6 +95,10 @@ private:
   void find_boundary(const TriangleMesh& mesh);
   void sum_quadrics();
   void fill_heap();
+  void sweep(std::size_t triangles, const Progress& progress);
+  void evaluate_touched();
+  [[nodiscard]] double cost_quantile(double fraction) const;
+  void compact();
   bool collapse_cheapest();
   [[nodiscard]] std::optional<Target> target(HalfEdge h, Placement placement) const;
   [[nodiscard]] Target best_on_curve(HalfEdge h, const Quadric& q) const;
@@ -112,7 +124,10 @@ private:
   Index stamp_ = 0;
   Aim aim_;
   ShapeLimits limits_;
+  std::size_t limits_used_ = 0;
   EdgeHeap heap_;
+  std::vector<double> sweep_cost_;     // #E while sweeping: known costs, infinite where an edge cannot collapse
+  std::vector<std::uint8_t> touched_;  // #V while sweeping: changed since the last sweep
   std::size_t triangles_ = 0;
   std::vector<Collapse> history_;
 };

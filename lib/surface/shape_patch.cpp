@@ -2,6 +2,7 @@
 
 #include "surface/incidence.hpp"
 #include "surface/measure.hpp"
+#include "surface/surface_walk.hpp"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
@@ -16,7 +17,6 @@ namespace {
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr std::size_t samples_per_triangle = 40;
 constexpr std::size_t most_in_patch = 64;  // triangles of a change; larger ones are refused
-constexpr double fold_cosine = -0.5;       // neighbours may not fold more sharply, unless they did before
 
 Vec3 area_vector(const std::array<Vec3, 3>& c) { return (c[1] - c[0]).cross(c[2] - c[0]); }
 
@@ -36,15 +36,19 @@ Vec3 barycentric(const Vec3& point, const std::array<Vec3, 3>& c) {
           n.dot((c[0] - point).cross(c[1] - point)) / squared};
 }
 
+// Whether the edge from corner k of new triangle i lies between two of them.
+bool is_inner(const PatchTrial& trial, std::size_t i, std::size_t k) {
+  const Index from = trial.corners[i][k];
+  const Index to = trial.corners[i][(k + 1) % 3];
+  return std::any_of(trial.corners.begin(), trial.corners.end(), [&](const std::array<Index, 3>& c) {
+    return (c[0] == to && c[1] == from) || (c[1] == to && c[2] == from) || (c[2] == to && c[0] == from);
+  });
+}
+
 }  // namespace
 
-ShapedMesh::ShapedMesh(const TriangleMesh& mesh, const TriangleMesh& target, const ClosestPoint& tree,
-                       const BoundaryCurves& curves)
-    : mesh_(mesh), tree_(tree), curves_(curves), states_(mesh.triangles.size()) {
-  target_normal_.reserve(target.triangles.size());
-  for (const auto& [i, j, k] : target.triangles) {
-    target_normal_.push_back(area_vector({target.vertices[i], target.vertices[j], target.vertices[k]}).normalized());
-  }
+TargetSamples sample_target(const TriangleMesh& mesh, const TriangleMesh& target, const ClosestPoint& tree) {
+  TargetSamples samples;
   // The target's vertices, every n-th in the order of its tree; with few of them the triangles' centres as well.
   const std::size_t wanted = samples_per_triangle * mesh.triangles.size();
   const double per_triangle = static_cast<double>(wanted) / static_cast<double>(target.triangles.size());
@@ -54,29 +58,43 @@ ShapedMesh::ShapedMesh(const TriangleMesh& mesh, const TriangleMesh& target, con
     due = std::min(due + per_triangle, 4.0);
     const auto& c = target.triangles[t];
     if (per_triangle >= 3 && due >= 1) {
-      sample_.push_back((target.vertices[c[0]] + target.vertices[c[1]] + target.vertices[c[2]]) / 3);
+      samples.points.push_back((target.vertices[c[0]] + target.vertices[c[1]] + target.vertices[c[2]]) / 3);
       due -= 1;
     }
     for (const Index v : c) {
       if (due >= 1 && !taken[v]) {
         taken[v] = true;
-        sample_.push_back(target.vertices[v]);
+        samples.points.push_back(target.vertices[v]);
         due -= 1;
       }
     }
   }
-  attach_samples(mesh);
-  find_places();
-}
-
-void ShapedMesh::attach_samples(const TriangleMesh& mesh) {
   const ClosestPoint own(mesh);
   std::optional<Index> guess;
-  for (std::size_t s = 0; s < sample_.size(); ++s) {
-    const auto hit = guess ? own.closest(sample_[s], *guess) : own.closest(sample_[s]);
-    guess = hit.triangle;
-    states_[hit.triangle].samples.push_back(static_cast<Index>(s));
+  for (const Vec3& p : samples.points) {
+    guess = (guess ? own.closest(p, *guess) : own.closest(p)).triangle;
+    samples.owner.push_back(*guess);
   }
+  samples.near.assign(mesh.triangles.size(), 0);
+  return samples;
+}
+
+ShapedMesh::ShapedMesh(const TriangleMesh& mesh, const TriangleMesh& target, NearestPoint nearest,
+                       TargetSamples samples, const BoundaryCurves& curves, const NearestPoint& first)
+    : mesh_(mesh),
+      target_(target),
+      nearest_(std::move(nearest)),
+      curves_(curves),
+      sample_(std::move(samples.points)),
+      states_(mesh.triangles.size()) {
+  for (std::size_t t = 0; t < states_.size(); ++t) {
+    states_[t].guess = samples.near[t];
+  }
+  for (std::size_t s = 0; s < sample_.size(); ++s) {
+    states_[samples.owner[s]].samples.push_back(static_cast<Index>(s));
+  }
+  measure_all(first);
+  find_places();
 }
 
 void ShapedMesh::find_places() {
@@ -101,7 +119,7 @@ void ShapedMesh::set_weights(const ShapeWeights& weights) {
   weights_ = weights;
   for (std::size_t t = 0; t < states_.size(); ++t) {
     if (mesh_.is_alive(static_cast<Index>(t))) {
-      refresh(static_cast<Index>(t));
+      states_[t].cost = shape_cost(corners(mesh_.triangles[t], {})) + error_cost(states_[t].error);
     }
   }
 }
@@ -119,6 +137,21 @@ double ShapedMesh::smallest_angle(Index t) const {
   return smallest_angle_degrees(c[0], c[1], c[2]);
 }
 
+std::optional<Vec3> ShapedMesh::farthest_sample(Index t) const {
+  const auto c = corners(mesh_.triangles[t], {});
+  const FlatTriangle flat(c[0], c[1], c[2]);
+  std::optional<Vec3> farthest;
+  double most = -1;
+  for (const Index s : states_[t].samples) {
+    const double squared = flat.squared_distance(sample_[s]);
+    if (squared > most) {
+      most = squared;
+      farthest = sample_[s];
+    }
+  }
+  return farthest;
+}
+
 double ShapedMesh::shape_cost(const std::array<Vec3, 3>& c) const {
   const double quality = radius_ratio(c[0], c[1], c[2]);
   double cost = weights_.quality * (1 - quality);
@@ -131,32 +164,93 @@ double ShapedMesh::shape_cost(const std::array<Vec3, 3>& c) const {
 }
 
 double ShapedMesh::error_cost(double error) const {
-  const double squared = error * error / (weights_.error * weights_.error);
-  return squared * squared;
-}
-
-double ShapedMesh::distance_to_target(const std::array<Vec3, 3>& c, Index& guess, bool& faces_away) const {
-  const Vec3 centre = (c[0] + c[1] + c[2]) / 3;
-  const auto hit = tree_.closest(centre, guess);
-  guess = hit.triangle;
-  faces_away = area_vector(c).dot(target_normal_[hit.triangle]) < 0;
-  double squared = hit.squared_distance;
-  for (std::size_t k = 0; k < 3; ++k) {
-    squared = std::max(squared, tree_.closest(c[k], guess).squared_distance);
-    squared = std::max(squared, tree_.closest(0.5 * (c[k] + c[(k + 1) % 3]), guess).squared_distance);
+  double cost = error / weights_.error;
+  for (int i = 0; i < weights_.doublings; ++i) {
+    cost *= cost;
   }
-  return std::sqrt(squared);
+  return cost;
 }
 
-void ShapedMesh::refresh(Index t) {
-  const auto c = corners(mesh_.triangles[t], {});
-  bool faces_away = false;
-  double error = distance_to_target(c, states_[t].guess, faces_away);
+bool ShapedMesh::faces_away(const std::array<Vec3, 3>& c, Index guess) const {
+  const auto& [i, j, k] = target_.triangles[guess];
+  return area_vector(c).dot(area_vector({target_.vertices[i], target_.vertices[j], target_.vertices[k]})) < 0;
+}
+
+double ShapedMesh::squared_of_samples(Index t, const std::array<Vec3, 3>& c) const {
+  const FlatTriangle flat(c[0], c[1], c[2]);
+  double squared = 0;
   for (const Index s : states_[t].samples) {
-    error = std::max(error, (sample_[s] - closest_point_on_triangle(sample_[s], c[0], c[1], c[2])).norm());
+    squared = std::max(squared, flat.squared_distance(sample_[s]));
   }
-  states_[t].error = error;
-  states_[t].cost = shape_cost(c) + error_cost(error);
+  return squared;
+}
+
+/// The errors of all triangles: at their centre and corners, in the middle of their edges (an inner edge counts for one
+/// of its triangles), and of their samples.
+void ShapedMesh::measure_all(const NearestPoint& nearest) {
+  vertex_error_.assign(mesh_.positions.size(), -1);
+  for (std::size_t t = 0; t < states_.size(); ++t) {
+    const auto& triangle = mesh_.triangles[t];
+    const auto c = corners(triangle, {});
+    State& state = states_[t];
+    const auto hit = nearest((c[0] + c[1] + c[2]) / 3, state.guess);
+    state.guess = hit.triangle;
+    double squared = std::max(hit.squared_distance, squared_of_samples(static_cast<Index>(t), c));
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Index v = triangle[k];
+      const Index w = triangle[(k + 1) % 3];
+      if (vertex_error_[v] < 0) {
+        vertex_error_[v] = std::sqrt(nearest(c[k], state.guess).squared_distance);
+      }
+      squared = std::max(squared, vertex_error_[v] * vertex_error_[v]);
+      if (v < w || mesh_.on_edge(v, w)[1] == EditMesh::none) {
+        squared = std::max(squared, nearest(0.5 * (c[k] + c[(k + 1) % 3]), state.guess).squared_distance);
+      }
+    }
+    state.error = std::sqrt(squared);
+  }
+}
+
+/// At a fourth, half and three fourths of all edges, and at the four points between these.
+double ShapedMesh::squared_within(const std::array<Vec3, 3>& c, Index guess) const {
+  constexpr int parts = 4;
+  double squared = squared_distance((c[0] + c[1] + c[2]) / 3, guess);
+  for (int i = 0; i <= parts; ++i) {
+    for (int j = 0; i + j <= parts; ++j) {
+      const bool corner = i == parts || j == parts || i + j == 0;
+      if (!corner) {
+        const Vec3 p = c[0] + (static_cast<double>(i) * (c[1] - c[0]) + static_cast<double>(j) * (c[2] - c[0])) / parts;
+        squared = std::max(squared, squared_distance(p, guess));
+      }
+    }
+  }
+  return squared;
+}
+
+void ShapedMesh::measure(Index t) {
+  const auto c = corners(mesh_.triangles[t], {});
+  State& state = states_[t];
+  double squared = std::max(squared_within(c, state.guess), squared_of_samples(t, c));
+  for (std::size_t k = 0; k < 3; ++k) {
+    double& error = vertex_error_[mesh_.triangles[t][k]];
+    error = std::sqrt(squared_distance(c[k], state.guess));
+    squared = std::max(squared, error * error);
+  }
+  state.error = std::sqrt(squared);
+  state.cost = shape_cost(c) + error_cost(state.error);
+}
+
+double ShapedMesh::measure_within(PatchTrial& trial) const {
+  double most = 0;
+  for (std::size_t i = 0; i < trial.corners.size(); ++i) {
+    const double within = std::sqrt(squared_within(corners(trial.corners[i], trial), trial.guess[i]));
+    if (within > trial.error[i]) {
+      trial.cost[i] += error_cost(within) - error_cost(trial.error[i]);
+      trial.error[i] = within;
+    }
+    most = std::max(most, trial.error[i]);
+  }
+  return most;
 }
 
 void ShapedMesh::make_move(Index vertex, const Vec3& position, PatchTrial& trial) const {
@@ -226,6 +320,15 @@ void ShapedMesh::make_split(Index u, Index v, PatchTrial& trial) const {
   }
 }
 
+void ShapedMesh::make_centre_split(Index t, PatchTrial& trial) const {
+  const auto& c = mesh_.triangles[t];
+  trial.removed = {t};
+  trial.moved = static_cast<Index>(mesh_.positions.size());
+  const Vec3 centre = (mesh_.positions[c[0]] + mesh_.positions[c[1]] + mesh_.positions[c[2]]) / 3;
+  trial.position = nearest_(centre, states_[t].guess).point;
+  trial.corners = {{c[0], c[1], trial.moved}, {c[1], c[2], trial.moved}, {c[2], c[0], trial.moved}};
+}
+
 bool ShapedMesh::folds(const PatchTrial& trial) const {
   // Sharpest fold of the old patch with its surroundings, and whether the new one has a sharper one.
   const auto normal_of = [&](Index t) { return area_vector(corners(mesh_.triangles[t], {})); };
@@ -239,7 +342,7 @@ bool ShapedMesh::folds(const PatchTrial& trial) const {
       }
     }
   }
-  const double limit = std::min(fold_cosine, before);
+  const double limit = std::min(weights_.fold_cosine, before);
   std::array<Vec3, most_in_patch> normals;
   const std::size_t count = trial.corners.size();
   for (std::size_t i = 0; i < count; ++i) {
@@ -283,7 +386,7 @@ double ShapedMesh::evaluate(PatchTrial& trial, double limit) const {
     before += states_[t].cost;
     most_error = std::max(most_error, states_[t].error);
     trial.samples.insert(trial.samples.end(), states_[t].samples.begin(), states_[t].samples.end());
-    faced_away = faced_away || area_vector(corners(mesh_.triangles[t], {})).dot(target_normal_[states_[t].guess]) < 0;
+    faced_away = faced_away || faces_away(corners(mesh_.triangles[t], {}), states_[t].guess);
   }
   const double allowed = before + limit;
   double total = 0;
@@ -294,19 +397,39 @@ double ShapedMesh::evaluate(PatchTrial& trial, double limit) const {
   trial.cost.assign(count, 0);
   trial.error.assign(count, 0);
   trial.guess.assign(count, states_[trial.removed[0]].guess);
+  std::array<std::array<Vec3, 3>, most_in_patch> c;
   for (std::size_t i = 0; i < count; ++i) {
-    trial.cost[i] = shape_cost(corners(trial.corners[i], trial));
+    c[i] = corners(trial.corners[i], trial);
+    trial.cost[i] = shape_cost(c[i]);
     total += trial.cost[i];
   }
   if (total >= allowed || folds(trial)) {
     return infinity;
   }
-  for (std::size_t i = 0; i < count; ++i) {
-    bool faces_away = false;
-    trial.error[i] = distance_to_target(corners(trial.corners[i], trial), trial.guess[i], faces_away);
-    if (faces_away && !faced_away) {
+  if (trial.moved != EditMesh::none) {
+    trial.moved_error = std::sqrt(squared_distance(trial.position, trial.guess[0]));
+    if (trial.moved_error > most_error) {
       return infinity;
     }
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto hit = nearest_((c[i][0] + c[i][1] + c[i][2]) / 3, trial.guess[i]);
+    trial.guess[i] = hit.triangle;
+    if (!faced_away && faces_away(c[i], hit.triangle)) {
+      return infinity;
+    }
+    double squared = hit.squared_distance;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Index v = trial.corners[i][k];
+      const Index w = trial.corners[i][(k + 1) % 3];
+      const double at_corner = v == trial.moved ? trial.moved_error : vertex_error_[v];
+      squared = std::max(squared, at_corner * at_corner);
+      // The middle of an edge within the patch counts for one of its triangles.
+      if (v < w || !is_inner(trial, i, k)) {
+        squared = std::max(squared, squared_distance(0.5 * (c[i][k] + c[i][(k + 1) % 3]), hit.triangle));
+      }
+    }
+    trial.error[i] = std::sqrt(squared);
     total += error_cost(trial.error[i]);
     if (total >= allowed || trial.error[i] > most_error) {
       return infinity;
@@ -314,16 +437,17 @@ double ShapedMesh::evaluate(PatchTrial& trial, double limit) const {
   }
   // Every sample goes to the nearest of the new triangles. The two-sided error cost of a triangle grows with the
   // farther one of the two sides.
-  std::array<std::array<Vec3, 3>, most_in_patch> c;
+  std::vector<FlatTriangle> flat;
+  flat.reserve(count);
   for (std::size_t i = 0; i < count; ++i) {
-    c[i] = corners(trial.corners[i], trial);
+    flat.emplace_back(c[i][0], c[i][1], c[i][2]);
   }
   trial.owner.resize(trial.samples.size());
   for (std::size_t s = 0; s < trial.samples.size(); ++s) {
     const Vec3& p = sample_[trial.samples[s]];
     double least = infinity;
     for (std::size_t i = 0; i < count; ++i) {
-      const double squared = (p - closest_point_on_triangle(p, c[i][0], c[i][1], c[i][2])).squaredNorm();
+      const double squared = flat[i].squared_distance(p);
       if (squared < least) {
         least = squared;
         trial.owner[s] = static_cast<Index>(i);
@@ -349,9 +473,10 @@ void ShapedMesh::commit(const PatchTrial& trial) {
   const bool is_new = trial.moved == mesh_.positions.size();
   if (is_new) {
     const auto& first = trial.corners[0];
-    // Of a boundary edge only one triangle was cut.
-    const bool boundary = trial.removed.size() == 1;
+    // Of a boundary edge only one triangle was cut, in two.
+    const bool boundary = trial.removed.size() == 1 && trial.corners.size() == 2;
     mesh_.add_vertex(trial.position, boundary);
+    vertex_error_.push_back(trial.moved_error);
     BoundaryCurves::Place place;
     if (boundary) {
       for (const Index v : first) {
@@ -363,6 +488,7 @@ void ShapedMesh::commit(const PatchTrial& trial) {
     places_.push_back(place);
   } else if (trial.moved != EditMesh::none) {
     mesh_.positions[trial.moved] = trial.position;
+    vertex_error_[trial.moved] = trial.moved_error;
     if (mesh_.on_boundary[trial.moved] != 0) {
       places_[trial.moved] = curves_.nearest(trial.position, places_[trial.moved].curve);
     }
@@ -476,7 +602,7 @@ Vec3 ShapedMesh::middle(Index u, Index v) const {
   const auto on = mesh_.on_edge(u, v);
   if (on[0] != EditMesh::none && on[1] != EditMesh::none) {
     const Vec3 x = 0.5 * (mesh_.positions[u] + mesh_.positions[v]);
-    return tree_.closest(x, states_[on[0]].guess).point;
+    return nearest_(x, states_[on[0]].guess).point;
   }
   const bool forward = on[0] != EditMesh::none;  // the triangle, and so the curve, runs from u to v
   return curves_.point(curves_.between(places_[forward ? u : v], places_[forward ? v : u], 0.5));

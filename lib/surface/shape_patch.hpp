@@ -4,16 +4,21 @@
 #include "surface/closest_point.hpp"
 #include "surface/edit_mesh.hpp"
 
+#include <functional>
+#include <optional>
+
 namespace tunica {
 
 /// What a triangle is charged for. Errors and shapes are weighed against each other by `error` and the two weights.
 struct ShapeWeights {
   /// mm: no triangle may get a larger error than this, unless one that it replaces had it.
   double most_error = std::numeric_limits<double>::infinity();
-  double error = 1;         ///< mm: what counts as a large error; it enters by its fourth power
-  double quality = 0.3;     ///< of 1 - radius ratio
-  double angle = 30;        ///< of the squared lack of angle, relative to the one wanted
-  double angle_wanted = 0;  ///< degrees
+  double error = 1;           ///< mm: what counts as a large error
+  int doublings = 2;          ///< the error enters by the power 2^doublings
+  double quality = 0.3;       ///< of 1 - radius ratio
+  double angle = 30;          ///< of the squared lack of angle, relative to the one wanted
+  double angle_wanted = 0;    ///< degrees
+  double fold_cosine = -0.5;  ///< neighbours may not fold more sharply, unless they did before
 };
 
 /// A local change of a mesh: these triangles go, those come, one vertex moves (or is new).
@@ -26,31 +31,59 @@ struct PatchTrial {
   // Filled in by the evaluation.
   std::vector<double> error, cost;  ///< of each new triangle
   std::vector<Index> guess;
+  double moved_error = 0;             ///< of the vertex that moves
   std::vector<Index> samples, owner;  ///< the target's points of the patch, and the new triangle each belongs to
 };
+
+/// Answers which point of the target is closest to p; the triangle named is probably near it.
+using NearestPoint = std::function<ClosestPoint::Hit(const Vec3& p, Index near)>;
+
+/// Points of the target that a mesh is to be close to.
+struct TargetSamples {
+  std::vector<Vec3> points;
+  std::vector<Index> owner;  ///< the mesh's triangle closest to each
+  std::vector<Index> near;   ///< #F of the mesh: a triangle of the target near it
+};
+
+/// About 40 points for each triangle of the mesh, if the target has as many vertices; with few of them the triangles'
+/// centres as well. @param tree over the target
+TargetSamples sample_target(const TriangleMesh& mesh, const TriangleMesh& target, const ClosestPoint& tree);
 
 /// A mesh beside its target: how far apart they are, triangle by triangle, both ways by points, and what local changes
 /// would make of it. Errors are of points, no bounds: what is made with them is certified afterwards.
 class ShapedMesh {
 public:
-  /// @param target  of the tree; must live as long
-  ShapedMesh(const TriangleMesh& mesh, const TriangleMesh& target, const ClosestPoint& tree,
-             const BoundaryCurves& curves);
+  /// @param target   must live as long
+  /// @param nearest  on the target
+  /// @param first    with it the errors are measured at the start: may be quicker and too large, see measure()
+  ShapedMesh(const TriangleMesh& mesh, const TriangleMesh& target, NearestPoint nearest, TargetSamples samples,
+             const BoundaryCurves& curves, const NearestPoint& first);
 
   void set_weights(const ShapeWeights& weights);
   [[nodiscard]] const ShapeWeights& weights() const { return weights_; }
+  /// Changes `most_error` alone.
+  void limit_error(double most_error) { weights_.most_error = most_error; }
 
   [[nodiscard]] const EditMesh& mesh() const { return mesh_; }
   [[nodiscard]] double error(Index t) const { return states_[t].error; }
+  /// The point of the target that is farthest from triangle t, of those that belong to it.
+  [[nodiscard]] std::optional<Vec3> farthest_sample(Index t) const;
   [[nodiscard]] double cost(Index t) const { return states_[t].cost; }
   [[nodiscard]] double smallest_angle(Index t) const;
   [[nodiscard]] const BoundaryCurves::Place& place(Index vertex) const { return places_[vertex]; }
+
+  /// Measures a triangle again, also within.
+  void measure(Index t);
+
+  /// Measures the new triangles of an evaluated trial also within. @return the largest error
+  double measure_within(PatchTrial& trial) const;
 
   /// Changes to try. Each clears the trial first; false where the topology forbids it.
   void make_move(Index vertex, const Vec3& position, PatchTrial& trial) const;
   [[nodiscard]] bool make_flip(Index u, Index v, PatchTrial& trial) const;
   [[nodiscard]] bool make_collapse(Index u, Index v, PatchTrial& trial) const;
   void make_split(Index u, Index v, PatchTrial& trial) const;
+  void make_centre_split(Index t, PatchTrial& trial) const;
 
   /// What the change costs, less what there is now: infinite where it folds the mesh over or costs more than `limit`.
   double evaluate(PatchTrial& trial, double limit) const;
@@ -64,6 +97,11 @@ public:
 
   /// The same for the moved vertex of an evaluated trial.
   [[nodiscard]] Vec3 proposal(const PatchTrial& trial, double pull) const;
+
+  /// The point of the target closest to a vertex.
+  [[nodiscard]] Vec3 foot(Index vertex) const {
+    return nearest_(mesh_.positions[vertex], states_[mesh_.around[vertex][0]].guess).point;
+  }
 
   /// A place on the boundary for a boundary vertex: the given fraction of the way between its neighbours there.
   [[nodiscard]] Vec3 slide(Index vertex, double fraction) const;
@@ -84,17 +122,22 @@ private:
   [[nodiscard]] double shape_cost(const std::array<Vec3, 3>& corners) const;
   [[nodiscard]] double error_cost(double error) const;
   [[nodiscard]] bool folds(const PatchTrial& trial) const;
-  [[nodiscard]] double distance_to_target(const std::array<Vec3, 3>& corners, Index& guess, bool& faces_away) const;
-  void refresh(Index t);
-  void attach_samples(const TriangleMesh& mesh);
+  [[nodiscard]] bool faces_away(const std::array<Vec3, 3>& corners, Index guess) const;
+  [[nodiscard]] double squared_distance(const Vec3& p, Index guess) const {
+    return nearest_(p, guess).squared_distance;
+  }
+  [[nodiscard]] double squared_within(const std::array<Vec3, 3>& corners, Index guess) const;
+  [[nodiscard]] double squared_of_samples(Index t, const std::array<Vec3, 3>& corners) const;
+  void measure_all(const NearestPoint& nearest);
   void find_places();
 
   EditMesh mesh_;
-  const ClosestPoint& tree_;
+  const TriangleMesh& target_;
+  NearestPoint nearest_;
   const BoundaryCurves& curves_;
   ShapeWeights weights_;
   std::vector<Vec3> sample_;
-  std::vector<Vec3> target_normal_;  // #F of the target, unit
+  std::vector<double> vertex_error_;  // #V distance of each vertex to the target
   std::vector<State> states_;
   std::vector<BoundaryCurves::Place> places_;
 };

@@ -27,8 +27,10 @@ constexpr double crease_cosine = 0.5;
 class Shaper {
 public:
   Shaper(const TriangleMesh& mesh, const TriangleMesh& target, const ClosestPoint& tree, const BoundaryCurves& curves,
-         const ShapingOptions& options)
-      : state_(mesh, target, tree, curves), tree_(tree), options_(options) {
+         const ShapingOptions& options, const NearestPoint& nearest)
+      : state_(mesh, target, nearest, sample_target(mesh, target, tree), curves, nearest),
+        tree_(tree),
+        options_(options) {
     weights_.error = 1e-3 * diagonal(target);
     weights_.most_error = 0.01 * diagonal(target);
     weights_.angle_wanted = safe_angle * options.min_angle;
@@ -473,7 +475,8 @@ bool has_sharp_sector(const TriangleMesh& mesh, Index v, std::span<const Index> 
 TriangleMesh shaped(const TriangleMesh& mesh, const TriangleMesh& target, const ClosestPoint& tree,
                     const ShapingOptions& options) {
   const BoundaryCurves curves(target);
-  return Shaper(mesh, target, tree, curves, options).run();
+  const NearestPoint nearest = [&tree](const Vec3& p, Index near) { return tree.closest(p, near); };
+  return Shaper(mesh, target, tree, curves, options, nearest).run();
 }
 
 double smallest_free_angle(const TriangleMesh& mesh, const TriangleMesh& target, double limit) {

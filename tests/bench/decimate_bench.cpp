@@ -6,7 +6,7 @@
 //
 // Prints a line per mesh and count: two-sided certified distance in % of the diagonal, smallest angle, mean quality,
 // triangles facing away from both neighbours' side, median CPU milliseconds, and the ratios.
-#include "cgal_mesh.hpp"
+#include "cgal_decimate.hpp"
 #include "core/error.hpp"
 #include "core/threads.hpp"
 #include "io/mesh_file.hpp"
@@ -15,10 +15,6 @@
 #include "surface/hausdorff.hpp"
 #include "surface/measure.hpp"
 
-#include <CGAL/Simple_cartesian.h>
-#include <CGAL/Surface_mesh_simplification/Policies/Edge_collapse/Bounded_normal_change_placement.h>
-#include <CGAL/Surface_mesh_simplification/Policies/Edge_collapse/GarlandHeckbert_plane_policies.h>
-#include <CGAL/Surface_mesh_simplification/edge_collapse.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -27,46 +23,8 @@
 #include <functional>
 
 using namespace tunica;
-namespace sms = CGAL::Surface_mesh_simplification;
-using Kernel = CGAL::Simple_cartesian<double>;
-using CgalMesh = CGAL::Surface_mesh<Kernel::Point_3>;
 
 namespace {
-
-struct StopAtFaces {
-  std::size_t faces;
-  template <typename Cost, typename Profile>
-  bool operator()(const Cost& /*cost*/, const Profile& profile, std::size_t /*first*/, std::size_t /*edges*/) const {
-    return profile.surface_mesh().number_of_faces() <= faces;
-  }
-};
-
-TriangleMesh from_cgal(CgalMesh& mesh) {
-  mesh.collect_garbage();
-  TriangleMesh result;
-  for (const auto v : mesh.vertices()) {
-    const auto& p = mesh.point(v);
-    result.vertices.emplace_back(p.x(), p.y(), p.z());
-  }
-  for (const auto f : mesh.faces()) {
-    std::array<Index, 3> corners{};
-    std::size_t k = 0;
-    for (const auto v : mesh.vertices_around_face(mesh.halfedge(f))) {
-      corners[k++] = static_cast<Index>(v);
-    }
-    result.triangles.push_back(corners);
-  }
-  return result;
-}
-
-TriangleMesh garland_heckbert(CgalMesh mesh, std::size_t triangles) {
-  using Policies = sms::GarlandHeckbert_plane_policies<CgalMesh, Kernel>;
-  const Policies policies(mesh);
-  const auto& cost = policies.get_cost();
-  const sms::Bounded_normal_change_placement<typename Policies::Get_placement> placement(policies.get_placement());
-  sms::edge_collapse(mesh, StopAtFaces{triangles}, CGAL::parameters::get_cost(cost).get_placement(placement));
-  return from_cgal(mesh);
-}
 
 double cpu_milliseconds(const std::function<void()>& work) {
   const std::clock_t start = std::clock();
@@ -102,7 +60,7 @@ void print(const char* who, const Measured& m) {
 void compare(const std::string& path, std::size_t count, std::size_t rounds, const std::optional<double>& angle,
              bool with_peer) {
   const TriangleMesh mesh = read_mesh(path, 1.0, false).mesh;
-  const CgalMesh given = to_cgal<CgalMesh>(mesh);
+  const SimpleCgalMesh given = to_cgal<SimpleCgalMesh>(mesh);
   Measured own, shaped, peer;
   DecimateOptions options;
   options.triangles = count;

@@ -1,0 +1,397 @@
+#include "surface/levelling.hpp"
+
+#include "surface/measure.hpp"
+#include "surface/shape_patch.hpp"
+#include "surface/surface_walk.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <optional>
+#include <queue>
+
+namespace tunica {
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr int doublings = 4;             // errors count by their 16th power: nearly the largest alone
+constexpr double least_gain = 0.15;      // of the worst triangle's cost, for a change to be made
+constexpr double collapse_share = 0.85;  // of the largest error, at most, may a collapse leave
+constexpr double renew_share = 0.8;      // of the error that costs refer to, below which they are computed anew
+constexpr double certain_share = 0.5;  // of the largest squared error: points that look farther off are looked at again
+constexpr double least_angle = 3;      // degrees: thinner triangles cost something
+constexpr double most_parts = 8;       // into which the edges of a large triangle of the target are cut
+constexpr std::size_t many_vertices = 24;  // per triangle of the mesh: no more are looked at
+// Work is counted in distances between a point and a triangle.
+constexpr std::size_t work_per_query = 30;
+std::size_t work_of(const PatchTrial& trial) {
+  return trial.corners.size() * (trial.samples.size() + 3 * work_per_query);
+}
+constexpr std::size_t least_work = 200'000;
+constexpr std::size_t work_per_triangle = 25;  // of the target
+
+/// The target's points that the mesh is to be close to, each with the triangle of the mesh nearest to it. Most owners
+/// come from the neighbourhood of the vertex that the point was merged into; those of points that look far off are
+/// certain.
+class Sampling {
+public:
+  Sampling(const TriangleMesh& mesh, const TriangleMesh& target, const std::vector<Index>& stands_for)
+      : mesh_(mesh), target_(target), walk_(mesh), tree_(mesh), vertex_(target.vertices.size()) {
+    start_.resize(mesh.vertices.size());
+    for (Index t = 0; t < mesh.triangles.size(); ++t) {
+      for (const Index v : mesh.triangles[t]) {
+        start_[v] = t;
+      }
+    }
+    add_vertices(stands_for);
+    add_within(stands_for);
+    look_again();
+  }
+
+  TargetSamples samples() && { return std::move(samples_); }
+
+private:
+  struct Found {
+    Index owner = 0;
+    double squared = -1;
+  };
+
+  void add(const Vec3& p, const Found& found) {
+    samples_.points.push_back(p);
+    samples_.owner.push_back(found.owner);
+    squared_.push_back(found.squared);
+  }
+
+  void add_vertices(const std::vector<Index>& stands_for) {
+    std::vector<Index> represents(mesh_.vertices.size(), 0);
+    const std::size_t stride = 1 + target_.vertices.size() / (many_vertices * mesh_.triangles.size());
+    for (Index t = 0; t < target_.triangles.size(); ++t) {
+      for (const Index v : target_.triangles[t]) {
+        if (v % stride == 0 && vertex_[v].squared < 0) {
+          represents[stands_for[v]] = t;
+          const Vec3& p = target_.vertices[v];
+          const auto hit = walk_.near_by(p, start_[stands_for[v]]);
+          vertex_[v] = {hit.triangle, hit.squared_distance};
+          add(p, vertex_[v]);
+        }
+      }
+    }
+    for (const auto& c : mesh_.triangles) {
+      samples_.near.push_back(represents[c[0]]);
+    }
+  }
+
+  // Target triangles that are as large as the mesh's need points within. Their mean edge is 1.5 steps long.
+  void add_within(const std::vector<Index>& stands_for) {
+    const double step = std::sqrt(area(mesh_) / static_cast<double>(mesh_.triangles.size()));
+    for (const auto& c : target_.triangles) {
+      const std::array<Vec3, 3> p{target_.vertices[c[0]], target_.vertices[c[1]], target_.vertices[c[2]]};
+      const double longest =
+          std::sqrt(std::max({(p[1] - p[0]).squaredNorm(), (p[2] - p[1]).squaredNorm(), (p[0] - p[2]).squaredNorm()}));
+      if (longest <= step) {
+        continue;
+      }
+      const int parts = static_cast<int>(std::min(std::ceil(longest / step), most_parts));
+      for (int i = 0; i <= parts; ++i) {
+        for (int j = i == 0 ? 1 : 0; i + j <= parts && i < parts && j < parts; ++j) {
+          const Vec3 x =
+              p[0] + (static_cast<double>(i) * (p[1] - p[0]) + static_cast<double>(j) * (p[2] - p[0])) / parts;
+          const auto hit = walk_.near_by(x, start_[stands_for[c[0]]]);
+          add(x, {hit.triangle, hit.squared_distance});
+        }
+      }
+    }
+  }
+
+  void look_again() {
+    std::vector<Index> order(squared_.size());
+    std::iota(order.begin(), order.end(), Index{0});
+    std::sort(order.begin(), order.end(),
+              [&](Index l, Index r) { return squared_[l] > squared_[r] || (squared_[l] == squared_[r] && l < r); });
+    double certain = 0;
+    for (const Index s : order) {
+      if (squared_[s] < certain_share * certain) {
+        break;
+      }
+      const auto hit = tree_.closest(samples_.points[s], samples_.owner[s]);
+      if (hit.squared_distance < squared_[s]) {
+        squared_[s] = hit.squared_distance;
+        samples_.owner[s] = hit.triangle;
+      }
+      certain = std::max(certain, squared_[s]);
+    }
+  }
+
+  const TriangleMesh& mesh_;
+  const TriangleMesh& target_;
+  SurfaceWalk walk_;
+  ClosestPoint tree_;
+  std::vector<Index> start_;   // #V of the mesh: a triangle around each vertex
+  std::vector<Found> vertex_;  // #V of the target
+  std::vector<double> squared_;
+  TargetSamples samples_;
+};
+
+class Leveller {
+public:
+  Leveller(const TriangleMesh& mesh, const TriangleMesh& target, const SurfaceWalk& walk, const BoundaryCurves& curves,
+           const LevellingOptions& options)
+      : state_(
+            mesh, target, [&walk](const Vec3& p, Index near) { return walk.closest(p, near); },
+            Sampling(mesh, target, options.stands_for).samples(), curves,
+            [&walk](const Vec3& p, Index near) { return walk.near_by(p, near); }),
+        options_(options),
+        certain_(mesh.triangles.size(), 0),
+        work_left_(std::max(least_work, work_per_triangle * target.triangles.size())) {
+    weights_.error = infinity;
+    weights_.doublings = doublings;
+    weights_.quality = 1e-4;
+    weights_.angle = 1;
+    weights_.angle_wanted = least_angle;
+    weights_.most_error = 0;
+    weights_.fold_cosine = -0.9;
+  }
+
+  TriangleMesh run() {
+    for (Index t = 0; t < mesh().triangles.size(); ++t) {
+      queue_.push({state_.error(t), t});
+    }
+    while (work_left_ > 0 && !queue_.empty()) {
+      const auto [error, t] = queue_.top();
+      if (!mesh().is_alive(t) || state_.error(t) != error) {
+        queue_.pop();
+        continue;
+      }
+      if (certain_[t] == 0) {
+        queue_.pop();
+        certain_[t] = 1;
+        spend(12 * work_per_query);
+        state_.measure(t);
+        queue_.push({state_.error(t), t});
+        continue;
+      }
+      if (!(error > 0)) {
+        break;
+      }
+      if (error < renew_share * weights_.error || error > weights_.error) {
+        weights_.error = error;
+        state_.set_weights(weights_);
+      }
+      if (!mend(t)) {
+        break;
+      }
+    }
+    return state_.mesh().mesh();
+  }
+
+private:
+  struct Worst {
+    double error;
+    Index triangle;
+    friend bool operator<(const Worst& l, const Worst& r) {
+      return l.error < r.error || (l.error == r.error && l.triangle > r.triangle);
+    }
+  };
+  [[nodiscard]] const EditMesh& mesh() const { return state_.mesh(); }
+
+  void spend(std::size_t work) { work_left_ -= std::min(work_left_, work); }
+
+  double evaluate(PatchTrial& trial, double limit) {
+    const double cost = state_.evaluate(trial, limit);
+    spend(work_of(trial));
+    return cost;
+  }
+
+  bool mend(Index t) {
+    error_ = state_.error(t);
+    least_gain_ = least_gain * state_.cost(t);
+    farthest_ = state_.farthest_sample(t);
+    return flip(t) || move(t) || collapse(t) || split(t);
+  }
+
+  // The best of several trials, and then it is done.
+  void begin() {
+    best_cost_ = -least_gain_;
+    found_ = false;
+  }
+  void consider() {
+    const double cost = evaluate(trial_, best_cost_);
+    if (!(cost < best_cost_)) {
+      return;
+    }
+    spend(10 * work_per_query * trial_.corners.size());
+    if (state_.measure_within(trial_) < error_) {
+      best_cost_ = cost;
+      std::swap(trial_, best_);
+      found_ = true;
+    }
+  }
+  bool finish() {
+    if (found_) {
+      accept(best_);
+    }
+    return found_;
+  }
+
+  void accept(const PatchTrial& trial) {
+    state_.commit(trial);
+    certain_.resize(mesh().triangles.size(), 0);
+    for (const auto& c : trial.corners) {
+      for (const Index t : mesh().around[c[0]]) {
+        if (mesh().triangles[t] == c) {
+          certain_[t] = 1;
+          queue_.push({state_.error(t), t});
+        }
+      }
+    }
+  }
+
+  bool flip(Index t) {
+    const auto c = mesh().triangles[t];
+    begin();
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (state_.make_flip(c[k], c[(k + 1) % 3], trial_)) {
+        consider();
+      }
+    }
+    return finish();
+  }
+
+  bool move(Index t) {
+    const auto c = mesh().triangles[t];
+    begin();
+    for (const Index v : c) {
+      if (mesh().on_boundary[v] != 0) {
+        for (const double fraction : {0.5, 0.4, 0.6}) {
+          consider_move(v, state_.slide(v, fraction));
+        }
+        continue;
+      }
+      const Vec3 here = mesh().positions[v];
+      places_ = {state_.proposal(v, 0.001), state_.proposal(v, 0.03), state_.foot(v)};
+      if (farthest_) {
+        places_.push_back(*farthest_);
+      }
+      for (const Vec3& there : places_) {
+        consider_move(v, there);
+        consider_move(v, 0.5 * (here + there));
+      }
+    }
+    return finish();
+  }
+
+  void consider_move(Index v, const Vec3& place) {
+    state_.make_move(v, place, trial_);
+    consider();
+  }
+
+  bool collapse(Index t) {
+    const auto c = mesh().triangles[t];
+    begin();
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (state_.make_collapse(c[k], c[(k + 1) % 3], trial_)) {
+        consider_places(mesh().on_boundary[trial_.moved] == 0);
+      }
+    }
+    return finish();
+  }
+
+  bool split(Index t) {
+    while (mesh().alive + 2 > options_.triangles) {
+      if (!collapse_cheaply()) {
+        return false;
+      }
+      if (!mesh().is_alive(t)) {
+        return true;
+      }
+    }
+    const auto c = mesh().triangles[t];
+    begin();
+    for (std::size_t k = 0; k < 3; ++k) {
+      state_.make_split(c[k], c[(k + 1) % 3], trial_);
+      consider_places(trial_.removed.size() == 2);
+    }
+    state_.make_centre_split(t, trial_);
+    consider_places(true);
+    return finish();
+  }
+
+  // The trial as it is, and with its vertex at other places, if it is free.
+  void consider_places(bool free) {
+    state_.limit_error(infinity);
+    PatchTrial first = trial_;
+    const double cost = evaluate(first, infinity);
+    state_.limit_error(0);
+    if (!(cost < infinity)) {
+      return;
+    }
+    consider();
+    if (!free) {
+      return;
+    }
+    places_ = {state_.proposal(first, 0.001), state_.proposal(first, 0.03)};
+    if (farthest_) {
+      places_.push_back(*farthest_);
+    }
+    for (const Vec3& place : places_) {
+      trial_ = first;
+      trial_.position = place;
+      consider();
+    }
+  }
+
+  // Makes room for a split where that leaves clearly less than the largest error.
+  bool collapse_cheaply() {
+    const double most_error = collapse_share * error_;
+    double limit = most_error / weights_.error;
+    for (int i = 0; i < doublings; ++i) {
+      limit *= limit;
+    }
+    bool found = false;
+    while (!found && next_ < options_.collapses.size() && work_left_ > 0) {
+      const auto& [u, v, position] = options_.collapses[next_++];
+      if (mesh().around[u].empty() || mesh().around[v].empty() || !state_.make_collapse(u, v, trial_)) {
+        continue;
+      }
+      const bool free = mesh().on_boundary[trial_.moved] == 0;
+      if (free) {
+        trial_.position = position;
+      }
+      state_.limit_error(infinity);
+      const double cost = evaluate(trial_, infinity);
+      state_.limit_error(most_error);
+      found = cost < limit && state_.measure_within(trial_) < most_error;
+      if (!found && free && cost < infinity) {
+        trial_.position = state_.proposal(trial_, 0.03);
+        found = evaluate(trial_, limit) < limit && state_.measure_within(trial_) < most_error;
+      }
+    }
+    state_.limit_error(0);
+    if (found) {
+      accept(trial_);
+    }
+    return found;
+  }
+
+  ShapedMesh state_;
+  const LevellingOptions& options_;
+  ShapeWeights weights_;
+  std::priority_queue<Worst> queue_;
+  std::vector<std::uint8_t> certain_;  // #F whether the error was measured in earnest
+  PatchTrial trial_, best_;
+  std::vector<Vec3> places_;
+  std::optional<Vec3> farthest_;
+  double error_ = 0, least_gain_ = 0, best_cost_ = 0;
+  bool found_ = false;
+  std::size_t next_ = 0, work_left_;
+};
+
+}  // namespace
+
+TriangleMesh levelled(const TriangleMesh& mesh, const TriangleMesh& target, const LevellingOptions& options) {
+  const BoundaryCurves curves(boundary_loops(mesh).empty() ? TriangleMesh{} : target);
+  const SurfaceWalk walk(target);
+  return Leveller(mesh, target, walk, curves, options).run();
+}
+
+}  // namespace tunica

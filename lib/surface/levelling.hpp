@@ -1,0 +1,30 @@
+#pragma once
+
+#include "surface/triangle_mesh.hpp"
+
+namespace tunica {
+
+/// An edge of a coarse mesh that may be collapsed, and where to.
+struct CheapCollapse {
+  Index kept, removed;
+  Vec3 position;
+};
+
+struct LevellingOptions {
+  std::size_t triangles = 0;             ///< at most this many; those that are missing are made use of
+  std::vector<CheapCollapse> collapses;  ///< cheapest first
+  std::vector<Index> stands_for;         ///< #V of the target: the vertex of the mesh that each was merged into
+};
+
+/// Lessens the largest error of a decimated mesh at its count. Over and over the place that is farthest off is mended:
+/// an edge flips, a vertex moves, an edge is split or collapses; triangles that a split needs are taken by collapses
+/// that leave less error than the largest. A change is made only if it lessens the largest error around it. Ends when
+/// the worst place cannot be mended or after work in proportion to the target's size.
+/// @param mesh    an oriented manifold decimated from `target`
+/// Keeps: topology, boundary (its vertices on the target's boundary curves), the side each triangle faces.
+/// Deterministic. Source: moves as in Hoppe et al., Mesh optimization, SIGGRAPH 1993; here only the largest error
+/// counts. Cost: about half a microsecond per triangle of the target. Limits: errors are those of points, found near
+/// by; certify afterwards.
+TriangleMesh levelled(const TriangleMesh& mesh, const TriangleMesh& target, const LevellingOptions& options);
+
+}  // namespace tunica

@@ -1,0 +1,51 @@
+// CGAL's Garland-Heckbert planes as the measure of decimation.
+#include "bench/cgal_decimate.hpp"
+#include "surface/decimate.hpp"
+#include "surface/hausdorff.hpp"
+#include "surface/measure.hpp"
+#include "surface/shapes.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace tunica {
+namespace {
+
+double distance(const TriangleMesh& a, const TriangleMesh& b) {
+  HausdorffOptions options;
+  options.width = 1e-4 * diagonal(b);
+  options.samples = 0;
+  return hausdorff(a, b, options).both.upper;
+}
+
+TriangleMesh own(const TriangleMesh& mesh, std::size_t triangles) {
+  DecimateOptions options;
+  options.triangles = triangles;
+  return decimate(mesh, options).mesh;
+}
+
+// A ball with waves of several lengths.
+TriangleMesh wavy_ball() {
+  TriangleMesh mesh = shapes::sphere(5);
+  for (Vec3& p : mesh.vertices) {
+    p *= 1 + 0.1 * std::sin(5 * p.x() + 1) * std::cos(4 * p.y()) + 0.05 * std::sin(9 * p.z() + 2 * p.x());
+    p.z() *= 0.5;
+  }
+  return mesh;
+}
+
+TEST(Decimate, ErrorIsNoLargerThanCgals) {
+  const std::vector<TriangleMesh> meshes{wavy_ball(), shapes::torus(60, 30), shapes::tube(40, 20),
+                                         shapes::shaken(shapes::torus(60, 30), 0.02, 5)};
+  for (const TriangleMesh& mesh : meshes) {
+    const auto given = to_cgal<SimpleCgalMesh>(mesh);
+    for (const std::size_t count : {std::size_t{120}, std::size_t{400}, std::size_t{1500}}) {
+      const double peer = distance(garland_heckbert(given, count), mesh);
+      EXPECT_LE(distance(own(mesh, count), mesh), 1.05 * peer + 1e-4 * diagonal(mesh)) << count;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace tunica
