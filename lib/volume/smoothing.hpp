@@ -54,7 +54,7 @@ struct StaircaseResult {
 /// Nesterov's accelerated projected gradient with restarts (O'Donoghue and Candes 2015).
 /// Cost: some 200 passes over the mesh.
 /// Limits: the mean error to the true surface falls to a quarter or a third where the organ's features are ten voxels
-/// across or more, and to 0.5 to 0.9 of the staircase's below: there marching cubes itself lies some 0.05 voxels too
+/// across or more, and to 0.5 to 0.8 of the staircase's below: there marching cubes itself lies some 0.05 voxels too
 /// far inside, which keeping its volume keeps, and creases are rounded.
 StaircaseResult smooth_staircase(TriangleMesh& mesh, const Mask& grid, const StaircaseOptions& options = {});
 

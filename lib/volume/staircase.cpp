@@ -95,6 +95,14 @@ public:
     }
     return x[vertex] - sum / static_cast<double>(end - begin);
   }
+  /// Mean square of the lengths of the edges to its neighbours.
+  [[nodiscard]] double squared_edge(const std::vector<Vec3>& x, std::size_t vertex) const {
+    double sum = 0;
+    for (std::size_t i = first_[vertex]; i < first_[vertex + 1]; ++i) {
+      sum += (x[list_[i]] - x[vertex]).squaredNorm();
+    }
+    return sum / static_cast<double>(first_[vertex + 1] - first_[vertex]);
+  }
   [[nodiscard]] bool alone(std::size_t vertex) const { return first_[vertex] == first_[vertex + 1]; }
 
 private:
@@ -269,22 +277,53 @@ private:
     return result;
   }
 
-  /// A thin part bends less when it is thinner, and would shrink up to the limits. The staircase itself moves as much
-  /// outward as inward over a few steps, so the mean move along the normal over some neighbours is taken back.
-  void remove_local_drift(const Neighbours& neighbours) {
-    constexpr int spread = 24;
-    const std::vector<Vec3> normal = normals(now_);
-    std::vector<double> drift(now_.size(), 0.0);
-    for_all(now_.size(), [&](std::size_t v) { drift[v] = (now_[v] - start_[v]).dot(normal[v].normalized()); });
-    std::vector<double> next = drift;
-    for (int i = 0; i < spread; ++i) {
-      for_all(now_.size(), [&](std::size_t v) {
+  /// Moves each value `steps` times towards the mean of its neighbours, by half of share(vertex).
+  template <typename Share>
+  static void spread(const Neighbours& neighbours, std::vector<double>& values, int steps, const Share& share) {
+    std::vector<double> next = values;
+    for (int i = 0; i < steps; ++i) {
+      for_all(values.size(), [&](std::size_t v) {
         if (!neighbours.alone(v)) {
-          next[v] = drift[v] - 0.5 * neighbours.laplacian(drift, v);
+          next[v] = values[v] - 0.5 * share(v) * neighbours.laplacian(values, v);
         }
       });
-      drift.swap(next);
+      values.swap(next);
     }
+  }
+
+  /// Radius by which the surface is bent at each vertex, in voxels: one over the mean curvature.
+  [[nodiscard]] std::vector<double> radii(const Neighbours& neighbours, const std::vector<Vec3>& normal) const {
+    constexpr int steps = 4;  // a few triangles say little
+    std::vector<double> bend(now_.size(), 0.0);
+    std::vector<double> squared_edge(now_.size(), 0.0);
+    for_all(now_.size(), [&](std::size_t v) {
+      if (!neighbours.alone(v)) {
+        bend[v] = neighbours.laplacian(now_, v).dot(normal[v].normalized());
+        squared_edge[v] = neighbours.squared_edge(now_, v);
+      }
+    });
+    const auto all = [](std::size_t) { return 1.0; };
+    spread(neighbours, bend, steps, all);
+    spread(neighbours, squared_edge, steps, all);
+    std::vector<double> result(now_.size());
+    for_all(now_.size(), [&](std::size_t v) { result[v] = squared_edge[v] / (2 * std::abs(bend[v]) + 1e-9); });
+    return result;
+  }
+
+  /// A thin part bends less when it is thinner, and would shrink up to the limits. The staircase itself moves as much
+  /// outward as inward over a few steps, so the mean move along the normal over some neighbours is taken back. The
+  /// steps are as long as the root of the radius: the mean is taken over a square of a width in proportion, and so does
+  /// not mix a small part with what it joins.
+  void remove_local_drift(const Neighbours& neighbours) {
+    constexpr int steps = 24;
+    constexpr double radius_of_all_steps = 20;
+    constexpr double least_share = 0.1;
+    const std::vector<Vec3> normal = normals(now_);
+    const std::vector<double> radius = radii(neighbours, normal);
+    std::vector<double> drift(now_.size(), 0.0);
+    for_all(now_.size(), [&](std::size_t v) { drift[v] = (now_[v] - start_[v]).dot(normal[v].normalized()); });
+    spread(neighbours, drift, steps,
+           [&](std::size_t v) { return std::clamp(radius[v] / radius_of_all_steps, least_share, 1.0); });
     for_all(now_.size(), [&](std::size_t v) { now_[v] = confine(v, now_[v] - drift[v] * normal[v].normalized()); });
   }
 
