@@ -1,59 +1,15 @@
 #pragma once
 
-#include "mechanics/shell_element.hpp"
-
-#include <Eigen/Core>
+#include "core/lanes.hpp"
 
 #include <array>
-#include <cstddef>
-#include <experimental/simd>
 #ifdef __AVX__
 #include <immintrin.h>
 #endif
 
-/// Several numbers that go through the same arithmetic at once, as the scalar of small Eigen matrices: the same formula
-/// for several elements. What Eigen vectorises within one 3x3 or 6x6 block is little; across elements it is everything.
+/// Matrices of shell elements, several elements at once.
 namespace tunica {
 
-using Lanes = std::experimental::simd<double, std::experimental::simd_abi::deduce_t<double, lane_count>>;
-using LaneMask = Lanes::mask_type;
-
-}  // namespace tunica
-
-namespace Eigen {
-
-template <>
-struct NumTraits<tunica::Lanes> : GenericNumTraits<tunica::Lanes> {
-  using Real = tunica::Lanes;
-  using NonInteger = tunica::Lanes;
-  using Nested = tunica::Lanes;
-  using Literal = double;
-  enum {
-    IsComplex = 0,
-    IsInteger = 0,
-    IsSigned = 1,
-    RequireInitialization = 0,
-    ReadCost = 1,
-    AddCost = 1,
-    MulCost = 1
-  };
-};
-
-template <typename Operation>
-struct ScalarBinaryOpTraits<tunica::Lanes, double, Operation> {
-  using ReturnType = tunica::Lanes;
-};
-template <typename Operation>
-struct ScalarBinaryOpTraits<double, tunica::Lanes, Operation> {
-  using ReturnType = tunica::Lanes;
-};
-
-}  // namespace Eigen
-
-namespace tunica {
-
-using LaneVec2 = Eigen::Matrix<Lanes, 2, 1>;
-using LaneVec3 = Eigen::Matrix<Lanes, 3, 1>;
 using LaneVector6 = Eigen::Matrix<Lanes, 6, 1>;
 using LaneVector18 = Eigen::Matrix<Lanes, 18, 1>;
 using LaneMat2 = Eigen::Matrix<Lanes, 2, 2>;

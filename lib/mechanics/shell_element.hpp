@@ -91,9 +91,6 @@ struct ShellElement {
   Matrix39 curvature;               ///< mean, from the rotation vectors
 };
 
-/// Elements that a run computes at once (element_lanes.hpp).
-inline constexpr std::size_t lane_count = 4;
-
 /// What the three corners do: displacements (columns) and rotations from the reference.
 struct CornerMotion {
   Mat3 displacement;

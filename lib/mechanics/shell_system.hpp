@@ -1,5 +1,6 @@
 #pragma once
 
+#include "core/lane_count.hpp"
 #include "mechanics/block_matrix.hpp"
 #include "mechanics/model.hpp"
 #include "mechanics/pressure.hpp"

@@ -1,10 +1,7 @@
 #include "shell/curved_hausdorff.hpp"
 
-#include "core/threads.hpp"
 #include "shell/certificate.hpp"
 #include "surface/measure.hpp"
-
-#include <Eigen/Geometry>
 
 #include <algorithm>
 #include <cmath>
@@ -12,9 +9,6 @@
 
 namespace tunica {
 namespace {
-
-constexpr std::size_t grain = 256;
-constexpr std::size_t mean_samples = 60'000;
 
 double rounding_of(const ShellMesh& shell, const Target& target) {
   constexpr double epsilon = std::numeric_limits<double>::epsilon();
@@ -24,48 +18,6 @@ double rounding_of(const ShellMesh& shell, const Target& target) {
   const double coordinate =
       std::max(a.lower.cwiseAbs().cwiseMax(a.upper.cwiseAbs()).maxCoeff(), b.upper.cwiseAbs().maxCoeff());
   return target.tree().rounding(reach) + 256 * epsilon * (coordinate + reach);
-}
-
-/// Mean and root mean square of the distance from the curved surface, by the midpoints of its pieces.
-std::pair<double, double> means(const std::vector<CubicPatch>& patches, const Target& target) {
-  struct Sum {
-    double area = 0, distance = 0, squared = 0;
-  };
-  const double per_patch = static_cast<double>(mean_samples) / static_cast<double>(patches.size());
-  const int level = std::clamp(static_cast<int>(std::sqrt(per_patch)), 2, 40);
-  std::vector<Sum> sums((patches.size() + grain - 1) / grain);
-  parallel_for_blocks(patches.size(), grain, [&](std::size_t begin, std::size_t end) {
-    Sum& sum = sums[begin / grain];
-    std::optional<Index> guess;
-    for (std::size_t t = begin; t < end; ++t) {
-      const auto add = [&](double c, double r) {
-        const Vec2 at(c / level, r / level);
-        const auto [u, v] = patches[t].tangents(at);
-        const double area = u.cross(v).norm() / (2.0 * level * level);
-        const Vec3 p = patches[t].point(at);
-        const auto hit = guess ? target.tree().closest(p, *guess) : target.tree().closest(p);
-        guess = hit.triangle;
-        sum.area += area;
-        sum.distance += area * std::sqrt(hit.squared_distance);
-        sum.squared += area * hit.squared_distance;
-      };
-      for (int r = 0; r < level; ++r) {
-        for (int c = 0; c < level - r; ++c) {
-          add(c + 1.0 / 3, r + 1.0 / 3);
-          if (c + 1 < level - r) {
-            add(c + 2.0 / 3, r + 2.0 / 3);
-          }
-        }
-      }
-    }
-  });
-  Sum total;
-  for (const Sum& sum : sums) {
-    total.area += sum.area;
-    total.distance += sum.distance;
-    total.squared += sum.squared;
-  }
-  return {total.distance / total.area, std::sqrt(total.squared / total.area)};
 }
 
 }  // namespace
@@ -86,7 +38,7 @@ ShellDistance curved_hausdorff(const ShellMesh& shell, const Target& target, con
               std::max(out.shell_to_target.upper, out.target_to_shell.upper)};
   out.mean = out.rms = std::numeric_limits<double>::quiet_NaN();
   if (options.with_mean) {
-    std::tie(out.mean, out.rms) = means(patches, target);
+    std::tie(out.mean, out.rms) = mean_distance(shell, target);
   }
   tunica::advance(options.progress, 1);
   return out;

@@ -36,10 +36,12 @@ constexpr std::size_t few_shells = 400;  // wanted: several starts cost little
 constexpr double margin = 0.97;          // of the tolerance: what samples miss
 constexpr double worth_it = 0.985;       // a round that leaves more than this of the count or error is the last
 constexpr int patience = 3;              // rounds that bring nothing
+constexpr double worth_a_round = 0.95;   // the same for an exchange of many shells, which is as dear as their search
 constexpr int most_settling = 20;
 constexpr int most_repairs = 12;
 constexpr double clearly_below = 0.975;
 constexpr int certificates = 10;
+constexpr double noted_width = 1.5;  // of the error, on the way
 constexpr double most_tightening = 0.95, least_tightening = 0.985;  // of the limit, where certificates find more
 constexpr double least_part = 0.2;                                  // of the tolerance, to part sheets that cross
 
@@ -375,7 +377,8 @@ private:
       best.measure();
       polish(best, best.error(), 3);
     }
-    result_.stopped = exhausted ? "further rounds bring nothing" : "the limit of rounds was reached";
+    record(result_.shell, result_.distance.both);
+    result_.stopped = exhausted ? "further rounds bring too little" : "the limit of rounds was reached";
     no_worse_than_flat({}, shells, start);
   }
 
@@ -400,11 +403,17 @@ private:
     }
     settle(state);
     mend_angles(state, 0.97 * state.error());
-    note(state);
     FitState best = state;
+    const bool cheap = shells < few_shells;
     const int rounds = options_.max_iterations.value_or(default_rounds);
+    const int enough = cheap ? patience : 1;
     int fruitless = 0;
-    for (int round = 1; round < rounds && fruitless < patience; ++round) {
+    bool noted = false;
+    for (int round = 1; round < rounds && fruitless < enough; ++round) {
+      if (!noted) {
+        note(best);
+        noted = true;
+      }
       advance(options_.progress, done[0] + (done[1] - done[0]) * static_cast<double>(round) / rounds);
       // Exchange: shells from where they are hardly needed to where the error is largest; more or fewer in turn.
       state = best;
@@ -415,13 +424,13 @@ private:
       collapse_edges(state, any, shells, {});
       settle(state);
       const bool better = state.mesh.alive <= shells && (state.error() < best.error() || best.mesh.alive > shells);
-      fruitless = better && state.error() < worth_it * best.error() ? 0 : fruitless + 1;
+      fruitless = better && state.error() < (cheap ? worth_it : worth_a_round) * best.error() ? 0 : fruitless + 1;
       if (better) {
         best = state;
-        note(best);
+        noted = false;
       }
     }
-    return {std::move(best), fruitless >= patience};
+    return {std::move(best), fruitless >= enough};
   }
 
   [[nodiscard]] FitMesh prepared(const FitStart& start) const {
@@ -453,7 +462,7 @@ private:
   static void polish(FitState& state, double limit, int steps) {
     for (int i = 0; i < steps; ++i) {
       if (i > 0) {
-        state.attach();
+        state.attach_again();
         state.measure();
       }
       flip_edges(state, limit);
@@ -461,7 +470,7 @@ private:
     }
     place_worst(state, 0.9 * limit);
     detach_worst(state, limit);
-    state.attach();
+    state.attach_again();
     state.measure();
   }
 
@@ -564,12 +573,16 @@ private:
   }
 
   void note(const FitState& state) {
-    RelaxIteration iteration;
-    iteration.shells = state.mesh.alive;
-    ShellMesh shell = state.mesh.shell();
+    const ShellMesh shell = state.mesh.shell();
     ShellDistanceOptions measuring;
-    measuring.width = std::max(width_, state.error() / 2);
-    iteration.hausdorff = shell_distance(shell, target_, measuring).both;
+    measuring.width = std::max(width_, noted_width * state.error());
+    record(shell, shell_distance(shell, target_, measuring).both);
+  }
+
+  void record(const ShellMesh& shell, const Interval& distance) {
+    RelaxIteration iteration;
+    iteration.shells = shell.triangles.size();
+    iteration.hausdorff = distance;
     iteration.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - last_).count();
     last_ = std::chrono::steady_clock::now();
     result_.iterations.push_back(iteration);

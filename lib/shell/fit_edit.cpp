@@ -15,6 +15,7 @@ namespace {
 
 constexpr int placing_steps = 3;
 constexpr double least_split_angle = 3;  // degrees, where nothing better can be had
+constexpr double good_enough = 0.5;      // of the limit: edges of closer patches stay
 constexpr double worth_a_crease = 0.6;   // of its error a patch may keep when it gets normals of its own
 
 /// What becomes of the patches around a node.
@@ -367,6 +368,11 @@ std::size_t flip_edges(FitState& state, double limit) {
         mesh.around[b].size() <= (mesh.on_boundary[b] != 0 ? 1U : 3U)) {
       continue;
     }
+    const double old_angle = std::min(smallest_angle(state, t1), smallest_angle(state, t2));
+    const double old_error = std::max(state.patches[t1].error, state.patches[t2].error);
+    if (old_error < good_enough * limit && old_angle >= state.limits.angle) {
+      continue;
+    }
     Trial trial;
     trial.limits = state.limits;
     trial.limits.angle = 0;
@@ -388,9 +394,7 @@ std::size_t flip_edges(FitState& state, double limit) {
     const auto angle_of = [](const PlacedPatch& p) {
       return smallest_angle_degrees(p.shape.corners[0], p.shape.corners[1], p.shape.corners[2]);
     };
-    const double old_angle = std::min(smallest_angle(state, t1), smallest_angle(state, t2));
     const double new_angle = std::min(angle_of(trial.patches[0]), angle_of(trial.patches[1]));
-    const double old_error = std::max(state.patches[t1].error, state.patches[t2].error);
     const bool mends = old_angle < state.limits.angle && new_angle > old_angle;
     if (!mends && new_angle < std::min(old_angle, state.limits.angle)) {
       continue;

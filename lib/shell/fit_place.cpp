@@ -1,5 +1,6 @@
 #include "shell/fit_place.hpp"
 
+#include "shell/normal_equations.hpp"
 #include "surface/measure.hpp"
 
 #include <Eigen/Cholesky>
@@ -21,11 +22,48 @@ struct Measured {
   double error = std::numeric_limits<double>::infinity();
 };
 
+/// At first all residuals count alike, then the largest.
+struct StepWeight {
+  bool alike;
+  double largest;  // mm
+  Lanes operator()(const Lanes& distance) const {
+    if (alike) {
+      return 1.0;
+    }
+    const Lanes part = std::experimental::max(distance / largest, Lanes(0.1));
+    const Lanes squared = part * part;
+    return squared * squared;
+  }
+};
+
 void put(std::vector<PlacedPatch>& patches, const PlacedNode& node) {
   for (PlacedPatch& p : patches) {
     if (p.corner != PlacedPatch::no_corner) {
       p.shape.corners[p.corner] = node.position;
       p.shape.normals[p.corner] = node.normals[p.slot];
+    }
+  }
+}
+
+/// Each point to the patch whose facet is closest.
+void attach_to_closest(const FitSamples& samples, const std::vector<Index>& points, std::vector<PlacedPatch>& patches) {
+  std::vector<FlatTriangle> facets;
+  facets.reserve(patches.size());
+  for (const PlacedPatch& p : patches) {
+    facets.emplace_back(p.shape.corners);
+  }
+  for (std::size_t i = 0; i < points.size(); i += lane_count) {
+    const LaneVec3 at = lane_points(
+        [&](std::size_t k) -> const Vec3& { return samples.points()[points[std::min(i + k, points.size() - 1)]]; });
+    Lanes least = facets[0].squared_distance(at), closest = 0.0;
+    for (std::size_t j = 1; j < facets.size(); ++j) {
+      const Lanes squared = facets[j].squared_distance(at);
+      const LaneMask closer = squared < least;
+      std::experimental::where(closer, least) = squared;
+      std::experimental::where(closer, closest) = static_cast<double>(j);
+    }
+    for (std::size_t k = 0; k < std::min(lane_count, points.size() - i); ++k) {
+      patches[static_cast<std::size_t>(closest[k])].attached.push_back(points[i + k]);
     }
   }
 }
@@ -42,20 +80,7 @@ Measured measure(const FitSamples& samples, std::vector<PlacedPatch>& patches, c
     p.attached.clear();
     p.residuals.clear();
   }
-  for (const Index q : points) {
-    PlacedPatch* closest = nullptr;
-    double least = std::numeric_limits<double>::infinity();
-    for (PlacedPatch& p : patches) {
-      const auto& c = p.shape.corners;
-      const Vec3& at = samples.points()[q];
-      const double squared = (closest_point_on_triangle(at, c[0], c[1], c[2]) - at).squaredNorm();
-      if (squared < least) {
-        least = squared;
-        closest = &p;
-      }
-    }
-    closest->attached.push_back(q);
-  }
+  attach_to_closest(samples, points, patches);
   std::vector<CubicPatch> curved;
   for (const PlacedPatch& p : patches) {
     curved.push_back(p.shape.patch());
@@ -75,16 +100,15 @@ Measured measure(const FitSamples& samples, std::vector<PlacedPatch>& patches, c
     }
     const Vec3 facing = facing_of(p.shape.corners);
     const std::size_t gaps = p.residuals.size();
-    samples.from_patch(patch, facing, FitSamples::Search::nearby, p.guesses, p.residuals);
+    const PatchPowers powers(patch);
+    samples.from_patch(powers, facing, FitSamples::Search::nearby, p.guesses, p.residuals);
     if (std::any_of(p.residuals.begin() + static_cast<std::ptrdiff_t>(gaps), p.residuals.end(),
                     [&](const Residual& r) { return std::abs(r.distance) > doubted; })) {
       // Downhill from a wrong start a point may seem far that is not.
       p.residuals.resize(gaps);
-      samples.from_patch(patch, facing, FitSamples::Search::everywhere, p.guesses, p.residuals);
+      samples.from_patch(powers, facing, FitSamples::Search::everywhere, p.guesses, p.residuals);
     }
-    for (const Index q : p.attached) {
-      samples.from_target(patch, facing, q, p.residuals);
-    }
+    samples.from_target(powers, facing, p.attached, p.residuals);
     p.error = 0;
     for (const Residual& r : p.residuals) {
       const double d = std::abs(r.distance);
@@ -115,7 +139,7 @@ bool is_sound(const PatchShape& shape, double agreement, double angle) {
   return normal_agreement(c, shape.normals) >= agreement && smallest_angle_degrees(c[0], c[1], c[2]) >= angle;
 }
 
-PatchJacobian patch_jacobian(const PatchShape& shape) {
+Eigen::Matrix<double, 30, 5> corner_jacobian(const PatchShape& shape, std::size_t corner) {
   const auto flat = [](const CubicPatch& patch) {
     return Eigen::Map<const Eigen::Matrix<double, 30, 1>>(patch.control[0].data());
   };
@@ -123,34 +147,29 @@ PatchJacobian patch_jacobian(const PatchShape& shape) {
   const double step = 1e-6 * std::sqrt((shape.corners[1] - shape.corners[0]).squaredNorm() +
                                        (shape.corners[2] - shape.corners[0]).squaredNorm());
   constexpr double tilt = 1e-6;
-  PatchJacobian jacobian;
+  Eigen::Matrix<double, 30, 5> jacobian;
   PatchShape changed = shape;
-  for (std::size_t i = 0; i < 3; ++i) {
-    for (Eigen::Index k = 0; k < 3; ++k) {
-      changed.corners[i][k] += step;
-      jacobian.col(3 * static_cast<Eigen::Index>(i) + k) = (flat(changed.patch()) - flat(base)) / step;
-      changed.corners[i] = shape.corners[i];
-    }
-    const auto axes = tilt_axes(shape.normals[i]);
-    for (std::size_t k = 0; k < 2; ++k) {
-      changed.normals[i] = shape.normals[i] + tilt * axes[k];
-      jacobian.col(static_cast<Eigen::Index>(9 + 2 * i + k)) = (flat(changed.patch()) - flat(base)) / tilt;
-      changed.normals[i] = shape.normals[i];
-    }
+  for (Eigen::Index k = 0; k < 3; ++k) {
+    changed.corners[corner][k] += step;
+    jacobian.col(k) = (flat(changed.patch()) - flat(base)) / step;
+    changed.corners[corner] = shape.corners[corner];
+  }
+  const auto axes = tilt_axes(shape.normals[corner]);
+  for (std::size_t k = 0; k < 2; ++k) {
+    changed.normals[corner] = shape.normals[corner] + tilt * axes[k];
+    jacobian.col(static_cast<Eigen::Index>(3 + k)) = (flat(changed.patch()) - flat(base)) / tilt;
   }
   return jacobian;
 }
 
-Eigen::Matrix<double, 15, 1> residual_gradient(const PatchJacobian& jacobian, const Residual& r) {
-  const double l1 = 1 - r.at[0] - r.at[1], l2 = r.at[0], l3 = r.at[1];
-  const std::array<double, 10> basis{l1 * l1 * l1,     l2 * l2 * l2,     l3 * l3 * l3,     3 * l1 * l1 * l2,
-                                     3 * l1 * l2 * l2, 3 * l2 * l2 * l3, 3 * l2 * l3 * l3, 3 * l3 * l3 * l1,
-                                     3 * l3 * l1 * l1, 6 * l1 * l2 * l3};
-  Eigen::Matrix<double, 30, 1> weights;
-  for (std::size_t i = 0; i < 10; ++i) {
-    weights.segment<3>(3 * static_cast<Eigen::Index>(i)) = basis[i] * r.direction;
+PatchJacobian patch_jacobian(const PatchShape& shape) {
+  PatchJacobian jacobian;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto own = corner_jacobian(shape, i);
+    jacobian.middleCols<3>(static_cast<Eigen::Index>(3 * i)) = own.leftCols<3>();
+    jacobian.middleCols<2>(static_cast<Eigen::Index>(9 + 2 * i)) = own.rightCols<2>();
   }
-  return jacobian.transpose() * weights;
+  return jacobian;
 }
 
 void place_node(const FitSamples& samples, std::vector<PlacedPatch>& patches, const std::vector<Index>& points,
@@ -168,7 +187,7 @@ void place_node(const FitSamples& samples, std::vector<PlacedPatch>& patches, co
   for (int step = 0; step < steps; ++step) {
     Matrix h = Matrix::Zero(size, size);
     Eigen::VectorXd g = Eigen::VectorXd::Zero(size);
-    const double power = step == 0 ? 0 : 4;
+    const StepWeight weights{step == 0, now.error};
     double edge = 0;
     std::size_t edges = 0;
     for (const PlacedPatch& p : patches) {
@@ -177,18 +196,9 @@ void place_node(const FitSamples& samples, std::vector<PlacedPatch>& patches, co
       }
       edge += (p.shape.corners[(p.corner + 1) % 3] - node.position).norm();
       ++edges;
-      const PatchJacobian jacobian = patch_jacobian(p.shape);
-      const auto c = static_cast<Eigen::Index>(p.corner);
       Eigen::Matrix<double, 5, 5> own = Eigen::Matrix<double, 5, 5>::Zero();
       Eigen::Matrix<double, 5, 1> side = Eigen::Matrix<double, 5, 1>::Zero();
-      for (const Residual& r : p.residuals) {
-        const auto full = residual_gradient(jacobian, r);
-        Eigen::Matrix<double, 5, 1> row;
-        row << full.segment<3>(3 * c), full.segment<2>(9 + 2 * c);
-        const double weight = power == 0 ? 1 : std::pow(std::max(std::abs(r.distance) / now.error, 0.1), power);
-        own += weight * row * row.transpose();
-        side -= weight * r.distance * row;
-      }
+      add_normal_equations<5>(corner_jacobian(p.shape, p.corner), p.residuals, weights, own, side);
       const auto s = static_cast<Eigen::Index>(3 + 2 * p.slot);
       h.topLeftCorner<3, 3>() += own.topLeftCorner<3, 3>();
       h.block<3, 2>(0, s) += own.topRightCorner<3, 2>();
@@ -251,15 +261,10 @@ void turn_normals(const FitSamples& samples, PlacedPatch& patch, const FitLimits
   Measured now = measure(samples, one, points, limits, scale, 0);
   PlacedPatch best = one[0];
   for (int step = 0; step < steps && std::isfinite(now.error); ++step) {
-    const PatchJacobian jacobian = patch_jacobian(one[0].shape);
     Eigen::Matrix<double, 6, 6> h = Eigen::Matrix<double, 6, 6>::Zero();
     Eigen::Matrix<double, 6, 1> g = Eigen::Matrix<double, 6, 1>::Zero();
-    for (const Residual& r : one[0].residuals) {
-      const Eigen::Matrix<double, 6, 1> row = residual_gradient(jacobian, r).tail<6>();
-      const double weight = step == 0 ? 1 : std::pow(std::max(std::abs(r.distance) / now.error, 0.1), 4);
-      h += weight * row * row.transpose();
-      g -= weight * r.distance * row;
-    }
+    add_normal_equations<6>(patch_jacobian(one[0].shape).rightCols<6>(), one[0].residuals,
+                            StepWeight{step == 0, now.error}, h, g);
     h.diagonal().array() += 1e-3 * h.trace() / 6 + 1e-300;
     const Eigen::Matrix<double, 6, 1> x = h.ldlt().solve(g);
     if (!x.allFinite()) {

@@ -21,8 +21,8 @@ double least_angle(double limit, double now);
 using PatchJacobian = Eigen::Matrix<double, 30, 15>;
 PatchJacobian patch_jacobian(const PatchShape& shape);
 
-/// How the residual follows them.
-Eigen::Matrix<double, 15, 1> residual_gradient(const PatchJacobian& jacobian, const Residual& residual);
+/// The same for one corner alone: x, y, z, and the two tilts of its normal.
+Eigen::Matrix<double, 30, 5> corner_jacobian(const PatchShape& shape, std::size_t corner);
 
 /// The two directions in which a unit normal tilts.
 std::array<Vec3, 2> tilt_axes(const Vec3& normal);

@@ -33,6 +33,8 @@ Vec2 inside(Vec2 b) {
   return sum > 1 ? Vec2(b / sum) : b;
 }
 
+double dot(const Lanes& a, const Lanes& b) { return std::experimental::reduce(a * b); }
+
 struct TriangleFoot {
   Vec3 point;
   double squared_distance;
@@ -85,18 +87,23 @@ PatchFoot foot_on_patch(const CubicPatch& patch, const Vec3& q) {
 }
 
 PatchFoot foot_on_patch(const CubicPatch& patch, const Vec3& q, Vec2 start, int steps) {
+  return foot_on_patch(PatchAxes(patch), q, start, steps);
+}
+
+PatchFoot foot_on_patch(const PatchAxes& patch, const Vec3& q, Vec2 start, int steps) {
+  const Lanes wanted = lanes_of([&](std::size_t k) { return k < 3 ? q[static_cast<Eigen::Index>(k)] : 0.0; });
   Vec2 at = start;
-  PatchFoot best{at, patch.point(at), 0};
-  best.squared_distance = (q - best.point).squaredNorm();
+  Lanes point = patch.point(at);
+  Lanes r = wanted - point;
+  double least = dot(r, r);
   for (int i = 0; i < steps; ++i) {
     const auto d = patch.tangents(at);
-    const Vec3 r = q - best.point;
-    double a = d[0].dot(d[0]), b = d[0].dot(d[1]), e = d[1].dot(d[1]);
-    const double f = d[0].dot(r), g = d[1].dot(r);
+    double a = dot(d[0], d[0]), b = dot(d[0], d[1]), e = dot(d[1], d[1]);
+    const double f = dot(d[0], r), g = dot(d[1], r);
     if (i >= gauss_newton_steps) {
       // What is left after these is the curvature's doing.
       const auto h = patch.second_derivatives(at);
-      const double a2 = a - h[0].dot(r), b2 = b - h[1].dot(r), e2 = e - h[2].dot(r);
+      const double a2 = a - dot(h[0], r), b2 = b - dot(h[1], r), e2 = e - dot(h[2], r);
       if (a2 > 0 && a2 * e2 - b2 * b2 > 1e-3 * (a * e - b * b)) {
         a = a2;
         b = b2;
@@ -113,35 +120,45 @@ PatchFoot foot_on_patch(const CubicPatch& patch, const Vec3& q, Vec2 start, int 
       next = inside(next);
       const Vec2 along = next[0] <= 0 ? Vec2(0, 1) : next[1] <= 0 ? Vec2(1, 0) : Vec2(-1, 1);
       const auto dn = patch.tangents(next);
-      const Vec3 tangent = along[0] * dn[0] + along[1] * dn[1];
-      next = inside(next + along * (tangent.dot(q - patch.point(next)) / std::max(tangent.squaredNorm(), 1e-300)));
+      const Lanes tangent = along[0] * dn[0] + along[1] * dn[1];
+      next =
+          inside(next + along * (dot(tangent, wanted - patch.point(next)) / std::max(dot(tangent, tangent), 1e-300)));
     }
-    const Vec3 p = patch.point(next);
-    const double squared = (q - p).squaredNorm();
-    if (squared >= best.squared_distance) {
+    const Lanes p = patch.point(next);
+    const Lanes rest = wanted - p;
+    const double squared = dot(rest, rest);
+    if (squared >= least) {
       break;
     }
     const bool arrived = (next - at).squaredNorm() < arrival * arrival;
     at = next;
-    best = {next, p, squared};
+    point = p;
+    r = rest;
+    least = squared;
     if (arrived) {
       break;
     }
   }
-  return best;
+  return {at, Vec3(point[0], point[1], point[2]), least};
 }
 
 std::array<Vec3, 3> edge_points(const CubicPatch& patch, std::size_t from, std::size_t to) {
-  return {patch.point(on_edge(from, to, 0.25)), patch.point(on_edge(from, to, 0.5)),
-          patch.point(on_edge(from, to, 0.75))};
+  // The edge's curve alone: control points of a cubic.
+  const auto& c = patch.control;
+  const bool forward = to == (from + 1) % 3;
+  const std::size_t edge = forward ? from : to;
+  const Vec3 &a = c[from], &b = c[forward ? 3 + 2 * edge : 4 + 2 * edge], &d = c[forward ? 4 + 2 * edge : 3 + 2 * edge],
+             &e = c[to];
+  return {(27 * a + 27 * b + 9 * d + e) / 64, (a + 3 * b + 3 * d + e) / 8, (a + 9 * b + 27 * d + 27 * e) / 64};
 }
 
 void FitSamples::from_gap(const CubicPatch& patch, std::size_t from, std::size_t to, const std::array<Vec3, 3>& other,
                           std::vector<Residual>& out) {
   const Vec3 inward = patch.control[3 - from - to] - (patch.control[from] + patch.control[to]) / 2;
+  const auto own = edge_points(patch, from, to);
   for (std::size_t i = 0; i < 3; ++i) {
     const Vec2 at = on_edge(from, to, 0.25 * static_cast<double>(i + 1));
-    const Vec3 apart = patch.point(at) - other[i];
+    const Vec3 apart = own[i] - other[i];
     const double width = apart.norm();
     if (width > 0 && apart.dot(inward) > 0) {  // else they overlap
       out.push_back({at, apart / width, width / 2});
@@ -196,6 +213,12 @@ FitSamples::FitSamples(const Target& target, std::size_t shells)
       grid_.emplace_back(static_cast<double>(j) / level, static_cast<double>(i) / level);
     }
   }
+  for (std::size_t i = 0; i < grid_.size(); i += lane_count) {
+    const auto at = [&](Eigen::Index axis) {
+      return lanes_of([&](std::size_t k) { return grid_[std::min(i + k, grid_.size() - 1)][axis]; });
+    };
+    grid_lanes_.push_back({at(0), at(1)});
+  }
 }
 
 ClosestPoint::Hit FitSamples::downhill(const Vec3& p, Index start) const {
@@ -237,36 +260,95 @@ ClosestPoint::Hit FitSamples::downhill(const Vec3& p, Index start) const {
   return target_.tree().closest(p, here);
 }
 
-void FitSamples::from_patch(const CubicPatch& patch, const Vec3& facing, Search search, std::vector<Index>& guesses,
+void FitSamples::downhill(const LaneVec3& p, std::size_t count, std::array<ClosestPoint::Hit, lane_count>& hits) const {
+  const TriangleMesh& mesh = target_.mesh();
+  const auto corner = [&](std::size_t c) {
+    return lane_points(
+        [&](std::size_t k) -> const Vec3& { return mesh.vertices[mesh.triangles[hits[k].triangle][c]]; });
+  };
+  const LaneVec3 a = corner(0), ab = corner(1) - a, ac = corner(2) - a, ap = p - a;
+  const Lanes uu = ab.dot(ab), uv = ab.dot(ac), vv = ac.dot(ac), pu = ap.dot(ab), pv = ap.dot(ac);
+  const Lanes determinant = uu * vv - uv * uv;
+  const Lanes s = vv * pu - uv * pv, t = uu * pv - uv * pu;
+  const LaneMask within = s > 0.0 && t > 0.0 && s + t < determinant;
+  const Lanes inverse = 1.0 / determinant;
+  const LaneVec3 foot = a + (s * inverse) * ab + (t * inverse) * ac;
+  const LaneVec3 away = p - foot;
+  const Lanes squared = away.dot(away);
+  for (std::size_t k = 0; k < count; ++k) {
+    if (within[k]) {
+      hits[k].point = Vec3(foot[0][k], foot[1][k], foot[2][k]);
+      hits[k].squared_distance = squared[k];
+    } else {
+      hits[k] = downhill(Vec3(p[0][k], p[1][k], p[2][k]), hits[k].triangle);
+    }
+  }
+}
+
+void FitSamples::from_patch(const PatchPowers& patch, const Vec3& facing, Search search, std::vector<Index>& guesses,
                             std::vector<Residual>& out) const {
   if (guesses.size() != grid_.size()) {
     guesses.assign(grid_.size(), guesses.empty() ? no_neighbour : guesses[0]);
   }
   Index last = guesses[0];
-  for (std::size_t i = 0; i < grid_.size(); ++i) {
-    const Vec3 p = patch.point(grid_[i]);
-    const Index guess = guesses[i] == no_neighbour ? last : guesses[i];
-    const auto hit = guess == no_neighbour          ? target_.tree().closest(p)
-                     : search == Search::everywhere ? target_.tree().closest(p, guess)
-                                                    : downhill(p, guess);
-    last = guesses[i] = hit.triangle;
-    if (facets_[hit.triangle].dot(facing) > 0) {
-      out.push_back(residual(grid_[i], p - hit.point, facets_[hit.triangle]));
-    } else if (const auto foot = target_.closest_facing(p, facing, other_wall * std::sqrt(hit.squared_distance))) {
-      out.push_back(residual(grid_[i], p - foot->point, foot->facet_normal));
+  std::array<ClosestPoint::Hit, lane_count> hits;
+  for (std::size_t i = 0; i < grid_.size(); i += lane_count) {
+    const auto& [x, y] = grid_lanes_[i / lane_count];
+    const LaneVec3 points = patch.point(x, y);
+    const std::size_t count = std::min(lane_count, grid_.size() - i);
+    const auto point = [&](std::size_t k) { return Vec3(points[0][k], points[1][k], points[2][k]); };
+    bool all_known = search == Search::nearby;
+    for (std::size_t k = 0; k < lane_count; ++k) {
+      const Index guess = guesses[std::min(i + k, grid_.size() - 1)];
+      hits[k].triangle = guess == no_neighbour ? last : guess;
+      all_known = all_known && hits[k].triangle != no_neighbour;
+    }
+    if (all_known) {
+      downhill(points, count, hits);
     } else {
-      const Vec3 away = p - hit.point;
-      const double distance = away.norm();
-      out.push_back({grid_[i], distance > 0 ? Vec3(away / distance) : facing, distance});
+      for (std::size_t k = 0; k < count; ++k) {
+        const Index guess = hits[k].triangle == no_neighbour ? last : hits[k].triangle;
+        hits[k] = guess == no_neighbour          ? target_.tree().closest(point(k))
+                  : search == Search::everywhere ? target_.tree().closest(point(k), guess)
+                                                 : downhill(point(k), guess);
+        last = hits[k].triangle;
+      }
+    }
+    last = hits[count - 1].triangle;
+    for (std::size_t k = 0; k < count; ++k) {
+      const ClosestPoint::Hit& hit = hits[k];
+      const Vec3 p = point(k);
+      const Vec2& at = grid_[i + k];
+      guesses[i + k] = hit.triangle;
+      if (facets_[hit.triangle].dot(facing) > 0) {
+        out.push_back(residual(at, p - hit.point, facets_[hit.triangle]));
+      } else if (const auto foot = target_.closest_facing(p, facing, other_wall * std::sqrt(hit.squared_distance))) {
+        out.push_back(residual(at, p - foot->point, foot->facet_normal));
+      } else {
+        const Vec3 away = p - hit.point;
+        const double distance = away.norm();
+        out.push_back({at, distance > 0 ? Vec3(away / distance) : facing, distance});
+      }
     }
   }
 }
 
-void FitSamples::from_target(const CubicPatch& patch, const Vec3& facing, Index point,
+void FitSamples::from_target(const PatchPowers& patch, const Vec3& facing, const std::vector<Index>& points,
                              std::vector<Residual>& out) const {
-  const PatchFoot foot = foot_on_patch(patch, points_[point]);
-  const Vec3 normal = patch.normal(foot.at);
-  out.push_back(residual(foot.at, foot.point - points_[point], normal.squaredNorm() > 0.5 ? normal : facing));
+  for (std::size_t i = 0; i < points.size(); i += lane_count) {
+    const std::size_t count = std::min(lane_count, points.size() - i);
+    const LaneVec3 q =
+        lane_points([&](std::size_t k) -> const Vec3& { return points_[points[std::min(i + k, points.size() - 1)]]; });
+    const LaneFeet feet = feet_on_patch(patch, q);
+    const auto [dx, dy] = patch.tangents(feet.x, feet.y);
+    const LaneVec3 normals = dx.cross(dy);
+    const LaneVec3 away = feet.point - q;
+    for (std::size_t k = 0; k < count; ++k) {
+      const auto lane = [&](const LaneVec3& v) { return Vec3(v[0][k], v[1][k], v[2][k]); };
+      const Vec3 normal = lane(normals).stableNormalized();
+      out.push_back(residual({feet.x[k], feet.y[k]}, lane(away), normal.squaredNorm() > 0.5 ? normal : facing));
+    }
+  }
 }
 
 Target::Foot FitSamples::foot(const Vec3& p, const Vec3& facing) const {

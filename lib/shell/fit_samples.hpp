@@ -1,6 +1,8 @@
 #pragma once
 
+#include "core/lanes.hpp"
 #include "shell/curved_surface.hpp"
+#include "shell/patch_lanes.hpp"
 #include "shell/target.hpp"
 #include "surface/incidence.hpp"
 
@@ -38,6 +40,7 @@ PatchFoot foot_on_patch(const CubicPatch& patch, const Vec3& q);
 
 /// The same from another start, by at most so many steps, Newton's from the third on.
 PatchFoot foot_on_patch(const CubicPatch& patch, const Vec3& q, Vec2 start, int steps);
+PatchFoot foot_on_patch(const PatchAxes& patch, const Vec3& q, Vec2 start, int steps);
 
 /// The points at 1/4, 1/2, 3/4 of a patch's edge between two corners.
 std::array<Vec3, 3> edge_points(const CubicPatch& patch, std::size_t from, std::size_t to);
@@ -61,7 +64,7 @@ public:
 
   /// Appends the residuals of the grid of a patch's points. @param facing  the facet's normal; guesses  triangles of
   /// the target that were closest the last time, kept up to date
-  void from_patch(const CubicPatch& patch, const Vec3& facing, Search search, std::vector<Index>& guesses,
+  void from_patch(const PatchPowers& patch, const Vec3& facing, Search search, std::vector<Index>& guesses,
                   std::vector<Residual>& out) const;
 
   /// Appends what makes two neighbours gape: where their edge curves part sideways, the target is bare between them by
@@ -70,14 +73,17 @@ public:
   static void from_gap(const CubicPatch& patch, std::size_t from, std::size_t to, const std::array<Vec3, 3>& other,
                        std::vector<Residual>& out);
 
-  /// Appends the residual of a point of the target against a patch.
-  void from_target(const CubicPatch& patch, const Vec3& facing, Index point, std::vector<Residual>& out) const;
+  /// Appends the residuals of points of the target against a patch.
+  void from_target(const PatchPowers& patch, const Vec3& facing, const std::vector<Index>& points,
+                   std::vector<Residual>& out) const;
 
   /// The closest facet's normal and point of the target on the side of `facing`.
   [[nodiscard]] Target::Foot foot(const Vec3& p, const Vec3& facing) const;
 
 private:
   [[nodiscard]] ClosestPoint::Hit downhill(const Vec3& p, Index start) const;
+  /// The same from the given start each, for those of the first `count` points whose foot is not within it.
+  void downhill(const LaneVec3& p, std::size_t count, std::array<ClosestPoint::Hit, lane_count>& hits) const;
 
   const Target& target_;
   Incidence around_;  // of the target
@@ -85,6 +91,7 @@ private:
   std::vector<Vec3> facets_;  // normals
   std::vector<Vec3> points_;
   std::vector<Vec2> grid_;
+  std::vector<std::array<Lanes, 2>> grid_lanes_;  // the last ones repeated
 };
 
 }  // namespace tunica

@@ -3,6 +3,7 @@
 
 #include "core/progress.hpp"
 #include "core/threads.hpp"
+#include "shell/normal_equations.hpp"
 #include "surface/closest_point.hpp"
 #include "surface/measure.hpp"
 
@@ -16,7 +17,9 @@ namespace tunica {
 namespace {
 
 constexpr std::size_t patches_per_block = 16;
-constexpr int search_level = 3;  // pieces per edge of the surface on which points of the target find their patch
+constexpr int search_level = 3;   // pieces per edge of the surface on which points of the target find their patch
+constexpr int most_steps = 4;     // from patch to patch
+constexpr double on_edge = 1e-9;  // of a patch's parameters
 constexpr int most_cg_steps = 60;
 constexpr double cg_tolerance = 1e-3;
 constexpr double least_weight = 0.1;  // residuals below this part of the largest count alike
@@ -28,8 +31,19 @@ constexpr double doubted = 0.7;  // of the largest error: from there on it is lo
 using Vector15 = Eigen::Matrix<double, 15, 1>;
 using Matrix15 = Eigen::Matrix<double, 15, 15>;
 
-double weight_of(double distance, double power, double scale) {
-  return std::pow(std::max(std::abs(distance) / scale, least_weight), power - 2);
+/// x^n, n even
+template <typename T>
+T powered(const T& x, int n) {
+  const T squared = x * x;
+  T result(1.0);
+  for (int i = 0; i < n; i += 2) {
+    result *= squared;
+  }
+  return result;
+}
+
+double weight_of(double distance, int power, double scale) {
+  return powered(std::max(std::abs(distance) / scale, least_weight), power - 2);
 }
 
 }  // namespace
@@ -60,6 +74,66 @@ void FitState::attach() {
   }
 }
 
+void FitState::attach_again() {
+  const auto& points = samples_->points();
+  std::vector<Index> home(points.size(), no_index);
+  const auto closer_patch = [&](Index q, Index here, PatchFoot foot) {
+    for (int step = 0; step < most_steps; ++step) {
+      const std::array<double, 3> weight{1 - foot.at[0] - foot.at[1], foot.at[0], foot.at[1]};
+      Index next = no_index;
+      PatchFoot best = foot;
+      for (std::size_t k = 0; k < 3; ++k) {
+        if (weight[(k + 2) % 3] > on_edge) {
+          continue;
+        }
+        const auto pair = mesh.on_edge(mesh.triangles[here][k], mesh.triangles[here][(k + 1) % 3]);
+        const Index other = pair.triangle[0] == here ? pair.triangle[1] : pair.triangle[0];
+        if (other == no_index) {
+          continue;
+        }
+        if (const PatchFoot there = foot_on_patch(mesh.patch(other), points[q]);
+            there.squared_distance < best.squared_distance) {
+          best = there;
+          next = other;
+        }
+      }
+      if (next == no_index) {
+        break;
+      }
+      here = next;
+      foot = best;
+    }
+    return here;
+  };
+  parallel_for_blocks(patches.size(), patches_per_block, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t t = begin; t < end; ++t) {
+      const auto& attached = patches[t].attached;
+      if (!mesh.is_alive(static_cast<Index>(t)) || attached.empty()) {
+        continue;
+      }
+      const PatchPowers patch(mesh.patch(static_cast<Index>(t)));
+      for (std::size_t i = 0; i < attached.size(); i += lane_count) {
+        const LaneVec3 q = lane_points(
+            [&](std::size_t k) -> const Vec3& { return points[attached[std::min(i + k, attached.size() - 1)]]; });
+        const LaneFeet feet = feet_on_patch(patch, q);
+        for (std::size_t k = 0; k < std::min(lane_count, attached.size() - i); ++k) {
+          const PatchFoot foot{
+              {feet.x[k], feet.y[k]}, {feet.point[0][k], feet.point[1][k], feet.point[2][k]}, feet.squared_distance[k]};
+          home[attached[i + k]] = closer_patch(attached[i + k], static_cast<Index>(t), foot);
+        }
+      }
+    }
+  });
+  for (Patch& p : patches) {
+    p.attached.clear();
+  }
+  for (std::size_t i = 0; i < home.size(); ++i) {
+    if (home[i] != no_index) {
+      patches[home[i]].attached.push_back(static_cast<Index>(i));
+    }
+  }
+}
+
 void FitState::measure(Index t, FitSamples::Search search) {
   Patch& p = patches[t];
   p.residuals.clear();
@@ -69,10 +143,9 @@ void FitState::measure(Index t, FitSamples::Search search) {
   }
   const CubicPatch patch = mesh.patch(t);
   const Vec3 facing = facing_of(mesh.corners(t));
-  samples_->from_patch(patch, facing, search, p.guesses, p.residuals);
-  for (const Index q : p.attached) {
-    samples_->from_target(patch, facing, q, p.residuals);
-  }
+  const PatchPowers powers(patch);
+  samples_->from_patch(powers, facing, search, p.guesses, p.residuals);
+  samples_->from_target(powers, facing, p.attached, p.residuals);
   for (std::size_t k = 0; k < 3; ++k) {
     const Index from = mesh.triangles[t][k], to = mesh.triangles[t][(k + 1) % 3];
     const auto pair = mesh.on_edge(from, to);
@@ -114,7 +187,7 @@ double FitState::error() const {
   return largest;
 }
 
-double FitState::cost_of(const Patch& patch, double power, double scale) const {
+double FitState::cost_of(const Patch& patch, int power, double scale) const {
   double cost = 0;
   for (const Residual& r : patch.residuals) {
     cost += weight_of(r.distance, power, scale) * r.distance * r.distance / (scale * scale);
@@ -158,7 +231,7 @@ void FitState::changed_patches(const std::vector<std::uint8_t>& moved, std::vect
   }
 }
 
-double FitState::solve(double power, double smoothing) {
+double FitState::solve(int power, double smoothing) {
   check_interrupt();
   const std::size_t nodes = mesh.positions.size(), slots = mesh.normals.size(), count = mesh.triangles.size();
   const double scale = error();
@@ -177,14 +250,12 @@ double FitState::solve(double power, double smoothing) {
         continue;
       }
       costs[t] = cost_of(patches[t], power, scale);
-      const PatchJacobian jacobian = patch_jacobian(shape(static_cast<Index>(t)));
-      for (const Residual& r : patches[t].residuals) {
-        const Vector15 row = residual_gradient(jacobian, r);
-        const double weight = weight_of(r.distance, power, scale);
-        matrices[t].selfadjointView<Eigen::Lower>().rankUpdate(row, weight);
-        sides[t] -= weight * r.distance * row;
-      }
-      matrices[t].triangularView<Eigen::StrictlyUpper>() = matrices[t].transpose();
+      add_normal_equations<15>(
+          patch_jacobian(shape(static_cast<Index>(t))), patches[t].residuals,
+          [&](const Lanes& distance) {
+            return powered(std::experimental::max(distance / scale, Lanes(least_weight)), power - 2);
+          },
+          matrices[t], sides[t]);
     }
   });
   // Node by node: diagonal blocks with damping, pull to the middle.

@@ -26,6 +26,9 @@ public:
   /// Attaches every point of the target to the patch it is closest to. Parallel.
   void attach();
 
+  /// The same where the patches have moved little since: from patch to patch, downhill. Ten times as fast. Parallel.
+  void attach_again();
+
   /// Measures all patches, or one. Parallel.
   void measure();
   void measure(Index t, FitSamples::Search search = FitSamples::Search::everywhere);
@@ -40,13 +43,14 @@ public:
 
   /// Moves all nodes and turns all normals at once by one Gauss-Newton step on the residuals weighted by
   /// (|residual| / largest)^(power - 2), where that lessens the sum of the powers around each node.
-  /// @param smoothing  pull towards the middle of the ring, relative to what keeps nodes from sliding
+  /// @param power  even, >= 2; smoothing  pull towards the middle of the ring, relative to what keeps nodes from
+  /// sliding
   /// @return how much of the cost is left, <= 1
-  double solve(double power, double smoothing);
+  double solve(int power, double smoothing);
 
 private:
   struct Step;
-  [[nodiscard]] double cost_of(const Patch& patch, double power, double scale) const;
+  [[nodiscard]] double cost_of(const Patch& patch, int power, double scale) const;
   /// Patches whose residuals change when these nodes move: theirs, and those that meet them along an edge.
   void changed_patches(const std::vector<std::uint8_t>& moved, std::vector<std::uint8_t>& changed) const;
   [[nodiscard]] Vec3 middle_of_ring(Index node) const;

@@ -77,6 +77,7 @@ PatchSearch::PatchSearch(const ShellMesh& shell, const std::vector<CubicPatch>& 
   }
   for (const CubicPatch& patch : patches) {
     flatness_.push_back(flatness(patch, 1));
+    axes_.emplace_back(patch);
   }
 }
 
@@ -113,7 +114,7 @@ SurfaceFoot PatchSearch::on_patch(const Vec3& p, Index patch) const {
 }
 
 SurfaceFoot PatchSearch::on_patch(const Vec3& p, Index patch, const Vec2& start) const {
-  return surface_foot(patch, foot_on_patch(patches_[patch], p, start, newton_steps));
+  return surface_foot(patch, foot_on_patch(axes_[patch], p, start, newton_steps));
 }
 
 double PatchSearch::bulge(Index patch, const Vec2& a, const Vec2& b, const Vec2& c) const {
@@ -170,7 +171,7 @@ void PatchSearch::search_part(Index patch, const Part& part, int depth, const Ve
     lower = std::min(lower, chord - part.bulge);
     const Vec3 weights = weights_in(part.point, p);
     const Vec2 start = weights[0] * part.at[0] + weights[1] * part.at[1] + weights[2] * part.at[2];
-    if (const PatchFoot here = foot_on_patch(patches_[patch], p, start, newton_steps);
+    if (const PatchFoot here = foot_on_patch(axes_[patch], p, start, newton_steps);
         here.squared_distance < foot.distance * foot.distance) {
       foot = surface_foot(patch, here);
     }

@@ -60,6 +60,7 @@ private:
 
   const std::vector<CubicPatch>& patches_;
   std::vector<std::array<Index, 3>> across_;
+  std::vector<PatchAxes> axes_;
   std::vector<double> flatness_;
   Tessellation coarse_;
   ClosestPoint tree_;

@@ -6,12 +6,16 @@
 #include "surface/hausdorff.hpp"
 #include "surface/incidence.hpp"
 
+#include <Eigen/Geometry>
+
 #include <algorithm>
 #include <cmath>
 
 namespace tunica {
 namespace {
 
+constexpr std::size_t grain = 256;
+constexpr std::size_t mean_samples = 60'000;
 constexpr std::size_t most_fine_triangles = 4'000'000;
 
 Tessellation affordable_tessellation(const ShellMesh& shell, double deviation) {
@@ -51,6 +55,49 @@ std::vector<Vec3> points_between_patches(const ShellMesh& shell) {
 
 ShellDistance shell_distance(const ShellMesh& shell, const Target& target, const ShellDistanceOptions& options) {
   return curved_hausdorff(shell, target, options);
+}
+
+std::pair<double, double> mean_distance(const ShellMesh& shell, const Target& target) {
+  // By the midpoints of pieces of the patches.
+  const std::vector<CubicPatch> patches = curved_patches(shell);
+  struct Sum {
+    double area = 0, distance = 0, squared = 0;
+  };
+  const double per_patch = static_cast<double>(mean_samples) / static_cast<double>(patches.size());
+  const int level = std::clamp(static_cast<int>(std::sqrt(per_patch)), 2, 40);
+  std::vector<Sum> sums((patches.size() + grain - 1) / grain);
+  parallel_for_blocks(patches.size(), grain, [&](std::size_t begin, std::size_t end) {
+    Sum& sum = sums[begin / grain];
+    std::optional<Index> guess;
+    for (std::size_t t = begin; t < end; ++t) {
+      const auto add = [&](double c, double r) {
+        const Vec2 at(c / level, r / level);
+        const auto [u, v] = patches[t].tangents(at);
+        const double area = u.cross(v).norm() / (2.0 * level * level);
+        const Vec3 p = patches[t].point(at);
+        const auto hit = guess ? target.tree().closest(p, *guess) : target.tree().closest(p);
+        guess = hit.triangle;
+        sum.area += area;
+        sum.distance += area * std::sqrt(hit.squared_distance);
+        sum.squared += area * hit.squared_distance;
+      };
+      for (int r = 0; r < level; ++r) {
+        for (int c = 0; c < level - r; ++c) {
+          add(c + 1.0 / 3, r + 1.0 / 3);
+          if (c + 1 < level - r) {
+            add(c + 2.0 / 3, r + 2.0 / 3);
+          }
+        }
+      }
+    }
+  });
+  Sum total;
+  for (const Sum& sum : sums) {
+    total.area += sum.area;
+    total.distance += sum.distance;
+    total.squared += sum.squared;
+  }
+  return {total.distance / total.area, std::sqrt(total.squared / total.area)};
 }
 
 ShellDistance flat_distance(const ShellMesh& shell, const Target& target, const ShellDistanceOptions& options) {

@@ -5,6 +5,7 @@
 #include "shell/target.hpp"
 
 #include <optional>
+#include <utility>
 
 namespace tunica {
 
@@ -30,6 +31,9 @@ struct ShellDistanceOptions {
 /// Certified, see curved_hausdorff.hpp. Where a patch is so wild that this would take some million cuts the intervals
 /// come out wider.
 ShellDistance shell_distance(const ShellMesh& shell, const Target& target, const ShellDistanceOptions& options);
+
+/// Mean and root mean square (mm) of the distance from the curved surface to the target, over its area.
+std::pair<double, double> mean_distance(const ShellMesh& shell, const Target& target);
 
 /// The same of the flat facets.
 ShellDistance flat_distance(const ShellMesh& shell, const Target& target, const ShellDistanceOptions& options);

@@ -1,0 +1,64 @@
+#pragma once
+
+#include "core/lanes.hpp"
+#include "shell/curved_surface.hpp"
+
+#include <array>
+
+/// Cubic patches at several places at once.
+namespace tunica {
+
+/// A patch in powers of its parameters x = b2, y = b3: 1, x, y, x2, xy, y2, x3, x2y, xy2, y3.
+class PatchPowers {
+public:
+  explicit PatchPowers(const CubicPatch& patch);
+
+  [[nodiscard]] LaneVec3 point(const Lanes& x, const Lanes& y) const;
+
+  /// Derivatives of the point by b2 and by b3.
+  [[nodiscard]] std::array<LaneVec3, 2> tangents(const Lanes& x, const Lanes& y) const;
+
+  /// Of the facet: corner 1, and the edges from there to corners 2 and 3.
+  [[nodiscard]] const Vec3& corner() const { return c_[0]; }
+  [[nodiscard]] const std::array<Vec3, 2>& edges() const { return edges_; }
+
+private:
+  std::array<Vec3, 10> c_;
+  std::array<Vec3, 2> edges_;
+};
+
+/// The same for one place, the coordinates of its point side by side: (x, y, z, 0).
+class PatchAxes {
+public:
+  explicit PatchAxes(const CubicPatch& patch);
+
+  [[nodiscard]] Lanes point(const Vec2& b) const;
+  [[nodiscard]] std::array<Lanes, 2> tangents(const Vec2& b) const;
+  /// Second derivatives: b2 b2, b2 b3, b3 b3.
+  [[nodiscard]] std::array<Lanes, 3> second_derivatives(const Vec2& b) const;
+
+private:
+  std::array<Lanes, 10> c_;  // of the powers as in PatchPowers
+};
+
+/// Nearly the points of a patch closest to q: foot_on_patch() for several.
+struct LaneFeet {
+  Lanes x, y;
+  LaneVec3 point;
+  Lanes squared_distance;
+};
+LaneFeet feet_on_patch(const PatchPowers& patch, const LaneVec3& q);
+
+/// Squared distances from points to one flat triangle.
+class FlatTriangle {
+public:
+  explicit FlatTriangle(const std::array<Vec3, 3>& corners);
+  [[nodiscard]] Lanes squared_distance(const LaneVec3& p) const;
+
+private:
+  Vec3 a_, ab_, ac_, bc_;
+  double inverse_ab_, inverse_ac_, inverse_bc_;  // of the squared lengths; zero on an edge of no length
+  double uu_, uv_, vv_, inverse_determinant_;    // zero on a triangle without area
+};
+
+}  // namespace tunica

@@ -1,0 +1,123 @@
+#include "shell/patch_lanes.hpp"
+
+#include "shell/fit_samples.hpp"
+#include "shell/normal_equations.hpp"
+#include "surface/measure.hpp"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+namespace tunica {
+namespace {
+
+CubicPatch some_patch() {
+  return comas_patch({Vec3(0, 0, 0), Vec3(2, 0, 0.1), Vec3(0.4, 1.5, -0.2)},
+                     {Vec3(-0.3, -0.2, 1).normalized(), Vec3(0.3, -0.1, 1).normalized(), Vec3(0, 0.3, 1).normalized()});
+}
+
+Vec3 lane(const LaneVec3& points, std::size_t k) { return {points[0][k], points[1][k], points[2][k]}; }
+
+TEST(PatchLanes, PowersAreThePatch) {
+  const CubicPatch patch = some_patch();
+  const PatchPowers powers(patch);
+  const PatchAxes axes(patch);
+  const std::array<Vec2, lane_count> places{Vec2(0, 0), Vec2(0.2, 0.3), Vec2(1, 0), Vec2(0.1, 0.9)};
+  const Lanes x = lanes_of([&](std::size_t k) { return places[k][0]; });
+  const Lanes y = lanes_of([&](std::size_t k) { return places[k][1]; });
+  const LaneVec3 points = powers.point(x, y);
+  const auto tangents = powers.tangents(x, y);
+  for (std::size_t k = 0; k < lane_count; ++k) {
+    const Lanes point = axes.point(places[k]);
+    const auto along = axes.tangents(places[k]);
+    const auto second = axes.second_derivatives(places[k]);
+    const auto expected_along = patch.tangents(places[k]);
+    const auto expected_second = patch.second_derivatives(places[k]);
+    EXPECT_LT((lane(points, k) - patch.point(places[k])).norm(), 1e-14);
+    EXPECT_LT((Vec3(point[0], point[1], point[2]) - patch.point(places[k])).norm(), 1e-14);
+    for (std::size_t i = 0; i < 2; ++i) {
+      EXPECT_LT((lane(tangents[i], k) - expected_along[i]).norm(), 1e-13);
+      EXPECT_LT((Vec3(along[i][0], along[i][1], along[i][2]) - expected_along[i]).norm(), 1e-13);
+    }
+    for (std::size_t i = 0; i < 3; ++i) {
+      EXPECT_LT((Vec3(second[i][0], second[i][1], second[i][2]) - expected_second[i]).norm(), 1e-12);
+    }
+  }
+}
+
+TEST(PatchLanes, FeetAreThoseOfOnePointAtATime) {
+  const CubicPatch patch = some_patch();
+  const PatchPowers powers(patch);
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> coordinate(-1, 2.5);
+  for (int i = 0; i < 500; ++i) {
+    std::array<Vec3, lane_count> q;
+    for (Vec3& p : q) {
+      p = {coordinate(random), coordinate(random), coordinate(random)};
+    }
+    const LaneFeet feet = feet_on_patch(powers, lane_points([&](std::size_t k) { return q[k]; }));
+    for (std::size_t k = 0; k < lane_count; ++k) {
+      const PatchFoot expected = foot_on_patch(patch, q[k]);
+      const Vec2 at(feet.x[k], feet.y[k]);
+      EXPECT_LT((at - expected.at).norm(), 1e-9);
+      EXPECT_NEAR(feet.squared_distance[k], expected.squared_distance, 1e-12);
+      EXPECT_LT((lane(feet.point, k) - patch.point(at)).norm(), 1e-13);
+    }
+  }
+}
+
+TEST(PatchLanes, DistancesFromAFlatTriangle) {
+  const std::vector<std::array<Vec3, 3>> triangles{
+      {Vec3(0, 0, 0), Vec3(1, 0.2, 0), Vec3(0.3, 0.8, 0.1)},
+      {Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(0.5, 0, 0)},     // no area
+      {Vec3(1, 1, 1), Vec3(1, 1, 1), Vec3(1, 1, 1)},       // a point
+      {Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(0.5, 1e-9, 0)},  // a needle
+  };
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> coordinate(-1, 2);
+  for (const auto& c : triangles) {
+    const FlatTriangle flat(c);
+    for (int i = 0; i < 300; ++i) {
+      const LaneVec3 p = lane_points([&](std::size_t) { return Vec3(coordinate(random), coordinate(random), 0.3); });
+      const Lanes squared = flat.squared_distance(p);
+      for (std::size_t k = 0; k < lane_count; ++k) {
+        const Vec3 q = lane(p, k);
+        EXPECT_NEAR(squared[k], (closest_point_on_triangle(q, c[0], c[1], c[2]) - q).squaredNorm(), 1e-9);
+      }
+    }
+  }
+}
+
+TEST(NormalEquations, AreTheSumsOverTheResiduals) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> value(-1, 1);
+  const auto any = [&] { return value(random); };
+  const Eigen::Matrix<double, 30, 5> jacobian = Eigen::Matrix<double, 30, 5>::NullaryExpr(any);
+  std::vector<Residual> residuals;
+  for (int i = 0; i < 7; ++i) {  // not a multiple of the lanes
+    residuals.push_back({Vec2(0.1 * i, 0.2), Vec3(any(), any(), any()).normalized(), any()});
+  }
+  Eigen::Matrix<double, 5, 5> h = Eigen::Matrix<double, 5, 5>::Identity(), expected_h = h;
+  Eigen::Matrix<double, 5, 1> g = Eigen::Matrix<double, 5, 1>::Ones(), expected_g = g;
+  add_normal_equations<5>(
+      jacobian, residuals, [](const Lanes& d) { return Lanes(1.0 + d * d); }, h, g);
+  for (const Residual& r : residuals) {
+    // How the patch's point follows, by control points that move.
+    Eigen::Matrix<double, 5, 1> row;
+    for (Eigen::Index c = 0; c < 5; ++c) {
+      CubicPatch moved;
+      for (std::size_t i = 0; i < 10; ++i) {
+        moved.control[i] = jacobian.block<3, 1>(3 * static_cast<Eigen::Index>(i), c);
+      }
+      row[c] = moved.point(r.at).dot(r.direction);
+    }
+    const double weight = 1 + r.distance * r.distance;
+    expected_h += weight * row * row.transpose();
+    expected_g -= weight * r.distance * row;
+  }
+  EXPECT_LT((h - expected_h).norm(), 1e-12);
+  EXPECT_LT((g - expected_g).norm(), 1e-12);
+}
+
+}  // namespace
+}  // namespace tunica
