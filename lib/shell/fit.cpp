@@ -41,7 +41,7 @@ constexpr int most_settling = 20;
 constexpr int most_repairs = 12;
 constexpr double clearly_below = 0.975;
 constexpr int certificates = 10;
-constexpr double noted_width = 1.5;  // of the error, on the way
+constexpr double noted_width = 1.5;                                 // of the error, on the way
 constexpr double most_tightening = 0.95, least_tightening = 0.985;  // of the limit, where certificates find more
 constexpr double least_part = 0.2;                                  // of the tolerance, to part sheets that cross
 
