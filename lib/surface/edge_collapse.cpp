@@ -30,7 +30,7 @@ constexpr std::size_t sweep_factor = 8;
 /// How strongly a new vertex is held near the middle of its edge where the quadric is flat.
 constexpr double pull = 1e-5;
 /// Weight of an edge's squared length times its quadric's weight: on flat ground short edges go first.
-constexpr double length_weight = 1e-9;
+constexpr double length_weight = 1e-10;
 
 // A quadric sums squared distance times area. Divided by all of its area it would be a mean squared distance, which is
 // closer to the largest distance but knows nothing of size; this power in between gave the least largest errors.
@@ -41,9 +41,10 @@ double length_to_quadric(double squared_length) {  // (length^2)^0.125
   return std::sqrt(std::sqrt(std::sqrt(squared_length)));
 }
 
-double height_over_longest(const Vec3& normal, const Vec3& a, const Vec3& b, const Vec3& c) {
-  const double squared_longest = std::max({(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()});
-  return squared_longest > 0 ? normal.norm() / squared_longest : 0;
+// Of the triangle p a b with that doubled area and that squared length of a b.
+double height_over_longest(double doubled_area, const Vec3& p, const Vec3& a, const Vec3& b, double squared_ab) {
+  const double squared_longest = std::max({squared_ab, (a - p).squaredNorm(), (b - p).squaredNorm()});
+  return squared_longest > 0 ? doubled_area / squared_longest : 0;
 }
 
 }  // namespace
@@ -360,9 +361,14 @@ bool EdgeCollapse::keeps_topology(HalfEdge h) {
     return false;
   }
   const auto keeps_enough = [&](Index apex) {
-    std::size_t valence = 0;
-    neighbours_of(apex, [&](Index) { ++valence; });
-    return valence > (vertex_[apex].curve == none ? 3U : 2U);
+    const std::size_t needed = vertex_[apex].curve == none ? 4 : 2;  // triangles: one more neighbour at a boundary
+    std::size_t triangles = 0;
+    HalfEdge spoke = vertex_[apex].outgoing;
+    do {
+      ++triangles;
+      spoke = half_[previous(spoke)].twin;
+    } while (triangles < needed && spoke != none && spoke != vertex_[apex].outgoing);
+    return triangles >= needed;
   };
   return keeps_enough(from(previous(h))) && (half_[h].twin == none || keeps_enough(from(previous(half_[h].twin))));
 }
@@ -389,15 +395,17 @@ double EdgeCollapse::fan_penalty(Index vertex, Index other, const Vec3& position
     const Vec3& b = vertex_[j].position;
     const Vec3 before = (a - old_position).cross(b - old_position);
     const Vec3 after = (a - position).cross(b - position);
-    const double lengths = before.norm() * after.norm();
-    const double old_height = height_over_longest(before, old_position, a, b);
-    const double new_height = height_over_longest(after, position, a, b);
+    const double length_before = before.norm();
+    const double length_after = after.norm();
+    const double rim = (b - a).squaredNorm();
+    const double old_height = height_over_longest(length_before, old_position, a, b, rim);
+    const double new_height = height_over_longest(length_after, position, a, b, rim);
     const bool was_flat = !(old_height > 1e-9);
     // Many small turns may add up: the given surface that the three corners stand for must be faced as well.
     const Vec3 given = facing + vertex_[i].facing + vertex_[j].facing;
-    good = (was_flat || before.dot(after) > least_cosine * lengths) &&
+    good = (was_flat || before.dot(after) > least_cosine * length_before * length_after) &&
            (after.dot(given) > 0 || before.dot(given) <= 0) &&
-           new_height > std::min(limits_.least_height, 0.7 * old_height) && after.squaredNorm() > 0;
+           new_height > std::min(limits_.least_height, 0.7 * old_height) && length_after > 0;
     const double wanted = std::min(limits_.good_height, 0.7 * old_height);
     if (new_height < wanted) {
       penalty = std::max(penalty, wanted / new_height);
@@ -408,7 +416,7 @@ double EdgeCollapse::fan_penalty(Index vertex, Index other, const Vec3& position
       const Vec3& c = vertex_[from(previous(across))].position;
       const Vec3 outer = (a - b).cross(c - b);
       const double limit = limits_.fold_cosine * outer.norm();
-      good = after.dot(outer) > limit * after.norm() || before.dot(outer) <= limit * before.norm();
+      good = after.dot(outer) > limit * length_after || before.dot(outer) <= limit * length_before;
     }
   });
   return good ? penalty : forbidden;

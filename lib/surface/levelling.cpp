@@ -19,6 +19,7 @@ constexpr double least_gain = 0.15;      // of the worst triangle's cost, for a 
 constexpr double collapse_share = 0.85;  // of the largest error, at most, may a collapse leave
 constexpr double renew_share = 0.8;      // of the error that costs refer to, below which they are computed anew
 constexpr double certain_share = 0.5;  // of the largest squared error: points that look farther off are looked at again
+constexpr double negligible = 1e-6;    // of the diagonal
 constexpr double least_angle = 3;      // degrees: thinner triangles cost something
 constexpr double most_parts = 8;       // into which the edges of a large triangle of the target are cut
 constexpr std::size_t many_vertices = 24;  // per triangle of the mesh: no more are looked at
@@ -141,6 +142,7 @@ public:
             Sampling(mesh, target, options.stands_for).samples(), curves,
             [&walk](const Vec3& p, Index near) { return walk.near_by(p, near); }),
         options_(options),
+        diagonal_(diagonal(target)),
         certain_(mesh.triangles.size(), 0),
         work_left_(std::max(least_work, work_per_triangle * target.triangles.size())) {
     weights_.error = infinity;
@@ -170,7 +172,7 @@ public:
         queue_.push({state_.error(t), t});
         continue;
       }
-      if (!(error > 0)) {
+      if (!(error > negligible * diagonal_)) {
         break;
       }
       if (error < renew_share * weights_.error || error > weights_.error) {
@@ -377,6 +379,7 @@ private:
   const LevellingOptions& options_;
   ShapeWeights weights_;
   std::priority_queue<Worst> queue_;
+  double diagonal_;
   std::vector<std::uint8_t> certain_;  // #F whether the error was measured in earnest
   PatchTrial trial_, best_;
   std::vector<Vec3> places_;
