@@ -41,7 +41,8 @@ constexpr int most_settling = 20;
 constexpr int most_repairs = 12;
 constexpr double clearly_below = 0.975;
 constexpr int certificates = 10;
-constexpr double noted_width = 1.5;                                 // of the error, on the way
+constexpr double noted_width = 1.5;  // of the error, on the way
+constexpr int local_mending = 3;     // certificates, before less error is asked for everywhere
 constexpr double most_tightening = 0.95, least_tightening = 0.985;  // of the limit, where certificates find more
 constexpr double least_part = 0.2;                                  // of the tolerance, to part sheets that cross
 
@@ -313,7 +314,7 @@ private:
       // What more samples alone do not mend gets more shells.
       const std::size_t added = add_missed(samples, state, limit, true);
       samples.add(farthest_);
-      if (i > 0 || added == 0) {
+      if (i >= local_mending) {
         // Of what is not seen only less error helps.
         limit *= std::clamp(tolerance / least_distance_, most_tightening, least_tightening);
       }

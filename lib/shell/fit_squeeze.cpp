@@ -24,8 +24,10 @@ constexpr int regaining = 8;                     // steps of all nodes
 constexpr int looks = 4;                         // for points that the samples missed
 constexpr std::size_t checked_points = 200'000;  // of the target, for places that the samples miss
 constexpr int checking_level = 6;                // pieces per edge of the patches there
+constexpr int fine_level = 12;  // where errors are wanted: ridges of a coarse target lie between the grid points
 constexpr std::size_t price_of_a_thin_one = 10;  // shells
 constexpr double narrow = 0.05;                  // of the limit: gaps that add nothing
+constexpr double exact = 1.025;  // limits: what is looked at above gaps is the worst, so with less margin
 
 /// Where patches part sideways and are off as well, the target above the gap is farther from both than either measure
 /// says: its points there that are too far off.
@@ -63,7 +65,7 @@ std::size_t price(const FitState& state) { return state.mesh.alive + price_of_a_
 
 std::size_t add_missed(FitSamples& samples, FitState& state, double limit, bool errors) {
   std::vector<Index> triangles;
-  const Tessellation fine = tessellate_uniformly(state.mesh.shell(&triangles), checking_level);
+  const Tessellation fine = tessellate_uniformly(state.mesh.shell(&triangles), errors ? fine_level : checking_level);
   const ClosestPoint tree(fine.mesh);
   const auto raise = [&](Index patch, double error) {
     if (errors) {
@@ -107,7 +109,7 @@ std::size_t add_missed(FitSamples& samples, FitState& state, double limit, bool 
       raise(patch, distance);
     }
   }
-  for (const Vec3& p : missed_over_gaps(state, limit)) {
+  for (const Vec3& p : missed_over_gaps(state, exact * limit)) {
     samples.add(p);
     ++added;
   }
