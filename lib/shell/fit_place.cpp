@@ -47,7 +47,7 @@ void put(std::vector<PlacedPatch>& patches, const PlacedNode& node) {
 
 /// Each point to the patch whose facet is closest.
 void attach_to_closest(const FitSamples& samples, const std::vector<Index>& points, std::vector<PlacedPatch>& patches) {
-  std::vector<FlatTriangle> facets;
+  std::vector<FacetDistances> facets;
   facets.reserve(patches.size());
   for (const PlacedPatch& p : patches) {
     facets.emplace_back(p.shape.corners);
@@ -99,15 +99,9 @@ Measured measure(const FitSamples& samples, std::vector<PlacedPatch>& patches, c
       }
     }
     const Vec3 facing = facing_of(p.shape.corners);
-    const std::size_t gaps = p.residuals.size();
     const PatchPowers powers(patch);
-    samples.from_patch(powers, facing, FitSamples::Search::nearby, p.guesses, p.residuals);
-    if (std::any_of(p.residuals.begin() + static_cast<std::ptrdiff_t>(gaps), p.residuals.end(),
-                    [&](const Residual& r) { return std::abs(r.distance) > doubted; })) {
-      // Downhill from a wrong start a point may seem far that is not.
-      p.residuals.resize(gaps);
-      samples.from_patch(powers, facing, FitSamples::Search::everywhere, p.guesses, p.residuals);
-    }
+    // Downhill from a wrong start a point may seem far that is not.
+    samples.from_patch(powers, facing, doubted, p.guesses, p.residuals);
     samples.from_target(powers, facing, p.attached, p.residuals);
     p.error = 0;
     for (const Residual& r : p.residuals) {

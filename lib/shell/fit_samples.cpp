@@ -169,6 +169,7 @@ void FitSamples::from_gap(const CubicPatch& patch, std::size_t from, std::size_t
 FitSamples::FitSamples(const Target& target, std::size_t shells)
     : target_(target),
       around_(incidence(target.mesh())),
+      grid_of_target_(target.mesh()),
       across_(neighbours(target.mesh(), around_)),
       facets_(facet_normals(target.mesh())) {
   const auto& mesh = target.mesh();
@@ -229,6 +230,15 @@ ClosestPoint::Hit FitSamples::downhill(const Vec3& p, Index start) const {
   };
   Index here = start;
   TriangleFoot foot = look(here);
+  if (foot.squared_distance > grid_of_target_.cell() * grid_of_target_.cell()) {
+    // Far from where it was the last time.
+    if (const auto other = grid_of_target_.near(p)) {
+      if (const TriangleFoot there = look(*other); there.squared_distance < foot.squared_distance) {
+        here = *other;
+        foot = there;
+      }
+    }
+  }
   for (int step = 0; step < most_steps; ++step) {
     if (foot.side == TriangleFoot::inside) {
       return {foot.point, here, foot.squared_distance};
@@ -285,7 +295,7 @@ void FitSamples::downhill(const LaneVec3& p, std::size_t count, std::array<Close
   }
 }
 
-void FitSamples::from_patch(const PatchPowers& patch, const Vec3& facing, Search search, std::vector<Index>& guesses,
+void FitSamples::from_patch(const PatchPowers& patch, const Vec3& facing, double doubted, std::vector<Index>& guesses,
                             std::vector<Residual>& out) const {
   if (guesses.size() != grid_.size()) {
     guesses.assign(grid_.size(), guesses.empty() ? no_neighbour : guesses[0]);
@@ -297,7 +307,7 @@ void FitSamples::from_patch(const PatchPowers& patch, const Vec3& facing, Search
     const LaneVec3 points = patch.point(x, y);
     const std::size_t count = std::min(lane_count, grid_.size() - i);
     const auto point = [&](std::size_t k) { return Vec3(points[0][k], points[1][k], points[2][k]); };
-    bool all_known = search == Search::nearby;
+    bool all_known = true;
     for (std::size_t k = 0; k < lane_count; ++k) {
       const Index guess = guesses[std::min(i + k, grid_.size() - 1)];
       hits[k].triangle = guess == no_neighbour ? last : guess;
@@ -305,12 +315,14 @@ void FitSamples::from_patch(const PatchPowers& patch, const Vec3& facing, Search
     }
     if (all_known) {
       downhill(points, count, hits);
+      for (std::size_t k = 0; k < count; ++k) {
+        if (hits[k].squared_distance > doubted * doubted) {
+          hits[k] = target_.tree().closest(point(k), hits[k].triangle);
+        }
+      }
     } else {
       for (std::size_t k = 0; k < count; ++k) {
-        const Index guess = hits[k].triangle == no_neighbour ? last : hits[k].triangle;
-        hits[k] = guess == no_neighbour          ? target_.tree().closest(point(k))
-                  : search == Search::everywhere ? target_.tree().closest(point(k), guess)
-                                                 : downhill(point(k), guess);
+        hits[k] = last == no_neighbour ? target_.tree().closest(point(k)) : target_.tree().closest(point(k), last);
         last = hits[k].triangle;
       }
     }

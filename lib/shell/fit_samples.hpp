@@ -3,6 +3,7 @@
 #include "core/lanes.hpp"
 #include "shell/curved_surface.hpp"
 #include "shell/patch_lanes.hpp"
+#include "shell/start_grid.hpp"
 #include "shell/target.hpp"
 #include "surface/incidence.hpp"
 
@@ -59,12 +60,11 @@ public:
   /// Further points of the target that must be met, such as where the distance was found largest.
   void add(const Vec3& point) { points_.push_back(point); }
 
-  /// How the target's closest points are looked for: among all, or downhill from the last ones, ten times as fast.
-  enum class Search { everywhere, nearby };
-
-  /// Appends the residuals of the grid of a patch's points. @param facing  the facet's normal; guesses  triangles of
-  /// the target that were closest the last time, kept up to date
-  void from_patch(const PatchPowers& patch, const Vec3& facing, Search search, std::vector<Index>& guesses,
+  /// Appends the residuals of the grid of a patch's points. The target's closest points are looked for downhill from
+  /// the last ones, ten times as fast as among all.
+  /// @param facing  the facet's normal; doubted  mm: points that seem to be farther off are looked for among all;
+  /// guesses  triangles of the target that were closest the last time, kept up to date
+  void from_patch(const PatchPowers& patch, const Vec3& facing, double doubted, std::vector<Index>& guesses,
                   std::vector<Residual>& out) const;
 
   /// Appends what makes two neighbours gape: where their edge curves part sideways, the target is bare between them by
@@ -87,6 +87,7 @@ private:
 
   const Target& target_;
   Incidence around_;  // of the target
+  StartGrid grid_of_target_;
   std::vector<std::array<Index, 3>> across_;
   std::vector<Vec3> facets_;  // normals
   std::vector<Vec3> points_;

@@ -25,6 +25,7 @@ constexpr double cg_tolerance = 1e-3;
 constexpr double least_weight = 0.1;  // residuals below this part of the largest count alike
 constexpr double largest_tilt = 0.3;  // rad
 constexpr double largest_move = 0.3;  // of the mean edge at the node
+constexpr double none_doubted = std::numeric_limits<double>::infinity();
 constexpr int trials = 6;
 constexpr double doubted = 0.7;  // of the largest error: from there on it is looked at again
 
@@ -134,7 +135,7 @@ void FitState::attach_again() {
   }
 }
 
-void FitState::measure(Index t, FitSamples::Search search) {
+void FitState::measure(Index t, double doubted) {
   Patch& p = patches[t];
   p.residuals.clear();
   p.error = 0;
@@ -144,7 +145,7 @@ void FitState::measure(Index t, FitSamples::Search search) {
   const CubicPatch patch = mesh.patch(t);
   const Vec3 facing = facing_of(mesh.corners(t));
   const PatchPowers powers(patch);
-  samples_->from_patch(powers, facing, search, p.guesses, p.residuals);
+  samples_->from_patch(powers, facing, doubted, p.guesses, p.residuals);
   samples_->from_target(powers, facing, p.attached, p.residuals);
   for (std::size_t k = 0; k < 3; ++k) {
     const Index from = mesh.triangles[t][k], to = mesh.triangles[t][(k + 1) % 3];
@@ -165,7 +166,7 @@ void FitState::measure() {
   patches.resize(mesh.triangles.size());
   parallel_for_blocks(patches.size(), patches_per_block, [&](std::size_t begin, std::size_t end) {
     for (std::size_t t = begin; t < end; ++t) {
-      measure(static_cast<Index>(t), FitSamples::Search::nearby);
+      measure(static_cast<Index>(t), none_doubted);
     }
   });
   // Downhill from a wrong start a point may seem far that is not.
@@ -173,7 +174,7 @@ void FitState::measure() {
   parallel_for_blocks(patches.size(), patches_per_block, [&](std::size_t begin, std::size_t end) {
     for (std::size_t t = begin; t < end; ++t) {
       if (patches[t].error > far) {
-        measure(static_cast<Index>(t), FitSamples::Search::everywhere);
+        measure(static_cast<Index>(t), far);
       }
     }
   });
@@ -438,7 +439,7 @@ double FitState::solve(int power, double smoothing) {
             !is_sound(i, std::min(limits.agreement, old_agreement[t]), least_angle(limits.angle, old_angle[t])) ||
             facing_of(mesh.corners(i)).dot(old_facing[t]) < 0.3;
         if (broken[t] == 0) {
-          measure(i, FitSamples::Search::nearby);
+          measure(i, none_doubted);
           new_costs[t] = cost_of(patches[t], power, scale);
         } else {
           new_costs[t] = 0;

@@ -31,7 +31,8 @@ public:
 
   /// Measures all patches, or one. Parallel.
   void measure();
-  void measure(Index t, FitSamples::Search search = FitSamples::Search::everywhere);
+  /// @param doubted  mm: see FitSamples::from_patch
+  void measure(Index t, double doubted);
 
   [[nodiscard]] PatchShape shape(Index t) const { return {mesh.corners(t), mesh.corner_normals(t), mesh.kind}; }
   [[nodiscard]] bool is_sound(Index t, double agreement, double angle) const {

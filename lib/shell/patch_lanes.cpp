@@ -154,7 +154,7 @@ LaneFeet feet_on_patch(const PatchPowers& patch, const LaneVec3& q) {
   return best;
 }
 
-FlatTriangle::FlatTriangle(const std::array<Vec3, 3>& corners)
+FacetDistances::FacetDistances(const std::array<Vec3, 3>& corners)
     : a_(corners[0]), ab_(corners[1] - corners[0]), ac_(corners[2] - corners[0]), bc_(corners[2] - corners[1]) {
   uu_ = ab_.dot(ab_);
   uv_ = ab_.dot(ac_);
@@ -165,7 +165,7 @@ FlatTriangle::FlatTriangle(const std::array<Vec3, 3>& corners)
   inverse_determinant_ = inverse_or_zero(uu_ * vv_ - uv_ * uv_);
 }
 
-Lanes FlatTriangle::squared_distance(const LaneVec3& p) const {
+Lanes FacetDistances::squared_distance(const LaneVec3& p) const {
   const LaneVec3 ap = minus(p, a_);
   const LaneVec3 bp = minus(ap, ab_);
   const Lanes pu = dot(ap, ab_), pv = dot(ap, ac_);

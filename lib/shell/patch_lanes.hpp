@@ -50,9 +50,9 @@ struct LaneFeet {
 LaneFeet feet_on_patch(const PatchPowers& patch, const LaneVec3& q);
 
 /// Squared distances from points to one flat triangle.
-class FlatTriangle {
+class FacetDistances {
 public:
-  explicit FlatTriangle(const std::array<Vec3, 3>& corners);
+  explicit FacetDistances(const std::array<Vec3, 3>& corners);
   [[nodiscard]] Lanes squared_distance(const LaneVec3& p) const;
 
 private:

@@ -66,7 +66,7 @@ TEST(PatchLanes, FeetAreThoseOfOnePointAtATime) {
   }
 }
 
-TEST(PatchLanes, DistancesFromAFlatTriangle) {
+TEST(PatchLanes, DistancesFromAFacetDistances) {
   const std::vector<std::array<Vec3, 3>> triangles{
       {Vec3(0, 0, 0), Vec3(1, 0.2, 0), Vec3(0.3, 0.8, 0.1)},
       {Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(0.5, 0, 0)},     // no area
@@ -76,7 +76,7 @@ TEST(PatchLanes, DistancesFromAFlatTriangle) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> coordinate(-1, 2);
   for (const auto& c : triangles) {
-    const FlatTriangle flat(c);
+    const FacetDistances flat(c);
     for (int i = 0; i < 300; ++i) {
       const LaneVec3 p = lane_points([&](std::size_t) { return Vec3(coordinate(random), coordinate(random), 0.3); });
       const Lanes squared = flat.squared_distance(p);
