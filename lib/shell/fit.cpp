@@ -41,6 +41,7 @@ constexpr int most_settling = 20;
 constexpr int most_repairs = 12;
 constexpr double clearly_below = 0.975;
 constexpr int certificates = 10;
+constexpr double hopeless = 2;       // times the limit: more shells will not mend it
 constexpr double noted_width = 1.5;  // of the error, on the way
 constexpr int local_mending = 3;     // certificates, before less error is asked for everywhere
 constexpr double most_tightening = 0.95, least_tightening = 0.985;  // of the limit, where certificates find more
@@ -216,6 +217,10 @@ private:
       if (state.error() > limit && !result_.shell.triangles.empty() && result_.distance.both.upper <= tolerance) {
         break;
       }
+      if (state.error() > hopeless * limit) {
+        certify(state, tolerance);
+        continue;
+      }
       if (join_normals(state, limit) > 0) {
         state.attach();
         state.measure();
@@ -334,7 +339,7 @@ private:
         mend_angles(state, limit);
       }
       stuck = state.error() > 0.999 * before && state.error() > limit ? stuck + 1 : 0;
-      if (state.error() > 2 * limit || stuck == patience) {
+      if (state.error() > hopeless * limit || stuck == patience) {
         return certify(state, tolerance);  // a place that more shells do not mend
       }
     }

@@ -13,6 +13,19 @@ import numpy as np
 
 def read_ply(path):
     """Vertex properties by name, triangles, comments of a binary little-endian PLY."""
+    vertices, faces, comments = read_elements(path)
+    return vertices, faces["vertex_indices"].astype(int), comments
+
+
+def read_corner_normals(path):
+    """#T x 3 x 3, the nodes' normals where the file has none per corner."""
+    vertices, faces, _ = read_elements(path)
+    if "corner_normals" in faces.dtype.names:
+        return faces["corner_normals"].reshape(-1, 3, 3)
+    return columns(vertices, ("nx", "ny", "nz"))[faces["vertex_indices"].astype(int)]
+
+
+def read_elements(path):
     with open(path, "rb") as file:
         data = file.read()
     end = data.index(b"end_header\n") + len(b"end_header\n")
@@ -35,7 +48,7 @@ def read_ply(path):
     vertices = np.frombuffer(data, np.dtype(fields), counts["vertex"], end)
     faces = np.frombuffer(data, np.dtype(face), counts["face"], end + vertices.nbytes)
     assert (faces["n_vertex_indices"] == 3).all()
-    return vertices, faces["vertex_indices"].astype(int), comments
+    return vertices, faces, comments
 
 
 def columns(vertices, names):

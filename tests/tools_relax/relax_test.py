@@ -9,7 +9,7 @@ import unittest
 
 import numpy as np
 
-from curved_patch import columns, patch_points, read_ply, watertight_points
+from curved_patch import columns, patch_points, read_corner_normals, read_ply, watertight_points
 
 BIN = os.environ["TUNICA_BIN"]
 PAPER = os.path.join(os.environ.get("TUNICA_SHARED_DATA", ""), "paper")
@@ -379,14 +379,14 @@ class Patch(Case):
         self.relax(self.path("coarse.ply"), self.path("target.ply"), self.path("shell.ply"), "--curved",
                    self.path("curved.ply"))
         shell, triangles, _ = read_ply(self.path("shell.ply"))
-        points, normals = columns(shell, "xyz"), columns(shell, ("nx", "ny", "nz"))
+        points, normals = columns(shell, "xyz"), read_corner_normals(self.path("shell.ply"))
         curved, fine, _ = read_ply(self.path("curved.ply"))
         curved = columns(curved, "xyz")
         size = np.linalg.norm(points.max(0) - points.min(0))
 
         # The fine vertices come patch by patch: a grid of level m has (m + 1)(m + 2) / 2 of them, rows along corner 3.
         used, fine_used = 0, 0
-        for corners in triangles:
+        for corners, facet_normals in zip(triangles, normals):
             level = 1
             while not (np.array_equal(curved[used], points[corners[0]])
                        and used + (level + 1) * (level + 2) // 2 <= len(curved)
@@ -395,12 +395,12 @@ class Patch(Case):
                 level += 1
                 self.assertLess(level, 1000)
             b = np.array([(level - i - j, i, j) for j in range(level + 1) for i in range(level + 1 - j)]) / level
-            expected = patch_points(points[corners], normals[corners], b)
+            expected = patch_points(points[corners], facet_normals, b)
             block = curved[used:used + len(b)]
             self.assertLess(np.abs(block - expected).max(), 1e-9 * size)
             # Within 0.001 % of the diagonal: the middles of the fine triangles against the patch at their parameters.
             cells = fine[fine_used:fine_used + level**2] - used
-            middles = patch_points(points[corners], normals[corners], b[cells].mean(1))
+            middles = patch_points(points[corners], facet_normals, b[cells].mean(1))
             self.assertLess(np.linalg.norm(block[cells].mean(1) - middles, axis=1).max(), 1e-5 * size)
             used += len(b)
             fine_used += level**2
