@@ -36,8 +36,8 @@ constexpr std::size_t few_shells = 400;  // wanted: several starts cost little
 constexpr double margin = 0.97;          // of the tolerance: what samples miss
 constexpr double worth_it = 0.985;       // a round that leaves more than this of the count or error is the last
 constexpr int patience = 3;              // rounds that bring nothing
-constexpr double worth_a_round = 0.95;   // the same for an exchange of many shells, which is as dear as their search
-constexpr int most_settling = 20;
+constexpr double worth_mending = 0.9;    // of the certified distance, by what it missed
+constexpr int most_settling = 20, some_settling = 6;
 constexpr int most_repairs = 12;
 constexpr double clearly_below = 0.975;
 constexpr int certificates = 10;
@@ -373,12 +373,18 @@ private:
         exhausted = its_exhausted;
       }
     }
+    // What samples missed is worth a few more certificates where few shells are to come as close as they can.
+    const double mistrusted = shells < few_shells ? 1.1 : 1.25;
+    double known = std::numeric_limits<double>::infinity();
     for (int i = 0; i < 3; ++i) {
       part_crossings(best, best.error(), shells);
       certify(best, std::nullopt);
-      if (result_.distance.both.lower <= 1.1 * best.error() || add_missed(samples, best, best.error()) == 0) {
+      const double now = result_.distance.both.lower;
+      if (now <= mistrusted * best.error() || now > worth_mending * known ||
+          add_missed(samples, best, best.error()) == 0) {
         break;
       }
+      known = now;
       best.attach();
       best.measure();
       polish(best, best.error(), 3);
@@ -396,6 +402,8 @@ private:
   /// The closest that many shells come from one start, by exchanging shells between where they are hardly needed and
   /// where the error is largest. @param done  of the whole fit, before and after
   Exchanged exchanged(FitSamples& samples, FitStart start, std::size_t shells, const std::array<double, 2>& done) {
+    const bool cheap = shells < few_shells;
+    const int settling = cheap ? most_settling : some_settling;
     FitState state(samples, prepared(start), {});
     // Few shells for a rough target: normals of their own would fit its ripples, and stay.
     smooth(state, 0.1 * start.flat_error, 0.5 * start.flat_error);
@@ -407,15 +415,13 @@ private:
       state = FitState(samples, prepared(start), {});
       smooth(state, 0.1 * start.flat_error, 0.5 * start.flat_error);
     }
-    settle(state);
+    settle(state, settling);
     mend_angles(state, 0.97 * state.error());
     FitState best = state;
-    const bool cheap = shells < few_shells;
-    const int rounds = options_.max_iterations.value_or(default_rounds);
-    const int enough = cheap ? patience : 1;
+    const int rounds = options_.max_iterations.value_or(cheap ? default_rounds : 1);
     int fruitless = 0;
     bool noted = false;
-    for (int round = 1; round < rounds && fruitless < enough; ++round) {
+    for (int round = 1; round < rounds && fruitless < patience; ++round) {
       if (!noted) {
         note(best);
         noted = true;
@@ -428,15 +434,15 @@ private:
       split_worst(state, 0.7 * error, std::max<std::size_t>(1, amounts[static_cast<std::size_t>(fruitless) % 3]));
       polish(state, error, 1);
       collapse_edges(state, any, shells, {});
-      settle(state);
+      settle(state, settling);
       const bool better = state.mesh.alive <= shells && (state.error() < best.error() || best.mesh.alive > shells);
-      fruitless = better && state.error() < (cheap ? worth_it : worth_a_round) * best.error() ? 0 : fruitless + 1;
+      fruitless = better && state.error() < worth_it * best.error() ? 0 : fruitless + 1;
       if (better) {
         best = state;
         noted = false;
       }
     }
-    return {std::move(best), fruitless >= enough};
+    return {std::move(best), fruitless >= patience};
   }
 
   [[nodiscard]] FitMesh prepared(const FitStart& start) const {
@@ -459,7 +465,7 @@ private:
       if (i > 0) {
         detach_worst(state, creased);
       }
-      state.attach();
+      state.attach_again();
       state.measure();
     }
   }
@@ -481,12 +487,12 @@ private:
   }
 
   /// Polishes until that brings little.
-  static void settle(FitState& state) {
+  static void settle(FitState& state, int most) {
     state.attach();
     state.measure();
     int fruitless = 0;
     FitState best = state;
-    for (int i = 0; i < most_settling && fruitless < 3; ++i) {
+    for (int i = 0; i < most && fruitless < patience; ++i) {
       polish(state, 0.95 * state.error(), 1);
       fruitless = state.error() < 0.98 * best.error() ? 0 : fruitless + 1;
       if (state.error() < best.error()) {

@@ -15,7 +15,7 @@ namespace tunica {
 namespace {
 
 constexpr std::size_t grain = 256;
-constexpr std::size_t mean_samples = 60'000;
+constexpr std::size_t mean_samples = 20'000;
 constexpr std::size_t most_fine_triangles = 4'000'000;
 
 Tessellation affordable_tessellation(const ShellMesh& shell, double deviation) {
