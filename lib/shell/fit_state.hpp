@@ -50,7 +50,6 @@ public:
   double solve(int power, double smoothing);
 
 private:
-  struct Step;
   [[nodiscard]] double cost_of(const Patch& patch, int power, double scale) const;
   /// Patches whose residuals change when these nodes move: theirs, and those that meet them along an edge.
   void changed_patches(const std::vector<std::uint8_t>& moved, std::vector<std::uint8_t>& changed) const;

@@ -32,10 +32,11 @@ struct ShellDistanceOptions {
 /// come out wider.
 ShellDistance shell_distance(const ShellMesh& shell, const Target& target, const ShellDistanceOptions& options);
 
-/// Mean and root mean square (mm) of the distance from the curved surface to the target, over its area.
+/// Mean and root mean square (mm) of the distance from the curved surface to the target, over its area, by some 20,000
+/// samples.
 std::pair<double, double> mean_distance(const ShellMesh& shell, const Target& target);
 
-/// The same of the flat facets.
+/// shell_distance() of the flat facets.
 ShellDistance flat_distance(const ShellMesh& shell, const Target& target, const ShellDistanceOptions& options);
 
 /// Largest sampled distance of each shell, mm: of points of its patch from the target, and of the target's vertices and

@@ -216,6 +216,52 @@ TEST(Fit, CrossingShellsAreParted) {
   EXPECT_FALSE(why_unfit(examine(flat_facets(state.mesh.shell()))));
 }
 
+TEST(Fit, PointsOfTheTargetFollowTheirPatches) {
+  const TriangleMesh mesh = walled_ball(4, 1);
+  const Target target(mesh);
+  FitStart start;
+  start.mesh = walled_ball(2, 1);
+  const FitSamples samples(target, 640);
+  FitState state(samples, prepare_fit(start, target), {});
+  state.attach();
+  for (std::size_t v = 0; v < state.mesh.positions.size(); ++v) {
+    state.mesh.positions[v] +=
+        0.1 * Vec3(std::sin(3.0 * static_cast<double>(v)), std::cos(7.0 * static_cast<double>(v)), 0);
+  }
+  FitState anew = state;
+  state.attach_again();
+  anew.attach();
+  std::size_t points = 0, elsewhere = 0, moved = 0;
+  FitState before(samples, prepare_fit(start, target), {});
+  before.attach();
+  for (std::size_t t = 0; t < state.patches.size(); ++t) {
+    const auto &here = state.patches[t].attached, &there = anew.patches[t].attached, &then = before.patches[t].attached;
+    points += here.size();
+    for (const Index q : here) {
+      elsewhere += std::find(there.begin(), there.end(), q) == there.end() ? 1 : 0;
+      moved += std::find(then.begin(), then.end(), q) == then.end() ? 1 : 0;
+    }
+  }
+  EXPECT_EQ(points, samples.points().size());
+  EXPECT_GT(moved, points / 100);
+  // attach() looks on flat pieces: points over an edge may differ.
+  EXPECT_LT(elsewhere, moved / 2);
+}
+
+TEST(StartGrid, LeadsNearThePointWhereverTheSurfaceIs) {
+  const TriangleMesh mesh = walled_ball(4, 1);
+  const StartGrid grid(mesh);
+  for (std::size_t t = 0; t < mesh.triangles.size(); t += 7) {
+    const auto& [a, b, c] = mesh.triangles[t];
+    const Vec3 p = (mesh.vertices[a] + mesh.vertices[b] + mesh.vertices[c]) / 3;
+    const auto near = grid.near(p);
+    ASSERT_TRUE(near);
+    EXPECT_LT((mesh.vertices[mesh.triangles[*near][0]] - p).norm(), 3 * grid.cell());
+  }
+  EXPECT_FALSE(grid.near(Vec3::Constant(1e9)));
+  EXPECT_FALSE(grid.near(Vec3::Constant(std::nan(""))));
+}
+
 TEST(Fit, SheetsCloserThanTheToleranceDoNotCross) {
   const TriangleMesh mesh = walled_ball(3, 0.25);
   const Target target(mesh);
