@@ -36,13 +36,20 @@ Vec3 barycentric(const Vec3& point, const std::array<Vec3, 3>& c) {
           n.dot((c[0] - point).cross(c[1] - point)) / squared};
 }
 
-// Whether the edge from corner k of new triangle i lies between two of them.
-bool is_inner(const PatchTrial& trial, std::size_t i, std::size_t k) {
+// The edge from corner k of new triangle i as the edge of an earlier one: 3 j + l, or `most_edges` if there is none.
+constexpr std::size_t most_edges = 3 * most_in_patch;
+std::size_t earlier_edge(const PatchTrial& trial, std::size_t i, std::size_t k) {
   const Index from = trial.corners[i][k];
   const Index to = trial.corners[i][(k + 1) % 3];
-  return std::any_of(trial.corners.begin(), trial.corners.end(), [&](const std::array<Index, 3>& c) {
-    return (c[0] == to && c[1] == from) || (c[1] == to && c[2] == from) || (c[2] == to && c[0] == from);
-  });
+  for (std::size_t j = 0; j < i; ++j) {
+    const auto& c = trial.corners[j];
+    for (std::size_t l = 0; l < 3; ++l) {
+      if (c[l] == to && c[(l + 1) % 3] == from) {
+        return 3 * j + l;
+      }
+    }
+  }
+  return most_edges;
 }
 
 }  // namespace
@@ -185,10 +192,10 @@ double ShapedMesh::squared_of_samples(Index t, const std::array<Vec3, 3>& c) con
   return squared;
 }
 
-/// The errors of all triangles: at their centre and corners, in the middle of their edges (an inner edge counts for one
-/// of its triangles), and of their samples.
+/// The errors of all triangles: at their centre and corners, in the middle of their edges, and of their samples.
 void ShapedMesh::measure_all(const NearestPoint& nearest) {
   vertex_error_.assign(mesh_.positions.size(), -1);
+  std::vector<double> middle(3 * states_.size());
   for (std::size_t t = 0; t < states_.size(); ++t) {
     const auto& triangle = mesh_.triangles[t];
     const auto c = corners(triangle, {});
@@ -203,9 +210,10 @@ void ShapedMesh::measure_all(const NearestPoint& nearest) {
         vertex_error_[v] = std::sqrt(nearest(c[k], state.guess).squared_distance);
       }
       squared = std::max(squared, vertex_error_[v] * vertex_error_[v]);
-      if (v < w || mesh_.on_edge(v, w)[1] == EditMesh::none) {
-        squared = std::max(squared, nearest(0.5 * (c[k] + c[(k + 1) % 3]), state.guess).squared_distance);
-      }
+      const Index other = mesh_.on_edge(v, w)[1];
+      middle[3 * t + k] = other < t ? middle[3 * other + mesh_.corner_of(other, w)]
+                                    : nearest(0.5 * (c[k] + c[(k + 1) % 3]), state.guess).squared_distance;
+      squared = std::max(squared, middle[3 * t + k]);
     }
     state.error = std::sqrt(squared);
   }
@@ -412,6 +420,7 @@ double ShapedMesh::evaluate(PatchTrial& trial, double limit) const {
       return infinity;
     }
   }
+  std::array<double, most_edges> middle;
   for (std::size_t i = 0; i < count; ++i) {
     const auto hit = nearest_((c[i][0] + c[i][1] + c[i][2]) / 3, trial.guess[i]);
     trial.guess[i] = hit.triangle;
@@ -421,13 +430,12 @@ double ShapedMesh::evaluate(PatchTrial& trial, double limit) const {
     double squared = hit.squared_distance;
     for (std::size_t k = 0; k < 3; ++k) {
       const Index v = trial.corners[i][k];
-      const Index w = trial.corners[i][(k + 1) % 3];
       const double at_corner = v == trial.moved ? trial.moved_error : vertex_error_[v];
-      squared = std::max(squared, at_corner * at_corner);
-      // The middle of an edge within the patch counts for one of its triangles.
-      if (v < w || !is_inner(trial, i, k)) {
-        squared = std::max(squared, squared_distance(0.5 * (c[i][k] + c[i][(k + 1) % 3]), hit.triangle));
-      }
+      // The middle of an edge within the patch is measured once, and counts for both triangles.
+      const std::size_t earlier = earlier_edge(trial, i, k);
+      middle[3 * i + k] =
+          earlier < most_edges ? middle[earlier] : squared_distance(0.5 * (c[i][k] + c[i][(k + 1) % 3]), hit.triangle);
+      squared = std::max({squared, at_corner * at_corner, middle[3 * i + k]});
     }
     trial.error[i] = std::sqrt(squared);
     total += error_cost(trial.error[i]);
