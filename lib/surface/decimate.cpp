@@ -132,8 +132,8 @@ private:
 // Well-shaped meshes of the counts that are asked for, or that an error needs.
 class ShapedSearch {
 public:
-  ShapedSearch(const TriangleMesh& mesh, const DecimateOptions& options)
-      : mesh_(mesh), options_(options), tree_(mesh), collapse_(mesh, EdgeCollapse::Aim::good_shape) {
+  ShapedSearch(const TriangleMesh& mesh, const DecimateOptions& options, EdgeCollapse collapse)
+      : mesh_(mesh), options_(options), tree_(mesh), collapse_(std::move(collapse)) {
     distance_.width = 1e-3 * options.max_error.value_or(0);
     distance_.samples = 0;
     distance_.max_splits = 2'000'000;
@@ -229,6 +229,7 @@ TriangleMesh level(const TriangleMesh& mesh, EdgeCollapse& collapse, std::size_t
     return coarse;
   }
   options.triangles = triangles;
+  options.closed = !collapse.has_boundary();
   collapse.run(triangles - static_cast<std::size_t>(more_collapses * static_cast<double>(triangles)), {});
   for (std::size_t i = steps; i < collapse.history().size(); ++i) {
     const Collapse& further = collapse.history()[i];
@@ -238,17 +239,23 @@ TriangleMesh level(const TriangleMesh& mesh, EdgeCollapse& collapse, std::size_t
   return levelled(coarse, mesh, options);
 }
 
-}  // namespace
-
-DecimateResult decimate(const TriangleMesh& mesh, const DecimateOptions& options) {
+[[noreturn]] void refuse(const TriangleMesh& mesh) {
   if (const auto reason = why_unfit(examine(mesh))) {
     throw InputError(fmt::format("not an oriented manifold: {}", *reason));
   }
-  if (!(diagonal(mesh) > 0)) {
-    throw InputError("all its vertices lie in one point");
+  throw InputError(diagonal(mesh) > 0 ? "its vertices are too far apart to reckon with"
+                                      : "all its vertices lie in one point");
+}
+
+}  // namespace
+
+DecimateResult decimate(const TriangleMesh& mesh, const DecimateOptions& options) {
+  EdgeCollapse collapse(mesh, options.min_angle ? EdgeCollapse::Aim::good_shape : EdgeCollapse::Aim::least_error);
+  if (!collapse.is_fit()) {
+    refuse(mesh);
   }
   if (options.min_angle) {
-    return ShapedSearch(mesh, options).run();
+    return ShapedSearch(mesh, options, std::move(collapse)).run();
   }
   const auto part = [&](double begin, double end) -> Progress {
     if (!options.progress) {
@@ -256,7 +263,6 @@ DecimateResult decimate(const TriangleMesh& mesh, const DecimateOptions& options
     }
     return [&options, begin, end](double fraction) { options.progress(begin + (end - begin) * fraction); };
   };
-  EdgeCollapse collapse(mesh);
   const double collapsing = options.max_error ? 0.2 : 0.8;
   collapse.run(options.triangles.value_or(0), part(0, collapsing));
   DecimateResult result;

@@ -60,11 +60,12 @@ Vec3 EdgeCollapse::Curve::at(double place) const {
 
 EdgeCollapse::EdgeCollapse(const TriangleMesh& mesh, Aim aim) : aim_(aim), heap_(0), triangles_(mesh.triangles.size()) {
   const Box box = bounding_box(mesh);
-  TUNICA_ASSERT(box.diagonal() > 0);
   centre_ = 0.5 * (box.lower + box.upper);
   scale_ = box.diagonal();
-  number_vertices(mesh);
-  connect(mesh);
+  if (!(scale_ > 0) || !std::isfinite(scale_) || !number_vertices(mesh) || !connect(mesh)) {
+    return;
+  }
+  fit_ = true;
   find_boundary(mesh);
   sum_quadrics();
 }
@@ -81,8 +82,9 @@ void EdgeCollapse::neighbours_of(Index vertex, const Visit& visit) const {
   }
 }
 
-/// Vertices in the order in which the triangles name them: what is near in space is then near in memory.
-void EdgeCollapse::number_vertices(const TriangleMesh& mesh) {
+/// Vertices in the order in which the triangles name them: what is near in space is then near in memory. @return
+/// whether they are finite and no triangle has a corner twice
+bool EdgeCollapse::number_vertices(const TriangleMesh& mesh) {
   number_.assign(mesh.vertices.size(), none);
   vertex_.reserve(mesh.vertices.size());
   given_.reserve(mesh.vertices.size());
@@ -93,12 +95,20 @@ void EdgeCollapse::number_vertices(const TriangleMesh& mesh) {
         given_.push_back(v);
         vertex_.push_back({});
         vertex_.back().position = (mesh.vertices[v] - centre_) / scale_;
+        if (!vertex_.back().position.allFinite()) {
+          return false;
+        }
       }
     }
+    if (triangle[0] == triangle[1] || triangle[1] == triangle[2] || triangle[2] == triangle[0]) {
+      return false;
+    }
   }
+  return true;
 }
 
-void EdgeCollapse::connect(const TriangleMesh& mesh) {
+/// @return whether the triangles are an oriented manifold
+bool EdgeCollapse::connect(const TriangleMesh& mesh) {
   half_.resize(3 * mesh.triangles.size());
   for (HalfEdge h = 0; h < half_.size(); ++h) {
     half_[h].from = number_[mesh.triangles[h / 3][h % 3]];
@@ -115,9 +125,14 @@ void EdgeCollapse::connect(const TriangleMesh& mesh) {
     for (const Index t : triangles.of(mesh.triangles[h / 3][next(h) % 3])) {
       for (HalfEdge other = 3 * t; other < 3 * t + 3; ++other) {
         if (from(other) == to(h) && to(other) == from(h)) {
+          if (half_[h].twin != none || from(previous(other)) == from(previous(h))) {
+            return false;  // a third triangle, or two on the same corners
+          }
           half_[h].twin = other;
           half_[other].twin = h;
           half_[other].edge = edge;
+        } else if (other != h && from(other) == from(h) && to(other) == to(h)) {
+          return false;
         }
       }
     }
@@ -128,6 +143,15 @@ void EdgeCollapse::connect(const TriangleMesh& mesh) {
       vertex_[from(h)].outgoing = h;
     }
   }
+  return has_one_fan_per_vertex();
+}
+
+bool EdgeCollapse::has_one_fan_per_vertex() const {
+  std::size_t reached = 0;
+  for (Index v = 0; v < vertex_.size(); ++v) {
+    around(v, [&](HalfEdge /*spoke*/) { ++reached; });
+  }
+  return reached == half_.size();
 }
 
 void EdgeCollapse::find_boundary(const TriangleMesh& mesh) {

@@ -29,9 +29,13 @@ class EdgeCollapse {
 public:
   enum class Aim { least_error, good_shape };
 
-  /// @param mesh  an oriented manifold, with boundary or without (see why_unfit)
+  /// @param mesh  an oriented manifold, with boundary or without; nothing but is_fit() may be asked of any other
   /// @param aim   good_shape spends error on triangles that are nowhere thin
   explicit EdgeCollapse(const TriangleMesh& mesh, Aim aim = Aim::least_error);
+
+  /// Whether the mesh is an oriented manifold of finite extent (why_unfit() names the place where it is not).
+  [[nodiscard]] bool is_fit() const { return fit_; }
+  [[nodiscard]] bool has_boundary() const { return !curves_.empty(); }
 
   /// Collapses edges until at most `triangles` are left or none can be collapsed. @return triangles left.
   std::size_t run(std::size_t triangles, const Progress& progress);
@@ -90,8 +94,9 @@ private:
   template <typename Visit>
   void neighbours_of(Index vertex, const Visit& visit) const;
 
-  void number_vertices(const TriangleMesh& mesh);
-  void connect(const TriangleMesh& mesh);
+  [[nodiscard]] bool number_vertices(const TriangleMesh& mesh);
+  [[nodiscard]] bool connect(const TriangleMesh& mesh);
+  [[nodiscard]] bool has_one_fan_per_vertex() const;
   void find_boundary(const TriangleMesh& mesh);
   void sum_quadrics();
   void fill_heap();
@@ -129,6 +134,7 @@ private:
   std::vector<double> sweep_cost_;     // #E while sweeping: known costs, infinite where an edge cannot collapse
   std::vector<std::uint8_t> touched_;  // #V while sweeping: changed since the last sweep
   std::size_t triangles_ = 0;
+  bool fit_ = false;
   std::vector<Collapse> history_;
 };
 

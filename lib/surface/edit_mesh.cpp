@@ -1,7 +1,5 @@
 #include "surface/edit_mesh.hpp"
 
-#include "surface/incidence.hpp"
-
 namespace tunica {
 
 EditMesh::EditMesh(const TriangleMesh& mesh)
@@ -10,19 +8,19 @@ EditMesh::EditMesh(const TriangleMesh& mesh)
       around(mesh.vertices.size()),
       on_boundary(mesh.vertices.size(), 0),
       alive(mesh.triangles.size()) {
-  for (std::size_t t = 0; t < triangles.size(); ++t) {
-    for (const Index v : triangles[t]) {
-      around[v].push_back(static_cast<Index>(t));
-    }
-  }
-  const auto across = neighbours(mesh, incidence(mesh));
+  // Inside, each neighbour of a vertex follows it in one triangle and precedes it in another; at a boundary the first
+  // one only follows, the last one only precedes.
+  std::vector<std::uint64_t> following(mesh.vertices.size(), 0), preceding(mesh.vertices.size(), 0);
   for (std::size_t t = 0; t < triangles.size(); ++t) {
     for (std::size_t k = 0; k < 3; ++k) {
-      if (across[t][k] == no_neighbour) {
-        on_boundary[triangles[t][k]] = 1;
-        on_boundary[triangles[t][(k + 1) % 3]] = 1;
-      }
+      const Index v = triangles[t][k];
+      around[v].push_back(static_cast<Index>(t));
+      following[v] += triangles[t][(k + 1) % 3];
+      preceding[v] += triangles[t][(k + 2) % 3];
     }
+  }
+  for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
+    on_boundary[v] = following[v] != preceding[v] ? 1 : 0;
   }
 }
 

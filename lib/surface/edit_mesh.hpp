@@ -18,6 +18,7 @@ struct EditMesh {
   std::vector<Index> free_triangles;
   std::size_t alive = 0;  ///< triangles
 
+  /// @param mesh  an oriented manifold
   explicit EditMesh(const TriangleMesh& mesh);
 
   [[nodiscard]] bool is_alive(Index t) const { return triangles[t][0] != none; }

@@ -1,5 +1,6 @@
 #include "surface/levelling.hpp"
 
+#include "surface/facet_distances.hpp"
 #include "surface/measure.hpp"
 #include "surface/shape_patch.hpp"
 #include "surface/surface_walk.hpp"
@@ -19,9 +20,11 @@ constexpr double least_gain = 0.15;      // of the worst triangle's cost, for a 
 constexpr double collapse_share = 0.85;  // of the largest error, at most, may a collapse leave
 constexpr double renew_share = 0.8;      // of the error that costs refer to, below which they are computed anew
 constexpr double certain_share = 0.5;  // of the largest squared error: points that look farther off are looked at again
-constexpr double negligible = 1e-6;    // of the diagonal
-constexpr double least_angle = 3;      // degrees: thinner triangles cost something
-constexpr double most_parts = 8;       // into which the edges of a large triangle of the target are cut
+constexpr std::array<double, 3> may_be_larger{3, 1.3, 1};  // than known, is a triangle's error: see Leveller::Known
+constexpr double negligible = 1e-6;                        // of the diagonal
+constexpr double least_angle = 3;                          // degrees: thinner triangles cost something
+constexpr double large_triangle = 1.5;                     // steps: longer ones of the target are cut
+constexpr double most_parts = 8;           // into which the edges of a large triangle of the target are cut
 constexpr std::size_t many_vertices = 24;  // per triangle of the mesh: no more are looked at
 // Work is counted in distances between a point and a triangle.
 constexpr std::size_t work_per_query = 30;
@@ -29,107 +32,128 @@ std::size_t work_of(const PatchTrial& trial) {
   return trial.corners.size() * (trial.samples.size() + 3 * work_per_query);
 }
 constexpr std::size_t least_work = 200'000;
-constexpr std::size_t work_per_triangle = 25;  // of the target
+constexpr std::size_t work_per_triangle = 50;  // of the target
 
-/// The target's points that the mesh is to be close to, each with the triangle of the mesh nearest to it. Most owners
-/// come from the neighbourhood of the vertex that the point was merged into; those of points that look far off are
-/// certain.
+/// The target's points that the mesh is to be close to, each with the triangle of the mesh nearest to it. Owners come
+/// from around the vertex that the point was merged into; points that look far off are looked at again.
 class Sampling {
 public:
   Sampling(const TriangleMesh& mesh, const TriangleMesh& target, const std::vector<Index>& stands_for)
-      : mesh_(mesh), target_(target), walk_(mesh), tree_(mesh), vertex_(target.vertices.size()) {
-    start_.resize(mesh.vertices.size());
-    for (Index t = 0; t < mesh.triangles.size(); ++t) {
-      for (const Index v : mesh.triangles[t]) {
-        start_[v] = t;
-      }
-    }
-    add_vertices(stands_for);
-    add_within(stands_for);
+      : mesh_(mesh), target_(target), stands_for_(stands_for), around_(incidence(mesh)) {
+    samples_.near.assign(mesh.triangles.size(), 0);
+    add_vertices();
+    add_within();
+    find_owners();
     look_again();
   }
 
   TargetSamples samples() && { return std::move(samples_); }
 
 private:
-  struct Found {
-    Index owner = 0;
-    double squared = -1;
+  // A point, with the vertex of the mesh that stands for its surroundings.
+  struct Given {
+    Vec3 point;
+    Index vertex;
   };
 
-  void add(const Vec3& p, const Found& found) {
-    samples_.points.push_back(p);
-    samples_.owner.push_back(found.owner);
-    squared_.push_back(found.squared);
-  }
-
-  void add_vertices(const std::vector<Index>& stands_for) {
-    std::vector<Index> represents(mesh_.vertices.size(), 0);
+  void add_vertices() {
     const std::size_t stride = 1 + target_.vertices.size() / (many_vertices * mesh_.triangles.size());
+    std::vector<std::uint8_t> taken(target_.vertices.size(), 0);
     for (Index t = 0; t < target_.triangles.size(); ++t) {
       for (const Index v : target_.triangles[t]) {
-        if (v % stride == 0 && vertex_[v].squared < 0) {
-          represents[stands_for[v]] = t;
-          const Vec3& p = target_.vertices[v];
-          const auto hit = walk_.near_by(p, start_[stands_for[v]]);
-          vertex_[v] = {hit.triangle, hit.squared_distance};
-          add(p, vertex_[v]);
+        if (v % stride == 0 && taken[v] == 0) {
+          taken[v] = 1;
+          given_.push_back({target_.vertices[v], stands_for_[v]});
+          samples_.near[around_.of(stands_for_[v])[0]] = t;
         }
       }
     }
-    for (const auto& c : mesh_.triangles) {
-      samples_.near.push_back(represents[c[0]]);
-    }
   }
 
-  // Target triangles that are as large as the mesh's need points within. Their mean edge is 1.5 steps long.
-  void add_within(const std::vector<Index>& stands_for) {
+  // Target triangles that are as large as the mesh's need points within. The mesh's mean edge is 1.5 steps long.
+  void add_within() {
     const double step = std::sqrt(area(mesh_) / static_cast<double>(mesh_.triangles.size()));
     for (const auto& c : target_.triangles) {
       const std::array<Vec3, 3> p{target_.vertices[c[0]], target_.vertices[c[1]], target_.vertices[c[2]]};
       const double longest =
           std::sqrt(std::max({(p[1] - p[0]).squaredNorm(), (p[2] - p[1]).squaredNorm(), (p[0] - p[2]).squaredNorm()}));
-      if (longest <= step) {
+      if (longest <= large_triangle * step) {
         continue;
       }
       const int parts = static_cast<int>(std::min(std::ceil(longest / step), most_parts));
       for (int i = 0; i <= parts; ++i) {
         for (int j = i == 0 ? 1 : 0; i + j <= parts && i < parts && j < parts; ++j) {
-          const Vec3 x =
-              p[0] + (static_cast<double>(i) * (p[1] - p[0]) + static_cast<double>(j) * (p[2] - p[0])) / parts;
-          const auto hit = walk_.near_by(x, start_[stands_for[c[0]]]);
-          add(x, {hit.triangle, hit.squared_distance});
+          given_.push_back(
+              {p[0] + (static_cast<double>(i) * (p[1] - p[0]) + static_cast<double>(j) * (p[2] - p[0])) / parts,
+               stands_for_[c[0]]});
+        }
+      }
+    }
+  }
+
+  // Points of one vertex together: several at once against the triangles around it.
+  void find_owners() {
+    std::vector<Index> offsets(mesh_.vertices.size() + 1, 0);
+    for (const Given& g : given_) {
+      ++offsets[g.vertex + 1];
+    }
+    std::partial_sum(offsets.begin(), offsets.end(), offsets.begin());
+    std::vector<Index> next(offsets.begin(), offsets.end() - 1);
+    samples_.points.resize(given_.size());
+    for (const Given& g : given_) {
+      samples_.points[next[g.vertex]++] = g.point;
+    }
+    samples_.owner.resize(given_.size());
+    samples_.squared.resize(given_.size());
+    std::vector<FacetDistances> facets;
+    facets.reserve(mesh_.triangles.size());
+    for (const auto& [i, j, k] : mesh_.triangles) {
+      facets.emplace_back(std::array<Vec3, 3>{mesh_.vertices[i], mesh_.vertices[j], mesh_.vertices[k]});
+    }
+    for (Index v = 0; v < mesh_.vertices.size(); ++v) {
+      const std::size_t end = offsets[v + 1];
+      for (std::size_t first = offsets[v]; first < end; first += lane_count) {
+        const LaneVec3 p =
+            lane_points([&](std::size_t lane) { return samples_.points[std::min(first + lane, end - 1)]; });
+        NearestFacet nearest;
+        for (const Index t : around_.of(v)) {
+          nearest.try_facet(facets[t], p, t);
+        }
+        for (std::size_t s = first; s < std::min(first + lane_count, end); ++s) {
+          samples_.owner[s] = static_cast<Index>(nearest.which[s - first]);
+          samples_.squared[s] = nearest.squared[s - first];
         }
       }
     }
   }
 
   void look_again() {
-    std::vector<Index> order(squared_.size());
-    std::iota(order.begin(), order.end(), Index{0});
-    std::sort(order.begin(), order.end(),
-              [&](Index l, Index r) { return squared_[l] > squared_[r] || (squared_[l] == squared_[r] && l < r); });
+    const SurfaceWalk walk(mesh_);
+    const auto nearer = [&](Index l, Index r) {
+      return samples_.squared[l] < samples_.squared[r] || (samples_.squared[l] == samples_.squared[r] && l > r);
+    };
+    std::vector<Index> farthest(samples_.points.size());
+    std::iota(farthest.begin(), farthest.end(), Index{0});
+    std::make_heap(farthest.begin(), farthest.end(), nearer);
     double certain = 0;
-    for (const Index s : order) {
-      if (squared_[s] < certain_share * certain) {
-        break;
-      }
-      const auto hit = tree_.closest(samples_.points[s], samples_.owner[s]);
-      if (hit.squared_distance < squared_[s]) {
-        squared_[s] = hit.squared_distance;
+    while (!farthest.empty() && samples_.squared[farthest.front()] >= certain_share * certain) {
+      const Index s = farthest.front();
+      std::pop_heap(farthest.begin(), farthest.end(), nearer);
+      farthest.pop_back();
+      const auto hit = walk.closest(samples_.points[s], samples_.owner[s]);
+      if (hit.squared_distance < samples_.squared[s]) {
+        samples_.squared[s] = hit.squared_distance;
         samples_.owner[s] = hit.triangle;
       }
-      certain = std::max(certain, squared_[s]);
+      certain = std::max(certain, samples_.squared[s]);
     }
   }
 
   const TriangleMesh& mesh_;
   const TriangleMesh& target_;
-  SurfaceWalk walk_;
-  ClosestPoint tree_;
-  std::vector<Index> start_;   // #V of the mesh: a triangle around each vertex
-  std::vector<Found> vertex_;  // #V of the target
-  std::vector<double> squared_;
+  const std::vector<Index>& stands_for_;
+  const Incidence around_;
+  std::vector<Given> given_;
   TargetSamples samples_;
 };
 
@@ -138,12 +162,12 @@ public:
   Leveller(const TriangleMesh& mesh, const TriangleMesh& target, const SurfaceWalk& walk, const BoundaryCurves& curves,
            const LevellingOptions& options)
       : state_(
-            mesh, target, [&walk](const Vec3& p, Index near) { return walk.closest(p, near); },
-            Sampling(mesh, target, options.stands_for).samples(), curves,
-            [&walk](const Vec3& p, Index near) { return walk.near_by(p, near); }),
+            mesh, target, [&walk](const Vec3& p, Index near, double enough) { return walk.closest(p, near, enough); },
+            Sampling(mesh, target, options.stands_for).samples(), curves),
         options_(options),
+        near_by_([&walk](const Vec3& p, Index near, double enough) { return walk.near_by(p, near, enough); }),
         diagonal_(diagonal(target)),
-        certain_(mesh.triangles.size(), 0),
+        known_(mesh.triangles.size(), Known::by_samples),
         work_left_(std::max(least_work, work_per_triangle * target.triangles.size())) {
     weights_.error = infinity;
     weights_.doublings = doublings;
@@ -152,24 +176,22 @@ public:
     weights_.angle_wanted = least_angle;
     weights_.most_error = 0;
     weights_.fold_cosine = -0.9;
+    state_.measure_corners(near_by_);
   }
 
   TriangleMesh run() {
     for (Index t = 0; t < mesh().triangles.size(); ++t) {
-      queue_.push({state_.error(t), t});
+      queue_.push({may_be(t), t});
     }
     while (work_left_ > 0 && !queue_.empty()) {
       const auto [error, t] = queue_.top();
-      if (!mesh().is_alive(t) || state_.error(t) != error) {
+      if (!mesh().is_alive(t) || may_be(t) != error) {
         queue_.pop();
         continue;
       }
-      if (certain_[t] == 0) {
+      if (known_[t] != Known::certainly) {
         queue_.pop();
-        certain_[t] = 1;
-        spend(12 * work_per_query);
-        state_.measure(t);
-        queue_.push({state_.error(t), t});
+        measure(t);
         continue;
       }
       if (!(error > negligible * diagonal_)) {
@@ -187,6 +209,8 @@ public:
   }
 
 private:
+  // How well a triangle's error is known: by the points of the target and its corners, by its middle as well, by all.
+  enum class Known : std::uint8_t { by_samples, nearly, certainly };
   struct Worst {
     double error;
     Index triangle;
@@ -195,6 +219,23 @@ private:
     }
   };
   [[nodiscard]] const EditMesh& mesh() const { return state_.mesh(); }
+
+  [[nodiscard]] double may_be(Index t) const {
+    return state_.error(t) * may_be_larger[static_cast<std::size_t>(known_[t])];
+  }
+
+  void measure(Index t) {
+    if (known_[t] == Known::by_samples) {
+      known_[t] = Known::nearly;
+      spend(4 * work_per_query);
+      state_.measure_middle(t, near_by_);
+    } else {
+      known_[t] = Known::certainly;
+      spend(12 * work_per_query);
+      state_.measure(t);
+    }
+    queue_.push({may_be(t), t});
+  }
 
   void spend(std::size_t work) { work_left_ -= std::min(work_left_, work); }
 
@@ -205,6 +246,14 @@ private:
   }
 
   bool mend(Index t) {
+    // What changes replace must be known as well as they themselves will be.
+    for (const Index v : mesh().triangles[t]) {
+      for (const Index neighbour : mesh().around[v]) {
+        if (known_[neighbour] == Known::by_samples) {
+          measure(neighbour);
+        }
+      }
+    }
     error_ = state_.error(t);
     least_gain_ = least_gain * state_.cost(t);
     farthest_ = state_.farthest_sample(t);
@@ -237,11 +286,11 @@ private:
 
   void accept(const PatchTrial& trial) {
     state_.commit(trial);
-    certain_.resize(mesh().triangles.size(), 0);
+    known_.resize(mesh().triangles.size(), Known::by_samples);
     for (const auto& c : trial.corners) {
       for (const Index t : mesh().around[c[0]]) {
         if (mesh().triangles[t] == c) {
-          certain_[t] = 1;
+          known_[t] = Known::certainly;
           queue_.push({state_.error(t), t});
         }
       }
@@ -379,8 +428,9 @@ private:
   const LevellingOptions& options_;
   ShapeWeights weights_;
   std::priority_queue<Worst> queue_;
+  NearestPoint near_by_;
   double diagonal_;
-  std::vector<std::uint8_t> certain_;  // #F whether the error was measured in earnest
+  std::vector<Known> known_;  // #F how well the error is known
   PatchTrial trial_, best_;
   std::vector<Vec3> places_;
   std::optional<Vec3> farthest_;
@@ -392,7 +442,7 @@ private:
 }  // namespace
 
 TriangleMesh levelled(const TriangleMesh& mesh, const TriangleMesh& target, const LevellingOptions& options) {
-  const BoundaryCurves curves(boundary_loops(mesh).empty() ? TriangleMesh{} : target);
+  const BoundaryCurves curves(options.closed || boundary_loops(mesh).empty() ? TriangleMesh{} : target);
   const SurfaceWalk walk(target);
   return Leveller(mesh, target, walk, curves, options).run();
 }

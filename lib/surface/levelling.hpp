@@ -12,6 +12,7 @@ struct CheapCollapse {
 
 struct LevellingOptions {
   std::size_t triangles = 0;             ///< at most this many; those that are missing are made use of
+  bool closed = false;                   ///< whether it is known that there is no boundary
   std::vector<CheapCollapse> collapses;  ///< cheapest first
   std::vector<Index> stands_for;         ///< #V of the target: the vertex of the mesh that each was merged into
 };

@@ -1,5 +1,6 @@
 #include "surface/shape_patch.hpp"
 
+#include "surface/facet_distances.hpp"
 #include "surface/incidence.hpp"
 #include "surface/measure.hpp"
 #include "surface/surface_walk.hpp"
@@ -36,12 +37,12 @@ Vec3 barycentric(const Vec3& point, const std::array<Vec3, 3>& c) {
           n.dot((c[0] - point).cross(c[1] - point)) / squared};
 }
 
-// The edge from corner k of new triangle i as the edge of an earlier one: 3 j + l, or `most_edges` if there is none.
+// The edge from corner k of new triangle i as the edge of another one: 3 j + l, or `most_edges` if there is none.
 constexpr std::size_t most_edges = 3 * most_in_patch;
-std::size_t earlier_edge(const PatchTrial& trial, std::size_t i, std::size_t k) {
+std::size_t other_edge(const PatchTrial& trial, std::size_t i, std::size_t k) {
   const Index from = trial.corners[i][k];
   const Index to = trial.corners[i][(k + 1) % 3];
-  for (std::size_t j = 0; j < i; ++j) {
+  for (std::size_t j = 0; j < trial.corners.size(); ++j) {
     const auto& c = trial.corners[j];
     for (std::size_t l = 0; l < 3; ++l) {
       if (c[l] == to && c[(l + 1) % 3] == from) {
@@ -79,15 +80,17 @@ TargetSamples sample_target(const TriangleMesh& mesh, const TriangleMesh& target
   const ClosestPoint own(mesh);
   std::optional<Index> guess;
   for (const Vec3& p : samples.points) {
-    guess = (guess ? own.closest(p, *guess) : own.closest(p)).triangle;
-    samples.owner.push_back(*guess);
+    const auto hit = guess ? own.closest(p, *guess) : own.closest(p);
+    guess = hit.triangle;
+    samples.owner.push_back(hit.triangle);
+    samples.squared.push_back(hit.squared_distance);
   }
   samples.near.assign(mesh.triangles.size(), 0);
   return samples;
 }
 
 ShapedMesh::ShapedMesh(const TriangleMesh& mesh, const TriangleMesh& target, NearestPoint nearest,
-                       TargetSamples samples, const BoundaryCurves& curves, const NearestPoint& first)
+                       TargetSamples samples, const BoundaryCurves& curves)
     : mesh_(mesh),
       target_(target),
       nearest_(std::move(nearest)),
@@ -98,9 +101,13 @@ ShapedMesh::ShapedMesh(const TriangleMesh& mesh, const TriangleMesh& target, Nea
     states_[t].guess = samples.near[t];
   }
   for (std::size_t s = 0; s < sample_.size(); ++s) {
-    states_[samples.owner[s]].samples.push_back(static_cast<Index>(s));
+    State& state = states_[samples.owner[s]];
+    state.samples.push_back(static_cast<Index>(s));
+    state.error = std::max(state.error, samples.squared[s]);
   }
-  measure_all(first);
+  for (State& state : states_) {
+    state.error = std::sqrt(state.error);
+  }
   find_places();
 }
 
@@ -192,43 +199,55 @@ double ShapedMesh::squared_of_samples(Index t, const std::array<Vec3, 3>& c) con
   return squared;
 }
 
-/// The errors of all triangles: at their centre and corners, in the middle of their edges, and of their samples.
-void ShapedMesh::measure_all(const NearestPoint& nearest) {
+void ShapedMesh::measure_corners(const NearestPoint& nearest) {
   vertex_error_.assign(mesh_.positions.size(), -1);
-  std::vector<double> middle(3 * states_.size());
   for (std::size_t t = 0; t < states_.size(); ++t) {
-    const auto& triangle = mesh_.triangles[t];
-    const auto c = corners(triangle, {});
-    State& state = states_[t];
-    const auto hit = nearest((c[0] + c[1] + c[2]) / 3, state.guess);
-    state.guess = hit.triangle;
-    double squared = std::max(hit.squared_distance, squared_of_samples(static_cast<Index>(t), c));
-    for (std::size_t k = 0; k < 3; ++k) {
-      const Index v = triangle[k];
-      const Index w = triangle[(k + 1) % 3];
+    for (const Index v : mesh_.triangles[t]) {
       if (vertex_error_[v] < 0) {
-        vertex_error_[v] = std::sqrt(nearest(c[k], state.guess).squared_distance);
+        const auto hit = nearest(mesh_.positions[v], states_[t].guess, exact);
+        vertex_error_[v] = std::sqrt(hit.squared_distance);
+        states_[t].guess = hit.triangle;
       }
-      squared = std::max(squared, vertex_error_[v] * vertex_error_[v]);
-      const Index other = mesh_.on_edge(v, w)[1];
-      middle[3 * t + k] = other < t ? middle[3 * other + mesh_.corner_of(other, w)]
-                                    : nearest(0.5 * (c[k] + c[(k + 1) % 3]), state.guess).squared_distance;
-      squared = std::max(squared, middle[3 * t + k]);
+      states_[t].error = std::max(states_[t].error, vertex_error_[v]);
     }
-    state.error = std::sqrt(squared);
   }
 }
 
-/// At a fourth, half and three fourths of all edges, and at the four points between these.
-double ShapedMesh::squared_within(const std::array<Vec3, 3>& c, Index guess) const {
+void ShapedMesh::measure_all() {
+  measure_corners(nearest_);
+  for (std::size_t t = 0; t < states_.size(); ++t) {
+    measure_middle(static_cast<Index>(t), nearest_);
+  }
+}
+
+void ShapedMesh::measure_middle(Index t, const NearestPoint& nearest) {
+  const auto c = corners(mesh_.triangles[t], {});
+  State& state = states_[t];
+  const auto hit = nearest((c[0] + c[1] + c[2]) / 3, state.guess, exact);
+  state.guess = hit.triangle;
+  double squared = std::max(hit.squared_distance, state.error * state.error);
+  for (std::size_t k = 0; k < 3; ++k) {
+    squared = std::max(squared, nearest(0.5 * (c[k] + c[(k + 1) % 3]), state.guess, squared).squared_distance);
+  }
+  state.error = std::sqrt(squared);
+  state.cost = shape_cost(c) + error_cost(state.error);
+}
+
+/// At a fourth, half and three fourths of all edges, at the four points between these and at the centre, but not less
+/// than `squared`.
+double ShapedMesh::squared_within(const std::array<Vec3, 3>& c, Index guess, double squared) const {
   constexpr int parts = 4;
-  double squared = squared_distance((c[0] + c[1] + c[2]) / 3, guess);
+  const auto try_point = [&](const Vec3& p) {
+    const auto hit = nearest_(p, guess, squared);
+    squared = std::max(squared, hit.squared_distance);
+    guess = hit.triangle;
+  };
+  try_point((c[0] + c[1] + c[2]) / 3);
   for (int i = 0; i <= parts; ++i) {
     for (int j = 0; i + j <= parts; ++j) {
       const bool corner = i == parts || j == parts || i + j == 0;
       if (!corner) {
-        const Vec3 p = c[0] + (static_cast<double>(i) * (c[1] - c[0]) + static_cast<double>(j) * (c[2] - c[0])) / parts;
-        squared = std::max(squared, squared_distance(p, guess));
+        try_point(c[0] + (static_cast<double>(i) * (c[1] - c[0]) + static_cast<double>(j) * (c[2] - c[0])) / parts);
       }
     }
   }
@@ -238,25 +257,27 @@ double ShapedMesh::squared_within(const std::array<Vec3, 3>& c, Index guess) con
 void ShapedMesh::measure(Index t) {
   const auto c = corners(mesh_.triangles[t], {});
   State& state = states_[t];
-  double squared = std::max(squared_within(c, state.guess), squared_of_samples(t, c));
+  double squared = squared_of_samples(t, c);
   for (std::size_t k = 0; k < 3; ++k) {
-    double& error = vertex_error_[mesh_.triangles[t][k]];
-    error = std::sqrt(squared_distance(c[k], state.guess));
-    squared = std::max(squared, error * error);
+    const double at_corner = nearest_(c[k], state.guess, exact).squared_distance;
+    vertex_error_[mesh_.triangles[t][k]] = std::sqrt(at_corner);
+    squared = std::max(squared, at_corner);
   }
-  state.error = std::sqrt(squared);
+  state.error = std::sqrt(squared_within(c, state.guess, squared));
   state.cost = shape_cost(c) + error_cost(state.error);
 }
 
 double ShapedMesh::measure_within(PatchTrial& trial) const {
   double most = 0;
   for (std::size_t i = 0; i < trial.corners.size(); ++i) {
-    const double within = std::sqrt(squared_within(corners(trial.corners[i], trial), trial.guess[i]));
-    if (within > trial.error[i]) {
-      trial.cost[i] += error_cost(within) - error_cost(trial.error[i]);
-      trial.error[i] = within;
+    double& error = trial.error[i];
+    const double squared = error * error;
+    const double within = squared_within(corners(trial.corners[i], trial), trial.guess[i], squared);
+    if (within > squared) {
+      trial.cost[i] += error_cost(std::sqrt(within)) - error_cost(error);
+      error = std::sqrt(within);
     }
-    most = std::max(most, trial.error[i]);
+    most = std::max(most, error);
   }
   return most;
 }
@@ -333,7 +354,7 @@ void ShapedMesh::make_centre_split(Index t, PatchTrial& trial) const {
   trial.removed = {t};
   trial.moved = static_cast<Index>(mesh_.positions.size());
   const Vec3 centre = (mesh_.positions[c[0]] + mesh_.positions[c[1]] + mesh_.positions[c[2]]) / 3;
-  trial.position = nearest_(centre, states_[t].guess).point;
+  trial.position = nearest_(centre, states_[t].guess, exact).point;
   trial.corners = {{c[0], c[1], trial.moved}, {c[1], c[2], trial.moved}, {c[2], c[0], trial.moved}};
 }
 
@@ -414,67 +435,91 @@ double ShapedMesh::evaluate(PatchTrial& trial, double limit) const {
   if (total >= allowed || folds(trial)) {
     return infinity;
   }
+  if (!assign_samples(trial, c.data(), allowed, most_error, total)) {
+    return infinity;
+  }
   if (trial.moved != EditMesh::none) {
-    trial.moved_error = std::sqrt(squared_distance(trial.position, trial.guess[0]));
+    trial.moved_error = std::sqrt(nearest_(trial.position, trial.guess[0], exact).squared_distance);
     if (trial.moved_error > most_error) {
       return infinity;
     }
   }
+  // The middle of an edge within the patch is measured once, and counts for both triangles.
   std::array<double, most_edges> middle;
+  middle.fill(-1);
   for (std::size_t i = 0; i < count; ++i) {
-    const auto hit = nearest_((c[i][0] + c[i][1] + c[i][2]) / 3, trial.guess[i]);
+    const auto hit = nearest_((c[i][0] + c[i][1] + c[i][2]) / 3, trial.guess[i], exact);
     trial.guess[i] = hit.triangle;
     if (!faced_away && faces_away(c[i], hit.triangle)) {
       return infinity;
     }
-    double squared = hit.squared_distance;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const Index v = trial.corners[i][k];
+    double squared = std::max(hit.squared_distance, trial.error[i] * trial.error[i]);
+    for (const Index v : trial.corners[i]) {
       const double at_corner = v == trial.moved ? trial.moved_error : vertex_error_[v];
-      // The middle of an edge within the patch is measured once, and counts for both triangles.
-      const std::size_t earlier = earlier_edge(trial, i, k);
-      middle[3 * i + k] =
-          earlier < most_edges ? middle[earlier] : squared_distance(0.5 * (c[i][k] + c[i][(k + 1) % 3]), hit.triangle);
-      squared = std::max({squared, at_corner * at_corner, middle[3 * i + k]});
+      squared = std::max(squared, at_corner * at_corner);
     }
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::size_t other = other_edge(trial, i, k);
+      if (other < 3 * i) {
+        squared = std::max(squared, middle[other]);
+        continue;
+      }
+      double enough = squared;
+      if (other < most_edges) {
+        enough = std::min(enough, trial.error[other / 3] * trial.error[other / 3]);
+      }
+      middle[3 * i + k] = nearest_(0.5 * (c[i][k] + c[i][(k + 1) % 3]), hit.triangle, enough).squared_distance;
+      squared = std::max(squared, middle[3 * i + k]);
+    }
+    total -= error_cost(trial.error[i]);
     trial.error[i] = std::sqrt(squared);
     total += error_cost(trial.error[i]);
     if (total >= allowed || trial.error[i] > most_error) {
       return infinity;
     }
   }
-  // Every sample goes to the nearest of the new triangles. The two-sided error cost of a triangle grows with the
-  // farther one of the two sides.
-  std::vector<FlatTriangle> flat;
-  flat.reserve(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    flat.emplace_back(c[i][0], c[i][1], c[i][2]);
-  }
-  trial.owner.resize(trial.samples.size());
-  for (std::size_t s = 0; s < trial.samples.size(); ++s) {
-    const Vec3& p = sample_[trial.samples[s]];
-    double least = infinity;
-    for (std::size_t i = 0; i < count; ++i) {
-      const double squared = flat[i].squared_distance(p);
-      if (squared < least) {
-        least = squared;
-        trial.owner[s] = static_cast<Index>(i);
-      }
-    }
-    double& error = trial.error[trial.owner[s]];
-    if (least > error * error) {
-      total -= error_cost(error);
-      error = std::sqrt(least);
-      total += error_cost(error);
-      if (total >= allowed || error > most_error) {
-        return infinity;
-      }
-    }
-  }
   for (std::size_t i = 0; i < count; ++i) {
     trial.cost[i] += error_cost(trial.error[i]);
   }
   return total - before;
+}
+
+/// Every sample goes to the nearest of the new triangles and adds to its error and to the total cost. @return whether
+/// these stay below what is allowed
+bool ShapedMesh::assign_samples(PatchTrial& trial, const std::array<Vec3, 3>* c, double allowed, double most_error,
+                                double& total) const {
+  std::vector<FacetDistances> facets;
+  facets.reserve(trial.corners.size());
+  for (std::size_t i = 0; i < trial.corners.size(); ++i) {
+    facets.emplace_back(c[i]);
+  }
+  const std::size_t end = trial.samples.size();
+  trial.owner.resize(end);
+  std::array<double, most_in_patch> squared_error{};
+  for (std::size_t first = 0; first < end; first += lane_count) {
+    const LaneVec3 p = lane_points(
+        [&](std::size_t lane) -> const Vec3& { return sample_[trial.samples[std::min(first + lane, end - 1)]]; });
+    NearestFacet nearest;
+    for (std::size_t i = 0; i < facets.size(); ++i) {
+      nearest.try_facet(facets[i], p, static_cast<double>(i));
+    }
+    for (std::size_t s = first; s < std::min(first + lane_count, end); ++s) {
+      const double squared = nearest.squared[s - first];
+      const auto owner = static_cast<std::size_t>(nearest.which[s - first]);
+      trial.owner[s] = static_cast<Index>(owner);
+      if (squared > squared_error[owner]) {
+        squared_error[owner] = squared;
+        double& error = trial.error[owner];
+        total -= error_cost(error);
+        error = std::sqrt(squared);
+        total += error_cost(error);
+        if (total >= allowed || error > most_error) {
+          return false;
+        }
+      }
+    }
+  }
+  return true;
 }
 
 void ShapedMesh::commit(const PatchTrial& trial) {
@@ -610,7 +655,7 @@ Vec3 ShapedMesh::middle(Index u, Index v) const {
   const auto on = mesh_.on_edge(u, v);
   if (on[0] != EditMesh::none && on[1] != EditMesh::none) {
     const Vec3 x = 0.5 * (mesh_.positions[u] + mesh_.positions[v]);
-    return nearest_(x, states_[on[0]].guess).point;
+    return nearest_(x, states_[on[0]].guess, exact).point;
   }
   const bool forward = on[0] != EditMesh::none;  // the triangle, and so the curve, runs from u to v
   return curves_.point(curves_.between(places_[forward ? u : v], places_[forward ? v : u], 0.5));

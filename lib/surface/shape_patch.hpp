@@ -35,14 +35,16 @@ struct PatchTrial {
   std::vector<Index> samples, owner;  ///< the target's points of the patch, and the new triangle each belongs to
 };
 
-/// Answers which point of the target is closest to p; the triangle named is probably near it.
-using NearestPoint = std::function<ClosestPoint::Hit(const Vec3& p, Index near)>;
+/// Answers which point of the target is closest to p; the triangle named is probably near it. Any point whose squared
+/// distance is at most `enough` will do.
+using NearestPoint = std::function<ClosestPoint::Hit(const Vec3& p, Index near, double enough)>;
 
 /// Points of the target that a mesh is to be close to.
 struct TargetSamples {
   std::vector<Vec3> points;
-  std::vector<Index> owner;  ///< the mesh's triangle closest to each
-  std::vector<Index> near;   ///< #F of the mesh: a triangle of the target near it
+  std::vector<Index> owner;     ///< the mesh's triangle closest to each
+  std::vector<double> squared;  ///< the squared distance to it
+  std::vector<Index> near;      ///< #F of the mesh: a triangle of the target near it
 };
 
 /// About 40 points for each triangle of the mesh, if the target has as many vertices; with few of them the triangles'
@@ -53,11 +55,17 @@ TargetSamples sample_target(const TriangleMesh& mesh, const TriangleMesh& target
 /// would make of it. Errors are of points, no bounds: what is made with them is certified afterwards.
 class ShapedMesh {
 public:
+  /// Errors are those of the samples at first: see measure_all(), measure_corners(), measure().
   /// @param target   must live as long
   /// @param nearest  on the target
-  /// @param first    with it the errors are measured at the start: may be quicker and too large, see measure()
   ShapedMesh(const TriangleMesh& mesh, const TriangleMesh& target, NearestPoint nearest, TargetSamples samples,
-             const BoundaryCurves& curves, const NearestPoint& first);
+             const BoundaryCurves& curves);
+
+  /// The errors of all triangles: at their centre and corners, in the middle of their edges, and of their samples.
+  void measure_all();
+
+  /// The errors of all triangles at their corners and of their samples. @param nearest may be quick and too far
+  void measure_corners(const NearestPoint& nearest);
 
   void set_weights(const ShapeWeights& weights);
   [[nodiscard]] const ShapeWeights& weights() const { return weights_; }
@@ -71,6 +79,9 @@ public:
   [[nodiscard]] double cost(Index t) const { return states_[t].cost; }
   [[nodiscard]] double smallest_angle(Index t) const;
   [[nodiscard]] const BoundaryCurves::Place& place(Index vertex) const { return places_[vertex]; }
+
+  /// Measures a triangle also at its centre and in the middle of its edges. @param nearest may be quick and too far
+  void measure_middle(Index t, const NearestPoint& nearest);
 
   /// Measures a triangle again, also within.
   void measure(Index t);
@@ -100,7 +111,7 @@ public:
 
   /// The point of the target closest to a vertex.
   [[nodiscard]] Vec3 foot(Index vertex) const {
-    return nearest_(mesh_.positions[vertex], states_[mesh_.around[vertex][0]].guess).point;
+    return nearest_(mesh_.positions[vertex], states_[mesh_.around[vertex][0]].guess, exact).point;
   }
 
   /// A place on the boundary for a boundary vertex: the given fraction of the way between its neighbours there.
@@ -110,6 +121,7 @@ public:
   [[nodiscard]] Vec3 middle(Index u, Index v) const;
 
 private:
+  static constexpr double exact = -1;  // no distance is near enough
   struct State {
     std::vector<Index> samples;
     double error = 0;
@@ -123,12 +135,10 @@ private:
   [[nodiscard]] double error_cost(double error) const;
   [[nodiscard]] bool folds(const PatchTrial& trial) const;
   [[nodiscard]] bool faces_away(const std::array<Vec3, 3>& corners, Index guess) const;
-  [[nodiscard]] double squared_distance(const Vec3& p, Index guess) const {
-    return nearest_(p, guess).squared_distance;
-  }
-  [[nodiscard]] double squared_within(const std::array<Vec3, 3>& corners, Index guess) const;
+  [[nodiscard]] double squared_within(const std::array<Vec3, 3>& corners, Index guess, double squared) const;
+  [[nodiscard]] bool assign_samples(PatchTrial& trial, const std::array<Vec3, 3>* corners, double allowed,
+                                    double most_error, double& total) const;
   [[nodiscard]] double squared_of_samples(Index t, const std::array<Vec3, 3>& corners) const;
-  void measure_all(const NearestPoint& nearest);
   void find_places();
 
   EditMesh mesh_;

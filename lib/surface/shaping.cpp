@@ -28,9 +28,8 @@ class Shaper {
 public:
   Shaper(const TriangleMesh& mesh, const TriangleMesh& target, const ClosestPoint& tree, const BoundaryCurves& curves,
          const ShapingOptions& options, const NearestPoint& nearest)
-      : state_(mesh, target, nearest, sample_target(mesh, target, tree), curves, nearest),
-        tree_(tree),
-        options_(options) {
+      : state_(mesh, target, nearest, sample_target(mesh, target, tree), curves), tree_(tree), options_(options) {
+    state_.measure_all();
     weights_.error = 1e-3 * diagonal(target);
     weights_.most_error = 0.01 * diagonal(target);
     weights_.angle_wanted = safe_angle * options.min_angle;
@@ -475,7 +474,7 @@ bool has_sharp_sector(const TriangleMesh& mesh, Index v, std::span<const Index> 
 TriangleMesh shaped(const TriangleMesh& mesh, const TriangleMesh& target, const ClosestPoint& tree,
                     const ShapingOptions& options) {
   const BoundaryCurves curves(target);
-  const NearestPoint nearest = [&tree](const Vec3& p, Index near) { return tree.closest(p, near); };
+  const NearestPoint nearest = [&tree](const Vec3& p, Index near, double /*enough*/) { return tree.closest(p, near); };
   return Shaper(mesh, target, tree, curves, options, nearest).run();
 }
 

@@ -123,45 +123,77 @@ Index SurfaceWalk::downhill(const Vec3& p, Index start) const {
   };
   try_vertex(mesh_.triangles[start][1]);
   try_vertex(mesh_.triangles[start][2]);
+  // Each neighbour follows the centre in one triangle; at a boundary one of them only precedes it.
   for (Index centre = no_neighbour; centre != nearest;) {
     centre = nearest;
-    for (const Index t : around_.of(centre)) {
-      for (const Index v : mesh_.triangles[t]) {
-        try_vertex(v);
+    for (const std::size_t step : {std::size_t{1}, std::size_t{2}}) {
+      for (const Index t : around_.of(centre)) {
+        const auto& c = mesh_.triangles[t];
+        const std::size_t k = c[0] == centre ? 0 : c[1] == centre ? 1 : 2;
+        try_vertex(c[(k + step) % 3]);
+      }
+      if (nearest != centre) {
+        break;
       }
     }
   }
   return nearest;
 }
 
-/// Takes the closest of the triangles around a vertex if it is closer than `hit`; `place` says where in it.
-void SurfaceWalk::search_around(Index vertex, const Vec3& p, ClosestPoint::Hit& hit,
-                                std::array<double, 2>& place) const {
-  for (const Index t : around_.of(vertex)) {
-    const auto& [i, j, k] = mesh_.triangles[t];
-    const FlatTriangle triangle(mesh_.vertices[i], mesh_.vertices[j], mesh_.vertices[k]);
-    const auto at = triangle.closest(p);
-    const Vec3 point = triangle.a + at[0] * triangle.ab + at[1] * triangle.ac;
-    const double squared = (p - point).squaredNorm();
-    if (squared < hit.squared_distance) {
-      hit = {point, t, squared};
-      place = at;
-    }
+/// Takes a triangle if it is closer than `hit`; `place` says where in it.
+void SurfaceWalk::try_triangle(Index t, const Vec3& p, ClosestPoint::Hit& hit, std::array<double, 2>& place) const {
+  const auto& [i, j, k] = mesh_.triangles[t];
+  const FlatTriangle triangle(mesh_.vertices[i], mesh_.vertices[j], mesh_.vertices[k]);
+  const auto at = triangle.closest(p);
+  const Vec3 point = triangle.a + at[0] * triangle.ab + at[1] * triangle.ac;
+  const double squared = (p - point).squaredNorm();
+  if (squared < hit.squared_distance) {
+    hit = {point, t, squared};
+    place = at;
   }
 }
 
-ClosestPoint::Hit SurfaceWalk::near_by(const Vec3& p, Index start) const {
+void SurfaceWalk::search_around(Index vertex, const Vec3& p, ClosestPoint::Hit& hit,
+                                std::array<double, 2>& place) const {
+  for (const Index t : around_.of(vertex)) {
+    try_triangle(t, p, hit, place);
+  }
+}
+
+/// The first triangle and those around the nearest vertex, until one is near enough. @return that vertex
+Index SurfaceWalk::search_near(Index start, const Vec3& p, double enough, ClosestPoint::Hit& hit,
+                               std::array<double, 2>& place) const {
+  if (enough > 0) {
+    try_triangle(start, p, hit, place);
+    if (hit.squared_distance <= enough) {
+      return no_neighbour;
+    }
+  }
+  const Index nearest = downhill(p, start);
+  for (const Index t : around_.of(nearest)) {
+    try_triangle(t, p, hit, place);
+    if (hit.squared_distance <= enough) {
+      break;
+    }
+  }
+  return nearest;
+}
+
+ClosestPoint::Hit SurfaceWalk::near_by(const Vec3& p, Index start, double enough) const {
   ClosestPoint::Hit hit;
   std::array<double, 2> place{};
-  search_around(downhill(p, start), p, hit, place);
+  search_near(start, p, enough, hit, place);
   return hit;
 }
 
-ClosestPoint::Hit SurfaceWalk::closest(const Vec3& p, Index start) const {
+ClosestPoint::Hit SurfaceWalk::closest(const Vec3& p, Index start, double enough) const {
   constexpr std::size_t most_steps = 64;
-  Index centre = downhill(p, start);
   ClosestPoint::Hit hit;
   std::array<double, 2> place{};
+  Index centre = enough > 0 ? search_near(start, p, enough, hit, place) : downhill(p, start);
+  if (hit.squared_distance <= enough) {
+    return hit;
+  }
   // Only points nearer than this vertex can do better.
   double least = (p - mesh_.vertices[centre]).squaredNorm();
   const double reach = std::sqrt(least);

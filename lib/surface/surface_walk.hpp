@@ -30,14 +30,18 @@ public:
   explicit SurfaceWalk(const TriangleMesh& mesh);
 
   /// Cost: some 0.3 microseconds, and more the farther away `start` is.
-  [[nodiscard]] ClosestPoint::Hit closest(const Vec3& p, Index start) const;
+  /// @param enough  squared distance: any point of the surface so near will do
+  [[nodiscard]] ClosestPoint::Hit closest(const Vec3& p, Index start, double enough = -1) const;
 
   /// A point that is probably the closest, near `start` in any case. Cost: half of the above.
-  [[nodiscard]] ClosestPoint::Hit near_by(const Vec3& p, Index start) const;
+  [[nodiscard]] ClosestPoint::Hit near_by(const Vec3& p, Index start, double enough = -1) const;
 
 private:
   [[nodiscard]] Index downhill(const Vec3& p, Index start) const;
+  void try_triangle(Index t, const Vec3& p, ClosestPoint::Hit& hit, std::array<double, 2>& place) const;
   void search_around(Index vertex, const Vec3& p, ClosestPoint::Hit& hit, std::array<double, 2>& place) const;
+  Index search_near(Index start, const Vec3& p, double enough, ClosestPoint::Hit& hit,
+                    std::array<double, 2>& place) const;
   void place_points();
   [[nodiscard]] Index cube_of(const Vec3& p) const;
   [[nodiscard]] std::size_t cell(double x, int axis) const;
