@@ -20,9 +20,9 @@ namespace {
 /// The greedy order's next collapses, of the triangles: from them comes what is spent where the error is largest.
 constexpr double more_collapses = 0.1;
 
-// The mesh after the first `steps` collapses; `vertex_of` tells for each given vertex which one it became.
+// The mesh after the first `steps` collapses; `origins` tells which vertices and triangles came from where.
 TriangleMesh replay(const TriangleMesh& mesh, const std::vector<Collapse>& history, std::size_t steps,
-                    std::vector<Index>* vertex_of = nullptr) {
+                    DecimationOrigins* origins = nullptr) {
   std::vector<Vec3> position = mesh.vertices;
   std::vector<Index> root(mesh.vertices.size());
   std::iota(root.begin(), root.end(), Index{0});
@@ -37,7 +37,8 @@ TriangleMesh replay(const TriangleMesh& mesh, const std::vector<Collapse>& histo
   TriangleMesh result;
   constexpr Index unused = 0xffffffff;
   std::vector<Index> renumbered(mesh.vertices.size(), unused);
-  for (const auto& triangle : mesh.triangles) {
+  for (Index t = 0; t < mesh.triangles.size(); ++t) {
+    const auto& triangle = mesh.triangles[t];
     std::array<Index, 3> corners{root[triangle[0]], root[triangle[1]], root[triangle[2]]};
     if (corners[0] == corners[1] || corners[1] == corners[2] || corners[2] == corners[0]) {
       continue;
@@ -50,12 +51,15 @@ TriangleMesh replay(const TriangleMesh& mesh, const std::vector<Collapse>& histo
       v = renumbered[v];
     }
     result.triangles.push_back(corners);
+    if (origins != nullptr) {
+      origins->triangles.push_back(t);
+    }
   }
-  if (vertex_of != nullptr) {
+  if (origins != nullptr) {
     for (Index& r : root) {
       r = renumbered[r];
     }
-    *vertex_of = std::move(root);
+    origins->stands_for = std::move(root);
   }
   return result;
 }
@@ -224,7 +228,7 @@ private:
 TriangleMesh level(const TriangleMesh& mesh, EdgeCollapse& collapse, std::size_t triangles) {
   const std::size_t steps = collapse.history().size();
   LevellingOptions options;
-  TriangleMesh coarse = replay(mesh, collapse.history(), steps, &options.stands_for);
+  TriangleMesh coarse = replay(mesh, collapse.history(), steps, &options.origins);
   if (steps == 0 || coarse.triangles.size() > triangles) {
     return coarse;
   }
@@ -234,7 +238,7 @@ TriangleMesh level(const TriangleMesh& mesh, EdgeCollapse& collapse, std::size_t
   for (std::size_t i = steps; i < collapse.history().size(); ++i) {
     const Collapse& further = collapse.history()[i];
     options.collapses.push_back(
-        {options.stands_for[further.kept], options.stands_for[further.removed], further.position});
+        {options.origins.stands_for[further.kept], options.origins.stands_for[further.removed], further.position});
   }
   return levelled(coarse, mesh, options);
 }

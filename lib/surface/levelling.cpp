@@ -32,15 +32,15 @@ std::size_t work_of(const PatchTrial& trial) {
   return trial.corners.size() * (trial.samples.size() + 3 * work_per_query);
 }
 constexpr std::size_t least_work = 200'000;
-constexpr std::size_t work_per_triangle = 50;  // of the target
+constexpr std::size_t work_per_triangle = 35;  // of the target
 
 /// The target's points that the mesh is to be close to, each with the triangle of the mesh nearest to it. Owners come
 /// from around the vertex that the point was merged into; points that look far off are looked at again.
 class Sampling {
 public:
-  Sampling(const TriangleMesh& mesh, const TriangleMesh& target, const std::vector<Index>& stands_for)
-      : mesh_(mesh), target_(target), stands_for_(stands_for), around_(incidence(mesh)) {
-    samples_.near.assign(mesh.triangles.size(), 0);
+  Sampling(const TriangleMesh& mesh, const TriangleMesh& target, const DecimationOrigins& origins)
+      : mesh_(mesh), target_(target), stands_for_(origins.stands_for), around_(incidence(mesh)) {
+    samples_.near = origins.triangles;
     add_vertices();
     add_within();
     find_owners();
@@ -59,12 +59,11 @@ private:
   void add_vertices() {
     const std::size_t stride = 1 + target_.vertices.size() / (many_vertices * mesh_.triangles.size());
     std::vector<std::uint8_t> taken(target_.vertices.size(), 0);
-    for (Index t = 0; t < target_.triangles.size(); ++t) {
-      for (const Index v : target_.triangles[t]) {
+    for (const auto& corners : target_.triangles) {
+      for (const Index v : corners) {
         if (v % stride == 0 && taken[v] == 0) {
           taken[v] = 1;
           given_.push_back({target_.vertices[v], stands_for_[v]});
-          samples_.near[around_.of(stands_for_[v])[0]] = t;
         }
       }
     }
@@ -163,7 +162,7 @@ public:
            const LevellingOptions& options)
       : state_(
             mesh, target, [&walk](const Vec3& p, Index near, double enough) { return walk.closest(p, near, enough); },
-            Sampling(mesh, target, options.stands_for).samples(), curves),
+            Sampling(mesh, target, options.origins).samples(), curves),
         options_(options),
         near_by_([&walk](const Vec3& p, Index near, double enough) { return walk.near_by(p, near, enough); }),
         diagonal_(diagonal(target)),
@@ -227,11 +226,11 @@ private:
   void measure(Index t) {
     if (known_[t] == Known::by_samples) {
       known_[t] = Known::nearly;
-      spend(4 * work_per_query);
+      spend(2 * work_per_query);
       state_.measure_middle(t, near_by_);
     } else {
       known_[t] = Known::certainly;
-      spend(12 * work_per_query);
+      spend(6 * work_per_query);
       state_.measure(t);
     }
     queue_.push({may_be(t), t});
@@ -270,7 +269,7 @@ private:
     if (!(cost < best_cost_)) {
       return;
     }
-    spend(10 * work_per_query * trial_.corners.size());
+    spend(4 * work_per_query * trial_.corners.size());
     if (state_.measure_within(trial_) < error_) {
       best_cost_ = cost;
       std::swap(trial_, best_);

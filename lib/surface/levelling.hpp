@@ -10,11 +10,17 @@ struct CheapCollapse {
   Vec3 position;
 };
 
+/// Where the parts of a decimated mesh came from.
+struct DecimationOrigins {
+  std::vector<Index> stands_for;  ///< #V of the target: the vertex of the mesh that each was merged into
+  std::vector<Index> triangles;   ///< #F of the mesh: the target's triangle that each was
+};
+
 struct LevellingOptions {
   std::size_t triangles = 0;             ///< at most this many; those that are missing are made use of
   bool closed = false;                   ///< whether it is known that there is no boundary
   std::vector<CheapCollapse> collapses;  ///< cheapest first
-  std::vector<Index> stands_for;         ///< #V of the target: the vertex of the mesh that each was merged into
+  DecimationOrigins origins;
 };
 
 /// Lessens the largest error of a decimated mesh at its count. Over and over the place that is farthest off is mended:
