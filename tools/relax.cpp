@@ -91,19 +91,24 @@ void refuse_contradictions(const Arguments& given) {
   }
 }
 
-MeshFile read_surface(const fs::path& path, const std::optional<double>& unit_mm) {
-  MeshFile file = read_mesh(path, unit_mm, true);
-  if (const auto why = why_unfit(examine(file.mesh))) {
+struct Surface {
+  MeshFile file;
+  MeshFacts facts;
+};
+
+Surface read_surface(const fs::path& path, const std::optional<double>& unit_mm) {
+  Surface surface{read_mesh(path, unit_mm, true), {}};
+  surface.facts = examine(surface.file.mesh);
+  if (const auto why = why_unfit(surface.facts)) {
     throw InputError(path.string() + ": " + *why + "; repair it first");
   }
-  if (!(diagonal(file.mesh) > 0)) {
+  if (!(diagonal(surface.file.mesh) > 0)) {
     throw InputError(path.string() + ": the mesh has no extent");
   }
-  return file;
+  return surface;
 }
 
-void warn_of_mismatch(const cli::Tool& tool, const TriangleMesh& coarse, const TriangleMesh& target) {
-  const MeshFacts a = examine(coarse), b = examine(target);
+void warn_of_mismatch(const cli::Tool& tool, const MeshFacts& a, const MeshFacts& b) {
   const auto differ = [&](std::size_t of_coarse, std::size_t of_target, const std::string& what) {
     if (of_coarse != of_target) {
       tool.warn(fmt::format("COARSE has {} {}, TARGET has {}; the distance will show what cannot be covered", of_coarse,
@@ -181,12 +186,13 @@ void run(cli::Tool& tool, const Arguments& given) {
   PlyOptions ply;
   {
     const auto stage = tool.stage("read");
-    MeshFile file = read_surface(tool.input(given.coarse), unit_mm);
-    MeshFile surface = read_surface(tool.input(given.target), unit_mm);
-    ply = ply_options(tool, common_space(file, given.coarse, surface, given.target));
-    coarse = std::move(file.mesh);
-    warn_of_mismatch(tool, coarse, surface.mesh);
-    target.emplace(std::move(surface.mesh));
+    Surface start = read_surface(tool.input(given.coarse), unit_mm);
+    tool.input(given.target);
+    Surface surface = given.coarse == given.target ? start : read_surface(given.target, unit_mm);
+    ply = ply_options(tool, common_space(start.file, given.coarse, surface.file, given.target));
+    warn_of_mismatch(tool, start.facts, surface.facts);
+    coarse = std::move(start.file.mesh);
+    target.emplace(std::move(surface.file.mesh));
   }
   const double diagonal = target->diagonal();
   const double percent = 100 / diagonal;

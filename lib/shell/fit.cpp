@@ -3,6 +3,7 @@
 #include "shell/curved_surface.hpp"
 #include "shell/fit_cross.hpp"
 #include "shell/fit_edit.hpp"
+#include "shell/fit_missed.hpp"
 #include "shell/fit_parts.hpp"
 #include "shell/fit_shape.hpp"
 #include "shell/fit_squeeze.hpp"
@@ -33,13 +34,15 @@ constexpr double expected_gain = 3;    // shells of the start per shell of the r
 constexpr double start_surplus = 1.5;  // triangles of the start per shell wanted
 constexpr std::array<double, 2> other_surpluses{1.25, 2.0};
 constexpr std::size_t few_shells = 400;  // wanted: several starts cost little
+constexpr std::size_t dense = 100;       // triangles of the target per shell: certificates cost as much as a round
 constexpr double margin = 0.97;          // of the tolerance: what samples miss
 constexpr double worth_it = 0.985;       // a round that leaves more than this of the count or error is the last
+constexpr double worth_much = 0.96;      // the same where rounds are slow
 constexpr int patience = 3;              // rounds that bring nothing
 constexpr double worth_mending = 0.9;    // of the certified distance, by what it missed
 constexpr int most_settling = 20, some_settling = 6;
 constexpr int most_repairs = 12;
-constexpr double clearly_below = 0.975;
+constexpr double clearly_below = 0.99;
 constexpr int certificates = 10;
 constexpr double hopeless = 2;       // times the limit: more shells will not mend it
 constexpr double noted_width = 1.5;  // of the error, on the way
@@ -53,7 +56,8 @@ public:
       : coarse_(coarse),
         target_(target),
         options_(options),
-        width_(options.width.value_or(default_width * target.diagonal())) {
+        width_(options.width.value_or(default_width * target.diagonal())),
+        like_target_(same_topology(coarse, target.mesh())) {
     if (options.tolerance) {
       width_ = std::min(width_, *options.tolerance / 20);
     }
@@ -106,8 +110,11 @@ private:
 
   /// Pieces are fitted together, and one by one where all together get no further than flat facets. Crumbs stay flat.
   void to_tolerance(double tolerance) {
-    std::vector<TriangleMesh> parts = parts_of(target_.mesh());
-    if (parts.size() == 1 || !same_topology(coarse_, target_.mesh())) {
+    std::vector<TriangleMesh> parts;
+    if (like_target_) {
+      parts = parts_of(target_.mesh(), target_.across());
+    }
+    if (parts.size() <= 1) {
       whole_to_tolerance(tolerance);
       return;
     }
@@ -186,7 +193,9 @@ private:
   }
 
   void whole_to_tolerance(double tolerance) {
-    const FitStart start = start_of_fit(coarse_, target_, start_error * tolerance, few, finer_start_error * tolerance);
+    const FitStart start = like_target_
+                               ? start_of_fit(target_, start_error * tolerance, few, finer_start_error * tolerance)
+                               : start_as_given(coarse_, target_);
     // Flat errors fall as 1 / count. Where curved shells need as many, flat facets are the answer.
     const double flat_count = static_cast<double>(start.mesh.triangles.size()) * start.flat_error / tolerance;
     const std::size_t most = static_cast<std::size_t>(std::clamp(flat_count, 64.0, 1e9));
@@ -201,7 +210,7 @@ private:
     std::vector<FitState> found{search(samples, start, tolerance, most, several ? search_patience : 1)};
     if (several) {
       // A greedy search ends elsewhere from elsewhere: from few and from well-shaped triangles.
-      const FitStart fewer = start_of_fit(coarse_, target_, start_error * tolerance, 0, 0);
+      const FitStart fewer = start_of_fit(target_, start_error * tolerance, 0, 0);
       for (const FitStart& other : {fewer, well_shaped(fewer), well_shaped(start)}) {
         found.push_back(search(samples, other, tolerance, most, search_patience));
       }
@@ -270,9 +279,12 @@ private:
       polish(state, limit, 3);
       repair(state, limit, most);
       mend_angles(state, limit);
-      note(state);
+      if (round == 0 || target_.mesh().triangles.size() < dense * state.mesh.alive) {
+        note(state);
+      }
       const bool fits = state.error() <= limit;
-      fruitless = static_cast<double>(state.mesh.alive) > worth_it * static_cast<double>(before) ? fruitless + 1 : 0;
+      const double worth = state.mesh.alive > affordable ? worth_much : worth_it;
+      fruitless = static_cast<double>(state.mesh.alive) > worth * static_cast<double>(before) ? fruitless + 1 : 0;
       const bool best_fits = best.error() <= limit;
       if (fits ? !best_fits || price(state) < price(best) : !best_fits && state.error() < best.error()) {
         best = state;
@@ -348,14 +360,18 @@ private:
 
   void to_count(std::size_t shells) {
     const bool all = shells >= target_.mesh().triangles.size();
-    FitStart start = start_of_fit(coarse_, target_,
-                                  all ? shells : static_cast<std::size_t>(start_surplus * static_cast<double>(shells)));
+    const auto start_for = [&](double triangles) {
+      return like_target_ ? start_of_fit(target_, static_cast<std::size_t>(triangles))
+                          : start_as_given(coarse_, target_);
+    };
+    const auto wanted = static_cast<double>(shells);
+    const FitStart start = start_for(all ? wanted : start_surplus * wanted);
     if (all && !start.own_topology) {
       result_.stopped = "the target has no more triangles than shells are allowed";
       no_worse_than_flat({}, shells, start);
       return;
     }
-    FitSamples samples(target_, guess(static_cast<double>(shells)));
+    FitSamples samples(target_, guess(wanted));
     // A greedy search ends elsewhere from elsewhere, and with few shells by much.
     std::vector<double> surpluses;
     if (shells < few_shells && !start.own_topology) {
@@ -364,8 +380,7 @@ private:
     const double part = 1.0 / static_cast<double>(1 + surpluses.size());
     auto [best, exhausted] = exchanged(samples, start, shells, {0, part});
     for (std::size_t i = 0; i < surpluses.size(); ++i) {
-      const FitStart other =
-          start_of_fit(coarse_, target_, static_cast<std::size_t>(surpluses[i] * static_cast<double>(shells)));
+      const FitStart other = start_for(surpluses[i] * wanted);
       const double begin = part * static_cast<double>(i + 1);
       auto [state, its_exhausted] = exchanged(samples, other, shells, {begin, begin + part});
       if (state.mesh.alive <= shells && (state.error() < best.error() || best.mesh.alive > shells)) {
@@ -411,7 +426,7 @@ private:
     collapse_edges(state, any, shells, {});
     if (state.mesh.alive > shells && !start.own_topology) {
       // So near the smallest mesh there is only decimation knows the way.
-      start = start_of_fit(coarse_, target_, shells);
+      start = start_of_fit(target_, shells);
       state = FitState(samples, prepared(start), {});
       smooth(state, 0.1 * start.flat_error, 0.5 * start.flat_error);
     }
@@ -528,7 +543,7 @@ private:
     ShellDistance distance = shell_distance(shell, target_, measuring);
     if (tolerance && distance.both.lower <= clearly_below * *tolerance && distance.both.upper > *tolerance) {
       // An open question deserves a closer look, but where the answer would be a narrow one shells are mended sooner.
-      measuring.width = *tolerance / 100;
+      measuring.width = *tolerance / 200;
       distance = shell_distance(shell, target_, measuring);
     }
     farthest_ = distance.farthest_of_target;
@@ -607,6 +622,7 @@ private:
   const Target& target_;
   const RelaxOptions& options_;
   double width_;
+  bool like_target_;              // COARSE has the target's topology
   std::size_t price_ = 0;         // of the result
   bool flat_ = false;             // the result is flat facets
   Vec3 farthest_ = Vec3::Zero();  // of the target, when last certified

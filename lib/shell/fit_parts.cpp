@@ -17,8 +17,7 @@ constexpr Index unused = 0xffffffff;
 
 }  // namespace
 
-std::vector<TriangleMesh> parts_of(const TriangleMesh& mesh) {
-  const auto across = neighbours(mesh, incidence(mesh));
+std::vector<TriangleMesh> parts_of(const TriangleMesh& mesh, std::span<const std::array<Index, 3>> across) {
   std::vector<std::uint8_t> seen(mesh.triangles.size(), 0);
   std::vector<Index> number(mesh.vertices.size(), unused);
   std::vector<TriangleMesh> parts;

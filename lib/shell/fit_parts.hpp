@@ -10,7 +10,8 @@ namespace tunica {
 
 /// The pieces of a mesh that hang together through edges, in the order of their first triangles; unused vertices are
 /// dropped. Cost: linear.
-std::vector<TriangleMesh> parts_of(const TriangleMesh& mesh);
+/// @param across  neighbours()
+std::vector<TriangleMesh> parts_of(const TriangleMesh& mesh, std::span<const std::array<Index, 3>> across);
 
 /// Several meshes as one, triangles and vertices in their order.
 TriangleMesh joined(std::span<const TriangleMesh> parts);

@@ -1,7 +1,5 @@
 #include "shell/fit_samples.hpp"
 
-#include "surface/incidence.hpp"
-
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
@@ -13,6 +11,7 @@ namespace {
 
 constexpr std::size_t points_per_shell = 16;      // of the target, about
 constexpr std::size_t most_grid_points = 22'000;  // of all patches: few large patches get a finer grid
+constexpr std::size_t most_further_points = 200'000;
 constexpr int coarsest_grid = 4;
 constexpr int finest_grid = 8;
 constexpr double other_wall = 4;  // times as far: beyond that a closest point that faces away is one around a rim
@@ -64,6 +63,34 @@ TriangleFoot foot_on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const
     }
   }
   return best;
+}
+
+std::vector<Vec3> points_in_spatial_order(const Target& target) {
+  const TriangleMesh& mesh = target.mesh();
+  const bool few = mesh.triangles.size() < most_further_points / 4;
+  const std::size_t stride = std::max<std::size_t>(1, mesh.vertices.size() / most_further_points);
+  std::vector<Vec3> points;
+  std::vector<std::uint8_t> met(mesh.vertices.size(), 0);
+  std::size_t vertices = 0;
+  for (const Index t : target.tree().spatial_order()) {
+    const auto& corners = mesh.triangles[t];
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vec3& here = mesh.vertices[corners[k]];
+      if (met[corners[k]] == 0) {
+        met[corners[k]] = 1;
+        if (vertices++ % stride == 0) {
+          points.push_back(here);
+        }
+      }
+      if (few && (target.across()[t][k] == no_neighbour || target.across()[t][k] > t)) {
+        points.emplace_back((here + mesh.vertices[corners[(k + 1) % 3]]) / 2);
+      }
+    }
+    if (few) {
+      points.emplace_back((mesh.vertices[corners[0]] + mesh.vertices[corners[1]] + mesh.vertices[corners[2]]) / 3);
+    }
+  }
+  return points;
 }
 
 /// Along the given normal, or along the distance itself where it points elsewhere (off an edge, rim or boundary).
@@ -166,15 +193,10 @@ void FitSamples::from_gap(const CubicPatch& patch, std::size_t from, std::size_t
   }
 }
 
-FitSamples::FitSamples(const Target& target, std::size_t shells)
-    : target_(target),
-      around_(incidence(target.mesh())),
-      grid_of_target_(target.mesh()),
-      across_(neighbours(target.mesh(), around_)),
-      facets_(facet_normals(target.mesh())) {
+FitSamples::FitSamples(const Target& target, std::size_t shells) : target_(target), grid_of_target_(target.mesh()) {
   const auto& mesh = target.mesh();
   std::vector<std::uint8_t> used(mesh.vertices.size(), 0);
-  for (const auto& loop : boundary_loops(mesh)) {
+  for (const auto& loop : boundary_loops(mesh.triangles, target.across())) {
     const std::size_t stride =
         std::max<std::size_t>(1, loop.size() / (16 * static_cast<std::size_t>(std::sqrt(shells)) + 64));
     for (std::size_t i = 0; i < loop.size(); i += stride) {
@@ -206,6 +228,7 @@ FitSamples::FitSamples(const Target& target, std::size_t shells)
       }
     }
   }
+  further_ = points_in_spatial_order(target);
   const int level = std::clamp(
       static_cast<int>(std::sqrt(2.0 * static_cast<double>(most_grid_points) / static_cast<double>(shells + 1))) - 2,
       coarsest_grid, finest_grid);
@@ -253,11 +276,11 @@ ClosestPoint::Hit FitSamples::downhill(const Vec3& p, Index start) const {
       }
     };
     if (foot.side < 3) {
-      if (const Index other = across_[here][foot.side]; other != no_neighbour) {
+      if (const Index other = target_.across()[here][foot.side]; other != no_neighbour) {
         consider(other);
       }
     } else {
-      for (const Index other : around_.of(mesh.triangles[here][foot.side - 3])) {
+      for (const Index other : target_.around().of(mesh.triangles[here][foot.side - 3])) {
         consider(other);
       }
     }
@@ -300,6 +323,7 @@ void FitSamples::from_patch(const PatchPowers& patch, const Vec3& facing, double
   if (guesses.size() != grid_.size()) {
     guesses.assign(grid_.size(), guesses.empty() ? no_neighbour : guesses[0]);
   }
+  const std::vector<Vec3>& facets = target_.facet_normals();
   Index last = guesses[0];
   std::array<ClosestPoint::Hit, lane_count> hits;
   for (std::size_t i = 0; i < grid_.size(); i += lane_count) {
@@ -332,8 +356,8 @@ void FitSamples::from_patch(const PatchPowers& patch, const Vec3& facing, double
       const Vec3 p = point(k);
       const Vec2& at = grid_[i + k];
       guesses[i + k] = hit.triangle;
-      if (facets_[hit.triangle].dot(facing) > 0) {
-        out.push_back(residual(at, p - hit.point, facets_[hit.triangle]));
+      if (facets[hit.triangle].dot(facing) > 0) {
+        out.push_back(residual(at, p - hit.point, facets[hit.triangle]));
       } else if (const auto foot = target_.closest_facing(p, facing, other_wall * std::sqrt(hit.squared_distance))) {
         out.push_back(residual(at, p - foot->point, foot->facet_normal));
       } else {

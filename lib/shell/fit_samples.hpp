@@ -57,6 +57,10 @@ public:
   [[nodiscard]] const std::vector<Vec3>& points() const { return points_; }
   [[nodiscard]] const Target& target() const { return target_; }
 
+  /// Many more points of the target, neighbours in space one after the other, in which to look for what is missed: its
+  /// vertices, at most 200,000, and of few triangles their centroids and the middles of their edges.
+  [[nodiscard]] const std::vector<Vec3>& further_points() const { return further_; }
+
   /// Further points of the target that must be met, such as where the distance was found largest.
   void add(const Vec3& point) { points_.push_back(point); }
 
@@ -86,11 +90,9 @@ private:
   void downhill(const LaneVec3& p, std::size_t count, std::array<ClosestPoint::Hit, lane_count>& hits) const;
 
   const Target& target_;
-  Incidence around_;  // of the target
   StartGrid grid_of_target_;
-  std::vector<std::array<Index, 3>> across_;
-  std::vector<Vec3> facets_;  // normals
   std::vector<Vec3> points_;
+  std::vector<Vec3> further_;
   std::vector<Vec2> grid_;
   std::vector<std::array<Lanes, 2>> grid_lanes_;  // the last ones repeated
 };

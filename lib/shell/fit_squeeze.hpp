@@ -7,12 +7,6 @@ namespace tunica {
 /// What a search for few shells lessens: shells, and for each thin triangle what five further nodes cost.
 std::size_t price(const FitState& state);
 
-/// Points of the target farther from the curved surface than `limit` (mm) join the samples; the state has to be
-/// attached and measured anew to heed them. @return how many
-/// @param errors  what is found of each patch's distance, both ways, raises its error
-/// Cost: linear in the target's vertices, of which at most 200,000 are looked at; about 50 ms.
-std::size_t add_missed(FitSamples& samples, FitState& state, double limit, bool errors = false);
-
 /// Moves all nodes until no error, nor that of points that the samples missed, is above `limit` (mm).
 /// @return whether that was possible
 bool regains(FitSamples& samples, FitState& state, double limit);

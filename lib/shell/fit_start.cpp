@@ -16,6 +16,7 @@ namespace tunica {
 namespace {
 
 constexpr std::size_t ladder_top = 60'000;    // triangles: the first decimation, where the search for the count starts
+constexpr double surplus = 1.5;               // of triangles, there
 constexpr std::size_t most_samples = 20'000;  // for the sampled error of flat facets
 constexpr double start_agreement = 0.35;      // of a corner's normal with its facet
 constexpr double crease_cosine = 0.8;         // of the angle between two facets: sharper edges may be creases
@@ -48,37 +49,54 @@ double sampled_error(const TriangleMesh& mesh, const Target& target) {
   return largest;
 }
 
-TriangleMesh decimated(const TriangleMesh& mesh, std::size_t triangles) {
+TriangleMesh decimated(const TriangleMesh& mesh, std::size_t triangles, bool levelled = true) {
   DecimateOptions options;
   options.triangles = triangles;
+  options.levelled = levelled;
   return decimate(mesh, options).mesh;
 }
 
 }  // namespace
 
 bool same_topology(const TriangleMesh& a, const TriangleMesh& b) {
+  if (a.triangles == b.triangles) {
+    return true;
+  }
   const MeshFacts x = examine(a), y = examine(b);
   return x.components == y.components && x.boundary_loops == y.boundary_loops && x.euler == y.euler;
 }
 
-FitStart start_of_fit(const TriangleMesh& coarse, const Target& target, std::size_t triangles) {
-  if (!same_topology(coarse, target.mesh())) {
-    return {coarse, sampled_error(coarse, target), true};
-  }
+FitStart start_as_given(const TriangleMesh& coarse, const Target& target) {
+  return {coarse, sampled_error(coarse, target), true};
+}
+
+FitStart start_of_fit(const Target& target, std::size_t triangles) {
   FitStart start;
   start.mesh = decimated(target.mesh(), triangles);
   start.flat_error = sampled_error(start.mesh, target);
   return start;
 }
 
-FitStart start_of_fit(const TriangleMesh& coarse, const Target& target, double flat_error, std::size_t few,
-                      double finer_error) {
-  if (!same_topology(coarse, target.mesh())) {
-    return {coarse, sampled_error(coarse, target), true};
-  }
+FitStart start_of_fit(const Target& target, double flat_error, std::size_t few, double finer_error) {
   FitStart start;
-  start.mesh = target.mesh().triangles.size() > ladder_top ? decimated(target.mesh(), ladder_top) : target.mesh();
   std::optional<FitStart> finer;
+  if (target.mesh().triangles.size() > ladder_top) {
+    start.mesh = decimated(target.mesh(), ladder_top, false);
+    start.flat_error = sampled_error(start.mesh, target);
+    // Errors go with 1 / count: most of the ladder is left out.
+    const double wanted = finer_error > 0 ? finer_error : flat_error;
+    const double count = surplus * start.flat_error / wanted * static_cast<double>(ladder_top);
+    if (count < 0.7 * static_cast<double>(ladder_top)) {
+      FitStart lower;
+      lower.mesh = decimated(start.mesh, static_cast<std::size_t>(std::max(count, 4.0)));
+      lower.flat_error = sampled_error(lower.mesh, target);
+      if (lower.flat_error <= wanted) {
+        start = std::move(lower);
+      }
+    }
+  } else {
+    start.mesh = target.mesh();
+  }
   const auto chosen = [&] { return start.mesh.triangles.size() < few && finer ? std::move(*finer) : std::move(start); };
   while (true) {
     const std::size_t next = start.mesh.triangles.size() * 7 / 10;

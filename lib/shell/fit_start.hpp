@@ -15,13 +15,15 @@ struct FitStart {
 /// Whether pieces, boundary loops and handles are as many.
 bool same_topology(const TriangleMesh& a, const TriangleMesh& b);
 
+/// COARSE itself, for a fit that keeps its triangles.
+FitStart start_as_given(const TriangleMesh& coarse, const Target& target);
+
 /// A decimation of the target with so many triangles.
-FitStart start_of_fit(const TriangleMesh& coarse, const Target& target, std::size_t triangles);
+FitStart start_of_fit(const Target& target, std::size_t triangles);
 
 /// The decimation with about the distance `flat_error` (mm), or where that has fewer than `few` triangles the one with
 /// about `finer_error`.
-FitStart start_of_fit(const TriangleMesh& coarse, const Target& target, double flat_error, std::size_t few,
-                      double finer_error);
+FitStart start_of_fit(const Target& target, double flat_error, std::size_t few, double finer_error);
 
 /// The start as a mesh under edit, with the target's normals at its nodes: several at a node where sharp creases of the
 /// target meet there. A crease is an edge whose sides, close by, turn by nearly as much as its facets do.

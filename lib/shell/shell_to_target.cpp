@@ -60,7 +60,7 @@ void look(const ClosestPoint& tree, Corners& c, std::size_t i, std::optional<Ind
 class FromShell {
 public:
   FromShell(const std::vector<CubicPatch>& patches, const Target& target, const Aim& aim)
-      : patches_(patches), tree_(target.tree()), cover_(target.tree()), aim_(aim) {}
+      : patches_(patches), tree_(target.tree()), cover_(target.cover()), aim_(aim) {}
 
   OneSided run() {
     std::vector<Piece> live = first_pieces();
@@ -219,7 +219,7 @@ private:
 
   const std::vector<CubicPatch>& patches_;
   const ClosestPoint& tree_;
-  CoverBound cover_;
+  const CoverBound& cover_;
   Aim aim_;
   double lower_ = 0, settled_ = 0;
   Vec3 farthest_ = Vec3::Zero();

@@ -78,12 +78,14 @@ Target::Target(TriangleMesh mesh)
     : mesh_(std::move(mesh)),
       diagonal_(tunica::diagonal(mesh_)),
       tree_(mesh_),
+      around_(incidence(mesh_)),
+      cover_(tree_, around_),
       facet_normals_(tunica::facet_normals(mesh_)),
       vertex_normals_(tunica::vertex_normals(mesh_)),
       centroids_(tunica::centroids(mesh_)),
       centroid_tree_(centroids_),
       largest_radius_(largest_radius(mesh_, centroids_)) {
-  for (const auto& loop : boundary_loops(mesh_)) {
+  for (const auto& loop : boundary_loops(mesh_.triangles, cover_.across())) {
     auto& polyline = boundary_.emplace_back();
     for (const Index v : loop) {
       polyline.push_back(mesh_.vertices[v]);

@@ -2,6 +2,8 @@
 
 #include "shell/point_tree.hpp"
 #include "surface/closest_point.hpp"
+#include "surface/cover_bound.hpp"
+#include "surface/incidence.hpp"
 #include "surface/triangle_mesh.hpp"
 
 #include <optional>
@@ -14,10 +16,17 @@ class Target {
 public:
   /// Errors: TUNICA_ASSERT on a mesh without triangles. Limits: an oriented manifold; the caller checks.
   explicit Target(TriangleMesh mesh);
+  Target(const Target&) = delete;
+  Target& operator=(const Target&) = delete;
 
   [[nodiscard]] const TriangleMesh& mesh() const { return mesh_; }
   [[nodiscard]] double diagonal() const { return diagonal_; }
   [[nodiscard]] const ClosestPoint& tree() const { return tree_; }
+  [[nodiscard]] const CoverBound& cover() const { return cover_; }
+  [[nodiscard]] const Incidence& around() const { return around_; }
+  /// By edge of each triangle (corner k to k + 1): the triangle across.
+  [[nodiscard]] const std::vector<std::array<Index, 3>>& across() const { return cover_.across(); }
+  [[nodiscard]] const std::vector<Vec3>& facet_normals() const { return facet_normals_; }
 
   /// A point of the surface and the normals there.
   struct Foot {
@@ -49,6 +58,8 @@ private:
   TriangleMesh mesh_;
   double diagonal_;
   ClosestPoint tree_;
+  Incidence around_;
+  CoverBound cover_;
   std::vector<Vec3> facet_normals_;
   std::vector<Vec3> vertex_normals_;
   std::vector<Vec3> centroids_;

@@ -1,5 +1,7 @@
 #include "surface/cover_bound.hpp"
 
+#include "core/threads.hpp"
+
 #include <Eigen/Geometry>
 
 #include <algorithm>
@@ -44,6 +46,15 @@ bool crosses(const Seen& a, const Seen& b) {
 
 // The largest height, up or down, of the part of a triangle that lies over s; negative when no part does.
 double largest_height(const std::array<Seen, 3>& triangle) {
+  const auto least_inside = [&](const Seen& p) { return std::min({p.inside[0], p.inside[1], p.inside[2]}); };
+  if (std::min({least_inside(triangle[0]), least_inside(triangle[1]), least_inside(triangle[2])}) >= 0) {
+    return std::max({std::abs(triangle[0].height), std::abs(triangle[1].height), std::abs(triangle[2].height)});
+  }
+  for (std::size_t side = 0; side < 3; ++side) {
+    if (std::max({triangle[0].inside[side], triangle[1].inside[side], triangle[2].inside[side]}) < 0) {
+      return -1;
+    }
+  }
   std::array<Seen, 9> polygon;
   std::copy(triangle.begin(), triangle.end(), polygon.begin());
   std::size_t count = 3;
@@ -68,6 +79,12 @@ double largest_height(const std::array<Seen, 3>& triangle) {
     height = std::max(height, std::abs(polygon[i].height));
   }
   return height;
+}
+
+// Whether the triangle has an edge from u to v.
+bool runs(const std::array<Index, 3>& triangle, Index u, Index v) {
+  return (triangle[0] == u && triangle[1] == v) || (triangle[1] == u && triangle[2] == v) ||
+         (triangle[2] == u && triangle[0] == v);
 }
 
 }  // namespace
@@ -98,21 +115,22 @@ bool CoverBound::Visited::insert(Index triangle) {
   return true;
 }
 
-/// The one other triangle at the edge from u to v of `triangle`, if it runs through it the other way.
-Index CoverBound::across(Index triangle, Index u, Index v) const {
-  Index found = no_neighbour;
-  for (const Index other : around_.of(u)) {
-    const auto& c = surface_.triangles()[other];
-    if (other == triangle || (c[0] != v && c[1] != v && c[2] != v)) {
-      continue;
+CoverBound::CoverBound(const ClosestPoint& surface)
+    : CoverBound(surface, incidence(surface.vertices().size(), surface.triangles())) {}
+
+CoverBound::CoverBound(const ClosestPoint& surface, const Incidence& around)
+    : surface_(surface), across_(neighbours(surface.triangles(), around)) {
+  const auto& triangles = surface.triangles();
+  parallel_for_blocks(triangles.size(), 4096, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t t = begin; t < end; ++t) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        if (across_[t][k] != no_neighbour &&
+            !runs(triangles[across_[t][k]], triangles[t][(k + 1) % 3], triangles[t][k])) {
+          across_[t][k] = no_neighbour;
+        }
+      }
     }
-    const bool opposite = (c[0] == v && c[1] == u) || (c[1] == v && c[2] == u) || (c[2] == v && c[0] == u);
-    if (found != no_neighbour || !opposite) {
-      return no_neighbour;
-    }
-    found = other;
-  }
-  return found;
+  });
 }
 
 double CoverBound::operator()(const std::array<Vec3, 3>& corners, Index start, double give_up, Visited& visited) const {
@@ -171,7 +189,7 @@ double CoverBound::operator()(const std::array<Vec3, 3>& corners, Index start, d
       if (!crosses(seen[k], seen[(k + 1) % 3])) {
         continue;
       }
-      const Index other = across(t, triangle[k], triangle[(k + 1) % 3]);
+      const Index other = across_[t][k];
       if (other == no_neighbour || (!visited.insert(other) && visited.full())) {
         return infinity;
       }

@@ -273,7 +273,8 @@ DecimateResult decimate(const TriangleMesh& mesh, const DecimateOptions& options
   if (options.max_error) {
     result = ErrorSearch(mesh, collapse.history(), *options.max_error).run(part(collapsing, 1));
   } else {
-    result.mesh = level(mesh, collapse, *options.triangles);
+    result.mesh = options.levelled ? level(mesh, collapse, *options.triangles)
+                                   : replay(mesh, collapse.history(), collapse.history().size());
     advance(options.progress, 1.0);
   }
   result.count_reached = !options.triangles || result.mesh.triangles.size() <= *options.triangles;

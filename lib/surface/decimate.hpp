@@ -11,6 +11,7 @@ struct DecimateOptions {
   std::optional<std::size_t> triangles;  ///< at most this many
   std::optional<double> max_error;       ///< mm: two-sided Hausdorff distance to the input, certainly at most this
   std::optional<double> min_angle;       ///< degrees, at most 40: no angle smaller, at the price of a larger error
+  bool levelled = true;  ///< with `triangles` only: the largest error is lessened at that count, see levelled()
   Progress progress;
 };
 

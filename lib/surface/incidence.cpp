@@ -1,5 +1,7 @@
 #include "surface/incidence.hpp"
 
+#include "core/threads.hpp"
+
 #include <algorithm>
 
 namespace tunica {
@@ -25,36 +27,42 @@ Incidence incidence(std::size_t vertices, std::span<const std::array<Index, 3>> 
   return result;
 }
 
-std::vector<std::array<Index, 3>> neighbours(const TriangleMesh& mesh, const Incidence& around) {
-  std::vector<std::array<Index, 3>> result(mesh.triangles.size(), {no_neighbour, no_neighbour, no_neighbour});
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      const Index u = mesh.triangles[t][k];
-      const Index v = mesh.triangles[t][(k + 1) % 3];
-      Index other = no_neighbour;
-      std::size_t shared = 0;
-      for (const Index candidate : around.of(u)) {
-        const auto& corners = mesh.triangles[candidate];
-        if (candidate != t && std::find(corners.begin(), corners.end(), v) != corners.end()) {
-          other = candidate;
-          ++shared;
+std::vector<std::array<Index, 3>> neighbours(std::span<const std::array<Index, 3>> triangles, const Incidence& around) {
+  std::vector<std::array<Index, 3>> result(triangles.size(), {no_neighbour, no_neighbour, no_neighbour});
+  parallel_for_blocks(triangles.size(), 4096, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t t = begin; t < end; ++t) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        const Index u = triangles[t][k];
+        const Index v = triangles[t][(k + 1) % 3];
+        Index other = no_neighbour;
+        std::size_t shared = 0;
+        for (const Index candidate : around.of(u)) {
+          const auto& corners = triangles[candidate];
+          if (candidate != t && (corners[0] == v || corners[1] == v || corners[2] == v)) {
+            other = candidate;
+            ++shared;
+          }
+        }
+        if (shared == 1) {
+          result[t][k] = other;
         }
       }
-      if (shared == 1) {
-        result[t][k] = other;
-      }
     }
-  }
+  });
   return result;
 }
 
 std::vector<std::vector<Index>> boundary_loops(const TriangleMesh& mesh) {
-  const auto across = neighbours(mesh, incidence(mesh));
+  return boundary_loops(mesh.triangles, neighbours(mesh, incidence(mesh)));
+}
+
+std::vector<std::vector<Index>> boundary_loops(std::span<const std::array<Index, 3>> triangles,
+                                               std::span<const std::array<Index, 3>> across) {
   std::vector<std::pair<Index, Index>> edges;
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+  for (std::size_t t = 0; t < triangles.size(); ++t) {
     for (std::size_t k = 0; k < 3; ++k) {
       if (across[t][k] == no_neighbour) {
-        edges.emplace_back(mesh.triangles[t][k], mesh.triangles[t][(k + 1) % 3]);
+        edges.emplace_back(triangles[t][k], triangles[t][(k + 1) % 3]);
       }
     }
   }

@@ -22,11 +22,18 @@ inline Incidence incidence(const TriangleMesh& mesh) { return incidence(mesh.ver
 
 /// For each triangle t and k = 0, 1, 2 the triangle across the edge from corner k to corner k + 1; `no_neighbour` at a
 /// boundary and where the edge is not shared by exactly two triangles.
+/// Parallel.
 inline constexpr Index no_neighbour = 0xffffffff;
-std::vector<std::array<Index, 3>> neighbours(const TriangleMesh& mesh, const Incidence& around);
+std::vector<std::array<Index, 3>> neighbours(std::span<const std::array<Index, 3>> triangles, const Incidence& around);
+inline std::vector<std::array<Index, 3>> neighbours(const TriangleMesh& mesh, const Incidence& around) {
+  return neighbours(mesh.triangles, around);
+}
 
 /// The boundary of an oriented manifold as closed loops of vertices, each in the direction of its triangles' edges.
 /// Limits: where the boundary touches itself at a vertex, the loops there are split in one of the possible ways.
+/// @param across  neighbours(), where known
+std::vector<std::vector<Index>> boundary_loops(std::span<const std::array<Index, 3>> triangles,
+                                               std::span<const std::array<Index, 3>> across);
 std::vector<std::vector<Index>> boundary_loops(const TriangleMesh& mesh);
 
 }  // namespace tunica

@@ -6,6 +6,7 @@
 #include "surface/checks.hpp"
 #include "surface/decimate.hpp"
 #include "surface/hausdorff.hpp"
+#include "surface/incidence.hpp"
 #include "surface/measure.hpp"
 
 #include <gtest/gtest.h>
@@ -47,7 +48,7 @@ TEST(FitParts, PartsAreWhatHangsTogether) {
                                         voxel(Vec3(1, 1, 5), Vec3(9, 0, 0))};
   TriangleMesh all = joined(parts);
   all.vertices.emplace_back(7, 7, 7);
-  const auto found = parts_of(all);
+  const auto found = parts_of(all, neighbours(all, incidence(all)));
   ASSERT_EQ(found.size(), parts.size());
   for (std::size_t i = 0; i < parts.size(); ++i) {
     EXPECT_EQ(found[i].triangles.size(), parts[i].triangles.size());

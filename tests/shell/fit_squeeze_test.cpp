@@ -3,6 +3,7 @@
 #include "shell/families.hpp"
 #include "shell/fit_cross.hpp"
 #include "shell/fit_edit.hpp"
+#include "shell/fit_missed.hpp"
 #include "shell/fit_shape.hpp"
 #include "shell/fit_start.hpp"
 #include "surface/checks.hpp"

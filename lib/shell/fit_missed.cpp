@@ -1,0 +1,132 @@
+#include "shell/fit_missed.hpp"
+
+#include "core/threads.hpp"
+#include "shell/curved_surface.hpp"
+#include "shell/patch_search.hpp"
+#include "surface/hausdorff.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tunica {
+namespace {
+
+constexpr std::size_t grain = 2048;
+constexpr double doubted = 0.8;  // of the limit: a foot beside the last one's that is farther may not be the closest
+constexpr double grid_points = 60'000;              // of all patches
+constexpr int coarsest_grid = 8, finest_grid = 12;  // ridges of a coarse target lie between the points of a coarse grid
+constexpr int gap_points = 11;                      // per edge
+constexpr double narrow = 0.05;                     // of the limit: gaps that add nothing
+constexpr double exact = 1.025;  // limits: what is looked at above gaps is the worst, so with less margin
+
+struct Missed {
+  Vec3 point;
+  Index patch;
+  double distance;
+};
+
+/// Points of the target whose closest patch is farther off than most of the limit.
+std::vector<Missed> far_points(const std::vector<Vec3>& points, const PatchSearch& search, double limit) {
+  std::vector<std::vector<Missed>> blocks((points.size() + grain - 1) / grain);
+  parallel_for_blocks(points.size(), grain, [&](std::size_t begin, std::size_t end) {
+    std::optional<Index> guess;
+    SurfaceFoot last = search.near(points[begin], guess);
+    for (std::size_t i = begin; i < end; ++i) {
+      SurfaceFoot foot = search.near(points[i], last.patch, last.at);
+      if (foot.distance > doubted * limit) {
+        foot = search.near(points[i], guess);
+        if (foot.distance > doubted * limit) {
+          blocks[begin / grain].push_back({points[i], foot.patch, foot.distance});
+        }
+      }
+      last = foot;
+    }
+  });
+  std::vector<Missed> found;
+  for (const auto& block : blocks) {
+    found.insert(found.end(), block.begin(), block.end());
+  }
+  return found;
+}
+
+Vec3 on_edge(const CubicPatch& patch, std::size_t from, std::size_t to, double s) {
+  const std::array<Vec2, 3> corners{Vec2(0, 0), Vec2(1, 0), Vec2(0, 1)};
+  return patch.point((1 - s) * corners[from] + s * corners[to]);
+}
+
+/// Where patches part sideways and are off as well, the target above the gap is farther from both than either measure
+/// says: its points there that are too far off.
+std::vector<Vec3> missed_over_gaps(const FitState& state, double limit) {
+  const FitMesh& mesh = state.mesh;
+  const Target& target = state.samples().target();
+  const auto edges = mesh.edges();
+  std::vector<std::vector<Vec3>> of_edge(edges.size());
+  parallel_for_blocks(edges.size(), 64, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t e = begin; e < end; ++e) {
+      const auto& [u, v] = edges[e];
+      const auto pair = mesh.on_edge(u, v);
+      if (pair.count() < 2) {
+        continue;
+      }
+      const Index one = pair.triangle[0], other = pair.triangle[1];
+      const CubicPatch here = mesh.patch(one), there = mesh.patch(other);
+      for (int i = 1; i <= gap_points; ++i) {
+        const double s = static_cast<double>(i) / (gap_points + 1);
+        const Vec3 a = on_edge(here, mesh.corner_of(one, u), mesh.corner_of(one, v), s);
+        const Vec3 b = on_edge(there, mesh.corner_of(other, u), mesh.corner_of(other, v), s);
+        if ((a - b).norm() < narrow * limit) {
+          continue;
+        }
+        const Vec3 p = target.closest((a + b) / 2).point;
+        const double squared =
+            std::min(foot_on_patch(here, p).squared_distance, foot_on_patch(there, p).squared_distance);
+        if (squared > limit * limit) {
+          of_edge[e].push_back(p);
+        }
+      }
+    }
+  });
+  std::vector<Vec3> found;
+  for (const auto& points : of_edge) {
+    found.insert(found.end(), points.begin(), points.end());
+  }
+  return found;
+}
+
+}  // namespace
+
+std::size_t add_missed(FitSamples& samples, FitState& state, double limit, bool errors) {
+  std::vector<Index> triangles;
+  const ShellMesh shell = state.mesh.shell(&triangles);
+  const std::vector<CubicPatch> patches = curved_patches(shell);
+  const auto raise = [&](Index patch, double error) {
+    if (errors) {
+      double& known = state.patches[triangles[patch]].error;
+      known = std::max(known, error);
+    }
+  };
+  std::size_t added = 0;
+  for (const Missed& far : far_points(samples.further_points(), PatchSearch(shell, patches), limit)) {
+    raise(far.patch, far.distance);
+    if (far.distance > limit) {
+      samples.add(far.point);
+      ++added;
+    }
+  }
+  for (const Vec3& p : missed_over_gaps(state, exact * limit)) {
+    samples.add(p);
+    ++added;
+  }
+  if (errors) {
+    const double per_patch = grid_points / static_cast<double>(patches.size());
+    const int level = std::clamp(static_cast<int>(std::sqrt(2 * per_patch)), coarsest_grid, finest_grid);
+    const Tessellation fine = tessellate_uniformly(shell, level);
+    const auto distances = vertex_distances(fine.mesh, samples.target().tree());
+    for (std::size_t v = 0; v < distances.size(); ++v) {
+      raise(fine.vertex_shell[v], distances[v]);
+    }
+  }
+  return added;
+}
+
+}  // namespace tunica
