@@ -30,6 +30,8 @@ constexpr double boundary_weight = 30;
 constexpr std::size_t sweep_factor = 8;
 /// How strongly a new vertex is held near the middle of its edge where the quadric is flat.
 constexpr double pull = 1e-5;
+/// Squared distances below it, in squared diagonals, are rounding.
+constexpr double invisible = 1e-17;
 /// Weight of an edge's squared length times its quadric's weight: on flat ground short edges go first.
 constexpr double length_weight = 1e-10;
 
@@ -206,13 +208,19 @@ void EdgeCollapse::sum_quadrics() {
 
 void EdgeCollapse::fill_heap() {
   heap_ = EdgeHeap(half_of_.size());
+  std::vector<Index> edges;
+  edges.reserve(half_of_.size());
   for (Index edge = 0; edge < half_of_.size(); ++edge) {
     placement_[edge] = Placement::best;
-    if (half_of_[edge] == none) {
-      continue;
+    if (half_of_[edge] != none) {
+      edges.push_back(edge);
     }
-    if (const auto found = target(half_of_[edge], Placement::best)) {
-      heap_.append(edge, found->cost());
+  }
+  std::vector<double> costs;
+  costs_of(edges, costs);
+  for (std::size_t i = 0; i < edges.size(); ++i) {
+    if (costs[i] < forbidden) {
+      heap_.append(edges[i], costs[i]);
     }
   }
   heap_.order();
@@ -251,7 +259,7 @@ std::size_t EdgeCollapse::run(std::size_t triangles, const Progress& progress) {
 bool EdgeCollapse::collapse_cheapest() {
   const Index edge = heap_.top();
   const HalfEdge h = half_of_[edge];
-  const double known = heap_.top_key() * (1 + 1e-12);
+  const double known = heap_.top_key() * (1 + 1e-6);  // rounding differs with what is computed together
   const auto chosen = target(h, placement_[edge]);
   TUNICA_ASSERT(chosen.has_value());
   if (!keeps_topology(h)) {
@@ -273,12 +281,22 @@ bool EdgeCollapse::collapse_cheapest() {
   }
   const Index kept = from(h);
   collapse(h, *chosen);
+  changed_.clear();
   around(kept, [&](HalfEdge spoke) {
-    evaluate(half_[spoke].edge, Placement::best);
+    changed_.push_back(half_[spoke].edge);
     if (half_[previous(spoke)].twin == none) {
-      evaluate(half_[previous(spoke)].edge, Placement::best);
+      changed_.push_back(half_[previous(spoke)].edge);
     }
   });
+  costs_of(changed_, changed_cost_);
+  for (std::size_t i = 0; i < changed_.size(); ++i) {
+    placement_[changed_[i]] = Placement::best;
+    if (changed_cost_[i] < forbidden) {
+      heap_.set(changed_[i], changed_cost_[i]);
+    } else {
+      heap_.remove(changed_[i]);
+    }
+  }
   return true;
 }
 
@@ -291,6 +309,60 @@ Quadric EdgeCollapse::cost_of(Index u, Index v) const {
   return q;
 }
 
+EdgeCollapse::Target EdgeCollapse::inner_target(const Vertex& u, const Vertex& v) {
+  const Quadric sum = u.quadric + v.quadric;
+  const double weight = per_area(u.area + v.area);
+  const Vec3 middle = 0.5 * (u.position + v.position);
+  const double squared_length = (u.position - v.position).squaredNorm();
+  const auto minimum = sum.minimum(middle, pull);
+  const Vec3 best = minimum && (*minimum - middle).squaredNorm() <= 4 * squared_length ? *minimum : middle;
+  const double trace = sum.trace();
+  return {best, weight * std::max(0.0, sum(best) - invisible * trace), 0,
+          length_weight * weight * trace * squared_length};
+}
+
+/// What inner_target() would cost, for several edges at once.
+Lanes EdgeCollapse::inner_costs(const std::array<HalfEdge, lane_count>& edges) const {
+  namespace stdx = std::experimental;
+  const auto sum = [&](double Quadric::*member) {
+    return lanes_of(
+        [&](std::size_t k) { return vertex_[from(edges[k])].quadric.*member + vertex_[to(edges[k])].quadric.*member; });
+  };
+  const Lanes xx = sum(&Quadric::xx), xy = sum(&Quadric::xy), xz = sum(&Quadric::xz), yy = sum(&Quadric::yy),
+              yz = sum(&Quadric::yz), zz = sum(&Quadric::zz), bx = sum(&Quadric::bx), by = sum(&Quadric::by),
+              bz = sum(&Quadric::bz), c = sum(&Quadric::c);
+  const Lanes area = lanes_of([&](std::size_t k) { return vertex_[from(edges[k])].area + vertex_[to(edges[k])].area; });
+  const LaneVec3 p = lane_points([&](std::size_t k) -> const Vec3& { return vertex_[from(edges[k])].position; });
+  const LaneVec3 r = lane_points([&](std::size_t k) -> const Vec3& { return vertex_[to(edges[k])].position; });
+  const Lanes mx = 0.5 * (p[0] + r[0]), my = 0.5 * (p[1] + r[1]), mz = 0.5 * (p[2] + r[2]);
+  const Lanes ex = p[0] - r[0], ey = p[1] - r[1], ez = p[2] - r[2];
+  const Lanes squared_length = ex * ex + ey * ey + ez * ez;
+  const Lanes trace = xx + yy + zz;
+  const Lanes a = xx + pull * trace, d = yy + pull * trace, f = zz + pull * trace;
+  const Lanes c00 = d * f - yz * yz, c01 = xz * yz - xy * f, c02 = xy * yz - xz * d;
+  const Lanes c11 = a * f - xz * xz, c12 = xy * xz - a * yz, c22 = a * d - xy * xy;
+  const Lanes determinant = a * c00 + xy * c01 + xz * c02;
+  const Lanes gx = xx * mx + xy * my + xz * mz + bx, gy = xy * mx + yy * my + yz * mz + by,
+              gz = xz * mx + yz * my + zz * mz + bz;
+  const LaneMask solvable = determinant > Quadric::least_determinant * trace * trace * trace;
+  Lanes inverse = 0.0;
+  stdx::where(solvable, inverse) = 1.0 / determinant;
+  Lanes sx = -(c00 * gx + c01 * gy + c02 * gz) * inverse, sy = -(c01 * gx + c11 * gy + c12 * gz) * inverse,
+        sz = -(c02 * gx + c12 * gy + c22 * gz) * inverse;
+  const LaneMask too_far = sx * sx + sy * sy + sz * sz > 4 * squared_length;
+  stdx::where(too_far, sx) = 0.0;
+  stdx::where(too_far, sy) = 0.0;
+  stdx::where(too_far, sz) = 0.0;
+  const Lanes x = mx + sx, y = my + sy, z = mz + sz;
+  const Lanes at_best = x * (xx * x + xy * y + xz * z) + y * (xy * x + yy * y + yz * z) +
+                        z * (xz * x + yz * y + zz * z) + 2 * (bx * x + by * y + bz * z) + c;
+  const Lanes power = area * stdx::sqrt(area * stdx::sqrt(area));  // per_area()
+  Lanes weight = 1.0;
+  stdx::where(area > 0.0, weight) = 1.0 / stdx::sqrt(power);
+  const Lanes error = stdx::max(at_best - invisible * trace, Lanes(0.0));
+  return weight * (error + length_weight * trace * squared_length);
+}
+
 std::optional<EdgeCollapse::Target> EdgeCollapse::target(HalfEdge h, Placement placement) const {
   const Index u = from(h);
   const Index v = to(h);
@@ -299,9 +371,12 @@ std::optional<EdgeCollapse::Target> EdgeCollapse::target(HalfEdge h, Placement p
   if (u_on_boundary && v_on_boundary && half_[h].twin != none) {
     return std::nullopt;  // would pinch the surface
   }
-  const Quadric q = cost_of(u, v);
   const Vec3& p = vertex_[u].position;
   const Vec3& r = vertex_[v].position;
+  if (!u_on_boundary && !v_on_boundary && placement == Placement::best) {
+    return inner_target(vertex_[u], vertex_[v]);
+  }
+  const Quadric q = cost_of(u, v);
   const auto at = [&](const Vec3& x) { return std::max(0.0, q(x)); };
   Target found;
   if (u_on_boundary != v_on_boundary) {
@@ -311,14 +386,9 @@ std::optional<EdgeCollapse::Target> EdgeCollapse::target(HalfEdge h, Placement p
     const double at_p = at(p);
     const double at_r = at(r);
     found = at_p <= at_r ? Target{p, at_p, curve_place_[u]} : Target{r, at_r, curve_place_[v]};
-  } else if (u_on_boundary) {
+  } else {
     found = best_on_curve(h, q);
     found.error = std::max(0.0, found.error);
-  } else {
-    const Vec3 middle = 0.5 * (p + r);
-    const auto minimum = q.minimum(middle, pull);
-    const Vec3 best = minimum && (*minimum - middle).squaredNorm() <= 4 * (p - r).squaredNorm() ? *minimum : middle;
-    found = {best, at(best)};
   }
   found.length_cost = length_weight * q.trace() * (p - r).squaredNorm();
   return found;
@@ -360,6 +430,39 @@ EdgeCollapse::Target EdgeCollapse::best_on_curve(HalfEdge h, const Quadric& q) c
     }
   }
   return best;
+}
+
+/// The costs of edges in their best places, `forbidden` for those that cannot collapse: inner ones several at once.
+void EdgeCollapse::costs_of(const std::vector<Index>& edges, std::vector<double>& costs) const {
+  costs.assign(edges.size(), forbidden);
+  std::array<HalfEdge, lane_count> together{};
+  std::array<std::size_t, lane_count> place{};
+  std::size_t waiting = 0;
+  const auto flush = [&] {
+    for (std::size_t k = waiting; k < lane_count; ++k) {
+      together[k] = together[0];
+    }
+    const Lanes found = inner_costs(together);
+    for (std::size_t k = 0; k < waiting; ++k) {
+      costs[place[k]] = found[k];
+    }
+    waiting = 0;
+  };
+  for (std::size_t i = 0; i < edges.size(); ++i) {
+    const HalfEdge h = half_of_[edges[i]];
+    if (vertex_[from(h)].curve == none && vertex_[to(h)].curve == none) {
+      together[waiting] = h;
+      place[waiting++] = i;
+      if (waiting == lane_count) {
+        flush();
+      }
+    } else if (const auto found = target(h, Placement::best)) {
+      costs[i] = found->cost();
+    }
+  }
+  if (waiting > 0) {
+    flush();
+  }
 }
 
 void EdgeCollapse::evaluate(Index edge, Placement placement) {

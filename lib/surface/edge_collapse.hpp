@@ -1,5 +1,6 @@
 #pragma once
 
+#include "core/lanes.hpp"
 #include "core/progress.hpp"
 #include "surface/edge_heap.hpp"
 #include "surface/quadric.hpp"
@@ -106,6 +107,9 @@ private:
   void compact();
   bool collapse_cheapest();
   [[nodiscard]] std::optional<Target> target(HalfEdge h, Placement placement) const;
+  [[nodiscard]] static Target inner_target(const Vertex& u, const Vertex& v);
+  [[nodiscard]] Lanes inner_costs(const std::array<HalfEdge, lane_count>& edges) const;
+  void costs_of(const std::vector<Index>& edges, std::vector<double>& costs) const;
   [[nodiscard]] Target best_on_curve(HalfEdge h, const Quadric& q) const;
   [[nodiscard]] Quadric cost_of(Index u, Index v) const;
   void evaluate(Index edge, Placement placement);
@@ -131,6 +135,8 @@ private:
   ShapeLimits limits_;
   std::size_t limits_used_ = 0;
   EdgeHeap heap_;
+  std::vector<Index> changed_;  // edges around the last collapse, and their costs
+  std::vector<double> changed_cost_;
   std::vector<double> sweep_cost_;     // #E while sweeping: known costs, infinite where an edge cannot collapse
   std::vector<std::uint8_t> touched_;  // #V while sweeping: changed since the last sweep
   std::size_t triangles_ = 0;

@@ -53,12 +53,16 @@ void EdgeCollapse::sweep(std::size_t triangles, const Progress& progress) {
 }
 
 void EdgeCollapse::evaluate_touched() {
+  changed_.clear();
   for (Index edge = 0; edge < half_of_.size(); ++edge) {
     const HalfEdge h = half_of_[edge];
     if (h != none && (touched_[from(h)] != 0 || touched_[to(h)] != 0)) {
-      const auto found = target(h, Placement::best);
-      sweep_cost_[edge] = found ? found->cost() : forbidden;
+      changed_.push_back(edge);
     }
+  }
+  costs_of(changed_, changed_cost_);
+  for (std::size_t i = 0; i < changed_.size(); ++i) {
+    sweep_cost_[changed_[i]] = changed_cost_[i];
   }
 }
 

@@ -12,6 +12,8 @@ namespace tunica {
 /// Weighted sum of squared distances to planes: q(p) = p' A p + 2 b' p + c (Garland, Heckbert, Surface simplification
 /// using quadric error metrics, SIGGRAPH 1997).
 struct Quadric {
+  static constexpr double least_determinant = 1e-18;  ///< of A, relative to its trace cubed: below it is singular
+
   double xx = 0, xy = 0, xz = 0, yy = 0, yz = 0, zz = 0;  // A
   double bx = 0, by = 0, bz = 0;
   double c = 0;
@@ -76,7 +78,7 @@ struct Quadric {
     const double c02 = xy * yz - xz * d;
     const double determinant = a * c00 + xy * c01 + xz * c02;
     const double size = trace();
-    if (!(determinant > 1e-18 * size * size * size)) {
+    if (!(determinant > least_determinant * size * size * size)) {
       return std::nullopt;
     }
     const double c11 = a * f - xz * xz;

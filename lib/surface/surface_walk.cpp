@@ -57,6 +57,17 @@ SurfaceWalk::SurfaceWalk(const TriangleMesh& mesh) : mesh_(mesh), around_(incide
   for (int axis = 0; axis < 3; ++axis) {
     cells_[static_cast<std::size_t>(axis)] = static_cast<std::size_t>(size[axis] * cells_per_mm_) + 1;
   }
+  std::vector<std::uint64_t> following(mesh.vertices.size(), 0), preceding(mesh.vertices.size(), 0);
+  for (const auto& c : mesh.triangles) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      following[c[k]] += c[(k + 1) % 3];
+      preceding[c[k]] += c[(k + 2) % 3];
+    }
+  }
+  at_boundary_.resize(mesh.vertices.size());
+  for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
+    at_boundary_[v] = following[v] != preceding[v] ? 1 : 0;
+  }
   place_points();
 }
 
@@ -132,7 +143,7 @@ Index SurfaceWalk::downhill(const Vec3& p, Index start) const {
         const std::size_t k = c[0] == centre ? 0 : c[1] == centre ? 1 : 2;
         try_vertex(c[(k + step) % 3]);
       }
-      if (nearest != centre) {
+      if (nearest != centre || at_boundary_[centre] == 0) {
         break;
       }
     }

@@ -48,6 +48,7 @@ private:
 
   const TriangleMesh& mesh_;
   Incidence around_;
+  std::vector<std::uint8_t> at_boundary_;  // #V: some neighbour does not follow it in any triangle
   // Points of the surface sorted into cubes: the vertices, and points within triangles that are larger than a cube.
   struct Placed {
     Vec3 at;
