@@ -2,7 +2,9 @@
 // 1998. B. O'Donoghue, E. Candes: Adaptive restart for accelerated gradient schemes. Found. Comput. Math. 15 (2015).
 #include "core/error.hpp"
 #include "core/threads.hpp"
+#include "volume/local_quadrics.hpp"
 #include "volume/smoothing.hpp"
+#include "volume/vertex_neighbours.hpp"
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
@@ -10,7 +12,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <map>
 #include <numeric>
 #include <utility>
 #include <vector>
@@ -51,73 +52,6 @@ void for_all(std::size_t size, const Body& body) {
     }
   });
 }
-
-/// Neighbours of each vertex: all around an inner vertex, along the boundary for one on the boundary.
-class Neighbours {
-public:
-  Neighbours(const TriangleMesh& mesh, const std::vector<bool>& boundary) : first_(mesh.vertices.size() + 1, 0) {
-    // Every edge of an inner vertex is run along once in each direction; of a boundary edge the way back is missing.
-    std::map<std::pair<Index, Index>, int> border_edges;
-    for_each_edge(mesh, [&](Index a, Index b) {
-      if (!boundary[a]) {
-        ++first_[a + 1];
-      } else if (boundary[b]) {
-        ++border_edges[std::minmax(a, b)];
-      }
-    });
-    std::erase_if(border_edges, [](const auto& edge) { return edge.second != 1; });
-    for (const auto& [edge, uses] : border_edges) {
-      ++first_[edge.first + 1];
-      ++first_[edge.second + 1];
-    }
-    std::partial_sum(first_.begin(), first_.end(), first_.begin());
-    list_.resize(first_.back());
-    std::vector<std::size_t> next(first_.begin(), first_.end() - 1);
-    for_each_edge(mesh, [&](Index a, Index b) {
-      if (!boundary[a]) {
-        list_[next[a]++] = b;
-      }
-    });
-    for (const auto& [edge, uses] : border_edges) {
-      list_[next[edge.first]++] = edge.second;
-      list_[next[edge.second]++] = edge.first;
-    }
-  }
-
-  /// x minus the mean of its neighbours.
-  template <typename T>
-  [[nodiscard]] T laplacian(const std::vector<T>& x, std::size_t vertex) const {
-    const std::size_t begin = first_[vertex];
-    const std::size_t end = first_[vertex + 1];
-    T sum = x[list_[begin]];
-    for (std::size_t i = begin + 1; i < end; ++i) {
-      sum += x[list_[i]];
-    }
-    return x[vertex] - sum / static_cast<double>(end - begin);
-  }
-  /// Mean square of the lengths of the edges to its neighbours.
-  [[nodiscard]] double squared_edge(const std::vector<Vec3>& x, std::size_t vertex) const {
-    double sum = 0;
-    for (std::size_t i = first_[vertex]; i < first_[vertex + 1]; ++i) {
-      sum += (x[list_[i]] - x[vertex]).squaredNorm();
-    }
-    return sum / static_cast<double>(first_[vertex + 1] - first_[vertex]);
-  }
-  [[nodiscard]] bool alone(std::size_t vertex) const { return first_[vertex] == first_[vertex + 1]; }
-
-private:
-  template <typename Visit>
-  static void for_each_edge(const TriangleMesh& mesh, const Visit& visit) {
-    for (const auto& t : mesh.triangles) {
-      for (int i = 0; i < 3; ++i) {
-        visit(t[i], t[(i + 1) % 3]);
-      }
-    }
-  }
-
-  std::vector<std::size_t> first_;
-  std::vector<Index> list_;
-};
 
 /// Number of the connected component of each vertex, and how many there are.
 std::pair<std::vector<Index>, std::size_t> label_components(const TriangleMesh& mesh) {
@@ -173,17 +107,16 @@ public:
   }
 
   StaircaseResult run(const Progress& progress) {
-    const Neighbours neighbours(mesh_, boundary_);
+    const VertexNeighbours neighbours(mesh_, boundary_);
     std::tie(component_, components_) = label_components(mesh_);
     // The boundary first, as curves in their planes; then the rest, with the boundary given.
     relax(neighbours, boundary_, most_iterations, {});
     std::vector<bool> inner(boundary_);
     inner.flip();
-    for (int round = 0; round < rounds; ++round) {
-      relax(neighbours, inner, most_iterations / rounds,
-            [&](double fraction) { advance(progress, 0.9 * (round + fraction) / rounds); });
-      remove_local_drift(neighbours);
-    }
+    relax(neighbours, inner, most_iterations, [&](double fraction) { advance(progress, 0.3 * fraction); });
+    remove_local_drift(neighbours);
+    move_to_quadrics(neighbours);
+    advance(progress, 0.9);
     StaircaseResult result;
     // Holding vertices back changes the volume, and offsetting for the volume may spoil a triangle: until neither.
     for (int round = 0; round < 8; ++round) {
@@ -217,14 +150,14 @@ public:
   }
 
 private:
-  static constexpr int most_iterations = 240;
-  static constexpr int rounds = 3;
+  static constexpr int most_iterations = 60;
 
   [[nodiscard]] Vec3 confine(std::size_t v, const Vec3& p) const { return p.cwiseMax(low_[v]).cwiseMin(high_[v]); }
 
   /// Minimises the sum over `active` vertices of degree * |laplacian|^2. With the degrees as metric the gradient is the
   /// laplacian of the laplacian, whose eigenvalues are at most 4, and the limits stay separate for each coordinate.
-  void relax(const Neighbours& neighbours, const std::vector<bool>& active, int iterations, const Progress& progress) {
+  void relax(const VertexNeighbours& neighbours, const std::vector<bool>& active, int iterations,
+             const Progress& progress) {
     constexpr double step = 0.25;
     constexpr double enough = 2e-4;
     const std::size_t size = now_.size();
@@ -279,7 +212,7 @@ private:
 
   /// Moves each value `steps` times towards the mean of its neighbours, by half of share(vertex).
   template <typename Share>
-  static void spread(const Neighbours& neighbours, std::vector<double>& values, int steps, const Share& share) {
+  static void spread(const VertexNeighbours& neighbours, std::vector<double>& values, int steps, const Share& share) {
     std::vector<double> next = values;
     for (int i = 0; i < steps; ++i) {
       for_all(values.size(), [&](std::size_t v) {
@@ -292,7 +225,7 @@ private:
   }
 
   /// Radius by which the surface is bent at each vertex, in voxels: one over the mean curvature.
-  [[nodiscard]] std::vector<double> radii(const Neighbours& neighbours, const std::vector<Vec3>& normal) const {
+  [[nodiscard]] std::vector<double> radii(const VertexNeighbours& neighbours, const std::vector<Vec3>& normal) const {
     constexpr int steps = 4;  // a few triangles say little
     std::vector<double> bend(now_.size(), 0.0);
     std::vector<double> squared_edge(now_.size(), 0.0);
@@ -314,7 +247,7 @@ private:
   /// outward as inward over a few steps, so the mean move along the normal over some neighbours is taken back. The
   /// steps are as long as the root of the radius: the mean is taken over a square of a width in proportion, and so does
   /// not mix a small part with what it joins.
-  void remove_local_drift(const Neighbours& neighbours) {
+  void remove_local_drift(const VertexNeighbours& neighbours) {
     constexpr int steps = 24;
     constexpr double radius_of_all_steps = 20;
     constexpr double least_share = 0.1;
@@ -325,6 +258,37 @@ private:
     spread(neighbours, drift, steps,
            [&](std::size_t v) { return std::clamp(radius[v] / radius_of_all_steps, least_share, 1.0); });
     for_all(now_.size(), [&](std::size_t v) { now_[v] = confine(v, now_[v] - drift[v] * normal[v].normalized()); });
+  }
+
+  /// Moves each vertex along the normal to the quadric that fits the edges around it best. The surface so far says
+  /// where that is to be looked for, and what the edges' middles are worth.
+  void move_to_quadrics(const VertexNeighbours& neighbours) {
+    std::vector<Vec3> world(now_.size());
+    for_all(now_.size(), [&](std::size_t v) { world[v] = to_world_ * now_[v]; });
+    const std::vector<Vec3> normal = normals(world);
+    std::vector<EdgeCrossing> crossings(now_.size());
+    for_all(now_.size(), [&](std::size_t v) {
+      crossings[v] = {world[v], normal[v].normalized(), to_world_ * start_[v], 0.5 * to_world_.col(edge_axis(v))};
+    });
+    const double voxel = std::cbrt(std::abs(to_world_.determinant()));
+    const std::vector<double> offset = local_quadric_offsets(crossings, neighbours, boundary_, voxel);
+    const Mat3 to_voxel = to_world_.inverse();
+    for_all(now_.size(),
+            [&](std::size_t v) { now_[v] = confine(v, now_[v] + offset[v] * (to_voxel * crossings[v].normal)); });
+  }
+
+  /// The axis of the voxels' edge on whose middle a vertex was: along it, it is between two samples.
+  [[nodiscard]] int edge_axis(std::size_t v) const {
+    int axis = 0;
+    double most = -1;
+    for (int i = 0; i < 3; ++i) {
+      const double off = low_[v][i] < high_[v][i] ? std::abs(start_[v][i] - std::round(start_[v][i])) : 0.0;
+      if (off > most) {
+        most = off;
+        axis = i;
+      }
+    }
+    return axis;
   }
 
   /// Volume swept by each component from its start, in voxels, outward positive; exact for straight moves of corners.
