@@ -18,6 +18,7 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr int doublings = 4;             // errors count by their 16th power: nearly the largest alone
 constexpr double least_gain = 0.15;      // of the worst triangle's cost, for a change to be made
 constexpr double collapse_share = 0.85;  // of the largest error, at most, may a collapse leave
+constexpr double beside_share = 0.3;     // of the largest error, at least, that a triangle beside it is mended for
 constexpr double renew_share = 0.8;      // of the error that costs refer to, below which they are computed anew
 constexpr double certain_share = 0.5;  // of the largest squared error: points that look farther off are looked at again
 constexpr std::array<double, 3> may_be_larger{3, 1.3, 1};  // than known, is a triangle's error: see Leveller::Known
@@ -32,7 +33,10 @@ std::size_t work_of(const PatchTrial& trial) {
   return trial.corners.size() * (trial.samples.size() + 3 * work_per_query);
 }
 constexpr std::size_t least_work = 200'000;
-constexpr std::size_t work_per_triangle = 35;  // of the target
+constexpr std::size_t work_per_triangle = 35;             // of the target
+constexpr std::size_t shaped_work_per_triangle = 20'000;  // of the mesh, where shape counts
+constexpr double good_shape_weight = 0.3;                 // of the lack of radius ratio, where shape counts
+constexpr double hard_angle_weight = 1e6;                 // so that no angle gets too small
 
 /// The target's points that the mesh is to be close to, each with the triangle of the mesh nearest to it. Owners come
 /// from around the vertex that the point was merged into; points that look far off are looked at again.
@@ -158,29 +162,35 @@ private:
 
 class Leveller {
 public:
-  Leveller(const TriangleMesh& mesh, const TriangleMesh& target, const SurfaceWalk& walk, const BoundaryCurves& curves,
-           const LevellingOptions& options)
-      : state_(
-            mesh, target, [&walk](const Vec3& p, Index near, double enough) { return walk.closest(p, near, enough); },
-            Sampling(mesh, target, options.origins).samples(), curves),
-        options_(options),
-        near_by_([&walk](const Vec3& p, Index near, double enough) { return walk.near_by(p, near, enough); }),
-        diagonal_(diagonal(target)),
-        known_(mesh.triangles.size(), Known::by_samples),
-        work_left_(std::max(least_work, work_per_triangle * target.triangles.size())) {
+  /// How well a triangle's error is known: by the points of the target and its corners, by its middle as well, by all.
+  enum class Known : std::uint8_t { by_samples, nearly, certainly };
+  /// How a mesh is levelled.
+  struct Plan {
+    ShapeWeights weights;
+    NearestPoint near_by;   ///< quick, may be too far
+    Known known;            ///< how well errors are known at the start
+    std::size_t triangles;  ///< at most
+    std::size_t work;       ///< at most
+    double diagonal;        ///< mm, of the target
+  };
+
+  Leveller(ShapedMesh& state, Plan plan, const std::vector<CheapCollapse>& collapses)
+      : state_(state),
+        plan_(std::move(plan)),
+        collapses_(collapses),
+        weights_(plan_.weights),
+        known_(mesh().triangles.size(), plan_.known),
+        work_left_(plan_.work) {
     weights_.error = infinity;
     weights_.doublings = doublings;
-    weights_.quality = 1e-4;
-    weights_.angle = 1;
-    weights_.angle_wanted = least_angle;
     weights_.most_error = 0;
-    weights_.fold_cosine = -0.9;
-    state_.measure_corners(near_by_);
   }
 
-  TriangleMesh run() {
+  void run() {
     for (Index t = 0; t < mesh().triangles.size(); ++t) {
-      queue_.push({may_be(t), t});
+      if (mesh().is_alive(t)) {
+        queue_.push({may_be(t), t});
+      }
     }
     while (work_left_ > 0 && !queue_.empty()) {
       const auto [error, t] = queue_.top();
@@ -193,23 +203,20 @@ public:
         measure(t);
         continue;
       }
-      if (!(error > negligible * diagonal_)) {
+      if (!(error > negligible * plan_.diagonal)) {
         break;
       }
       if (error < renew_share * weights_.error || error > weights_.error) {
         weights_.error = error;
         state_.set_weights(weights_);
       }
-      if (!mend(t)) {
+      if (!mend(t) && !mend_beside(t)) {
         break;
       }
     }
-    return state_.mesh().mesh();
   }
 
 private:
-  // How well a triangle's error is known: by the points of the target and its corners, by its middle as well, by all.
-  enum class Known : std::uint8_t { by_samples, nearly, certainly };
   struct Worst {
     double error;
     Index triangle;
@@ -227,7 +234,7 @@ private:
     if (known_[t] == Known::by_samples) {
       known_[t] = Known::nearly;
       spend(2 * work_per_query);
-      state_.measure_middle(t, near_by_);
+      state_.measure_middle(t, plan_.near_by);
     } else {
       known_[t] = Known::certainly;
       spend(6 * work_per_query);
@@ -257,6 +264,22 @@ private:
     least_gain_ = least_gain * state_.cost(t);
     farthest_ = state_.farthest_sample(t);
     return flip(t) || move(t) || collapse(t) || split(t);
+  }
+
+  // Where the worst triangle cannot be mended, mending one beside it may make room.
+  bool mend_beside(Index t) {
+    std::vector<Worst> beside;
+    for (const Index v : mesh().triangles[t]) {
+      for (const Index n : mesh().around[v]) {
+        if (n != t) {
+          beside.push_back({state_.error(n), n});
+        }
+      }
+    }
+    std::sort(beside.begin(), beside.end(), [](const Worst& l, const Worst& r) { return r < l; });
+    return std::any_of(beside.begin(), beside.end(), [&](const Worst& n) {
+      return work_left_ > 0 && n.error > beside_share * state_.error(t) && mend(n.triangle);
+    });
   }
 
   // The best of several trials, and then it is done.
@@ -347,7 +370,7 @@ private:
   }
 
   bool split(Index t) {
-    while (mesh().alive + 2 > options_.triangles) {
+    while (mesh().alive + 2 > plan_.triangles) {
       if (!collapse_cheaply()) {
         return false;
       }
@@ -398,8 +421,8 @@ private:
       limit *= limit;
     }
     bool found = false;
-    while (!found && next_ < options_.collapses.size() && work_left_ > 0) {
-      const auto& [u, v, position] = options_.collapses[next_++];
+    while (!found && next_ < collapses_.size() && work_left_ > 0) {
+      const auto& [u, v, position] = collapses_[next_++];
       if (mesh().around[u].empty() || mesh().around[v].empty() || !state_.make_collapse(u, v, trial_)) {
         continue;
       }
@@ -423,12 +446,11 @@ private:
     return found;
   }
 
-  ShapedMesh state_;
-  const LevellingOptions& options_;
+  ShapedMesh& state_;
+  Plan plan_;
+  const std::vector<CheapCollapse>& collapses_;
   ShapeWeights weights_;
   std::priority_queue<Worst> queue_;
-  NearestPoint near_by_;
-  double diagonal_;
   std::vector<Known> known_;  // #F how well the error is known
   PatchTrial trial_, best_;
   std::vector<Vec3> places_;
@@ -443,7 +465,59 @@ private:
 TriangleMesh levelled(const TriangleMesh& mesh, const TriangleMesh& target, const LevellingOptions& options) {
   const BoundaryCurves curves(options.closed || boundary_loops(mesh).empty() ? TriangleMesh{} : target);
   const SurfaceWalk walk(target);
-  return Leveller(mesh, target, walk, curves, options).run();
+  const NearestPoint nearest = [&walk](const Vec3& p, Index near, double enough) {
+    return walk.closest(p, near, enough);
+  };
+  Leveller::Plan plan;
+  plan.near_by = [&walk](const Vec3& p, Index near, double enough) { return walk.near_by(p, near, enough); };
+  plan.weights.quality = 1e-4;
+  plan.weights.angle = 1;
+  plan.weights.angle_wanted = least_angle;
+  plan.weights.fold_cosine = -0.9;
+  plan.known = Leveller::Known::by_samples;
+  plan.triangles = options.triangles;
+  plan.work = std::max(least_work, work_per_triangle * target.triangles.size());
+  plan.diagonal = diagonal(target);
+  ShapedMesh state(mesh, target, nearest, Sampling(mesh, target, options.origins).samples(), curves);
+  state.measure_corners(plan.near_by);
+  Leveller(state, plan, options.collapses).run();
+  return state.mesh().mesh();
+}
+
+void level_well_shaped(ShapedMesh& state, const TriangleMesh& target, const WellShapedOptions& options) {
+  const EditMesh& mesh = state.mesh();
+  Leveller::Plan plan;
+  plan.near_by = options.nearest;
+  plan.weights.quality = good_shape_weight;
+  plan.weights.angle = hard_angle_weight;
+  plan.weights.angle_wanted = options.angle;
+  plan.known = Leveller::Known::certainly;
+  plan.triangles = options.triangles;
+  plan.work = shaped_work_per_triangle * mesh.alive;
+  plan.diagonal = diagonal(target);
+  for (Index t = 0; t < mesh.triangles.size(); ++t) {
+    if (mesh.is_alive(t)) {
+      state.measure(t);
+    }
+  }
+  // The edges whose triangles are close to the target, short ones first.
+  std::vector<std::pair<double, CheapCollapse>> found;
+  for (const auto& [u, v] : mesh.edges()) {
+    double error = 0;
+    for (const Index end : {u, v}) {
+      for (const Index t : mesh.around[end]) {
+        error = std::max(error, state.error(t));
+      }
+    }
+    const Vec3 middle = 0.5 * (mesh.positions[u] + mesh.positions[v]);
+    found.push_back({error * (mesh.positions[u] - mesh.positions[v]).norm(), {u, v, middle}});
+  }
+  std::stable_sort(found.begin(), found.end(), [](const auto& l, const auto& r) { return l.first < r.first; });
+  std::vector<CheapCollapse> collapses;
+  for (const auto& [cost, collapse] : found) {
+    collapses.push_back(collapse);
+  }
+  Leveller(state, plan, collapses).run();
 }
 
 }  // namespace tunica

@@ -95,6 +95,9 @@ ShapedMesh::ShapedMesh(const TriangleMesh& mesh, const TriangleMesh& target, Nea
       target_(target),
       nearest_(std::move(nearest)),
       curves_(curves),
+      parts_(static_cast<int>(std::clamp(
+          std::sqrt(static_cast<double>(target.triangles.size()) / static_cast<double>(mesh.triangles.size())), 4.0,
+          8.0))),
       sample_(std::move(samples.points)),
       states_(mesh.triangles.size()) {
   for (std::size_t t = 0; t < states_.size(); ++t) {
@@ -233,10 +236,9 @@ void ShapedMesh::measure_middle(Index t, const NearestPoint& nearest) {
   state.cost = shape_cost(c) + error_cost(state.error);
 }
 
-/// At a fourth, half and three fourths of all edges, at the four points between these and at the centre, but not less
-/// than `squared`.
+/// At points that cut each edge in `parts_`, at those between them and at the centre, but not less than `squared`.
 double ShapedMesh::squared_within(const std::array<Vec3, 3>& c, Index guess, double squared) const {
-  constexpr int parts = 4;
+  const int parts = parts_;
   const auto try_point = [&](const Vec3& p) {
     const auto hit = nearest_(p, guess, squared);
     squared = std::max(squared, hit.squared_distance);

@@ -146,6 +146,7 @@ private:
   NearestPoint nearest_;
   const BoundaryCurves& curves_;
   ShapeWeights weights_;
+  int parts_;  // of an edge, where a triangle is measured within: about as long as the target's edges
   std::vector<Vec3> sample_;
   std::vector<double> vertex_error_;  // #V distance of each vertex to the target
   std::vector<State> states_;

@@ -1,6 +1,7 @@
 #include "surface/shaping.hpp"
 
 #include "surface/incidence.hpp"
+#include "surface/levelling.hpp"
 #include "surface/measure.hpp"
 #include "surface/shape_patch.hpp"
 
@@ -28,7 +29,11 @@ class Shaper {
 public:
   Shaper(const TriangleMesh& mesh, const TriangleMesh& target, const ClosestPoint& tree, const BoundaryCurves& curves,
          const ShapingOptions& options, const NearestPoint& nearest)
-      : state_(mesh, target, nearest, sample_target(mesh, target, tree), curves), tree_(tree), options_(options) {
+      : state_(mesh, target, nearest, sample_target(mesh, target, tree), curves),
+        target_(target),
+        tree_(tree),
+        nearest_(nearest),
+        options_(options) {
     state_.measure_all();
     weights_.error = 1e-3 * diagonal(target);
     weights_.most_error = 0.01 * diagonal(target);
@@ -50,6 +55,7 @@ public:
       improve();
     }
     mend();
+    level_well_shaped(state_, target_, {1.01 * options_.min_angle, options_.triangles, nearest_});
     advance(options_.progress, 1.0);
     return state_.mesh().mesh();
   }
@@ -420,7 +426,9 @@ private:
   }
 
   ShapedMesh state_;
+  const TriangleMesh& target_;
   const ClosestPoint& tree_;
+  const NearestPoint& nearest_;
   const ShapingOptions& options_;
   ShapeWeights weights_;
   PatchTrial trial_, best_;

@@ -202,6 +202,22 @@ TEST(Decimate, UnfitMeshesAreRefusedWithThePlace) {
   fin.vertices.emplace_back(3, 3, 3);
   fin.triangles.push_back({fin.triangles[0][0], fin.triangles[0][1], static_cast<Index>(fin.vertices.size() - 1)});
   EXPECT_THAT(message(fin), testing::HasSubstr("shared by three"));
+  TriangleMesh double_sided{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{{0, 1, 2}}, {{0, 2, 1}}}};
+  EXPECT_THAT(message(double_sided), testing::HasSubstr("there twice"));
+  TriangleMesh touching = shapes::together(shapes::sphere(1), shapes::moved(shapes::sphere(1), {9, 0, 0}));
+  const auto second = static_cast<Index>(shapes::sphere(1).vertices.size());
+  for (auto& triangle : touching.triangles) {
+    std::replace(triangle.begin(), triangle.end(), second, Index{0});
+  }
+  EXPECT_THAT(message(touching), testing::HasSubstr("only touch there"));
+  TriangleMesh nowhere = shapes::sphere(2);
+  nowhere.vertices[3].y() = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THAT(message(nowhere), testing::HasSubstr("not finite"));
+  TriangleMesh huge = shapes::sphere(2);
+  for (Vec3& v : huge.vertices) {
+    v *= 1e308;
+  }
+  EXPECT_THAT(message(huge), testing::HasSubstr("too far apart"));
   EXPECT_THAT(message({}), testing::HasSubstr("no triangles"));
   EXPECT_THAT(message({{{1, 1, 1}, {1, 1, 1}, {1, 1, 1}}, {{{0, 1, 2}}}}), testing::HasSubstr("one point"));
 }

@@ -1,5 +1,6 @@
 #include "surface/surface_walk.hpp"
 
+#include "surface/facet_distances.hpp"
 #include "surface/shapes.hpp"
 
 #include <gtest/gtest.h>
@@ -36,9 +37,46 @@ TEST(SurfaceWalk, NeverNearerThanTheClosestPointAndMostlyThere) {
   }
 }
 
+TEST(SurfaceWalk, WhatIsNearEnoughMayEndTheSearchAndNothingElse) {
+  const TriangleMesh mesh = shapes::shaken(shapes::torus(40, 20), 0.1, 2);
+  const SurfaceWalk walk(mesh);
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  for (std::size_t i = 0; i < 1000; ++i) {
+    const auto start = static_cast<Index>(random() % mesh.triangles.size());
+    const Vec3 p = mesh.vertices[random() % mesh.vertices.size()] + 0.1 * Vec3(uniform(random), uniform(random), 0);
+    const double truth = walk.closest(p, start).squared_distance;
+    for (const double enough : {0.5 * truth, 1.5 * truth, 1.0}) {
+      const double found = walk.closest(p, start, enough).squared_distance;
+      EXPECT_LE(found, std::max(truth * (1 + 1e-9), enough));
+    }
+  }
+}
+
+TEST(FacetDistances, SeveralAtOnceAreThoseOfOne) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  const auto any = [&] { return Vec3(uniform(random), uniform(random), uniform(random)); };
+  for (int i = 0; i < 500; ++i) {
+    const std::array<Vec3, 3> c{any(), any(), any()};
+    std::array<Vec3, lane_count> points;
+    std::generate(points.begin(), points.end(), any);
+    const Lanes squared = FacetDistances(c).squared_distance(lane_points([&](std::size_t k) { return points[k]; }));
+    for (std::size_t k = 0; k < lane_count; ++k) {
+      EXPECT_NEAR(squared[k], FlatTriangle(c[0], c[1], c[2]).squared_distance(points[k]), 1e-12);
+    }
+  }
+}
+
 TEST(SurfaceWalk, TrianglesWithoutAreaGiveNoDistanceThatIsTooSmall) {
   const FlatTriangle needle({0, 0, 0}, {1, 1e-17, 0}, {3, 0, 0});
   const FlatTriangle point({1, 1, 1}, {1, 1, 1}, {1, 1, 1});
+  const std::array<Vec3, 4> points{Vec3(5, 0, 0), Vec3(-1, 1, 0), Vec3(2, 0, 2), Vec3(3, 2, 0)};
+  const Lanes squared = FacetDistances({Vec3(0, 0, 0), Vec3(1, 1e-17, 0), Vec3(3, 0, 0)})
+                            .squared_distance(lane_points([&](std::size_t k) { return points[k % 4]; }));
+  for (std::size_t k = 0; k < std::min(lane_count, points.size()); ++k) {
+    EXPECT_NEAR(squared[k], (std::array<double, 4>{4, 2, 4, 4}[k]), 1e-12);
+  }
   EXPECT_NEAR(needle.squared_distance({-1, 1, 0}), 2, 1e-12);
   EXPECT_NEAR(needle.squared_distance({2, 0, 2}), 4, 1e-12);
   EXPECT_NEAR(needle.squared_distance({5, 0, 0}), 4, 1e-12);
