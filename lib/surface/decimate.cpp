@@ -19,6 +19,9 @@ namespace {
 
 /// The greedy order's next collapses, of the triangles: from them comes what is spent where the error is largest.
 constexpr double more_collapses = 0.1;
+/// For an error, levelling is tried down to this share of the triangles that do without, in so many steps.
+constexpr double least_levelled = 0.4;
+constexpr int level_steps = 6;
 
 // The mesh after the first `steps` collapses; `origins` tells which vertices and triangles came from where.
 TriangleMesh replay(const TriangleMesh& mesh, const std::vector<Collapse>& history, std::size_t steps,
@@ -64,11 +67,33 @@ TriangleMesh replay(const TriangleMesh& mesh, const std::vector<Collapse>& histo
   return result;
 }
 
+// The mesh after the first `steps` collapses, its largest error lessened at that count; what the history says to
+// collapse next is what may be spent on that.
+TriangleMesh level(const TriangleMesh& mesh, const EdgeCollapse& collapse, std::size_t steps) {
+  const std::vector<Collapse>& history = collapse.history();
+  LevellingOptions options;
+  const TriangleMesh coarse = replay(mesh, history, steps, &options.origins);
+  options.triangles = coarse.triangles.size();
+  options.closed = !collapse.has_boundary();
+  const auto end = static_cast<std::size_t>((1 - more_collapses) * static_cast<double>(options.triangles));
+  for (std::size_t i = steps; i < history.size() && history[i].triangles_left >= end; ++i) {
+    const Collapse& further = history[i];
+    options.collapses.push_back(
+        {options.origins.stands_for[further.kept], options.origins.stands_for[further.removed], further.position});
+  }
+  return levelled(coarse, mesh, options);
+}
+
 // Finds how far along the history the error still holds.
 class ErrorSearch {
 public:
-  ErrorSearch(const TriangleMesh& mesh, const std::vector<Collapse>& history, double max_error)
-      : mesh_(mesh), history_(history), max_error_(max_error), tree_(mesh) {
+  ErrorSearch(const TriangleMesh& mesh, const EdgeCollapse& collapse, double max_error, bool levelled)
+      : mesh_(mesh),
+        collapse_(collapse),
+        history_(collapse.history()),
+        max_error_(max_error),
+        levelled_(levelled),
+        tree_(mesh) {
     options_.limit = max_error;
     options_.width = 1e-3 * max_error;
     options_.samples = 0;
@@ -97,14 +122,35 @@ public:
         try_steps(steps);
       }
     }
+    if (levelled_) {
+      level_further();
+    }
     return result();
   }
 
 private:
   [[nodiscard]] double remaining(std::size_t steps) const { return static_cast<double>(history_.size() + 4 - steps); }
 
-  bool try_steps(std::size_t steps) {
-    TriangleMesh candidate = replay(mesh_, history_, steps);
+  // Fewer triangles, their largest error lessened.
+  void level_further() {
+    double holds = static_cast<double>(best_.triangles.size());
+    double fails = least_levelled * holds;
+    for (int step = 0; step < level_steps && fails + 1 < holds; ++step) {
+      const double middle = std::sqrt(holds * fails);
+      const auto found = std::find_if(history_.begin(), history_.end(), [&](const Collapse& c) {
+        return static_cast<double>(c.triangles_left) <= middle;
+      });
+      if (found == history_.end()) {
+        return;
+      }
+      const auto steps = static_cast<std::size_t>(found + 1 - history_.begin());
+      (accept(level(mesh_, collapse_, steps)) ? holds : fails) = middle;
+    }
+  }
+
+  bool try_steps(std::size_t steps) { return accept(replay(mesh_, history_, steps)); }
+
+  bool accept(TriangleMesh candidate) {
     const Interval error = hausdorff(ClosestPoint(candidate), tree_, options_).both;
     if (error.upper > max_error_) {
       return false;
@@ -125,8 +171,10 @@ private:
   }
 
   const TriangleMesh& mesh_;
+  const EdgeCollapse& collapse_;
   const std::vector<Collapse>& history_;
   double max_error_;
+  bool levelled_;
   ClosestPoint tree_;
   HausdorffOptions options_;
   TriangleMesh best_;
@@ -224,25 +272,6 @@ private:
   HausdorffOptions distance_;
 };
 
-// The mesh of the collapses so far, its largest error lessened at that count.
-TriangleMesh level(const TriangleMesh& mesh, EdgeCollapse& collapse, std::size_t triangles) {
-  const std::size_t steps = collapse.history().size();
-  LevellingOptions options;
-  TriangleMesh coarse = replay(mesh, collapse.history(), steps, &options.origins);
-  if (steps == 0 || coarse.triangles.size() > triangles) {
-    return coarse;
-  }
-  options.triangles = triangles;
-  options.closed = !collapse.has_boundary();
-  collapse.run(triangles - static_cast<std::size_t>(more_collapses * static_cast<double>(triangles)), {});
-  for (std::size_t i = steps; i < collapse.history().size(); ++i) {
-    const Collapse& further = collapse.history()[i];
-    options.collapses.push_back(
-        {options.origins.stands_for[further.kept], options.origins.stands_for[further.removed], further.position});
-  }
-  return levelled(coarse, mesh, options);
-}
-
 [[noreturn]] void refuse(const TriangleMesh& mesh) {
   if (const auto reason = why_unfit(examine(mesh))) {
     throw InputError(fmt::format("not an oriented manifold: {}", *reason));
@@ -271,10 +300,15 @@ DecimateResult decimate(const TriangleMesh& mesh, const DecimateOptions& options
   collapse.run(options.triangles.value_or(0), part(0, collapsing));
   DecimateResult result;
   if (options.max_error) {
-    result = ErrorSearch(mesh, collapse.history(), *options.max_error).run(part(collapsing, 1));
+    result = ErrorSearch(mesh, collapse, *options.max_error, options.levelled).run(part(collapsing, 1));
   } else {
-    result.mesh = options.levelled ? level(mesh, collapse, *options.triangles)
-                                   : replay(mesh, collapse.history(), collapse.history().size());
+    const std::size_t steps = collapse.history().size();
+    if (options.levelled && steps > 0 && collapse.history().back().triangles_left <= *options.triangles) {
+      collapse.run(static_cast<std::size_t>((1 - more_collapses) * static_cast<double>(*options.triangles)), {});
+      result.mesh = level(mesh, collapse, steps);
+    } else {
+      result.mesh = replay(mesh, collapse.history(), steps);
+    }
     advance(options.progress, 1.0);
   }
   result.count_reached = !options.triangles || result.mesh.triangles.size() <= *options.triangles;

@@ -11,7 +11,7 @@ struct DecimateOptions {
   std::optional<std::size_t> triangles;  ///< at most this many
   std::optional<double> max_error;       ///< mm: two-sided Hausdorff distance to the input, certainly at most this
   std::optional<double> min_angle;       ///< degrees, at most 40: no angle smaller, at the price of a larger error
-  bool levelled = true;  ///< with `triangles` only: the largest error is lessened at that count, see levelled()
+  bool levelled = true;  ///< without `min_angle`: the largest error is lessened at the count, see levelled()
   Progress progress;
 };
 
@@ -26,10 +26,10 @@ struct DecimateResult {
 
 /// Fewer triangles for the same surface, by quadric edge collapse with optimal placement (see EdgeCollapse).
 /// With `triangles` only: stops at that count, then lessens the largest error there (see levelled()). With `max_error`
-/// only: the fewest triangles found whose certified distance holds. With both: as with `triangles`; when the error does
-/// not allow that count, the fewest that it allows. With `min_angle` triangles are well shaped (mean radius ratio about
-/// 0.87), see shaped(); the count stays. The mesh comes back also when a requirement failed: the best that could be
-/// done.
+/// only: the fewest triangles found whose certified distance holds, levelled where that allows fewer. With both: as
+/// with `triangles`; when the error does not allow that count, the fewest that it allows. With `min_angle` triangles
+/// are well shaped (mean radius ratio about 0.87), see shaped(); the count stays. The mesh comes back also when a
+/// requirement failed: the best that could be done.
 /// @param mesh  an oriented manifold, closed or with boundary; unused vertices are dropped
 /// Keeps: Euler number, pieces, boundary loops (their vertices stay on the given boundary curve), the side each
 /// triangle faces. Deterministic, independent of the number of threads, of the unit and of the place of the mesh.
@@ -37,7 +37,7 @@ struct DecimateResult {
 /// Source: Garland, Heckbert, Surface simplification using quadric error metrics, SIGGRAPH 1997.
 /// Cost: n log n; with `max_error` some twenty distance measurements more. With
 /// `min_angle` about 5 ms per triangle of the result more, and some eight times that with `max_error`.
-/// Limits: greedy; `max_error` looks among the meshes that the greedy order passes through.
+/// Limits: greedy; `max_error` looks among the meshes that the greedy order passes through, and some of them levelled.
 DecimateResult decimate(const TriangleMesh& mesh, const DecimateOptions& options);
 
 }  // namespace tunica

@@ -1,5 +1,6 @@
-// Decimation beside CGAL's Garland-Heckbert planes (with its bound on the change of normals, as its manual has it):
-// error, shape and CPU time at the same counts, in one run, one thread, the two taking turns.
+// Decimation beside CGAL's Garland-Heckbert planes (with its bound on the change of normals, as its manual has it) and,
+// where it was found, beside meshoptimizer: error, shape and CPU time at the same counts, in one run, one thread,
+// taking turns.
 //
 //   build/release/tests/bench/bench_decimate aneurysm_tube.ply:772,1200 bumpy.ply:100000 [--angle 20] [--rounds 3]
 //   [--alone]
@@ -14,6 +15,9 @@
 #include "surface/decimate.hpp"
 #include "surface/hausdorff.hpp"
 #include "surface/measure.hpp"
+#ifdef TUNICA_HAS_MESHOPTIMIZER
+#include "meshoptimizer_decimate.hpp"
+#endif
 
 #include <fmt/format.h>
 
@@ -62,12 +66,20 @@ void compare(const std::string& path, std::size_t count, std::size_t rounds, con
   const TriangleMesh mesh = read_mesh(path, 1.0, false).mesh;
   const SimpleCgalMesh given = to_cgal<SimpleCgalMesh>(mesh);
   Measured own, shaped, peer;
+#ifdef TUNICA_HAS_MESHOPTIMIZER
+  const MeshoptimizerMesh single(mesh);
+  Measured other;
+  std::vector<unsigned int> left;
+#endif
   DecimateOptions options;
   options.triangles = count;
   for (std::size_t i = 0; i < rounds; ++i) {
     own.milliseconds.push_back(cpu_milliseconds([&] { own.mesh = decimate(mesh, options).mesh; }));
     if (with_peer) {
       peer.milliseconds.push_back(cpu_milliseconds([&] { peer.mesh = garland_heckbert(given, count); }));
+#ifdef TUNICA_HAS_MESHOPTIMIZER
+      other.milliseconds.push_back(cpu_milliseconds([&] { left = meshoptimizer_simplified(single, count); }));
+#endif
     }
   }
   const ClosestPoint target(mesh);
@@ -80,6 +92,13 @@ void compare(const std::string& path, std::size_t count, std::size_t rounds, con
     print("CGAL", peer);
     fmt::print("  error {:.3f} x CGAL's, speed {:.1f} x CGAL's\n", own.percent / peer.percent,
                median(peer.milliseconds) / median(own.milliseconds));
+#ifdef TUNICA_HAS_MESHOPTIMIZER
+    other.mesh = from_meshoptimizer(single, left);
+    finish(other, target, diagonal_mm);
+    print("meshopt", other);
+    fmt::print("  error {:.3f} x meshoptimizer's, speed {:.2f} x meshoptimizer's\n", own.percent / other.percent,
+               median(other.milliseconds) / median(own.milliseconds));
+#endif
   }
   if (angle) {
     options.min_angle = angle;

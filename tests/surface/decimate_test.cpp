@@ -155,6 +155,20 @@ TEST(Decimate, MaxErrorIsHonouredBothWays) {
   }
 }
 
+TEST(Decimate, LevellingLetsFewerTrianglesKeepTheError) {
+  for (const TriangleMesh& mesh : {shapes::sphere(5), shapes::shaken(shapes::torus(60, 30), 0.01, 3)}) {
+    DecimateOptions options;
+    options.max_error = 0.01 * diagonal(mesh);
+    const DecimateResult levelled = decimate(mesh, options);
+    options.levelled = false;
+    const DecimateResult plain = decimate(mesh, options);
+    EXPECT_TRUE(levelled.error_kept && plain.error_kept);
+    EXPECT_LE(distance(levelled.mesh, mesh), 1.001 * *options.max_error);
+    EXPECT_LT(levelled.mesh.triangles.size(), 0.9 * static_cast<double>(plain.mesh.triangles.size()));
+    EXPECT_EQ(examine(levelled.mesh).euler, examine(mesh).euler);
+  }
+}
+
 TEST(Decimate, MaxErrorWinsOverTheCount) {
   const TriangleMesh mesh = shapes::sphere(4);
   DecimateOptions options;
