@@ -18,14 +18,12 @@ std::size_t whole_large_pages(std::size_t bytes);
 /// Errors: none; the contents are undefined afterwards.
 void touch_pages(void* begin, std::size_t bytes);
 
-/// Makes an empty vector hold `size` elements, as resize() does, where the memory is likely new to the process: mapped
-/// in large pages and by all threads.
+/// Room in an empty vector for `size` elements, where the memory is likely new to the process: in large pages, which
+/// are mapped by whoever writes to them first.
 template <typename T>
-void resize_fresh(std::vector<T>& vector, std::size_t size) {
+void reserve_fresh(std::vector<T>& vector, std::size_t size) {
   vector.reserve(whole_large_pages(size * sizeof(T)) / sizeof(T));
   prefer_large_pages(vector.data(), size * sizeof(T));
-  touch_pages(vector.data(), size * sizeof(T));
-  vector.resize(size);
 }
 
 /// Memory that is zero without being written: for large vectors of words that begin as zeros, `std::vector<Word,

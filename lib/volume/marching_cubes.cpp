@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <mutex>
 #include <span>
 #include <type_traits>
 #include <utility>
@@ -96,8 +97,9 @@ public:
                       first_triangle_[slices], max_index));
     }
     tunica::advance(options.progress, 0.3);
-    resize_fresh(mesh_.vertices, first_vertex_[slices]);
-    resize_fresh(mesh_.triangles, first_triangle_[slices]);
+    reserve_fresh(mesh_.vertices, first_vertex_[slices]);
+    mesh_.vertices.resize(first_vertex_[slices]);  // their constructor writes nothing
+    reserve_fresh(mesh_.triangles, first_triangle_[slices]);
   }
 
   [[nodiscard]] std::size_t slices() const { return counts_.size() - 1; }
@@ -109,11 +111,13 @@ public:
     cell_layers::Window window = window_;
     window.first_slice = first_slice;
     const PaddedGrid grid(mask_, window, options_.open_border);
+    std::array<Index, 3>* const triangles = mesh_.triangles.data();
     std::vector<std::vector<PinchedVertex>> pinched((end - begin + grain - 1) / grain);
     for_each_block(grid, end - begin, [&](Layers& layers, std::size_t from, std::size_t to) {
       const std::size_t slice = begin + from;
+      grow_triangles(first_triangle_[begin + to]);
       const cell_layers::Output out{first_vertex_[slice], mesh_.vertices.data() + first_vertex_[slice],
-                                    mesh_.triangles.data() + first_triangle_[slice]};
+                                    triangles + first_triangle_[slice]};
       layers.write(slice, begin + to, counts_.data() + slice, out, crossings, pinched[from / grain]);
     });
     for (const auto& block : pinched) {
@@ -129,6 +133,15 @@ public:
   }
 
 private:
+  /// A vector writes zeros to what it grows by: block by block, so that they are overwritten before they leave the
+  /// cache, and no thread waits for all of them. There is room for all, so that nothing moves.
+  void grow_triangles(std::size_t size) {
+    const std::lock_guard lock(growing_);
+    if (mesh_.triangles.size() < size) {
+      mesh_.triangles.resize(size);
+    }
+  }
+
   const Mask& mask_;
   MarchingCubesOptions options_;
   cell_layers::Window window_;
@@ -136,6 +149,7 @@ private:
   std::vector<std::size_t> first_vertex_;  // sums over the slices before each
   std::vector<std::size_t> first_triangle_;
   TriangleMesh mesh_;
+  std::mutex growing_;  // of its triangles
   std::vector<PinchedVertex> pinched_;
 };
 
