@@ -1,6 +1,11 @@
 #include "surface/edit_mesh.hpp"
 
 namespace tunica {
+namespace {
+
+constexpr std::size_t spare_places = 2;  // around a vertex, for triangles to come
+
+}  // namespace
 
 EditMesh::EditMesh(const TriangleMesh& mesh)
     : positions(mesh.vertices),
@@ -11,6 +16,15 @@ EditMesh::EditMesh(const TriangleMesh& mesh)
   // Inside, each neighbour of a vertex follows it in one triangle and precedes it in another; at a boundary the first
   // one only follows, the last one only precedes.
   std::vector<std::uint64_t> following(mesh.vertices.size(), 0), preceding(mesh.vertices.size(), 0);
+  std::vector<std::uint32_t> valence(mesh.vertices.size(), 0);
+  for (const auto& c : triangles) {
+    for (const Index v : c) {
+      ++valence[v];
+    }
+  }
+  for (std::size_t v = 0; v < valence.size(); ++v) {
+    around[v].reserve(valence[v] + spare_places);
+  }
   for (std::size_t t = 0; t < triangles.size(); ++t) {
     for (std::size_t k = 0; k < 3; ++k) {
       const Index v = triangles[t][k];

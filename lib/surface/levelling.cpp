@@ -187,11 +187,14 @@ public:
   }
 
   void run() {
+    std::vector<Worst> all;
+    all.reserve(mesh().triangles.size());
     for (Index t = 0; t < mesh().triangles.size(); ++t) {
       if (mesh().is_alive(t)) {
-        queue_.push({may_be(t), t});
+        all.push_back({may_be(t), t});
       }
     }
+    queue_ = std::priority_queue<Worst>({}, std::move(all));
     while (work_left_ > 0 && !queue_.empty()) {
       const auto [error, t] = queue_.top();
       if (!mesh().is_alive(t) || may_be(t) != error) {

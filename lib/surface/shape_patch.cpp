@@ -103,6 +103,13 @@ ShapedMesh::ShapedMesh(const TriangleMesh& mesh, const TriangleMesh& target, Nea
   for (std::size_t t = 0; t < states_.size(); ++t) {
     states_[t].guess = samples.near[t];
   }
+  std::vector<Index> owned(states_.size(), 0);
+  for (const Index t : samples.owner) {
+    ++owned[t];
+  }
+  for (std::size_t t = 0; t < states_.size(); ++t) {
+    states_[t].samples.reserve(owned[t]);
+  }
   for (std::size_t s = 0; s < sample_.size(); ++s) {
     State& state = states_[samples.owner[s]];
     state.samples.push_back(static_cast<Index>(s));
@@ -133,12 +140,25 @@ void ShapedMesh::find_places() {
 }
 
 void ShapedMesh::set_weights(const ShapeWeights& weights) {
+  const bool shapes_cost_the_same = weights.quality == weights_.quality && weights.angle == weights_.angle &&
+                                    weights.angle_wanted == weights_.angle_wanted;
+  if (!shapes_cost_the_same) {
+    shape_cost_.assign(states_.size(), -1);
+  }
   weights_ = weights;
-  for (std::size_t t = 0; t < states_.size(); ++t) {
-    if (mesh_.is_alive(static_cast<Index>(t))) {
-      states_[t].cost = shape_cost(corners(mesh_.triangles[t], {})) + error_cost(states_[t].error);
+  for (Index t = 0; t < states_.size(); ++t) {
+    if (mesh_.is_alive(t)) {
+      states_[t].cost = shape_cost_of(t) + error_cost(states_[t].error);
     }
   }
+}
+
+double ShapedMesh::shape_cost_of(Index t) {
+  shape_cost_.resize(states_.size(), -1);
+  if (shape_cost_[t] < 0) {
+    shape_cost_[t] = shape_cost(corners(mesh_.triangles[t], {}));
+  }
+  return shape_cost_[t];
 }
 
 std::array<Vec3, 3> ShapedMesh::corners(const std::array<Index, 3>& triangle, const PatchTrial& trial) const {
@@ -233,7 +253,7 @@ void ShapedMesh::measure_middle(Index t, const NearestPoint& nearest) {
     squared = std::max(squared, nearest(0.5 * (c[k] + c[(k + 1) % 3]), state.guess, squared).squared_distance);
   }
   state.error = std::sqrt(squared);
-  state.cost = shape_cost(c) + error_cost(state.error);
+  state.cost = shape_cost_of(t) + error_cost(state.error);
 }
 
 /// At points that cut each edge in `parts_`, at those between them and at the centre, but not less than `squared`.
@@ -266,7 +286,7 @@ void ShapedMesh::measure(Index t) {
     squared = std::max(squared, at_corner);
   }
   state.error = std::sqrt(squared_within(c, state.guess, squared));
-  state.cost = shape_cost(c) + error_cost(state.error);
+  state.cost = shape_cost_of(t) + error_cost(state.error);
 }
 
 double ShapedMesh::measure_within(PatchTrial& trial) const {
@@ -551,6 +571,9 @@ void ShapedMesh::commit(const PatchTrial& trial) {
   for (const Index t : trial.removed) {
     mesh_.remove_triangle(t);
     states_[t] = {};
+    if (t < shape_cost_.size()) {
+      shape_cost_[t] = -1;
+    }
   }
   std::vector<Index> made;
   for (std::size_t i = 0; i < trial.corners.size(); ++i) {

@@ -132,6 +132,7 @@ private:
 
   [[nodiscard]] std::array<Vec3, 3> corners(const std::array<Index, 3>& triangle, const PatchTrial& trial) const;
   [[nodiscard]] double shape_cost(const std::array<Vec3, 3>& corners) const;
+  [[nodiscard]] double shape_cost_of(Index t);
   [[nodiscard]] double error_cost(double error) const;
   [[nodiscard]] bool folds(const PatchTrial& trial) const;
   [[nodiscard]] bool faces_away(const std::array<Vec3, 3>& corners, Index guess) const;
@@ -150,6 +151,7 @@ private:
   std::vector<Vec3> sample_;
   std::vector<double> vertex_error_;  // #V distance of each vertex to the target
   std::vector<State> states_;
+  std::vector<double> shape_cost_;  // #T as far as known, else -1
   std::vector<BoundaryCurves::Place> places_;
 };
 
