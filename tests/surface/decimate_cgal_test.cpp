@@ -1,8 +1,6 @@
 // CGAL's Garland-Heckbert planes as the measure of decimation.
 #include "bench/cgal_decimate.hpp"
-#include "surface/decimate.hpp"
-#include "surface/hausdorff.hpp"
-#include "surface/measure.hpp"
+#include "surface/decimated.hpp"
 #include "surface/shapes.hpp"
 
 #include <gtest/gtest.h>
@@ -11,19 +9,6 @@
 
 namespace tunica {
 namespace {
-
-double distance(const TriangleMesh& a, const TriangleMesh& b) {
-  HausdorffOptions options;
-  options.width = 1e-4 * diagonal(b);
-  options.samples = 0;
-  return hausdorff(a, b, options).both.upper;
-}
-
-TriangleMesh own(const TriangleMesh& mesh, std::size_t triangles) {
-  DecimateOptions options;
-  options.triangles = triangles;
-  return decimate(mesh, options).mesh;
-}
 
 // A ball with waves of several lengths.
 TriangleMesh wavy_ball() {
@@ -42,7 +27,7 @@ TEST(Decimate, ErrorIsNoLargerThanCgals) {
     const auto given = to_cgal<SimpleCgalMesh>(mesh);
     for (const std::size_t count : {std::size_t{120}, std::size_t{400}, std::size_t{1500}}) {
       const double peer = distance(garland_heckbert(given, count), mesh);
-      EXPECT_LE(distance(own(mesh, count), mesh), 1.05 * peer + 1e-4 * diagonal(mesh)) << count;
+      EXPECT_LE(distance(decimated_to(mesh, count).mesh, mesh), 1.05 * peer + 1e-4 * diagonal(mesh)) << count;
     }
   }
 }

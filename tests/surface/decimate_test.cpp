@@ -1,10 +1,8 @@
-#include "surface/decimate.hpp"
+#include "surface/decimated.hpp"
 
 #include "core/error.hpp"
 #include "surface/checks.hpp"
-#include "surface/hausdorff.hpp"
 #include "surface/incidence.hpp"
-#include "surface/measure.hpp"
 #include "surface/shapes.hpp"
 
 #include <gmock/gmock.h>
@@ -19,13 +17,6 @@ TriangleMesh decimated(const TriangleMesh& mesh, std::size_t triangles) {
   DecimateResult result = decimate(mesh, options);
   EXPECT_TRUE(result.count_reached);
   return std::move(result.mesh);
-}
-
-double distance(const TriangleMesh& a, const TriangleMesh& b) {
-  HausdorffOptions options;
-  options.width = 1e-5 * diagonal(b);
-  options.samples = 0;
-  return hausdorff(a, b, options).both.upper;
 }
 
 void expect_same_topology(const TriangleMesh& before, const TriangleMesh& after) {

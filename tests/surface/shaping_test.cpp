@@ -1,30 +1,14 @@
 #include "surface/shaping.hpp"
 
 #include "surface/checks.hpp"
-#include "surface/decimate.hpp"
-#include "surface/hausdorff.hpp"
+#include "surface/decimated.hpp"
 #include "surface/incidence.hpp"
-#include "surface/measure.hpp"
 #include "surface/shapes.hpp"
 
 #include <gtest/gtest.h>
 
 namespace tunica {
 namespace {
-
-double distance(const TriangleMesh& a, const TriangleMesh& b) {
-  HausdorffOptions options;
-  options.width = 1e-5 * diagonal(b);
-  options.samples = 0;
-  return hausdorff(a, b, options).both.upper;
-}
-
-DecimateResult well_shaped(const TriangleMesh& mesh, std::size_t triangles, double angle) {
-  DecimateOptions options;
-  options.triangles = triangles;
-  options.min_angle = angle;
-  return decimate(mesh, options);
-}
 
 void expect_same_topology(const TriangleMesh& before, const TriangleMesh& after) {
   const MeshFacts was = examine(before);
@@ -46,9 +30,7 @@ TEST(Shaping, GoodTrianglesForALittleErrorOnSmoothSurfaces) {
   }();
   for (const TriangleMesh& mesh : {shapes::sphere(5), shapes::torus(120, 60), shapes::tube(80, 60), waves}) {
     for (const std::size_t count : {std::size_t{900}, std::size_t{250}}) {
-      const DecimateResult good = well_shaped(mesh, count, 20);
-      DecimateOptions plain;
-      plain.triangles = count;
+      const DecimateResult good = decimated_to(mesh, count, 20);
       EXPECT_TRUE(good.angle_held && good.count_reached);
       EXPECT_LE(good.mesh.triangles.size(), count);
       EXPECT_GE(good.mesh.triangles.size() + 4, count);
@@ -56,7 +38,7 @@ TEST(Shaping, GoodTrianglesForALittleErrorOnSmoothSurfaces) {
       EXPECT_GE(mean_quality(good.mesh), 0.85);
       const double error = distance(good.mesh, mesh);
       if (examine(mesh).closed) {
-        EXPECT_LE(error, 2.5 * distance(decimate(mesh, plain).mesh, mesh));
+        EXPECT_LE(error, 2.5 * distance(decimated_to(mesh, count).mesh, mesh));
       } else {
         // On a straight tube needles cost nothing: what counts is what good triangles can do. Of edge h, h^2 / 8 off.
         const double squared_edge = area(mesh) / static_cast<double>(count) * 4 / std::sqrt(3.0);
@@ -70,12 +52,10 @@ TEST(Shaping, GoodTrianglesForALittleErrorOnSmoothSurfaces) {
 TEST(Shaping, RoughSurfacesKeepTheirTopologyAndFaceOutward) {
   for (const std::uint32_t seed : {1U, 2U}) {
     const TriangleMesh mesh = shapes::shaken(shapes::sphere(5), 0.01, seed);
-    const DecimateResult good = well_shaped(mesh, 800, 20);
+    const DecimateResult good = decimated_to(mesh, 800, 20);
     EXPECT_TRUE(good.angle_held);
     expect_same_topology(mesh, good.mesh);
-    DecimateOptions plain;
-    plain.triangles = 800;
-    EXPECT_LE(distance(good.mesh, mesh), 2.0 * distance(decimate(mesh, plain).mesh, mesh));
+    EXPECT_LE(distance(good.mesh, mesh), 2.0 * distance(decimated_to(mesh, 800).mesh, mesh));
     for (const auto& [i, j, k] : good.mesh.triangles) {
       const Vec3& a = good.mesh.vertices[i];
       const Vec3 normal = (good.mesh.vertices[j] - a).cross(good.mesh.vertices[k] - a);
@@ -86,7 +66,7 @@ TEST(Shaping, RoughSurfacesKeepTheirTopologyAndFaceOutward) {
 
 TEST(Shaping, BoundaryVerticesStayOnTheBoundaryCurve) {
   const TriangleMesh tube = shapes::tube(64, 40);
-  const DecimateResult good = well_shaped(tube, 300, 20);
+  const DecimateResult good = decimated_to(tube, 300, 20);
   for (const auto& loop : boundary_loops(good.mesh)) {
     EXPECT_GE(loop.size(), 3U);
     for (const Index v : loop) {
@@ -103,7 +83,7 @@ TEST(Shaping, TheCountHoldsAtBoundariesToo) {
   // Collapses at a rim take one triangle away, splits inside add two.
   const TriangleMesh sheet = shapes::shaken(shapes::plane(40, 40), 0.004, 9);
   for (std::size_t count = 95; count < 101; ++count) {
-    EXPECT_LE(well_shaped(sheet, count, 20).mesh.triangles.size(), count);
+    EXPECT_LE(decimated_to(sheet, count, 20).mesh.triangles.size(), count);
   }
 }
 
@@ -142,7 +122,7 @@ TEST(Shaping, EdgesOfABoxStaySharp) {
     welded.triangles.push_back(t);
   }
   ASSERT_TRUE(examine(welded).closed);
-  const DecimateResult good = well_shaped(welded, 200, 20);
+  const DecimateResult good = decimated_to(welded, 200, 20);
   EXPECT_TRUE(good.angle_held);
   EXPECT_LT(distance(good.mesh, welded), 0.03);
   EXPECT_GE(mean_quality(good.mesh), 0.8);
@@ -164,7 +144,7 @@ TEST(Shaping, AngleAndErrorTogether) {
 TEST(Shaping, AnAngleThatCannotBeHeldIsSaid) {
   // Two triangles cannot fill a narrow strip well.
   const TriangleMesh strip = shapes::plane(40, 2, 1, 0.02);
-  const DecimateResult result = well_shaped(strip, 2, 20);
+  const DecimateResult result = decimated_to(strip, 2, 20);
   EXPECT_LT(result.smallest_angle, 20);
   EXPECT_FALSE(result.angle_held);
   EXPECT_LT(distance(result.mesh, strip), 0.05);
@@ -181,8 +161,8 @@ TEST(Shaping, CornersSharperThanAskedForAreExempt) {
 
 TEST(Shaping, TheSameMeshEveryTime) {
   const TriangleMesh mesh = shapes::shaken(shapes::torus(60, 30), 0.01, 5);
-  const TriangleMesh one = well_shaped(mesh, 500, 20).mesh;
-  const TriangleMesh other = well_shaped(mesh, 500, 20).mesh;
+  const TriangleMesh one = decimated_to(mesh, 500, 20).mesh;
+  const TriangleMesh other = decimated_to(mesh, 500, 20).mesh;
   EXPECT_EQ(one.triangles, other.triangles);
   EXPECT_TRUE(std::equal(one.vertices.begin(), one.vertices.end(), other.vertices.begin(), other.vertices.end()));
 }
