@@ -39,8 +39,11 @@ constexpr double margin = 0.97;          // of the tolerance: what samples miss
 constexpr double worth_it = 0.985;       // a round that leaves more than this of the count or error is the last
 constexpr double worth_much = 0.96;      // the same where rounds are slow
 constexpr int patience = 3;              // rounds that bring nothing
-constexpr double worth_mending = 0.9;    // of the certified distance, by what it missed
-constexpr int most_settling = 20, some_settling = 6;
+constexpr double uneven_error = 0.6, uneven_share = 0.1;
+constexpr double mistrusted = 1.15;  // times the samples' error: a certified one that they missed
+constexpr int rough_certificates = 3;
+constexpr double worth_mending = 0.97;  // of the certified distance, by what it missed
+constexpr int most_settling = 20, some_settling = 4;
 constexpr int most_repairs = 12;
 constexpr double clearly_below = 0.99;
 constexpr int certificates = 10;
@@ -378,47 +381,44 @@ private:
       surpluses.assign(other_surpluses.begin(), other_surpluses.end());
     }
     const double part = 1.0 / static_cast<double>(1 + surpluses.size());
-    auto [best, exhausted] = exchanged(samples, start, shells, {0, part});
+    FitState best = settled(samples, start, shells);
+    const bool worth_exchanging = shells < few_shells || is_uneven(best);
+    const int rounds = options_.max_iterations.value_or(worth_exchanging ? default_rounds : 1);
+    bool exhausted = exchange(best, shells, rounds, {0, part});
     for (std::size_t i = 0; i < surpluses.size(); ++i) {
-      const FitStart other = start_for(surpluses[i] * wanted);
+      FitState state = settled(samples, start_for(surpluses[i] * wanted), shells);
       const double begin = part * static_cast<double>(i + 1);
-      auto [state, its_exhausted] = exchanged(samples, other, shells, {begin, begin + part});
+      const bool its_exhausted = exchange(state, shells, rounds, {begin, begin + part});
       if (state.mesh.alive <= shells && (state.error() < best.error() || best.mesh.alive > shells)) {
         best = std::move(state);
         exhausted = its_exhausted;
       }
     }
-    // What samples missed is worth a few more certificates where few shells are to come as close as they can.
-    const double mistrusted = shells < few_shells ? 1.1 : 1.25;
+    // What samples missed is worth a few more certificates and rounds where the target is rough.
     double known = std::numeric_limits<double>::infinity();
-    for (int i = 0; i < 3; ++i) {
+    for (int i = 0; i < rough_certificates; ++i) {
       part_crossings(best, best.error(), shells);
       certify(best, std::nullopt);
       const double now = result_.distance.both.lower;
       if (now <= mistrusted * best.error() || now > worth_mending * known ||
-          add_missed(samples, best, best.error()) == 0) {
+          add_missed(samples, best, best.error(), true) == 0) {
         break;
       }
       known = now;
       best.attach();
       best.measure();
       polish(best, best.error(), 3);
+      if (!options_.max_iterations) {
+        exhausted = exchange(best, shells, default_rounds, {part, 1});
+      }
     }
     record(result_.shell, result_.distance.both);
     result_.stopped = exhausted ? "further rounds bring too little" : "the limit of rounds was reached";
     no_worse_than_flat({}, shells, start);
   }
 
-  struct Exchanged {
-    FitState state;
-    bool exhausted = false;  ///< the last rounds brought nothing
-  };
-
-  /// The closest that many shells come from one start, by exchanging shells between where they are hardly needed and
-  /// where the error is largest. @param done  of the whole fit, before and after
-  Exchanged exchanged(FitSamples& samples, FitStart start, std::size_t shells, const std::array<double, 2>& done) {
-    const bool cheap = shells < few_shells;
-    const int settling = cheap ? most_settling : some_settling;
+  /// So many shells from one start, all nodes settled.
+  FitState settled(FitSamples& samples, FitStart start, std::size_t shells) const {
     FitState state(samples, prepared(start), {});
     // Few shells for a rough target: normals of their own would fit its ripples, and stay.
     smooth(state, 0.1 * start.flat_error, 0.5 * start.flat_error);
@@ -430,10 +430,16 @@ private:
       state = FitState(samples, prepared(start), {});
       smooth(state, 0.1 * start.flat_error, 0.5 * start.flat_error);
     }
-    settle(state, settling);
+    settle(state, settling(shells));
     mend_angles(state, 0.97 * state.error());
-    FitState best = state;
-    const int rounds = options_.max_iterations.value_or(cheap ? default_rounds : 1);
+    return state;
+  }
+
+  /// Exchanges shells between where they are hardly needed and where the error is largest, more or fewer in turn, as
+  /// long as that brings the closest of so many closer.
+  /// @param done  of the whole fit, before and after
+  /// @return whether the last rounds brought nothing
+  bool exchange(FitState& best, std::size_t shells, int rounds, const std::array<double, 2>& done) {
     int fruitless = 0;
     bool noted = false;
     for (int round = 1; round < rounds && fruitless < patience; ++round) {
@@ -442,23 +448,32 @@ private:
         noted = true;
       }
       advance(options_.progress, done[0] + (done[1] - done[0]) * static_cast<double>(round) / rounds);
-      // Exchange: shells from where they are hardly needed to where the error is largest; more or fewer in turn.
-      state = best;
+      FitState state = best;
       const double error = state.error();
       const std::array<std::size_t, 3> amounts{shells / 40, 1, shells / 15};
       split_worst(state, 0.7 * error, std::max<std::size_t>(1, amounts[static_cast<std::size_t>(fruitless) % 3]));
       polish(state, error, 1);
-      collapse_edges(state, any, shells, {});
-      settle(state, settling);
+      collapse_edges(state, std::numeric_limits<double>::infinity(), shells, {});
+      settle(state, settling(shells));
       const bool better = state.mesh.alive <= shells && (state.error() < best.error() || best.mesh.alive > shells);
       fruitless = better && state.error() < worth_it * best.error() ? 0 : fruitless + 1;
       if (better) {
-        best = state;
+        best = std::move(state);
         noted = false;
       }
     }
-    return {std::move(best), fruitless >= patience};
+    return fruitless >= patience;
   }
+
+  /// Whether a few patches are much farther off than the others: shells of the others would serve better there.
+  static bool is_uneven(const FitState& state) {
+    const double far = uneven_error * state.error();
+    const auto far_patches = static_cast<double>(
+        std::count_if(state.patches.begin(), state.patches.end(), [&](const auto& p) { return p.error > far; }));
+    return far_patches < uneven_share * static_cast<double>(state.mesh.alive);
+  }
+
+  static int settling(std::size_t shells) { return shells < few_shells ? most_settling : some_settling; }
 
   [[nodiscard]] FitMesh prepared(const FitStart& start) const {
     FitMesh mesh = prepare_fit(start, target_);

@@ -95,12 +95,12 @@ std::vector<Vec3> missed_over_gaps(const FitState& state, double limit) {
 
 }  // namespace
 
-std::size_t add_missed(FitSamples& samples, FitState& state, double limit, bool errors) {
+std::size_t add_missed(FitSamples& samples, FitState& state, double limit, bool both_ways) {
   std::vector<Index> triangles;
   const ShellMesh shell = state.mesh.shell(&triangles);
   const std::vector<CubicPatch> patches = curved_patches(shell);
   const auto raise = [&](Index patch, double error) {
-    if (errors) {
+    if (both_ways) {
       double& known = state.patches[triangles[patch]].error;
       known = std::max(known, error);
     }
@@ -117,13 +117,17 @@ std::size_t add_missed(FitSamples& samples, FitState& state, double limit, bool 
     samples.add(p);
     ++added;
   }
-  if (errors) {
+  if (both_ways) {
     const double per_patch = grid_points / static_cast<double>(patches.size());
     const int level = std::clamp(static_cast<int>(std::sqrt(2 * per_patch)), coarsest_grid, finest_grid);
     const Tessellation fine = tessellate_uniformly(shell, level);
     const auto distances = vertex_distances(fine.mesh, samples.target().tree());
     for (std::size_t v = 0; v < distances.size(); ++v) {
       raise(fine.vertex_shell[v], distances[v]);
+      if (distances[v] > limit) {
+        samples.add(samples.target().closest(fine.mesh.vertices[v]).point);
+        ++added;
+      }
     }
   }
   return added;

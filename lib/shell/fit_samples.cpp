@@ -12,7 +12,7 @@ namespace {
 constexpr std::size_t points_per_shell = 16;      // of the target, about
 constexpr std::size_t most_grid_points = 22'000;  // of all patches: few large patches get a finer grid
 constexpr std::size_t most_further_points = 200'000;
-constexpr int coarsest_grid = 4;
+constexpr int coarsest_grid = 6;
 constexpr int finest_grid = 8;
 constexpr double other_wall = 4;  // times as far: beyond that a closest point that faces away is one around a rim
 constexpr double arrival = 1e-6;  // in a patch's parameters: a step to the foot that is the last
