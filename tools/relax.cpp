@@ -63,7 +63,8 @@ void declare(cli::Tool& tool, Arguments& given) {
       ->type_name("N");
   app.add_option("--max-shells", given.max_shells, "at most N shells")->check(cli::whole_number(1))->type_name("N");
   app.add_option("--max-iterations", given.max_iterations,
-                 "at most N iterations (barycentre: 20, with --refine 60; fit: 8 rounds; 1 to 400 shells or more that a smooth target evens out)")
+                 "at most N iterations (barycentre: 20, with --refine 60; fit: 8 rounds, or 1 to many shells on a "
+                 "smooth target)")
       ->check(cli::whole_number(1, 100000))
       ->type_name("N");
   app.add_option("--map", given.map, "error map: the curved surface with its distance to the target, PLY")
