@@ -29,10 +29,11 @@ constexpr double least_cosine_of_group = 0.8;
 constexpr std::array<double, 4> radii{4, 5.7, 8, 11.3};
 /// Beyond this many voxels every other crossing counts, for two.
 constexpr double thinned_beyond = 7;
-/// Weighted mean of the squares by which a quadric misses the edges, in variances of their middles: up to the first a
-/// radius counts in full.
+/// Weighted mean of the squares by which a quadric misses the edges, in variances of their middles: up to this a radius
+/// counts in full, and at twice this not at all.
 constexpr double missed_little = 0.5;
-constexpr double missed_much = 1;
+/// Where the smallest radius misses more, by noise: up to this many times that.
+constexpr double missed_anyway = 1.3;
 /// Crossings whose normal turns away by more than the angle with this cosine are of another sheet.
 constexpr double least_cosine = 0.2;
 /// Least uncertainty of a middle, in voxels: that of what is taken as known about the surroundings.
@@ -181,6 +182,7 @@ public:
     const Vec3 off_leader = site.place - sites_[leader].place;
     std::size_t placed = 0;
     double height = 0;
+    double tolerated = 0;
     for (const double radius : radii) {
       placed = place_around(site, off_leader, placed,
                             shell_end_[std::min(shell_of(radius + off_leader.norm()), shells - 1)]);
@@ -188,9 +190,12 @@ public:
       if (weights_ <= 0) {
         break;  // a corner of the mask with no direction of its own
       }
+      const double misses = missed(quadric, placed, radius);
       double share = 1;
-      if (radius != radii.front()) {
-        share = std::clamp((missed_much - missed(quadric, placed, radius)) / (missed_much - missed_little), 0.0, 1.0);
+      if (radius == radii.front()) {
+        tolerated = std::max(missed_little, missed_anyway * misses);
+      } else {
+        share = std::clamp(2 - misses / tolerated, 0.0, 1.0);
       }
       height += share * (quadric[0] - height);
       if (share == 0) {

@@ -22,8 +22,9 @@ struct EdgeCrossing {
 /// The true surface is uniformly distributed along an edge, so a middle's height has a variance of a third of the
 /// square of the edge's half, taken along the normal: its weight is one over that. A slice 5 mm thick so counts little
 /// where the surface lies along the slices, and as much as any other where it stands across. The fit is repeated over
-/// radii of 4, 5.7 and 8 `voxel`, and a larger one counts only as far as its quadric keeps crossing the edges: what
-/// passes by them, in variances of a middle and as a weighted mean, is to be below 0.5, and fades out up to twice that.
+/// radii of 4, 5.7, 8 and 11.3 `voxel` (of what is farther than 7, every other crossing, for two), and a larger one
+/// counts only as far as its quadric keeps crossing the edges: what passes by them, in variances of a middle and as a
+/// weighted mean, is to be below 0.5 (in noise, 1.3 times what the smallest passes by), and fades out up to twice that.
 /// The same to the bit whatever the number of threads.
 /// @param neighbours  of the crossings as vertices of a mesh, along which the surroundings are gathered
 /// @param skip  crossings whose offset is not wanted: theirs is 0

@@ -116,6 +116,8 @@ public:
     relax(neighbours, inner, most_iterations, [&](double fraction) { advance(progress, 0.3 * fraction); });
     remove_local_drift(neighbours);
     move_to_quadrics(neighbours);
+    // Neighbours may have fitted over different radii.
+    relax(neighbours, inner, most_last_iterations, {});
     advance(progress, 0.9);
     StaircaseResult result;
     // Holding vertices back changes the volume, and offsetting for the volume may spoil a triangle: until neither.
@@ -151,6 +153,7 @@ public:
 
 private:
   static constexpr int most_iterations = 60;
+  static constexpr int most_last_iterations = 3;
 
   [[nodiscard]] Vec3 confine(std::size_t v, const Vec3& p) const { return p.cwiseMax(low_[v]).cwiseMin(high_[v]); }
 
