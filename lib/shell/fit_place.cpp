@@ -1,6 +1,7 @@
 #include "shell/fit_place.hpp"
 
 #include "shell/normal_equations.hpp"
+#include "surface/facet_distances.hpp"
 #include "surface/measure.hpp"
 
 #include <Eigen/Cholesky>
@@ -55,15 +56,12 @@ void attach_to_closest(const FitSamples& samples, const std::vector<Index>& poin
   for (std::size_t i = 0; i < points.size(); i += lane_count) {
     const LaneVec3 at = lane_points(
         [&](std::size_t k) -> const Vec3& { return samples.points()[points[std::min(i + k, points.size() - 1)]]; });
-    Lanes least = facets[0].squared_distance(at), closest = 0.0;
-    for (std::size_t j = 1; j < facets.size(); ++j) {
-      const Lanes squared = facets[j].squared_distance(at);
-      const LaneMask closer = squared < least;
-      std::experimental::where(closer, least) = squared;
-      std::experimental::where(closer, closest) = static_cast<double>(j);
+    NearestFacet nearest;
+    for (std::size_t j = 0; j < facets.size(); ++j) {
+      nearest.try_facet(facets[j], at, static_cast<double>(j));
     }
     for (std::size_t k = 0; k < std::min(lane_count, points.size() - i); ++k) {
-      patches[static_cast<std::size_t>(closest[k])].attached.push_back(points[i + k]);
+      patches[static_cast<std::size_t>(nearest.which[k])].attached.push_back(points[i + k]);
     }
   }
 }

@@ -9,8 +9,6 @@ constexpr int steps = 2;            // Gauss-Newton's
 constexpr double singular = 1e-14;  // determinant of a patch's metric, relative
 constexpr double arrival = 1e-6;    // in a patch's parameters: a step to the foot that is the last
 
-double inverse_or_zero(double x) { return x > 0 ? 1 / x : 0; }
-
 Lanes dot(const LaneVec3& a, const LaneVec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 Lanes dot(const LaneVec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
@@ -152,35 +150,6 @@ LaneFeet feet_on_patch(const PatchPowers& patch, const LaneVec3& q) {
     going = going && on_its_way;
   }
   return best;
-}
-
-FacetDistances::FacetDistances(const std::array<Vec3, 3>& corners)
-    : a_(corners[0]), ab_(corners[1] - corners[0]), ac_(corners[2] - corners[0]), bc_(corners[2] - corners[1]) {
-  uu_ = ab_.dot(ab_);
-  uv_ = ab_.dot(ac_);
-  vv_ = ac_.dot(ac_);
-  inverse_ab_ = inverse_or_zero(uu_);
-  inverse_ac_ = inverse_or_zero(vv_);
-  inverse_bc_ = inverse_or_zero(bc_.dot(bc_));
-  inverse_determinant_ = inverse_or_zero(uu_ * vv_ - uv_ * uv_);
-}
-
-Lanes FacetDistances::squared_distance(const LaneVec3& p) const {
-  const LaneVec3 ap = minus(p, a_);
-  const LaneVec3 bp = minus(ap, ab_);
-  const Lanes pu = dot(ap, ab_), pv = dot(ap, ac_);
-  const auto to_edge = [](const LaneVec3& from, const Vec3& edge, const Lanes& along) {
-    const Lanes part = stdx::min(stdx::max(along, Lanes(0.0)), Lanes(1.0));
-    const LaneVec3 rest{from[0] - part * edge[0], from[1] - part * edge[1], from[2] - part * edge[2]};
-    return dot(rest, rest);
-  };
-  const Lanes squared = stdx::min(stdx::min(to_edge(ap, ab_, pu * inverse_ab_), to_edge(ap, ac_, pv * inverse_ac_)),
-                                  to_edge(bp, bc_, dot(bp, bc_) * inverse_bc_));
-  const Lanes s = (vv_ * pu - uv_ * pv) * inverse_determinant_, t = (uu_ * pv - uv_ * pu) * inverse_determinant_;
-  const LaneVec3 rest{ap[0] - s * ab_[0] - t * ac_[0], ap[1] - s * ab_[1] - t * ac_[1],
-                      ap[2] - s * ab_[2] - t * ac_[2]};
-  const LaneMask inside = s >= 0.0 && t >= 0.0 && s + t <= 1.0 && LaneMask(inverse_determinant_ > 0);
-  return chosen(inside, stdx::min(squared, dot(rest, rest)), squared);
 }
 
 }  // namespace tunica

@@ -49,16 +49,4 @@ struct LaneFeet {
 };
 LaneFeet feet_on_patch(const PatchPowers& patch, const LaneVec3& q);
 
-/// Squared distances from points to one flat triangle.
-class FacetDistances {
-public:
-  explicit FacetDistances(const std::array<Vec3, 3>& corners);
-  [[nodiscard]] Lanes squared_distance(const LaneVec3& p) const;
-
-private:
-  Vec3 a_, ab_, ac_, bc_;
-  double inverse_ab_, inverse_ac_, inverse_bc_;  // of the squared lengths; zero on an edge of no length
-  double uu_, uv_, vv_, inverse_determinant_;    // zero on a triangle without area
-};
-
 }  // namespace tunica

@@ -27,6 +27,16 @@ def text_files():
                     yield path.relative_to(SOURCE).as_posix(), data.decode("utf-8", errors="replace")
 
 
+def twice_defined(files):
+    """Names of types that several headers of the library define: {name: [paths]}."""
+    where = {}
+    for path, text in files:
+        if path.startswith("lib/") and path.endswith(".hpp"):
+            for name in re.findall(r"^(?:class|struct|enum class) (\w+)[^;{]*\{", text, re.MULTILINE):
+                where.setdefault(name, set()).add(path)
+    return {name: sorted(paths) for name, paths in where.items() if len(paths) > 1}
+
+
 class House(unittest.TestCase):
     """Every rule on every file."""
 
@@ -41,6 +51,15 @@ class House(unittest.TestCase):
                     if path != "tests/house/house_test.py":
                         found += rule(path, text)
                 self.assertEqual(found, [], f"{rule.__doc__}\n" + "\n".join(found))
+
+    def test_one_definition(self):
+        """Two types of one name in the library's namespace break the one-definition rule without a word."""
+        self.assertEqual(twice_defined(text_files()), {})
+        text = "namespace tunica {\nstruct Foot {\n};\n}\n"
+        both = [("lib/a/a.hpp", text), ("lib/b/b.hpp", text)]
+        self.assertEqual(twice_defined(both), {"Foot": ["lib/a/a.hpp", "lib/b/b.hpp"]})
+        declared = ("lib/b/b.hpp", "namespace tunica {\nstruct Foot;\n}\n")
+        self.assertEqual(twice_defined([both[0], declared, ("tests/b.hpp", text)]), {})
 
     def test_every_tool_is_there(self):
         missing = [verb for verb in TOOLS if not (SOURCE / "tools" / f"{verb}.cpp").is_file()]

@@ -2,7 +2,6 @@
 
 #include "shell/fit_samples.hpp"
 #include "shell/normal_equations.hpp"
-#include "surface/measure.hpp"
 
 #include <gtest/gtest.h>
 
@@ -62,28 +61,6 @@ TEST(PatchLanes, FeetAreThoseOfOnePointAtATime) {
       EXPECT_LT((at - expected.at).norm(), 1e-9);
       EXPECT_NEAR(feet.squared_distance[k], expected.squared_distance, 1e-12);
       EXPECT_LT((lane(feet.point, k) - patch.point(at)).norm(), 1e-13);
-    }
-  }
-}
-
-TEST(PatchLanes, DistancesFromAFacetDistances) {
-  const std::vector<std::array<Vec3, 3>> triangles{
-      {Vec3(0, 0, 0), Vec3(1, 0.2, 0), Vec3(0.3, 0.8, 0.1)},
-      {Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(0.5, 0, 0)},     // no area
-      {Vec3(1, 1, 1), Vec3(1, 1, 1), Vec3(1, 1, 1)},       // a point
-      {Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(0.5, 1e-9, 0)},  // a needle
-  };
-  std::mt19937 random(3);
-  std::uniform_real_distribution<double> coordinate(-1, 2);
-  for (const auto& c : triangles) {
-    const FacetDistances flat(c);
-    for (int i = 0; i < 300; ++i) {
-      const LaneVec3 p = lane_points([&](std::size_t) { return Vec3(coordinate(random), coordinate(random), 0.3); });
-      const Lanes squared = flat.squared_distance(p);
-      for (std::size_t k = 0; k < lane_count; ++k) {
-        const Vec3 q = lane(p, k);
-        EXPECT_NEAR(squared[k], (closest_point_on_triangle(q, c[0], c[1], c[2]) - q).squaredNorm(), 1e-9);
-      }
     }
   }
 }

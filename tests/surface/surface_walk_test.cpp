@@ -1,5 +1,6 @@
 #include "surface/surface_walk.hpp"
 
+#include "surface/closest_point.hpp"
 #include "surface/facet_distances.hpp"
 #include "surface/shapes.hpp"
 
@@ -64,6 +65,28 @@ TEST(FacetDistances, SeveralAtOnceAreThoseOfOne) {
     const Lanes squared = FacetDistances(c).squared_distance(lane_points([&](std::size_t k) { return points[k]; }));
     for (std::size_t k = 0; k < lane_count; ++k) {
       EXPECT_NEAR(squared[k], FlatTriangle(c[0], c[1], c[2]).squared_distance(points[k]), 1e-12);
+    }
+  }
+}
+
+TEST(FacetDistances, AreThoseOfTheClosestPoint) {
+  const std::vector<std::array<Vec3, 3>> triangles{
+      {Vec3(0, 0, 0), Vec3(1, 0.2, 0), Vec3(0.3, 0.8, 0.1)},
+      {Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(0.5, 0, 0)},     // no area
+      {Vec3(1, 1, 1), Vec3(1, 1, 1), Vec3(1, 1, 1)},       // a point
+      {Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(0.5, 1e-9, 0)},  // a needle
+  };
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> coordinate(-1, 2);
+  for (const auto& c : triangles) {
+    const FacetDistances flat(c);
+    for (int i = 0; i < 300; ++i) {
+      const LaneVec3 p = lane_points([&](std::size_t) { return Vec3(coordinate(random), coordinate(random), 0.3); });
+      const Lanes squared = flat.squared_distance(p);
+      for (std::size_t k = 0; k < lane_count; ++k) {
+        const Vec3 q(p[0][k], p[1][k], p[2][k]);
+        EXPECT_NEAR(squared[k], (closest_point_on_triangle(q, c[0], c[1], c[2]) - q).squaredNorm(), 1e-9);
+      }
     }
   }
 }
