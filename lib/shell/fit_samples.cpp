@@ -12,7 +12,8 @@ namespace {
 constexpr std::size_t points_per_shell = 16;      // of the target, about
 constexpr std::size_t most_grid_points = 22'000;  // of all patches: few large patches get a finer grid
 constexpr std::size_t most_further_points = 200'000;
-constexpr int coarsest_grid = 6;
+constexpr int coarsest_grid = 4, coarsest_on_facets = 6;
+constexpr std::size_t smooth_from = 64;  // triangles of the target per shell: fewer are felt
 constexpr int finest_grid = 8;
 constexpr double other_wall = 4;  // times as far: beyond that a closest point that faces away is one around a rim
 constexpr double arrival = 1e-6;  // in a patch's parameters: a step to the foot that is the last
@@ -229,9 +230,10 @@ FitSamples::FitSamples(const Target& target, std::size_t shells) : target_(targe
     }
   }
   further_ = points_in_spatial_order(target);
+  const int coarsest = mesh.triangles.size() < smooth_from * shells ? coarsest_on_facets : coarsest_grid;
   const int level = std::clamp(
       static_cast<int>(std::sqrt(2.0 * static_cast<double>(most_grid_points) / static_cast<double>(shells + 1))) - 2,
-      coarsest_grid, finest_grid);
+      coarsest, finest_grid);
   for (int i = 0; i <= level; ++i) {
     for (int j = 0; i + j <= level; ++j) {
       grid_.emplace_back(static_cast<double>(j) / level, static_cast<double>(i) / level);
