@@ -3,6 +3,7 @@
 #include "shell/curved_surface.hpp"
 #include "shell/fit_cross.hpp"
 #include "shell/fit_edit.hpp"
+#include "shell/fit_exchange.hpp"
 #include "shell/fit_missed.hpp"
 #include "shell/fit_parts.hpp"
 #include "shell/fit_shape.hpp"
@@ -240,6 +241,7 @@ private:
       if (regains(samples, state, limit)) {
         part_crossings(state, limit, most);
         squeeze(samples, state, limit);
+        exchange_pieces(samples, state, limit);
       }
       shape_up(samples, state, limit, most);
       // What the certificate asked for may have made triangles thin: then the next best is looked at as well.
@@ -333,7 +335,9 @@ private:
       const double before = state.error();
       // What more samples alone do not mend gets more shells.
       const std::size_t added = add_missed(samples, state, limit, true);
-      samples.add(farthest_);
+      if (farthest_) {
+        samples.add(*farthest_);
+      }
       if (i >= local_mending) {
         // Of what is not seen only less error helps.
         limit *= std::clamp(tolerance / least_distance_, most_tightening, least_tightening);
@@ -561,7 +565,10 @@ private:
       measuring.width = *tolerance / 200;
       distance = shell_distance(shell, target_, measuring);
     }
-    farthest_ = distance.farthest_of_target;
+    farthest_.reset();
+    if (distance.target_to_shell.lower > 0) {
+      farthest_ = distance.farthest_of_target;
+    }
     least_distance_ = distance.both.lower;
     const bool holds = tolerance && distance.both.upper <= *tolerance;
     const bool held = tolerance && !result_.shell.triangles.empty() && result_.distance.both.upper <= *tolerance;
@@ -640,7 +647,7 @@ private:
   bool like_target_;              // COARSE has the target's topology
   std::size_t price_ = 0;         // of the result
   bool flat_ = false;             // the result is flat facets
-  Vec3 farthest_ = Vec3::Zero();  // of the target, when last certified
+  std::optional<Vec3> farthest_;  // of the target, when last certified; none where that was not looked for
   double least_distance_ = 0;     // mm, certainly, then
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
   RelaxResult result_;

@@ -112,7 +112,7 @@ public:
     if (!prepare(u, v)) {
       return std::numeric_limits<double>::infinity();
     }
-    make_compatible(trial);
+    start_soundly(u, v);
     place_node(state_.samples(), trial.patches, trial.points, trial.limits, limit_, placing_steps, trial.node);
     return trial.node.error;
   }
@@ -149,7 +149,8 @@ public:
 private:
   bool keeps_topology(Index u, Index v) {
     const std::size_t on_edge = mesh_.on_edge(u, v).count();
-    if (on_edge == 0 || (on_edge == 2 && mesh_.on_boundary[u] != 0 && mesh_.on_boundary[v] != 0) || mesh_.alive <= 4) {
+    if (mesh_.is_held(u) || mesh_.is_held(v) || on_edge == 0 ||
+        (on_edge == 2 && mesh_.on_boundary[u] != 0 && mesh_.on_boundary[v] != 0) || mesh_.alive <= 4) {
       return false;
     }
     mesh_.ring(u, ring_u_);
@@ -246,11 +247,7 @@ private:
     link(state_, nodes_, replaced_, trial);
     // Start: what is special about one end decides, else the middle.
     trial.node = {};
-    std::vector<Index> of_u, of_v;
-    mesh_.slots_of(u, of_u);
-    mesh_.slots_of(v, of_v);
-    const int rank_u = mesh_.on_boundary[u] * 4 + static_cast<int>(of_u.size());
-    const int rank_v = mesh_.on_boundary[v] * 4 + static_cast<int>(of_v.size());
+    const int rank_u = special(u), rank_v = special(v);
     for (const Vec3& sum : sums) {
       trial.node.normals.push_back(sum.norm() > 1e-3 ? Vec3(sum.normalized()) : mesh_.normals[classes_[0]]);
     }
@@ -261,6 +258,50 @@ private:
       trial.node.position = state_.samples().foot(middle, trial.node.normals[0]).point;
     }
     return true;
+  }
+
+  /// From where facets fold or angles are small no way is looked for: then the merged node starts elsewhere.
+  void start_soundly(Index u, Index v) {
+    const PlacedNode first = trial_.node;
+    make_compatible(trial_);
+    std::vector<Vec3> starts;
+    if (mesh_.on_boundary[u] + mesh_.on_boundary[v] == 0 && first.normals.size() == 1) {
+      starts = {mesh_.positions[u], mesh_.positions[v], middle_of_rings(u, v, first.normals[0])};
+    } else if (special(u) == special(v)) {
+      starts = {mesh_.positions[u], mesh_.positions[v]};
+    }
+    for (std::size_t i = 0; i < starts.size() && !stands_soundly(); ++i) {
+      trial_.node = first;
+      trial_.node.position = starts[i];
+      make_compatible(trial_);
+    }
+  }
+
+  /// On the target.
+  Vec3 middle_of_rings(Index u, Index v, const Vec3& normal) {
+    common_.clear();
+    std::set_union(ring_u_.begin(), ring_u_.end(), ring_v_.begin(), ring_v_.end(), std::back_inserter(common_));
+    Vec3 middle = Vec3::Zero();
+    for (const Index w : common_) {
+      middle += w == u || w == v ? Vec3::Zero() : Vec3(mesh_.positions[w] / static_cast<double>(common_.size() - 2));
+    }
+    return state_.samples().foot(middle, normal).point;
+  }
+
+  bool stands_soundly() {
+    return std::all_of(trial_.patches.begin(), trial_.patches.end(), [&](const PlacedPatch& p) {
+      PatchShape shape = p.shape;
+      shape.corners[p.corner] = trial_.node.position;
+      shape.normals[p.corner] = trial_.node.normals[p.slot];
+      return is_sound(shape, trial_.limits.agreement, trial_.limits.angle);
+    });
+  }
+
+  /// Boundaries first, then creases.
+  [[nodiscard]] int special(Index node) const {
+    std::vector<Index> slots;
+    mesh_.slots_of(node, slots);
+    return mesh_.on_boundary[node] * 4 + static_cast<int>(slots.size());
   }
 
   FitState& state_;
@@ -363,8 +404,8 @@ std::size_t flip_edges(FitState& state, double limit) {
     const std::size_t a2 = mesh.corner_of(t2, a), b2 = mesh.corner_of(t2, b), d2 = 3 - a2 - b2;
     const Index c = mesh.triangles[t1][c1], d = mesh.triangles[t2][d2];
     const auto &s1 = mesh.slots[t1], &s2 = mesh.slots[t2];
-    if (c == d || s1[a1] != s2[a2] || s1[b1] != s2[b2] || mesh.on_edge(c, d).count() > 0 ||
-        mesh.around[a].size() <= (mesh.on_boundary[a] != 0 ? 1U : 3U) ||
+    if (c == d || (mesh.is_held(c) && mesh.is_held(d)) || s1[a1] != s2[a2] || s1[b1] != s2[b2] ||
+        mesh.on_edge(c, d).count() > 0 || mesh.around[a].size() <= (mesh.on_boundary[a] != 0 ? 1U : 3U) ||
         mesh.around[b].size() <= (mesh.on_boundary[b] != 0 ? 1U : 3U)) {
       continue;
     }
@@ -424,6 +465,9 @@ std::size_t flip_edges(FitState& state, double limit) {
 bool split_edge(FitState& state, Index u, Index v, double limit) {
   FitMesh& mesh = state.mesh;
   const auto pair = mesh.on_edge(u, v);
+  if (pair.count() < 2 && mesh.is_held(u) && mesh.is_held(v)) {
+    return false;
+  }
   Trial trial;
   trial.limits = state.limits;
   std::vector<std::array<Index, 3>> nodes, slots;
@@ -579,6 +623,9 @@ std::vector<std::vector<std::size_t>> pairs_merged(std::size_t count) {
 }  // namespace
 
 bool move_node(FitState& state, Index v, const Vec3& start, double angle, double limit) {
+  if (state.mesh.is_held(v)) {
+    return false;
+  }
   std::vector<Index> own;
   state.mesh.slots_of(v, own);
   std::vector<std::size_t> same(own.size());

@@ -20,6 +20,7 @@ struct FitMesh {
   std::vector<std::array<Index, 3>> slots;      ///< #T slot of each corner; a slot belongs to one node
   std::vector<std::vector<Index>> around;       ///< #V triangles around each node; empty: the node is gone
   std::vector<std::uint8_t> on_boundary;        ///< #V
+  std::vector<std::uint8_t> held;               ///< #V or shorter (then not): the node stays where it is, see FitRegion
   std::vector<Index> free_triangles;
   std::size_t alive = 0;  ///< triangles
   Patch kind = Patch::comas;
@@ -28,6 +29,7 @@ struct FitMesh {
   FitMesh(const TriangleMesh& mesh, const std::vector<Vec3>& node_normals);
 
   [[nodiscard]] bool is_alive(Index t) const { return triangles[t][0] != no_index; }
+  [[nodiscard]] bool is_held(Index node) const { return node < held.size() && held[node] != 0; }
   [[nodiscard]] std::array<Vec3, 3> corners(Index t) const {
     const auto& v = triangles[t];
     return {positions[v[0]], positions[v[1]], positions[v[2]]};

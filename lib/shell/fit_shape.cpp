@@ -76,6 +76,9 @@ Vec3 on_boundary(const Target& target, const Vec3& p) {
 /// Slides a node to where the angles around it are best.
 bool slide(FitState& state, Index v, double limit) {
   const FitMesh& mesh = state.mesh;
+  if (mesh.is_held(v)) {
+    return false;
+  }
   Vec3 normal = Vec3::Zero();
   double edge = 0, error = limit;
   for (const Index t : mesh.around[v]) {

@@ -281,7 +281,7 @@ double FitState::solve(int power, double smoothing) {
   }
   std::vector<Index> of_node;
   for (std::size_t v = 0; v < nodes; ++v) {
-    if (mesh.around[v].empty()) {
+    if (mesh.around[v].empty() || mesh.is_held(static_cast<Index>(v))) {
       position_inverse[v].setZero();
       continue;
     }
@@ -401,6 +401,12 @@ double FitState::solve(int power, double smoothing) {
   const std::vector<Patch> old_patches = patches;
   std::vector<double> new_costs(count, 0);
   std::vector<std::uint8_t> broken(count, 0), moved(nodes, 1), changed(count, 1);
+  for (std::size_t v = 0; v < nodes; ++v) {
+    if (mesh.is_held(static_cast<Index>(v))) {
+      moved[v] = 0;
+      length[v] = 0;
+    }
+  }
   for (int trial = 0; trial <= trials; ++trial) {
     for (std::size_t v = 0; v < nodes; ++v) {
       if (mesh.around[v].empty() || moved[v] == 0) {
