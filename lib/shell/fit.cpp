@@ -11,6 +11,7 @@
 #include "shell/fit_start.hpp"
 #include "shell/fit_worst.hpp"
 #include "surface/decimate.hpp"
+#include "surface/measure.hpp"
 #include "surface/self_intersections.hpp"
 
 #include <fmt/core.h>
@@ -52,7 +53,8 @@ constexpr double hopeless = 2;       // times the limit: more shells will not me
 constexpr double noted_width = 1.5;  // of the error, on the way
 constexpr int local_mending = 3;     // certificates, before less error is asked for everywhere
 constexpr double most_tightening = 0.95, least_tightening = 0.985;  // of the limit, where certificates find more
-constexpr double least_part = 0.2;                                  // of the tolerance, to part sheets that cross
+constexpr std::array<double, 6> parts_of_tolerance{0.95, 0.9, 0.8, 0.65, 0.5, 0.25};  // to part sheets that cross
+constexpr double good_enough_angle = 0.9;                                             // of the limit
 
 class Fitting {
 public:
@@ -92,22 +94,29 @@ public:
   }
 
 private:
-  /// Sheets of the target that are closer to each other than the tolerance may cross everywhere: then only a smaller
-  /// error parts them.
+  /// Where sheets of the target are closer to each other than the tolerance, patches may cross that nothing parts any
+  /// more. A somewhat smaller error is another search, a much smaller one parts them for certain.
   void part_sheets(std::size_t most) {
     std::size_t crossings = crossing_shells(result_.shell).size();
     if (crossings == 0 || count_self_intersections(target_.mesh()) > 0) {
       return;
     }
-    for (double part = 0.5; part >= least_part && crossings > 0; part /= 2) {
+    double angle = min_angle_degrees(flat_facets(result_.shell));
+    for (const double part : parts_of_tolerance) {
       Fitting closer(coarse_, target_, options_);
       closer.to_tolerance(part * *options_.tolerance);
       const std::size_t left = crossing_shells(closer.result_.shell).size();
-      if (left < crossings && closer.result_.shell.triangles.size() <= most &&
+      const double its_angle = std::min(min_angle_degrees(flat_facets(closer.result_.shell)), FitLimits{}.angle);
+      const bool better = left < crossings || (left == 0 && its_angle > angle);
+      if (better && closer.result_.shell.triangles.size() <= most &&
           closer.result_.distance.both.upper <= *options_.tolerance) {
         result_.shell = std::move(closer.result_.shell);
         result_.distance = closer.result_.distance;
         crossings = left;
+        angle = its_angle;
+      }
+      if (crossings == 0 && angle >= good_enough_angle * FitLimits{}.angle) {
+        return;
       }
     }
   }
