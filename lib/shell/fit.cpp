@@ -27,8 +27,8 @@ constexpr double default_width = 1e-4;  // of the diagonal
 constexpr int default_rounds = 8;
 constexpr double start_error = 3;  // tolerances: flat error of the mesh that the search starts from
 constexpr std::size_t few = 600;   // triangles: from so few slivers hardly any good ones come, and more cost little
-constexpr std::size_t affordable = 700;  // triangles of a start: further searches cost little
-constexpr int search_patience = 2;       // rounds that leave as many shells
+constexpr std::size_t affordable = 1300;  // triangles of a start: further searches cost little
+constexpr int search_patience = 2;        // rounds that leave as many shells
 constexpr double finer_start_error = 1.5;
 constexpr double limited_by_target =
     0.6;                               // of its triangles: a start that needs more follows its facets, not its shape

@@ -17,7 +17,7 @@ namespace tunica {
 namespace {
 
 constexpr std::size_t most_tries = 1'000, tries_per_shell = 4;
-constexpr std::size_t most_fits = 80;  // of pieces anew: what costs
+constexpr std::size_t most_fits = 200;  // of pieces anew: what costs
 constexpr std::size_t most_shells = 400;
 constexpr int rings = 1;          // of nodes around a merger that move with it
 constexpr int regaining = 4;      // steps of all nodes of a piece
