@@ -1,11 +1,11 @@
 #include "shell/fit_squeeze.hpp"
 
-#include "shell/families.hpp"
 #include "shell/fit_cross.hpp"
 #include "shell/fit_edit.hpp"
 #include "shell/fit_missed.hpp"
 #include "shell/fit_shape.hpp"
 #include "shell/fit_start.hpp"
+#include "shell/fit_states.hpp"
 #include "surface/checks.hpp"
 
 #include <gtest/gtest.h>
@@ -15,23 +15,8 @@
 namespace tunica {
 namespace {
 
-/// A sphere with waves.
-TriangleMesh wavy(int times) {
-  TriangleMesh mesh = testing::sphere(times);
-  for (Vec3& p : mesh.vertices) {
-    p *= 10 * (1 + 0.12 * std::sin(3 * p.x() + 1) * std::cos(2 * p.y()) + 0.05 * std::sin(5 * p.z() + 2 * p.x()));
-  }
-  return mesh;
-}
-
-FitState state_of(const FitSamples& samples, const TriangleMesh& mesh) {
-  FitStart start;
-  start.mesh = mesh;
-  FitState state(samples, prepare_fit(start, samples.target()), {});
-  state.attach();
-  state.measure();
-  return state;
-}
+using testing::state_of;
+using testing::wavy;
 
 std::size_t slots_in_use(const FitState& state) {
   std::size_t sum = 0;
