@@ -41,8 +41,9 @@ constexpr double margin = 0.97;          // of the tolerance: what samples miss
 constexpr double worth_it = 0.985;       // a round that leaves more than this of the count or error is the last
 constexpr double worth_much = 0.96;      // the same where rounds are slow
 constexpr int patience = 3;              // rounds that bring nothing
-constexpr double uneven_error = 0.6, uneven_share = 0.1;
-constexpr double mistrusted = 1.15;  // times the samples' error: a certified one that they missed
+constexpr double uneven_error = 0.6;     // of the largest: patches so far off decide about the distance
+constexpr double uneven_share = 0.1;     // of all patches: fewer than these are a few
+constexpr double mistrusted = 1.15;      // times the samples' error: a certified one that they missed
 constexpr int rough_certificates = 3;
 constexpr double worth_mending = 0.97;  // of the certified distance, by what it missed
 constexpr int most_settling = 20, some_settling = 4;
@@ -95,7 +96,7 @@ public:
 
 private:
   /// Where sheets of the target are closer to each other than the tolerance, patches may cross that nothing parts any
-  /// more. A somewhat smaller error is another search, a much smaller one parts them for certain.
+  /// more. A somewhat smaller error is another search, a much smaller one parts them where they have room.
   void part_sheets(std::size_t most) {
     std::size_t crossings = crossing_shells(result_.shell).size();
     if (crossings == 0 || count_self_intersections(target_.mesh()) > 0) {

@@ -35,7 +35,7 @@ struct RelaxOptions {
   bool refine = false;
   std::optional<std::size_t> max_shells;  ///< for refine and fit
   std::optional<std::size_t> shells;      ///< for fit: at most this many instead of as many as COARSE has
-  std::optional<int> max_iterations;      ///< none: 20, with refine 60
+  std::optional<int> max_iterations;      ///< none: 20, with refine 60; fit: 8 rounds, see fit()
   std::optional<double> width;            ///< mm: of the measured intervals; none: 0.01 % of the target's diagonal
   /// Tells how it goes; the mesh is the best one until then.
   std::function<void(const RelaxIteration&, const ShellMesh&)> on_iteration;

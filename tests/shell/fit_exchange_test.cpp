@@ -18,6 +18,7 @@
 namespace tunica {
 namespace {
 
+using testing::collapse_to;
 using testing::state_of;
 using testing::wavy;
 
@@ -125,12 +126,7 @@ TEST(FitExchange, FewerShellsThanSqueezingFindsAreWithinTheSameLimit) {
   FitSamples samples(target, 160);
   FitState state = state_of(samples, wavy(2));
   const double limit = 0.3;
-  for (int i = 0; i < 6; ++i) {
-    state.solve(i < 3 ? 2 : 8, 1);
-    state.attach();
-    state.measure();
-  }
-  collapse_edges(state, limit, 4, {});
+  collapse_to(state, limit);
   ASSERT_TRUE(regains(samples, state, limit));
   squeeze(samples, state, limit);
   const std::size_t before = state.mesh.alive;

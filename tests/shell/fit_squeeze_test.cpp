@@ -10,11 +10,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace tunica {
 namespace {
 
+using testing::collapse_to;
 using testing::state_of;
 using testing::wavy;
 
@@ -33,12 +35,7 @@ TEST(FitSqueeze, FewerShellsAreWithinTheSameLimit) {
   FitSamples samples(target, 160);
   FitState state = state_of(samples, wavy(2));
   const double limit = 0.15;
-  for (int i = 0; i < 6; ++i) {
-    state.solve(i < 3 ? 2 : 8, 1);
-    state.attach();
-    state.measure();
-  }
-  collapse_edges(state, limit, 4, {});
+  collapse_to(state, limit);
   ASSERT_TRUE(regains(samples, state, limit));
   const std::size_t before = state.mesh.alive;
   squeeze(samples, state, limit);
@@ -50,6 +47,28 @@ TEST(FitSqueeze, FewerShellsAreWithinTheSameLimit) {
   const MeshFacts facts = examine(flat_facets(state.mesh.shell()));
   EXPECT_FALSE(why_unfit(facts)) << why_unfit(facts).value_or("");
   EXPECT_EQ(facts.euler, 2);
+}
+
+TEST(FitSqueeze, WhatIsMissedBothWaysRaisesTheErrorsOfItsPatches) {
+  const Target target(testing::sphere(4, 10));
+  FitSamples samples(target, 320);
+  FitState state = state_of(samples, testing::sphere(2, 10));
+  ASSERT_LT(state.error(), 0.3);
+  state.mesh.positions[0] *= 1.1;
+  FitState one_way = state;
+  EXPECT_GT(add_missed(samples, one_way, 0.3), 0U);
+  EXPECT_LT(one_way.error(), 0.3);
+  const std::size_t before = samples.points().size();
+  const std::size_t added = add_missed(samples, state, 0.3, true);
+  EXPECT_EQ(samples.points().size(), before + added);
+  for (std::size_t t = 0; t < state.patches.size(); ++t) {
+    const auto& v = state.mesh.triangles[t];
+    const bool pulled = std::find(v.begin(), v.end(), 0U) != v.end();
+    EXPECT_TRUE(!pulled || state.patches[t].error > 0.9) << t;
+  }
+  for (std::size_t i = before; i < samples.points().size(); ++i) {
+    EXPECT_LT(target.closest(samples.points()[i]).distance, 1e-9);
+  }
 }
 
 TEST(FitSqueeze, MissedPointsJoinTheSamples) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "shell/families.hpp"
+#include "shell/fit_edit.hpp"
 #include "shell/fit_start.hpp"
 #include "shell/fit_state.hpp"
 
@@ -24,6 +25,16 @@ inline FitState state_of(const FitSamples& samples, const TriangleMesh& mesh) {
   state.attach();
   state.measure();
   return state;
+}
+
+/// As few shells as single mergers leave within `limit` (mm).
+inline void collapse_to(FitState& state, double limit) {
+  for (int i = 0; i < 6; ++i) {
+    state.solve(i < 3 ? 2 : 8, 1);
+    state.attach();
+    state.measure();
+  }
+  collapse_edges(state, limit, 4, {});
 }
 
 }  // namespace tunica::testing
