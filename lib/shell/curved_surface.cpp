@@ -154,11 +154,6 @@ Tessellation tessellate_by(const ShellMesh& shell, const std::vector<CubicPatch>
   return out;
 }
 
-/// As if nothing lay across the edges, or the same normals.
-std::array<std::array<Vec3, 2>, 3> own_normals_across(const std::array<Vec3, 3>& n) {
-  return {{{n[0], n[1]}, {n[1], n[2]}, {n[2], n[0]}}};
-}
-
 /// What a patch of a closed surface adds to its volume: a third of the flux of the position, about `origin`. The
 /// integrand is of degree 7; five Gauss points each way on the square that collapses to the triangle are exact to 8
 /// and 9.
@@ -260,8 +255,12 @@ Vec3 watertight_edge_point(const Vec3& here, const Vec3& there, const std::array
   return here + 2 / (3 * (1 + cosine) * cosine) * tangent;
 }
 
+NormalsAcross own_normals_across(const std::array<Vec3, 3>& normals) {
+  return {{{normals[0], normals[1]}, {normals[1], normals[2]}, {normals[2], normals[0]}}};
+}
+
 CubicPatch watertight_patch(const std::array<Vec3, 3>& corners, const std::array<Vec3, 3>& normals,
-                            const std::array<std::array<Vec3, 2>, 3>& across) {
+                            const NormalsAcross& across) {
   CubicPatch patch;
   auto& p = patch.control;
   std::array<Vec3, 3> edges;

@@ -2,6 +2,7 @@
 
 #include "shell/shell_mesh.hpp"
 
+#include <array>
 #include <string>
 
 /// The curved surface that positions and normals stand for, patch by patch. Parameters of a patch are barycentric:
@@ -61,8 +62,12 @@ Vec3 watertight_edge_point(const Vec3& here, const Vec3& there, const std::array
 /// the edge; where they are this triangle's own, or there is none, the edge is smooth
 /// Source: the layout of Vlachos et al., Curved PN triangles, I3D 2001, with lengths of the tangents for arcs (theirs
 /// err 2 to 6 times as much) and the centre of Comas, Duriez, Cotin 2010, eq. 1.
+using NormalsAcross = std::array<std::array<Vec3, 2>, 3>;
 CubicPatch watertight_patch(const std::array<Vec3, 3>& corners, const std::array<Vec3, 3>& normals,
-                            const std::array<std::array<Vec3, 2>, 3>& across);
+                            const NormalsAcross& across);
+
+/// A triangle's own normals in their place, as if all its edges were smooth.
+NormalsAcross own_normals_across(const std::array<Vec3, 3>& normals);
 
 /// The patch over a facet all of whose edges are smooth.
 CubicPatch smooth_patch(Patch kind, const std::array<Vec3, 3>& corners, const std::array<Vec3, 3>& normals);

@@ -2,6 +2,7 @@
 
 #include "shell/curved_surface.hpp"
 #include "shell/fit_cross.hpp"
+#include "shell/fit_detach.hpp"
 #include "shell/fit_edit.hpp"
 #include "shell/fit_exchange.hpp"
 #include "shell/fit_missed.hpp"

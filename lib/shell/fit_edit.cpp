@@ -1,6 +1,6 @@
 #include "shell/fit_edit.hpp"
 
-#include "shell/normals.hpp"
+#include "shell/fit_trial.hpp"
 #include "surface/measure.hpp"
 
 #include <Eigen/Geometry>
@@ -13,94 +13,8 @@
 namespace tunica {
 namespace {
 
-constexpr int placing_steps = 3;
 constexpr double least_split_angle = 3;  // degrees, where nothing better can be had
 constexpr double good_enough = 0.5;      // of the limit: edges of closer patches stay
-constexpr double worth_a_crease = 0.6;   // of its error a patch may keep when it gets normals of its own
-
-/// What becomes of the patches around a node.
-struct Trial {
-  PlacedNode node;
-  std::vector<PlacedPatch> patches;
-  std::vector<Index> triangles;  // of the mesh, for each of the patches
-  std::vector<Index> points;
-  FitLimits limits;
-};
-
-double smallest_angle(const FitState& state, Index t) {
-  const auto c = state.mesh.corners(t);
-  return smallest_angle_degrees(c[0], c[1], c[2]);
-}
-
-void gather(const FitState& state, Index t, Trial& trial) {
-  const auto& attached = state.patches[t].attached;
-  trial.points.insert(trial.points.end(), attached.begin(), attached.end());
-}
-
-/// What was worse before may stay so.
-void ease_limits(const FitState& state, Index t, FitLimits& limits) {
-  limits.angle = std::min(limits.angle, least_angle(state.limits.angle, smallest_angle(state, t)));
-  limits.agreement =
-      std::min(limits.agreement, normal_agreement(state.mesh.corners(t), state.mesh.corner_normals(t)) - 1e-9);
-  limits.agreement = std::max(limits.agreement, least_normal_agreement + 1e-6);
-}
-
-PlacedPatch placed(const FitState& state, Index t) {
-  PlacedPatch patch;
-  patch.shape = state.shape(t);
-  patch.guesses = state.patches[t].guesses;
-  return patch;
-}
-
-/// Fills in what lies across the edges of the trial's patches.
-/// @param nodes  of each patch's corners, as they will be
-void link(const FitState& state, const std::vector<std::array<Index, 3>>& nodes, const std::vector<Index>& replaced,
-          Trial& trial) {
-  const FitMesh& mesh = state.mesh;
-  for (std::size_t i = 0; i < nodes.size(); ++i) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      const Index from = nodes[i][k], to = nodes[i][(k + 1) % 3];
-      auto& across = trial.patches[i].across[k];
-      across = {};
-      for (std::size_t j = 0; j < nodes.size(); ++j) {
-        for (std::size_t l = 0; l < 3; ++l) {
-          if (nodes[j][l] == to && nodes[j][(l + 1) % 3] == from) {
-            across.patch = j;
-            across.from = (l + 1) % 3;
-            across.to = l;
-          }
-        }
-      }
-      if (across.patch != PlacedPatch::Across::none || from >= mesh.around.size() || to >= mesh.around.size()) {
-        continue;
-      }
-      for (const Index t : mesh.around[from]) {
-        const std::size_t c = mesh.corner_of(t, from);
-        if (mesh.triangles[t][(c + 2) % 3] == to && std::find(replaced.begin(), replaced.end(), t) == replaced.end()) {
-          across.points = edge_points(mesh.patch(t), c, (c + 2) % 3);
-        }
-      }
-    }
-  }
-}
-
-/// A start where the facets do not suit the normal gets one that does.
-void make_compatible(Trial& trial) {
-  if (trial.node.normals.size() != 1) {
-    return;
-  }
-  std::vector<Vec3> facets;
-  for (const PlacedPatch& p : trial.patches) {
-    auto corners = p.shape.corners;
-    if (p.corner != PlacedPatch::no_corner) {
-      corners[p.corner] = trial.node.position;
-    }
-    facets.push_back(facing_of(corners));
-  }
-  if (const auto normal = compatible_normal(trial.node.normals[0], facets, trial.limits.agreement + 0.05)) {
-    trial.node.normals[0] = *normal;
-  }
-}
 
 class Collapser {
 public:
@@ -661,34 +575,6 @@ std::size_t join_normals(FitState& state, double limit) {
     }
   }
   return gone;
-}
-
-std::size_t detach_worst(FitState& state, double limit) {
-  FitMesh& mesh = state.mesh;
-  std::size_t detached = 0;
-  for (Index t = 0; t < mesh.triangles.size(); ++t) {
-    if (!mesh.is_alive(t) || state.patches[t].error <= limit) {
-      continue;
-    }
-    Trial trial;
-    trial.limits = {state.limits.agreement, 0};
-    trial.patches.push_back(placed(state, t));
-    link(state, {mesh.triangles[t]}, {t}, trial);
-    PlacedPatch& patch = trial.patches[0];
-    patch.attached = state.patches[t].attached;
-    patch.shape.normals.fill(facing_of(patch.shape.corners));
-    turn_normals(state.samples(), patch, trial.limits, placing_steps);
-    if (!(patch.error < worth_a_crease * state.patches[t].error)) {
-      continue;
-    }
-    for (std::size_t k = 0; k < 3; ++k) {
-      mesh.slots[t][k] = static_cast<Index>(mesh.normals.size());
-      mesh.normals.push_back(patch.shape.normals[k]);
-    }
-    state.patches[t] = {std::move(patch.guesses), std::move(patch.attached), std::move(patch.residuals), patch.error};
-    ++detached;
-  }
-  return detached;
 }
 
 }  // namespace tunica

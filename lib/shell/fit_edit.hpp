@@ -30,8 +30,4 @@ bool move_node(FitState& state, Index node, const Vec3& start, double angle, dou
 /// error around stays below `limit` (mm). @return how many went
 std::size_t join_normals(FitState& state, double limit);
 
-/// Gives patches with an error above `limit` normals of their own at their corners where these, from flat, bring the
-/// patch much closer: what no common normal can serve, a crease or a rim. @return how many
-std::size_t detach_worst(FitState& state, double limit);
-
 }  // namespace tunica

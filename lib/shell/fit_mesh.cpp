@@ -38,6 +38,57 @@ FitMesh::Pair FitMesh::on_edge(Index u, Index v) const {
   return pair;
 }
 
+CubicPatch FitMesh::patch(Index t) const {
+  const auto across = creases(t);
+  return across ? watertight_patch(corners(t), corner_normals(t), *across)
+                : smooth_patch(kind, corners(t), corner_normals(t));
+}
+
+std::array<std::array<Index, 2>, 3> FitMesh::slots_across(Index t) const {
+  const auto &v = triangles[t], &s = slots[t];
+  std::array<std::array<Index, 2>, 3> across{{{s[0], s[1]}, {s[1], s[2]}, {s[2], s[0]}}};
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Index from = v[k], to = v[(k + 1) % 3];
+    const Pair pair = on_edge(from, to);
+    const Index other = pair.triangle[0] == t ? pair.triangle[1] : pair.triangle[0];
+    if (other != no_index) {
+      across[k] = {slots[other][corner_of(other, from)], slots[other][corner_of(other, to)]};
+    }
+  }
+  return across;
+}
+
+std::optional<NormalsAcross> FitMesh::creases(Index t) const {
+  if (kind != Patch::watertight) {
+    return {};
+  }
+  const auto &v = triangles[t], &s = slots[t];
+  std::optional<NormalsAcross> out;
+  const auto set = [&](std::size_t edge, std::size_t end, const Vec3& normal) {
+    if (!out) {
+      out = own_normals_across(corner_normals(t));
+    }
+    (*out)[edge][end] = normal;
+  };
+  const auto across = slots_across(t);
+  for (std::size_t k = 0; k < 3; ++k) {
+    for (std::size_t end = 0; end < 2; ++end) {
+      if (across[k][end] != s[(k + end) % 3]) {
+        set(k, end, normals[across[k][end]]);
+      }
+    }
+  }
+  for (const RimEdge& edge : rim) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (edge.nodes == std::array<Index, 2>{v[k], v[(k + 1) % 3]}) {
+        set(k, 0, edge.normals[0]);
+        set(k, 1, edge.normals[1]);
+      }
+    }
+  }
+  return out;
+}
+
 void FitMesh::ring(Index node, std::vector<Index>& out) const {
   out.clear();
   for (const Index t : around[node]) {

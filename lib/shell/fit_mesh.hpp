@@ -4,6 +4,7 @@
 #include "shell/shell_mesh.hpp"
 #include "surface/incidence.hpp"
 
+#include <optional>
 #include <span>
 
 namespace tunica {
@@ -38,7 +39,21 @@ struct FitMesh {
     const auto& s = slots[t];
     return {normals[s[0]], normals[s[1]], normals[s[2]]};
   }
-  [[nodiscard]] CubicPatch patch(Index t) const { return smooth_patch(kind, corners(t), corner_normals(t)); }
+  [[nodiscard]] CubicPatch patch(Index t) const;
+
+  /// For the edges of a triangle (corner k to k + 1): the slots that the triangle across has at the edge's start and
+  /// end; its own where there is none.
+  [[nodiscard]] std::array<std::array<Index, 2>, 3> slots_across(Index t) const;
+
+  /// The normals across that make edges of a watertight patch creases; nothing where all edges are smooth.
+  [[nodiscard]] std::optional<NormalsAcross> creases(Index t) const;
+
+  /// An edge at the rim of a piece, and the normals that the triangle beyond has at its ends.
+  struct RimEdge {
+    std::array<Index, 2> nodes;
+    std::array<Vec3, 2> normals;
+  };
+  std::vector<RimEdge> rim;  ///< the creases there
 
   /// 0, 1 or 2: where in triangle t the node stands.
   [[nodiscard]] std::size_t corner_of(Index t, Index node) const {

@@ -42,6 +42,10 @@ void put(std::vector<PlacedPatch>& patches, const PlacedNode& node) {
     if (p.corner != PlacedPatch::no_corner) {
       p.shape.corners[p.corner] = node.position;
       p.shape.normals[p.corner] = node.normals[p.slot];
+      if (p.shape.across) {
+        (*p.shape.across)[p.corner][0] = node.normals[p.beside[0]];
+        (*p.shape.across)[(p.corner + 2) % 3][1] = node.normals[p.beside[1]];
+      }
     }
   }
 }
@@ -89,6 +93,9 @@ Measured measure(const FitSamples& samples, std::vector<PlacedPatch>& patches, c
     const CubicPatch& patch = curved[i];
     for (std::size_t k = 0; k < 3; ++k) {
       const PlacedPatch::Across& across = p.across[k];
+      if (p.shape.kind == Patch::watertight) {
+        break;  // it meets its neighbours
+      }
       if (across.patch != PlacedPatch::Across::none) {
         FitSamples::from_gap(patch, k, (k + 1) % 3, edge_points(curved[across.patch], across.from, across.to),
                              p.residuals);
@@ -154,6 +161,28 @@ Eigen::Matrix<double, 30, 5> corner_jacobian(const PatchShape& shape, std::size_
   return jacobian;
 }
 
+Eigen::Matrix<double, 30, 12> across_jacobian(const PatchShape& shape) {
+  const CubicPatch base = shape.patch();
+  constexpr double tilt = 1e-6;
+  Eigen::Matrix<double, 30, 12> jacobian;
+  PatchShape changed = shape;
+  for (std::size_t i = 0; i < 6; ++i) {
+    Vec3& normal = (*changed.across)[i / 2][i % 2];
+    const Vec3 before = normal;
+    const auto axes = tilt_axes(before);
+    for (std::size_t k = 0; k < 2; ++k) {
+      normal = before + tilt * axes[k];
+      const CubicPatch tilted = changed.patch();
+      for (std::size_t j = 0; j < 10; ++j) {
+        jacobian.block<3, 1>(static_cast<Eigen::Index>(3 * j), static_cast<Eigen::Index>(2 * i + k)) =
+            (tilted.control[j] - base.control[j]) / tilt;
+      }
+    }
+    normal = before;
+  }
+  return jacobian;
+}
+
 PatchJacobian patch_jacobian(const PatchShape& shape) {
   PatchJacobian jacobian;
   for (std::size_t i = 0; i < 3; ++i) {
@@ -163,6 +192,35 @@ PatchJacobian patch_jacobian(const PatchShape& shape) {
   }
   return jacobian;
 }
+
+namespace {
+
+/// What a patch with creases adds to the equations of its node: its edges also follow the normals across.
+void add_creased(const PlacedPatch& p, const StepWeight& weights, Eigen::MatrixXd& h, Eigen::VectorXd& g) {
+  Eigen::Matrix<double, 30, 9> jacobian;
+  jacobian.leftCols<5>() = corner_jacobian(p.shape, p.corner);
+  const Eigen::Matrix<double, 30, 12> across = across_jacobian(p.shape);
+  jacobian.middleCols<2>(5) = across.middleCols<2>(static_cast<Eigen::Index>(4 * p.corner));
+  jacobian.middleCols<2>(7) = across.middleCols<2>(static_cast<Eigen::Index>(4 * ((p.corner + 2) % 3) + 2));
+  Eigen::Matrix<double, 9, 9> own = Eigen::Matrix<double, 9, 9>::Zero();
+  Eigen::Matrix<double, 9, 1> side = Eigen::Matrix<double, 9, 1>::Zero();
+  add_normal_equations<9>(jacobian, p.residuals, weights, own, side);
+  // Several of the three may be one.
+  std::array<Eigen::Index, 9> to{0, 1, 2};
+  std::size_t n = 3;
+  for (const std::size_t slot : {p.slot, p.beside[0], p.beside[1]}) {
+    to[n++] = static_cast<Eigen::Index>(3 + 2 * slot);
+    to[n++] = static_cast<Eigen::Index>(4 + 2 * slot);
+  }
+  for (std::size_t a = 0; a < 9; ++a) {
+    g[to[a]] += side[static_cast<Eigen::Index>(a)];
+    for (std::size_t b = 0; b < 9; ++b) {
+      h(to[a], to[b]) += own(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(b));
+    }
+  }
+}
+
+}  // namespace
 
 void place_node(const FitSamples& samples, std::vector<PlacedPatch>& patches, const std::vector<Index>& points,
                 const FitLimits& limits, double give_up, int steps, PlacedNode& node) {
@@ -188,6 +246,10 @@ void place_node(const FitSamples& samples, std::vector<PlacedPatch>& patches, co
       }
       edge += (p.shape.corners[(p.corner + 1) % 3] - node.position).norm();
       ++edges;
+      if (p.shape.across) {
+        add_creased(p, weights, h, g);
+        continue;
+      }
       Eigen::Matrix<double, 5, 5> own = Eigen::Matrix<double, 5, 5>::Zero();
       Eigen::Matrix<double, 5, 1> side = Eigen::Matrix<double, 5, 1>::Zero();
       add_normal_equations<5>(corner_jacobian(p.shape, p.corner), p.residuals, weights, own, side);

@@ -24,6 +24,10 @@ PatchJacobian patch_jacobian(const PatchShape& shape);
 /// The same for one corner alone: x, y, z, and the two tilts of its normal.
 Eigen::Matrix<double, 30, 5> corner_jacobian(const PatchShape& shape, std::size_t corner);
 
+/// How the control points of a patch with creases follow the tilts of the normals across: of the start and the end of
+/// edge 1-2, then of 2-3 and 3-1, two columns each.
+Eigen::Matrix<double, 30, 12> across_jacobian(const PatchShape& shape);
+
 /// The two directions in which a unit normal tilts.
 std::array<Vec3, 2> tilt_axes(const Vec3& normal);
 
@@ -36,10 +40,11 @@ bool is_sound(const PatchShape& shape, double agreement, double angle);
 /// One of the patches around a node that is being placed.
 struct PlacedPatch {
   PatchShape shape;
-  std::size_t corner = no_corner;  ///< which corner is the node; no_corner: none, the patch is only measured
-  std::size_t slot = 0;            ///< which of the node's normals it has there
-  /// By edge (corner k to k + 1): what lies across. A patch of the same list by its number, or the points of a patch
-  /// that stays as it is (see edge_points), in this patch's direction.
+  std::size_t corner = no_corner;           ///< which corner is the node; no_corner: none, the patch is only measured
+  std::size_t slot = 0;                     ///< which of the node's normals it has there
+  std::array<std::size_t, 2> beside{0, 0};  ///< where shape.across is: those across the edges that leave and arrive
+  /// By edge (corner k to k + 1): what a comas patch may gape at. A patch of the same list by its number, or the points
+  /// of a patch that stays as it is (see edge_points), in this patch's direction.
   struct Across {
     std::size_t patch = none;
     std::size_t from = 0, to = 0;  ///< the edge's ends in that patch, in this patch's direction

@@ -23,6 +23,27 @@ private:
   std::vector<Index> number_, old_;
 };
 
+/// Where the edges between these triangles and the others are creases: what lies on the other side.
+std::vector<FitMesh::RimEdge> creases_beyond(const FitMesh& mesh, const std::vector<Index>& triangles,
+                                             Numbering& node) {
+  std::vector<FitMesh::RimEdge> out;
+  for (const Index t : triangles) {
+    const auto &v = mesh.triangles[t], &s = mesh.slots[t];
+    const auto across = mesh.slots_across(t);
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::size_t next = (k + 1) % 3;
+      const auto pair = mesh.on_edge(v[k], v[next]);
+      const bool creased = across[k][0] != s[k] || across[k][1] != s[next];
+      if (creased && std::any_of(pair.triangle.begin(), pair.triangle.end(), [&](Index other) {
+            return !std::binary_search(triangles.begin(), triangles.end(), other);
+          })) {
+        out.push_back({{node.of(v[k]), node.of(v[next])}, {mesh.normals[across[k][0]], mesh.normals[across[k][1]]}});
+      }
+    }
+  }
+  return out;
+}
+
 }  // namespace
 
 FitRegion cut_out(const FitState& whole, const std::vector<Index>& nodes, int rings) {
@@ -65,6 +86,9 @@ FitRegion cut_out(const FitState& whole, const std::vector<Index>& nodes, int ri
   piece.held.assign(node.old().size(), 1);
   for (std::size_t i = 0; i < node.old().size(); ++i) {
     piece.on_boundary[i] = mesh.on_boundary[node.old()[i]];
+  }
+  if (mesh.kind == Patch::watertight) {
+    piece.rim = creases_beyond(mesh, triangles, node);
   }
   for (const Index v : free) {
     if (!mesh.around[v].empty()) {

@@ -7,6 +7,7 @@
 #include "shell/target.hpp"
 #include "surface/incidence.hpp"
 
+#include <optional>
 #include <span>
 
 namespace tunica {
@@ -24,9 +25,11 @@ struct PatchShape {
   std::array<Vec3, 3> corners;
   std::array<Vec3, 3> normals;
   Patch kind = Patch::comas;
+  std::optional<NormalsAcross> across = {};  ///< of a watertight patch with a crease along an edge
 
-  /// As if its edges were smooth: at a crease a watertight patch also heeds the normals across.
-  [[nodiscard]] CubicPatch patch() const { return smooth_patch(kind, corners, normals); }
+  [[nodiscard]] CubicPatch patch() const {
+    return across ? watertight_patch(corners, normals, *across) : smooth_patch(kind, corners, normals);
+  }
 };
 
 /// A point of a patch near a given one.

@@ -12,6 +12,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 
 namespace tunica {
 namespace {
@@ -31,6 +32,24 @@ constexpr double doubted = 0.7;  // of the largest error: from there on it is lo
 
 using Vector15 = Eigen::Matrix<double, 15, 1>;
 using Matrix15 = Eigen::Matrix<double, 15, 15>;
+
+/// The equations of a watertight patch with creases: its edges also follow normals across.
+struct Creased {
+  Index triangle;
+  std::array<Index, 9> slots;  // of its corners, then of edges 1-2, 2-3, 3-1 across: start, end
+  Eigen::Matrix<double, 27, 27> matrix = Eigen::Matrix<double, 27, 27>::Zero();
+  Eigen::Matrix<double, 27, 1> side = Eigen::Matrix<double, 27, 1>::Zero();
+};
+
+template <typename Weight>
+std::unique_ptr<Creased> creased_equations(const PatchShape& shape, const std::vector<Residual>& residuals,
+                                           const Weight& weight) {
+  auto out = std::make_unique<Creased>();
+  Eigen::Matrix<double, 30, 27> jacobian;
+  jacobian << patch_jacobian(shape), across_jacobian(shape);
+  add_normal_equations<27>(jacobian, residuals, weight, out->matrix, out->side);
+  return out;
+}
 
 /// x^n, n even
 template <typename T>
@@ -147,7 +166,7 @@ void FitState::measure(Index t, double doubted) {
   const PatchPowers powers(patch);
   samples_->from_patch(powers, facing, doubted, p.guesses, p.residuals);
   samples_->from_target(powers, facing, p.attached, p.residuals);
-  for (std::size_t k = 0; k < 3; ++k) {
+  for (std::size_t k = 0; k < 3 && mesh.kind == tunica::Patch::comas; ++k) {  // watertight ones meet
     const Index from = mesh.triangles[t][k], to = mesh.triangles[t][(k + 1) % 3];
     const auto pair = mesh.on_edge(from, to);
     if (pair.count() == 2) {
@@ -243,6 +262,10 @@ double FitState::solve(int power, double smoothing) {
   std::vector<Matrix15> matrices(count);
   std::vector<Vector15> sides(count);
   std::vector<double> costs(count, 0);
+  std::vector<std::unique_ptr<Creased>> creased(count);
+  const auto weight = [&](const Lanes& distance) {
+    return powered(std::experimental::max(distance / scale, Lanes(least_weight)), power - 2);
+  };
   parallel_for_blocks(count, patches_per_block, [&](std::size_t begin, std::size_t end) {
     for (std::size_t t = begin; t < end; ++t) {
       matrices[t].setZero();
@@ -251,14 +274,22 @@ double FitState::solve(int power, double smoothing) {
         continue;
       }
       costs[t] = cost_of(patches[t], power, scale);
-      add_normal_equations<15>(
-          patch_jacobian(shape(static_cast<Index>(t))), patches[t].residuals,
-          [&](const Lanes& distance) {
-            return powered(std::experimental::max(distance / scale, Lanes(least_weight)), power - 2);
-          },
-          matrices[t], sides[t]);
+      const PatchShape form = shape(static_cast<Index>(t));
+      if (form.across) {
+        creased[t] = creased_equations(form, patches[t].residuals, weight);
+        creased[t]->triangle = static_cast<Index>(t);
+        const auto across = mesh.slots_across(static_cast<Index>(t));
+        for (std::size_t i = 0; i < 9; ++i) {
+          creased[t]->slots[i] = i < 3 ? mesh.slots[t][i] : across[(i - 3) / 2][(i - 3) % 2];
+        }
+        matrices[t] = creased[t]->matrix.topLeftCorner<15, 15>();
+        sides[t] = creased[t]->side.head<15>();
+        continue;
+      }
+      add_normal_equations<15>(patch_jacobian(form), patches[t].residuals, weight, matrices[t], sides[t]);
     }
   });
+  std::erase(creased, nullptr);
   // Node by node: diagonal blocks with damping, pull to the middle.
   const std::size_t tilts = 3 * nodes, size = tilts + 2 * slots;
   Eigen::VectorXd side = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(size));
@@ -277,6 +308,13 @@ double FitState::solve(int power, double smoothing) {
       side.segment<3>(3 * static_cast<Eigen::Index>(v)) += sides[t].segment<3>(3 * i);
       side.segment<2>(static_cast<Eigen::Index>(tilts + 2 * s)) += sides[t].segment<2>(9 + 2 * i);
       edge[v] += (mesh.positions[mesh.triangles[t][(k + 1) % 3]] - mesh.positions[v]).norm();
+    }
+  }
+  for (const auto& patch : creased) {
+    for (std::size_t i = 3; i < 9; ++i) {
+      const auto at = static_cast<Eigen::Index>(9 + 2 * i);
+      tilt_block[patch->slots[i]] += patch->matrix.block<2, 2>(at, at);
+      side.segment<2>(static_cast<Eigen::Index>(tilts + 2 * patch->slots[i])) += patch->side.segment<2>(at);
     }
   }
   std::vector<Index> of_node;
@@ -320,17 +358,34 @@ double FitState::solve(int power, double smoothing) {
     }
     return local;
   };
+  const auto scatter = [&](const Vector15& local, std::size_t t, Eigen::VectorXd& y) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto i = static_cast<Eigen::Index>(k);
+      y.segment<3>(3 * static_cast<Eigen::Index>(mesh.triangles[t][k])) += local.segment<3>(3 * i);
+      y.segment<2>(static_cast<Eigen::Index>(tilts + 2 * mesh.slots[t][k])) += local.segment<2>(9 + 2 * i);
+    }
+  };
   const auto apply = [&](const Eigen::VectorXd& x) {
     Eigen::VectorXd y = Eigen::VectorXd::Zero(x.size());
     for (std::size_t t = 0; t < count; ++t) {
       if (!mesh.is_alive(static_cast<Index>(t))) {
         continue;
       }
-      const Vector15 local = matrices[t] * gather(x, t);
-      for (std::size_t k = 0; k < 3; ++k) {
-        const auto i = static_cast<Eigen::Index>(k);
-        y.segment<3>(3 * static_cast<Eigen::Index>(mesh.triangles[t][k])) += local.segment<3>(3 * i);
-        y.segment<2>(static_cast<Eigen::Index>(tilts + 2 * mesh.slots[t][k])) += local.segment<2>(9 + 2 * i);
+      scatter(matrices[t] * gather(x, t), t, y);
+    }
+    for (const auto& patch : creased) {
+      Eigen::Matrix<double, 27, 1> all;
+      all.head<15>() = gather(x, patch->triangle);
+      for (std::size_t i = 3; i < 9; ++i) {
+        all.segment<2>(static_cast<Eigen::Index>(9 + 2 * i)) =
+            x.segment<2>(static_cast<Eigen::Index>(tilts + 2 * patch->slots[i]));
+      }
+      const Vector15 own = patch->matrix.topRightCorner<15, 12>() * all.tail<12>();
+      const Eigen::Matrix<double, 12, 1> across = patch->matrix.bottomRows<12>() * all;
+      scatter(own, patch->triangle, y);
+      for (std::size_t i = 3; i < 9; ++i) {
+        y.segment<2>(static_cast<Eigen::Index>(tilts + 2 * patch->slots[i])) +=
+            across.segment<2>(static_cast<Eigen::Index>(2 * i - 6));
       }
     }
     for (std::size_t v = 0; v < nodes; ++v) {

@@ -34,7 +34,9 @@ public:
   /// @param doubted  mm: see FitSamples::from_patch
   void measure(Index t, double doubted);
 
-  [[nodiscard]] PatchShape shape(Index t) const { return {mesh.corners(t), mesh.corner_normals(t), mesh.kind}; }
+  [[nodiscard]] PatchShape shape(Index t) const {
+    return {mesh.corners(t), mesh.corner_normals(t), mesh.kind, mesh.creases(t)};
+  }
   [[nodiscard]] bool is_sound(Index t, double agreement, double angle) const {
     return tunica::is_sound(shape(t), agreement, angle);
   }

@@ -1,0 +1,12 @@
+#pragma once
+
+#include "shell/fit_state.hpp"
+
+namespace tunica {
+
+/// Gives patches with an error above `limit` normals of their own at their corners where these, from flat, bring the
+/// patch much closer: what no common normal can serve, a crease or a rim. The
+/// neighbours of a watertight patch, which share its edges, must bear that. @return how many
+std::size_t detach_worst(FitState& state, double limit);
+
+}  // namespace tunica
