@@ -22,6 +22,9 @@ constexpr double more_collapses = 0.1;
 /// For an error, levelling is tried down to this share of the triangles that do without, in so many steps.
 constexpr double least_levelled = 0.4;
 constexpr int level_steps = 6;
+/// What a certificate may take: a mesh that needs more counts as one that does not keep the error.
+constexpr std::size_t least_splits = 100'000;
+constexpr std::size_t splits_per_triangle = 4;  // of the target
 
 // The mesh after the first `steps` collapses; `origins` tells which vertices and triangles came from where.
 TriangleMesh replay(const TriangleMesh& mesh, const std::vector<Collapse>& history, std::size_t steps,
@@ -97,6 +100,7 @@ public:
     options_.limit = max_error;
     options_.width = 1e-3 * max_error;
     options_.samples = 0;
+    options_.max_splits = std::max(least_splits, splits_per_triangle * mesh.triangles.size());
   }
 
   DecimateResult run(const Progress& progress) {

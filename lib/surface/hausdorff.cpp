@@ -5,6 +5,8 @@
 #include "surface/cover_bound.hpp"
 #include "surface/measure.hpp"
 
+#include <Eigen/Geometry>
+
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -339,29 +341,55 @@ private:
     split(other, levels - 1, block);
   }
 
-  // The edge to cut and where. At a tie of neighbouring (or quite different) triangles of B, so that each side then has
-  // one closest triangle and is settled: coincident surfaces with other triangles take few cuts. Every fourth time the
-  // longest edge in half, so that pieces always shrink.
+  // The edge to cut and where. At a tie of neighbouring triangles of B, so that each side then has one closest triangle
+  // and is settled: coincident surfaces with other triangles take few cuts. Across a bend of B first, for on either
+  // side of it many nearly flat triangles are settled together; and where the two do not touch, in half, for a tie
+  // within what is flat would leave slivers that all reach over the bend. Every fourth time the longest edge in half,
+  // so that pieces always shrink.
   [[nodiscard]] std::pair<std::size_t, double> choose_cut(const Piece& piece) const {
     std::array<double, 3> squared_length;
     for (std::size_t k = 0; k < 3; ++k) {
       squared_length[k] = (piece.corner[(k + 1) % 3] - piece.corner[k]).squaredNorm();
     }
-    std::array<std::size_t, 3> by_length{0, 1, 2};
-    std::sort(by_length.begin(), by_length.end(),
+    std::array<std::size_t, 3> order{0, 1, 2};
+    std::sort(order.begin(), order.end(),
               [&](std::size_t l, std::size_t r) { return squared_length[l] > squared_length[r]; });
-    if (piece.cuts % 4 != 3) {
-      for (const std::size_t k : by_length) {
-        const Index s = piece.nearest[k];
-        const Index t = piece.nearest[(k + 1) % 3];
-        if (s != t && touch(s, t)) {
-          if (const auto along = tie(b_, piece.corner[k], piece.corner[(k + 1) % 3], s, t, 0.05 * options_.width)) {
-            return {k, *along};
-          }
+    if (piece.cuts % 4 == 3 || (piece.nearest[0] == piece.nearest[1] && piece.nearest[1] == piece.nearest[2])) {
+      return {order[0], 0.5};
+    }
+    const std::size_t longest = order[0];
+    const std::array<double, 3> bend = bends(piece);
+    std::stable_sort(order.begin(), order.end(), [&](std::size_t l, std::size_t r) { return bend[l] > bend[r]; });
+    for (const std::size_t k : order) {
+      const Index s = piece.nearest[k];
+      const Index t = piece.nearest[(k + 1) % 3];
+      if (s != t && touch(s, t)) {
+        if (const auto along = tie(b_, piece.corner[k], piece.corner[(k + 1) % 3], s, t, 0.05 * options_.width)) {
+          return {k, *along};
         }
       }
+      if (bend[k] > 0) {
+        return {k, 0.5};
+      }
     }
-    return {by_length[0], 0.5};
+    return {longest, 0.5};
+  }
+
+  // How much the triangles closest to the ends of each edge are turned from each other: one less the cosine, zero where
+  // that is little.
+  [[nodiscard]] std::array<double, 3> bends(const Piece& piece) const {
+    constexpr double little = 0.1;
+    std::array<Vec3, 3> normal;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto [p, q, r] = b_.corners(piece.nearest[k]);
+      normal[k] = (q - p).cross(r - p).normalized();
+    }
+    std::array<double, 3> bend;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double turned = 1 - normal[k].dot(normal[(k + 1) % 3]);
+      bend[k] = turned > little ? turned : 0;
+    }
+    return bend;
   }
 
   [[nodiscard]] bool touch(Index s, Index t) const {
