@@ -6,7 +6,9 @@ first vertex (x axis along the edge from it to the next).
 
 watertight: a cubic Bezier triangle. An edge's control point next to a corner lies from it along the edge's part in the
 tangent plane, by 2 |edge| / (3 (1 + cos)), cos that between the two; the centre makes the terms x^2 y of every
-coordinate vanish, averaged over the first vertex like w. (Without creases.)
+coordinate vanish, averaged over the first vertex like w. Where the normals A and B of the two triangles at an edge's end
+differ, the edge also loses its part along A - B, by a share: all of it where they are 20 degrees apart or more, none where
+they agree or the edge lies along A - B.
 """
 import numpy as np
 
@@ -87,11 +89,36 @@ def patch_points(corners, normals, barycentric):
     return barycentric @ corners + np.outer(w, n)
 
 
-def watertight_points(corners, normals, barycentric):
-    """Points of the watertight patch at rows (b1, b2, b3)."""
+def normals_across(triangles, corner_normals):
+    """#T x 3 x 3 x 3: at corner i of a triangle, what the triangle across the edge to corner j has there (its own where
+    there is none, and for i = j)."""
+    at = {}
+    for t, nodes in enumerate(triangles):
+        for i in range(3):
+            for j in ((i + 1) % 3, (i + 2) % 3):
+                at.setdefault((nodes[i], nodes[j]), []).append((t, corner_normals[t][i]))
+    out = np.repeat(np.asarray(corner_normals)[:, :, None], 3, axis=2)
+    for t, nodes in enumerate(triangles):
+        for i in range(3):
+            for j in ((i + 1) % 3, (i + 2) % 3):
+                for other, normal in at[nodes[i], nodes[j]]:
+                    if other != t:
+                        out[t, i, j] = normal
+    return out
+
+
+def watertight_points(corners, normals, barycentric, across=None):
+    """Points of the watertight patch at rows (b1, b2, b3). across: normals_across() of it, where edges are creases."""
     def beside(i, j):
         edge = corners[j] - corners[i]
-        along = edge - normals[i] * (normals[i] @ edge)
+        other = normals[i] if across is None else across[i, j]
+        mean = (normals[i] + other) / np.linalg.norm(normals[i] + other)
+        along = edge - mean * (mean @ edge)
+        apart = normals[i] - other
+        if apart @ apart > 0:
+            turned = (apart @ edge) ** 2 / (apart @ apart * (edge @ edge))
+            share = min(1, apart @ apart / (2 * np.sin(np.radians(10))) ** 2) * np.clip(2 - 4 * turned, 0, 1)
+            along = along - share * apart * (apart @ edge) / (apart @ apart)
         cosine = np.linalg.norm(along) / np.linalg.norm(edge)
         return corners[i] + along / np.linalg.norm(along) * np.linalg.norm(edge) * 2 / (3 * (1 + cosine))
 

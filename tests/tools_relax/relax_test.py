@@ -9,7 +9,7 @@ import unittest
 
 import numpy as np
 
-from curved_patch import columns, patch_points, read_corner_normals, read_ply, watertight_points
+from curved_patch import columns, normals_across, patch_points, read_corner_normals, read_ply, watertight_points
 
 BIN = os.environ["TUNICA_BIN"]
 PAPER = os.path.join(os.environ.get("TUNICA_SHARED_DATA", ""), "paper")
@@ -38,6 +38,24 @@ def cylinder(around, along, radius=10.0, length=30.0):
             c, d = a + around, b + around
             triangles += [(a, b, c), (b, d, c)] if j % 2 == 0 else [(a, b, d), (a, d, c)]
     return vertices, np.array(triangles)
+
+
+def closed_cylinder(around, radius=10.0, length=30.0):
+    vertices, triangles = cylinder(around, around // 2, radius, length)
+    vertices, triangles = list(vertices), list(triangles)
+    rings, last = around // 8, len(vertices) - around
+    for z, rim, turn in ((0.0, 0, 1), (length, last, -1)):
+        outer = [rim + i for i in range(around)]
+        for ring in range(rings - 1, 0, -1):
+            inner = list(range(len(vertices), len(vertices) + around))
+            vertices += [np.append(vertices[rim + i][:2] * ring / rings, z) for i in range(around)]
+            for i in range(around):
+                a, b, c, d = outer[i], outer[(i + 1) % around], inner[i], inner[(i + 1) % around]
+                triangles += [(a, c, d)[::turn], (a, d, b)[::turn]]
+            outer = inner
+        vertices.append(np.array([0, 0, z]))
+        triangles += [(outer[i], len(vertices) - 1, outer[(i + 1) % around])[::turn] for i in range(around)]
+    return np.array(vertices), np.array(triangles)
 
 
 def sphere(times, radius=20.0):
@@ -178,6 +196,41 @@ class Contract(Case):
                 again = json.load(file)["result"]["hausdorff_percent"]
             self.assertLessEqual(again["lower"], record["result"]["hausdorff_percent"]["upper"])
             self.assertGreaterEqual(again["upper"], record["result"]["hausdorff_percent"]["lower"])
+
+    def test_a_watertight_closed_cylinder_is_closed_at_its_rims_whoever_reads_the_file(self):
+        target = self.path("closed.ply")
+        vertices, triangles = closed_cylinder(96)
+        write_ply(target, vertices, triangles)
+        record, _ = self.relax(target, target, self.out, "--surface", "watertight", "--tolerance", "0.3%")
+        points, triangles, comments = read_ply(self.out)
+        points, normals = columns(points, "xyz"), read_corner_normals(self.out)
+        self.assertIn("surface=watertight", comments)
+        self.assertLess(np.sum(normals[:, 0] * normals[:, 1], axis=1).min(), 1 - 1e-6)
+        across = normals_across(triangles, normals)
+        self.assertGreater((np.linalg.norm(across - normals[:, :, None], axis=3) > 0.5).sum(), 20)
+        grid = np.array([(12 - i - j, i, j) for i in range(13) for j in range(13 - i)]) / 12
+        patches = np.array([watertight_points(points[t], normals[i], grid, across[i]) for i, t in enumerate(triangles)])
+        on_edges = grid.min(axis=1) == 0
+        rounded = {tuple(p) for p in np.round(patches[:, on_edges], 9).reshape(-1, 3) + 0.0}
+        self.assertEqual(len(rounded), len(points) + 11 * 3 * len(triangles) // 2)
+        # The true cylinder is within the certified distance, but for the target's own facets.
+        upper = record["result"]["hausdorff_mm"]["upper"] + 10 * (1 - np.cos(np.pi / 96))
+        all_points = patches.reshape(-1, 3)
+        beside = np.abs(np.hypot(all_points[:, 0], all_points[:, 1]) - 10)
+        beyond = np.minimum(np.abs(all_points[:, 2]), np.abs(all_points[:, 2] - 30))
+        self.assertLessEqual(np.minimum(beside, beyond).max(), upper)
+        smooth = np.array([watertight_points(points[t], normals[i], grid) for i, t in enumerate(triangles)])
+        self.assertGreater(np.abs(smooth - patches).max(), 0.01)  # creases that do something
+        for command in (["tunica-compare", self.out, target, "--shell", "--max", "0.3%"],
+                        ["tunica-simulate", self.out, self.path("closed.hdf"), "--static", "--pressure", "1kPa", "--young",
+                         "1MPa", "--poisson", "0.45", "--thickness", "1mm", "--density", "1100kg/m3", "--fix",
+                         "rigid-motions"]):
+            report = self.path(command[0] + ".json")
+            run = subprocess.run([os.path.join(BIN, command[0]), *command[1:], "--report", report], capture_output=True,
+                                 text=True)
+            self.assertEqual(run.returncode, 0, run.stderr)
+        with open(report) as file:
+            self.assertAlmostEqual(json.load(file)["result"]["volume_before_mm3"] / (np.pi * 3000), 1, delta=0.01)
 
     def test_tolerance_out_of_reach_is_4_and_the_best_mesh_stays(self):
         record, error = self.relax(self.coarse, self.target, self.out, "--tolerance", "0.0001%", "--max-iterations", 2,
