@@ -252,7 +252,7 @@ private:
       if (regains(samples, state, limit)) {
         part_crossings(state, limit, most);
         squeeze(samples, state, limit);
-        exchange_pieces(samples, state, limit);
+        exchange_pieces(samples, state, limit, tolerance);
       }
       shape_up(samples, state, limit, most);
       // What the certificate asked for may have made triangles thin: then the next best is looked at as well.
@@ -348,6 +348,9 @@ private:
       const std::size_t added = add_missed(samples, state, limit, true);
       if (farthest_) {
         samples.add(*farthest_);
+      }
+      if (regains_with_few(samples, state, limit, most)) {
+        continue;
       }
       if (i >= local_mending) {
         // Of what is not seen only less error helps.

@@ -11,19 +11,20 @@
 #include "shell/fit_worst.hpp"
 
 #include <algorithm>
+#include <map>
 #include <random>
 
 namespace tunica {
 namespace {
 
-constexpr std::size_t most_tries = 1'000, tries_per_shell = 4;
-constexpr std::size_t most_fits = 200;  // of pieces anew: what costs
+constexpr std::size_t most_fits = 600;  // of pieces anew: what costs
 constexpr std::size_t most_shells = 400;
-constexpr int rings = 1;          // of nodes around a merger that move with it
-constexpr int regaining = 4;      // steps of all nodes of a piece
-constexpr double loosened = 8;    // limits: error of a merger before its piece is fitted anew
-constexpr double thin_angle = 5;  // degrees, for the time being
-constexpr double slow = 0.97;     // of the error is left by a step that brings little
+constexpr int fewest_rings = 1, most_rings = 3;  // of nodes around a merger that move with it
+constexpr int regaining = 4;                     // steps of all nodes of a piece
+constexpr double loosened = 8;                   // limits: error of a merger before its piece is fitted anew
+constexpr double thin_angle = 5;                 // degrees, for the time being
+constexpr double slow = 0.97;                    // of the error is left by a step that brings little
+constexpr int certificates = 3;                  // per change
 
 bool recovers(FitState& piece, double limit) {
   double before = std::numeric_limits<double>::infinity();
@@ -58,46 +59,145 @@ bool fits_again(FitState& piece, std::size_t shells, std::size_t before, double 
   return price(piece) <= before && piece.error() <= limit;
 }
 
-}  // namespace
-
-void exchange_pieces(FitSamples& samples, FitState& state, double limit) {
-  if (state.mesh.alive > most_shells) {
-    return;
+void widen(Box& box, const FitState& state, Index t) {
+  for (const Vec3& p : state.mesh.patch(t).control) {
+    box.lower = box.lower.cwiseMin(p);
+    box.upper = box.upper.cwiseMax(p);
   }
-  std::mt19937 random;
-  const std::size_t tries = std::min(tries_per_shell * state.mesh.alive, most_tries);
-  const std::size_t crossings = crossing_shells(state.mesh.shell()).size();
-  const auto worse = [&](const FitState& trial) {
-    return trial.error() > limit || price(trial) > price(state) ||
-           crossing_shells(trial.mesh.shell()).size() > crossings;
-  };
-  std::size_t fits = 0;
-  for (std::size_t i = 0; i < tries && fits < most_fits; ++i) {
-    const auto edges = state.mesh.edges();
-    const auto [u, v] = edges[random() % edges.size()];
-    FitRegion region = cut_out(state, {u, v}, rings);
-    const auto in_piece = [&nodes = region.nodes](Index node) {
-      return static_cast<Index>(std::find(nodes.begin(), nodes.end(), node) - nodes.begin());
+}
+
+class Exchange {
+public:
+  Exchange(FitSamples& samples, FitState& state, double limit, double tolerance)
+      : samples_(samples),
+        state_(state),
+        limit_(limit),
+        tolerance_(tolerance),
+        crossings_(crossing_shells(state.mesh.shell()).size()),
+        changed_(state.mesh.positions.size(), 1) {}
+
+  void run() {
+    std::mt19937 random;
+    for (int rings = fewest_rings; rings <= most_rings;) {
+      const std::size_t before = fits_;
+      auto edges = state_.mesh.edges();
+      for (std::size_t i = edges.size(); i > 1; --i) {
+        std::swap(edges[i - 1], edges[random() % i]);
+      }
+      for (const auto& [u, v] : edges) {
+        if (fits_ >= most_fits) {
+          return;
+        }
+        if (state_.mesh.on_edge(u, v).count() > 0) {
+          try_without(u, v, rings);
+        }
+      }
+      rings += fits_ == before ? 1 : 0;
+    }
+  }
+
+private:
+  void try_without(Index u, Index v, int rings) {
+    FitRegion region = cut_out(state_, {u, v}, rings);
+    // What failed fails again until something around has changed.
+    std::size_t& last = tried_[{u, v, static_cast<Index>(rings)}];
+    if (std::none_of(region.nodes.begin(), region.nodes.end(), [&](Index node) { return changed_[node] > last; })) {
+      return;
+    }
+    last = now_;
+    const auto in_piece = [&](Index node) {
+      return static_cast<Index>(std::find(region.nodes.begin(), region.nodes.end(), node) - region.nodes.begin());
     };
     const std::size_t shells = region.state.mesh.alive, before = price(region.state);
     region.state.limits.angle = thin_angle;
-    if (!merge_edge(region.state, in_piece(u), in_piece(v), loosened * limit)) {
-      continue;
+    if (!merge_edge(region.state, in_piece(u), in_piece(v), loosened * limit_)) {
+      return;
     }
-    ++fits;
-    if (!fits_again(region.state, shells, before, state.limits.angle, limit)) {
-      continue;
+    ++fits_;
+    if (!fits_again(region.state, shells, before, state_.limits.angle, limit_)) {
+      return;
     }
-    FitState trial = state;
-    if (put_back(region, trial) > limit || worse(trial)) {
-      continue;
+    FitState trial = state_;
+    if (put_back(region, trial) <= limit_ && !worse(trial) && holds(trial, around(region))) {
+      accept(std::move(trial), region.nodes);
     }
-    add_missed(samples, trial, limit);
-    trial.attach();
-    trial.measure();
-    if (trial.error() <= limit || (regains(samples, trial, limit) && !worse(trial))) {
-      state = std::move(trial);
+  }
+
+  [[nodiscard]] bool worse(const FitState& trial) const {
+    return trial.error() > limit_ || price(trial) > price(state_) ||
+           crossing_shells(trial.mesh.shell()).size() > crossings_;
+  }
+
+  /// What a changed piece may be close to, before and after.
+  [[nodiscard]] Box around(const FitRegion& region) const {
+    const FitState& piece = region.state;
+    Box box{piece.mesh.positions[0], piece.mesh.positions[0]};
+    for (const Index t : region.triangles) {
+      widen(box, state_, t);
     }
+    for (Index t = 0; t < piece.mesh.triangles.size(); ++t) {
+      if (piece.mesh.is_alive(t)) {
+        widen(box, piece, t);
+      }
+    }
+    box.lower.array() -= limit_;
+    box.upper.array() += limit_;
+    return box;
+  }
+
+  /// Whether no point is too far off that the samples missed, if need be after steps of all nodes.
+  bool holds(FitState& trial, Box box) {
+    std::vector<Vec3> missed = missed_within(trial, box, limit_);
+    for (int i = 0; i < certificates; ++i) {
+      for (const Vec3& p : missed) {
+        samples_.add(p);
+      }
+      trial.attach();
+      trial.measure();
+      if (trial.error() > limit_) {
+        if (!regains(samples_, trial, limit_) || worse(trial)) {
+          return false;
+        }
+        box = {Vec3::Constant(-everywhere), Vec3::Constant(everywhere)};
+      } else if (i > 0) {
+        return false;  // what is wrong is not seen
+      }
+      if (holds_within(trial, box, tolerance_, missed)) {
+        return true;
+      }
+    }
+    return false;
+  }
+
+  void accept(FitState trial, const std::vector<Index>& nodes) {
+    ++now_;
+    const std::size_t before = changed_.size();
+    changed_.resize(trial.mesh.positions.size(), now_);
+    for (std::size_t i = 0; i < before; ++i) {
+      changed_[i] = trial.mesh.positions[i] == state_.mesh.positions[i] ? changed_[i] : now_;
+    }
+    for (const Index node : nodes) {
+      changed_[node] = now_;
+    }
+    state_ = std::move(trial);
+  }
+
+  static constexpr double everywhere = std::numeric_limits<double>::infinity();
+
+  FitSamples& samples_;
+  FitState& state_;
+  double limit_, tolerance_;
+  std::size_t crossings_;
+  std::size_t fits_ = 0, now_ = 1;    // changes so far
+  std::vector<std::size_t> changed_;  // when each node was last
+  std::map<std::array<Index, 3>, std::size_t> tried_;
+};
+
+}  // namespace
+
+void exchange_pieces(FitSamples& samples, FitState& state, double limit, double tolerance) {
+  if (state.mesh.alive <= most_shells) {
+    Exchange(samples, state, limit, tolerance).run();
   }
 }
 

@@ -1,6 +1,7 @@
 #include "shell/fit_missed.hpp"
 
 #include "core/threads.hpp"
+#include "shell/certificate.hpp"
 #include "shell/curved_surface.hpp"
 #include "shell/patch_search.hpp"
 #include "surface/hausdorff.hpp"
@@ -17,6 +18,7 @@ constexpr double grid_points = 60'000;              // of all patches
 constexpr int coarsest_grid = 8, finest_grid = 12;  // ridges of a coarse target lie between the points of a coarse grid
 constexpr int gap_points = 11;                      // per edge
 constexpr double narrow = 0.05;                     // of the limit: gaps that add nothing
+constexpr double width_of_certificates = 0.005;     // of the tolerance
 constexpr double exact = 1.025;  // limits: what is looked at above gaps is the worst, so with less margin
 
 struct Missed {
@@ -54,12 +56,16 @@ Vec3 on_edge(const CubicPatch& patch, std::size_t from, std::size_t to, double s
   return patch.point((1 - s) * corners[from] + s * corners[to]);
 }
 
+bool is_within(const Box& box, const Vec3& p) {
+  return (p.array() >= box.lower.array()).all() && (p.array() <= box.upper.array()).all();
+}
+
 /// Where patches part sideways and are off as well, the target above the gap is farther from both than either measure
 /// says: its points there that are too far off.
-std::vector<Vec3> missed_over_gaps(const FitState& state, double limit) {
+std::vector<Vec3> missed_over_gaps(const FitState& state, const std::vector<std::array<Index, 2>>& edges,
+                                   double limit) {
   const FitMesh& mesh = state.mesh;
   const Target& target = state.samples().target();
-  const auto edges = mesh.edges();
   std::vector<std::vector<Vec3>> of_edge(edges.size());
   parallel_for_blocks(edges.size(), 64, [&](std::size_t begin, std::size_t end) {
     for (std::size_t e = begin; e < end; ++e) {
@@ -113,7 +119,7 @@ std::size_t add_missed(FitSamples& samples, FitState& state, double limit, bool 
       ++added;
     }
   }
-  for (const Vec3& p : missed_over_gaps(state, exact * limit)) {
+  for (const Vec3& p : missed_over_gaps(state, state.mesh.edges(), exact * limit)) {
     samples.add(p);
     ++added;
   }
@@ -131,6 +137,71 @@ std::size_t add_missed(FitSamples& samples, FitState& state, double limit, bool 
     }
   }
   return added;
+}
+
+std::vector<Vec3> missed_within(const FitState& state, const Box& box, double limit) {
+  const FitSamples& samples = state.samples();
+  std::vector<Vec3> points, found;
+  for (const Vec3& p : samples.further_points()) {
+    if (is_within(box, p)) {
+      points.push_back(p);
+    }
+  }
+  const ShellMesh shell = state.mesh.shell();
+  const std::vector<CubicPatch> patches = curved_patches(shell);
+  for (const Missed& far : far_points(points, PatchSearch(shell, patches), limit)) {
+    if (far.distance > limit) {
+      found.push_back(far.point);
+    }
+  }
+  auto edges = state.mesh.edges();
+  std::erase_if(edges, [&](const auto& edge) {
+    return !is_within(box, state.mesh.positions[edge[0]]) && !is_within(box, state.mesh.positions[edge[1]]);
+  });
+  for (const Vec3& p : missed_over_gaps(state, edges, exact * limit)) {
+    found.push_back(p);
+  }
+  return found;
+}
+
+bool holds_within(const FitState& state, const Box& box, double tolerance, std::vector<Vec3>& farthest) {
+  const Target& target = state.samples().target();
+  const ShellMesh shell = state.mesh.shell();
+  const std::vector<CubicPatch> patches = curved_patches(shell);
+  std::vector<CubicPatch> here;
+  for (const CubicPatch& patch : patches) {
+    if (std::any_of(patch.control.begin(), patch.control.end(), [&](const Vec3& p) { return is_within(box, p); })) {
+      here.push_back(patch);
+    }
+  }
+  TriangleMesh part;
+  std::vector<Index> number(target.mesh().vertices.size(), no_index);
+  for (auto corners : target.mesh().triangles) {
+    if (std::none_of(corners.begin(), corners.end(),
+                     [&](Index v) { return is_within(box, target.mesh().vertices[v]); })) {
+      continue;
+    }
+    for (Index& v : corners) {
+      if (number[v] == no_index) {
+        number[v] = static_cast<Index>(part.vertices.size());
+        part.vertices.push_back(target.mesh().vertices[v]);
+      }
+      v = number[v];
+    }
+    part.triangles.push_back(corners);
+  }
+  const Aim aim{width_of_certificates * tolerance, tolerance, 0};
+  const OneSided from_shell = here.empty() ? OneSided{} : shell_to_target(here, target, aim);
+  const OneSided from_target =
+      part.triangles.empty() ? OneSided{} : target_to_shell(shell, patches, Target(part), aim, state.error());
+  farthest.clear();
+  if (from_shell.distance.upper > tolerance) {
+    farthest.push_back(target.closest(from_shell.farthest).point);
+  }
+  if (from_target.distance.upper > tolerance) {
+    farthest.push_back(from_target.farthest);
+  }
+  return farthest.empty();
 }
 
 }  // namespace tunica

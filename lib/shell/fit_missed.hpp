@@ -1,6 +1,7 @@
 #pragma once
 
 #include "shell/fit_state.hpp"
+#include "surface/measure.hpp"
 
 namespace tunica {
 
@@ -11,5 +12,14 @@ namespace tunica {
 /// Cost: linear in the target's vertices, of which at most 200,000 are looked at: some 0.3 microseconds each; both ways
 /// some 0.1 s more.
 std::size_t add_missed(FitSamples& samples, FitState& state, double limit, bool both_ways = false);
+
+/// What add_missed() finds one way within a box, without adding it. Cost: as there, but of the points outside only a
+/// comparison.
+std::vector<Vec3> missed_within(const FitState& state, const Box& box, double limit);
+
+/// Certifies the distance of what lies within a box, both ways, but for rounding.
+/// @param farthest  out: where it is above `tolerance` (mm): the points of the target there, one per direction
+/// Cost: linear in the target's triangles, and what a certificate costs of those within.
+bool holds_within(const FitState& state, const Box& box, double tolerance, std::vector<Vec3>& farthest);
 
 }  // namespace tunica

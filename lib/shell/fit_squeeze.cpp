@@ -17,7 +17,8 @@ constexpr double first_part = 0.05;             // of the shells: how many fewer
 constexpr double loosened = 1.5;                // limits: error of a merger that all nodes together may make good
 constexpr std::size_t squeezed_shells = 2'500;  // of all tries: what they may cost
 constexpr std::size_t least_squeezes = 1, most_squeezes = 12;
-constexpr int regaining = 8;                     // steps of all nodes
+constexpr int regaining = 8;  // steps of all nodes
+constexpr int few_splits = 3;
 constexpr int looks = 4;                         // for points that the samples missed
 constexpr std::size_t price_of_a_thin_one = 10;  // shells
 
@@ -43,6 +44,29 @@ bool regains(FitSamples& samples, FitState& state, double limit) {
     }
     state.attach();
     state.measure();
+  }
+  return false;
+}
+
+bool regains_with_few(FitSamples& samples, FitState& state, double limit, std::size_t most) {
+  FitState trial = state;
+  trial.attach();
+  trial.measure();
+  if (trial.error() <= limit) {
+    return false;  // nothing new is known
+  }
+  for (int splits = 0; splits <= few_splits; ++splits) {
+    if (splits > 0) {
+      if (trial.mesh.alive + 2 > most || split_worst(trial, limit, 1) == 0) {
+        return false;
+      }
+      trial.attach();
+      trial.measure();
+    }
+    if (regains(samples, trial, limit)) {
+      state = std::move(trial);
+      return true;
+    }
   }
   return false;
 }
