@@ -9,7 +9,8 @@ namespace tunica {
 /// then worst. What is neither dearer (see price()) nor above `limit` (mm) nor crosses more is kept, so that also
 /// steps that bring nothing lead on to others, where a certificate of the surroundings finds nothing above `tolerance`
 /// (mm). Larger pieces once no smaller one is left that has changed since it was tried.
-/// Deterministic. Cost: at most 600 pieces are fitted anew, some 30 ms each. Of more than 400 shells none.
+/// Deterministic. Cost: at most 600 pieces are fitted anew, some 15 ms each: what is far off after a step or two is
+/// given up. Of more than 400 shells none.
 void exchange_pieces(FitSamples& samples, FitState& state, double limit, double tolerance);
 
 }  // namespace tunica
