@@ -32,8 +32,9 @@ constexpr std::size_t work_per_query = 30;
 std::size_t work_of(const PatchTrial& trial) {
   return trial.corners.size() * (trial.samples.size() + 3 * work_per_query);
 }
-constexpr std::size_t least_work = 200'000;
-constexpr std::size_t work_per_triangle = 35;             // of the target
+constexpr std::size_t least_work = 150'000;
+constexpr std::size_t work_per_collapsed = 35;            // triangle of the target
+constexpr std::size_t work_per_triangle = 25;             // of the target, at least: the worst places have to be found
 constexpr std::size_t shaped_work_per_triangle = 20'000;  // of the mesh, where shape counts
 constexpr double good_shape_weight = 0.3;                 // of the lack of radius ratio, where shape counts
 constexpr double hard_angle_weight = 1e6;                 // so that no angle gets too small
@@ -45,6 +46,7 @@ public:
   Sampling(const TriangleMesh& mesh, const TriangleMesh& target, const DecimationOrigins& origins)
       : mesh_(mesh), target_(target), stands_for_(origins.stands_for), around_(incidence(mesh)) {
     samples_.near = origins.triangles;
+    samples_.on_target.assign(mesh.vertices.size(), 0);
     add_vertices();
     add_within();
     find_owners();
@@ -115,6 +117,12 @@ private:
     }
     for (Index v = 0; v < mesh_.vertices.size(); ++v) {
       const std::size_t end = offsets[v + 1];
+      if (end == offsets[v] + 1 && samples_.points[offsets[v]] == mesh_.vertices[v]) {
+        samples_.owner[offsets[v]] = around_.of(v)[0];
+        samples_.squared[offsets[v]] = 0;
+        samples_.on_target[v] = 1;
+        continue;
+      }
       for (std::size_t first = offsets[v]; first < end; first += lane_count) {
         const LaneVec3 p =
             lane_points([&](std::size_t lane) { return samples_.points[std::min(first + lane, end - 1)]; });
@@ -236,7 +244,7 @@ private:
   void measure(Index t) {
     if (known_[t] == Known::by_samples) {
       known_[t] = Known::nearly;
-      spend(2 * work_per_query);
+      spend(work_per_query);
       state_.measure_middle(t, plan_.near_by);
     } else {
       known_[t] = Known::certainly;
@@ -479,7 +487,8 @@ TriangleMesh levelled(const TriangleMesh& mesh, const TriangleMesh& target, cons
   plan.weights.fold_cosine = -0.9;
   plan.known = Leveller::Known::by_samples;
   plan.triangles = options.triangles;
-  plan.work = std::max(least_work, work_per_triangle * target.triangles.size());
+  const std::size_t collapsed = target.triangles.size() - std::min(target.triangles.size(), mesh.triangles.size());
+  plan.work = std::max({least_work, work_per_collapsed * collapsed, work_per_triangle * target.triangles.size()});
   plan.diagonal = diagonal(target);
   ShapedMesh state(mesh, target, nearest, Sampling(mesh, target, options.origins).samples(), curves);
   state.measure_corners(plan.near_by);

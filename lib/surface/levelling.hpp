@@ -26,7 +26,8 @@ struct LevellingOptions {
 /// Lessens the largest error of a decimated mesh at its count. Over and over the place that is farthest off is mended:
 /// an edge flips, a vertex moves, an edge is split or collapses; triangles that a split needs are taken by collapses
 /// that leave less error than the largest. A change is made only if it lessens the largest error around it. Ends when
-/// the worst place cannot be mended or after work in proportion to the target's size.
+/// the worst place cannot be mended or after work in proportion to the triangles collapsed and, less, to all of the
+/// target's.
 /// @param mesh    an oriented manifold decimated from `target`
 /// Keeps: topology, boundary (its vertices on the target's boundary curves), the side each triangle faces.
 /// Deterministic. Source: moves as in Hoppe et al., Mesh optimization, SIGGRAPH 1993; here only the largest error

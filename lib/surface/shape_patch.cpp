@@ -99,7 +99,10 @@ ShapedMesh::ShapedMesh(const TriangleMesh& mesh, const TriangleMesh& target, Nea
           std::sqrt(static_cast<double>(target.triangles.size()) / static_cast<double>(mesh.triangles.size())), 4.0,
           8.0))),
       sample_(std::move(samples.points)),
-      states_(mesh.triangles.size()) {
+      on_target_(std::move(samples.on_target)),
+      states_(mesh.triangles.size()),
+      shape_cost_(mesh.triangles.size(), unknown),
+      middle_(mesh.triangles.size(), no_middles) {
   for (std::size_t t = 0; t < states_.size(); ++t) {
     states_[t].guess = samples.near[t];
   }
@@ -143,22 +146,16 @@ void ShapedMesh::set_weights(const ShapeWeights& weights) {
   const bool shapes_cost_the_same = weights.quality == weights_.quality && weights.angle == weights_.angle &&
                                     weights.angle_wanted == weights_.angle_wanted;
   if (!shapes_cost_the_same) {
-    shape_cost_.assign(states_.size(), -1);
+    shape_cost_.assign(states_.size(), unknown);
   }
   weights_ = weights;
-  for (Index t = 0; t < states_.size(); ++t) {
-    if (mesh_.is_alive(t)) {
-      states_[t].cost = shape_cost_of(t) + error_cost(states_[t].error);
-    }
-  }
 }
 
-double ShapedMesh::shape_cost_of(Index t) {
-  shape_cost_.resize(states_.size(), -1);
+double ShapedMesh::cost(Index t) const {
   if (shape_cost_[t] < 0) {
     shape_cost_[t] = shape_cost(corners(mesh_.triangles[t], {}));
   }
-  return shape_cost_[t];
+  return shape_cost_[t] + error_cost(states_[t].error);
 }
 
 std::array<Vec3, 3> ShapedMesh::corners(const std::array<Index, 3>& triangle, const PatchTrial& trial) const {
@@ -226,6 +223,9 @@ void ShapedMesh::measure_corners(const NearestPoint& nearest) {
   vertex_error_.assign(mesh_.positions.size(), -1);
   for (std::size_t t = 0; t < states_.size(); ++t) {
     for (const Index v : mesh_.triangles[t]) {
+      if (vertex_error_[v] < 0 && !on_target_.empty() && on_target_[v] != 0) {
+        vertex_error_[v] = 0;
+      }
       if (vertex_error_[v] < 0) {
         const auto hit = nearest(mesh_.positions[v], states_[t].guess, exact);
         vertex_error_[v] = std::sqrt(hit.squared_distance);
@@ -246,14 +246,18 @@ void ShapedMesh::measure_all() {
 void ShapedMesh::measure_middle(Index t, const NearestPoint& nearest) {
   const auto c = corners(mesh_.triangles[t], {});
   State& state = states_[t];
-  const auto hit = nearest((c[0] + c[1] + c[2]) / 3, state.guess, exact);
+  double squared = state.error * state.error;
+  const auto hit = nearest((c[0] + c[1] + c[2]) / 3, state.guess, squared);
   state.guess = hit.triangle;
-  double squared = std::max(hit.squared_distance, state.error * state.error);
+  squared = std::max(hit.squared_distance, squared);
   for (std::size_t k = 0; k < 3; ++k) {
-    squared = std::max(squared, nearest(0.5 * (c[k] + c[(k + 1) % 3]), state.guess, squared).squared_distance);
+    const double known = known_middle(t, k);
+    if (known < 0 || known > squared) {
+      middle_[t][k] = nearest(0.5 * (c[k] + c[(k + 1) % 3]), state.guess, squared).squared_distance;
+      squared = std::max(squared, middle_[t][k]);
+    }
   }
   state.error = std::sqrt(squared);
-  state.cost = shape_cost_of(t) + error_cost(state.error);
 }
 
 /// At points that cut each edge in `parts_`, at those between them and at the centre, but not less than `squared`.
@@ -286,7 +290,6 @@ void ShapedMesh::measure(Index t) {
     squared = std::max(squared, at_corner);
   }
   state.error = std::sqrt(squared_within(c, state.guess, squared));
-  state.cost = shape_cost_of(t) + error_cost(state.error);
 }
 
 double ShapedMesh::measure_within(PatchTrial& trial) const {
@@ -434,7 +437,7 @@ double ShapedMesh::evaluate(PatchTrial& trial, double limit) const {
   bool faced_away = false;
   trial.samples.clear();
   for (const Index t : trial.removed) {
-    before += states_[t].cost;
+    before += cost(t);
     most_error = std::max(most_error, states_[t].error);
     trial.samples.insert(trial.samples.end(), states_[t].samples.begin(), states_[t].samples.end());
     faced_away = faced_away || faces_away(corners(mesh_.triangles[t], {}), states_[t].guess);
@@ -545,6 +548,7 @@ bool ShapedMesh::assign_samples(PatchTrial& trial, const std::array<Vec3, 3>* c,
 }
 
 void ShapedMesh::commit(const PatchTrial& trial) {
+  on_target_.clear();  // from here on vertices are elsewhere
   const bool is_new = trial.moved == mesh_.positions.size();
   if (is_new) {
     const auto& first = trial.corners[0];
@@ -571,17 +575,19 @@ void ShapedMesh::commit(const PatchTrial& trial) {
   for (const Index t : trial.removed) {
     mesh_.remove_triangle(t);
     states_[t] = {};
-    if (t < shape_cost_.size()) {
-      shape_cost_[t] = -1;
-    }
+    shape_cost_[t] = unknown;
+    middle_[t] = no_middles;
   }
   std::vector<Index> made;
   for (std::size_t i = 0; i < trial.corners.size(); ++i) {
     const Index t = mesh_.add_triangle(trial.corners[i]);
     made.push_back(t);
-    states_.resize(std::max(states_.size(), mesh_.triangles.size()));
+    if (states_.size() < mesh_.triangles.size()) {
+      states_.resize(mesh_.triangles.size());
+      shape_cost_.resize(states_.size(), unknown);
+      middle_.resize(states_.size(), no_middles);
+    }
     states_[t].error = trial.error[i];
-    states_[t].cost = trial.cost[i];
     states_[t].guess = trial.guess[i];
   }
   for (std::size_t s = 0; s < trial.samples.size(); ++s) {

@@ -42,9 +42,10 @@ using NearestPoint = std::function<ClosestPoint::Hit(const Vec3& p, Index near, 
 /// Points of the target that a mesh is to be close to.
 struct TargetSamples {
   std::vector<Vec3> points;
-  std::vector<Index> owner;     ///< the mesh's triangle closest to each
-  std::vector<double> squared;  ///< the squared distance to it
-  std::vector<Index> near;      ///< #F of the mesh: a triangle of the target near it
+  std::vector<Index> owner;             ///< the mesh's triangle closest to each
+  std::vector<double> squared;          ///< the squared distance to it
+  std::vector<Index> near;              ///< #F of the mesh: a triangle of the target near it
+  std::vector<std::uint8_t> on_target;  ///< #V of the mesh: is a vertex of the target; empty: not known
 };
 
 /// About 40 points for each triangle of the mesh, if the target has as many vertices; with few of them the triangles'
@@ -76,7 +77,7 @@ public:
   [[nodiscard]] double error(Index t) const { return states_[t].error; }
   /// The point of the target that is farthest from triangle t, of those that belong to it.
   [[nodiscard]] std::optional<Vec3> farthest_sample(Index t) const;
-  [[nodiscard]] double cost(Index t) const { return states_[t].cost; }
+  [[nodiscard]] double cost(Index t) const;
   [[nodiscard]] double smallest_angle(Index t) const;
   [[nodiscard]] const BoundaryCurves::Place& place(Index vertex) const { return places_[vertex]; }
 
@@ -122,23 +123,29 @@ public:
 
 private:
   static constexpr double exact = -1;  // no distance is near enough
+  static constexpr double unknown = -1;
+  static constexpr std::array<double, 3> no_middles{unknown, unknown, unknown};
   struct State {
     std::vector<Index> samples;
     double error = 0;
-    double cost = 0;
     Index guess = 0;
   };
   struct LeastSquares;
 
   [[nodiscard]] std::array<Vec3, 3> corners(const std::array<Index, 3>& triangle, const PatchTrial& trial) const;
   [[nodiscard]] double shape_cost(const std::array<Vec3, 3>& corners) const;
-  [[nodiscard]] double shape_cost_of(Index t);
   [[nodiscard]] double error_cost(double error) const;
   [[nodiscard]] bool folds(const PatchTrial& trial) const;
   [[nodiscard]] bool faces_away(const std::array<Vec3, 3>& corners, Index guess) const;
   [[nodiscard]] double squared_within(const std::array<Vec3, 3>& corners, Index guess, double squared) const;
   [[nodiscard]] bool assign_samples(PatchTrial& trial, const std::array<Vec3, 3>* corners, double allowed,
                                     double most_error, double& total) const;
+  // What was found in the middle of the edge from corner k of t on, from its other side; it may be too much.
+  [[nodiscard]] double known_middle(Index t, std::size_t k) const {
+    const Index next = mesh_.triangles[t][(k + 1) % 3];
+    const Index across = mesh_.on_edge(mesh_.triangles[t][k], next)[1];
+    return across == EditMesh::none ? unknown : middle_[across][mesh_.corner_of(across, next)];
+  }
   [[nodiscard]] double squared_of_samples(Index t, const std::array<Vec3, 3>& corners) const;
   void find_places();
 
@@ -149,9 +156,11 @@ private:
   ShapeWeights weights_;
   int parts_;  // of an edge, where a triangle is measured within: about as long as the target's edges
   std::vector<Vec3> sample_;
-  std::vector<double> vertex_error_;  // #V distance of each vertex to the target
+  std::vector<std::uint8_t> on_target_;  // #V of the mesh as given, see TargetSamples
+  std::vector<double> vertex_error_;     // #V distance of each vertex to the target
   std::vector<State> states_;
-  std::vector<double> shape_cost_;  // #T as far as known, else -1
+  mutable std::vector<double> shape_cost_;     // #T as far as known
+  std::vector<std::array<double, 3>> middle_;  // #T squared distances in the middle of each edge, as far as known
   std::vector<BoundaryCurves::Place> places_;
 };
 
