@@ -31,10 +31,22 @@ public:
     return trial.node.error;
   }
 
-  /// Does what evaluate() tried last.
+  /// The same with the merged node where an earlier evaluation found it best.
+  double evaluate_at(Index u, Index v, const PlacedNode& node) {
+    if (!prepare(u, v)) {
+      return std::numeric_limits<double>::infinity();
+    }
+    trial_.node = node;
+    place_node(state_.samples(), trial_.patches, trial_.points, trial_.limits, limit_, 0, trial_.node);
+    return trial_.node.error;
+  }
+
+  /// Where the last evaluation found the merged node best.
+  [[nodiscard]] const PlacedNode& placed_node() const { return trial_.node; }
+
+  /// Does what was evaluated last.
   void commit(Index u, Index v) {
     Trial& trial = trial_;
-    place_node(state_.samples(), trial.patches, trial.points, trial.limits, limit_, 0, trial.node);
     const auto shared = mesh_.on_edge(u, v);
     for (std::size_t i = 0; i < shared.count(); ++i) {
       state_.patches[shared.triangle[i]] = {};
@@ -236,6 +248,7 @@ std::size_t collapse_edges(FitState& state, double limit, std::size_t shells, co
     double error;
     Index u, v;
     unsigned version;
+    std::size_t evaluated;  // which of the evaluations, when of this version
     bool operator<(const Candidate& o) const {
       return error != o.error ? error > o.error : u != o.u ? u > o.u : v > o.v;
     }
@@ -244,6 +257,7 @@ std::size_t collapse_edges(FitState& state, double limit, std::size_t shells, co
   Collapser collapser(state, limit);
   std::vector<unsigned> version(mesh.positions.size(), 1);
   std::priority_queue<Candidate> queue;
+  std::vector<PlacedNode> evaluations;
   const auto current = [&](Index u, Index v) { return version[u] + version[v]; };
   for (const auto& [u, v] : mesh.edges()) {
     // A first guess, below the truth: the largest error around.
@@ -253,7 +267,7 @@ std::size_t collapse_edges(FitState& state, double limit, std::size_t shells, co
         guess = std::max(guess, state.patches[t].error);
       }
     }
-    queue.push({guess, u, v, 0});
+    queue.push({guess, u, v, 0, 0});
   }
   const std::size_t before = mesh.alive;
   std::size_t gone = 0;
@@ -265,12 +279,14 @@ std::size_t collapse_edges(FitState& state, double limit, std::size_t shells, co
     }
     const double known = c.error;
     const bool fresh = c.version == current(c.u, c.v);
-    c.error = collapser.evaluate(c.u, c.v);
+    c.error = fresh ? collapser.evaluate_at(c.u, c.v, evaluations[c.evaluated]) : collapser.evaluate(c.u, c.v);
     if (!(c.error <= limit) || !std::isfinite(c.error)) {
       continue;
     }
     if (!fresh && !queue.empty() && c.error > 1.001 * std::max(known, queue.top().error)) {
       c.version = current(c.u, c.v);
+      c.evaluated = evaluations.size();
+      evaluations.push_back(collapser.placed_node());
       queue.push(c);
       continue;
     }
@@ -283,7 +299,7 @@ std::size_t collapse_edges(FitState& state, double limit, std::size_t shells, co
       ++version[w];
     }
     for (const Index w : ring) {
-      queue.push({c.error, std::min(c.u, w), std::max(c.u, w), 0});
+      queue.push({c.error, std::min(c.u, w), std::max(c.u, w), 0, 0});
     }
     if (gone % 32 == 0) {
       advance(progress, static_cast<double>(before - mesh.alive) / static_cast<double>(before));
@@ -441,7 +457,6 @@ bool split_edge(FitState& state, Index u, Index v, double limit) {
   if (!std::isfinite(trial.node.error)) {
     return false;
   }
-  place_node(state.samples(), trial.patches, trial.points, trial.limits, limit, 0, trial.node);
   for (std::size_t i = 0; i < pair.count(); ++i) {
     state.patches[pair.triangle[i]] = {};
   }
@@ -506,7 +521,6 @@ bool place_with_slots(FitState& state, Index v, const Vec3& start, const std::ve
   if (!(trial.node.error < limit)) {
     return false;
   }
-  place_node(state.samples(), trial.patches, trial.points, trial.limits, limit, 0, trial.node);
   mesh.positions[v] = trial.node.position;
   for (std::size_t s = 0; s < trial.node.normals.size(); ++s) {
     mesh.normals[own[s]] = trial.node.normals[s];

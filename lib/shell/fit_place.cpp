@@ -120,6 +120,40 @@ Measured measure(const FitSamples& samples, std::vector<PlacedPatch>& patches, c
   return sum;
 }
 
+/// What was measured of the patches with the node at its best, while another place is tried.
+class Findings {
+public:
+  /// The patches keep the guesses only: walks from those of a failed trial may end elsewhere.
+  void put_aside(std::vector<PlacedPatch>& patches) {
+    exchange(patches);
+    for (std::size_t i = 0; i < patches.size(); ++i) {
+      patches[i].guesses = kept_[i].guesses;
+    }
+  }
+
+  void take_back(std::vector<PlacedPatch>& patches) { exchange(patches); }
+
+private:
+  struct OfPatch {
+    std::vector<Index> guesses;
+    std::vector<Index> attached;
+    std::vector<Residual> residuals;
+    double error = 0;
+  };
+
+  void exchange(std::vector<PlacedPatch>& patches) {
+    kept_.resize(patches.size());
+    for (std::size_t i = 0; i < patches.size(); ++i) {
+      std::swap(kept_[i].guesses, patches[i].guesses);
+      std::swap(kept_[i].attached, patches[i].attached);
+      std::swap(kept_[i].residuals, patches[i].residuals);
+      std::swap(kept_[i].error, patches[i].error);
+    }
+  }
+
+  std::vector<OfPatch> kept_;
+};
+
 }  // namespace
 
 std::array<Vec3, 2> tilt_axes(const Vec3& normal) {
@@ -234,6 +268,7 @@ void place_node(const FitSamples& samples, std::vector<PlacedPatch>& patches, co
   using Matrix = Eigen::MatrixXd;
   const auto size = static_cast<Eigen::Index>(3 + 2 * node.normals.size());
   PlacedNode best = node;
+  Findings findings;
   for (int step = 0; step < steps; ++step) {
     Matrix h = Matrix::Zero(size, size);
     Eigen::VectorXd g = Eigen::VectorXd::Zero(size);
@@ -289,6 +324,7 @@ void place_node(const FitSamples& samples, std::vector<PlacedPatch>& patches, co
         moved.normals[s] = (best.normals[s] + tilt[0] * axes[0] + tilt[1] * axes[1]).normalized();
       }
       put(patches, moved);
+      findings.put_aside(patches);
       const Measured then = measure(samples, patches, points, limits, scale, give_up);
       if (then.cost < now.cost) {
         now = then;
@@ -297,12 +333,12 @@ void place_node(const FitSamples& samples, std::vector<PlacedPatch>& patches, co
         better = true;
         break;
       }
+      findings.take_back(patches);
     }
     if (!better || now.error > hopeless * give_up) {
       break;
     }
   }
-  // The patches' residuals are those of the last trial; their owner only needs the shapes.
   put(patches, best);
   node = best;
 }

@@ -69,6 +69,7 @@ struct PlacedNode {
 /// Moves one node and turns its normals so that the patches around it come closest to the target: Gauss-Newton steps
 /// on the squares, then on the eighth powers of the residuals. Tangentially the node is held the more the better the
 /// patches fit.
+/// @param patches   out: as they are with the node at its best, with what is attached to them and their residuals
 /// @param node      in: where to start; out: the best, error = largest residual of all patches; infinite when the
 ///                  patches are not sound there
 /// @param points    of the target, to be attached each to the patch whose facet is closest
