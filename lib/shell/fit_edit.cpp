@@ -31,13 +31,13 @@ public:
     return trial.node.error;
   }
 
-  /// The same with the merged node where an earlier evaluation found it best.
+  /// The same from where an earlier evaluation found the merged node best: what surrounds it may have moved since.
   double evaluate_at(Index u, Index v, const PlacedNode& node) {
     if (!prepare(u, v)) {
       return std::numeric_limits<double>::infinity();
     }
     trial_.node = node;
-    place_node(state_.samples(), trial_.patches, trial_.points, trial_.limits, limit_, 0, trial_.node);
+    place_node(state_.samples(), trial_.patches, trial_.points, trial_.limits, limit_, 1, trial_.node);
     return trial_.node.error;
   }
 
