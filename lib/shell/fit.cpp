@@ -331,17 +331,23 @@ private:
   bool make_certain(FitSamples& samples, FitState& state, double tolerance, std::size_t most) {
     double limit = margin * tolerance;
     int stuck = 0;
+    bool held = false;
     for (int i = 0; i < certificates; ++i) {
       part_crossings(state, limit, most);
       if (certify(state, tolerance)) {
+        // Better angles are another mesh to be made certain; the result is kept meanwhile.
+        held = true;
+        FitState shaped = state;
         if (count_thin(state) > 0) {
-          FitState shaped = state;
           shape_up(samples, shaped, limit, most);
-          if (price(shaped) < price(state) && certify(shaped, tolerance)) {
-            state = std::move(shaped);
-          }
         }
-        return true;
+        if (price(shaped) >= price(state)) {
+          return true;
+        }
+        state = std::move(shaped);
+        if (certify(state, tolerance)) {
+          return true;
+        }
       }
       const double before = state.error();
       // What more samples alone do not mend gets more shells.
@@ -373,10 +379,10 @@ private:
       }
       stuck = state.error() > 0.999 * before && state.error() > limit ? stuck + 1 : 0;
       if (state.error() > hopeless * limit || stuck == patience) {
-        return certify(state, tolerance);  // a place that more shells do not mend
+        return certify(state, tolerance) || held;  // a place that more shells do not mend
       }
     }
-    return false;
+    return held;
   }
 
   void to_count(std::size_t shells) {

@@ -18,7 +18,8 @@ namespace tunica {
 namespace {
 
 constexpr std::size_t most_fits = 600;  // of pieces anew: what costs
-constexpr std::size_t most_shells = 400;
+constexpr std::size_t most_shells = 400, most_on_coarse_targets = 600;
+constexpr std::size_t coarse_target = 60;  // triangles per shell: walks on denser ones are what a piece costs
 constexpr int fewest_rings = 1, most_rings = 3;          // of nodes around a merger that move with it
 constexpr int regaining = 4;                             // steps of all nodes of a piece
 constexpr double loosened = 4;                           // limits: error of a merger before its piece is fitted anew
@@ -200,7 +201,8 @@ private:
 }  // namespace
 
 void exchange_pieces(FitSamples& samples, FitState& state, double limit, double tolerance) {
-  if (state.mesh.alive <= most_shells) {
+  const bool coarse = samples.target().mesh().triangles.size() < coarse_target * state.mesh.alive;
+  if (state.mesh.alive <= (coarse ? most_on_coarse_targets : most_shells)) {
     Exchange(samples, state, limit, tolerance).run();
   }
 }

@@ -10,7 +10,7 @@ namespace tunica {
 /// steps that bring nothing lead on to others, where a certificate of the surroundings finds nothing above `tolerance`
 /// (mm). Larger pieces once no smaller one is left that has changed since it was tried.
 /// Deterministic. Cost: at most 600 pieces are fitted anew, some 15 ms each: what is far off after a step or two is
-/// given up. Of more than 400 shells none.
+/// given up. Of more than 400 shells none, of more than 600 where the target has fewer than 60 triangles per shell.
 void exchange_pieces(FitSamples& samples, FitState& state, double limit, double tolerance);
 
 }  // namespace tunica
