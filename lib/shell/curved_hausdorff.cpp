@@ -1,7 +1,10 @@
 #include "shell/curved_hausdorff.hpp"
 
+#include "core/error.hpp"
 #include "shell/certificate.hpp"
 #include "surface/measure.hpp"
+
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <cmath>
@@ -20,10 +23,25 @@ double rounding_of(const ShellMesh& shell, const Target& target) {
   return target.tree().rounding(reach) + 256 * epsilon * (coordinate + reach);
 }
 
+/// Searches among coordinates that are no numbers would not end.
+void require_finite(const ShellMesh& shell, const std::vector<CubicPatch>& patches) {
+  for (std::size_t t = 0; t < patches.size(); ++t) {
+    const auto& control = patches[t].control;
+    if (!std::all_of(control.begin(), control.end(), [](const Vec3& p) { return p.allFinite(); })) {
+      const Vec3& at = shell.vertices[shell.triangles[t][0]];
+      throw InputError(
+          fmt::format("a triangle at ({:.6g}, {:.6g}, {:.6g}) mm has no area, or a normal in its own plane: no curved "
+                      "surface lies over it; make the mesh anew without such triangles",
+                      at.x(), at.y(), at.z()));
+    }
+  }
+}
+
 }  // namespace
 
 ShellDistance curved_hausdorff(const ShellMesh& shell, const Target& target, const ShellDistanceOptions& options) {
   const std::vector<CubicPatch> patches = curved_patches(shell);
+  require_finite(shell, patches);
   const Aim aim{options.width, options.limit, rounding_of(shell, target)};
   ShellDistance out;
   const OneSided from_shell = shell_to_target(patches, target, aim);

@@ -1,5 +1,6 @@
 #include "shell/fit.hpp"
 
+#include "core/error.hpp"
 #include "shell/curved_surface.hpp"
 #include "shell/fit_cross.hpp"
 #include "shell/fit_detach.hpp"
@@ -623,6 +624,15 @@ private:
       decimating.triangles = most;
     }
     const DecimateResult flat = decimate(target_.mesh(), decimating);
+    const auto normals = facet_normals(flat.mesh);
+    const bool without_area =
+        std::any_of(normals.begin(), normals.end(), [](const Vec3& n) { return n.squaredNorm() < 0.5; });
+    if (without_area && none) {
+      throw InputError("too many triangles without area: no shells are left without them; make the surface anew");
+    }
+    if (without_area) {
+      return;
+    }
     ShellMesh shell = flat_shells(flat.mesh, options_.surface);
     ShellDistanceOptions measuring;
     measuring.width = width_;

@@ -19,11 +19,11 @@ namespace {
 
 constexpr std::size_t most_fits = 600;  // of pieces anew: what costs
 constexpr std::size_t most_shells = 400, most_on_coarse_targets = 600;
-constexpr std::size_t coarse_target = 60;  // triangles per shell: walks on denser ones are what a piece costs
-constexpr int fewest_rings = 1, most_rings = 3;          // of nodes around a merger that move with it
-constexpr int regaining = 4;                             // steps of all nodes of a piece
-constexpr double loosened = 4;                           // limits: error of a merger before its piece is fitted anew
-constexpr double thin_angle = 5;                         // degrees, for the time being
+constexpr std::size_t coarse_target = 60;        // triangles per shell: walks on denser ones are what a piece costs
+constexpr int fewest_rings = 1, most_rings = 3;  // of nodes around a merger that move with it
+constexpr int regaining = 4;                     // steps of all nodes of a piece
+constexpr double loosened = 4;                   // limits: error of a merger before its piece is fitted anew
+constexpr double thin_angle = 5;                 // degrees, for the time being
 constexpr double promising = 1.5, promising_soon = 1.2;  // limits: after one step, and later: more hardly ever recovers
 constexpr double slow = 0.97;                            // of the error is left by a step that brings little
 constexpr int certificates = 3;                          // per change

@@ -1,5 +1,6 @@
 #include "shell/fit_place.hpp"
 
+#include "core/progress.hpp"
 #include "shell/normal_equations.hpp"
 #include "surface/facet_distances.hpp"
 #include "surface/measure.hpp"
@@ -258,6 +259,7 @@ void add_creased(const PlacedPatch& p, const StepWeight& weights, Eigen::MatrixX
 
 void place_node(const FitSamples& samples, std::vector<PlacedPatch>& patches, const std::vector<Index>& points,
                 const FitLimits& limits, double give_up, int steps, PlacedNode& node) {
+  check_interrupt();  // all that takes long comes by here
   put(patches, node);
   const double scale = samples.target().diagonal();
   Measured now = measure(samples, patches, points, limits, scale, give_up);

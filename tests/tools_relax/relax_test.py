@@ -390,6 +390,15 @@ class Fit(Case):
         self.assertIn("pieces, holes and handles", error)
         self.assertEqual(len(read_ply(self.out + ".part")[1]), 6)
 
+    def test_triangles_without_area_are_3(self):
+        line, points = self.path("line.ply"), np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [4.0, 0, 0]])
+        write_ply(line, points, [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]])
+        for rules in (["--shells", 4], ["--tolerance", "1%"], ["--refine", "--tolerance", "1%"],
+                      ["--surface", "watertight", "--tolerance", "1%"]):
+            _, error = self.relax(line, line, self.out, *rules, expect=3)
+            self.assertRegex(error, "no area|without area")
+            self.assertFalse(os.path.exists(self.out))
+
     def test_more_shells_than_the_target_has_triangles_are_the_target(self):
         record, _ = self.relax(self.target, self.target, self.out, "--shells", 100000)
         self.assertEqual(record["result"]["shells"], 5120)
