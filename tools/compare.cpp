@@ -272,11 +272,13 @@ void run(cli::Tool& tool, const Arguments& given) {
        {{"a", {distance.worst_a.x(), distance.worst_a.y(), distance.worst_a.z()}},
         {"b", {distance.worst_b.x(), distance.worst_b.y(), distance.worst_b.z()}}}},
   };
-  tool.note(fmt::format("distance {:.6g} to {:.6g} mm ({:.4f} to {:.4f} %), mean {:.4f} %, rms {:.4f} %",
-                        distance.both.lower, distance.both.upper, percent * distance.both.lower,
-                        percent * distance.both.upper, percent * distance.mean, percent * distance.rms));
+  const std::string means = std::isfinite(distance.mean) ? fmt::format(", mean {:.4f} %, rms {:.4f} %",
+                                                                       percent * distance.mean, percent * distance.rms)
+                                                         : ", no mean over a surface without area";
+  tool.note(fmt::format("distance {:.6g} to {:.6g} mm ({:.4f} to {:.4f} %){}", distance.both.lower, distance.both.upper,
+                        percent * distance.both.lower, percent * distance.both.upper, means));
   if (distance.both.upper - distance.both.lower > 1.01 * width) {
-    tool.warn("the interval is wider than asked for: the work would have passed its bound");
+    tool.warn("the interval is wider than asked for: rounding allows no less, or the work would have passed its bound");
   }
   write_outputs(tool, given, a, b, distance, diagonal_mm);
   if (limit && distance.both.upper > *limit) {

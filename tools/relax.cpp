@@ -84,8 +84,8 @@ void refuse_contradictions(const Arguments& given) {
   if (given.shells && given.max_shells) {
     throw UsageError("--shells and --max-shells say the same to --method fit; give one of them");
   }
-  if (given.max_shells && !given.refine) {
-    throw UsageError("--max-shells limits --refine; without it the number of shells does not change");
+  if (given.max_shells && !given.refine && !(fit && given.tolerance)) {
+    throw UsageError("--max-shells limits --refine, or a fit to a --tolerance; else the number of shells is given");
   }
   if (given.refine && !given.tolerance && !given.max_shells && !given.max_iterations) {
     throw UsageError("--refine needs to know where to end: --tolerance, --max-shells or --max-iterations");
