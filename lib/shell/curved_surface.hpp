@@ -54,6 +54,9 @@ Deflection comas_deflection(const std::array<Vec3, 3>& corners, const std::array
 /// Limits: the normals are not opposite, and neither is along the edge.
 Vec3 watertight_edge_point(const Vec3& here, const Vec3& there, const std::array<Vec3, 2>& normals);
 
+/// For each edge of a triangle, from corner k to k + 1, the unit normals at its two ends that lie across it.
+using NormalsAcross = std::array<std::array<Vec3, 2>, 3>;
+
 /// The watertight patch over a facet: edge curves by watertight_edge_point(), so that neighbours meet exactly; the
 /// centre follows the edges as in the comas patch, coordinate by coordinate (a plane is kept, what is quadratic over
 /// the facet met to the fourth order).
@@ -62,7 +65,6 @@ Vec3 watertight_edge_point(const Vec3& here, const Vec3& there, const std::array
 /// the edge; where they are this triangle's own, or there is none, the edge is smooth
 /// Source: the layout of Vlachos et al., Curved PN triangles, I3D 2001, with lengths of the tangents for arcs (theirs
 /// err 2 to 6 times as much) and the centre of Comas, Duriez, Cotin 2010, eq. 1.
-using NormalsAcross = std::array<std::array<Vec3, 2>, 3>;
 CubicPatch watertight_patch(const std::array<Vec3, 3>& corners, const std::array<Vec3, 3>& normals,
                             const NormalsAcross& across);
 

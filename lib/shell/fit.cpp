@@ -338,10 +338,11 @@ private:
       if (certify(state, tolerance)) {
         // Better angles are another mesh to be made certain; the result is kept meanwhile.
         held = true;
-        FitState shaped = state;
-        if (count_thin(state) > 0) {
-          shape_up(samples, shaped, limit, most);
+        if (count_thin(state) == 0) {
+          return true;
         }
+        FitState shaped = state;
+        shape_up(samples, shaped, limit, most);
         if (price(shaped) >= price(state)) {
           return true;
         }
