@@ -19,6 +19,9 @@ namespace {
 
 /// The greedy order's next collapses, of the triangles: from them comes what is spent where the error is largest.
 constexpr double more_collapses = 0.1;
+/// Where more than this share of the triangles stays, collapses are measured as they are made: finding the places that
+/// levelling should mend would take longer than all of them.
+constexpr double much = 0.25;
 /// For an error, levelling is tried down to this share of the triangles that do without, in so many steps.
 constexpr double least_levelled = 0.4;
 constexpr int level_steps = 6;
@@ -287,7 +290,12 @@ private:
 }  // namespace
 
 DecimateResult decimate(const TriangleMesh& mesh, const DecimateOptions& options) {
-  EdgeCollapse collapse(mesh, options.min_angle ? EdgeCollapse::Aim::good_shape : EdgeCollapse::Aim::least_error);
+  const bool much_stays =
+      options.levelled && !options.max_error && !options.min_angle &&
+      static_cast<double>(options.triangles.value_or(0)) > much * static_cast<double>(mesh.triangles.size());
+  EdgeCollapse collapse(mesh, options.min_angle ? EdgeCollapse::Aim::good_shape
+                              : much_stays      ? EdgeCollapse::Aim::few_collapses
+                                                : EdgeCollapse::Aim::least_error);
   if (!collapse.is_fit()) {
     refuse(mesh);
   }
@@ -307,7 +315,8 @@ DecimateResult decimate(const TriangleMesh& mesh, const DecimateOptions& options
     result = ErrorSearch(mesh, collapse, *options.max_error, options.levelled).run(part(collapsing, 1));
   } else {
     const std::size_t steps = collapse.history().size();
-    if (options.levelled && steps > 0 && collapse.history().back().triangles_left <= *options.triangles) {
+    if (options.levelled && !much_stays && steps > 0 &&
+        collapse.history().back().triangles_left <= *options.triangles) {
       collapse.run(static_cast<std::size_t>((1 - more_collapses) * static_cast<double>(*options.triangles)), {});
       result.mesh = level(mesh, collapse, steps);
     } else {

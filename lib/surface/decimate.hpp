@@ -11,7 +11,7 @@ struct DecimateOptions {
   std::optional<std::size_t> triangles;  ///< at most this many
   std::optional<double> max_error;       ///< mm: two-sided Hausdorff distance to the input, certainly at most this
   std::optional<double> min_angle;       ///< degrees, at most 40: no angle smaller, at the price of a larger error
-  bool levelled = true;  ///< without `min_angle`: the largest error is lessened at the count, see levelled()
+  bool levelled = true;                  ///< without `min_angle`: the largest error is lessened, see below
   Progress progress;
 };
 
@@ -25,7 +25,8 @@ struct DecimateResult {
 };
 
 /// Fewer triangles for the same surface, by quadric edge collapse with optimal placement (see EdgeCollapse).
-/// With `triangles` only: stops at that count, then lessens the largest error there (see levelled()). With `max_error`
+/// With `triangles` only: stops at that count, then lessens the largest error there (see levelled()); where more than a
+/// quarter of the triangles stays, collapses are measured before they are made instead. With `max_error`
 /// only: the fewest triangles found whose certified distance holds, levelled where that allows fewer. With both: as
 /// with `triangles`; when the error does not allow that count, the fewest that it allows. With `min_angle` triangles
 /// are well shaped (mean radius ratio about 0.87), see shaped(); the count stays. The mesh comes back also when a
