@@ -75,11 +75,12 @@ TriangleMesh replay(const TriangleMesh& mesh, const std::vector<Collapse>& histo
 
 // The mesh after the first `steps` collapses, its largest error lessened at that count; what the history says to
 // collapse next is what may be spent on that.
-TriangleMesh level(const TriangleMesh& mesh, const EdgeCollapse& collapse, std::size_t steps) {
+TriangleMesh level(const TriangleMesh& mesh, const EdgeCollapse& collapse, std::size_t steps, bool thorough) {
   const std::vector<Collapse>& history = collapse.history();
   LevellingOptions options;
   const TriangleMesh coarse = replay(mesh, history, steps, &options.origins);
   options.triangles = coarse.triangles.size();
+  options.thorough = thorough;
   options.closed = !collapse.has_boundary();
   const auto end = static_cast<std::size_t>((1 - more_collapses) * static_cast<double>(options.triangles));
   for (std::size_t i = steps; i < history.size() && history[i].triangles_left >= end; ++i) {
@@ -151,7 +152,7 @@ private:
         return;
       }
       const auto steps = static_cast<std::size_t>(found + 1 - history_.begin());
-      (accept(level(mesh_, collapse_, steps)) ? holds : fails) = middle;
+      (accept(level(mesh_, collapse_, steps, true)) ? holds : fails) = middle;
     }
   }
 
@@ -318,7 +319,7 @@ DecimateResult decimate(const TriangleMesh& mesh, const DecimateOptions& options
     if (options.levelled && !much_stays && steps > 0 &&
         collapse.history().back().triangles_left <= *options.triangles) {
       collapse.run(static_cast<std::size_t>((1 - more_collapses) * static_cast<double>(*options.triangles)), {});
-      result.mesh = level(mesh, collapse, steps);
+      result.mesh = level(mesh, collapse, steps, false);
     } else {
       result.mesh = replay(mesh, collapse.history(), steps);
     }

@@ -33,11 +33,21 @@ std::size_t work_of(const PatchTrial& trial) {
   return trial.corners.size() * (trial.samples.size() + 3 * work_per_query);
 }
 constexpr std::size_t least_work = 150'000;
-constexpr std::size_t work_per_collapsed = 35;            // triangle of the target
-constexpr std::size_t work_per_triangle = 25;             // of the target, at least: the worst places have to be found
+constexpr std::size_t work_per_collapsed = 35;  // triangle of the target
+constexpr std::size_t work_per_triangle = 25;   // of the target, at least: the worst places have to be found
+// Where much stays the collapses took little time, and half of that work does: from the first share of the target's
+// triangles on ever less, from the second on half.
+constexpr std::array<double, 2> much_stays{0.05, 0.1};
 constexpr std::size_t shaped_work_per_triangle = 20'000;  // of the mesh, where shape counts
-constexpr double good_shape_weight = 0.3;                 // of the lack of radius ratio, where shape counts
-constexpr double hard_angle_weight = 1e6;                 // so that no angle gets too small
+std::size_t levelling_work(std::size_t given, std::size_t left, bool thorough) {
+  const std::size_t collapsed = given - std::min(given, left);
+  const std::size_t work = std::max({least_work, work_per_collapsed * collapsed, work_per_triangle * given});
+  const double share = static_cast<double>(left) / static_cast<double>(given);
+  const double much = thorough ? 0 : std::clamp((share - much_stays[0]) / (much_stays[1] - much_stays[0]), 0.0, 1.0);
+  return static_cast<std::size_t>((1 - 0.5 * much) * static_cast<double>(work));
+}
+constexpr double good_shape_weight = 0.3;  // of the lack of radius ratio, where shape counts
+constexpr double hard_angle_weight = 1e6;  // so that no angle gets too small
 
 /// The target's points that the mesh is to be close to, each with the triangle of the mesh nearest to it. Owners come
 /// from around the vertex that the point was merged into; points that look far off are looked at again.
@@ -487,8 +497,7 @@ TriangleMesh levelled(const TriangleMesh& mesh, const TriangleMesh& target, cons
   plan.weights.fold_cosine = -0.9;
   plan.known = Leveller::Known::by_samples;
   plan.triangles = options.triangles;
-  const std::size_t collapsed = target.triangles.size() - std::min(target.triangles.size(), mesh.triangles.size());
-  plan.work = std::max({least_work, work_per_collapsed * collapsed, work_per_triangle * target.triangles.size()});
+  plan.work = levelling_work(target.triangles.size(), mesh.triangles.size(), options.thorough);
   plan.diagonal = diagonal(target);
   ShapedMesh state(mesh, target, nearest, Sampling(mesh, target, options.origins).samples(), curves);
   state.measure_corners(plan.near_by);

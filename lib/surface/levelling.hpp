@@ -19,6 +19,7 @@ struct DecimationOrigins {
 struct LevellingOptions {
   std::size_t triangles = 0;             ///< at most this many; those that are missing are made use of
   bool closed = false;                   ///< whether it is known that there is no boundary
+  bool thorough = false;                 ///< works as much where many triangles are left as where few are
   std::vector<CheapCollapse> collapses;  ///< cheapest first
   DecimationOrigins origins;
 };
