@@ -2,6 +2,7 @@
 #include "shell/relax.hpp"
 #include "cli/tool.hpp"
 #include "cli/usage.hpp"
+#include "core/quantity.hpp"
 #include "io/mesh_file.hpp"
 #include "io/picture.hpp"
 #include "shell/curved_surface.hpp"
@@ -23,7 +24,8 @@ namespace {
 constexpr double interval_width = 1e-4;  // of the diagonal: what the report certifies
 constexpr double rounding = 1e-9;        // of the diagonal: by which a certified interval may be wider than asked
 constexpr double curved_deviation =
-    0.8e-5;  // of the diagonal; the contract of --curved, 1e-5, may be taken of either surface
+    0.8e-5;                          // of the diagonal; the contract of --curved, 1e-5, may be taken of either surface
+constexpr double largest_kink = 90;  // degrees
 constexpr std::size_t map_triangles = 200'000;
 
 struct Arguments {
@@ -35,6 +37,7 @@ struct Arguments {
   std::optional<std::string> mesh_unit;
   bool refine = false;
   std::optional<std::size_t> shells, max_shells;
+  std::optional<std::string> kink;
   std::optional<int> max_iterations;
 };
 
@@ -62,6 +65,11 @@ void declare(cli::Tool& tool, Arguments& given) {
       ->check(cli::whole_number(1))
       ->type_name("N");
   app.add_option("--max-shells", given.max_shells, "at most N shells")->check(cli::whole_number(1))->type_name("N");
+  app.add_option(
+         "--kink", given.kink,
+         "fit to a --tolerance, comas: degrees by which the normals of shells that meet at a node may part where "
+         "that saves shells (default 45; 0: only creases have several normals)")
+      ->type_name("DEG");
   app.add_option("--max-iterations", given.max_iterations,
                  "at most N iterations (barycentre: 20, with --refine 60; fit: 8 rounds, or 1 to many shells on a "
                  "smooth target)")
@@ -87,9 +95,25 @@ void refuse_contradictions(const Arguments& given) {
   if (given.max_shells && !given.refine && !(fit && given.tolerance)) {
     throw UsageError("--max-shells limits --refine, or a fit to a --tolerance; else the number of shells is given");
   }
+  if (given.kink && (!fit || !given.tolerance || given.refine || given.surface != "comas")) {
+    throw UsageError("--kink belongs to --method fit with --tolerance, without --refine, and comas patches");
+  }
   if (given.refine && !given.tolerance && !given.max_shells && !given.max_iterations) {
     throw UsageError("--refine needs to know where to end: --tolerance, --max-shells or --max-iterations");
   }
+}
+
+/// Degrees.
+std::optional<double> kink(const Arguments& given) {
+  if (!given.kink) {
+    return {};
+  }
+  const auto number = parse_number(*given.kink);
+  if (!number || !(*number >= 0) || *number > largest_kink) {
+    throw UsageError(
+        fmt::format("--kink: '{}' is not a number of degrees from 0 to {:.0f}", *given.kink, largest_kink));
+  }
+  return number;
 }
 
 struct Surface {
@@ -171,6 +195,7 @@ void write_maps(cli::Tool& tool, const Arguments& given, const ShellMesh& shell,
 
 void run(cli::Tool& tool, const Arguments& given) {
   refuse_contradictions(given);
+  const auto largest_part = kink(given);
   tool.output(given.out, {".ply"});
   for (const auto& [path, ending] : {std::pair(given.map, ".ply"), {given.picture, ".png"}, {given.curved, ".ply"}}) {
     if (path) {
@@ -211,6 +236,7 @@ void run(cli::Tool& tool, const Arguments& given) {
   options.shells = given.shells;
   options.max_shells = given.max_shells;
   options.max_iterations = given.max_iterations;
+  options.kink = largest_part.value_or(options.kink);
   options.width = interval_width * diagonal;
   options.progress = tool.progress("relax");
   if (given.tolerance) {

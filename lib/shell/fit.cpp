@@ -3,11 +3,11 @@
 #include "core/error.hpp"
 #include "shell/curved_surface.hpp"
 #include "shell/fit_cross.hpp"
-#include "shell/fit_detach.hpp"
 #include "shell/fit_edit.hpp"
 #include "shell/fit_exchange.hpp"
 #include "shell/fit_missed.hpp"
 #include "shell/fit_parts.hpp"
+#include "shell/fit_polish.hpp"
 #include "shell/fit_shape.hpp"
 #include "shell/fit_squeeze.hpp"
 #include "shell/fit_start.hpp"
@@ -49,12 +49,12 @@ constexpr double mistrusted = 1.15;      // times the samples' error: a certifie
 constexpr int rough_certificates = 3;
 constexpr double worth_mending = 0.97;  // of the certified distance, by what it missed
 constexpr int most_settling = 20, some_settling = 4;
-constexpr int most_repairs = 12;
 constexpr double clearly_below = 0.99;
 constexpr int certificates = 10;
-constexpr double hopeless = 2;       // times the limit: more shells will not mend it
-constexpr double noted_width = 1.5;  // of the error, on the way
-constexpr int local_mending = 3;     // certificates, before less error is asked for everywhere
+constexpr double hopeless = 2;          // times the limit: more shells will not mend it
+constexpr double worth_a_search = 1.5;  // tolerances: error of as many shells as are allowed
+constexpr double noted_width = 1.5;     // of the error, on the way
+constexpr int local_mending = 3;        // certificates, before less error is asked for everywhere
 constexpr double most_tightening = 0.95, least_tightening = 0.985;  // of the limit, where certificates find more
 constexpr std::array<double, 6> parts_of_tolerance{0.95, 0.9, 0.8, 0.65, 0.5, 0.25};  // to part sheets that cross
 constexpr double good_enough_angle = 0.9;                                             // of the limit
@@ -83,13 +83,14 @@ public:
       result_.stopped = "the tolerance holds";
       return std::move(result_);
     }
-    // When the shells allowed do not do, nothing has to be said about fewer.
     if (most) {
       to_count(*most);
-    }
-    if (!most || result_.distance.both.upper <= *options_.tolerance) {
+      if (result_.distance.both.upper <= worth_a_search * *options_.tolerance) {
+        take_fewest(*most);
+      }
+    } else {
       to_tolerance(*options_.tolerance);
-      part_sheets(most.value_or(max_index));
+      part_sheets(max_index);
     }
     result_.reached = result_.distance.both.upper <= *options_.tolerance;
     result_.stopped = *result_.reached ? "the tolerance holds" : "closer shells were not found";
@@ -97,6 +98,21 @@ public:
   }
 
 private:
+  /// The result of a search without regard to how many shells there may be, where these are so few.
+  void take_fewest(std::size_t most) {
+    Fitting fewest(coarse_, target_, options_);
+    fewest.to_tolerance(*options_.tolerance);
+    fewest.part_sheets(most);
+    RelaxResult& found = fewest.result_;
+    result_.iterations.insert(result_.iterations.end(), found.iterations.begin(), found.iterations.end());
+    const bool held = result_.distance.both.upper <= *options_.tolerance;
+    const std::size_t enough = held ? result_.shell.triangles.size() - 1 : most;
+    if (found.distance.both.upper <= *options_.tolerance && found.shell.triangles.size() <= enough) {
+      result_.shell = std::move(found.shell);
+      result_.distance = found.distance;
+    }
+  }
+
   /// Where sheets of the target are closer to each other than the tolerance, patches may cross that nothing parts any
   /// more. A somewhat smaller error is another search, a much smaller one parts them where they have room.
   void part_sheets(std::size_t most) {
@@ -254,6 +270,9 @@ private:
         part_crossings(state, limit, most);
         squeeze(samples, state, limit);
         exchange_pieces(samples, state, limit, tolerance);
+        if (options_.kink > 0 && options_.surface == Patch::comas) {
+          exchange_parted(samples, state, limit, tolerance, options_.kink);
+        }
       }
       shape_up(samples, state, limit, most);
       // What the certificate asked for may have made triangles thin: then the next best is looked at as well.
@@ -508,72 +527,6 @@ private:
   }
 
   static std::size_t guess(double shells) { return static_cast<std::size_t>(std::max(8.0, shells)); }
-
-  /// From slivers to triangles that carry patches.
-  /// @param creased  mm: patches farther off may get normals of their own
-  static void smooth(FitState& state, double limit, double creased) {
-    state.attach();
-    state.measure();
-    for (int i = 0; i < 3; ++i) {
-      flip_edges(state, limit);
-      state.solve(2, 3);
-      place_worst(state, std::max(limit, 0.3 * state.error()));
-      if (i > 0) {
-        detach_worst(state, creased);
-      }
-      state.attach_again();
-      state.measure();
-    }
-  }
-
-  /// The state must have been attached and measured, and is so in the end.
-  static void polish(FitState& state, double limit, int steps) {
-    for (int i = 0; i < steps; ++i) {
-      if (i > 0) {
-        state.attach_again();
-        state.measure();
-      }
-      flip_edges(state, limit);
-      state.solve(i == 0 && steps > 1 ? 4 : 8, 1);
-    }
-    place_worst(state, 0.9 * limit);
-    detach_worst(state, limit);
-    state.attach_again();
-    state.measure();
-  }
-
-  /// Polishes until that brings little.
-  static void settle(FitState& state, int most) {
-    state.attach();
-    state.measure();
-    int fruitless = 0;
-    FitState best = state;
-    for (int i = 0; i < most && fruitless < patience; ++i) {
-      polish(state, 0.95 * state.error(), 1);
-      fruitless = state.error() < 0.98 * best.error() ? 0 : fruitless + 1;
-      if (state.error() < best.error()) {
-        best = state;
-      }
-    }
-    state = std::move(best);
-  }
-
-  static void repair(FitState& state, double limit, std::size_t most) {
-    double best = state.error();
-    int fruitless = 0;
-    for (int i = 0; i < most_repairs && fruitless < patience && state.error() > limit && state.mesh.alive + 2 <= most;
-         ++i) {
-      const std::size_t some = std::max<std::size_t>(1, std::min(state.mesh.alive / 20, (most - state.mesh.alive) / 2));
-      if (split_worst(state, limit, i < 2 ? std::max<std::size_t>(some, state.mesh.alive / 4) : some) == 0) {
-        break;
-      }
-      state.attach();
-      state.measure();
-      polish(state, limit, 2);
-      fruitless = state.error() < worth_it * best ? 0 : fruitless + 1;
-      best = std::min(best, state.error());
-    }
-  }
 
   /// Takes the mesh as the result when it is better. @return whether the tolerance certainly holds
   bool certify(const FitState& state, std::optional<double> tolerance) {

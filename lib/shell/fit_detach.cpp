@@ -69,18 +69,32 @@ std::size_t detach_worst(FitState& state, double limit) {
     }
     const auto old_slots = mesh.slots[t];
     for (std::size_t k = 0; k < 3; ++k) {
-      mesh.slots[t][k] = static_cast<Index>(mesh.normals.size());
-      mesh.normals.push_back(patch.shape.normals[k]);
+      mesh.slots[t][k] = mesh.add_slot(patch.shape.normals[k], mesh.fresh_sector(mesh.triangles[t][k]));
     }
     if (mesh.kind == Patch::watertight && !neighbours_bear(state, t, std::max(limit, worth_a_crease * before))) {
       mesh.slots[t] = old_slots;
       mesh.normals.resize(mesh.normals.size() - 3);
+      mesh.sectors.resize(mesh.normals.size());
       continue;
     }
     state.patches[t] = {std::move(patch.guesses), std::move(patch.attached), std::move(patch.residuals), patch.error};
     ++detached;
   }
   return detached;
+}
+
+void part_normals(FitState& state) {
+  FitMesh& mesh = state.mesh;
+  std::vector<std::uint8_t> taken(mesh.normals.size(), 0);
+  for (Index t = 0; t < mesh.triangles.size(); ++t) {
+    for (std::size_t k = 0; mesh.is_alive(t) && k < 3; ++k) {
+      const Index s = mesh.slots[t][k];
+      if (taken[s] != 0) {
+        mesh.slots[t][k] = mesh.add_slot(mesh.normals[s], mesh.sectors[s]);
+      }
+      taken[s] = 1;
+    }
+  }
 }
 
 }  // namespace tunica

@@ -9,4 +9,7 @@ namespace tunica {
 /// neighbours of a watertight patch, which share its edges, must bear that. @return how many
 std::size_t detach_worst(FitState& state, double limit);
 
+/// Gives every corner a normal of its own. They start alike, and part by at most FitLimits::kink.
+void part_normals(FitState& state);
+
 }  // namespace tunica

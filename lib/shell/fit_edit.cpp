@@ -57,6 +57,7 @@ public:
     for (std::size_t s = 0; s < trial.node.normals.size(); ++s) {
       slot_of.push_back(classes_[s]);
       mesh_.normals[classes_[s]] = trial.node.normals[s];
+      mesh_.sectors[classes_[s]] = trial.node.sectors[s];
     }
     for (const Index t : mesh_.around[v]) {
       mesh_.triangles[t][mesh_.corner_of(t, v)] = u;
@@ -95,6 +96,22 @@ private:
     return ring_u_.size() + ring_v_.size() >= on_edge + 2 + 3;
   }
 
+  /// Which sector of the merged node one of u's or v's becomes: those that meet across the edge are one.
+  auto merged_sectors(Index u, Index v, const FitMesh::Pair& shared) {
+    const Index beyond = mesh_.fresh_sector(u);
+    std::vector<Index> merged(beyond + mesh_.fresh_sector(v));
+    std::iota(merged.begin(), merged.end(), 0);
+    for (std::size_t i = 0; i < shared.count(); ++i) {
+      const Index t = shared.triangle[i];
+      const Index a = merged[mesh_.sectors[mesh_.slots[t][mesh_.corner_of(t, u)]]];
+      const Index b = merged[beyond + mesh_.sectors[mesh_.slots[t][mesh_.corner_of(t, v)]]];
+      std::replace(merged.begin(), merged.end(), b, a);
+    }
+    return [this, beyond, merged = std::move(merged)](Index slot, bool of_v) {
+      return merged[mesh_.sectors[slot] + (of_v ? beyond : 0)];
+    };
+  }
+
   /// The slots of the merged node: those of u and v, the ones that meet across the edge being one. A crease
   /// may end so: the error decides.
   void merge_slots(Index u, Index v, const FitMesh::Pair& shared) {
@@ -122,9 +139,12 @@ private:
       }
     }
     classes_.clear();
+    sectors_.clear();
+    const auto sector = merged_sectors(u, v, shared);
     for (const auto& p : parent) {
       if (std::find(classes_.begin(), classes_.end(), p.second) == classes_.end()) {
         classes_.push_back(p.second);
+        sectors_.push_back(sector(p.second, std::find(of_u.begin(), of_u.end(), p.second) == of_u.end()));
       }
     }
     class_of_ = parent;
@@ -173,6 +193,7 @@ private:
     link(state_, nodes_, replaced_, trial);
     // Start: what is special about one end decides, else the middle.
     trial.node = {};
+    trial.node.sectors = sectors_;
     const int rank_u = special(u), rank_v = special(v);
     for (const Vec3& sum : sums) {
       trial.node.normals.push_back(sum.norm() > 1e-3 ? Vec3(sum.normalized()) : mesh_.normals[classes_[0]]);
@@ -237,6 +258,7 @@ private:
   std::vector<Index> ring_u_, ring_v_, common_;
   std::vector<std::array<Index, 3>> nodes_;
   std::vector<Index> replaced_;
+  std::vector<Index> sectors_;                     // of each class
   std::vector<Index> classes_;                     // slot that stands for each class
   std::vector<std::pair<Index, Index>> class_of_;  // slot, the one that stands for its class
 };
@@ -420,8 +442,11 @@ bool split_edge(FitState& state, Index u, Index v, double limit) {
     const auto same = std::find(sides.begin(), sides.end(), side);
     if (same == sides.end()) {
       slot = sides.size();
+      const bool smooth = slot == 0 || (mesh.sectors[side[0]] == mesh.sectors[sides[0][0]] &&
+                                        mesh.sectors[side[1]] == mesh.sectors[sides[0][1]]);
       sides.push_back(side);
       trial.node.normals.push_back(patch.normal(mid));
+      trial.node.sectors.push_back(smooth ? 0 : 1);
     } else {
       slot = static_cast<std::size_t>(same - sides.begin());
       trial.node.normals[slot] = (trial.node.normals[slot] + patch.normal(mid)).normalized();
@@ -467,8 +492,8 @@ bool split_edge(FitState& state, Index u, Index v, double limit) {
   mesh.positions.push_back(trial.node.position);
   mesh.on_boundary.push_back(count == 1 ? 1 : 0);
   mesh.around.emplace_back();
-  for (const Vec3& n : trial.node.normals) {
-    mesh.normals.push_back(n);
+  for (std::size_t s = 0; s < trial.node.normals.size(); ++s) {
+    mesh.add_slot(trial.node.normals[s], trial.node.sectors[s]);
   }
   for (std::size_t i = 0; i < trial.patches.size(); ++i) {
     const Index t = mesh.add_triangle(nodes[i], slots[i]);
@@ -489,7 +514,9 @@ bool place_with_slots(FitState& state, Index v, const Vec3& start, const std::ve
   trial.limits = state.limits;
   trial.node.position = start;
   trial.node.normals.assign(*std::max_element(merged.begin(), merged.end()) + 1, Vec3::Zero());
-  for (std::size_t s = 0; s < own.size(); ++s) {
+  trial.node.sectors.resize(trial.node.normals.size());
+  for (std::size_t s = own.size(); s-- > 0;) {
+    trial.node.sectors[merged[s]] = mesh.sectors[own[s]];
     trial.node.normals[merged[s]] += mesh.normals[own[s]];
   }
   for (Vec3& n : trial.node.normals) {
@@ -524,6 +551,7 @@ bool place_with_slots(FitState& state, Index v, const Vec3& start, const std::ve
   mesh.positions[v] = trial.node.position;
   for (std::size_t s = 0; s < trial.node.normals.size(); ++s) {
     mesh.normals[own[s]] = trial.node.normals[s];
+    mesh.sectors[own[s]] = trial.node.sectors[s];
   }
   for (std::size_t i = 0; i < trial.triangles.size(); ++i) {
     PlacedPatch& p = trial.patches[i];
@@ -533,17 +561,22 @@ bool place_with_slots(FitState& state, Index v, const Vec3& start, const std::ve
   return true;
 }
 
-/// All ways to make one of two slots of a node.
-std::vector<std::vector<std::size_t>> pairs_merged(std::size_t count) {
-  std::vector<std::vector<std::size_t>> out;
-  for (std::size_t i = 0; i < count; ++i) {
-    for (std::size_t j = i + 1; j < count; ++j) {
-      std::vector<std::size_t> merged(count);
-      for (std::size_t s = 0; s < count; ++s) {
+/// All ways to make one of two slots of a node, the most alike first.
+std::vector<std::vector<std::size_t>> pairs_merged(const FitMesh& mesh, const std::vector<Index>& own) {
+  std::vector<std::pair<double, std::vector<std::size_t>>> ways;
+  for (std::size_t i = 0; i < own.size(); ++i) {
+    for (std::size_t j = i + 1; j < own.size(); ++j) {
+      std::vector<std::size_t> merged(own.size());
+      for (std::size_t s = 0; s < own.size(); ++s) {
         merged[s] = s == j ? i : s > j ? s - 1 : s;
       }
-      out.push_back(std::move(merged));
+      ways.emplace_back(mesh.normals[own[i]].dot(mesh.normals[own[j]]), std::move(merged));
     }
+  }
+  std::stable_sort(ways.begin(), ways.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::vector<std::vector<std::size_t>> out;
+  for (auto& way : ways) {
+    out.push_back(std::move(way.second));
   }
   return out;
 }
@@ -578,7 +611,7 @@ std::size_t join_normals(FitState& state, double limit) {
     bool better = own.size() > 2;
     while (better && own.size() > 1) {
       better = false;
-      for (const auto& merged : pairs_merged(own.size())) {
+      for (const auto& merged : pairs_merged(mesh, own)) {
         if (place_with_slots(state, v, mesh.positions[v], own, merged, 0, limit)) {
           ++gone;
           mesh.slots_of(v, own);

@@ -3,6 +3,7 @@
 #include "shell/fit_exchange.hpp"
 
 #include "shell/fit_cross.hpp"
+#include "shell/fit_detach.hpp"
 #include "shell/fit_edit.hpp"
 #include "shell/fit_missed.hpp"
 #include "shell/fit_region.hpp"
@@ -11,6 +12,7 @@
 #include "shell/fit_worst.hpp"
 
 #include <algorithm>
+#include <array>
 #include <map>
 #include <random>
 
@@ -26,6 +28,7 @@ constexpr double loosened = 4;                   // limits: error of a merger be
 constexpr double thin_angle = 5;                 // degrees, for the time being
 constexpr double promising = 1.5, promising_soon = 1.2;  // limits: after one step, and later: more hardly ever recovers
 constexpr double slow = 0.97;                            // of the error is left by a step that brings little
+constexpr std::array<double, 3> joining{1, 0.95, 0.9};   // of the limit
 constexpr int certificates = 3;                          // per change
 
 bool recovers(FitState& piece, double limit) {
@@ -113,6 +116,9 @@ private:
     const auto in_piece = [&](Index node) {
       return static_cast<Index>(std::find(region.nodes.begin(), region.nodes.end(), node) - region.nodes.begin());
     };
+    if (state_.limits.kink > 0) {
+      part_normals(region.state);
+    }
     const std::size_t shells = region.state.mesh.alive, before = price(region.state);
     region.state.limits.angle = thin_angle;
     if (!merge_edge(region.state, in_piece(u), in_piece(v), loosened * limit_)) {
@@ -198,12 +204,46 @@ private:
   std::map<std::array<Index, 3>, std::size_t> tried_;
 };
 
+bool is_worth_it(const FitSamples& samples, const FitState& state) {
+  const bool coarse = samples.target().mesh().triangles.size() < coarse_target * state.mesh.alive;
+  return state.mesh.alive <= (coarse ? most_on_coarse_targets : most_shells);
+}
+
+/// Joins normals as long as the error allows. One after the other they may ask too much of those that follow: then
+/// with a margin.
+void join_again(FitSamples& samples, FitState& state, double limit) {
+  for (const double part : joining) {
+    FitState joined = state;
+    join_normals(joined, part * limit);
+    joined.attach();
+    joined.measure();
+    if (regains(samples, joined, limit) && price(joined) <= price(state)) {
+      state = std::move(joined);
+      return;
+    }
+  }
+}
+
 }  // namespace
 
 void exchange_pieces(FitSamples& samples, FitState& state, double limit, double tolerance) {
-  const bool coarse = samples.target().mesh().triangles.size() < coarse_target * state.mesh.alive;
-  if (state.mesh.alive <= (coarse ? most_on_coarse_targets : most_shells)) {
+  if (is_worth_it(samples, state)) {
     Exchange(samples, state, limit, tolerance).run();
+  }
+}
+
+void exchange_parted(FitSamples& samples, FitState& state, double limit, double tolerance, double kink) {
+  if (!is_worth_it(samples, state)) {
+    return;
+  }
+  FitState parted = state;
+  parted.limits.kink = kink;
+  part_normals(parted);
+  squeeze(samples, parted, limit);
+  Exchange(samples, parted, limit, tolerance).run();
+  if (price(parted) < price(state)) {
+    join_again(samples, parted, limit);
+    state = std::move(parted);
   }
 }
 

@@ -13,4 +13,9 @@ namespace tunica {
 /// given up. Of more than 400 shells none, of more than 600 where the target has fewer than 60 triangles per shell.
 void exchange_pieces(FitSamples& samples, FitState& state, double limit, double tolerance);
 
+/// The same with normals that may part, at corners that meet at a node, by `kink` degrees: every patch follows the
+/// target more closely, so that fewer do. What the limit does not ask for is joined again; the state keeps
+/// FitLimits::kink. For comas patches: the edges of watertight ones follow the normals of both sides, and gain nothing.
+void exchange_parted(FitSamples& samples, FitState& state, double limit, double tolerance, double kink);
+
 }  // namespace tunica

@@ -7,6 +7,7 @@ namespace tunica {
 FitMesh::FitMesh(const TriangleMesh& mesh, const std::vector<Vec3>& node_normals)
     : positions(mesh.vertices),
       normals(node_normals),
+      sectors(node_normals.size(), 0),
       triangles(mesh.triangles),
       slots(mesh.triangles),
       around(mesh.vertices.size()),
@@ -109,6 +110,20 @@ void FitMesh::slots_of(Index node, std::vector<Index>& out) const {
   }
   std::sort(out.begin(), out.end());
   out.erase(std::unique(out.begin(), out.end()), out.end());
+}
+
+Index FitMesh::add_slot(const Vec3& normal, Index sector) {
+  normals.push_back(normal);
+  sectors.push_back(sector);
+  return static_cast<Index>(normals.size() - 1);
+}
+
+Index FitMesh::fresh_sector(Index node) const {
+  Index fresh = 0;
+  for (const Index t : around[node]) {
+    fresh = std::max(fresh, sectors[slots[t][corner_of(t, node)]] + 1);
+  }
+  return fresh;
 }
 
 Index FitMesh::add_triangle(const std::array<Index, 3>& nodes, const std::array<Index, 3>& corner_slots) {

@@ -11,12 +11,13 @@ namespace tunica {
 
 inline constexpr Index no_index = 0xffffffff;
 
-/// A shell mesh under edit: triangles vanish and appear, nodes move, and a node may carry several normals ("slots"),
-/// one for each side of the creases that meet there. Triangles that are gone have no_index corners; their places are
-/// used again.
+/// A shell mesh under edit: triangles vanish and appear, nodes move, and a node may carry several normals ("slots"):
+/// one or more for each side ("sector") of the creases that meet there. Triangles that are gone have no_index corners;
+/// their places are used again.
 struct FitMesh {
   std::vector<Vec3> positions;                  ///< #V
   std::vector<Vec3> normals;                    ///< #S unit, one per slot
+  std::vector<Index> sectors;                   ///< #S numbers, per node, of the sides of creases that meet there
   std::vector<std::array<Index, 3>> triangles;  ///< #T nodes
   std::vector<std::array<Index, 3>> slots;      ///< #T slot of each corner; a slot belongs to one node
   std::vector<std::vector<Index>> around;       ///< #V triangles around each node; empty: the node is gone
@@ -77,6 +78,12 @@ struct FitMesh {
 
   /// The slots in use at a node, each once, ascending.
   void slots_of(Index node, std::vector<Index>& out) const;
+
+  /// One more normal. @return its slot
+  Index add_slot(const Vec3& normal, Index sector);
+
+  /// A number that no sector at the node has.
+  [[nodiscard]] Index fresh_sector(Index node) const;
 
   Index add_triangle(const std::array<Index, 3>& nodes, const std::array<Index, 3>& corner_slots);
   void remove_triangle(Index t);

@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace tunica {
 namespace {
@@ -162,6 +163,31 @@ std::array<Vec3, 2> tilt_axes(const Vec3& normal) {
   return {first, normal.cross(first)};
 }
 
+void hold_together(std::vector<Vec3>& normals, const std::vector<Index>& sectors, double kink) {
+  const double half = kink * std::numbers::pi / 360;
+  for (std::size_t i = 0; i < normals.size(); ++i) {
+    Vec3 sum = Vec3::Zero();
+    std::size_t count = 0;
+    for (std::size_t j = 0; j < normals.size(); ++j) {
+      if (sectors[j] == sectors[i]) {
+        count += j < i ? normals.size() : 1;  // done already
+        sum += normals[j];
+      }
+    }
+    if (count < 2 || count > normals.size() || !(sum.norm() > 1e-3)) {
+      continue;
+    }
+    const Vec3 mean = sum.normalized();
+    for (std::size_t j = i; j < normals.size(); ++j) {
+      const double along = normals[j].dot(mean);
+      const Vec3 beside = normals[j] - along * mean;
+      if (sectors[j] == sectors[i] && std::atan2(beside.norm(), along) > half) {
+        normals[j] = std::cos(half) * mean + std::sin(half) * beside.stableNormalized();
+      }
+    }
+  }
+}
+
 Vec3 facing_of(const std::array<Vec3, 3>& corners) {
   return (corners[1] - corners[0]).cross(corners[2] - corners[0]).stableNormalized();
 }
@@ -260,6 +286,7 @@ void add_creased(const PlacedPatch& p, const StepWeight& weights, Eigen::MatrixX
 void place_node(const FitSamples& samples, std::vector<PlacedPatch>& patches, const std::vector<Index>& points,
                 const FitLimits& limits, double give_up, int steps, PlacedNode& node) {
   check_interrupt();  // all that takes long comes by here
+  hold_together(node.normals, node.sectors, limits.kink);
   put(patches, node);
   const double scale = samples.target().diagonal();
   Measured now = measure(samples, patches, points, limits, scale, give_up);
@@ -325,6 +352,7 @@ void place_node(const FitSamples& samples, std::vector<PlacedPatch>& patches, co
         const auto axes = tilt_axes(best.normals[s]);
         moved.normals[s] = (best.normals[s] + tilt[0] * axes[0] + tilt[1] * axes[1]).normalized();
       }
+      hold_together(moved.normals, moved.sectors, limits.kink);
       put(patches, moved);
       findings.put_aside(patches);
       const Measured then = measure(samples, patches, points, limits, scale, give_up);

@@ -11,6 +11,7 @@ namespace tunica {
 struct FitLimits {
   double agreement = 0.3;  ///< N·n at its corners
   double angle = 20;       ///< degrees
+  double kink = 0;         ///< degrees by which normals of one node and sector may part
 };
 
 /// The angle, degrees, that a facet must keep whose smallest angle is `now`: the limit, or nearly what it has.
@@ -30,6 +31,10 @@ Eigen::Matrix<double, 30, 12> across_jacobian(const PatchShape& shape);
 
 /// The two directions in which a unit normal tilts.
 std::array<Vec3, 2> tilt_axes(const Vec3& normal);
+
+/// Turns those of the normals that are of one sector towards their mean where they part by more than `kink` degrees.
+/// @param normals  unit; @param sectors  of each normal
+void hold_together(std::vector<Vec3>& normals, const std::vector<Index>& sectors, double kink);
 
 /// Unit normal of a facet; zero without area.
 Vec3 facing_of(const std::array<Vec3, 3>& corners);
@@ -62,7 +67,8 @@ struct PlacedPatch {
 /// A node that is looking for its place.
 struct PlacedNode {
   Vec3 position = Vec3::Zero();
-  std::vector<Vec3> normals;  ///< one per slot
+  std::vector<Vec3> normals;   ///< one per slot
+  std::vector<Index> sectors;  ///< likewise, see FitMesh
   double error = std::numeric_limits<double>::infinity();
 };
 

@@ -74,14 +74,17 @@ FitRegion cut_out(const FitState& whole, const std::vector<Index>& nodes, int ri
     corner_slots.push_back({slot.of(s[0]), slot.of(s[1]), slot.of(s[2])});
   }
   std::vector<Vec3> normals;
+  std::vector<Index> sectors;
   for (const Index v : node.old()) {
     facets.vertices.push_back(mesh.positions[v]);
   }
   for (const Index s : slot.old()) {
     normals.push_back(mesh.normals[s]);
+    sectors.push_back(mesh.sectors[s]);
   }
   FitMesh piece(facets, normals);
   piece.slots = std::move(corner_slots);
+  piece.sectors = std::move(sectors);
   piece.kind = mesh.kind;
   piece.held.assign(node.old().size(), 1);
   for (std::size_t i = 0; i < node.old().size(); ++i) {
@@ -118,8 +121,7 @@ double put_back(const FitRegion& region, FitState& whole) {
     mesh.around.emplace_back();
   }
   for (std::size_t s = slot.size(); s < piece.normals.size(); ++s) {
-    slot.push_back(static_cast<Index>(mesh.normals.size()));
-    mesh.normals.emplace_back();
+    slot.push_back(mesh.add_slot(piece.normals[s], piece.sectors[s]));
   }
   for (std::size_t v = 0; v < node.size(); ++v) {
     mesh.positions[node[v]] = piece.positions[v];
@@ -127,6 +129,7 @@ double put_back(const FitRegion& region, FitState& whole) {
   }
   for (std::size_t s = 0; s < slot.size(); ++s) {
     mesh.normals[slot[s]] = piece.normals[s];
+    mesh.sectors[slot[s]] = piece.sectors[s];
   }
   std::vector<Index> changed;
   for (Index i = 0; i < piece.triangles.size(); ++i) {

@@ -160,7 +160,7 @@ FitMesh prepare_fit(const FitStart& start, const Target& target) {
       continue;
     }
     std::vector<Index> open = out.around[v];
-    bool first = true;
+    Index sector_number = 0;
     while (!open.empty()) {
       std::vector<Index> sector{open.back()};
       open.pop_back();
@@ -182,23 +182,22 @@ FitMesh prepare_fit(const FitStart& start, const Target& target) {
         const Vec3 b = mesh.vertices[mesh.triangles[t][(c + 2) % 3]] - mesh.vertices[v];
         normal += std::atan2(a.cross(b).norm(), a.dot(b)) * facets[t];
       }
-      if (first) {
+      if (sector_number == 0) {
         out.normals[v] = normal.normalized();
-        first = false;
+        ++sector_number;
         continue;
       }
+      const Index slot = out.add_slot(normal.normalized(), sector_number++);
       for (const Index t : sector) {
-        out.slots[t][out.corner_of(t, node)] = static_cast<Index>(out.normals.size());
+        out.slots[t][out.corner_of(t, node)] = slot;
       }
-      out.normals.emplace_back(normal.normalized());
     }
   }
   // Where facets fold so that no normal suits them, they stay flat there for the time being.
   for (Index t = 0; t < mesh.triangles.size(); ++t) {
     for (std::size_t k = 0; k < 3; ++k) {
       if (out.normals[out.slots[t][k]].dot(facets[t]) < start_agreement && facets[t].squaredNorm() > 0.5) {
-        out.slots[t][k] = static_cast<Index>(out.normals.size());
-        out.normals.push_back(facets[t]);
+        out.slots[t][k] = out.add_slot(facets[t], out.fresh_sector(mesh.triangles[t][k]));
       }
     }
   }

@@ -17,6 +17,23 @@
 namespace tunica {
 namespace {
 
+/// See hold_together() of normals alone.
+void hold_together(FitMesh& mesh, const std::vector<Index>& slots, double kink) {
+  if (slots.size() < 2) {
+    return;
+  }
+  std::vector<Vec3> normals;
+  std::vector<Index> sectors;
+  for (const Index s : slots) {
+    normals.push_back(mesh.normals[s]);
+    sectors.push_back(mesh.sectors[s]);
+  }
+  tunica::hold_together(normals, sectors, kink);
+  for (std::size_t i = 0; i < slots.size(); ++i) {
+    mesh.normals[slots[i]] = normals[i];
+  }
+}
+
 constexpr std::size_t patches_per_block = 16;
 constexpr int search_level = 3;   // pieces per edge of the surface on which points of the target find their patch
 constexpr int most_steps = 4;     // from patch to patch
@@ -486,6 +503,9 @@ double FitState::solve(int power, double smoothing) {
         const auto axes = tilt_axes(old_normals[s]);
         mesh.normals[s] = length[v] > 0 ? Vec3((old_normals[s] + tilt[0] * axes[0] + tilt[1] * axes[1]).normalized())
                                         : old_normals[s];
+      }
+      if (length[v] > 0) {
+        hold_together(mesh, of_node, limits.kink);
       }
     }
     std::vector<std::uint8_t> bad(nodes, 0);

@@ -35,8 +35,11 @@ struct RelaxOptions {
   bool refine = false;
   std::optional<std::size_t> max_shells;  ///< for refine and fit
   std::optional<std::size_t> shells;      ///< for fit: at most this many instead of as many as COARSE has
-  std::optional<int> max_iterations;      ///< none: 20, with refine 60; fit: 8 rounds, see fit()
-  std::optional<double> width;            ///< mm: of the measured intervals; none: 0.01 % of the target's diagonal
+  /// Degrees by which the normals of comas shells that meet at a node may part where that saves shells, for fit to a
+  /// tolerance: 0 where only creases may have several.
+  double kink = 45;
+  std::optional<int> max_iterations;  ///< none: 20, with refine 60; fit: 8 rounds, see fit()
+  std::optional<double> width;        ///< mm: of the measured intervals; none: 0.01 % of the target's diagonal
   /// Tells how it goes; the mesh is the best one until then.
   std::function<void(const RelaxIteration&, const ShellMesh&)> on_iteration;
   Progress progress;
