@@ -269,10 +269,7 @@ private:
       if (regains(samples, state, limit)) {
         part_crossings(state, limit, most);
         squeeze(samples, state, limit);
-        exchange_pieces(samples, state, limit, tolerance);
-        if (options_.kink > 0 && options_.surface == Patch::comas) {
-          exchange_parted(samples, state, limit, tolerance, options_.kink);
-        }
+        exchange_pieces(samples, state, limit, tolerance, options_.kink);
       }
       shape_up(samples, state, limit, most);
       // What the certificate asked for may have made triangles thin: then the next best is looked at as well.

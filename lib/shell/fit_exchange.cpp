@@ -6,6 +6,7 @@
 #include "shell/fit_detach.hpp"
 #include "shell/fit_edit.hpp"
 #include "shell/fit_missed.hpp"
+#include "shell/fit_polish.hpp"
 #include "shell/fit_region.hpp"
 #include "shell/fit_shape.hpp"
 #include "shell/fit_squeeze.hpp"
@@ -19,7 +20,7 @@
 namespace tunica {
 namespace {
 
-constexpr std::size_t most_fits = 600;  // of pieces anew: what costs
+constexpr std::size_t most_fits = 600;  // of pieces anew, twice where normals part: what costs
 constexpr std::size_t most_shells = 400, most_on_coarse_targets = 600;
 constexpr std::size_t coarse_target = 60;        // triangles per shell: walks on denser ones are what a piece costs
 constexpr int fewest_rings = 1, most_rings = 3;  // of nodes around a merger that move with it
@@ -29,6 +30,8 @@ constexpr double thin_angle = 5;                 // degrees, for the time being
 constexpr double promising = 1.5, promising_soon = 1.2;  // limits: after one step, and later: more hardly ever recovers
 constexpr double slow = 0.97;                            // of the error is left by a step that brings little
 constexpr std::array<double, 3> joining{1, 0.95, 0.9};   // of the limit
+constexpr int easing = 8;                                // steps of all nodes
+constexpr int patience = 2;                              // times that bring nothing
 constexpr int certificates = 3;                          // per change
 
 bool recovers(FitState& piece, double limit) {
@@ -84,7 +87,8 @@ public:
         crossings_(crossing_shells(state.mesh.shell()).size()),
         changed_(state.mesh.positions.size(), 1) {}
 
-  void run() {
+  /// @param most  pieces fitted anew; @return how many were
+  std::size_t run(std::size_t most) {
     std::mt19937 random;
     for (int rings = fewest_rings; rings <= most_rings;) {
       const std::size_t before = fits_;
@@ -93,8 +97,8 @@ public:
         std::swap(edges[i - 1], edges[random() % i]);
       }
       for (const auto& [u, v] : edges) {
-        if (fits_ >= most_fits) {
-          return;
+        if (fits_ >= most) {
+          return fits_;
         }
         if (state_.mesh.on_edge(u, v).count() > 0) {
           try_without(u, v, rings);
@@ -102,6 +106,7 @@ public:
       }
       rings += fits_ == before ? 1 : 0;
     }
+    return fits_;
   }
 
 private:
@@ -204,9 +209,21 @@ private:
   std::map<std::array<Index, 3>, std::size_t> tried_;
 };
 
-bool is_worth_it(const FitSamples& samples, const FitState& state) {
-  const bool coarse = samples.target().mesh().triangles.size() < coarse_target * state.mesh.alive;
-  return state.mesh.alive <= (coarse ? most_on_coarse_targets : most_shells);
+/// Exchanges until nothing comes of it any more, with the room that less error everywhere gives in between.
+void dig(FitSamples& samples, FitState& state, double limit, double tolerance) {
+  std::size_t left = most_fits;
+  for (int fruitless = 0; fruitless < patience && left > 0;) {
+    const std::size_t before = price(state);
+    squeeze(samples, state, limit);
+    left -= Exchange(samples, state, limit, tolerance).run(left);
+    FitState eased = state;
+    settle(eased, easing);
+    if (regains(samples, eased, limit) && price(eased) <= price(state) &&
+        crossing_shells(eased.mesh.shell()).size() <= crossing_shells(state.mesh.shell()).size()) {
+      state = std::move(eased);
+    }
+    fruitless = price(state) < before ? 0 : fruitless + 1;
+  }
 }
 
 /// Joins normals as long as the error allows. One after the other they may ask too much of those that follow: then
@@ -226,21 +243,20 @@ void join_again(FitSamples& samples, FitState& state, double limit) {
 
 }  // namespace
 
-void exchange_pieces(FitSamples& samples, FitState& state, double limit, double tolerance) {
-  if (is_worth_it(samples, state)) {
-    Exchange(samples, state, limit, tolerance).run();
-  }
-}
-
-void exchange_parted(FitSamples& samples, FitState& state, double limit, double tolerance, double kink) {
-  if (!is_worth_it(samples, state)) {
+void exchange_pieces(FitSamples& samples, FitState& state, double limit, double tolerance, double kink) {
+  const bool coarse = samples.target().mesh().triangles.size() < coarse_target * state.mesh.alive;
+  if (state.mesh.alive > (coarse ? most_on_coarse_targets : most_shells)) {
     return;
   }
+  if (!(kink > 0) || state.mesh.kind != Patch::comas) {
+    dig(samples, state, limit, tolerance);
+    return;
+  }
+  Exchange(samples, state, limit, tolerance).run(most_fits);
   FitState parted = state;
   parted.limits.kink = kink;
   part_normals(parted);
-  squeeze(samples, parted, limit);
-  Exchange(samples, parted, limit, tolerance).run();
+  dig(samples, parted, limit, tolerance);
   if (price(parted) < price(state)) {
     join_again(samples, parted, limit);
     state = std::move(parted);

@@ -9,13 +9,11 @@ namespace tunica {
 /// then worst. What is neither dearer (see price()) nor above `limit` (mm) nor crosses more is kept, so that also
 /// steps that bring nothing lead on to others, where a certificate of the surroundings finds nothing above `tolerance`
 /// (mm). Larger pieces once no smaller one is left that has changed since it was tried.
-/// Deterministic. Cost: at most 600 pieces are fitted anew, some 15 ms each: what is far off after a step or two is
+/// Then the same with normals that may part, at corners that meet at a node, by `kink` degrees (none for 0): every
+/// patch follows the target more closely, so that fewer do; what the limit does not ask for is joined again, and the
+/// state keeps FitLimits::kink. Not for watertight patches: their edges follow the normals of both sides.
+/// Deterministic. Cost: at most 1,200 pieces are fitted anew, some 15 ms each: what is far off after a step or two is
 /// given up. Of more than 400 shells none, of more than 600 where the target has fewer than 60 triangles per shell.
-void exchange_pieces(FitSamples& samples, FitState& state, double limit, double tolerance);
-
-/// The same with normals that may part, at corners that meet at a node, by `kink` degrees: every patch follows the
-/// target more closely, so that fewer do. What the limit does not ask for is joined again; the state keeps
-/// FitLimits::kink. For comas patches: the edges of watertight ones follow the normals of both sides, and gain nothing.
-void exchange_parted(FitSamples& samples, FitState& state, double limit, double tolerance, double kink);
+void exchange_pieces(FitSamples& samples, FitState& state, double limit, double tolerance, double kink);
 
 }  // namespace tunica
