@@ -31,6 +31,7 @@ constexpr double promising = 1.5, promising_soon = 1.2;  // limits: after one st
 constexpr double slow = 0.97;                            // of the error is left by a step that brings little
 constexpr std::array<double, 3> joining{1, 0.95, 0.9};   // of the limit
 constexpr int easing = 8;                                // steps of all nodes
+constexpr int tries = 3;                                 // in other orders
 constexpr int patience = 2;                              // times that bring nothing
 constexpr int certificates = 3;                          // per change
 
@@ -88,8 +89,7 @@ public:
         changed_(state.mesh.positions.size(), 1) {}
 
   /// @param most  pieces fitted anew; @return how many were
-  std::size_t run(std::size_t most) {
-    std::mt19937 random;
+  std::size_t run(std::size_t most, std::mt19937& random) {
     for (int rings = fewest_rings; rings <= most_rings;) {
       const std::size_t before = fits_;
       auto edges = state_.mesh.edges();
@@ -210,12 +210,13 @@ private:
 };
 
 /// Exchanges until nothing comes of it any more, with the room that less error everywhere gives in between.
-void dig(FitSamples& samples, FitState& state, double limit, double tolerance) {
-  std::size_t left = most_fits;
+/// @param left  pieces that may be fitted anew; @return how many of these are left
+std::size_t dig(FitSamples& samples, FitState& state, double limit, double tolerance, std::size_t left,
+                std::mt19937& random) {
   for (int fruitless = 0; fruitless < patience && left > 0;) {
     const std::size_t before = price(state);
     squeeze(samples, state, limit);
-    left -= Exchange(samples, state, limit, tolerance).run(left);
+    left -= Exchange(samples, state, limit, tolerance).run(left, random);
     FitState eased = state;
     settle(eased, easing);
     if (regains(samples, eased, limit) && price(eased) <= price(state) &&
@@ -224,6 +225,7 @@ void dig(FitSamples& samples, FitState& state, double limit, double tolerance) {
     }
     fruitless = price(state) < before ? 0 : fruitless + 1;
   }
+  return left;
 }
 
 /// Joins normals as long as the error allows. One after the other they may ask too much of those that follow: then
@@ -248,18 +250,31 @@ void exchange_pieces(FitSamples& samples, FitState& state, double limit, double 
   if (state.mesh.alive > (coarse ? most_on_coarse_targets : most_shells)) {
     return;
   }
+  std::mt19937 random;
   if (!(kink > 0) || state.mesh.kind != Patch::comas) {
-    dig(samples, state, limit, tolerance);
+    dig(samples, state, limit, tolerance, most_fits, random);
     return;
   }
-  Exchange(samples, state, limit, tolerance).run(most_fits);
-  FitState parted = state;
-  parted.limits.kink = kink;
-  part_normals(parted);
-  dig(samples, parted, limit, tolerance);
-  if (price(parted) < price(state)) {
-    join_again(samples, parted, limit);
-    state = std::move(parted);
+  Exchange(samples, state, limit, tolerance).run(most_fits, random);
+  FitState best = state;
+  const std::vector<Vec3> points = samples.points();
+  std::vector<Vec3> points_of_best = points;
+  std::size_t left = most_fits;
+  for (int i = 0; i < tries && left > 0; ++i) {
+    FitState parted = state;
+    parted.limits.kink = kink;
+    part_normals(parted);
+    samples.take_points(points);
+    left = dig(samples, parted, limit, tolerance, left, random);
+    if (price(parted) < price(best) && parted.error() <= limit) {
+      best = std::move(parted);
+      points_of_best = samples.points();
+    }
+  }
+  samples.take_points(std::move(points_of_best));
+  if (price(best) < price(state)) {
+    join_again(samples, best, limit);
+    state = std::move(best);
   }
 }
 

@@ -67,6 +67,9 @@ public:
   /// Further points of the target that must be met, such as where the distance was found largest.
   void add(const Vec3& point) { points_.push_back(point); }
 
+  /// Other points instead, such as those that there were before some were added: to be attached anew.
+  void take_points(std::vector<Vec3> points) { points_ = std::move(points); }
+
   /// Appends the residuals of the grid of a patch's points. The target's closest points are looked for downhill from
   /// the last ones, ten times as fast as among all.
   /// @param facing  the facet's normal; doubted  mm: points that seem to be farther off are looked for among all;
