@@ -130,7 +130,7 @@ TEST(FitExchange, FewerShellsThanSqueezingFindsAreWithinTheSameLimit) {
   ASSERT_TRUE(regains(samples, state, limit));
   squeeze(samples, state, limit);
   const std::size_t before = state.mesh.alive;
-  exchange_pieces(samples, state, limit, limit / 0.97);
+  exchange_pieces(samples, state, limit, limit / 0.97, 0);
   EXPECT_LT(state.mesh.alive, before);
   EXPECT_LE(state.error(), limit);
   EXPECT_EQ(crossing_shells(state.mesh.shell()).size(), 0U);
