@@ -20,7 +20,8 @@
 namespace tunica {
 namespace {
 
-constexpr std::size_t most_fits = 600;  // of pieces anew, twice where normals part: what costs
+constexpr std::size_t most_fits = 600;            // of pieces anew: what costs
+constexpr std::size_t most_before_parting = 150;  // of these more, where normals are to part
 constexpr std::size_t most_shells = 400, most_on_coarse_targets = 600;
 constexpr std::size_t coarse_target = 60;        // triangles per shell: walks on denser ones are what a piece costs
 constexpr int fewest_rings = 1, most_rings = 3;  // of nodes around a merger that move with it
@@ -255,7 +256,7 @@ void exchange_pieces(FitSamples& samples, FitState& state, double limit, double 
     dig(samples, state, limit, tolerance, most_fits, random);
     return;
   }
-  Exchange(samples, state, limit, tolerance).run(most_fits, random);
+  Exchange(samples, state, limit, tolerance).run(most_before_parting, random);
   FitState best = state;
   const std::vector<Vec3> points = samples.points();
   std::vector<Vec3> points_of_best = points;

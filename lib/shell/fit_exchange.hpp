@@ -12,7 +12,7 @@ namespace tunica {
 /// Then the same with normals that may part, at corners that meet at a node, by `kink` degrees (none for 0): every
 /// patch follows the target more closely, so that fewer do; what the limit does not ask for is joined again, and the
 /// state keeps FitLimits::kink. Not for watertight patches: their edges follow the normals of both sides.
-/// Deterministic. Cost: at most 1,200 pieces are fitted anew, some 15 ms each: what is far off after a step or two is
+/// Deterministic. Cost: at most 750 pieces are fitted anew, some 15 ms each: what is far off after a step or two is
 /// given up. Of more than 400 shells none, of more than 600 where the target has fewer than 60 triangles per shell.
 void exchange_pieces(FitSamples& samples, FitState& state, double limit, double tolerance, double kink);
 

@@ -122,10 +122,10 @@ TEST(FitRegion, AChangedPieceFitsItsSurroundings) {
 }
 
 TEST(FitExchange, FewerShellsThanSqueezingFindsAreWithinTheSameLimit) {
-  const Target target(wavy(4));
+  const Target target(wavy(3));
   FitSamples samples(target, 160);
   FitState state = state_of(samples, wavy(2));
-  const double limit = 0.3;
+  const double limit = 0.6;
   collapse_to(state, limit);
   ASSERT_TRUE(regains(samples, state, limit));
   squeeze(samples, state, limit);
