@@ -125,7 +125,7 @@ TEST(FitExchange, FewerShellsThanSqueezingFindsAreWithinTheSameLimit) {
   const Target target(wavy(3));
   FitSamples samples(target, 160);
   FitState state = state_of(samples, wavy(2));
-  const double limit = 0.6;
+  const double limit = 1.2;
   collapse_to(state, limit);
   ASSERT_TRUE(regains(samples, state, limit));
   squeeze(samples, state, limit);

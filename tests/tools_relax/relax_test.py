@@ -13,6 +13,7 @@ from curved_patch import columns, normals_across, patch_points, read_corner_norm
 
 BIN = os.environ["TUNICA_BIN"]
 PAPER = os.path.join(os.environ.get("TUNICA_SHARED_DATA", ""), "paper")
+MESHES = os.path.join(os.environ.get("TUNICA_SHARED_DATA", ""), "meshes")
 
 
 def write_ply(path, vertices, triangles, space="LPS"):
@@ -252,6 +253,12 @@ class Contract(Case):
                       ["--surface", "smooth"], ["--refine"], ["--max-shells", "10"],
                       ["--max-iterations", "0"], ["--mesh-unit", "parsec"], ["--unknown"]):
             self.relax(self.coarse, self.target, self.out, *extra, expect=2)
+        for extra in (["--tolerance", "1%", "--kink", "-1"], ["--tolerance", "1%", "--kink", "91"],
+                      ["--tolerance", "1%", "--kink", "nan"], ["--tolerance", "1%", "--kink", "wide"],
+                      ["--kink", "20"], ["--tolerance", "1%", "--kink", "20", "--refine"],
+                      ["--tolerance", "1%", "--kink", "20", "--surface", "watertight"],
+                      ["--tolerance", "1%", "--kink", "20", "--method", "barycentre"]):
+            self.relax(self.coarse, self.target, self.out, *extra, expect=2)
         for extra in (["--shells", "0"], ["--shells", "100", "--max-shells", "100", "--refine"]):
             self.relax(self.coarse, self.target, self.out, *extra, expect=2)
         barycentre = ["--method", "barycentre"]
@@ -434,6 +441,36 @@ class Fit(Case):
             os.remove(self.out + ".part")
 
 
+    def test_normals_part_by_no_more_than_asked_and_save_shells(self):
+        vertices, triangles = sphere(3)
+        vertices *= 1 + 0.12 * np.sin(vertices[:, :1] / 6) * np.cos(vertices[:, 1:2] / 8)
+        wavy = self.path("wavy.ply")
+        write_ply(wavy, vertices, triangles)
+        shells = {}
+        for kink in (0, 40):
+            out = self.path(f"{kink}.ply")
+            record, _ = self.relax(wavy, wavy, out, "--tolerance", "1%", "--kink", kink)
+            self.assertTrue(record["result"]["reached"])
+            self.assertEqual(record["result"]["self_intersections"], 0)
+            shells[kink] = record["result"]["shells"]
+            _, faces, _ = read_ply(out)
+            normals = read_corner_normals(out)
+            largest = 0
+            for node in range(faces.max() + 1):
+                here = normals[faces == node]
+                largest = max(largest, np.degrees(np.arccos(np.clip(here @ here.T, -1, 1))).max())
+            self.assertLess(largest, kink + 1e-4)
+        self.assertLess(shells[40], shells[0])
+
+    def test_a_limit_of_shells_that_only_a_search_for_the_fewest_keeps_is_kept(self):
+        record, _ = self.relax(self.target, self.target, self.out, "--tolerance", "0.3%", "--kink", 0)
+        fewest = record["result"]["shells"]
+        record, _ = self.relax(self.target, self.target, self.out, "--tolerance", "0.3%", "--kink", 0, "--max-shells",
+                               fewest, "--force")
+        self.assertTrue(record["result"]["reached"])
+        self.assertLessEqual(record["result"]["shells"], fewest)
+
+
 class Patch(Case):
     def test_the_file_alone_gives_the_curved_surface(self):
         vertices, triangles = sphere(3)
@@ -471,6 +508,23 @@ class Patch(Case):
             fine_used += level**2
         self.assertEqual(used, len(curved))
         self.assertEqual(fine_used, len(fine))
+
+
+@unittest.skipUnless(os.path.isdir(MESHES), f"no real organs in {MESHES}")
+class Organs(Case):
+    def test_an_open_aorta_within_a_percent_takes_a_third_of_the_well_shaped_flat_triangles(self):
+        target, flat, report = os.path.join(MESHES, "vmtk_aorta_open.stl"), self.path("flat.ply"), self.path("flat.json")
+        unit = ["--mesh-unit", "mm"]
+        subprocess.run([os.path.join(BIN, "tunica-decimate"), target, flat, *unit, "--max-error", "1%", "--min-angle",
+                        "20", "--report", report], check=True, capture_output=True, timeout=300)
+        with open(report) as file:
+            triangles = json.load(file)["result"]["triangles"]
+        record, _ = self.relax(target, target, self.path("shell.ply"), *unit, "--tolerance", "1%")
+        result = record["result"]
+        self.assertLessEqual(result["hausdorff_percent"]["upper"], 1)
+        self.assertLessEqual(3 * result["shells"], triangles)
+        self.assertGreaterEqual(result["min_angle_deg"], 20 - 1e-6)
+        self.assertEqual(result["self_intersections"], 0)
 
 
 @unittest.skipUnless(os.path.isdir(PAPER), f"no paper meshes in {PAPER}")
