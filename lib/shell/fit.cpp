@@ -417,14 +417,14 @@ private:
       return;
     }
     FitSamples samples(target_, guess(wanted));
-    // A greedy search ends elsewhere from elsewhere, and with few shells by much.
+    FitState best = settled(samples, start, shells);
+    // A greedy search ends elsewhere from elsewhere, with few shells or on rough targets by much.
+    const bool worth_exchanging = shells < few_shells || is_uneven(best);
     std::vector<double> surpluses;
-    if (shells < few_shells && !start.own_topology) {
+    if (worth_exchanging && shells < affordable && !start.own_topology) {
       surpluses.assign(other_surpluses.begin(), other_surpluses.end());
     }
     const double part = 1.0 / static_cast<double>(1 + surpluses.size());
-    FitState best = settled(samples, start, shells);
-    const bool worth_exchanging = shells < few_shells || is_uneven(best);
     const int rounds = options_.max_iterations.value_or(worth_exchanging ? default_rounds : 1);
     bool exhausted = exchange(best, shells, rounds, {0, part});
     for (std::size_t i = 0; i < surpluses.size(); ++i) {
