@@ -13,15 +13,17 @@ namespace tunica {
 /// powers of the residuals; patches that are too far off are split; nodes slide where
 /// angles are small. Last, mergers that no single node makes good are tried with all nodes together (fit_squeeze.hpp),
 /// and small pieces are changed and fitted by themselves (fit_exchange.hpp). Where the target has a sharp crease,
-/// shells carry a normal per corner. A certified distance ends it.
+/// shells carry a normal per corner; to a tolerance also where that saves shells (RelaxOptions::kink). A certified
+/// distance ends it.
 ///
 /// With `tolerance` the fewest shells found whose certified distance holds, or with `refine` COARSE's triangles, placed
 /// anew and split where that is needed; without, the least distance found with at most `shells` (none: as many as
 /// COARSE has, with `refine` four times as many; more where the topology needs more). Never more shells, or a larger
 /// distance, than plain decimation: where that wins, its flat facets are the result (flat shells: corner normals are
 /// the facets'). To a tolerance each piece of the target may be flat by itself, crumbs without being tried.
-/// Searches that cost little (to a tolerance from few triangles, to few shells) run from several starts, of which the
-/// best is kept. To a tolerance, shells that cross are parted where the target's own triangles do not cross.
+/// Searches that cost little (to a tolerance from few triangles, to few shells) or are uncertain (to a count on a rough
+/// target) run from several starts, of which the best is kept. To a tolerance, shells that cross are parted where the
+/// target's own triangles do not cross.
 /// @param coarse  an oriented manifold; its count, and its topology, may matter; @param target  likewise
 /// Keeps: topology of the start, boundary loops (on the target's boundary to the same tolerance). Angles are at least
 /// 20 degrees but where folds, rims or creases of the target would cost the tolerance (or, to a count, error).
