@@ -68,7 +68,7 @@ void declare(cli::Tool& tool, Arguments& given) {
   app.add_option(
          "--kink", given.kink,
          "fit to a --tolerance, comas: degrees by which the normals of shells that meet at a node may part where "
-         "that saves shells (default 45; 0: only creases have several normals)")
+         "that saves shells (default 45; 0: several normals only at creases and where facets turn too far for one)")
       ->type_name("DEG");
   app.add_option("--max-iterations", given.max_iterations,
                  "at most N iterations (barycentre: 20, with --refine 60; fit: 8 rounds, or 1 to many shells on a "

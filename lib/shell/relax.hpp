@@ -36,7 +36,8 @@ struct RelaxOptions {
   std::optional<std::size_t> max_shells;  ///< for refine and fit
   std::optional<std::size_t> shells;      ///< for fit: at most this many instead of as many as COARSE has
   /// Degrees by which the normals of comas shells that meet at a node may part where that saves shells, for fit to a
-  /// tolerance: 0 where only creases may have several.
+  /// tolerance: 0 where only creases may have several. Where facets turn so far that no single normal serves
+  /// them all, or a patch is far closer with its own, they part all the same.
   double kink = 45;
   std::optional<int> max_iterations;  ///< none: 20, with refine 60; fit: 8 rounds, see fit()
   std::optional<double> width;        ///< mm: of the measured intervals; none: 0.01 % of the target's diagonal

@@ -310,7 +310,7 @@ DecimateResult decimate(const TriangleMesh& mesh, const DecimateOptions& options
     return [&options, begin, end](double fraction) { options.progress(begin + (end - begin) * fraction); };
   };
   const double collapsing = options.max_error ? 0.2 : 0.8;
-  collapse.run(options.triangles.value_or(0), part(0, collapsing));
+  collapse.run(options.triangles.value_or(0), part(0, collapsing), options.max_error.has_value());
   DecimateResult result;
   if (options.max_error) {
     result = ErrorSearch(mesh, collapse, *options.max_error, options.levelled).run(part(collapsing, 1));

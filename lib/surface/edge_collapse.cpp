@@ -242,12 +242,12 @@ void EdgeCollapse::fill_heap() {
   heap_.order();
 }
 
-std::size_t EdgeCollapse::run(std::size_t triangles, const Progress& progress) {
+std::size_t EdgeCollapse::run(std::size_t triangles, const Progress& progress, bool in_order) {
   const std::size_t start = triangles_;
   const double work = static_cast<double>(start - std::min(start, triangles));
   const Progress part = [&](double) { tunica::advance(progress, static_cast<double>(start - triangles_) / work); };
   const auto& all_limits = aim_ == Aim::good_shape ? good_shape_limits : shape_limits;
-  if (aim_ == Aim::least_error && triangles > 0 && triangles_ > sweep_factor * triangles) {
+  if (!in_order && aim_ == Aim::least_error && triangles > 0 && triangles_ > sweep_factor * triangles) {
     limits_ = all_limits[0];
     sweep(sweep_factor * triangles, part);
   }

@@ -42,7 +42,9 @@ public:
   [[nodiscard]] bool has_boundary() const { return !curves_.empty(); }
 
   /// Collapses edges until at most `triangles` are left or none can be collapsed. @return triangles left.
-  std::size_t run(std::size_t triangles, const Progress& progress);
+  /// @param in_order  from the first one on, for when it may be the result of few that is wanted; else the early ones
+  ///                  of many are done in sweeps over the memory
+  std::size_t run(std::size_t triangles, const Progress& progress, bool in_order = false);
 
   /// What was done, in order.
   [[nodiscard]] const std::vector<Collapse>& history() const { return history_; }

@@ -238,5 +238,17 @@ TEST(Decimate, TrianglesWithoutAreaInTheInputAreNoObstacle) {
   EXPECT_LT(distance(coarse, mesh), 0.1);
 }
 
+TEST(Decimate, ACountOutOfReachDoesNotWorsenWhatAnErrorAllows) {
+  const TriangleMesh mesh = shapes::torus(100, 50);
+  DecimateOptions options;
+  options.max_error = 2e-4 * diagonal(mesh);
+  const std::size_t fewest = decimate(mesh, options).mesh.triangles.size();
+  options.triangles = 10;
+  const DecimateResult both = decimate(mesh, options);
+  EXPECT_FALSE(both.count_reached);
+  EXPECT_TRUE(both.error_kept);
+  EXPECT_LE(static_cast<double>(both.mesh.triangles.size()), 1.02 * static_cast<double>(fewest));
+}
+
 }  // namespace
 }  // namespace tunica
