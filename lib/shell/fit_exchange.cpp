@@ -210,6 +210,16 @@ private:
   std::map<std::array<Index, 3>, std::size_t> tried_;
 };
 
+/// Takes a changed state when steps of all nodes bring it within the limit, and it is no dearer and crosses no more.
+bool take_if_sound(FitSamples& samples, FitState trial, FitState& state, double limit) {
+  if (!regains(samples, trial, limit) || price(trial) > price(state) ||
+      crossing_shells(trial.mesh.shell()).size() > crossing_shells(state.mesh.shell()).size()) {
+    return false;
+  }
+  state = std::move(trial);
+  return true;
+}
+
 /// Exchanges until nothing comes of it any more, with the room that less error everywhere gives in between.
 /// @param left  pieces that may be fitted anew; @return how many of these are left
 std::size_t dig(FitSamples& samples, FitState& state, double limit, double tolerance, std::size_t left,
@@ -220,10 +230,7 @@ std::size_t dig(FitSamples& samples, FitState& state, double limit, double toler
     left -= Exchange(samples, state, limit, tolerance).run(left, random);
     FitState eased = state;
     settle(eased, easing);
-    if (regains(samples, eased, limit) && price(eased) <= price(state) &&
-        crossing_shells(eased.mesh.shell()).size() <= crossing_shells(state.mesh.shell()).size()) {
-      state = std::move(eased);
-    }
+    take_if_sound(samples, std::move(eased), state, limit);
     fruitless = price(state) < before ? 0 : fruitless + 1;
   }
   return left;
@@ -237,8 +244,7 @@ void join_again(FitSamples& samples, FitState& state, double limit) {
     join_normals(joined, part * limit);
     joined.attach();
     joined.measure();
-    if (regains(samples, joined, limit) && price(joined) <= price(state)) {
-      state = std::move(joined);
+    if (take_if_sound(samples, std::move(joined), state, limit)) {
       return;
     }
   }

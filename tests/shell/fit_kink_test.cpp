@@ -171,23 +171,32 @@ TEST(FitKink, ACreaseIsNotHeldTogether) {
   EXPECT_LT(largest_kink(state.mesh), 5 + 1e-9);
 }
 
-TEST(FitKink, FewerShellsDoWithinTheSameLimit) {
+TEST(FitExchange, FewerShellsDoWithinTheSameLimitAndStillFewerWhereNormalsPart) {
   const Target target(wavy(3));
   FitSamples samples(target, 160);
   FitState state = state_of(samples, wavy(2));
   const double limit = 1.2;
   collapse_to(state, limit);
   ASSERT_TRUE(regains(samples, state, limit));
+  squeeze(samples, state, limit);
   FitState shared = state;
   exchange_pieces(samples, shared, limit, limit / 0.97, 0);
+  EXPECT_LT(shared.mesh.alive, state.mesh.alive) << "than squeezing finds";
   exchange_pieces(samples, state, limit, limit / 0.97, 30);
   EXPECT_LT(state.mesh.alive, shared.mesh.alive);
   state.attach();
   state.measure();
   EXPECT_LE(state.error(), limit);
+  EXPECT_LE(shared.error(), limit);
+  EXPECT_LT(largest_kink(shared.mesh), 1e-9);
   EXPECT_LT(largest_kink(state.mesh), 30 + 1e-9);
-  EXPECT_EQ(crossing_shells(state.mesh.shell()).size(), 0U);
-  EXPECT_EQ(count_thin(state), 0U);
+  for (const FitState* result : {&shared, &state}) {
+    EXPECT_EQ(crossing_shells(result->mesh.shell()).size(), 0U);
+    EXPECT_EQ(count_thin(*result), 0U);
+    const MeshFacts facts = examine(flat_facets(result->mesh.shell()));
+    EXPECT_FALSE(why_unfit(facts)) << why_unfit(facts).value_or("");
+    EXPECT_EQ(facts.euler, 2);
+  }
 }
 
 }  // namespace

@@ -1,24 +1,17 @@
-#include "shell/fit_exchange.hpp"
-
-#include "shell/fit_cross.hpp"
-#include "shell/fit_edit.hpp"
 #include "shell/fit_region.hpp"
-#include "shell/fit_shape.hpp"
-#include "shell/fit_squeeze.hpp"
-#include "shell/fit_start.hpp"
+
+#include "shell/fit_edit.hpp"
 #include "shell/fit_states.hpp"
 #include "surface/checks.hpp"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cmath>
 #include <tuple>
 
 namespace tunica {
 namespace {
 
-using testing::collapse_to;
 using testing::state_of;
 using testing::wavy;
 
@@ -119,25 +112,6 @@ TEST(FitRegion, AChangedPieceFitsItsSurroundings) {
   EXPECT_LE(error, state.error());
   state.measure();
   EXPECT_GE(state.error(), error * 0.999);
-}
-
-TEST(FitExchange, FewerShellsThanSqueezingFindsAreWithinTheSameLimit) {
-  const Target target(wavy(3));
-  FitSamples samples(target, 160);
-  FitState state = state_of(samples, wavy(2));
-  const double limit = 1.2;
-  collapse_to(state, limit);
-  ASSERT_TRUE(regains(samples, state, limit));
-  squeeze(samples, state, limit);
-  const std::size_t before = state.mesh.alive;
-  exchange_pieces(samples, state, limit, limit / 0.97, 0);
-  EXPECT_LT(state.mesh.alive, before);
-  EXPECT_LE(state.error(), limit);
-  EXPECT_EQ(crossing_shells(state.mesh.shell()).size(), 0U);
-  EXPECT_EQ(count_thin(state), 0U);
-  const MeshFacts facts = examine(flat_facets(state.mesh.shell()));
-  EXPECT_FALSE(why_unfit(facts)) << why_unfit(facts).value_or("");
-  EXPECT_EQ(facts.euler, 2);
 }
 
 }  // namespace
