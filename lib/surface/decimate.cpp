@@ -2,6 +2,7 @@
 
 #include "core/error.hpp"
 #include "surface/checks.hpp"
+#include "surface/degenerate.hpp"
 #include "surface/edge_collapse.hpp"
 #include "surface/hausdorff.hpp"
 #include "surface/levelling.hpp"
@@ -19,15 +20,16 @@ namespace {
 
 /// The greedy order's next collapses, of the triangles: from them comes what is spent where the error is largest.
 constexpr double more_collapses = 0.1;
-/// Where more than this share of the triangles stays, collapses are measured as they are made: finding the places that
-/// levelling should mend would take longer than all of them.
-constexpr double much = 0.25;
+/// Where more than this share of the triangles stays there is no levelling: finding the places that it should mend
+/// would take longer than all collapses.
+constexpr double much = 0.2;
 /// For an error, levelling is tried down to this share of the triangles that do without, in so many steps.
 constexpr double least_levelled = 0.4;
 constexpr int level_steps = 6;
 /// What a certificate may take: a mesh that needs more counts as one that does not keep the error.
 constexpr std::size_t least_splits = 100'000;
 constexpr std::size_t splits_per_triangle = 4;  // of the target
+constexpr double least_size = 1e-100;           // mm: squares of edges below vanish
 
 // The mesh after the first `steps` collapses; `origins` tells which vertices and triangles came from where.
 TriangleMesh replay(const TriangleMesh& mesh, const std::vector<Collapse>& history, std::size_t steps,
@@ -44,6 +46,9 @@ TriangleMesh replay(const TriangleMesh& mesh, const std::vector<Collapse>& histo
     root[history[i].removed] = root[history[i].kept];
   }
   TriangleMesh result;
+  const std::size_t left = steps > 0 ? history[steps - 1].triangles_left : mesh.triangles.size();
+  result.triangles.reserve(left);
+  result.vertices.reserve(mesh.vertices.size() - steps);
   constexpr Index unused = 0xffffffff;
   std::vector<Index> renumbered(mesh.vertices.size(), unused);
   for (Index t = 0; t < mesh.triangles.size(); ++t) {
@@ -288,15 +293,13 @@ private:
                                       : "all its vertices lie in one point");
 }
 
-}  // namespace
-
-DecimateResult decimate(const TriangleMesh& mesh, const DecimateOptions& options) {
-  const bool much_stays =
-      options.levelled && !options.max_error && !options.min_angle &&
-      static_cast<double>(options.triangles.value_or(0)) > much * static_cast<double>(mesh.triangles.size());
-  EdgeCollapse collapse(mesh, options.min_angle ? EdgeCollapse::Aim::good_shape
-                              : much_stays      ? EdgeCollapse::Aim::few_collapses
-                                                : EdgeCollapse::Aim::least_error);
+/// @param mesh  without degenerate triangles, but where they cannot go
+DecimateResult decimate_sound(const TriangleMesh& mesh, const DecimateOptions& options) {
+  const double share = static_cast<double>(options.triangles.value_or(0)) / static_cast<double>(mesh.triangles.size());
+  const bool to_count = options.levelled && !options.max_error && !options.min_angle;
+  EdgeCollapse collapse(mesh, options.min_angle          ? EdgeCollapse::Aim::good_shape
+                              : to_count && share > much ? EdgeCollapse::Aim::few_collapses
+                                                         : EdgeCollapse::Aim::least_error);
   if (!collapse.is_fit()) {
     refuse(mesh);
   }
@@ -316,8 +319,7 @@ DecimateResult decimate(const TriangleMesh& mesh, const DecimateOptions& options
     result = ErrorSearch(mesh, collapse, *options.max_error, options.levelled).run(part(collapsing, 1));
   } else {
     const std::size_t steps = collapse.history().size();
-    if (options.levelled && !much_stays && steps > 0 &&
-        collapse.history().back().triangles_left <= *options.triangles) {
+    if (to_count && share <= much && steps > 0 && collapse.history().back().triangles_left <= *options.triangles) {
       collapse.run(static_cast<std::size_t>((1 - more_collapses) * static_cast<double>(*options.triangles)), {});
       result.mesh = level(mesh, collapse, steps, false);
     } else {
@@ -326,6 +328,29 @@ DecimateResult decimate(const TriangleMesh& mesh, const DecimateOptions& options
     advance(options.progress, 1.0);
   }
   result.count_reached = !options.triangles || result.mesh.triangles.size() <= *options.triangles;
+  return result;
+}
+
+}  // namespace
+
+DecimateResult decimate(const TriangleMesh& mesh, const DecimateOptions& options) {
+  const double size = diagonal(mesh);
+  if (count_degenerate(mesh) == 0 || !(size > least_size && size < 1 / least_size) || why_unfit(examine(mesh))) {
+    return decimate_sound(mesh, options);
+  }
+  if (count_degenerate(mesh) == mesh.triangles.size()) {
+    throw InputError("all of its triangles are without area");
+  }
+  const WithoutDegenerate cleaned = without_degenerate_triangles(mesh);
+  DecimateOptions within = options;
+  if (options.max_error) {
+    within.max_error = std::max(0.0, *options.max_error - cleaned.moved);
+  }
+  DecimateResult result = decimate_sound(cleaned.mesh, within);
+  if (result.error) {
+    result.error->lower = std::max(0.0, result.error->lower - cleaned.moved);
+    result.error->upper += cleaned.moved;
+  }
   return result;
 }
 

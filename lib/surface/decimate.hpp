@@ -26,16 +26,16 @@ struct DecimateResult {
 
 /// Fewer triangles for the same surface, by quadric edge collapse with optimal placement (see EdgeCollapse).
 /// With `triangles` only: stops at that count, then lessens the largest error there (see levelled()); where more than a
-/// quarter of the triangles stays, collapses are measured before they are made instead. With `max_error`
+/// fifth of the triangles stays, all planes count alike and that is all. With `max_error`
 /// only: the fewest triangles found whose certified distance holds, levelled where that allows fewer. With both: as
 /// with `triangles`; when the error does not allow that count, the fewest that it allows. With `min_angle` triangles
 /// are well shaped (mean radius ratio about 0.87), see shaped(); the count stays. The mesh comes back also when a
 /// requirement failed: the best that could be done.
 /// @param mesh  an oriented manifold, closed or with boundary; unused vertices are dropped
 /// Keeps: Euler number, pieces, boundary loops (their vertices stay on the given boundary curve), the side each
-/// triangle faces. Deterministic, independent of the number of threads, of the unit and of the place of the mesh.
-/// Errors: InputError when the mesh is not fit (says where); Interrupted.
-/// Source: Garland, Heckbert, Surface simplification using quadric error metrics, SIGGRAPH 1997.
+/// triangle faces. Degenerate triangles go, see without_degenerate_triangles(). Deterministic, independent of the
+/// number of threads, of the unit and of the place of the mesh. Errors: InputError when the mesh is not fit (says
+/// where); Interrupted. Source: Garland, Heckbert, Surface simplification using quadric error metrics, SIGGRAPH 1997.
 /// Cost: n log n; with `max_error` some twenty distance measurements more. With
 /// `min_angle` about 5 ms per triangle of the result more, and some eight times that with `max_error`.
 /// Limits: greedy; `max_error` looks among the meshes that the greedy order passes through, and some of them levelled.

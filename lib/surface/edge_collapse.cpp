@@ -1,7 +1,7 @@
 #include "surface/edge_collapse.hpp"
 
 #include "core/error.hpp"
-#include "surface/incidence.hpp"
+#include "surface/facet_distances.hpp"
 #include "surface/measure.hpp"
 
 #include <algorithm>
@@ -25,19 +25,22 @@ constexpr double normal_variance = 0.02;
 /// Weight of the planes that stand on boundary edges. New boundary vertices lie on the curve, so all of their error is
 /// on one side of it; and a ragged rim is seen before a rough surface.
 constexpr double boundary_weight = 30;
+/// The same where all planes count alike: for the planes that stand on boundary edges, and for those of the triangles
+/// beside, which are fewer around a boundary vertex than around others (5 and 40 or 20 and 200 do as well).
+constexpr double even_boundary_weight = 100;
+constexpr double even_rim_weight = 5;
 /// Down to this many times the triangles wanted, edges collapse in sweeps, unless shape counts (rough surfaces then
 /// come out worse by a quarter).
 constexpr std::size_t sweep_factor = 8;
-/// How strongly a new vertex is held near the middle of its edge where the quadric is flat.
+/// How strongly a new vertex is held near the middle of its edge where the quadric is flat. Where few planes have met
+/// it must be weak: on a fine mesh even what looks flat is curved, and the held vertices are the first to be off.
 constexpr double pull = 1e-5;
-/// What a squared distance that was measured counts for, against the sum over the planes of the triangles merged (about
-/// ten at first): it decides where it is much larger than what the planes say.
-constexpr double measured_weight = 10;
-/// Of the triangles that go, the share of the edges that will have to collapse at least, in the order of their costs:
-/// it was 0.55 to 1.4 on smooth and on rough surfaces.
-constexpr double certain_share = 0.5;
-/// Collapses are measured from this share of the cost on to which those edges come.
-constexpr double measured_from = 0.25;
+constexpr double weak_pull = 1e-10;
+/// At a tip the sum of the normals is shorter than this share of the areas' sum: at a right-angled edge it is 0.71.
+constexpr double tip_share = 0.8;
+/// What the squared distance of a vertex that goes counts for where all planes count alike: as much as from three
+/// planes, of the ten or more that it comes from where nothing is lost.
+constexpr double loss_weight = 3;
 /// Squared distances below it, in squared diagonals, are rounding.
 constexpr double invisible = 1e-17;
 /// Weight of an edge's squared length times its quadric's weight: on flat ground short edges go first.
@@ -68,7 +71,8 @@ Vec3 EdgeCollapse::Curve::at(double place) const {
   return fraction == 0 ? points[i] : Vec3(points[i] + fraction * (points[(i + 1) % points.size()] - points[i]));
 }
 
-EdgeCollapse::EdgeCollapse(const TriangleMesh& mesh, Aim aim) : aim_(aim), heap_(0), triangles_(mesh.triangles.size()) {
+EdgeCollapse::EdgeCollapse(const TriangleMesh& mesh, Aim aim)
+    : aim_(aim), pull_(aim == Aim::few_collapses ? weak_pull : pull), heap_(0), triangles_(mesh.triangles.size()) {
   const Box box = bounding_box(mesh);
   centre_ = 0.5 * (box.lower + box.upper);
   scale_ = box.diagonal();
@@ -76,11 +80,8 @@ EdgeCollapse::EdgeCollapse(const TriangleMesh& mesh, Aim aim) : aim_(aim), heap_
     return;
   }
   fit_ = true;
-  find_boundary(mesh);
+  find_boundary();
   sum_quadrics();
-  if (aim_ == Aim::few_collapses) {
-    prepare_measuring(mesh);
-  }
 }
 
 /// Vertices in the order in which the triangles name them: what is near in space is then near in memory. @return
@@ -111,35 +112,40 @@ bool EdgeCollapse::number_vertices(const TriangleMesh& mesh) {
 /// @return whether the triangles are an oriented manifold
 bool EdgeCollapse::connect(const TriangleMesh& mesh) {
   half_.resize(3 * mesh.triangles.size());
-  for (HalfEdge h = 0; h < half_.size(); ++h) {
-    half_[h].from = number_[mesh.triangles[h / 3][h % 3]];
+  HalfEdge corner = 0;
+  for (const auto& triangle : mesh.triangles) {
+    for (const Index v : triangle) {
+      half_[corner++].from = number_[v];
+    }
   }
-  Incidence triangles = incidence(mesh);
-  half_of_.reserve(half_.size() / 2);
+  // The edges known so far at their lower end, each as the higher end and the edge before it in the same list.
+  struct Known {
+    Index higher, before;
+  };
+  std::vector<Known> known;
+  known.reserve(half_.size() / 2 + 1);
+  half_of_.reserve(half_.size() / 2 + 1);
+  std::vector<Index> last(vertex_.size(), none);
   for (HalfEdge h = 0; h < half_.size(); ++h) {
-    if (half_[h].edge != none) {
+    const Index lower = std::min(from(h), to(h));
+    const Index higher = std::max(from(h), to(h));
+    Index edge = last[lower];
+    while (edge != none && known[edge].higher != higher) {
+      edge = known[edge].before;
+    }
+    if (edge == none) {
+      half_[h].edge = static_cast<Index>(known.size());
+      known.push_back({higher, last[lower]});
+      last[lower] = half_[h].edge;
+      half_of_.push_back(h);
       continue;
     }
-    const auto edge = static_cast<Index>(half_of_.size());
-    half_of_.push_back(h);
-    half_[h].edge = edge;
-    for (const Index t : triangles.of(mesh.triangles[h / 3][next(h) % 3])) {
-      for (HalfEdge other = 3 * t; other < 3 * t + 3; ++other) {
-        if (from(other) == to(h) && to(other) == from(h)) {
-          if (half_[h].twin != none || from(previous(other)) == from(previous(h))) {
-            return false;  // a third triangle, or two on the same corners
-          }
-          half_[h].twin = other;
-          half_[other].twin = h;
-          half_[other].edge = edge;
-        } else if (other != h && from(other) == from(h) && to(other) == to(h)) {
-          return false;
-        }
-      }
+    const HalfEdge other = half_of_[edge];
+    if (half_[other].twin != none || from(other) == from(h) || from(previous(other)) == from(previous(h))) {
+      return false;  // a third triangle, one that faces the other way, or two on the same corners
     }
-  }
-  if (aim_ == Aim::few_collapses) {
-    given_around_ = std::move(triangles);
+    half_[h] = {from(h), other, edge};
+    half_[other].twin = h;
   }
   placement_.assign(half_of_.size(), Placement::best);
   for (HalfEdge h = 0; h < half_.size(); ++h) {
@@ -158,15 +164,19 @@ bool EdgeCollapse::has_one_fan_per_vertex() const {
   return reached == half_.size();
 }
 
-void EdgeCollapse::find_boundary(const TriangleMesh& mesh) {
+/// The boundary loops, each from the vertex that was given first.
+void EdgeCollapse::find_boundary() {
   curve_place_.assign(vertex_.size(), 0);
   if (std::all_of(half_.begin(), half_.end(), [](const Half& half) { return half.twin != none; })) {
     return;
   }
-  for (const auto& loop : boundary_loops(mesh)) {
+  for (Index given = 0; given < number_.size(); ++given) {
+    const Index first = number_[given];
+    if (first == none || half_[vertex_[first].outgoing].twin != none || vertex_[first].curve != none) {
+      continue;
+    }
     Curve curve;
-    for (const Index given : loop) {
-      const Index v = number_[given];
+    for (Index v = first; vertex_[v].curve == none; v = to(vertex_[v].outgoing)) {
       vertex_[v].curve = static_cast<Index>(curves_.size());
       curve_place_[v] = static_cast<double>(curve.points.size());
       curve.points.push_back(vertex_[v].position);
@@ -195,30 +205,22 @@ void EdgeCollapse::sum_quadrics() {
       vertex_[half_[k].from].quadric += plane;
       vertex_[half_[k].from].area += by_area ? doubled_area : 0;
       vertex_[half_[k].from].facing += normal;
+      vertex_[half_[k].from].given_area += doubled_area;
       if (half_[k].twin == none) {
         const Vec3 edge = vertex_[to(k)].position - vertex_[from(k)].position;
         const Vec3 outward = edge.cross(unit);
         if (outward.norm() > 0) {
-          const Quadric wall = Quadric::plane(outward.normalized(), vertex_[from(k)].position,
-                                              boundary_weight * length_to_quadric(edge.squaredNorm()));
+          const double weight =
+              by_area ? boundary_weight * length_to_quadric(edge.squaredNorm()) : even_boundary_weight;
+          Quadric wall = Quadric::plane(outward.normalized(), vertex_[from(k)].position, weight);
+          if (!by_area) {
+            wall += Quadric::plane(unit, vertex_[from(k)].position, even_rim_weight);
+          }
           wall_[from(k)] += wall;
           wall_[to(k)] += wall;
         }
       }
     }
-  }
-}
-
-/// Finds a cost up to which collapses will have to be made until so many triangles are left: whether one is cheaper
-/// than another does not matter below it.
-void EdgeCollapse::expect_cost(std::size_t triangles) {
-  certain_cost_ = 0;
-  const double share = certain_share * (1 - static_cast<double>(triangles) / static_cast<double>(triangles_));
-  std::vector<double> costs = heap_.keys();
-  if (!costs.empty()) {
-    const auto at = costs.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(costs.size() - 1));
-    std::nth_element(costs.begin(), at, costs.end());
-    certain_cost_ = *at;
   }
 }
 
@@ -256,9 +258,6 @@ std::size_t EdgeCollapse::run(std::size_t triangles, const Progress& progress, b
     if (heap_.empty()) {
       // What was refused may be possible now that the surroundings have changed, or with the next limits.
       fill_heap();
-      if (aim_ == Aim::few_collapses && history_.empty()) {
-        expect_cost(triangles);
-      }
     }
     bool progressed = false;
     for (std::size_t step = 0; triangles_ > triangles && !heap_.empty(); ++step) {
@@ -272,6 +271,34 @@ std::size_t EdgeCollapse::run(std::size_t triangles, const Progress& progress, b
     }
   }
   return triangles_;
+}
+
+/// Whether the given triangles that an edge's ends stand for face so many ways that their normals cancel.
+bool EdgeCollapse::is_at_tip(HalfEdge h) const {
+  const Vertex& u = vertex_[from(h)];
+  const Vertex& v = vertex_[to(h)];
+  const double least = tip_share * (u.given_area + v.given_area);
+  return (u.facing + v.facing).squaredNorm() < least * least;
+}
+
+/// The larger squared distance of a collapse's two ends to the triangles that it makes, which planes do not know at
+/// a thin tip: it lies in the planes of what stays.
+double EdgeCollapse::squared_loss(HalfEdge h, const Vec3& position) const {
+  const Index u = from(h);
+  const Index v = to(h);
+  const LaneVec3 ends = lane_points([&](std::size_t k) -> const Vec3& { return vertex_[k == 0 ? u : v].position; });
+  Lanes least = forbidden;
+  for (const Index end : {u, v}) {
+    around(end, [&](HalfEdge spoke) {
+      const Index i = to(spoke);
+      const Index j = to(next(spoke));
+      if (i != u && i != v && j != u && j != v) {
+        const FacetDistances facet({position, vertex_[i].position, vertex_[j].position});
+        least = std::experimental::min(least, facet.squared_distance(ends));
+      }
+    });
+  }
+  return std::max(least[0], least[1]);
 }
 
 /// What its shapes make dearer is found out only when its turn comes.
@@ -295,15 +322,8 @@ bool EdgeCollapse::collapse_cheapest() {
     return false;
   }
   double cost = chosen->cost(penalty);
-  if (aim_ == Aim::few_collapses && cost <= known && measured_[edge] == 0) {
-    const double enough = std::max(known, certain_cost_);
-    if (known > measured_from * certain_cost_) {
-      const double measured = measured_weight * squared_distance_off(h, chosen->position, enough / measured_weight);
-      if (measured > enough) {
-        cost = measured;
-        measured_[edge] = 1;
-      }
-    }
+  if (aim_ == Aim::few_collapses && cost <= known && is_at_tip(h)) {
+    cost = std::max(cost, loss_weight * squared_loss(h, chosen->position));
   }
   if (cost > known) {
     heap_.set(edge, cost);
@@ -321,9 +341,6 @@ bool EdgeCollapse::collapse_cheapest() {
   costs_of(changed_, changed_cost_);
   for (std::size_t i = 0; i < changed_.size(); ++i) {
     placement_[changed_[i]] = Placement::best;
-    if (!measured_.empty()) {
-      measured_[changed_[i]] = 0;
-    }
     if (changed_cost_[i] < forbidden) {
       heap_.set(changed_[i], changed_cost_[i]);
     } else {
@@ -342,12 +359,12 @@ Quadric EdgeCollapse::cost_of(Index u, Index v) const {
   return q;
 }
 
-EdgeCollapse::Target EdgeCollapse::inner_target(const Vertex& u, const Vertex& v) {
+EdgeCollapse::Target EdgeCollapse::inner_target(const Vertex& u, const Vertex& v) const {
   const Quadric sum = u.quadric + v.quadric;
   const double weight = per_area(u.area + v.area);
   const Vec3 middle = 0.5 * (u.position + v.position);
   const double squared_length = (u.position - v.position).squaredNorm();
-  const auto minimum = sum.minimum(middle, pull);
+  const auto minimum = sum.minimum(middle, pull_);
   const Vec3 best = minimum && (*minimum - middle).squaredNorm() <= 4 * squared_length ? *minimum : middle;
   const double trace = sum.trace();
   return {best, weight * std::max(0.0, sum(best) - invisible * trace), 0,
@@ -371,7 +388,7 @@ Lanes EdgeCollapse::inner_costs(const std::array<HalfEdge, lane_count>& edges) c
   const Lanes ex = p[0] - r[0], ey = p[1] - r[1], ez = p[2] - r[2];
   const Lanes squared_length = ex * ex + ey * ey + ez * ez;
   const Lanes trace = xx + yy + zz;
-  const Lanes a = xx + pull * trace, d = yy + pull * trace, f = zz + pull * trace;
+  const Lanes a = xx + pull_ * trace, d = yy + pull_ * trace, f = zz + pull_ * trace;
   const Lanes c00 = d * f - yz * yz, c01 = xz * yz - xy * f, c02 = xy * yz - xz * d;
   const Lanes c11 = a * f - xz * xz, c12 = xy * xz - a * yz, c22 = a * d - xy * xy;
   const Lanes determinant = a * c00 + xy * c01 + xz * c02;
@@ -500,9 +517,6 @@ void EdgeCollapse::costs_of(const std::vector<Index>& edges, std::vector<double>
 
 void EdgeCollapse::evaluate(Index edge, Placement placement) {
   placement_[edge] = placement;
-  if (!measured_.empty()) {
-    measured_[edge] = 0;
-  }
   if (const auto found = target(half_of_[edge], placement)) {
     heap_.set(edge, found->cost());
   } else {
@@ -633,14 +647,11 @@ void EdgeCollapse::collapse(HalfEdge h, const Target& chosen) {
     unlink(next(o), previous(o));
     triangles_ -= 1;
   }
-  if (!next_merged_.empty()) {
-    next_merged_[last_merged_[u]] = v;
-    last_merged_[u] = last_merged_[v];
-  }
   vertex_[u].position = chosen.position;
   vertex_[u].quadric += vertex_[v].quadric;
   vertex_[u].area += vertex_[v].area;
   vertex_[u].facing += vertex_[v].facing;
+  vertex_[u].given_area += vertex_[v].given_area;
   if (!wall_.empty()) {
     wall_[u] += wall_[v];
   }

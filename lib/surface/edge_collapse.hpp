@@ -3,7 +3,6 @@
 #include "core/lanes.hpp"
 #include "core/progress.hpp"
 #include "surface/edge_heap.hpp"
-#include "surface/incidence.hpp"
 #include "surface/quadric.hpp"
 #include "surface/triangle_mesh.hpp"
 
@@ -31,10 +30,9 @@ class EdgeCollapse {
 public:
   enum class Aim { least_error, good_shape, few_collapses };
 
-  /// @param mesh  an oriented manifold, with boundary or without; nothing but is_fit() may be asked of any other. For
-  ///              few_collapses it must live as long
-  /// @param aim   good_shape spends error on triangles that are nowhere thin; few_collapses, for when much of the mesh
-  ///              stays, measures every collapse before it is made, and those that look better than they are wait
+  /// @param mesh  an oriented manifold, with boundary or without; nothing but is_fit() may be asked of any other
+  /// @param aim   good_shape spends error on triangles that are nowhere thin; few_collapses is for when much of the
+  ///              mesh stays: few planes have met anywhere, and all count alike
   explicit EdgeCollapse(const TriangleMesh& mesh, Aim aim = Aim::least_error);
 
   /// Whether the mesh is an oriented manifold of finite extent (why_unfit() names the place where it is not).
@@ -73,22 +71,10 @@ private:
     double area = 0;  // sum of those weights; zero where costs are not divided by it
     Vec3 position = Vec3::Zero();
     Vec3 facing = Vec3::Zero();  // sum of the given triangles' normals times area that the vertex stands for
+    double given_area = 0;       // twice the sum of their areas
     HalfEdge outgoing = none;    // a half-edge from it; at a boundary the one without a twin
     Index curve = none;          // boundary curve
     Index mark = 0;              // stamp of the last link check
-  };
-  // A triangle, made ready for how high points are over it.
-  struct Facet {
-    Vec3 normal;         // as long as twice the area
-    double inverse = 0;  // of its squared length
-    double height = 0;   // of the origin, times that length
-    // The shares of the second and third corner at a point: linear. Without area, none is over it.
-    std::array<Vec3, 2> along{Vec3::Zero(), Vec3::Zero()};
-    std::array<double, 2> share{-1, -1};
-
-    Facet(const Vec3& a, const Vec3& b, const Vec3& c);
-    // Infinite for points that are not over it.
-    [[nodiscard]] Lanes squared_height(const LaneVec3& p) const;
   };
   struct Half {
     Index from = 0;
@@ -125,17 +111,16 @@ private:
   [[nodiscard]] bool number_vertices(const TriangleMesh& mesh);
   [[nodiscard]] bool connect(const TriangleMesh& mesh);
   [[nodiscard]] bool has_one_fan_per_vertex() const;
-  void find_boundary(const TriangleMesh& mesh);
+  void find_boundary();
   void sum_quadrics();
   void fill_heap();
-  void expect_cost(std::size_t triangles);
   void sweep(std::size_t triangles, const Progress& progress);
   void evaluate_touched();
   [[nodiscard]] double cost_quantile(double fraction) const;
   void compact();
   bool collapse_cheapest();
   [[nodiscard]] std::optional<Target> target(HalfEdge h, Placement placement) const;
-  [[nodiscard]] static Target inner_target(const Vertex& u, const Vertex& v);
+  [[nodiscard]] Target inner_target(const Vertex& u, const Vertex& v) const;
   [[nodiscard]] Lanes inner_costs(const std::array<HalfEdge, lane_count>& edges) const;
   void costs_of(const std::vector<Index>& edges, std::vector<double>& costs) const;
   [[nodiscard]] Target best_on_curve(HalfEdge h, const Quadric& q) const;
@@ -143,13 +128,9 @@ private:
   void evaluate(Index edge, Placement placement);
   [[nodiscard]] bool keeps_topology(HalfEdge h);
   [[nodiscard]] double shape_penalty(HalfEdge h, const Vec3& position) const;
-  void prepare_measuring(const TriangleMesh& mesh);
-  [[nodiscard]] Vec3 given_position(Index given) const { return (given_mesh_->vertices[given] - centre_) / scale_; }
-  template <typename FacetOf, typename CornersOf>
-  [[nodiscard]] double farthest_off(std::size_t facets, const FacetOf& facet, const CornersOf& corners,
-                                    double enough) const;
-  [[nodiscard]] double squared_distance_off(HalfEdge h, const Vec3& position, double enough);
   [[nodiscard]] double fan_penalty(Index vertex, Index other, const Vec3& position) const;
+  [[nodiscard]] bool is_at_tip(HalfEdge h) const;
+  [[nodiscard]] double squared_loss(HalfEdge h, const Vec3& position) const;
   void collapse(HalfEdge h, const Target& target);
   void unlink(HalfEdge spoke, HalfEdge rim);
   void set_outgoing(Index vertex, HalfEdge any);
@@ -165,18 +146,8 @@ private:
   std::vector<Curve> curves_;
   std::vector<Index> number_, given_;  // of the given mesh's vertices here, and back
   Index stamp_ = 0;
-  // Where collapses are measured: the given triangles, and which vertices were merged into one, as a list.
-  const TriangleMesh* given_mesh_ = nullptr;
-  Incidence given_around_;
-  std::vector<Facet> given_facets_;
-  std::vector<Index> next_merged_, last_merged_;  // #V
-  std::vector<std::uint8_t> measured_;            // #E the cost in the heap is a measured one
-  double certain_cost_ = 0;                       // collapses up to it will have to be made
-  std::vector<Vec3> off_;                         // points to measure
-  std::vector<Index> off_from_;                   // given triangles to measure them from
-  std::vector<Facet> made_;                       // by the collapse that is measured
-  std::vector<std::array<Vec3, 3>> made_corners_;
   Aim aim_;
+  double pull_;  // how strongly a new vertex is held near the middle of its edge where the quadric is flat
   ShapeLimits limits_;
   std::size_t limits_used_ = 0;
   EdgeHeap heap_;

@@ -18,15 +18,6 @@ public:
   [[nodiscard]] Index top() const { return heap_.front().item; }
   [[nodiscard]] bool contains(Index item) const { return place_[item] != absent; }
 
-  [[nodiscard]] std::vector<double> keys() const {
-    std::vector<double> found;
-    found.reserve(heap_.size());
-    for (const Entry& entry : heap_) {
-      found.push_back(entry.key);
-    }
-    return found;
-  }
-
   /// Appends without order; call order() before anything else.
   void append(Index item, double key) {
     place_[item] = static_cast<Index>(heap_.size());

@@ -52,24 +52,15 @@ std::vector<std::array<Index, 3>> neighbours(std::span<const std::array<Index, 3
   return result;
 }
 
-std::vector<std::vector<Index>> boundary_loops(const TriangleMesh& mesh) {
-  return boundary_loops(mesh.triangles, neighbours(mesh, incidence(mesh)));
-}
+namespace {
 
-std::vector<std::vector<Index>> boundary_loops(std::span<const std::array<Index, 3>> triangles,
-                                               std::span<const std::array<Index, 3>> across) {
-  std::vector<std::pair<Index, Index>> edges;
-  for (std::size_t t = 0; t < triangles.size(); ++t) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      if (across[t][k] == no_neighbour) {
-        edges.emplace_back(triangles[t][k], triangles[t][(k + 1) % 3]);
-      }
-    }
-  }
+using DirectedEdge = std::pair<Index, Index>;
+
+std::vector<std::vector<Index>> loops_of(std::vector<DirectedEdge> edges) {
   std::sort(edges.begin(), edges.end());
   std::vector<bool> used(edges.size(), false);
   const auto next_unused = [&](Index from) {
-    auto it = std::lower_bound(edges.begin(), edges.end(), std::pair<Index, Index>{from, 0});
+    auto it = std::lower_bound(edges.begin(), edges.end(), DirectedEdge{from, 0});
     while (it != edges.end() && it->first == from && used[static_cast<std::size_t>(it - edges.begin())]) {
       ++it;
     }
@@ -89,6 +80,59 @@ std::vector<std::vector<Index>> boundary_loops(std::span<const std::array<Index,
     loops.push_back(std::move(loop));
   }
   return loops;
+}
+
+}  // namespace
+
+std::vector<std::vector<Index>> boundary_loops(const TriangleMesh& mesh) {
+  // The edges known so far in a list at their lower end, each with the number of its triangles.
+  struct Edge {
+    Index higher, before, triangles;
+  };
+  constexpr Index none = 0xffffffff;
+  std::vector<Edge> edges;
+  edges.reserve(3 * mesh.triangles.size() / 2 + 1);
+  std::vector<Index> last(mesh.vertices.size(), none);
+  std::vector<Index> edge_of;
+  edge_of.reserve(3 * mesh.triangles.size());
+  for (const auto& c : mesh.triangles) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Index lower = std::min(c[k], c[(k + 1) % 3]);
+      const Index higher = std::max(c[k], c[(k + 1) % 3]);
+      Index edge = last[lower];
+      while (edge != none && edges[edge].higher != higher) {
+        edge = edges[edge].before;
+      }
+      if (edge == none) {
+        edge = static_cast<Index>(edges.size());
+        edges.push_back({higher, last[lower], 0});
+        last[lower] = edge;
+      }
+      ++edges[edge].triangles;
+      edge_of.push_back(edge);
+    }
+  }
+  std::vector<DirectedEdge> found;
+  for (std::size_t h = 0; h < edge_of.size(); ++h) {
+    if (edges[edge_of[h]].triangles != 2) {
+      const auto& c = mesh.triangles[h / 3];
+      found.emplace_back(c[h % 3], c[(h % 3 + 1) % 3]);
+    }
+  }
+  return loops_of(std::move(found));
+}
+
+std::vector<std::vector<Index>> boundary_loops(std::span<const std::array<Index, 3>> triangles,
+                                               std::span<const std::array<Index, 3>> across) {
+  std::vector<DirectedEdge> edges;
+  for (std::size_t t = 0; t < triangles.size(); ++t) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (across[t][k] == no_neighbour) {
+        edges.emplace_back(triangles[t][k], triangles[t][(k + 1) % 3]);
+      }
+    }
+  }
+  return loops_of(std::move(edges));
 }
 
 }  // namespace tunica
