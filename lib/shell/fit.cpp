@@ -1,6 +1,5 @@
 #include "shell/fit.hpp"
 
-#include "core/error.hpp"
 #include "shell/curved_surface.hpp"
 #include "shell/fit_cross.hpp"
 #include "shell/fit_edit.hpp"
@@ -8,6 +7,7 @@
 #include "shell/fit_missed.hpp"
 #include "shell/fit_parts.hpp"
 #include "shell/fit_polish.hpp"
+#include "shell/fit_result.hpp"
 #include "shell/fit_shape.hpp"
 #include "shell/fit_squeeze.hpp"
 #include "shell/fit_start.hpp"
@@ -16,10 +16,7 @@
 #include "surface/measure.hpp"
 #include "surface/self_intersections.hpp"
 
-#include <fmt/core.h>
-
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
 namespace tunica {
@@ -49,11 +46,9 @@ constexpr double mistrusted = 1.15;      // times the samples' error: a certifie
 constexpr int rough_certificates = 3;
 constexpr double worth_mending = 0.97;  // of the certified distance, by what it missed
 constexpr int most_settling = 20, some_settling = 4;
-constexpr double clearly_below = 0.99;
 constexpr int certificates = 10;
 constexpr double hopeless = 2;          // times the limit: more shells will not mend it
 constexpr double worth_a_search = 1.5;  // tolerances: error of as many shells as are allowed
-constexpr double noted_width = 1.5;     // of the error, on the way
 constexpr int local_mending = 3;        // certificates, before less error is asked for everywhere
 constexpr double most_tightening = 0.95, least_tightening = 0.985;  // of the limit, where certificates find more
 constexpr std::array<double, 6> parts_of_tolerance{0.95, 0.9, 0.8, 0.65, 0.5, 0.25};  // to part sheets that cross
@@ -62,75 +57,77 @@ constexpr double good_enough_angle = 0.9;                                       
 class Fitting {
 public:
   Fitting(const TriangleMesh& coarse, const Target& target, const RelaxOptions& options)
-      : coarse_(coarse),
-        target_(target),
-        options_(options),
-        width_(options.width.value_or(default_width * target.diagonal())),
-        like_target_(same_topology(coarse, target.mesh())) {
-    if (options.tolerance) {
-      width_ = std::min(width_, *options.tolerance / 20);
-    }
-  }
+      : Fitting(coarse, target, options, width_for(target, options)) {}
 
   RelaxResult run() {
     const std::optional<std::size_t> most = options_.shells ? options_.shells : options_.max_shells;
     if (!options_.tolerance) {
       to_count(most.value_or((options_.refine ? 4 : 1) * coarse_.triangles.size()));
-      return std::move(result_);
+      return std::move(result_.found);
     }
     if (options_.refine && coarse_refined(*options_.tolerance, most.value_or(max_index))) {
-      result_.reached = true;
-      result_.stopped = "the tolerance holds";
-      return std::move(result_);
+      result_.found.reached = true;
+      result_.found.stopped = "the tolerance holds";
+      return std::move(result_.found);
     }
     if (most) {
       to_count(*most);
-      if (result_.distance.both.upper <= worth_a_search * *options_.tolerance) {
+      if (result_.found.distance.both.upper <= worth_a_search * *options_.tolerance) {
         take_fewest(*most);
       }
     } else {
       to_tolerance(*options_.tolerance);
       part_sheets(max_index);
     }
-    result_.reached = result_.distance.both.upper <= *options_.tolerance;
-    result_.stopped = *result_.reached ? "the tolerance holds" : "closer shells were not found";
-    return std::move(result_);
+    result_.found.reached = result_.found.distance.both.upper <= *options_.tolerance;
+    result_.found.stopped = *result_.found.reached ? "the tolerance holds" : "closer shells were not found";
+    return std::move(result_.found);
   }
 
 private:
+  Fitting(const TriangleMesh& coarse, const Target& target, const RelaxOptions& options, double width)
+      : coarse_(coarse),
+        target_(target),
+        options_(options),
+        like_target_(same_topology(coarse, target.mesh())),
+        result_(target, options, width) {}
+
+  static double width_for(const Target& target, const RelaxOptions& options) {
+    const double width = options.width.value_or(default_width * target.diagonal());
+    return options.tolerance ? std::min(width, *options.tolerance / 20) : width;
+  }
+
   /// The result of a search without regard to how many shells there may be, where these are so few.
   void take_fewest(std::size_t most) {
     Fitting fewest(coarse_, target_, options_);
     fewest.to_tolerance(*options_.tolerance);
     fewest.part_sheets(most);
-    RelaxResult& found = fewest.result_;
-    result_.iterations.insert(result_.iterations.end(), found.iterations.begin(), found.iterations.end());
-    const bool held = result_.distance.both.upper <= *options_.tolerance;
-    const std::size_t enough = held ? result_.shell.triangles.size() - 1 : most;
+    RelaxResult& found = fewest.result_.found;
+    result_.found.iterations.insert(result_.found.iterations.end(), found.iterations.begin(), found.iterations.end());
+    const bool held = result_.holds(*options_.tolerance);
+    const std::size_t enough = held ? result_.found.shell.triangles.size() - 1 : most;
     if (found.distance.both.upper <= *options_.tolerance && found.shell.triangles.size() <= enough) {
-      result_.shell = std::move(found.shell);
-      result_.distance = found.distance;
+      result_.take(std::move(found.shell), found.distance);
     }
   }
 
   /// Where sheets of the target are closer to each other than the tolerance, patches may cross that nothing parts any
   /// more. A somewhat smaller error is another search, a much smaller one parts them where they have room.
   void part_sheets(std::size_t most) {
-    std::size_t crossings = crossing_shells(result_.shell).size();
+    std::size_t crossings = crossing_shells(result_.found.shell).size();
     if (crossings == 0 || count_self_intersections(target_.mesh()) > 0) {
       return;
     }
-    double angle = min_angle_degrees(flat_facets(result_.shell));
+    double angle = min_angle_degrees(flat_facets(result_.found.shell));
     for (const double part : parts_of_tolerance) {
       Fitting closer(coarse_, target_, options_);
       closer.to_tolerance(part * *options_.tolerance);
-      const std::size_t left = crossing_shells(closer.result_.shell).size();
-      const double its_angle = std::min(min_angle_degrees(flat_facets(closer.result_.shell)), FitLimits{}.angle);
+      const std::size_t left = crossing_shells(closer.result_.found.shell).size();
+      const double its_angle = std::min(min_angle_degrees(flat_facets(closer.result_.found.shell)), FitLimits{}.angle);
       const bool better = left < crossings || (left == 0 && its_angle > angle);
-      if (better && closer.result_.shell.triangles.size() <= most &&
-          closer.result_.distance.both.upper <= *options_.tolerance) {
-        result_.shell = std::move(closer.result_.shell);
-        result_.distance = closer.result_.distance;
+      if (better && closer.result_.found.shell.triangles.size() <= most &&
+          closer.result_.found.distance.both.upper <= *options_.tolerance) {
+        result_.take(std::move(closer.result_.found.shell), closer.result_.found.distance);
         crossings = left;
         angle = its_angle;
       }
@@ -155,7 +152,7 @@ private:
     for (TriangleMesh& part : parts) {
       if (const auto crumb = crumb_within(part, tolerance, FitLimits{}.angle)) {
         ShellDistanceOptions measuring;
-        measuring.width = width_;
+        measuring.width = result_.width();
         ShellMesh shell = flat_shells(*crumb, options_.surface);
         const ShellDistance distance = shell_distance(shell, Target(std::move(part)), measuring);
         done.push_back({std::move(shell), distance});
@@ -173,14 +170,6 @@ private:
     join(done, tolerance);
   }
 
-  /// What is certain from elsewhere.
-  static void lower_uppers(ShellDistance& distance, const Interval& both, const Interval& to_target,
-                           const Interval& to_shell) {
-    distance.both.upper = std::min(distance.both.upper, both.upper);
-    distance.shell_to_target.upper = std::min(distance.shell_to_target.upper, to_target.upper);
-    distance.target_to_shell.upper = std::min(distance.target_to_shell.upper, to_shell.upper);
-  }
-
   struct Fitted {
     ShellMesh shell;
     ShellDistance distance;  ///< to its part of the target
@@ -189,13 +178,12 @@ private:
   /// @return whether it became curved
   bool fit_part(const TriangleMesh& part, double tolerance, std::vector<Fitted>& done) {
     const Target target(part);
-    Fitting fitting(part, target, options_);
-    fitting.width_ = width_;
+    Fitting fitting(part, target, options_, result_.width());
     fitting.whole_to_tolerance(tolerance);
-    RelaxResult& fitted = fitting.result_;
-    result_.iterations.insert(result_.iterations.end(), fitted.iterations.begin(), fitted.iterations.end());
+    RelaxResult& fitted = fitting.result_.found;
+    result_.found.iterations.insert(result_.found.iterations.end(), fitted.iterations.begin(), fitted.iterations.end());
     done.push_back({std::move(fitted.shell), fitted.distance});
-    return !fitting.flat_;
+    return !fitting.result_.is_flat();
   }
 
   /// Takes all parts as the result when that is better. What is certain of each part is so of all together.
@@ -210,17 +198,14 @@ private:
       raise(most.target_to_shell.upper, part.distance.target_to_shell.upper);
     }
     ShellMesh shell = joined(shells);
-    ShellDistanceOptions measuring;
-    measuring.width = width_;
-    ShellDistance distance = shell_distance(shell, target_, measuring);
+    ShellDistance distance = result_.distance_of(shell);
     lower_uppers(distance, most.both, most.shell_to_target, most.target_to_shell);
-    const bool held = !result_.shell.triangles.empty() && result_.distance.both.upper <= tolerance;
+    const bool held = result_.holds(tolerance);
     const bool better =
-        held ? distance.both.upper <= tolerance && shell.triangles.size() < result_.shell.triangles.size()
-             : result_.shell.triangles.empty() || distance.both.upper < result_.distance.both.upper;
+        held ? distance.both.upper <= tolerance && shell.triangles.size() < result_.found.shell.triangles.size()
+             : result_.is_empty() || distance.both.upper < result_.found.distance.both.upper;
     if (better) {
-      result_.shell = std::move(shell);
-      result_.distance = distance;
+      result_.take(std::move(shell), distance);
     }
   }
 
@@ -233,7 +218,7 @@ private:
     const std::size_t most = static_cast<std::size_t>(std::clamp(flat_count, 64.0, 1e9));
     if (!start.own_topology && static_cast<double>(start.mesh.triangles.size()) >
                                    limited_by_target * static_cast<double>(target_.mesh().triangles.size())) {
-      no_worse_than_flat(tolerance, max_index, start);
+      result_.no_worse_than_flat(tolerance, max_index, start);
       return;
     }
     FitSamples samples(target_, guess(start.mesh.triangles.size() / expected_gain));
@@ -255,29 +240,41 @@ private:
     for (FitState& state : found) {
       state.attach();
       state.measure();
-      if (state.error() > limit && !result_.shell.triangles.empty() && result_.distance.both.upper <= tolerance) {
+      if (state.error() > limit && result_.holds(tolerance)) {
         break;
       }
       if (state.error() > hopeless * limit) {
-        certify(state, tolerance);
+        result_.certify(state, tolerance);
         continue;
       }
       if (join_normals(state, limit) > 0) {
         state.attach();
         state.measure();
       }
-      if (regains(samples, state, limit)) {
+      bool holds = regains(samples, state, limit);
+      for (int i = 0; i < local_mending && !holds; ++i) {
+        // Shells that are in the way may be exchanged later, what does not hold may not.
+        split_worst(state, worth_it * limit, 1);
+        repair(state, limit, most);
+        mend_angles(state, limit);
+        holds = regains(samples, state, limit);
+      }
+      if (holds) {
         part_crossings(state, limit, most);
         squeeze(samples, state, limit);
-        exchange_pieces(samples, state, limit, tolerance, options_.kink);
       }
-      shape_up(samples, state, limit, most);
       // What the certificate asked for may have made triangles thin: then the next best is looked at as well.
-      if (make_certain(samples, state, tolerance, most) && count_thin(state) == 0) {
+      bool certain = shape_and_certify(samples, state, tolerance, most);
+      if (holds) {
+        // What is exchanged is certified where it changes: all is certain if it was so before.
+        exchange_pieces(samples, state, limit, tolerance, options_.kink);
+        certain = shape_and_certify(samples, state, tolerance, most) || certain;
+      }
+      if (certain && count_thin(state) == 0) {
         break;
       }
     }
-    no_worse_than_flat(tolerance, max_index, start);
+    result_.no_worse_than_flat(tolerance, max_index, start);
   }
 
   /// As many triangles of the target with better angles.
@@ -313,7 +310,7 @@ private:
       repair(state, limit, most);
       mend_angles(state, limit);
       if (round == 0 || target_.mesh().triangles.size() < dense * state.mesh.alive) {
-        note(state);
+        result_.note(state);
       }
       const bool fits = state.error() <= limit;
       const double worth = state.mesh.alive > affordable ? worth_much : worth_it;
@@ -340,7 +337,12 @@ private:
     }
     repair(state, limit, most);
     mend_angles(state, limit);
-    note(state);
+    result_.note(state);
+    return make_certain(samples, state, tolerance, most);
+  }
+
+  bool shape_and_certify(FitSamples& samples, FitState& state, double tolerance, std::size_t most) {
+    shape_up(samples, state, margin * tolerance, most);
     return make_certain(samples, state, tolerance, most);
   }
 
@@ -351,7 +353,7 @@ private:
     bool held = false;
     for (int i = 0; i < certificates; ++i) {
       part_crossings(state, limit, most);
-      if (certify(state, tolerance)) {
+      if (result_.certify(state, tolerance)) {
         // Better angles are another mesh to be made certain; the result is kept meanwhile.
         held = true;
         if (count_thin(state) == 0) {
@@ -363,22 +365,22 @@ private:
           return true;
         }
         state = std::move(shaped);
-        if (certify(state, tolerance)) {
+        if (result_.certify(state, tolerance)) {
           return true;
         }
       }
       const double before = state.error();
       // What more samples alone do not mend gets more shells.
       const std::size_t added = add_missed(samples, state, limit, true);
-      if (farthest_) {
-        samples.add(*farthest_);
+      if (result_.farthest()) {
+        samples.add(*result_.farthest());
       }
       if (regains_with_few(samples, state, limit, most)) {
         continue;
       }
       if (i >= local_mending) {
         // Of what is not seen only less error helps.
-        limit *= std::clamp(tolerance / least_distance_, most_tightening, least_tightening);
+        limit *= std::clamp(tolerance / result_.least_distance(), most_tightening, least_tightening);
       }
       if (i > 0 || added == 0) {
         split_worst(state, 0.985 * tolerance, state.mesh.alive);
@@ -397,7 +399,7 @@ private:
       }
       stuck = state.error() > 0.999 * before && state.error() > limit ? stuck + 1 : 0;
       if (state.error() > hopeless * limit || stuck == patience) {
-        return certify(state, tolerance) || held;  // a place that more shells do not mend
+        return result_.certify(state, tolerance) || held;  // a place that more shells do not mend
       }
     }
     return held;
@@ -412,8 +414,8 @@ private:
     const auto wanted = static_cast<double>(shells);
     const FitStart start = start_for(all ? wanted : start_surplus * wanted);
     if (all && !start.own_topology) {
-      result_.stopped = "the target has no more triangles than shells are allowed";
-      no_worse_than_flat({}, shells, start);
+      result_.found.stopped = "the target has no more triangles than shells are allowed";
+      result_.no_worse_than_flat({}, shells, start);
       return;
     }
     FitSamples samples(target_, guess(wanted));
@@ -440,8 +442,8 @@ private:
     double known = std::numeric_limits<double>::infinity();
     for (int i = 0; i < rough_certificates; ++i) {
       part_crossings(best, best.error(), shells);
-      certify(best, std::nullopt);
-      const double now = result_.distance.both.lower;
+      result_.certify(best, std::nullopt);
+      const double now = result_.found.distance.both.lower;
       if (now <= mistrusted * best.error() || now > worth_mending * known ||
           add_missed(samples, best, best.error(), true) == 0) {
         break;
@@ -454,9 +456,9 @@ private:
         exhausted = exchange(best, shells, default_rounds, {part, 1});
       }
     }
-    record(result_.shell, result_.distance.both);
-    result_.stopped = exhausted ? "further rounds bring too little" : "the limit of rounds was reached";
-    no_worse_than_flat({}, shells, start);
+    result_.record(result_.found.shell, result_.found.distance.both);
+    result_.found.stopped = exhausted ? "further rounds bring too little" : "the limit of rounds was reached";
+    result_.no_worse_than_flat({}, shells, start);
   }
 
   /// So many shells from one start, all nodes settled.
@@ -486,7 +488,7 @@ private:
     bool noted = false;
     for (int round = 1; round < rounds && fruitless < patience; ++round) {
       if (!noted) {
-        note(best);
+        result_.note(best);
         noted = true;
       }
       advance(options_.progress, done[0] + (done[1] - done[0]) * static_cast<double>(round) / rounds);
@@ -525,113 +527,11 @@ private:
 
   static std::size_t guess(double shells) { return static_cast<std::size_t>(std::max(8.0, shells)); }
 
-  /// Takes the mesh as the result when it is better. @return whether the tolerance certainly holds
-  bool certify(const FitState& state, std::optional<double> tolerance) {
-    ShellMesh shell = state.mesh.shell();
-    ShellDistanceOptions measuring;
-    measuring.width = std::max(width_, state.error() / 20);
-    measuring.limit = tolerance;
-    ShellDistance distance = shell_distance(shell, target_, measuring);
-    if (tolerance && distance.both.lower <= clearly_below * *tolerance && distance.both.upper > *tolerance) {
-      // An open question deserves a closer look, but where the answer would be a narrow one shells are mended sooner.
-      measuring.width = *tolerance / 200;
-      distance = shell_distance(shell, target_, measuring);
-    }
-    farthest_.reset();
-    if (distance.target_to_shell.lower > 0) {
-      farthest_ = distance.farthest_of_target;
-    }
-    least_distance_ = distance.both.lower;
-    const bool holds = tolerance && distance.both.upper <= *tolerance;
-    const bool held = tolerance && !result_.shell.triangles.empty() && result_.distance.both.upper <= *tolerance;
-    if (result_.shell.triangles.empty() ||
-        (held ? holds && price(state) < price_ : distance.both.upper < result_.distance.both.upper)) {
-      result_.shell = std::move(shell);
-      result_.distance = distance;
-      price_ = price(state);
-    }
-    return holds;
-  }
-
-  /// Flat facets instead, where they do better.
-  void no_worse_than_flat(std::optional<double> tolerance, std::size_t most, const FitStart& start) {
-    if (start.own_topology) {
-      return;
-    }
-    const bool none = result_.shell.triangles.empty();
-    const bool holds = tolerance && !none && result_.distance.both.upper <= *tolerance;
-    // Flat errors fall as 1 / count: far from that nothing needs to be tried.
-    const double flat_count =
-        tolerance ? static_cast<double>(start.mesh.triangles.size()) * start.flat_error / *tolerance : 0;
-    if (holds && static_cast<double>(result_.shell.triangles.size()) < 0.6 * flat_count) {
-      return;
-    }
-    if (!tolerance && !none && result_.distance.both.upper < start.flat_error) {
-      return;
-    }
-    DecimateOptions decimating;
-    decimating.max_error = tolerance;
-    if (!tolerance) {
-      decimating.triangles = most;
-    }
-    const DecimateResult flat = decimate(target_.mesh(), decimating);
-    const auto normals = facet_normals(flat.mesh);
-    const bool without_area =
-        std::any_of(normals.begin(), normals.end(), [](const Vec3& n) { return n.squaredNorm() < 0.5; });
-    if (without_area && none) {
-      throw InputError("too many triangles without area: no shells are left without them; make the surface anew");
-    }
-    if (without_area) {
-      return;
-    }
-    ShellMesh shell = flat_shells(flat.mesh, options_.surface);
-    ShellDistanceOptions measuring;
-    measuring.width = width_;
-    ShellDistance distance = shell_distance(shell, target_, measuring);
-    if (flat.error) {
-      lower_uppers(distance, *flat.error, *flat.error, *flat.error);
-    }
-    const bool flat_holds = tolerance && distance.both.upper <= *tolerance;
-    const bool better =
-        none || (tolerance ? flat_holds && (!holds || shell.triangles.size() < result_.shell.triangles.size())
-                           : distance.both.upper < result_.distance.both.upper);
-    if (better) {
-      result_.shell = std::move(shell);
-      result_.distance = distance;
-      flat_ = true;
-    }
-  }
-
-  void note(const FitState& state) {
-    const ShellMesh shell = state.mesh.shell();
-    ShellDistanceOptions measuring;
-    measuring.width = std::max(width_, noted_width * state.error());
-    record(shell, shell_distance(shell, target_, measuring).both);
-  }
-
-  void record(const ShellMesh& shell, const Interval& distance) {
-    RelaxIteration iteration;
-    iteration.shells = shell.triangles.size();
-    iteration.hausdorff = distance;
-    iteration.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - last_).count();
-    last_ = std::chrono::steady_clock::now();
-    result_.iterations.push_back(iteration);
-    if (options_.on_iteration) {
-      options_.on_iteration(iteration, shell);
-    }
-  }
-
   const TriangleMesh& coarse_;
   const Target& target_;
   const RelaxOptions& options_;
-  double width_;
-  bool like_target_;              // COARSE has the target's topology
-  std::size_t price_ = 0;         // of the result
-  bool flat_ = false;             // the result is flat facets
-  std::optional<Vec3> farthest_;  // of the target, when last certified; none where that was not looked for
-  double least_distance_ = 0;     // mm, certainly, then
-  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
-  RelaxResult result_;
+  bool like_target_;  // COARSE has the target's topology
+  FitResult result_;
 };
 
 }  // namespace

@@ -15,19 +15,21 @@ namespace {
 
 constexpr double least_split_angle = 3;  // degrees, where nothing better can be had
 constexpr double good_enough = 0.5;      // of the limit: edges of closer patches stay
+constexpr double far_behind = 1.5;       // times the least error known: mergers that need not be placed well yet
 
 class Collapser {
 public:
   Collapser(FitState& state, double limit) : state_(state), mesh_(state.mesh), limit_(limit) {}
 
+  /// @param far  mm: of an error above this it need not be known how small it can become
   /// @return the error after the collapse; infinite when it is not possible
-  double evaluate(Index u, Index v) {
+  double evaluate(Index u, Index v, double far = std::numeric_limits<double>::infinity()) {
     Trial& trial = trial_;
     if (!prepare(u, v)) {
       return std::numeric_limits<double>::infinity();
     }
     start_soundly(u, v);
-    place_node(state_.samples(), trial.patches, trial.points, trial.limits, limit_, placing_steps, trial.node);
+    place_node(state_.samples(), trial.patches, trial.points, trial.limits, limit_, placing_steps, trial.node, far);
     return trial.node.error;
   }
 
@@ -212,7 +214,8 @@ private:
     const PlacedNode first = trial_.node;
     make_compatible(trial_);
     std::vector<Vec3> starts;
-    if (mesh_.on_boundary[u] + mesh_.on_boundary[v] == 0 && first.normals.size() == 1) {
+    const bool smooth = std::all_of(sectors_.begin(), sectors_.end(), [&](Index s) { return s == sectors_[0]; });
+    if (mesh_.on_boundary[u] + mesh_.on_boundary[v] == 0 && smooth) {
       starts = {mesh_.positions[u], mesh_.positions[v], middle_of_rings(u, v, first.normals[0])};
     } else if (special(u) == special(v)) {
       starts = {mesh_.positions[u], mesh_.positions[v]};
@@ -246,9 +249,14 @@ private:
 
   /// Boundaries first, then creases.
   [[nodiscard]] int special(Index node) const {
-    std::vector<Index> slots;
-    mesh_.slots_of(node, slots);
-    return mesh_.on_boundary[node] * 4 + static_cast<int>(slots.size());
+    std::vector<Index> sides;
+    mesh_.slots_of(node, sides);
+    for (Index& s : sides) {
+      s = mesh_.sectors[s];
+    }
+    std::sort(sides.begin(), sides.end());
+    sides.erase(std::unique(sides.begin(), sides.end()), sides.end());
+    return mesh_.on_boundary[node] * 4 + static_cast<int>(sides.size());
   }
 
   FitState& state_;
@@ -301,11 +309,13 @@ std::size_t collapse_edges(FitState& state, double limit, std::size_t shells, co
     }
     const double known = c.error;
     const bool fresh = c.version == current(c.u, c.v);
-    c.error = fresh ? collapser.evaluate_at(c.u, c.v, evaluations[c.evaluated]) : collapser.evaluate(c.u, c.v);
+    const double next = queue.empty() ? limit : queue.top().error;
+    const double far = far_behind * std::max(known, next);
+    c.error = fresh ? collapser.evaluate_at(c.u, c.v, evaluations[c.evaluated]) : collapser.evaluate(c.u, c.v, far);
     if (!(c.error <= limit) || !std::isfinite(c.error)) {
       continue;
     }
-    if (!fresh && !queue.empty() && c.error > 1.001 * std::max(known, queue.top().error)) {
+    if (!fresh && !queue.empty() && c.error > 1.001 * std::max(known, next)) {
       c.version = current(c.u, c.v);
       c.evaluated = evaluations.size();
       evaluations.push_back(collapser.placed_node());

@@ -15,6 +15,7 @@
 #include <algorithm>
 #include <array>
 #include <map>
+#include <optional>
 #include <random>
 
 namespace tunica {
@@ -22,13 +23,13 @@ namespace {
 
 constexpr std::size_t most_fits = 600;            // of pieces anew: what costs
 constexpr std::size_t most_before_parting = 150;  // of these more, where normals are to part
-constexpr std::size_t most_shells = 400, most_on_coarse_targets = 600;
-constexpr std::size_t coarse_target = 60;        // triangles per shell: walks on denser ones are what a piece costs
+constexpr std::size_t most_shells = 600, most_on_coarse_targets = 1300;
+constexpr std::size_t coarse_target = 250;       // triangles per shell: walks on denser ones are what a piece costs
 constexpr int fewest_rings = 1, most_rings = 3;  // of nodes around a merger that move with it
 constexpr int regaining = 4;                     // steps of all nodes of a piece
 constexpr double loosened = 4;                   // limits: error of a merger before its piece is fitted anew
 constexpr double thin_angle = 5;                 // degrees, for the time being
-constexpr double promising = 1.5, promising_soon = 1.2;  // limits: after one step, and later: more hardly ever recovers
+constexpr double promising = 1.3, promising_soon = 1.1;  // limits: after one step, and later: more hardly ever recovers
 constexpr double slow = 0.97;                            // of the error is left by a step that brings little
 constexpr std::array<double, 3> joining{1, 0.95, 0.9};   // of the limit
 constexpr int easing = 8;                                // steps of all nodes
@@ -134,9 +135,63 @@ private:
     if (!fits_again(region.state, shells, before, state_.limits.angle, limit_)) {
       return;
     }
-    FitState trial = state_;
-    if (put_back(region, trial) <= limit_ && !worse(trial) && holds(trial, around(region))) {
-      accept(std::move(trial), region.nodes);
+    const std::size_t points = samples_.points().size();
+    if (auto trial = sound(region, before)) {
+      accept(std::move(*trial), region.nodes);
+    } else {
+      samples_.keep(points);  // what only a piece that failed had to heed costs every other
+    }
+  }
+
+  /// The whole with a changed piece, where no point is too far off that the samples missed, if need be after further
+  /// steps of the piece.
+  std::optional<FitState> sound(FitRegion& region, std::size_t price_before) {
+    for (int i = 0; i < certificates; ++i) {
+      FitState trial = state_;
+      if (put_back(region, trial) > limit_ || worse(trial)) {
+        return {};
+      }
+      const Box box = around(region);
+      std::vector<Vec3> missed = missed_within(trial, box, limit_);
+      if (missed.empty() && holds_within(trial, box, tolerance_, missed)) {
+        // The samples must see that as well, or steps of all nodes would start above the limit. From patch to patch:
+        // attached to a tessellation's nearest triangle, some would be far off that are not.
+        trial.attach_again();
+        trial.measure();
+        return trial.error() <= limit_ ? std::optional(std::move(trial)) : std::nullopt;
+      }
+      attach_to_closest(missed, region.state);
+      region.state.measure();
+      if (region.state.error() <= limit_) {
+        return {};  // what is wrong is not seen
+      }
+      if (!recovers(region.state, limit_)) {
+        return {};
+      }
+      mend_angles(region.state, limit_);
+      if (region.state.error() > limit_ || price(region.state) > price_before) {
+        return {};
+      }
+    }
+    return {};
+  }
+
+  /// Adds points to the samples, and to those of a piece.
+  void attach_to_closest(const std::vector<Vec3>& points, FitState& piece) {
+    for (const Vec3& p : points) {
+      double least = everywhere;
+      Index closest = 0;
+      for (Index t = 0; t < piece.mesh.triangles.size(); ++t) {
+        if (!piece.mesh.is_alive(t)) {
+          continue;
+        }
+        if (const double d = foot_on_patch(piece.mesh.patch(t), p).squared_distance; d < least) {
+          least = d;
+          closest = t;
+        }
+      }
+      piece.patches[closest].attached.push_back(static_cast<Index>(samples_.points().size()));
+      samples_.add(p);
     }
   }
 
@@ -160,30 +215,6 @@ private:
     box.lower.array() -= limit_;
     box.upper.array() += limit_;
     return box;
-  }
-
-  /// Whether no point is too far off that the samples missed, if need be after steps of all nodes.
-  bool holds(FitState& trial, Box box) {
-    std::vector<Vec3> missed = missed_within(trial, box, limit_);
-    for (int i = 0; i < certificates; ++i) {
-      for (const Vec3& p : missed) {
-        samples_.add(p);
-      }
-      trial.attach();
-      trial.measure();
-      if (trial.error() > limit_) {
-        if (!regains(samples_, trial, limit_) || worse(trial)) {
-          return false;
-        }
-        box = {Vec3::Constant(-everywhere), Vec3::Constant(everywhere)};
-      } else if (i > 0) {
-        return false;  // what is wrong is not seen
-      }
-      if (holds_within(trial, box, tolerance_, missed)) {
-        return true;
-      }
-    }
-    return false;
   }
 
   void accept(FitState trial, const std::vector<Index>& nodes) {
@@ -210,10 +241,18 @@ private:
   std::map<std::array<Index, 3>, std::size_t> tried_;
 };
 
-/// Takes a changed state when steps of all nodes bring it within the limit, and it is no dearer and crosses no more.
-bool take_if_sound(FitSamples& samples, FitState trial, FitState& state, double limit) {
+bool is_certain(const FitState& state, double tolerance) {
+  constexpr double everywhere = std::numeric_limits<double>::infinity();
+  std::vector<Vec3> farthest;
+  return holds_within(state, {Vec3::Constant(-everywhere), Vec3::Constant(everywhere)}, tolerance, farthest);
+}
+
+/// Takes a changed state when steps of all nodes bring it within the limit, it is no dearer, crosses no more, and is
+/// certainly within the tolerance, if what it was made from is.
+bool take_if_sound(FitSamples& samples, FitState trial, FitState& state, double limit, double tolerance) {
   if (!regains(samples, trial, limit) || price(trial) > price(state) ||
-      crossing_shells(trial.mesh.shell()).size() > crossing_shells(state.mesh.shell()).size()) {
+      crossing_shells(trial.mesh.shell()).size() > crossing_shells(state.mesh.shell()).size() ||
+      (!is_certain(trial, tolerance) && is_certain(state, tolerance))) {
     return false;
   }
   state = std::move(trial);
@@ -226,11 +265,15 @@ std::size_t dig(FitSamples& samples, FitState& state, double limit, double toler
                 std::mt19937& random) {
   for (int fruitless = 0; fruitless < patience && left > 0;) {
     const std::size_t before = price(state);
-    squeeze(samples, state, limit);
+    FitState squeezed = state;
+    squeeze(samples, squeezed, limit);
+    if (price(squeezed) < before) {
+      take_if_sound(samples, std::move(squeezed), state, limit, tolerance);
+    }
     left -= Exchange(samples, state, limit, tolerance).run(left, random);
     FitState eased = state;
     settle(eased, easing);
-    take_if_sound(samples, std::move(eased), state, limit);
+    take_if_sound(samples, std::move(eased), state, limit, tolerance);
     fruitless = price(state) < before ? 0 : fruitless + 1;
   }
   return left;
@@ -238,13 +281,13 @@ std::size_t dig(FitSamples& samples, FitState& state, double limit, double toler
 
 /// Joins normals as long as the error allows. One after the other they may ask too much of those that follow: then
 /// with a margin.
-void join_again(FitSamples& samples, FitState& state, double limit) {
+void join_again(FitSamples& samples, FitState& state, double limit, double tolerance) {
   for (const double part : joining) {
     FitState joined = state;
     join_normals(joined, part * limit);
     joined.attach();
     joined.measure();
-    if (take_if_sound(samples, std::move(joined), state, limit)) {
+    if (take_if_sound(samples, std::move(joined), state, limit, tolerance)) {
       return;
     }
   }
@@ -280,7 +323,7 @@ void exchange_pieces(FitSamples& samples, FitState& state, double limit, double 
   }
   samples.take_points(std::move(points_of_best));
   if (price(best) < price(state)) {
-    join_again(samples, best, limit);
+    join_again(samples, best, limit, tolerance);
     state = std::move(best);
   }
 }

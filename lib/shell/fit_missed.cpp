@@ -60,6 +60,33 @@ bool is_within(const Box& box, const Vec3& p) {
   return (p.array() >= box.lower.array()).all() && (p.array() <= box.upper.array()).all();
 }
 
+/// The shells that come as close as `reach` (mm) to a box, so all that its points can have within that. All of them
+/// where patches follow the normals across their edges.
+ShellMesh shells_near(ShellMesh shell, const Box& box, double reach) {
+  if (shell.patch == Patch::watertight) {
+    return shell;
+  }
+  const Box wide{box.lower - Vec3::Constant(reach), box.upper + Vec3::Constant(reach)};
+  const std::vector<CubicPatch> patches = curved_patches(shell);
+  ShellMesh near = shell;
+  near.triangles.clear();
+  near.corner_normals.clear();
+  for (std::size_t t = 0; t < patches.size(); ++t) {
+    Box hull{patches[t].control[0], patches[t].control[0]};
+    for (const Vec3& p : patches[t].control) {
+      hull.lower = hull.lower.cwiseMin(p);
+      hull.upper = hull.upper.cwiseMax(p);
+    }
+    if ((hull.lower.array() <= wide.upper.array()).all() && (hull.upper.array() >= wide.lower.array()).all()) {
+      near.triangles.push_back(shell.triangles[t]);
+      if (!shell.corner_normals.empty()) {
+        near.corner_normals.push_back(shell.corner_normals[t]);
+      }
+    }
+  }
+  return near;
+}
+
 /// Where patches part sideways and are off as well, the target above the gap is farther from both than either measure
 /// says: its points there that are too far off.
 std::vector<Vec3> missed_over_gaps(const FitState& state, const std::vector<std::array<Index, 2>>& edges,
@@ -147,7 +174,7 @@ std::vector<Vec3> missed_within(const FitState& state, const Box& box, double li
       points.push_back(p);
     }
   }
-  const ShellMesh shell = state.mesh.shell();
+  const ShellMesh shell = shells_near(state.mesh.shell(), box, limit);
   const std::vector<CubicPatch> patches = curved_patches(shell);
   for (const Missed& far : far_points(points, PatchSearch(shell, patches), limit)) {
     if (far.distance > limit) {
@@ -166,7 +193,7 @@ std::vector<Vec3> missed_within(const FitState& state, const Box& box, double li
 
 bool holds_within(const FitState& state, const Box& box, double tolerance, std::vector<Vec3>& farthest) {
   const Target& target = state.samples().target();
-  const ShellMesh shell = state.mesh.shell();
+  const ShellMesh shell = shells_near(state.mesh.shell(), box, tolerance);
   const std::vector<CubicPatch> patches = curved_patches(shell);
   std::vector<CubicPatch> here;
   for (const CubicPatch& patch : patches) {

@@ -284,7 +284,7 @@ void add_creased(const PlacedPatch& p, const StepWeight& weights, Eigen::MatrixX
 }  // namespace
 
 void place_node(const FitSamples& samples, std::vector<PlacedPatch>& patches, const std::vector<Index>& points,
-                const FitLimits& limits, double give_up, int steps, PlacedNode& node) {
+                const FitLimits& limits, double give_up, int steps, PlacedNode& node, double far) {
   check_interrupt();  // all that takes long comes by here
   hold_together(node.normals, node.sectors, limits.kink);
   put(patches, node);
@@ -340,14 +340,14 @@ void place_node(const FitSamples& samples, std::vector<PlacedPatch>& patches, co
     for (const double length : {1.0, 0.35}) {
       PlacedNode moved = best;
       Vec3 move = length * x.head<3>();
-      if (const double far = move.norm(); far > largest_move * edge) {
-        move *= largest_move * edge / far;
+      if (const double way = move.norm(); way > largest_move * edge) {
+        move *= largest_move * edge / way;
       }
       moved.position += move;
       for (std::size_t s = 0; s < moved.normals.size(); ++s) {
         Vec2 tilt = length * x.segment<2>(static_cast<Eigen::Index>(3 + 2 * s));
-        if (const double far = tilt.norm(); far > largest_tilt) {
-          tilt *= largest_tilt / far;
+        if (const double angle = tilt.norm(); angle > largest_tilt) {
+          tilt *= largest_tilt / angle;
         }
         const auto axes = tilt_axes(best.normals[s]);
         moved.normals[s] = (best.normals[s] + tilt[0] * axes[0] + tilt[1] * axes[1]).normalized();
@@ -365,7 +365,7 @@ void place_node(const FitSamples& samples, std::vector<PlacedPatch>& patches, co
       }
       findings.take_back(patches);
     }
-    if (!better || now.error > hopeless * give_up) {
+    if (!better || now.error > hopeless * give_up || (now.error > far && now.error <= give_up)) {
       break;
     }
   }

@@ -80,8 +80,10 @@ struct PlacedNode {
 ///                  patches are not sound there
 /// @param points    of the target, to be attached each to the patch whose facet is closest
 /// @param give_up   mm: an error that stays far above this ends the work
+/// @param far       mm: an error above this, though not above give_up, after any of the steps ends it, too
 void place_node(const FitSamples& samples, std::vector<PlacedPatch>& patches, const std::vector<Index>& points,
-                const FitLimits& limits, double give_up, int steps, PlacedNode& node);
+                const FitLimits& limits, double give_up, int steps, PlacedNode& node,
+                double far = std::numeric_limits<double>::infinity());
 
 /// Turns the three normals of one patch, as if they were its own, so that it alone comes closest to the target.
 /// @param patch  in: shape, attached points, what lies across; out: the best, error and residuals

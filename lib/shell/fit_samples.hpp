@@ -67,6 +67,9 @@ public:
   /// Further points of the target that must be met, such as where the distance was found largest.
   void add(const Vec3& point) { points_.push_back(point); }
 
+  /// Forgets the points added since there were so many.
+  void keep(std::size_t count) { points_.resize(count); }
+
   /// Other points instead, such as those that there were before some were added: to be attached anew.
   void take_points(std::vector<Vec3> points) { points_ = std::move(points); }
 

@@ -19,7 +19,7 @@ constexpr std::size_t squeezed_shells = 2'500;  // of all tries: what they may c
 constexpr std::size_t least_squeezes = 1, most_squeezes = 12;
 constexpr int regaining = 8;  // steps of all nodes
 constexpr int few_splits = 3;
-constexpr int looks = 4;                         // for points that the samples missed
+constexpr int looks = 12;                        // for points that the samples missed
 constexpr std::size_t price_of_a_thin_one = 10;  // shells
 
 }  // namespace

@@ -103,19 +103,34 @@ void link(const FitState& state, const std::vector<std::array<Index, 3>>& nodes,
 }
 
 void make_compatible(Trial& trial) {
-  if (trial.node.normals.size() != 1) {
+  PlacedNode& node = trial.node;
+  if (std::any_of(node.sectors.begin(), node.sectors.end(), [&](Index s) { return s != node.sectors[0]; })) {
     return;
   }
   std::vector<Vec3> facets;
+  std::vector<std::uint8_t> agrees(node.normals.size(), 1);
+  const double least = trial.limits.agreement + 0.05;
   for (const PlacedPatch& p : trial.patches) {
     auto corners = p.shape.corners;
     if (p.corner != PlacedPatch::no_corner) {
-      corners[p.corner] = trial.node.position;
+      corners[p.corner] = node.position;
     }
     facets.push_back(facing_of(corners));
+    if (p.corner != PlacedPatch::no_corner && node.normals[p.slot].dot(facets.back()) < least) {
+      agrees[p.slot] = 0;
+    }
   }
-  if (const auto normal = compatible_normal(trial.node.normals[0], facets, trial.limits.agreement + 0.05)) {
-    trial.node.normals[0] = *normal;
+  Vec3 wanted = node.normals[0];
+  for (std::size_t s = 1; s < node.normals.size(); ++s) {
+    wanted += node.normals[s];
+  }
+  if (node.normals.size() > 1) {
+    wanted.stableNormalize();
+  }
+  if (const auto normal = compatible_normal(wanted, facets, least)) {
+    for (std::size_t s = 0; s < node.normals.size(); ++s) {
+      node.normals[s] = agrees[s] != 0 ? node.normals[s] : *normal;
+    }
   }
 }
 

@@ -207,6 +207,10 @@ private:
     } else if (farthest <= enough) {
       piece.upper = std::min(piece.upper, difference(patches_[patch], here));
     }
+    if (piece.upper > enough) {
+      // However small, a piece between folds may have feet far apart, and what is between these farther off than they.
+      piece.upper = std::min(piece.upper, by_one_corner(c));
+    }
     if (piece.upper <= enough) {
       block.settled = std::max(block.settled, piece.upper);
     } else {

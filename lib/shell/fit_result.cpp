@@ -1,0 +1,132 @@
+#include "shell/fit_result.hpp"
+
+#include "core/error.hpp"
+#include "shell/curved_surface.hpp"
+#include "shell/fit_parts.hpp"
+#include "shell/fit_squeeze.hpp"
+#include "shell/shell_distance.hpp"
+#include "surface/decimate.hpp"
+#include "surface/measure.hpp"
+
+#include <algorithm>
+
+namespace tunica {
+namespace {
+
+constexpr double clearly_below = 0.998;
+constexpr double noted_width = 1.5;    // of the error, on the way
+constexpr double far_from_flat = 0.6;  // of the flat facets that the tolerance would take
+
+bool has_degenerate(const TriangleMesh& mesh) {
+  const auto normals = facet_normals(mesh);
+  return std::any_of(normals.begin(), normals.end(), [](const Vec3& n) { return n.squaredNorm() < 0.5; });
+}
+
+}  // namespace
+
+FitResult::FitResult(const Target& target, const RelaxOptions& options, double width)
+    : target_(target), options_(options), width_(width) {}
+
+bool FitResult::certify(const FitState& state, std::optional<double> tolerance) {
+  ShellMesh shell = state.mesh.shell();
+  ShellDistanceOptions measuring;
+  measuring.width = std::max(width_, state.error() / 20);
+  measuring.limit = tolerance;
+  ShellDistance distance = shell_distance(shell, target_, measuring);
+  if (tolerance && distance.both.lower <= clearly_below * *tolerance && distance.both.upper > *tolerance) {
+    // An open question deserves a closer look, but where the answer would be a narrow one shells are mended sooner.
+    measuring.width = std::min(*tolerance / 200, (*tolerance - distance.both.lower) / 2);
+    distance = shell_distance(shell, target_, measuring);
+  }
+  farthest_.reset();
+  if (distance.target_to_shell.lower > 0) {
+    farthest_ = distance.farthest_of_target;
+  }
+  least_distance_ = distance.both.lower;
+  const bool within = tolerance && distance.both.upper <= *tolerance;
+  const bool better = tolerance && holds(*tolerance) ? within && price(state) < price_
+                                                     : distance.both.upper < found.distance.both.upper;
+  if (is_empty() || better) {
+    take(std::move(shell), distance);
+    price_ = price(state);
+  }
+  return within;
+}
+
+void FitResult::no_worse_than_flat(std::optional<double> tolerance, std::size_t most, const FitStart& start) {
+  if (start.own_topology) {
+    return;
+  }
+  const bool within = tolerance && holds(*tolerance);
+  // Flat errors fall as 1 / count: far from that nothing needs to be tried.
+  const double flat_count =
+      tolerance ? static_cast<double>(start.mesh.triangles.size()) * start.flat_error / *tolerance : 0;
+  if (within && static_cast<double>(found.shell.triangles.size()) < far_from_flat * flat_count) {
+    return;
+  }
+  if (!tolerance && !is_empty() && found.distance.both.upper < start.flat_error) {
+    return;
+  }
+  DecimateOptions decimating;
+  decimating.max_error = tolerance;
+  if (!tolerance) {
+    decimating.triangles = most;
+  }
+  const DecimateResult flat = decimate(target_.mesh(), decimating);
+  if (has_degenerate(flat.mesh)) {
+    if (is_empty()) {
+      throw InputError("too many triangles without area: no shells are left without them; make the surface anew");
+    }
+    return;
+  }
+  ShellMesh shell = flat_shells(flat.mesh, options_.surface);
+  ShellDistance distance = distance_of(shell);
+  if (flat.error) {
+    lower_uppers(distance, *flat.error, *flat.error, *flat.error);
+  }
+  const bool flat_within = tolerance && distance.both.upper <= *tolerance;
+  const bool better = tolerance ? flat_within && (!within || shell.triangles.size() < found.shell.triangles.size())
+                                : distance.both.upper < found.distance.both.upper;
+  if (is_empty() || better) {
+    take(std::move(shell), distance);
+    flat_ = true;
+  }
+}
+
+void FitResult::take(ShellMesh shell, const ShellDistance& distance) {
+  found.shell = std::move(shell);
+  found.distance = distance;
+}
+
+void FitResult::note(const FitState& state) {
+  const ShellMesh shell = state.mesh.shell();
+  ShellDistanceOptions measuring;
+  measuring.width = std::max(width_, noted_width * state.error());
+  record(shell, shell_distance(shell, target_, measuring).both);
+}
+
+void FitResult::record(const ShellMesh& shell, const Interval& distance) {
+  RelaxIteration iteration;
+  iteration.shells = shell.triangles.size();
+  iteration.hausdorff = distance;
+  iteration.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - last_).count();
+  last_ = std::chrono::steady_clock::now();
+  found.iterations.push_back(iteration);
+  if (options_.on_iteration) {
+    options_.on_iteration(iteration, shell);
+  }
+}
+
+ShellDistance FitResult::distance_of(const ShellMesh& shell) const {
+  ShellDistanceOptions measuring;
+  measuring.width = width_;
+  return shell_distance(shell, target_, measuring);
+}
+
+void lower_uppers(ShellDistance& distance, const Interval& both, const Interval& to_target, const Interval& to_shell) {
+  distance.both.upper = std::min(distance.both.upper, both.upper);
+  distance.shell_to_target.upper = std::min(distance.shell_to_target.upper, to_target.upper);
+  distance.target_to_shell.upper = std::min(distance.target_to_shell.upper, to_shell.upper);
+}
+
+}  // namespace tunica

@@ -1,0 +1,64 @@
+#pragma once
+
+#include "shell/fit_start.hpp"
+#include "shell/fit_state.hpp"
+#include "shell/relax.hpp"
+
+#include <chrono>
+#include <optional>
+
+namespace tunica {
+
+/// The best shells of a fit so far, what is certain of their distance to the target, and what was noted on the way.
+class FitResult {
+public:
+  /// @param options  of the whole fit: surface, on_iteration; they and the target must live as long
+  /// @param width    mm: of certified intervals
+  FitResult(const Target& target, const RelaxOptions& options, double width);
+
+  [[nodiscard]] bool is_empty() const { return found.shell.triangles.empty(); }
+  /// Whether there are shells, certainly within the tolerance, mm.
+  [[nodiscard]] bool holds(double tolerance) const { return !is_empty() && found.distance.both.upper <= tolerance; }
+  [[nodiscard]] double width() const { return width_; }
+  /// Whether the shells are the target's flat facets.
+  [[nodiscard]] bool is_flat() const { return flat_; }
+
+  /// Takes the mesh when it is better: to a tolerance (mm) cheaper within it, see price(), else closer.
+  /// @return whether the tolerance certainly holds
+  bool certify(const FitState& state, std::optional<double> tolerance);
+
+  /// Flat facets instead, where they do better: fewer within the tolerance (mm), or closer with at most so many.
+  /// Errors: InputError where nothing else was found and facets have no area.
+  void no_worse_than_flat(std::optional<double> tolerance, std::size_t most, const FitStart& start);
+
+  void take(ShellMesh shell, const ShellDistance& distance);
+
+  /// Certifies shells, roughly, for the record alone.
+  void note(const FitState& state);
+  void record(const ShellMesh& shell, const Interval& distance);
+
+  /// The certified distance of shells, mm.
+  [[nodiscard]] ShellDistance distance_of(const ShellMesh& shell) const;
+
+  /// Where on the target the largest distance was, when last certified; none where that was not looked for.
+  [[nodiscard]] const std::optional<Vec3>& farthest() const { return farthest_; }
+  /// mm: what the last certified distance certainly is at least.
+  [[nodiscard]] double least_distance() const { return least_distance_; }
+
+  RelaxResult found;
+
+private:
+  const Target& target_;
+  const RelaxOptions& options_;
+  double width_;
+  std::size_t price_ = 0;  // of what was found
+  bool flat_ = false;
+  std::optional<Vec3> farthest_;
+  double least_distance_ = 0;
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
+
+/// What is certain of a distance from elsewhere.
+void lower_uppers(ShellDistance& distance, const Interval& both, const Interval& to_target, const Interval& to_shell);
+
+}  // namespace tunica
