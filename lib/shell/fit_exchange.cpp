@@ -2,12 +2,14 @@
 // problems, CP 1998, with mergers for removals and least squares for what is put back.
 #include "shell/fit_exchange.hpp"
 
+#include "core/threads.hpp"
 #include "shell/fit_cross.hpp"
 #include "shell/fit_detach.hpp"
 #include "shell/fit_edit.hpp"
 #include "shell/fit_missed.hpp"
 #include "shell/fit_polish.hpp"
 #include "shell/fit_region.hpp"
+#include "shell/fit_remove.hpp"
 #include "shell/fit_shape.hpp"
 #include "shell/fit_squeeze.hpp"
 #include "shell/fit_worst.hpp"
@@ -21,7 +23,8 @@
 namespace tunica {
 namespace {
 
-constexpr std::size_t most_fits = 600;            // of pieces anew: what costs
+constexpr std::size_t at_once = 8;  // changes, whatever the number of threads
+constexpr std::size_t fits_per_shell = 6, fewest_fits = 600, most_fits = 2'500;  // of pieces anew: what costs
 constexpr std::size_t most_before_parting = 150;  // of these more, where normals are to part
 constexpr std::size_t most_shells = 600, most_on_coarse_targets = 1300;
 constexpr std::size_t coarse_target = 250;       // triangles per shell: walks on denser ones are what a piece costs
@@ -33,9 +36,10 @@ constexpr double promising = 1.3, promising_soon = 1.1;  // limits: after one st
 constexpr double slow = 0.97;                            // of the error is left by a step that brings little
 constexpr std::array<double, 3> joining{1, 0.95, 0.9};   // of the limit
 constexpr int easing = 8;                                // steps of all nodes
-constexpr int tries = 3;                                 // in other orders
-constexpr int patience = 2;                              // times that bring nothing
-constexpr int certificates = 3;                          // per change
+constexpr int tries = 12;                                // from other meshes
+constexpr std::size_t least_kick = 2, shells_per_split = 10;
+constexpr int patience = 2;      // times that bring nothing
+constexpr int certificates = 3;  // per change
 
 bool recovers(FitState& piece, double limit) {
   double before = std::numeric_limits<double>::infinity();
@@ -53,7 +57,8 @@ bool recovers(FitState& piece, double limit) {
   return piece.error() <= limit;
 }
 
-/// Fits a piece in which two nodes were merged. @param shells, before  how many, and their price before that
+/// Fits a piece in which two nodes were merged, or one was taken out. @param shells, before  how many, and their price
+/// before that
 /// @return whether it is no dearer now and within the limit
 bool fits_again(FitState& piece, std::size_t shells, std::size_t before, double angle, double limit) {
   piece.attach_again();
@@ -98,12 +103,20 @@ public:
       for (std::size_t i = edges.size(); i > 1; --i) {
         std::swap(edges[i - 1], edges[random() % i]);
       }
-      for (const auto& [u, v] : edges) {
-        if (fits_ >= most) {
-          return fits_;
-        }
-        if (state_.mesh.on_edge(u, v).count() > 0) {
-          try_without(u, v, rings);
+      for (std::size_t i = 0; i < edges.size(); i += at_once) {
+        const std::size_t count = std::min(at_once, edges.size() - i);
+        std::vector<Attempt> attempts(count);
+        parallel_for_blocks(count, 1, [&](std::size_t begin, std::size_t end) {
+          for (std::size_t k = begin; k < end; ++k) {
+            attempts[k] = attempt(edges[i + k], rings);
+          }
+        });
+        const std::size_t start = now_;
+        for (Attempt& done : attempts) {
+          if (fits_ >= most) {
+            return fits_;
+          }
+          conclude(done, start);
         }
       }
       rings += fits_ == before ? 1 : 0;
@@ -112,32 +125,85 @@ public:
   }
 
 private:
-  void try_without(Index u, Index v, int rings) {
-    FitRegion region = cut_out(state_, {u, v}, rings);
-    // What failed fails again until something around has changed.
-    std::size_t& last = tried_[{u, v, static_cast<Index>(rings)}];
-    if (std::none_of(region.nodes.begin(), region.nodes.end(), [&](Index node) { return changed_[node] > last; })) {
-      return;
+  /// Two nodes to be merged, or one (twice) to be taken out, and the rings around that move with them.
+  using Change = std::array<Index, 3>;
+
+  struct Attempt {
+    std::vector<Change> looked_at;
+    std::optional<FitRegion> region;  ///< where one of them was possible
+    bool fits = false;                ///< again, for the price before
+    std::size_t price_before = 0;
+  };
+
+  /// Merges the nodes of an edge, or takes one of them out where they cannot be merged, and fits the piece around.
+  /// Changes nothing, so that several are tried at once.
+  [[nodiscard]] Attempt attempt(const std::array<Index, 2>& edge, int rings) const {
+    Attempt out;
+    const auto [u, v] = edge;
+    for (const auto& [a, b] : {std::pair{u, v}, std::pair{u, u}, std::pair{v, v}}) {
+      const bool exists = a == b ? !state_.mesh.around[a].empty() : state_.mesh.on_edge(a, b).count() > 0;
+      if (!exists) {
+        continue;
+      }
+      const Change change{a, b, static_cast<Index>(rings)};
+      FitRegion region = cut_out(state_, {a, b}, rings);
+      // What failed fails again until something around has changed.
+      const auto tried = tried_.find(change);
+      const std::size_t last = tried == tried_.end() ? 0 : tried->second;
+      if (std::none_of(region.nodes.begin(), region.nodes.end(), [&](Index node) { return changed_[node] > last; })) {
+        continue;
+      }
+      out.looked_at.push_back(change);
+      const std::size_t shells = region.state.mesh.alive;
+      out.price_before = price(region.state);
+      if (!make(region, a, b)) {
+        continue;
+      }
+      out.fits = fits_again(region.state, shells, out.price_before, state_.limits.angle, limit_);
+      out.region = std::move(region);
+      break;
     }
-    last = now_;
+    return out;
+  }
+
+  /// One change of a piece, whatever that does to errors and angles for the time being.
+  [[nodiscard]] bool make(FitRegion& region, Index a, Index b) const {
+    FitState& piece = region.state;
     const auto in_piece = [&](Index node) {
       return static_cast<Index>(std::find(region.nodes.begin(), region.nodes.end(), node) - region.nodes.begin());
     };
-    if (state_.limits.kink > 0) {
-      part_normals(region.state);
+    const bool parted = state_.limits.kink > 0;
+    if (parted) {
+      part_normals(piece);
     }
-    const std::size_t shells = region.state.mesh.alive, before = price(region.state);
-    region.state.limits.angle = thin_angle;
-    if (!merge_edge(region.state, in_piece(u), in_piece(v), loosened * limit_)) {
+    piece.limits.angle = thin_angle;
+    if (a != b) {
+      return merge_edge(piece, in_piece(a), in_piece(b), loosened * limit_);
+    }
+    if (!remove_node(piece, in_piece(a), loosened * limit_)) {
+      return false;
+    }
+    if (parted) {
+      part_normals(piece);
+    }
+    return true;
+  }
+
+  /// @param start  of the attempts made at once: after one that came off, another is made anew some time
+  void conclude(Attempt& done, std::size_t start) {
+    if (now_ > start && done.fits) {
       return;
     }
-    ++fits_;
-    if (!fits_again(region.state, shells, before, state_.limits.angle, limit_)) {
+    for (const Change& change : done.looked_at) {
+      tried_[change] = start;
+    }
+    fits_ += done.region ? 1 : 0;
+    if (!done.fits) {
       return;
     }
     const std::size_t points = samples_.points().size();
-    if (auto trial = sound(region, before)) {
-      accept(std::move(*trial), region.nodes);
+    if (auto trial = sound(*done.region, done.price_before)) {
+      accept(std::move(*trial), done.region->nodes);
     } else {
       samples_.keep(points);  // what only a piece that failed had to heed costs every other
     }
@@ -238,7 +304,7 @@ private:
   std::size_t crossings_;
   std::size_t fits_ = 0, now_ = 1;    // changes so far
   std::vector<std::size_t> changed_;  // when each node was last
-  std::map<std::array<Index, 3>, std::size_t> tried_;
+  std::map<Change, std::size_t> tried_;
 };
 
 bool is_certain(const FitState& state, double tolerance) {
@@ -293,6 +359,28 @@ void join_again(FitSamples& samples, FitState& state, double limit, double toler
   }
 }
 
+/// A mesh of shells from which a search may end elsewhere: some edges at random are split.
+std::optional<FitState> kicked(FitSamples& samples, const FitState& from, double limit, double tolerance,
+                               std::mt19937& random) {
+  FitState state = from;
+  const auto edges = state.mesh.edges();
+  const std::size_t splits = std::max(least_kick, from.mesh.alive / shells_per_split);
+  for (std::size_t i = 0; i < splits; ++i) {
+    const auto& [u, v] = edges[random() % edges.size()];
+    if (state.mesh.on_edge(u, v).count() > 0) {
+      split_edge(state, u, v, limit);
+    }
+  }
+  rid_of_thin(state, limit, 2 * from.mesh.alive + 2 * splits);
+  state.attach();
+  state.measure();
+  if (!regains(samples, state, limit) || crossing_shells(state.mesh.shell()).size() > 0 ||
+      !is_certain(state, tolerance)) {
+    return {};
+  }
+  return state;
+}
+
 }  // namespace
 
 void exchange_pieces(FitSamples& samples, FitState& state, double limit, double tolerance, double kink) {
@@ -301,20 +389,28 @@ void exchange_pieces(FitSamples& samples, FitState& state, double limit, double 
     return;
   }
   std::mt19937 random;
+  std::size_t left = std::clamp(fits_per_shell * state.mesh.alive, fewest_fits, most_fits);
   if (!(kink > 0) || state.mesh.kind != Patch::comas) {
-    dig(samples, state, limit, tolerance, most_fits, random);
+    dig(samples, state, limit, tolerance, left, random);
     return;
   }
   Exchange(samples, state, limit, tolerance).run(most_before_parting, random);
   FitState best = state;
   const std::vector<Vec3> points = samples.points();
   std::vector<Vec3> points_of_best = points;
-  std::size_t left = most_fits;
   for (int i = 0; i < tries && left > 0; ++i) {
-    FitState parted = state;
+    samples.take_points(i == 0 ? points : points_of_best);
+    FitState parted = best;
+    if (i > 0) {
+      if (auto other = kicked(samples, best, limit, tolerance, random)) {
+        parted = std::move(*other);
+      } else {
+        samples.take_points(points);
+        parted = state;
+      }
+    }
     parted.limits.kink = kink;
     part_normals(parted);
-    samples.take_points(points);
     left = dig(samples, parted, limit, tolerance, left, random);
     if (price(parted) < price(best) && parted.error() <= limit) {
       best = std::move(parted);
