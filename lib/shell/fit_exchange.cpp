@@ -24,7 +24,7 @@ namespace tunica {
 namespace {
 
 constexpr std::size_t at_once = 8;  // changes, whatever the number of threads
-constexpr std::size_t fits_per_shell = 6, fewest_fits = 600, most_fits = 2'500;  // of pieces anew: what costs
+constexpr std::size_t fits_per_shell = 6, fewest_fits = 400, most_fits = 2'500;  // of pieces anew: what costs
 constexpr std::size_t most_before_parting = 150;  // of these more, where normals are to part
 constexpr std::size_t most_shells = 600, most_on_coarse_targets = 1300;
 constexpr std::size_t coarse_target = 250;       // triangles per shell: walks on denser ones are what a piece costs
@@ -388,38 +388,37 @@ void exchange_pieces(FitSamples& samples, FitState& state, double limit, double 
   if (state.mesh.alive > (coarse ? most_on_coarse_targets : most_shells)) {
     return;
   }
+  const bool parting = kink > 0 && state.mesh.kind == Patch::comas;
   std::mt19937 random;
   std::size_t left = std::clamp(fits_per_shell * state.mesh.alive, fewest_fits, most_fits);
-  if (!(kink > 0) || state.mesh.kind != Patch::comas) {
-    dig(samples, state, limit, tolerance, left, random);
-    return;
+  if (parting) {
+    Exchange(samples, state, limit, tolerance).run(most_before_parting, random);
   }
-  Exchange(samples, state, limit, tolerance).run(most_before_parting, random);
   FitState best = state;
   const std::vector<Vec3> points = samples.points();
   std::vector<Vec3> points_of_best = points;
   for (int i = 0; i < tries && left > 0; ++i) {
-    samples.take_points(i == 0 ? points : points_of_best);
-    FitState parted = best;
-    if (i > 0) {
-      if (auto other = kicked(samples, best, limit, tolerance, random)) {
-        parted = std::move(*other);
-      } else {
-        samples.take_points(points);
-        parted = state;
-      }
+    samples.take_points(points_of_best);
+    std::optional<FitState> trial = i == 0 ? best : kicked(samples, best, limit, tolerance, random);
+    if (!trial) {
+      samples.take_points(points);
+      trial = state;
     }
-    parted.limits.kink = kink;
-    part_normals(parted);
-    left = dig(samples, parted, limit, tolerance, left, random);
-    if (price(parted) < price(best) && parted.error() <= limit) {
-      best = std::move(parted);
+    if (parting) {
+      trial->limits.kink = kink;
+      part_normals(*trial);
+    }
+    left = dig(samples, *trial, limit, tolerance, left, random);
+    if (price(*trial) < price(best) && trial->error() <= limit) {
+      best = std::move(*trial);
       points_of_best = samples.points();
     }
   }
   samples.take_points(std::move(points_of_best));
   if (price(best) < price(state)) {
-    join_again(samples, best, limit, tolerance);
+    if (parting) {
+      join_again(samples, best, limit, tolerance);
+    }
     state = std::move(best);
   }
 }
