@@ -36,7 +36,7 @@ constexpr double promising = 1.3, promising_soon = 1.1;  // limits: after one st
 constexpr double slow = 0.97;                            // of the error is left by a step that brings little
 constexpr std::array<double, 3> joining{1, 0.95, 0.9};   // of the limit
 constexpr int easing = 8;                                // steps of all nodes
-constexpr int tries = 12;                                // from other meshes
+constexpr int tries = 5;                                 // from other meshes
 constexpr std::size_t least_kick = 2, shells_per_split = 10;
 constexpr int patience = 2;      // times that bring nothing
 constexpr int certificates = 3;  // per change
