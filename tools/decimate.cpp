@@ -150,7 +150,11 @@ void run(cli::Tool& tool, const Arguments& given) {
       options.max_error = given.max_error->millimetres(diagonal_mm);
     }
     options.progress = tool.progress("decimate");
-    coarse = decimate(in.mesh, options);
+    try {
+      coarse = decimate(in.mesh, options);
+    } catch (const InputError& error) {
+      throw InputError(fmt::format("{}: {}", given.in.string(), error.what()));
+    }
   }
   const auto failure = what_failed(given, coarse);
 

@@ -268,6 +268,7 @@ private:
       if (holds) {
         // What is exchanged is certified where it changes: all is certain if it was so before.
         exchange_pieces(samples, state, limit, tolerance, options_.kink);
+        result_.note(state);
         certain = shape_and_certify(samples, state, tolerance, most) || certain;
       }
       if (certain && count_thin(state) == 0) {

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
+#include <numbers>
 #include <optional>
 
 namespace tunica {
@@ -48,7 +48,7 @@ std::optional<Hole> hole_around(const FitMesh& mesh, Index node) {
   }
   Hole hole;
   Index last = end(first, 1);
-  for (std::size_t i = first; i < count && hole.triangles.size() < count; i = find(1, last)) {
+  for (std::size_t i = first; i < count && (hole.nodes.empty() || last != hole.nodes[0]); i = find(1, last)) {
     hole.triangles.push_back(around[i]);
     hole.nodes.push_back(last);
     hole.after.push_back(slot(i, 1));
@@ -115,19 +115,33 @@ public:
     const Vec3 facing = facing_of(shape.corners);
     for (std::size_t k = 0; limits_.kink > 0 && k < 3; ++k) {
       if (shape.normals[k].dot(facing) < limits_.agreement + clear_agreement) {
-        std::vector<Index> own;
-        mesh.slots_of(hole_.nodes[corners[k]], own);
-        std::erase_if(own, [&](Index s) { return mesh.sectors[s] != mesh.sectors[slots[k]]; });
-        std::vector<Vec3> normals{facing};
-        std::transform(own.begin(), own.end(), std::back_inserter(normals), [&](Index s) { return mesh.normals[s]; });
-        hold_together(normals, std::vector<Index>(normals.size(), 0), limits_.kink);
-        shape.normals[k] = normals[0];
+        shape.normals[k] = turned_towards(facing, hole_.nodes[corners[k]], mesh.sectors[slots[k]], shape.normals[k]);
       }
     }
     return shape;
   }
 
 private:
+  /// The direction closest to `wanted` that a further normal of a node's sector may have; `otherwise` where these
+  /// have no mean.
+  [[nodiscard]] Vec3 turned_towards(const Vec3& wanted, Index node, Index sector, const Vec3& otherwise) const {
+    std::vector<Index> slots;
+    state_.mesh.slots_of(node, slots);
+    Vec3 mean = Vec3::Zero();
+    for (const Index s : slots) {
+      mean += state_.mesh.sectors[s] == sector ? state_.mesh.normals[s] : Vec3::Zero();
+    }
+    if (!(mean.norm() > 1e-3)) {
+      return otherwise;
+    }
+    mean.normalize();
+    const double along = wanted.dot(mean);
+    const Vec3 beside = wanted - along * mean;
+    const double half = limits_.kink * std::numbers::pi / 360;
+    const double angle = std::min(half, std::atan2(beside.norm(), along));
+    return std::cos(angle) * mean + std::sin(angle) * beside.stableNormalized();
+  }
+
   struct Best {
     double error = never;
     std::size_t between = 0;
@@ -135,8 +149,9 @@ private:
 
   /// The part of the hole between nodes i and j, on the side of the nodes in between.
   void find_best(std::size_t i, std::size_t j) {
-    const bool whole = i == 0 && j + 1 == size_;
-    if ((!whole || hole_.triangles.size() < size_) && !may_meet(hole_.nodes[i], hole_.nodes[j])) {
+    // Where the hole is closed, its last and first node have an edge.
+    const bool whole = i == 0 && j + 1 == size_ && hole_.triangles.size() == size_;
+    if (!whole && !may_meet(hole_.nodes[i], hole_.nodes[j])) {
       return;
     }
     Best& best = best_[i * size_ + j];

@@ -18,30 +18,13 @@
 namespace tunica {
 namespace {
 
+using testing::angle_between;
 using testing::collapse_to;
+using testing::largest_kink;
 using testing::state_of;
 using testing::wavy;
 
 constexpr double degree = 3.14159265358979323846 / 180;
-
-double angle_between(const Vec3& a, const Vec3& b) { return std::atan2(a.cross(b).norm(), a.dot(b)) / degree; }
-
-/// Degrees: by which normals of one node and sector part, at most.
-double largest_kink(const FitMesh& mesh) {
-  double largest = 0;
-  std::vector<Index> slots;
-  for (Index v = 0; v < mesh.positions.size(); ++v) {
-    mesh.slots_of(v, slots);
-    for (const Index a : slots) {
-      for (const Index b : slots) {
-        if (mesh.sectors[a] == mesh.sectors[b]) {
-          largest = std::max(largest, angle_between(mesh.normals[a], mesh.normals[b]));
-        }
-      }
-    }
-  }
-  return largest;
-}
 
 /// Two squares of edge 10 that meet at a right angle, n x n squares each.
 TriangleMesh roof(int n) {

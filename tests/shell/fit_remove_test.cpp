@@ -208,6 +208,8 @@ TEST(FitRemove, NormalsThatMayPartAreTurnedToAgree) {
   parting.limits.kink = 60;
   part_normals(parting);
   ASSERT_TRUE(remove_node(parting, 0, any_error));
+  EXPECT_GT(testing::largest_kink(parting.mesh), 5);
+  EXPECT_LT(testing::largest_kink(parting.mesh), 60 + 1e-9);
   for (Index t = 0; t < parting.mesh.triangles.size(); ++t) {
     if (parting.mesh.is_alive(t)) {
       EXPECT_TRUE(parting.is_sound(t, 0.75, 0));

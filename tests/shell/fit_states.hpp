@@ -5,7 +5,12 @@
 #include "shell/fit_start.hpp"
 #include "shell/fit_state.hpp"
 
+#include <Eigen/Geometry>
+
+#include <algorithm>
 #include <cmath>
+#include <numbers>
+#include <vector>
 
 namespace tunica::testing {
 
@@ -35,6 +40,28 @@ inline void collapse_to(FitState& state, double limit) {
     state.measure();
   }
   collapse_edges(state, limit, 4, {});
+}
+
+/// Degrees.
+inline double angle_between(const Vec3& a, const Vec3& b) {
+  return std::atan2(a.cross(b).norm(), a.dot(b)) * 180 / std::numbers::pi;
+}
+
+/// Degrees: by which normals of one node and sector part, at most.
+inline double largest_kink(const FitMesh& mesh) {
+  double largest = 0;
+  std::vector<Index> slots;
+  for (Index v = 0; v < mesh.positions.size(); ++v) {
+    mesh.slots_of(v, slots);
+    for (const Index a : slots) {
+      for (const Index b : slots) {
+        if (mesh.sectors[a] == mesh.sectors[b]) {
+          largest = std::max(largest, angle_between(mesh.normals[a], mesh.normals[b]));
+        }
+      }
+    }
+  }
+  return largest;
 }
 
 }  // namespace tunica::testing

@@ -152,6 +152,12 @@ class Decimate(WholeTool):
         self.run_tool("point.ply", "out.ply", "--triangles", 100, code=3, says="point.ply")
         self.assertFalse(self.exists("out.ply"))
 
+    def test_triangles_without_area_are_refused_by_name(self):
+        meshes.write_ply(self.path("line.ply"), [(0.0, 0, 0), (1.0, 0, 0), (2.0, 0, 0), (4.0, 0, 0)],
+                         [(0, 1, 2), (0, 2, 3), (0, 3, 1), (1, 3, 2)])
+        self.run_tool("line.ply", "out.ply", "--triangles", 4, code=3, says="line.ply: all of its triangles are without area")
+        self.assertFalse(os.path.exists(self.path("out.ply")))
+
     def test_repair(self):
         vertices, triangles = self.surface()
         broken = [triangles[0][::-1]] + triangles[1:] + [triangles[7], (0, 0, 1),
