@@ -24,7 +24,7 @@ namespace tunica {
 namespace {
 
 constexpr std::size_t at_once = 8;  // changes, whatever the number of threads
-constexpr std::size_t fits_per_shell = 6, fewest_fits = 250, most_fits = 2'500;  // of pieces anew: what costs
+constexpr std::size_t fits_per_shell = 6, fewest_fits = 600, most_fits = 2'500;  // of pieces anew: what costs
 constexpr std::size_t most_before_parting = 150;  // of these more, where normals are to part
 constexpr std::size_t most_shells = 600, most_on_coarse_targets = 1300;
 constexpr std::size_t coarse_target = 250;       // triangles per shell: walks on denser ones are what a piece costs

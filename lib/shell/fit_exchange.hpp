@@ -14,7 +14,7 @@ namespace tunica {
 /// closely, so that fewer do; what the limit does not ask for is joined again, and the state keeps FitLimits::kink. Not
 /// for watertight patches: their edges follow the normals of both sides. Once that brings nothing more, edges of the
 /// best are split at random, to search from there. Deterministic, whatever the number of threads. Parallel. Cost: six
-/// pieces per shell are fitted anew, at least 250 and at most 2,500, some 20 ms each: what is far off after a step or
+/// pieces per shell are fitted anew, at least 600 and at most 2,500, some 20 ms each: what is far off after a step or
 /// two is given up. Of more than 600 shells none, of more than 1,300 where the target has fewer than 250 triangles per
 /// shell.
 void exchange_pieces(FitSamples& samples, FitState& state, double limit, double tolerance, double kink);
