@@ -26,6 +26,7 @@ constexpr double rounding = 1e-9;        // of the diagonal: by which a certifie
 constexpr double curved_deviation =
     0.8e-5;                          // of the diagonal; the contract of --curved, 1e-5, may be taken of either surface
 constexpr double largest_kink = 90;  // degrees
+constexpr double least_angle = 1, most_angle = 30;  // degrees
 constexpr std::size_t map_triangles = 200'000;
 
 struct Arguments {
@@ -37,7 +38,7 @@ struct Arguments {
   std::optional<std::string> mesh_unit;
   bool refine = false;
   std::optional<std::size_t> shells, max_shells;
-  std::optional<std::string> kink;
+  std::optional<std::string> kink, min_angle;
   std::optional<int> max_iterations;
 };
 
@@ -70,9 +71,14 @@ void declare(cli::Tool& tool, Arguments& given) {
          "fit to a --tolerance, comas: degrees by which the normals of shells that meet at a node may part where "
          "that saves shells (default 45; 0: several normals only at creases and where facets turn too far for one)")
       ->type_name("DEG");
+  app.add_option(
+         "--min-angle", given.min_angle,
+         "fit: degrees that the angles of the shells keep where folds, rims and creases allow it (default 20; to "
+         "a --tolerance 10 or 5 along cylinders, where that saves a quarter of the shells)")
+      ->type_name("DEG");
   app.add_option("--max-iterations", given.max_iterations,
                  "at most N iterations (barycentre: 20, with --refine 60; fit: 8 rounds, or 1 to many shells on a "
-                 "smooth target)")
+                 "smooth target; to a tolerance as many, and 5 of exchanges)")
       ->check(cli::whole_number(1, 100000))
       ->type_name("N");
   app.add_option("--map", given.map, "error map: the curved surface with its distance to the target, PLY")
@@ -98,20 +104,24 @@ void refuse_contradictions(const Arguments& given) {
   if (given.kink && (!fit || !given.tolerance || given.refine || given.surface != "comas")) {
     throw UsageError("--kink belongs to --method fit with --tolerance, without --refine, and comas patches");
   }
+  if (given.min_angle && !fit) {
+    throw UsageError("--min-angle belongs to --method fit");
+  }
   if (given.refine && !given.tolerance && !given.max_shells && !given.max_iterations) {
     throw UsageError("--refine needs to know where to end: --tolerance, --max-shells or --max-iterations");
   }
 }
 
-/// Degrees.
-std::optional<double> kink(const Arguments& given) {
-  if (!given.kink) {
+/// What an option says, degrees.
+std::optional<double> degrees(const std::string& option, const std::optional<std::string>& said, double least,
+                              double most) {
+  if (!said) {
     return {};
   }
-  const auto number = parse_number(*given.kink);
-  if (!number || !(*number >= 0) || *number > largest_kink) {
+  const auto number = parse_number(*said);
+  if (!number || !(*number >= least) || *number > most) {
     throw UsageError(
-        fmt::format("--kink: '{}' is not a number of degrees from 0 to {:.0f}", *given.kink, largest_kink));
+        fmt::format("{}: '{}' is not a number of degrees from {:.0f} to {:.0f}", option, *said, least, most));
   }
   return number;
 }
@@ -195,7 +205,8 @@ void write_maps(cli::Tool& tool, const Arguments& given, const ShellMesh& shell,
 
 void run(cli::Tool& tool, const Arguments& given) {
   refuse_contradictions(given);
-  const auto largest_part = kink(given);
+  const auto largest_part = degrees("--kink", given.kink, 0, largest_kink);
+  const auto min_angle = degrees("--min-angle", given.min_angle, least_angle, most_angle);
   tool.output(given.out, {".ply"});
   for (const auto& [path, ending] : {std::pair(given.map, ".ply"), {given.picture, ".png"}, {given.curved, ".ply"}}) {
     if (path) {
@@ -237,6 +248,7 @@ void run(cli::Tool& tool, const Arguments& given) {
   options.max_shells = given.max_shells;
   options.max_iterations = given.max_iterations;
   options.kink = largest_part.value_or(options.kink);
+  options.min_angle = min_angle;
   options.width = interval_width * diagonal;
   options.progress = tool.progress("relax");
   if (given.tolerance) {
@@ -305,7 +317,14 @@ void run(cli::Tool& tool, const Arguments& given) {
                                       {"hausdorff_percent", interval(iteration.hausdorff, percent)},
                                       {"seconds", iteration.seconds}});
     }
-    result["min_angle_deg"] = min_angle_degrees(flat_facets(relaxed.shell));
+    const double angle = min_angle_degrees(flat_facets(relaxed.shell));
+    result["min_angle_deg"] = angle;
+    if (options.min_angle && angle < *options.min_angle) {
+      tool.warn(fmt::format(
+          "the smallest angle is {:.3g} degrees: folds, rims or creases, or the shells that it would cost, do not "
+          "allow {:.3g} everywhere",
+          angle, *options.min_angle));
+    }
     result["self_intersections"] = crossing_shells(relaxed.shell).size();
     result["reached"] = relaxed.reached ? Json(*relaxed.reached) : Json();
     result["stopped"] = relaxed.stopped;

@@ -16,6 +16,8 @@
 #include "surface/measure.hpp"
 #include "surface/self_intersections.hpp"
 
+#include <Eigen/Geometry>
+
 #include <algorithm>
 #include <cmath>
 
@@ -53,6 +55,22 @@ constexpr int local_mending = 3;        // certificates, before less error is as
 constexpr double most_tightening = 0.95, least_tightening = 0.985;  // of the limit, where certificates find more
 constexpr std::array<double, 6> parts_of_tolerance{0.95, 0.9, 0.8, 0.65, 0.5, 0.25};  // to part sheets that cross
 constexpr double good_enough_angle = 0.9;                                             // of the limit
+constexpr double needle = 10;                          // degrees: angles of a plain decimation, along cylinders
+constexpr std::array<double, 2> narrow_angles{10, 5};  // degrees: of shells there
+constexpr double most_by_exchanges = 2;                // times fewer shells
+constexpr double worth_narrow = 0.75;                  // of the shells with better angles
+
+/// Whether most of the area of a plain decimation is in needles: as along a cylinder, where length costs no error.
+bool is_of_needles(const TriangleMesh& mesh) {
+  double of_needles = 0, area = 0;
+  for (const auto& [a, b, c] : mesh.triangles) {
+    const Vec3 &p = mesh.vertices[a], &q = mesh.vertices[b], &r = mesh.vertices[c];
+    const double its_area = (q - p).cross(r - p).norm();
+    area += its_area;
+    of_needles += smallest_angle_degrees(p, q, r) < needle ? its_area : 0;
+  }
+  return of_needles > area / 2;
+}
 
 class Fitting {
 public:
@@ -89,6 +107,7 @@ private:
       : coarse_(coarse),
         target_(target),
         options_(options),
+        angle_(options.min_angle.value_or(FitLimits{}.angle)),
         like_target_(same_topology(coarse, target.mesh())),
         result_(target, options, width) {}
 
@@ -103,7 +122,7 @@ private:
     fewest.to_tolerance(*options_.tolerance);
     fewest.part_sheets(most);
     RelaxResult& found = fewest.result_.found;
-    result_.found.iterations.insert(result_.found.iterations.end(), found.iterations.begin(), found.iterations.end());
+    add_iterations(found);
     const bool held = result_.holds(*options_.tolerance);
     const std::size_t enough = held ? result_.found.shell.triangles.size() - 1 : most;
     if (found.distance.both.upper <= *options_.tolerance && found.shell.triangles.size() <= enough) {
@@ -123,7 +142,7 @@ private:
       Fitting closer(coarse_, target_, options_);
       closer.to_tolerance(part * *options_.tolerance);
       const std::size_t left = crossing_shells(closer.result_.found.shell).size();
-      const double its_angle = std::min(min_angle_degrees(flat_facets(closer.result_.found.shell)), FitLimits{}.angle);
+      const double its_angle = std::min(min_angle_degrees(flat_facets(closer.result_.found.shell)), angle_);
       const bool better = left < crossings || (left == 0 && its_angle > angle);
       if (better && closer.result_.found.shell.triangles.size() <= most &&
           closer.result_.found.distance.both.upper <= *options_.tolerance) {
@@ -131,7 +150,7 @@ private:
         crossings = left;
         angle = its_angle;
       }
-      if (crossings == 0 && angle >= good_enough_angle * FitLimits{}.angle) {
+      if (crossings == 0 && angle >= good_enough_angle * angle_) {
         return;
       }
     }
@@ -150,7 +169,7 @@ private:
     std::vector<Fitted> done;
     std::vector<TriangleMesh> rest;
     for (TriangleMesh& part : parts) {
-      if (const auto crumb = crumb_within(part, tolerance, FitLimits{}.angle)) {
+      if (const auto crumb = crumb_within(part, tolerance, angle_)) {
         ShellDistanceOptions measuring;
         measuring.width = result_.width();
         ShellMesh shell = flat_shells(*crumb, options_.surface);
@@ -181,7 +200,7 @@ private:
     Fitting fitting(part, target, options_, result_.width());
     fitting.whole_to_tolerance(tolerance);
     RelaxResult& fitted = fitting.result_.found;
-    result_.found.iterations.insert(result_.found.iterations.end(), fitted.iterations.begin(), fitted.iterations.end());
+    add_iterations(fitted);
     done.push_back({std::move(fitted.shell), fitted.distance});
     return !fitting.result_.is_flat();
   }
@@ -221,6 +240,41 @@ private:
       result_.no_worse_than_flat(tolerance, max_index, start);
       return;
     }
+    if (!options_.min_angle && is_of_needles(start.mesh)) {
+      long_shells(start, tolerance, most);
+    } else {
+      search_from(start, tolerance, most);
+    }
+    result_.no_worse_than_flat(tolerance, max_index, start);
+  }
+
+  /// Shells as long as decimation's needles where that saves many.
+  void long_shells(const FitStart& start, double tolerance, std::size_t most) {
+    std::vector<RelaxResult> narrow;
+    std::size_t fewest = max_index;
+    for (const double angle : narrow_angles) {
+      RelaxOptions options = options_;
+      options.min_angle = angle;
+      Fitting fitting(coarse_, target_, options, result_.width());
+      fitting.search_from(start, tolerance, most);
+      add_iterations(fitting.result_.found);
+      if (fitting.result_.holds(tolerance)) {
+        fewest = std::min(fewest, fitting.result_.found.shell.triangles.size());
+        narrow.push_back(std::move(fitting.result_.found));
+      }
+    }
+    search_from(start, tolerance, most, static_cast<double>(fewest) / worth_narrow);
+    for (RelaxResult& found : narrow) {
+      const double enough = worth_narrow * static_cast<double>(result_.found.shell.triangles.size());
+      if (!result_.holds(tolerance) || static_cast<double>(found.shell.triangles.size()) <= enough) {
+        result_.take(std::move(found.shell), found.distance);
+      }
+    }
+  }
+
+  /// The fewest shells found within the tolerance, from one decimation of the target or several.
+  /// @param wanted  shells: of many more none are exchanged
+  void search_from(const FitStart& start, double tolerance, std::size_t most, double wanted = max_index) {
     FitSamples samples(target_, guess(start.mesh.triangles.size() / expected_gain));
     const double limit = margin * tolerance;
     const bool several = !start.own_topology && start.mesh.triangles.size() < affordable;
@@ -265,9 +319,9 @@ private:
       }
       // What the certificate asked for may have made triangles thin: then the next best is looked at as well.
       bool certain = shape_and_certify(samples, state, tolerance, most);
-      if (holds) {
+      if (holds && static_cast<double>(state.mesh.alive) < most_by_exchanges * wanted) {
         // What is exchanged is certified where it changes: all is certain if it was so before.
-        exchange_pieces(samples, state, limit, tolerance, options_.kink);
+        exchange_pieces(samples, state, exchanging(limit, tolerance));
         result_.note(state);
         certain = shape_and_certify(samples, state, tolerance, most) || certain;
       }
@@ -275,21 +329,32 @@ private:
         break;
       }
     }
-    result_.no_worse_than_flat(tolerance, max_index, start);
+  }
+
+  ExchangeOptions exchanging(double limit, double tolerance) {
+    ExchangeOptions out{limit, tolerance, options_.kink};
+    out.tries = std::min(out.tries, options_.max_iterations.value_or(out.tries));
+    out.on_better = [&](const FitState& state) { result_.note(state); };
+    out.progress = options_.progress;
+    return out;
+  }
+
+  void add_iterations(const RelaxResult& of) {
+    result_.found.iterations.insert(result_.found.iterations.end(), of.iterations.begin(), of.iterations.end());
   }
 
   /// As many triangles of the target with better angles.
   [[nodiscard]] FitStart well_shaped(const FitStart& start) const {
     DecimateOptions decimating;
     decimating.triangles = start.mesh.triangles.size();
-    decimating.min_angle = FitLimits{}.angle;
+    decimating.min_angle = angle_;
     return {decimate(target_.mesh(), decimating).mesh, start.flat_error, false};
   }
 
   /// The fewest shells found from one start, by collapses, steps of all nodes and splits in turn.
   /// @param patience_left  rounds that leave as many shells
   FitState search(FitSamples& samples, const FitStart& start, double tolerance, std::size_t most, int patience_left) {
-    FitState state(samples, prepared(start), {});
+    FitState state(samples, prepared(start), limits());
     smooth(state, tolerance, tolerance);
     const int rounds = options_.max_iterations.value_or(default_rounds);
     const double limit = margin * tolerance;
@@ -328,7 +393,7 @@ private:
   bool coarse_refined(double tolerance, std::size_t most) {
     const FitStart start{coarse_, 0, true};
     FitSamples samples(target_, guess(static_cast<double>(coarse_.triangles.size())));
-    FitState state(samples, prepared(start), {});
+    FitState state(samples, prepared(start), limits());
     smooth(state, tolerance, tolerance);
     const double limit = margin * tolerance;
     polish(state, limit, 3);
@@ -464,7 +529,7 @@ private:
 
   /// So many shells from one start, all nodes settled.
   FitState settled(FitSamples& samples, FitStart start, std::size_t shells) const {
-    FitState state(samples, prepared(start), {});
+    FitState state(samples, prepared(start), limits());
     // Few shells for a rough target: normals of their own would fit its ripples, and stay.
     smooth(state, 0.1 * start.flat_error, 0.5 * start.flat_error);
     constexpr double any = std::numeric_limits<double>::infinity();
@@ -472,7 +537,7 @@ private:
     if (state.mesh.alive > shells && !start.own_topology) {
       // So near the smallest mesh there is only decimation knows the way.
       start = start_of_fit(target_, shells);
-      state = FitState(samples, prepared(start), {});
+      state = FitState(samples, prepared(start), limits());
       smooth(state, 0.1 * start.flat_error, 0.5 * start.flat_error);
     }
     settle(state, settling(shells));
@@ -520,6 +585,12 @@ private:
 
   static int settling(std::size_t shells) { return shells < few_shells ? most_settling : some_settling; }
 
+  [[nodiscard]] FitLimits limits() const {
+    FitLimits out;
+    out.angle = angle_;
+    return out;
+  }
+
   [[nodiscard]] FitMesh prepared(const FitStart& start) const {
     FitMesh mesh = prepare_fit(start, target_);
     mesh.kind = options_.surface;
@@ -531,6 +602,7 @@ private:
   const TriangleMesh& coarse_;
   const Target& target_;
   const RelaxOptions& options_;
+  double angle_;      // degrees
   bool like_target_;  // COARSE has the target's topology
   FitResult result_;
 };

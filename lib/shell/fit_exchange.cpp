@@ -25,7 +25,7 @@ namespace tunica {
 namespace {
 
 constexpr std::size_t at_once = 8;  // changes, whatever the number of threads
-constexpr std::size_t fits_per_shell = 6, fewest_fits = 600, most_fits = 2'500;  // of pieces anew: what costs
+constexpr std::size_t fits_per_shell = 6, fewest_fits = 600, most_fits = 6'000;  // of pieces anew: what costs
 constexpr std::size_t most_before_parting = 150;  // of these more, where normals are to part
 constexpr std::size_t most_shells = 600, most_on_coarse_targets = 1300;
 constexpr std::size_t coarse_target = 250;       // triangles per shell: walks on denser ones are what a piece costs
@@ -37,7 +37,6 @@ constexpr double promising = 1.3, promising_soon = 1.1;  // limits: after one st
 constexpr double slow = 0.97;                            // of the error is left by a step that brings little
 constexpr std::array<double, 3> joining{1, 0.95, 0.9};   // of the limit
 constexpr int easing = 8;                                // steps of all nodes
-constexpr int tries = 5;                                 // from other meshes
 constexpr std::size_t least_kick = 2, shells_per_split = 10;
 constexpr int points_per_edge = 8;
 constexpr int patience = 2;      // times that bring nothing
@@ -218,7 +217,7 @@ private:
     if (parted) {
       part_normals(piece);
     }
-    piece.limits.angle = thin_angle;
+    piece.limits.angle = std::min(thin_angle, state_.limits.angle / 2);
     if (a != b) {
       return merge_edge(piece, in_piece(a), in_piece(b), loosened * limit_);
     }
@@ -428,14 +427,16 @@ std::optional<FitState> kicked(FitSamples& samples, const FitState& from, double
 
 }  // namespace
 
-void exchange_pieces(FitSamples& samples, FitState& state, double limit, double tolerance, double kink) {
+void exchange_pieces(FitSamples& samples, FitState& state, const ExchangeOptions& options) {
+  const auto& [limit, tolerance, kink, tries, on_better, progress] = options;
   const bool coarse = samples.target().mesh().triangles.size() < coarse_target * state.mesh.alive;
   if (state.mesh.alive > (coarse ? most_on_coarse_targets : most_shells)) {
     return;
   }
   const bool parting = kink > 0 && state.mesh.kind == Patch::comas;
   std::mt19937 random;
-  std::size_t left = std::clamp(fits_per_shell * state.mesh.alive, fewest_fits, most_fits);
+  const std::size_t all = std::clamp(fits_per_shell * state.mesh.alive, fewest_fits, most_fits);
+  std::size_t left = all;
   if (parting) {
     Exchange(samples, state, limit, tolerance).run(most_before_parting, random);
   }
@@ -443,6 +444,7 @@ void exchange_pieces(FitSamples& samples, FitState& state, double limit, double 
   const std::vector<Vec3> points = samples.points();
   std::vector<Vec3> points_of_best = points;
   for (int i = 0; i < tries && left > 0; ++i) {
+    advance(progress, 1 - static_cast<double>(left) / static_cast<double>(all));
     samples.take_points(points_of_best);
     std::optional<FitState> trial = i == 0 ? best : kicked(samples, best, limit, tolerance, random);
     if (!trial) {
@@ -457,6 +459,9 @@ void exchange_pieces(FitSamples& samples, FitState& state, double limit, double 
     if (price(*trial) < price(best) && trial->error() <= limit) {
       best = std::move(*trial);
       points_of_best = samples.points();
+      if (on_better) {
+        on_better(best);
+      }
     }
   }
   samples.take_points(std::move(points_of_best));

@@ -1,8 +1,20 @@
 #pragma once
 
+#include "core/progress.hpp"
 #include "shell/fit_state.hpp"
 
+#include <functional>
+
 namespace tunica {
+
+struct ExchangeOptions {
+  double limit = 0;      ///< mm: no error of the samples is above it
+  double tolerance = 0;  ///< mm: what certificates are to hold
+  double kink = 0;       ///< degrees by which normals that meet at a node may part; 0: not at all
+  int tries = 5;         ///< meshes to search from: the given one, then the best of them with edges split at random
+  std::function<void(const FitState&)> on_better = {};  ///< told of every one with fewer shells
+  Progress progress = {};
+};
 
 /// Fewer shells by changes of small pieces, each by itself: an edge taken at random is merged, or one of its nodes
 /// taken out where that is not possible, whatever that does to errors and angles for the time being, and the piece
@@ -14,9 +26,9 @@ namespace tunica {
 /// closely, so that fewer do; what the limit does not ask for is joined again, and the state keeps FitLimits::kink. Not
 /// for watertight patches: their edges follow the normals of both sides. Once that brings nothing more, edges of the
 /// best are split at random, to search from there. Deterministic, whatever the number of threads. Parallel. Cost: six
-/// pieces per shell are fitted anew, at least 600 and at most 2,500, some 20 ms each: what is far off after a step or
+/// pieces per shell are fitted anew, at least 600 and at most 6,000, some 20 ms each: what is far off after a step or
 /// two is given up. Of more than 600 shells none, of more than 1,300 where the target has fewer than 250 triangles per
 /// shell.
-void exchange_pieces(FitSamples& samples, FitState& state, double limit, double tolerance, double kink);
+void exchange_pieces(FitSamples& samples, FitState& state, const ExchangeOptions& options);
 
 }  // namespace tunica

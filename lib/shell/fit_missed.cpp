@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 namespace tunica {
 namespace {
@@ -19,6 +20,7 @@ constexpr int coarsest_grid = 8, finest_grid = 12;  // ridges of a coarse target
 constexpr int gap_points = 11;                      // per edge
 constexpr double narrow = 0.05;                     // of the limit: gaps that add nothing
 constexpr double width_of_certificates = 0.005;     // of the tolerance
+constexpr std::size_t most_added = 2000;            // points, at once
 constexpr double exact = 1.025;  // limits: what is looked at above gaps is the worst, so with less margin
 
 struct Missed {
@@ -49,6 +51,29 @@ std::vector<Missed> far_points(const std::vector<Vec3>& points, const PatchSearc
     found.insert(found.end(), block.begin(), block.end());
   }
   return found;
+}
+
+/// Some of so many that every step would cost what all of them do: evenly spread, as neighbours follow each other, and
+/// the farthest of each patch.
+std::vector<Missed> thinned(const std::vector<Missed>& missed) {
+  if (missed.size() <= most_added) {
+    return missed;
+  }
+  std::map<Index, std::size_t> farthest;
+  for (std::size_t i = 0; i < missed.size(); ++i) {
+    const auto [found, is_first] = farthest.emplace(missed[i].patch, i);
+    if (!is_first && missed[i].distance > missed[found->second].distance) {
+      found->second = i;
+    }
+  }
+  std::vector<Missed> kept;
+  const std::size_t step = missed.size() / most_added + 1;
+  for (std::size_t i = 0; i < missed.size(); ++i) {
+    if (i % step == 0 || farthest.at(missed[i].patch) == i) {
+      kept.push_back(missed[i]);
+    }
+  }
+  return kept;
 }
 
 Vec3 on_edge(const CubicPatch& patch, std::size_t from, std::size_t to, double s) {
@@ -139,12 +164,14 @@ std::size_t add_missed(FitSamples& samples, FitState& state, double limit, bool 
     }
   };
   std::size_t added = 0;
-  for (const Missed& far : far_points(samples.further_points(), PatchSearch(shell, patches), limit)) {
+  std::vector<Missed> missed = far_points(samples.further_points(), PatchSearch(shell, patches), limit);
+  for (const Missed& far : missed) {
     raise(far.patch, far.distance);
-    if (far.distance > limit) {
-      samples.add(far.point);
-      ++added;
-    }
+  }
+  std::erase_if(missed, [&](const Missed& far) { return far.distance <= limit; });
+  for (const Missed& far : thinned(missed)) {
+    samples.add(far.point);
+    ++added;
   }
   for (const Vec3& p : missed_over_gaps(state, state.mesh.edges(), exact * limit)) {
     samples.add(p);

@@ -69,6 +69,7 @@ void FitResult::no_worse_than_flat(std::optional<double> tolerance, std::size_t 
   }
   DecimateOptions decimating;
   decimating.max_error = tolerance;
+  decimating.min_angle = options_.min_angle;
   if (!tolerance) {
     decimating.triangles = most;
   }
@@ -83,6 +84,9 @@ void FitResult::no_worse_than_flat(std::optional<double> tolerance, std::size_t 
   ShellDistance distance = distance_of(shell);
   if (flat.error) {
     lower_uppers(distance, *flat.error, *flat.error, *flat.error);
+  }
+  if (!is_empty() && !flat.angle_held) {
+    return;
   }
   const bool flat_within = tolerance && distance.both.upper <= *tolerance;
   const bool better = tolerance ? flat_within && (!within || shell.triangles.size() < found.shell.triangles.size())

@@ -43,7 +43,7 @@ std::vector<Index> thin_triangles(const FitState& state) {
 
 /// Smallest angle around a node, were it at p; none where a facet would turn over.
 double angle_around(const FitState& state, Index v, const Vec3& p) {
-  double least = good_angle;
+  double least = std::max(good_angle, state.limits.angle);
   for (const Index t : state.mesh.around[v]) {
     auto c = state.mesh.corners(t);
     const Vec3 before = facing_of(c);

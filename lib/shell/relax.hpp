@@ -39,7 +39,11 @@ struct RelaxOptions {
   /// tolerance: 0 where only creases may have several. Where facets turn so far that no single normal serves
   /// them all, or a patch is far closer with its own, they part all the same.
   double kink = 45;
-  std::optional<int> max_iterations;  ///< none: 20, with refine 60; fit: 8 rounds, see fit()
+  /// Degrees: what the angles of fit's shells keep where the target's folds, rims and creases allow it. None: 20; to a
+  /// tolerance 10 or 5 where plain decimation makes needles, as along cylinders, and that saves a quarter of the
+  /// shells.
+  std::optional<double> min_angle;
+  std::optional<int> max_iterations;  ///< none: 20, with refine 60; fit: 8 rounds, see fit(), and 5 of exchanges
   std::optional<double> width;        ///< mm: of the measured intervals; none: 0.01 % of the target's diagonal
   /// Tells how it goes; the mesh is the best one until then.
   std::function<void(const RelaxIteration&, const ShellMesh&)> on_iteration;

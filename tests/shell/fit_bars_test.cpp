@@ -56,8 +56,11 @@ TriangleMesh dumbbell(int times) {
   return mesh;
 }
 
-RelaxResult fitted(const Target& target, double percent, Patch surface = Patch::comas) {
+/// @param angle  degrees: asked for; none: as the fit sees fit, at least `least`
+RelaxResult fitted(const Target& target, double percent, Patch surface = Patch::comas, std::optional<double> angle = {},
+                   double least = 20) {
   RelaxOptions options;
+  options.min_angle = angle;
   options.method = RelaxMethod::fit;
   options.surface = surface;
   options.tolerance = percent / 100 * target.diagonal();
@@ -65,7 +68,7 @@ RelaxResult fitted(const Target& target, double percent, Patch surface = Patch::
   EXPECT_EQ(result.reached, true);
   EXPECT_LE(result.distance.both.upper, *options.tolerance);
   EXPECT_EQ(crossing_shells(result.shell).size(), 0U);
-  EXPECT_GE(min_angle_degrees(flat_facets(result.shell)), 20);
+  EXPECT_GE(min_angle_degrees(flat_facets(result.shell)), angle.value_or(least));
   return result;
 }
 
@@ -161,6 +164,22 @@ TEST(FitBars, DumbbellAtATenthOfAPercent) {
   const RelaxResult result = fitted(target, 0.1);
   EXPECT_LE(7 * static_cast<double>(result.shell.triangles.size()), static_cast<double>(flat_triangles(target, 0.1)))
       << result.shell.triangles.size();
+}
+
+TEST(FitBars, LongShellsServeAlongACylinder) {
+  const Target target(testing::cylinder(160, 60, 20, 80));
+  for (const Patch surface : {Patch::comas, Patch::watertight}) {
+    const RelaxResult result = fitted(target, 0.1, surface, {}, 5);
+    EXPECT_LE(7 * static_cast<double>(result.shell.triangles.size()), static_cast<double>(flat_triangles(target, 0.1)))
+        << result.shell.triangles.size();
+  }
+}
+
+TEST(FitBars, AnglesAskedForAreKeptWhereLongShellsWouldBeFewer) {
+  const Target target(testing::cylinder(80, 30, 20, 80));
+  const std::size_t any = fitted(target, 0.3, Patch::comas, {}, 5).shell.triangles.size();
+  const std::size_t good = fitted(target, 0.3, Patch::comas, 20).shell.triangles.size();
+  EXPECT_LT(4 * any, 3 * good);
 }
 
 TEST(FitBars, FineTolerancesAreReachedByFewPatches) {

@@ -163,9 +163,9 @@ TEST(FitExchange, FewerShellsDoWithinTheSameLimitAndStillFewerWhereNormalsPart) 
   ASSERT_TRUE(regains(samples, state, limit));
   squeeze(samples, state, limit);
   FitState shared = state;
-  exchange_pieces(samples, shared, limit, limit / 0.97, 0);
+  exchange_pieces(samples, shared, {limit, limit / 0.97, 0});
   EXPECT_LT(shared.mesh.alive, state.mesh.alive) << "than squeezing finds";
-  exchange_pieces(samples, state, limit, limit / 0.97, 30);
+  exchange_pieces(samples, state, {limit, limit / 0.97, 30});
   EXPECT_LT(state.mesh.alive, shared.mesh.alive);
   state.attach();
   state.measure();

@@ -257,7 +257,9 @@ class Contract(Case):
                       ["--tolerance", "1%", "--kink", "nan"], ["--tolerance", "1%", "--kink", "wide"],
                       ["--kink", "20"], ["--tolerance", "1%", "--kink", "20", "--refine"],
                       ["--tolerance", "1%", "--kink", "20", "--surface", "watertight"],
-                      ["--tolerance", "1%", "--kink", "20", "--method", "barycentre"]):
+                      ["--tolerance", "1%", "--kink", "20", "--method", "barycentre"],
+                      ["--min-angle", "0.5"], ["--min-angle", "31"], ["--min-angle", "nan"], ["--min-angle", "wide"],
+                      ["--min-angle", "20", "--method", "barycentre"]):
             self.relax(self.coarse, self.target, self.out, *extra, expect=2)
         for extra in (["--shells", "0"], ["--shells", "100", "--max-shells", "100", "--refine"]):
             self.relax(self.coarse, self.target, self.out, *extra, expect=2)
@@ -461,6 +463,26 @@ class Fit(Case):
                 largest = max(largest, np.degrees(np.arccos(np.clip(here @ here.T, -1, 1))).max())
             self.assertLess(largest, kink + 1e-4)
         self.assertLess(shells[40], shells[0])
+
+    def test_angles_are_kept_that_are_asked_for(self):
+        vertices, triangles = cylinder(60, 24, radius=1, length=4)
+        tube = self.path("tube.ply")
+        write_ply(tube, vertices, triangles)
+        shells = {}
+        for angle in (8, 25):
+            record, _ = self.relax(tube, tube, self.out, "--tolerance", "0.5%", "--min-angle", angle, "--force")
+            self.assertTrue(record["result"]["reached"])
+            self.assertGreaterEqual(record["result"]["min_angle_deg"], angle)
+            shells[angle] = record["result"]["shells"]
+        self.assertLess(shells[8], shells[25])
+
+    def test_an_angle_that_cannot_be_kept_is_told(self):
+        corners = np.array([[0, 0, 0], [40, 0, 0], [40, 4, 0], [20, 6, 0]], float)
+        wedge = self.path("wedge.ply")
+        write_ply(wedge, corners, [[0, 1, 2], [0, 2, 3]])
+        record, err = self.relax(wedge, wedge, self.out, "--tolerance", "0.5%", "--min-angle", 20)
+        self.assertLess(record["result"]["min_angle_deg"], 20)
+        self.assertIn("the smallest angle is", err)
 
     def test_a_limit_of_shells_that_only_a_search_for_the_fewest_keeps_is_kept(self):
         record, _ = self.relax(self.target, self.target, self.out, "--tolerance", "0.3%", "--kink", 0)
