@@ -26,7 +26,8 @@ namespace tunica {
 /// target's own triangles do not cross.
 /// @param coarse  an oriented manifold; its count, and its topology, may matter; @param target  likewise
 /// Keeps: topology of the start, boundary loops (on the target's boundary to the same tolerance). Angles are at least
-/// 20 degrees but where folds, rims or creases of the target would cost the tolerance (or, to a count, error).
+/// 20 degrees (RelaxOptions::min_angle) but where folds, rims or creases of the target would cost the tolerance (or, to
+/// a count, error).
 /// Deterministic, independent of the number of threads. Errors: Interrupted. Source: error-driven collapse as in Hoppe
 /// et al., Mesh optimization, SIGGRAPH 1993, with cubic patches (Comas, Duriez, Cotin 2010, eq. 1-2) in place of
 /// facets. Cost: n log n for the target, then about 1 ms per shell of the result to a count of 400 or more of a smooth
