@@ -321,8 +321,8 @@ void run(cli::Tool& tool, const Arguments& given) {
     result["min_angle_deg"] = angle;
     if (options.min_angle && angle < *options.min_angle) {
       tool.warn(fmt::format(
-          "the smallest angle is {:.3g} degrees: folds, rims or creases, or the shells that it would cost, do not "
-          "allow {:.3g} everywhere",
+          "the smallest angle is {:.3g} degrees: folds, rims or creases do not allow {:.3g} everywhere, or the error "
+          "would be larger",
           angle, *options.min_angle));
     }
     result["self_intersections"] = crossing_shells(relaxed.shell).size();

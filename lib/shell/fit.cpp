@@ -55,10 +55,11 @@ constexpr int local_mending = 3;        // certificates, before less error is as
 constexpr double most_tightening = 0.95, least_tightening = 0.985;  // of the limit, where certificates find more
 constexpr std::array<double, 6> parts_of_tolerance{0.95, 0.9, 0.8, 0.65, 0.5, 0.25};  // to part sheets that cross
 constexpr double good_enough_angle = 0.9;                                             // of the limit
-constexpr double needle = 10;                          // degrees: angles of a plain decimation, along cylinders
-constexpr std::array<double, 2> narrow_angles{10, 5};  // degrees: of shells there
-constexpr double most_by_exchanges = 2;                // times fewer shells
-constexpr double worth_narrow = 0.75;                  // of the shells with better angles
+constexpr double needle = 10;                              // degrees: angles of a plain decimation, along cylinders
+constexpr std::array<double, 2> narrow_angles{10, 5};      // degrees: of shells there
+constexpr std::size_t price_of_an_angle_asked_for = 1000;  // shells
+constexpr double most_by_exchanges = 2;                    // times fewer shells
+constexpr double worth_narrow = 0.75;                      // of the shells with better angles
 
 /// Whether most of the area of a plain decimation is in needles: as along a cylinder, where length costs no error.
 bool is_of_needles(const TriangleMesh& mesh) {
@@ -103,11 +104,13 @@ public:
   }
 
 private:
-  Fitting(const TriangleMesh& coarse, const Target& target, const RelaxOptions& options, double width)
+  /// @param angle  degrees, instead of 20 or what was asked for
+  Fitting(const TriangleMesh& coarse, const Target& target, const RelaxOptions& options, double width,
+          std::optional<double> angle = {})
       : coarse_(coarse),
         target_(target),
         options_(options),
-        angle_(options.min_angle.value_or(FitLimits{}.angle)),
+        angle_(angle.value_or(options.min_angle.value_or(FitLimits{}.angle))),
         like_target_(same_topology(coarse, target.mesh())),
         result_(target, options, width) {}
 
@@ -234,7 +237,8 @@ private:
                                : start_as_given(coarse_, target_);
     // Flat errors fall as 1 / count. Where curved shells need as many, flat facets are the answer.
     const double flat_count = static_cast<double>(start.mesh.triangles.size()) * start.flat_error / tolerance;
-    const std::size_t most = static_cast<std::size_t>(std::clamp(flat_count, 64.0, 1e9));
+    const std::size_t most =
+        options_.min_angle ? max_index : static_cast<std::size_t>(std::clamp(flat_count, 64.0, 1e9));
     if (!start.own_topology && static_cast<double>(start.mesh.triangles.size()) >
                                    limited_by_target * static_cast<double>(target_.mesh().triangles.size())) {
       result_.no_worse_than_flat(tolerance, max_index, start);
@@ -253,9 +257,7 @@ private:
     std::vector<RelaxResult> narrow;
     std::size_t fewest = max_index;
     for (const double angle : narrow_angles) {
-      RelaxOptions options = options_;
-      options.min_angle = angle;
-      Fitting fitting(coarse_, target_, options, result_.width());
+      Fitting fitting(coarse_, target_, options_, result_.width(), angle);
       fitting.search_from(start, tolerance, most);
       add_iterations(fitting.result_.found);
       if (fitting.result_.holds(tolerance)) {
@@ -282,7 +284,7 @@ private:
     if (several) {
       // A greedy search ends elsewhere from elsewhere: from few and from well-shaped triangles.
       const FitStart fewer = start_of_fit(target_, start_error * tolerance, 0, 0);
-      for (const FitStart& other : {fewer, well_shaped(fewer), well_shaped(start)}) {
+      for (const FitStart& other : {fewer, well_shaped(fewer, tolerance), well_shaped(start, tolerance)}) {
         found.push_back(search(samples, other, tolerance, most, search_patience));
       }
     }
@@ -343,10 +345,14 @@ private:
     result_.found.iterations.insert(result_.found.iterations.end(), of.iterations.begin(), of.iterations.end());
   }
 
-  /// As many triangles of the target with better angles.
-  [[nodiscard]] FitStart well_shaped(const FitStart& start) const {
+  /// As many triangles of the target with better angles; where angles were asked for, as many as these take.
+  [[nodiscard]] FitStart well_shaped(const FitStart& start, double tolerance) const {
     DecimateOptions decimating;
-    decimating.triangles = start.mesh.triangles.size();
+    if (options_.min_angle) {
+      decimating.max_error = std::max(start.flat_error, tolerance);
+    } else {
+      decimating.triangles = start.mesh.triangles.size();
+    }
     decimating.min_angle = angle_;
     return {decimate(target_.mesh(), decimating).mesh, start.flat_error, false};
   }
@@ -588,6 +594,7 @@ private:
   [[nodiscard]] FitLimits limits() const {
     FitLimits out;
     out.angle = angle_;
+    out.price_of_a_thin_one = options_.min_angle ? price_of_an_angle_asked_for : out.price_of_a_thin_one;
     return out;
   }
 

@@ -9,9 +9,10 @@ namespace tunica {
 
 /// What a facet must keep, unless it was worse before.
 struct FitLimits {
-  double agreement = 0.3;  ///< N·n at its corners
-  double angle = 20;       ///< degrees
-  double kink = 0;         ///< degrees by which normals of one node and sector may part
+  double agreement = 0.3;                ///< N·n at its corners
+  double angle = 20;                     ///< degrees
+  double kink = 0;                       ///< degrees by which normals of one node and sector may part
+  std::size_t price_of_a_thin_one = 10;  ///< shells that a triangle with a smaller angle may cost to be rid of
 };
 
 /// The angle, degrees, that a facet must keep whose smallest angle is `now`: the limit, or nearly what it has.

@@ -19,12 +19,13 @@ constexpr std::size_t squeezed_shells = 2'500;  // of all tries: what they may c
 constexpr std::size_t least_squeezes = 1, most_squeezes = 12;
 constexpr int regaining = 8;  // steps of all nodes
 constexpr int few_splits = 3;
-constexpr int looks = 12;                        // for points that the samples missed
-constexpr std::size_t price_of_a_thin_one = 10;  // shells
+constexpr int looks = 12;  // for points that the samples missed
 
 }  // namespace
 
-std::size_t price(const FitState& state) { return state.mesh.alive + price_of_a_thin_one * count_thin(state); }
+std::size_t price(const FitState& state) {
+  return state.mesh.alive + state.limits.price_of_a_thin_one * count_thin(state);
+}
 
 bool regains(FitSamples& samples, FitState& state, double limit) {
   for (int look = 0; look < looks; ++look) {

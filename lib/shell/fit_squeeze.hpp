@@ -4,7 +4,7 @@
 
 namespace tunica {
 
-/// What a search for few shells lessens: shells, and for each thin triangle what five further nodes cost.
+/// What a search for few shells lessens: shells, and for each thin triangle FitLimits::price_of_a_thin_one.
 std::size_t price(const FitState& state);
 
 /// Moves all nodes until no error, nor that of points that the samples missed, is above `limit` (mm).
