@@ -125,7 +125,7 @@ private:
     fewest.to_tolerance(*options_.tolerance);
     fewest.part_sheets(most);
     RelaxResult& found = fewest.result_.found;
-    add_iterations(found);
+    result_.add_iterations(found.iterations);
     const bool held = result_.holds(*options_.tolerance);
     const std::size_t enough = held ? result_.found.shell.triangles.size() - 1 : most;
     if (found.distance.both.upper <= *options_.tolerance && found.shell.triangles.size() <= enough) {
@@ -203,7 +203,7 @@ private:
     Fitting fitting(part, target, options_, result_.width());
     fitting.whole_to_tolerance(tolerance);
     RelaxResult& fitted = fitting.result_.found;
-    add_iterations(fitted);
+    result_.add_iterations(fitted.iterations);
     done.push_back({std::move(fitted.shell), fitted.distance});
     return !fitting.result_.is_flat();
   }
@@ -259,7 +259,7 @@ private:
     for (const double angle : narrow_angles) {
       Fitting fitting(coarse_, target_, options_, result_.width(), angle);
       fitting.search_from(start, tolerance, most);
-      add_iterations(fitting.result_.found);
+      result_.add_iterations(fitting.result_.found.iterations);
       if (fitting.result_.holds(tolerance)) {
         fewest = std::min(fewest, fitting.result_.found.shell.triangles.size());
         narrow.push_back(std::move(fitting.result_.found));
@@ -339,10 +339,6 @@ private:
     out.on_better = [&](const FitState& state) { result_.note(state); };
     out.progress = options_.progress;
     return out;
-  }
-
-  void add_iterations(const RelaxResult& of) {
-    result_.found.iterations.insert(result_.found.iterations.end(), of.iterations.begin(), of.iterations.end());
   }
 
   /// As many triangles of the target with better angles; where angles were asked for, as many as these take.

@@ -19,15 +19,15 @@ namespace tunica {
 /// With `tolerance` the fewest shells found whose certified distance holds, or with `refine` COARSE's triangles, placed
 /// anew and split where that is needed; without, the least distance found with at most `shells` (none: as many as
 /// COARSE has, with `refine` four times as many; more where the topology needs more). Never more shells, or a larger
-/// distance, than plain decimation: where that wins, its flat facets are the result (flat shells: corner normals are
-/// the facets'). To a tolerance each piece of the target may be flat by itself, crumbs without being tried.
-/// Searches that cost little (to a tolerance from few triangles, to few shells) or are uncertain (to a count on a rough
-/// target) run from several starts, of which the best is kept. To a tolerance, shells that cross are parted where the
-/// target's own triangles do not cross.
+/// distance, than plain decimation, or with `min_angle` one that keeps it: where that wins, its flat facets are the
+/// result (flat shells: corner normals are the facets'). To a tolerance each piece of the target may be flat by itself,
+/// crumbs without being tried. Searches that cost little (to a tolerance from few triangles, to few shells) or are
+/// uncertain (to a count on a rough target) run from several starts, of which the best is kept. To a tolerance, shells
+/// that cross are parted where the target's own triangles do not cross.
 /// @param coarse  an oriented manifold; its count, and its topology, may matter; @param target  likewise
-/// Keeps: topology of the start, boundary loops (on the target's boundary to the same tolerance). Angles are at least
-/// 20 degrees (RelaxOptions::min_angle) but where folds, rims or creases of the target would cost the tolerance (or, to
-/// a count, error).
+/// Keeps: topology of the start, boundary loops (on the target's boundary to about the tolerance, which the samples
+/// tell and no certificate). Angles are at least 20 degrees (RelaxOptions::min_angle) but where folds, rims or creases
+/// of the target would cost the tolerance (or, to a count, error), or, unless asked for, ten shells per thin one.
 /// Deterministic, independent of the number of threads. Errors: Interrupted. Source: error-driven collapse as in Hoppe
 /// et al., Mesh optimization, SIGGRAPH 1993, with cubic patches (Comas, Duriez, Cotin 2010, eq. 1-2) in place of
 /// facets. Cost: n log n for the target, then about 1 ms per shell of the result to a count of 400 or more of a smooth

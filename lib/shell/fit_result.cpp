@@ -121,6 +121,11 @@ void FitResult::record(const ShellMesh& shell, const Interval& distance) {
   }
 }
 
+void FitResult::add_iterations(const std::vector<RelaxIteration>& of) {
+  found.iterations.insert(found.iterations.end(), of.begin(), of.end());
+  last_ = std::chrono::steady_clock::now();
+}
+
 ShellDistance FitResult::distance_of(const ShellMesh& shell) const {
   ShellDistanceOptions measuring;
   measuring.width = width_;

@@ -37,6 +37,9 @@ public:
   void note(const FitState& state);
   void record(const ShellMesh& shell, const Interval& distance);
 
+  /// Adds what another fit noted, whose time is not to be counted again.
+  void add_iterations(const std::vector<RelaxIteration>& of);
+
   /// The certified distance of shells, mm.
   [[nodiscard]] ShellDistance distance_of(const ShellMesh& shell) const;
 

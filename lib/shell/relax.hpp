@@ -41,7 +41,7 @@ struct RelaxOptions {
   double kink = 45;
   /// Degrees: what the angles of fit's shells keep where the target's folds, rims and creases allow it. None: 20; to a
   /// tolerance 10 or 5 where plain decimation makes needles, as along cylinders, and that saves a quarter of the
-  /// shells.
+  /// shells. From 1 to 30.
   std::optional<double> min_angle;
   std::optional<int> max_iterations;  ///< none: 20, with refine 60; fit: 8 rounds, see fit(), and 5 of exchanges
   std::optional<double> width;        ///< mm: of the measured intervals; none: 0.01 % of the target's diagonal
