@@ -1,6 +1,7 @@
 #include "cli/tool.hpp"
 #include "io/mesh_file.hpp"
 #include "io/picture.hpp"
+#include "shell/boundary_distance.hpp"
 #include "shell/curved_surface.hpp"
 #include "shell/shell_distance.hpp"
 #include "shell/target.hpp"
@@ -272,6 +273,10 @@ void run(cli::Tool& tool, const Arguments& given) {
        {{"a", {distance.worst_a.x(), distance.worst_a.y(), distance.worst_a.z()}},
         {"b", {distance.worst_b.x(), distance.worst_b.y(), distance.worst_b.z()}}}},
   };
+  if (a.shell) {
+    const auto boundary = boundary_distance(boundary_curves(*a.shell), *b.target, width);
+    tool.result()["boundary_percent"] = boundary ? interval(boundary->both, percent) : Json();
+  }
   const std::string means = std::isfinite(distance.mean) ? fmt::format(", mean {:.4f} %, rms {:.4f} %",
                                                                        percent * distance.mean, percent * distance.rms)
                                                          : ", no mean over a surface without area";

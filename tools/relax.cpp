@@ -5,6 +5,7 @@
 #include "core/quantity.hpp"
 #include "io/mesh_file.hpp"
 #include "io/picture.hpp"
+#include "shell/boundary_distance.hpp"
 #include "shell/curved_surface.hpp"
 #include "shell/fit_cross.hpp"
 #include "surface/checks.hpp"
@@ -280,6 +281,7 @@ void run(cli::Tool& tool, const Arguments& given) {
   }
 
   ShellDistance distance;
+  std::optional<Interval> boundary;
   {
     const auto stage = tool.stage("measure");
     ShellDistanceOptions measuring;
@@ -308,6 +310,10 @@ void run(cli::Tool& tool, const Arguments& given) {
     result["hausdorff_percent"] = interval(distance.both, percent);
     result["one_sided_percent"] = {{"shell_to_target", interval(distance.shell_to_target, percent)},
                                    {"target_to_shell", interval(distance.target_to_shell, percent)}};
+    if (const auto between = boundary_distance(boundary_curves(relaxed.shell), *target, measuring.width)) {
+      boundary = intersection(between->both, relaxed.distance.boundary.value_or(between->both));
+    }
+    result["boundary_percent"] = boundary ? interval(*boundary, percent) : Json();
     result["mean_percent"] = distance.mean * percent;
     result["rms_percent"] = distance.rms * percent;
     result["flat_hausdorff_percent"] = interval(flat.both, percent);
@@ -347,9 +353,12 @@ void run(cli::Tool& tool, const Arguments& given) {
   if (options.tolerance && !*relaxed.reached) {
     keep_partial(relaxed.shell);
     throw RequirementError(fmt::format(
-        "{}: the tolerance of {:.4g} % is not reached: {:.4g} % with {} shells ({}); the best mesh is {}.part. {}",
-        given.out.string(), percent * *options.tolerance, percent * distance.both.upper, relaxed.shell.triangles.size(),
-        relaxed.stopped, given.out.string(),
+        "{}: the tolerance of {:.4g} % is not reached: {:.4g} %{} with {} shells ({}); the best mesh is {}.part. {}",
+        given.out.string(), percent * *options.tolerance, percent * distance.both.upper,
+        boundary && options.method == RelaxMethod::fit
+            ? fmt::format(", {:.4g} % of the boundaries", percent * boundary->upper)
+            : "",
+        relaxed.shell.triangles.size(), relaxed.stopped, given.out.string(),
         options.method == RelaxMethod::fit ? "Allow more shells or iterations, or a wider tolerance"
         : given.refine                     ? "Allow more shells or iterations"
                                            : "Add --refine, or take a coarse mesh with more triangles"));

@@ -91,14 +91,14 @@ public:
     }
     if (most) {
       to_count(*most);
-      if (result_.found.distance.both.upper <= worth_a_search * *options_.tolerance) {
+      if (result_.found.distance.upper() <= worth_a_search * *options_.tolerance) {
         take_fewest(*most);
       }
     } else {
       to_tolerance(*options_.tolerance);
       part_sheets(max_index);
     }
-    result_.found.reached = result_.found.distance.both.upper <= *options_.tolerance;
+    result_.found.reached = result_.found.distance.upper() <= *options_.tolerance;
     result_.found.stopped = *result_.found.reached ? "the tolerance holds" : "closer shells were not found";
     return std::move(result_.found);
   }
@@ -112,7 +112,7 @@ private:
         options_(options),
         angle_(angle.value_or(options.min_angle.value_or(FitLimits{}.angle))),
         like_target_(same_topology(coarse, target.mesh())),
-        result_(target, options, width) {}
+        result_(target, options, width, like_target_) {}
 
   static double width_for(const Target& target, const RelaxOptions& options) {
     const double width = options.width.value_or(default_width * target.diagonal());
@@ -128,7 +128,7 @@ private:
     result_.add_iterations(found.iterations);
     const bool held = result_.holds(*options_.tolerance);
     const std::size_t enough = held ? result_.found.shell.triangles.size() - 1 : most;
-    if (found.distance.both.upper <= *options_.tolerance && found.shell.triangles.size() <= enough) {
+    if (found.distance.upper() <= *options_.tolerance && found.shell.triangles.size() <= enough) {
       result_.take(std::move(found.shell), found.distance);
     }
   }
@@ -148,7 +148,7 @@ private:
       const double its_angle = std::min(min_angle_degrees(flat_facets(closer.result_.found.shell)), angle_);
       const bool better = left < crossings || (left == 0 && its_angle > angle);
       if (better && closer.result_.found.shell.triangles.size() <= most &&
-          closer.result_.found.distance.both.upper <= *options_.tolerance) {
+          closer.result_.found.distance.upper() <= *options_.tolerance) {
         result_.take(std::move(closer.result_.found.shell), closer.result_.found.distance);
         crossings = left;
         angle = its_angle;
@@ -172,12 +172,8 @@ private:
     std::vector<Fitted> done;
     std::vector<TriangleMesh> rest;
     for (TriangleMesh& part : parts) {
-      if (const auto crumb = crumb_within(part, tolerance, angle_)) {
-        ShellDistanceOptions measuring;
-        measuring.width = result_.width();
-        ShellMesh shell = flat_shells(*crumb, options_.surface);
-        const ShellDistance distance = shell_distance(shell, Target(std::move(part)), measuring);
-        done.push_back({std::move(shell), distance});
+      if (auto crumb = flat_crumb(part, tolerance)) {
+        done.push_back(std::move(*crumb));
       } else {
         rest.push_back(std::move(part));
       }
@@ -196,6 +192,18 @@ private:
     ShellMesh shell;
     ShellDistance distance;  ///< to its part of the target
   };
+
+  /// A part that is so small that flat facets serve it, boundaries included.
+  [[nodiscard]] std::optional<Fitted> flat_crumb(const TriangleMesh& part, double tolerance) const {
+    const auto crumb = crumb_within(part, tolerance, angle_);
+    if (!crumb) {
+      return {};
+    }
+    const Target target(part);
+    ShellMesh shell = flat_shells(*crumb, options_.surface);
+    const ShellDistance distance = FitResult(target, options_, result_.width(), true).distance_of(shell);
+    return distance.upper() <= tolerance ? std::optional(Fitted{std::move(shell), distance}) : std::nullopt;
+  }
 
   /// @return whether it became curved
   bool fit_part(const TriangleMesh& part, double tolerance, std::vector<Fitted>& done) {
@@ -224,8 +232,8 @@ private:
     lower_uppers(distance, most.both, most.shell_to_target, most.target_to_shell);
     const bool held = result_.holds(tolerance);
     const bool better =
-        held ? distance.both.upper <= tolerance && shell.triangles.size() < result_.found.shell.triangles.size()
-             : result_.is_empty() || distance.both.upper < result_.found.distance.both.upper;
+        held ? distance.upper() <= tolerance && shell.triangles.size() < result_.found.shell.triangles.size()
+             : result_.is_empty() || distance.upper() < result_.found.distance.upper();
     if (better) {
       result_.take(std::move(shell), distance);
     }
@@ -277,7 +285,7 @@ private:
   /// The fewest shells found within the tolerance, from one decimation of the target or several.
   /// @param wanted  shells: of many more none are exchanged
   void search_from(const FitStart& start, double tolerance, std::size_t most, double wanted = max_index) {
-    FitSamples samples(target_, guess(start.mesh.triangles.size() / expected_gain));
+    FitSamples samples(target_, guess(start.mesh.triangles.size() / expected_gain), like_target_);
     const double limit = margin * tolerance;
     const bool several = !start.own_topology && start.mesh.triangles.size() < affordable;
     std::vector<FitState> found{search(samples, start, tolerance, most, several ? search_patience : 1)};
@@ -394,7 +402,7 @@ private:
   /// COARSE's triangles, placed anew, and split where they are too far off. @return whether the tolerance holds
   bool coarse_refined(double tolerance, std::size_t most) {
     const FitStart start{coarse_, 0, true};
-    FitSamples samples(target_, guess(static_cast<double>(coarse_.triangles.size())));
+    FitSamples samples(target_, guess(static_cast<double>(coarse_.triangles.size())), like_target_);
     FitState state(samples, prepared(start), limits());
     smooth(state, tolerance, tolerance);
     const double limit = margin * tolerance;
@@ -440,8 +448,8 @@ private:
       const double before = state.error();
       // What more samples alone do not mend gets more shells.
       const std::size_t added = add_missed(samples, state, limit, true);
-      if (result_.farthest()) {
-        samples.add(*result_.farthest());
+      for (const SamplePoint& point : result_.farthest()) {
+        samples.add(point);
       }
       if (regains_with_few(samples, state, limit, most)) {
         continue;
@@ -486,7 +494,7 @@ private:
       result_.no_worse_than_flat({}, shells, start);
       return;
     }
-    FitSamples samples(target_, guess(wanted));
+    FitSamples samples(target_, guess(wanted), like_target_);
     FitState best = settled(samples, start, shells);
     // A greedy search ends elsewhere from elsewhere, with few shells or on rough targets by much.
     const bool worth_exchanging = shells < few_shells || is_uneven(best);

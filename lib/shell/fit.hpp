@@ -25,16 +25,16 @@ namespace tunica {
 /// uncertain (to a count on a rough target) run from several starts, of which the best is kept. To a tolerance, shells
 /// that cross are parted where the target's own triangles do not cross.
 /// @param coarse  an oriented manifold; its count, and its topology, may matter; @param target  likewise
-/// Keeps: topology of the start, boundary loops (on the target's boundary to about the tolerance, which the samples
-/// tell and no certificate). Angles are at least 20 degrees (RelaxOptions::min_angle) but where folds, rims or creases
-/// of the target would cost the tolerance (or, to a count, error), or, unless asked for, ten shells per thin one.
-/// Deterministic, independent of the number of threads. Errors: Interrupted. Source: error-driven collapse as in Hoppe
-/// et al., Mesh optimization, SIGGRAPH 1993, with cubic patches (Comas, Duriez, Cotin 2010, eq. 1-2) in place of
-/// facets. Cost: n log n for the target, then about 1 ms per shell of the result to a count of 400 or more of a smooth
-/// target (one round unless `max_iterations` allows more), some 10 ms to other counts and where the target is rough,
-/// and to a tolerance up to 0.2 s per shell of few (four searches, pieces fitted anew), 20 ms of many. Limits: a greedy
-/// search; where its facets, not its shape, decide (a target hardly denser than the shells needed) plain decimation is
-/// the answer.
+/// Keeps: topology of the start, boundary loops. Where COARSE has the target's topology a tolerance holds, certified,
+/// for the boundaries as curves too (ShellDistance::boundary; else they are only where the shells end). Angles are at
+/// least 20 degrees (RelaxOptions::min_angle) but where folds, rims or creases of the target would cost the tolerance
+/// (or, to a count, error), or, unless asked for, ten shells per thin one. Deterministic, independent of the number of
+/// threads. Errors: Interrupted. Source: error-driven collapse as in Hoppe et al., Mesh optimization, SIGGRAPH 1993,
+/// with cubic patches (Comas, Duriez, Cotin 2010, eq. 1-2) in place of facets. Cost: n log n for the target, then about
+/// 1 ms per shell of the result to a count of 400 or more of a smooth target (one round unless `max_iterations` allows
+/// more), some 10 ms to other counts and where the target is rough, and to a tolerance up to 0.2 s per shell of few
+/// (four searches, pieces fitted anew), 20 ms of many. Limits: a greedy search; where its facets, not its shape, decide
+/// (a target hardly denser than the shells needed) plain decimation is the answer.
 RelaxResult fit(const TriangleMesh& coarse, const Target& target, const RelaxOptions& options);
 
 }  // namespace tunica

@@ -38,7 +38,6 @@ constexpr double slow = 0.97;                            // of the error is left
 constexpr std::array<double, 3> joining{1, 0.95, 0.9};   // of the limit
 constexpr int easing = 8;                                // steps of all nodes
 constexpr std::size_t least_kick = 2, shells_per_split = 10;
-constexpr int points_per_edge = 8;
 constexpr int patience = 2;      // times that bring nothing
 constexpr int certificates = 3;  // per change
 
@@ -86,45 +85,6 @@ void widen(Box& box, const FitState& state, Index t) {
   }
 }
 
-/// How far, mm, the boundary curves of the shells get from those of the target: the distance of the surfaces says
-/// little about that where a boundary winds. 0 without boundaries. Cost: points times edges.
-double off_boundary(const FitState& state) {
-  const FitMesh& mesh = state.mesh;
-  const TriangleMesh& target = state.samples().target().mesh();
-  const auto& across = state.samples().target().across();
-  std::vector<std::array<Vec3, 2>> edges;
-  for (std::size_t t = 0; t < target.triangles.size(); ++t) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      if (across[t][k] == no_neighbour) {
-        edges.push_back({target.vertices[target.triangles[t][k]], target.vertices[target.triangles[t][(k + 1) % 3]]});
-      }
-    }
-  }
-  const std::array<Vec2, 3> corner{Vec2(0, 0), Vec2(1, 0), Vec2(0, 1)};
-  double farthest = 0;
-  for (Index t = 0; t < mesh.triangles.size() && !edges.empty(); ++t) {
-    for (std::size_t k = 0; mesh.is_alive(t) && k < 3; ++k) {
-      const Index from = mesh.triangles[t][k], to = mesh.triangles[t][(k + 1) % 3];
-      if (mesh.on_boundary[from] == 0 || mesh.on_boundary[to] == 0 || mesh.on_edge(from, to).count() != 1) {
-        continue;
-      }
-      const CubicPatch patch = mesh.patch(t);
-      for (int i = 0; i < points_per_edge; ++i) {
-        const double s = static_cast<double>(i) / points_per_edge;
-        const Vec3 p = patch.point((1 - s) * corner[k] + s * corner[(k + 1) % 3]);
-        double least = std::numeric_limits<double>::infinity();
-        for (const auto& [a, b] : edges) {
-          const Vec3 along = b - a;
-          const double foot = std::clamp((p - a).dot(along) / along.squaredNorm(), 0.0, 1.0);
-          least = std::min(least, (p - a - foot * along).squaredNorm());
-        }
-        farthest = std::max(farthest, std::sqrt(least));
-      }
-    }
-  }
-  return farthest;
-}
-
 class Exchange {
 public:
   Exchange(FitSamples& samples, FitState& state, double limit, double tolerance)
@@ -133,7 +93,6 @@ public:
         limit_(limit),
         tolerance_(tolerance),
         crossings_(crossing_shells(state.mesh.shell()).size()),
-        off_boundary_(std::max(limit, off_boundary(state))),
         changed_(state.mesh.positions.size(), 1) {}
 
   /// @param most  pieces fitted anew; @return how many were
@@ -259,7 +218,7 @@ private:
         return {};
       }
       const Box box = around(region);
-      std::vector<Vec3> missed = missed_within(trial, box, limit_);
+      std::vector<SamplePoint> missed = missed_within(trial, box, limit_);
       if (missed.empty() && holds_within(trial, box, tolerance_, missed)) {
         // The samples must see that as well, or steps of all nodes would start above the limit. From patch to patch:
         // attached to a tessellation's nearest triangle, some would be far off that are not.
@@ -284,18 +243,21 @@ private:
   }
 
   /// Adds points to the samples, and to those of a piece.
-  void attach_to_closest(const std::vector<Vec3>& points, FitState& piece) {
-    for (const Vec3& p : points) {
+  void attach_to_closest(const std::vector<SamplePoint>& points, FitState& piece) {
+    for (const SamplePoint& p : points) {
       double least = everywhere;
-      Index closest = 0;
+      Index closest = no_index;
       for (Index t = 0; t < piece.mesh.triangles.size(); ++t) {
-        if (!piece.mesh.is_alive(t)) {
+        if (!piece.mesh.is_alive(t) || (p.of_boundary && piece.mesh.boundary_edges(t) == 0)) {
           continue;
         }
-        if (const double d = foot_on_patch(piece.mesh.patch(t), p).squared_distance; d < least) {
+        if (const double d = foot_on_patch(piece.mesh.patch(t), p.point).squared_distance; d < least) {
           least = d;
           closest = t;
         }
+      }
+      if (closest == no_index) {
+        continue;  // the piece has no part in the boundary
       }
       piece.patches[closest].attached.push_back(static_cast<Index>(samples_.points().size()));
       samples_.add(p);
@@ -304,7 +266,7 @@ private:
 
   [[nodiscard]] bool worse(const FitState& trial) const {
     return trial.error() > limit_ || price(trial) > price(state_) ||
-           crossing_shells(trial.mesh.shell()).size() > crossings_ || off_boundary(trial) > off_boundary_;
+           crossing_shells(trial.mesh.shell()).size() > crossings_;
   }
 
   /// What a changed piece may be close to, before and after.
@@ -344,7 +306,6 @@ private:
   FitState& state_;
   double limit_, tolerance_;
   std::size_t crossings_;
-  double off_boundary_;               // mm, allowed
   std::size_t fits_ = 0, now_ = 1;    // changes so far
   std::vector<std::size_t> changed_;  // when each node was last
   std::map<Change, std::size_t> tried_;
@@ -352,7 +313,7 @@ private:
 
 bool is_certain(const FitState& state, double tolerance) {
   constexpr double everywhere = std::numeric_limits<double>::infinity();
-  std::vector<Vec3> farthest;
+  std::vector<SamplePoint> farthest;
   return holds_within(state, {Vec3::Constant(-everywhere), Vec3::Constant(everywhere)}, tolerance, farthest);
 }
 
@@ -361,7 +322,6 @@ bool is_certain(const FitState& state, double tolerance) {
 bool take_if_sound(FitSamples& samples, FitState trial, FitState& state, double limit, double tolerance) {
   if (!regains(samples, trial, limit) || price(trial) > price(state) ||
       crossing_shells(trial.mesh.shell()).size() > crossing_shells(state.mesh.shell()).size() ||
-      off_boundary(trial) > std::max(limit, off_boundary(state)) ||
       (!is_certain(trial, tolerance) && is_certain(state, tolerance))) {
     return false;
   }
@@ -419,7 +379,7 @@ std::optional<FitState> kicked(FitSamples& samples, const FitState& from, double
   state.attach();
   state.measure();
   if (!regains(samples, state, limit) || crossing_shells(state.mesh.shell()).size() > 0 ||
-      off_boundary(state) > std::max(limit, off_boundary(from)) || !is_certain(state, tolerance)) {
+      !is_certain(state, tolerance)) {
     return {};
   }
   return state;
@@ -441,8 +401,8 @@ void exchange_pieces(FitSamples& samples, FitState& state, const ExchangeOptions
     Exchange(samples, state, limit, tolerance).run(most_before_parting, random);
   }
   FitState best = state;
-  const std::vector<Vec3> points = samples.points();
-  std::vector<Vec3> points_of_best = points;
+  const std::vector<SamplePoint> points = samples.points();
+  std::vector<SamplePoint> points_of_best = points;
   for (int i = 0; i < tries && left > 0; ++i) {
     advance(progress, 1 - static_cast<double>(left) / static_cast<double>(all));
     samples.take_points(points_of_best);

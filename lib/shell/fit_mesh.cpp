@@ -155,6 +155,32 @@ void FitMesh::remove_triangle(Index t) {
   --alive;
 }
 
+bool FitMesh::is_boundary_edge(Index u, Index v) const {
+  return on_boundary[u] != 0 && on_boundary[v] != 0 && on_edge(u, v).count() == 1 && !is_cut(u, v);
+}
+
+EdgeBits FitMesh::boundary_edges(Index t) const {
+  const auto& v = triangles[t];
+  EdgeBits bits = 0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    bits |= static_cast<EdgeBits>(is_boundary_edge(v[k], v[(k + 1) % 3]) ? 1U << k : 0U);
+  }
+  return bits;
+}
+
+std::vector<FitMesh::BoundaryEdge> FitMesh::boundary() const {
+  std::vector<BoundaryEdge> out;
+  for (Index t = 0; t < triangles.size(); ++t) {
+    const EdgeBits bits = is_alive(t) ? boundary_edges(t) : EdgeBits{0};
+    for (std::size_t k = 0; k < 3; ++k) {
+      if ((bits >> k & 1) != 0) {
+        out.push_back({t, edge_curve(patch(t), k)});
+      }
+    }
+  }
+  return out;
+}
+
 std::vector<std::array<Index, 2>> FitMesh::edges() const {
   std::vector<std::array<Index, 2>> out;
   for (std::size_t t = 0; t < triangles.size(); ++t) {

@@ -1,9 +1,11 @@
 #pragma once
 
+#include "shell/boundary_distance.hpp"
 #include "shell/curved_surface.hpp"
 #include "shell/shell_mesh.hpp"
 #include "surface/incidence.hpp"
 
+#include <algorithm>
 #include <optional>
 #include <span>
 
@@ -55,6 +57,22 @@ struct FitMesh {
     std::array<Vec3, 2> normals;
   };
   std::vector<RimEdge> rim;  ///< the creases there
+
+  /// The edges at the rim of a piece beyond which there are further triangles, ascending ends, sorted: no boundary.
+  std::vector<std::array<Index, 2>> cut;
+
+  [[nodiscard]] bool is_cut(Index u, Index v) const {
+    return std::binary_search(cut.begin(), cut.end(), std::array<Index, 2>{std::min(u, v), std::max(u, v)});
+  }
+  [[nodiscard]] bool is_boundary_edge(Index u, Index v) const;
+  [[nodiscard]] EdgeBits boundary_edges(Index t) const;
+
+  struct BoundaryEdge {
+    Index triangle;
+    CubicCurve curve;
+  };
+  /// All boundary edges.
+  [[nodiscard]] std::vector<BoundaryEdge> boundary() const;
 
   /// 0, 1 or 2: where in triangle t the node stands.
   [[nodiscard]] std::size_t corner_of(Index t, Index node) const {

@@ -1,6 +1,7 @@
 #include "shell/fit_missed.hpp"
 
 #include "core/threads.hpp"
+#include "shell/boundary_distance.hpp"
 #include "shell/certificate.hpp"
 #include "shell/curved_surface.hpp"
 #include "shell/patch_search.hpp"
@@ -21,7 +22,11 @@ constexpr int gap_points = 11;                      // per edge
 constexpr double narrow = 0.05;                     // of the limit: gaps that add nothing
 constexpr double width_of_certificates = 0.005;     // of the tolerance
 constexpr std::size_t most_added = 2000;            // points, at once
+constexpr int boundary_chords = 16;                 // per edge, for a look at the boundary
 constexpr double exact = 1.025;  // limits: what is looked at above gaps is the worst, so with less margin
+
+const Box everywhere{Vec3::Constant(-std::numeric_limits<double>::infinity()),
+                     Vec3::Constant(std::numeric_limits<double>::infinity())};
 
 struct Missed {
   Vec3 point;
@@ -83,6 +88,41 @@ Vec3 on_edge(const CubicPatch& patch, std::size_t from, std::size_t to, double s
 
 bool is_within(const Box& box, const Vec3& p) {
   return (p.array() >= box.lower.array()).all() && (p.array() <= box.upper.array()).all();
+}
+
+/// The boundary edges, where they are to be the target's boundary.
+std::vector<FitMesh::BoundaryEdge> boundary_of(const FitState& state) {
+  return state.samples().has_boundaries() ? state.mesh.boundary() : std::vector<FitMesh::BoundaryEdge>{};
+}
+
+/// Points of the target's boundary that are far from all boundary edges.
+/// @param box  none outside are looked at; @param raise  told of the triangle and the distance
+template <typename Raise>
+std::vector<Missed> far_boundary_points(const FitState& state, const Box& box, double limit, const Raise& raise) {
+  std::vector<CubicCurve> curves;
+  std::vector<Index> triangles;
+  for (const FitMesh::BoundaryEdge& edge : boundary_of(state)) {
+    curves.push_back(edge.curve);
+    triangles.push_back(edge.triangle);
+  }
+  std::vector<Missed> found;
+  if (curves.empty()) {
+    return found;
+  }
+  const ClosestPoint tree(chords_of(curves, boundary_chords).mesh);
+  for (const Vec3& p : state.samples().further_boundary_points()) {
+    if (!is_within(box, p)) {
+      continue;
+    }
+    const auto hit = tree.closest(p);
+    const double distance = std::sqrt(hit.squared_distance);
+    const Index triangle = triangles[hit.triangle / boundary_chords];
+    raise(triangle, distance);
+    if (distance > limit) {
+      found.push_back({p, triangle, distance});
+    }
+  }
+  return found;
 }
 
 /// The shells that come as close as `reach` (mm) to a box, so all that its points can have within that. All of them
@@ -170,11 +210,19 @@ std::size_t add_missed(FitSamples& samples, FitState& state, double limit, bool 
   }
   std::erase_if(missed, [&](const Missed& far) { return far.distance <= limit; });
   for (const Missed& far : thinned(missed)) {
-    samples.add(far.point);
+    samples.add({far.point});
+    ++added;
+  }
+  const auto raise_edge = [&](Index triangle, double error) {
+    double& known = state.patches[triangle].error;
+    known = both_ways ? std::max(known, error) : known;
+  };
+  for (const Missed& far : thinned(far_boundary_points(state, everywhere, limit, raise_edge))) {
+    samples.add({far.point, true});
     ++added;
   }
   for (const Vec3& p : missed_over_gaps(state, state.mesh.edges(), exact * limit)) {
-    samples.add(p);
+    samples.add({p});
     ++added;
   }
   if (both_ways) {
@@ -185,7 +233,7 @@ std::size_t add_missed(FitSamples& samples, FitState& state, double limit, bool 
     for (std::size_t v = 0; v < distances.size(); ++v) {
       raise(fine.vertex_shell[v], distances[v]);
       if (distances[v] > limit) {
-        samples.add(samples.target().closest(fine.mesh.vertices[v]).point);
+        samples.add({samples.target().closest(fine.mesh.vertices[v]).point});
         ++added;
       }
     }
@@ -193,9 +241,10 @@ std::size_t add_missed(FitSamples& samples, FitState& state, double limit, bool 
   return added;
 }
 
-std::vector<Vec3> missed_within(const FitState& state, const Box& box, double limit) {
+std::vector<SamplePoint> missed_within(const FitState& state, const Box& box, double limit) {
   const FitSamples& samples = state.samples();
-  std::vector<Vec3> points, found;
+  std::vector<Vec3> points;
+  std::vector<SamplePoint> found;
   for (const Vec3& p : samples.further_points()) {
     if (is_within(box, p)) {
       points.push_back(p);
@@ -205,20 +254,23 @@ std::vector<Vec3> missed_within(const FitState& state, const Box& box, double li
   const std::vector<CubicPatch> patches = curved_patches(shell);
   for (const Missed& far : far_points(points, PatchSearch(shell, patches), limit)) {
     if (far.distance > limit) {
-      found.push_back(far.point);
+      found.push_back({far.point});
     }
+  }
+  for (const Missed& far : far_boundary_points(state, box, limit, [](Index, double) {})) {
+    found.push_back({far.point, true});
   }
   auto edges = state.mesh.edges();
   std::erase_if(edges, [&](const auto& edge) {
     return !is_within(box, state.mesh.positions[edge[0]]) && !is_within(box, state.mesh.positions[edge[1]]);
   });
   for (const Vec3& p : missed_over_gaps(state, edges, exact * limit)) {
-    found.push_back(p);
+    found.push_back({p});
   }
   return found;
 }
 
-bool holds_within(const FitState& state, const Box& box, double tolerance, std::vector<Vec3>& farthest) {
+bool holds_within(const FitState& state, const Box& box, double tolerance, std::vector<SamplePoint>& farthest) {
   const Target& target = state.samples().target();
   const ShellMesh shell = shells_near(state.mesh.shell(), box, tolerance);
   const std::vector<CubicPatch> patches = curved_patches(shell);
@@ -250,10 +302,22 @@ bool holds_within(const FitState& state, const Box& box, double tolerance, std::
       part.triangles.empty() ? OneSided{} : target_to_shell(shell, patches, Target(part), aim, state.error());
   farthest.clear();
   if (from_shell.distance.upper > tolerance) {
-    farthest.push_back(target.closest(from_shell.farthest).point);
+    farthest.push_back({target.closest(from_shell.farthest).point});
   }
   if (from_target.distance.upper > tolerance) {
-    farthest.push_back(from_target.farthest);
+    farthest.push_back({from_target.farthest});
+  }
+  std::vector<CubicCurve> curves;
+  bool any = false;
+  for (const FitMesh::BoundaryEdge& edge : boundary_of(state)) {
+    curves.push_back(edge.curve);
+    any = any || std::any_of(edge.curve.begin(), edge.curve.end(), [&](const Vec3& p) { return is_within(box, p); });
+  }
+  const auto between = any ? boundary_distance(curves, target, aim.width, tolerance) : std::nullopt;
+  if (between && between->both.upper > tolerance) {
+    for (const Vec3& p : between->farthest) {
+      farthest.push_back({p, true});
+    }
   }
   return farthest.empty();
 }

@@ -5,7 +5,8 @@
 
 namespace tunica {
 
-/// Points of the target farther from the curved surface than `limit` (mm) join the samples; the state has to be
+/// Points of the target farther from the curved surface than `limit` (mm), or of its boundary from the curved edges
+/// there, join the samples; the state has to be
 /// attached and measured anew to heed them. Of more than 2,000 an even share joins. @return how many
 /// @param both_ways  points of the patches that far from the target count too, by the target's points closest to them,
 /// and what is found of each patch's distance raises its error
@@ -15,11 +16,12 @@ std::size_t add_missed(FitSamples& samples, FitState& state, double limit, bool 
 
 /// What add_missed() finds one way within a box, without adding it. Cost: as there, but of the points outside only a
 /// comparison.
-std::vector<Vec3> missed_within(const FitState& state, const Box& box, double limit);
+std::vector<SamplePoint> missed_within(const FitState& state, const Box& box, double limit);
 
-/// Certifies the distance of what lies within a box, both ways, but for rounding.
+/// Certifies the distance of what lies within a box, both ways, but for rounding, and of the whole boundary where some
+/// of it does.
 /// @param farthest  out: where it is above `tolerance` (mm): the points of the target there, one per direction
 /// Cost: linear in the target's triangles, and what a certificate costs of those within.
-bool holds_within(const FitState& state, const Box& box, double tolerance, std::vector<Vec3>& farthest);
+bool holds_within(const FitState& state, const Box& box, double tolerance, std::vector<SamplePoint>& farthest);
 
 }  // namespace tunica

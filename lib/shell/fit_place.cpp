@@ -52,23 +52,61 @@ void put(std::vector<PlacedPatch>& patches, const PlacedNode& node) {
   }
 }
 
-/// Each point to the patch whose facet is closest.
+/// Attaches a point of the boundary to the patch whose boundary edge is closest. @return whether there is one
+bool attach_to_edge(const Vec3& point, Index number, std::vector<PlacedPatch>& patches) {
+  PlacedPatch* closest = nullptr;
+  double least = std::numeric_limits<double>::infinity();
+  for (PlacedPatch& p : patches) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      if ((p.boundary >> k & 1) == 0) {
+        continue;
+      }
+      const Vec3 &a = p.shape.corners[k], along = p.shape.corners[(k + 1) % 3] - a;
+      const double part = std::clamp((point - a).dot(along) / std::max(along.squaredNorm(), 1e-300), 0.0, 1.0);
+      if (const double squared = (point - a - part * along).squaredNorm(); squared < least) {
+        least = squared;
+        closest = &p;
+      }
+    }
+  }
+  if (closest != nullptr) {
+    closest->attached.push_back(number);
+  }
+  return closest != nullptr;
+}
+
+/// Each point to the patch whose facet, or boundary edge, is closest.
 void attach_to_closest(const FitSamples& samples, const std::vector<Index>& points, std::vector<PlacedPatch>& patches) {
   std::vector<FacetDistances> facets;
   facets.reserve(patches.size());
   for (const PlacedPatch& p : patches) {
     facets.emplace_back(p.shape.corners);
   }
-  for (std::size_t i = 0; i < points.size(); i += lane_count) {
+  std::array<Index, lane_count> group{};
+  std::size_t count = 0;
+  const auto attach_group = [&] {
     const LaneVec3 at = lane_points(
-        [&](std::size_t k) -> const Vec3& { return samples.points()[points[std::min(i + k, points.size() - 1)]]; });
+        [&](std::size_t k) -> const Vec3& { return samples.points()[group[std::min(k, count - 1)]].point; });
     NearestFacet nearest;
     for (std::size_t j = 0; j < facets.size(); ++j) {
       nearest.try_facet(facets[j], at, static_cast<double>(j));
     }
-    for (std::size_t k = 0; k < std::min(lane_count, points.size() - i); ++k) {
-      patches[static_cast<std::size_t>(nearest.which[k])].attached.push_back(points[i + k]);
+    for (std::size_t k = 0; k < count; ++k) {
+      patches[static_cast<std::size_t>(nearest.which[k])].attached.push_back(group[k]);
     }
+    count = 0;
+  };
+  for (const Index i : points) {
+    if (samples.points()[i].of_boundary && attach_to_edge(samples.points()[i].point, i, patches)) {
+      continue;
+    }
+    group[count++] = i;
+    if (count == lane_count) {
+      attach_group();
+    }
+  }
+  if (count > 0) {
+    attach_group();
   }
 }
 
@@ -109,7 +147,8 @@ Measured measure(const FitSamples& samples, std::vector<PlacedPatch>& patches, c
     const PatchPowers powers(patch);
     // Downhill from a wrong start a point may seem far that is not.
     samples.from_patch(powers, facing, doubted, p.guesses, p.residuals);
-    samples.from_target(powers, facing, p.attached, p.residuals);
+    samples.from_target(patch, powers, facing, p.boundary, p.attached, p.residuals);
+    samples.from_boundary(patch, facing, p.boundary, p.residuals);
     p.error = 0;
     for (const Residual& r : p.residuals) {
       const double d = std::abs(r.distance);

@@ -58,6 +58,7 @@ struct PlacedPatch {
     static constexpr std::size_t none = static_cast<std::size_t>(-1);
   };
   std::array<Across, 3> across;
+  EdgeBits boundary = 0;  ///< edges with nothing across, which belong on the target's boundary
   std::vector<Index> guesses;
   std::vector<Index> attached;
   std::vector<Residual> residuals;

@@ -44,6 +44,25 @@ std::vector<FitMesh::RimEdge> creases_beyond(const FitMesh& mesh, const std::vec
   return out;
 }
 
+/// The edges between these triangles and the others, or those of what they are a piece of themselves.
+std::vector<std::array<Index, 2>> edges_cut(const FitMesh& mesh, const std::vector<Index>& triangles, Numbering& node) {
+  std::vector<std::array<Index, 2>> out;
+  for (const Index t : triangles) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Index u = mesh.triangles[t][k], v = mesh.triangles[t][(k + 1) % 3];
+      const auto pair = mesh.on_edge(u, v);
+      const bool inside = std::all_of(pair.triangle.begin(), pair.triangle.end(), [&](Index other) {
+        return other == no_index || std::binary_search(triangles.begin(), triangles.end(), other);
+      });
+      if (!inside || mesh.is_cut(u, v)) {
+        out.push_back({std::min(node.of(u), node.of(v)), std::max(node.of(u), node.of(v))});
+      }
+    }
+  }
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
 }  // namespace
 
 FitRegion cut_out(const FitState& whole, const std::vector<Index>& nodes, int rings) {
@@ -90,6 +109,7 @@ FitRegion cut_out(const FitState& whole, const std::vector<Index>& nodes, int ri
   for (std::size_t i = 0; i < node.old().size(); ++i) {
     piece.on_boundary[i] = mesh.on_boundary[node.old()[i]];
   }
+  piece.cut = edges_cut(mesh, triangles, node);
   if (mesh.kind == Patch::watertight) {
     piece.rim = creases_beyond(mesh, triangles, node);
   }

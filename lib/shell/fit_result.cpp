@@ -1,6 +1,7 @@
 #include "shell/fit_result.hpp"
 
 #include "core/error.hpp"
+#include "shell/boundary_distance.hpp"
 #include "shell/curved_surface.hpp"
 #include "shell/fit_parts.hpp"
 #include "shell/fit_squeeze.hpp"
@@ -16,6 +17,7 @@ namespace {
 constexpr double clearly_below = 0.998;
 constexpr double noted_width = 1.5;    // of the error, on the way
 constexpr double far_from_flat = 0.6;  // of the flat facets that the tolerance would take
+constexpr std::array<double, 5> parts_for_boundaries{1, 0.7, 0.4, 0.2, 0.1};  // of the tolerance
 
 bool has_degenerate(const TriangleMesh& mesh) {
   const auto normals = facet_normals(mesh);
@@ -24,8 +26,8 @@ bool has_degenerate(const TriangleMesh& mesh) {
 
 }  // namespace
 
-FitResult::FitResult(const Target& target, const RelaxOptions& options, double width)
-    : target_(target), options_(options), width_(width) {}
+FitResult::FitResult(const Target& target, const RelaxOptions& options, double width, bool boundaries)
+    : target_(target), options_(options), width_(width), boundaries_(boundaries && target.boundary_tree()) {}
 
 bool FitResult::certify(const FitState& state, std::optional<double> tolerance) {
   ShellMesh shell = state.mesh.shell();
@@ -38,14 +40,24 @@ bool FitResult::certify(const FitState& state, std::optional<double> tolerance) 
     measuring.width = std::min(*tolerance / 200, (*tolerance - distance.both.lower) / 2);
     distance = shell_distance(shell, target_, measuring);
   }
-  farthest_.reset();
+  farthest_.clear();
   if (distance.target_to_shell.lower > 0) {
-    farthest_ = distance.farthest_of_target;
+    farthest_.push_back({distance.farthest_of_target});
   }
   least_distance_ = distance.both.lower;
-  const bool within = tolerance && distance.both.upper <= *tolerance;
-  const bool better = tolerance && holds(*tolerance) ? within && price(state) < price_
-                                                     : distance.both.upper < found.distance.both.upper;
+  if (boundaries_) {
+    const double width = tolerance ? std::min(measuring.width, *tolerance / 200) : measuring.width;
+    if (const auto between = boundary_distance(boundary_curves(shell), target_, width, tolerance)) {
+      distance.boundary = between->both;
+      least_distance_ = std::max(least_distance_, between->both.lower);
+      for (const Vec3& p : between->farthest) {
+        farthest_.push_back({p, true});
+      }
+    }
+  }
+  const bool within = tolerance && distance.upper() <= *tolerance;
+  const bool better =
+      tolerance && holds(*tolerance) ? within && price(state) < price_ : distance.upper() < found.distance.upper();
   if (is_empty() || better) {
     take(std::move(shell), distance);
     price_ = price(state);
@@ -64,36 +76,44 @@ void FitResult::no_worse_than_flat(std::optional<double> tolerance, std::size_t 
   if (within && static_cast<double>(found.shell.triangles.size()) < far_from_flat * flat_count) {
     return;
   }
-  if (!tolerance && !is_empty() && found.distance.both.upper < start.flat_error) {
+  if (!tolerance && !is_empty() && found.distance.upper() < start.flat_error) {
     return;
   }
   DecimateOptions decimating;
-  decimating.max_error = tolerance;
   decimating.min_angle = options_.min_angle;
   if (!tolerance) {
     decimating.triangles = most;
   }
-  const DecimateResult flat = decimate(target_.mesh(), decimating);
-  if (has_degenerate(flat.mesh)) {
-    if (is_empty()) {
-      throw InputError("too many triangles without area: no shells are left without them; make the surface anew");
+  // What decimation certifies is the distance of the surfaces: where boundaries are farther apart, with less of that.
+  for (const double part : parts_for_boundaries) {
+    if (tolerance) {
+      decimating.max_error = part * *tolerance;
     }
-    return;
-  }
-  ShellMesh shell = flat_shells(flat.mesh, options_.surface);
-  ShellDistance distance = distance_of(shell);
-  if (flat.error) {
-    lower_uppers(distance, *flat.error, *flat.error, *flat.error);
-  }
-  if (!is_empty() && !flat.angle_held) {
-    return;
-  }
-  const bool flat_within = tolerance && distance.both.upper <= *tolerance;
-  const bool better = tolerance ? flat_within && (!within || shell.triangles.size() < found.shell.triangles.size())
-                                : distance.both.upper < found.distance.both.upper;
-  if (is_empty() || better) {
-    take(std::move(shell), distance);
-    flat_ = true;
+    const DecimateResult flat = decimate(target_.mesh(), decimating);
+    if (has_degenerate(flat.mesh)) {
+      if (is_empty()) {
+        throw InputError("too many triangles without area: no shells are left without them; make the surface anew");
+      }
+      return;
+    }
+    ShellMesh shell = flat_shells(flat.mesh, options_.surface);
+    ShellDistance distance = distance_of(shell);
+    if (flat.error) {
+      lower_uppers(distance, *flat.error, *flat.error, *flat.error);
+    }
+    if (!is_empty() && !flat.angle_held) {
+      return;
+    }
+    const bool flat_within = tolerance && distance.upper() <= *tolerance;
+    const bool fewer = shell.triangles.size() < found.shell.triangles.size();
+    const bool better = tolerance ? flat_within && (!within || fewer) : distance.upper() < found.distance.upper();
+    if (is_empty() || better) {
+      take(std::move(shell), distance);
+      flat_ = true;
+    }
+    if (!tolerance || flat_within || (within && !fewer)) {
+      return;
+    }
   }
 }
 
@@ -129,7 +149,13 @@ void FitResult::add_iterations(const std::vector<RelaxIteration>& of) {
 ShellDistance FitResult::distance_of(const ShellMesh& shell) const {
   ShellDistanceOptions measuring;
   measuring.width = width_;
-  return shell_distance(shell, target_, measuring);
+  ShellDistance distance = shell_distance(shell, target_, measuring);
+  if (boundaries_) {
+    if (const auto between = boundary_distance(boundary_curves(shell), target_, width_)) {
+      distance.boundary = between->both;
+    }
+  }
+  return distance;
 }
 
 void lower_uppers(ShellDistance& distance, const Interval& both, const Interval& to_target, const Interval& to_shell) {

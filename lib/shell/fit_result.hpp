@@ -13,12 +13,13 @@ namespace tunica {
 class FitResult {
 public:
   /// @param options  of the whole fit: surface, on_iteration; they and the target must live as long
-  /// @param width    mm: of certified intervals
-  FitResult(const Target& target, const RelaxOptions& options, double width);
+  /// @param width       mm: of certified intervals
+  /// @param boundaries  whether the shells' boundary is to be the target's: then the tolerance holds for it as well
+  FitResult(const Target& target, const RelaxOptions& options, double width, bool boundaries);
 
   [[nodiscard]] bool is_empty() const { return found.shell.triangles.empty(); }
   /// Whether there are shells, certainly within the tolerance, mm.
-  [[nodiscard]] bool holds(double tolerance) const { return !is_empty() && found.distance.both.upper <= tolerance; }
+  [[nodiscard]] bool holds(double tolerance) const { return !is_empty() && found.distance.upper() <= tolerance; }
   [[nodiscard]] double width() const { return width_; }
   /// Whether the shells are the target's flat facets.
   [[nodiscard]] bool is_flat() const { return flat_; }
@@ -40,11 +41,11 @@ public:
   /// Adds what another fit noted, whose time is not to be counted again.
   void add_iterations(const std::vector<RelaxIteration>& of);
 
-  /// The certified distance of shells, mm.
+  /// The certified distance of shells, mm, with that of the boundaries where it counts.
   [[nodiscard]] ShellDistance distance_of(const ShellMesh& shell) const;
 
-  /// Where on the target the largest distance was, when last certified; none where that was not looked for.
-  [[nodiscard]] const std::optional<Vec3>& farthest() const { return farthest_; }
+  /// Where on the target the largest distances were, when last certified; none where that was not looked for.
+  [[nodiscard]] const std::vector<SamplePoint>& farthest() const { return farthest_; }
   /// mm: what the last certified distance certainly is at least.
   [[nodiscard]] double least_distance() const { return least_distance_; }
 
@@ -54,9 +55,10 @@ private:
   const Target& target_;
   const RelaxOptions& options_;
   double width_;
+  bool boundaries_;
   std::size_t price_ = 0;  // of what was found
   bool flat_ = false;
-  std::optional<Vec3> farthest_;
+  std::vector<SamplePoint> farthest_;
   double least_distance_ = 0;
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };

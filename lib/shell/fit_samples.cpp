@@ -22,6 +22,9 @@ constexpr double closer = 1 - 1e-9;
 constexpr int gauss_newton_steps = 2;
 constexpr double beside = 0.7;  // cosine: farther off the normal than this, a distance counts along itself
 
+constexpr int edge_starts = 4, edge_steps = 4;  // of the search for the foot on an edge
+constexpr int points_per_edge = 4;              // of the boundary: pieces between them
+
 Vec2 on_edge(std::size_t from, std::size_t to, double s) {
   const std::array<Vec2, 3> corners{Vec2(0, 0), Vec2(1, 0), Vec2(0, 1)};
   return (1 - s) * corners[from] + s * corners[to];
@@ -102,6 +105,52 @@ Residual residual(const Vec2& at, const Vec3& away, const Vec3& normal) {
     return {at, away / distance, distance};
   }
   return {at, normal, along < 0 ? -distance : distance};
+}
+
+/// Along the distance itself: curves meet where nothing is left of it.
+Residual residual_of_curve(const Vec2& at, const Vec3& away, const Vec3& facing) {
+  const double distance = away.norm();
+  return {at, distance > 0 ? Vec3(away / distance) : facing, distance};
+}
+
+/// Where a curve is closest to q, nearly: Gauss-Newton steps from the best of a few places.
+double foot_on_curve(const CubicCurve& curve, const Vec3& q) {
+  double s = 0, least = std::numeric_limits<double>::infinity();
+  for (int i = 0; i <= edge_starts; ++i) {
+    const double there = static_cast<double>(i) / edge_starts;
+    if (const double squared = (point_on(curve, there) - q).squaredNorm(); squared < least) {
+      least = squared;
+      s = there;
+    }
+  }
+  for (int i = 0; i < edge_steps; ++i) {
+    const double r = 1 - s;
+    const Vec3 tangent =
+        3 * (r * r * (curve[1] - curve[0]) + 2 * r * s * (curve[2] - curve[1]) + s * s * (curve[3] - curve[2]));
+    const double step = tangent.dot(q - point_on(curve, s)) / std::max(tangent.squaredNorm(), 1e-300);
+    const double next = std::clamp(s + step, 0.0, 1.0);
+    const double squared = (point_on(curve, next) - q).squaredNorm();
+    if (squared >= least) {
+      break;
+    }
+    least = squared;
+    s = next;
+  }
+  return s;
+}
+
+/// Of a point of the target's boundary, against the closest of a patch's boundary edges.
+Residual residual_on_edges(const CubicPatch& patch, const Vec3& facing, EdgeBits boundary, const Vec3& q) {
+  Residual best{{}, facing, std::numeric_limits<double>::infinity()};
+  for (std::size_t k = 0; k < 3; ++k) {
+    if ((boundary >> k & 1) != 0) {
+      const CubicCurve curve = edge_curve(patch, k);
+      const double s = foot_on_curve(curve, q);
+      const Residual r = residual_of_curve(place_on_edge(k, s), point_on(curve, s) - q, facing);
+      best = r.distance < best.distance ? r : best;
+    }
+  }
+  return best;
 }
 
 }  // namespace
@@ -194,15 +243,21 @@ void FitSamples::from_gap(const CubicPatch& patch, std::size_t from, std::size_t
   }
 }
 
-FitSamples::FitSamples(const Target& target, std::size_t shells) : target_(target), grid_of_target_(target.mesh()) {
+FitSamples::FitSamples(const Target& target, std::size_t shells, bool boundaries)
+    : target_(target), grid_of_target_(target.mesh()), boundaries_(boundaries && target.boundary_tree()) {
   const auto& mesh = target.mesh();
   std::vector<std::uint8_t> used(mesh.vertices.size(), 0);
   for (const auto& loop : boundary_loops(mesh.triangles, target.across())) {
     const std::size_t stride =
         std::max<std::size_t>(1, loop.size() / (16 * static_cast<std::size_t>(std::sqrt(shells)) + 64));
     for (std::size_t i = 0; i < loop.size(); i += stride) {
-      points_.push_back(mesh.vertices[loop[i]]);
+      points_.push_back({mesh.vertices[loop[i]], boundaries_});
       used[loop[i]] = 1;
+    }
+    for (std::size_t i = 0; boundaries_ && i < loop.size(); ++i) {
+      const Vec3 &here = mesh.vertices[loop[i]], &next = mesh.vertices[loop[(i + 1) % loop.size()]];
+      further_boundary_.push_back(here);
+      further_boundary_.emplace_back((here + next) / 2);
     }
   }
   const std::size_t wanted = points_per_shell * shells;
@@ -213,19 +268,19 @@ FitSamples::FitSamples(const Target& target, std::size_t shells) : target_(targe
     for (double i = stride / 2; i < static_cast<double>(order.size()); i += stride) {
       const Index v = mesh.triangles[order[static_cast<std::size_t>(i)]][0];
       if (used[v] == 0) {
-        points_.push_back(mesh.vertices[v]);
+        points_.push_back({mesh.vertices[v]});
         used[v] = 1;
       }
     }
   } else {
     for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
       if (used[v] == 0) {
-        points_.push_back(mesh.vertices[v]);
+        points_.push_back({mesh.vertices[v]});
       }
     }
     if (mesh.triangles.size() + points_.size() <= wanted) {
       for (const auto& [a, b, c] : mesh.triangles) {
-        points_.emplace_back((mesh.vertices[a] + mesh.vertices[b] + mesh.vertices[c]) / 3);
+        points_.push_back({(mesh.vertices[a] + mesh.vertices[b] + mesh.vertices[c]) / 3});
       }
     }
   }
@@ -371,20 +426,50 @@ void FitSamples::from_patch(const PatchPowers& patch, const Vec3& facing, double
   }
 }
 
-void FitSamples::from_target(const PatchPowers& patch, const Vec3& facing, const std::vector<Index>& points,
-                             std::vector<Residual>& out) const {
-  for (std::size_t i = 0; i < points.size(); i += lane_count) {
-    const std::size_t count = std::min(lane_count, points.size() - i);
+void FitSamples::from_target(const CubicPatch& patch, const PatchPowers& powers, const Vec3& facing, EdgeBits boundary,
+                             const std::vector<Index>& points, std::vector<Residual>& out) const {
+  std::array<Index, lane_count> group{};
+  std::size_t count = 0;
+  const auto measure_group = [&] {
     const LaneVec3 q =
-        lane_points([&](std::size_t k) -> const Vec3& { return points_[points[std::min(i + k, points.size() - 1)]]; });
-    const LaneFeet feet = feet_on_patch(patch, q);
-    const auto [dx, dy] = patch.tangents(feet.x, feet.y);
+        lane_points([&](std::size_t k) -> const Vec3& { return points_[group[std::min(k, count - 1)]].point; });
+    const LaneFeet feet = feet_on_patch(powers, q);
+    const auto [dx, dy] = powers.tangents(feet.x, feet.y);
     const LaneVec3 normals = dx.cross(dy);
     const LaneVec3 away = feet.point - q;
     for (std::size_t k = 0; k < count; ++k) {
       const auto lane = [&](const LaneVec3& v) { return Vec3(v[0][k], v[1][k], v[2][k]); };
       const Vec3 normal = lane(normals).stableNormalized();
       out.push_back(residual({feet.x[k], feet.y[k]}, lane(away), normal.squaredNorm() > 0.5 ? normal : facing));
+    }
+    count = 0;
+  };
+  for (const Index point : points) {
+    if (points_[point].of_boundary && boundary != 0) {
+      out.push_back(residual_on_edges(patch, facing, boundary, points_[point].point));
+      continue;
+    }
+    group[count++] = point;
+    if (count == lane_count) {
+      measure_group();
+    }
+  }
+  if (count > 0) {
+    measure_group();
+  }
+}
+
+void FitSamples::from_boundary(const CubicPatch& patch, const Vec3& facing, EdgeBits boundary,
+                               std::vector<Residual>& out) const {
+  for (std::size_t k = 0; k < 3 && boundaries_; ++k) {
+    if ((boundary >> k & 1) == 0) {
+      continue;
+    }
+    const CubicCurve curve = edge_curve(patch, k);
+    for (int i = 0; i <= points_per_edge; ++i) {
+      const double s = static_cast<double>(i) / points_per_edge;
+      const Vec3 p = point_on(curve, s);
+      out.push_back(residual_of_curve(place_on_edge(k, s), p - target_.boundary_tree()->closest(p).point, facing));
     }
   }
 }

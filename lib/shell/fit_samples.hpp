@@ -1,6 +1,7 @@
 #pragma once
 
 #include "core/lanes.hpp"
+#include "shell/boundary_distance.hpp"
 #include "shell/curved_surface.hpp"
 #include "shell/patch_lanes.hpp"
 #include "shell/start_grid.hpp"
@@ -49,29 +50,40 @@ PatchFoot foot_on_patch(const PatchAxes& patch, const Vec3& q, Vec2 start, int s
 /// The points at 1/4, 1/2, 3/4 of a patch's edge between two corners.
 std::array<Vec3, 3> edge_points(const CubicPatch& patch, std::size_t from, std::size_t to);
 
+/// A point of the target that shells must be close to; one of its boundary, their boundary edges.
+struct SamplePoint {
+  Vec3 point;
+  bool of_boundary = false;
+};
+
 /// Measures patches against the target, both ways: from a grid of points of each patch to the closest point of the
 /// target on the side that the patch faces, and from points of the target to the patch that they are attached to.
+/// Boundaries are measured as curves besides, both ways too.
 class FitSamples {
 public:
-  /// @param shells  roughly how many there will be: it sets how many points of the target are used
-  FitSamples(const Target& target, std::size_t shells);
+  /// @param shells      roughly how many there will be: it sets how many points of the target are used
+  /// @param boundaries  whether the shells' boundary is to be the target's; else it is only where they end
+  FitSamples(const Target& target, std::size_t shells, bool boundaries = true);
 
-  /// Points of the target; all those of its boundary are among them.
-  [[nodiscard]] const std::vector<Vec3>& points() const { return points_; }
+  [[nodiscard]] const std::vector<SamplePoint>& points() const { return points_; }
   [[nodiscard]] const Target& target() const { return target_; }
+  [[nodiscard]] bool has_boundaries() const { return boundaries_; }
 
   /// Many more points of the target, neighbours in space one after the other, in which to look for what is missed: its
   /// vertices, at most 200,000, and of few triangles their centroids and the middles of their edges.
   [[nodiscard]] const std::vector<Vec3>& further_points() const { return further_; }
 
+  /// The same of its boundary: vertices and the middles between them. Empty where that is only where shells end.
+  [[nodiscard]] const std::vector<Vec3>& further_boundary_points() const { return further_boundary_; }
+
   /// Further points of the target that must be met, such as where the distance was found largest.
-  void add(const Vec3& point) { points_.push_back(point); }
+  void add(const SamplePoint& point) { points_.push_back(point); }
 
   /// Forgets the points added since there were so many.
   void keep(std::size_t count) { points_.resize(count); }
 
   /// Other points instead, such as those that there were before some were added: to be attached anew.
-  void take_points(std::vector<Vec3> points) { points_ = std::move(points); }
+  void take_points(std::vector<SamplePoint> points) { points_ = std::move(points); }
 
   /// Appends the residuals of the grid of a patch's points. The target's closest points are looked for downhill from
   /// the last ones, ten times as fast as among all.
@@ -86,9 +98,12 @@ public:
   static void from_gap(const CubicPatch& patch, std::size_t from, std::size_t to, const std::array<Vec3, 3>& other,
                        std::vector<Residual>& out);
 
-  /// Appends the residuals of points of the target against a patch.
-  void from_target(const PatchPowers& patch, const Vec3& facing, const std::vector<Index>& points,
-                   std::vector<Residual>& out) const;
+  /// Appends the residuals of points of the target against a patch, those of the boundary against its boundary edges.
+  void from_target(const CubicPatch& patch, const PatchPowers& powers, const Vec3& facing, EdgeBits boundary,
+                   const std::vector<Index>& points, std::vector<Residual>& out) const;
+
+  /// Appends the residuals of points of a patch's boundary edges against the target's boundary.
+  void from_boundary(const CubicPatch& patch, const Vec3& facing, EdgeBits boundary, std::vector<Residual>& out) const;
 
   /// The closest facet's normal and point of the target on the side of `facing`.
   [[nodiscard]] Target::Foot foot(const Vec3& p, const Vec3& facing) const;
@@ -100,8 +115,10 @@ private:
 
   const Target& target_;
   StartGrid grid_of_target_;
-  std::vector<Vec3> points_;
+  bool boundaries_;
+  std::vector<SamplePoint> points_;
   std::vector<Vec3> further_;
+  std::vector<Vec3> further_boundary_;
   std::vector<Vec2> grid_;
   std::vector<std::array<Lanes, 2>> grid_lanes_;  // the last ones repeated
 };

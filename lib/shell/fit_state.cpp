@@ -88,6 +88,33 @@ double weight_of(double distance, int power, double scale) {
 FitState::FitState(const FitSamples& samples, FitMesh m, const FitLimits& l)
     : mesh(std::move(m)), limits(l), patches(mesh.triangles.size()), samples_(&samples) {}
 
+namespace {
+
+/// The boundary edges of shells, to find which of them is closest.
+class BoundaryEdges {
+public:
+  explicit BoundaryEdges(const FitMesh& mesh) {
+    std::vector<CubicCurve> curves;
+    for (const FitMesh::BoundaryEdge& edge : mesh.boundary()) {
+      curves.push_back(edge.curve);
+      triangles_.push_back(edge.triangle);
+    }
+    if (!curves.empty()) {
+      tree_.emplace(chords_of(curves, chords).mesh);
+    }
+  }
+
+  [[nodiscard]] bool empty() const { return triangles_.empty(); }
+  [[nodiscard]] Index closest(const Vec3& p) const { return triangles_[tree_->closest(p).triangle / chords]; }
+
+private:
+  static constexpr int chords = 8;
+  std::vector<Index> triangles_;
+  std::optional<ClosestPoint> tree_;
+};
+
+}  // namespace
+
 void FitState::attach() {
   std::vector<Index> triangle;
   const ShellMesh shell = mesh.shell(&triangle);
@@ -95,10 +122,16 @@ void FitState::attach() {
   const ClosestPoint tree(fine.mesh);
   const auto& points = samples_->points();
   std::vector<Index> found(points.size());
+  const BoundaryEdges boundary(mesh);
   parallel_for_blocks(points.size(), 512, [&](std::size_t begin, std::size_t end) {
     std::optional<Index> guess;
     for (std::size_t i = begin; i < end; ++i) {
-      const auto hit = guess ? tree.closest(points[i], *guess) : tree.closest(points[i]);
+      const auto& [point, of_boundary] = points[i];
+      if (of_boundary && !boundary.empty()) {
+        found[i] = boundary.closest(point);
+        continue;
+      }
+      const auto hit = guess ? tree.closest(point, *guess) : tree.closest(point);
       guess = hit.triangle;
       found[i] = triangle[fine.shell[hit.triangle]];
     }
@@ -114,6 +147,7 @@ void FitState::attach() {
 void FitState::attach_again() {
   const auto& points = samples_->points();
   std::vector<Index> home(points.size(), no_index);
+  const BoundaryEdges boundary(mesh);
   const auto closer_patch = [&](Index q, Index here, PatchFoot foot) {
     for (int step = 0; step < most_steps; ++step) {
       const std::array<double, 3> weight{1 - foot.at[0] - foot.at[1], foot.at[0], foot.at[1]};
@@ -128,7 +162,7 @@ void FitState::attach_again() {
         if (other == no_index) {
           continue;
         }
-        if (const PatchFoot there = foot_on_patch(mesh.patch(other), points[q]);
+        if (const PatchFoot there = foot_on_patch(mesh.patch(other), points[q].point);
             there.squared_distance < best.squared_distance) {
           best = there;
           next = other;
@@ -151,12 +185,15 @@ void FitState::attach_again() {
       const PatchPowers patch(mesh.patch(static_cast<Index>(t)));
       for (std::size_t i = 0; i < attached.size(); i += lane_count) {
         const LaneVec3 q = lane_points(
-            [&](std::size_t k) -> const Vec3& { return points[attached[std::min(i + k, attached.size() - 1)]]; });
+            [&](std::size_t k) -> const Vec3& { return points[attached[std::min(i + k, attached.size() - 1)]].point; });
         const LaneFeet feet = feet_on_patch(patch, q);
         for (std::size_t k = 0; k < std::min(lane_count, attached.size() - i); ++k) {
           const PatchFoot foot{
               {feet.x[k], feet.y[k]}, {feet.point[0][k], feet.point[1][k], feet.point[2][k]}, feet.squared_distance[k]};
-          home[attached[i + k]] = closer_patch(attached[i + k], static_cast<Index>(t), foot);
+          const Index point = attached[i + k];
+          home[point] = points[point].of_boundary && !boundary.empty()
+                            ? boundary.closest(points[point].point)
+                            : closer_patch(point, static_cast<Index>(t), foot);
         }
       }
     }
@@ -182,7 +219,9 @@ void FitState::measure(Index t, double doubted) {
   const Vec3 facing = facing_of(mesh.corners(t));
   const PatchPowers powers(patch);
   samples_->from_patch(powers, facing, doubted, p.guesses, p.residuals);
-  samples_->from_target(powers, facing, p.attached, p.residuals);
+  const EdgeBits boundary = mesh.boundary_edges(t);
+  samples_->from_target(patch, powers, facing, boundary, p.attached, p.residuals);
+  samples_->from_boundary(patch, facing, boundary, p.residuals);
   for (std::size_t k = 0; k < 3 && mesh.kind == tunica::Patch::comas; ++k) {  // watertight ones meet
     const Index from = mesh.triangles[t][k], to = mesh.triangles[t][(k + 1) % 3];
     const auto pair = mesh.on_edge(from, to);

@@ -60,6 +60,7 @@ void link(const FitState& state, const std::vector<std::array<Index, 3>>& nodes,
     const bool watertight = patch.shape.kind == Patch::watertight;
     patch.beside = {patch.slot, patch.slot};
     patch.shape.across.reset();
+    patch.boundary = 0;
     for (std::size_t k = 0; k < 3; ++k) {
       const Index from = nodes[i][k], to = nodes[i][(k + 1) % 3];
       auto& across = patch.across[k];
@@ -78,12 +79,18 @@ void link(const FitState& state, const std::vector<std::array<Index, 3>>& nodes,
           }
         }
       }
-      if (across.patch != PlacedPatch::Across::none || from >= mesh.around.size() || to >= mesh.around.size()) {
+      if (across.patch != PlacedPatch::Across::none) {
+        continue;
+      }
+      const auto bit = static_cast<EdgeBits>(1U << k);
+      patch.boundary |= bit;  // unless there is something across
+      if (from >= mesh.around.size() || to >= mesh.around.size()) {
         continue;
       }
       for (const Index t : mesh.around[from]) {
         const std::size_t c = mesh.corner_of(t, from);
         if (mesh.triangles[t][(c + 2) % 3] == to && std::find(replaced.begin(), replaced.end(), t) == replaced.end()) {
+          patch.boundary &= static_cast<EdgeBits>(~bit);
           if (watertight) {
             set_across(patch, k, 0, mesh.normals[mesh.slots[t][c]], patch.slot);
             set_across(patch, k, 1, mesh.normals[mesh.slots[t][(c + 2) % 3]], patch.slot);
@@ -91,6 +98,9 @@ void link(const FitState& state, const std::vector<std::array<Index, 3>>& nodes,
             across.points = edge_points(mesh.patch(t), c, (c + 2) % 3);
           }
         }
+      }
+      if (mesh.is_cut(from, to)) {
+        patch.boundary &= static_cast<EdgeBits>(~bit);
       }
       for (const FitMesh::RimEdge& edge : mesh.rim) {
         if (edge.nodes == std::array<Index, 2>{from, to}) {

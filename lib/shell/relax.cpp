@@ -5,6 +5,7 @@
 #include "shell/fit.hpp"
 #include "shell/mend.hpp"
 #include "shell/refine.hpp"
+#include "surface/checks.hpp"
 
 #include <fmt/core.h>
 #include <Eigen/Geometry>
@@ -42,23 +43,6 @@ void turn_around(std::vector<std::array<Index, 3>>& triangles) {
   }
 }
 
-ShellMesh without_unused(const TriangleMesh& mesh) {
-  constexpr Index unused = 0xffffffff;
-  ShellMesh out;
-  std::vector<Index> number(mesh.vertices.size(), unused);
-  for (auto v : mesh.triangles) {
-    for (Index& i : v) {
-      if (number[i] == unused) {
-        number[i] = static_cast<Index>(out.vertices.size());
-        out.vertices.push_back(mesh.vertices[i]);
-      }
-      i = number[i];
-    }
-    out.triangles.push_back(v);
-  }
-  return out;
-}
-
 class Relaxation {
 public:
   Relaxation(const TriangleMesh& coarse, const Target& target, const RelaxOptions& options)
@@ -66,7 +50,9 @@ public:
     if (options.tolerance) {
       width_ = std::min(width_, *options.tolerance / 10);
     }
-    current_ = without_unused(coarse);
+    TriangleMesh start = without_unused(coarse);
+    current_.vertices = std::move(start.vertices);
+    current_.triangles = std::move(start.triangles);
     current_.patch = options.surface;
     if (faces_other_way(coarse, target)) {
       result_.turned_around = true;

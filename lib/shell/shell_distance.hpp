@@ -4,6 +4,7 @@
 #include "shell/shell_mesh.hpp"
 #include "shell/target.hpp"
 
+#include <algorithm>
 #include <optional>
 #include <utility>
 
@@ -19,6 +20,11 @@ struct ShellDistance {
   Vec3 farthest_of_shell = Vec3::Zero();              ///< a point of the curved surface that has shell_to_target.lower
   Vec3 farthest_of_target = Vec3::Zero();             ///< a point of the target that has target_to_shell.lower
   Vec3 closest_to_farthest_of_target = Vec3::Zero();  ///< of the curved surface
+  /// Two-sided, of the boundary curves; none where either has no boundary, or it was not asked for.
+  std::optional<Interval> boundary = {};
+
+  /// mm: surfaces, and boundaries where these were measured, are certainly at most so far apart.
+  [[nodiscard]] double upper() const { return boundary ? std::max(both.upper, boundary->upper) : both.upper; }
 };
 
 struct ShellDistanceOptions {

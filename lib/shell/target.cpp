@@ -1,6 +1,8 @@
 #include "shell/target.hpp"
 
 #include "core/error.hpp"
+#include "surface/boundary_curves.hpp"
+#include "surface/checks.hpp"
 #include "surface/incidence.hpp"
 #include "surface/measure.hpp"
 
@@ -75,7 +77,7 @@ std::vector<Vec3> vertex_normals(const TriangleMesh& mesh) {
 }
 
 Target::Target(TriangleMesh mesh)
-    : mesh_(std::move(mesh)),
+    : mesh_(without_unused(std::move(mesh))),
       diagonal_(tunica::diagonal(mesh_)),
       tree_(mesh_),
       around_(incidence(mesh_)),
@@ -85,11 +87,18 @@ Target::Target(TriangleMesh mesh)
       centroids_(tunica::centroids(mesh_)),
       centroid_tree_(centroids_),
       largest_radius_(largest_radius(mesh_, centroids_)) {
+  std::vector<std::array<Vec3, 2>> segments;
   for (const auto& loop : boundary_loops(mesh_.triangles, cover_.across())) {
     auto& polyline = boundary_.emplace_back();
     for (const Index v : loop) {
       polyline.push_back(mesh_.vertices[v]);
     }
+    for (std::size_t i = 0; i < polyline.size(); ++i) {
+      segments.push_back({polyline[i], polyline[(i + 1) % polyline.size()]});
+    }
+  }
+  if (!segments.empty()) {
+    boundary_tree_.emplace(segments_as_triangles(segments));
   }
 }
 

@@ -14,7 +14,8 @@ namespace tunica {
 /// Cost: build n log n, about 200 bytes per triangle; a query a few microseconds.
 class Target {
 public:
-  /// Errors: TUNICA_ASSERT on a mesh without triangles. Limits: an oriented manifold; the caller checks.
+  /// Vertices that belong to no triangle are left out. Errors: TUNICA_ASSERT on a mesh without triangles. Limits: an
+  /// oriented manifold; the caller checks.
   explicit Target(TriangleMesh mesh);
   Target(const Target&) = delete;
   Target& operator=(const Target&) = delete;
@@ -51,6 +52,8 @@ public:
 
   /// The boundary as closed polylines, in the direction of the triangles' edges.
   [[nodiscard]] const std::vector<std::vector<Vec3>>& boundary() const { return boundary_; }
+  /// Their segments, see segments_as_triangles(); nothing without a boundary.
+  [[nodiscard]] const std::optional<ClosestPoint>& boundary_tree() const { return boundary_tree_; }
 
 private:
   [[nodiscard]] Foot foot(const Vec3& p, const Vec3& on, Index triangle) const;
@@ -66,6 +69,7 @@ private:
   PointTree centroid_tree_;
   double largest_radius_;  ///< of a corner from its triangle's centroid, mm
   std::vector<std::vector<Vec3>> boundary_;
+  std::optional<ClosestPoint> boundary_tree_;
 };
 
 /// Unit normal per triangle; zero where it has no area.

@@ -8,6 +8,19 @@
 
 namespace tunica {
 
+TriangleMesh segments_as_triangles(const std::vector<std::array<Vec3, 2>>& segments) {
+  TriangleMesh out;
+  out.vertices.reserve(2 * segments.size());
+  out.triangles.reserve(segments.size());
+  for (const auto& [a, b] : segments) {
+    const auto first = static_cast<Index>(out.vertices.size());
+    out.vertices.push_back(a);
+    out.vertices.push_back(b);
+    out.triangles.push_back({first, first + 1, first + 1});
+  }
+  return out;
+}
+
 BoundaryCurves::BoundaryCurves(const TriangleMesh& mesh) {
   for (const auto& loop : boundary_loops(mesh)) {
     Curve curve;

@@ -4,6 +4,9 @@
 
 namespace tunica {
 
+/// Segments as triangles without width, (a, b, b): what measures surfaces measures curves so.
+TriangleMesh segments_as_triangles(const std::vector<std::array<Vec3, 2>>& segments);
+
 /// The boundary loops of a surface as closed polylines with places on them, measured by length.
 class BoundaryCurves {
 public:

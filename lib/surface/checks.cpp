@@ -217,6 +217,30 @@ std::string phrase(std::size_t count, const char* one, const char* many, const s
 
 MeshFacts examine(const TriangleMesh& mesh) { return Examiner(mesh).run(); }
 
+TriangleMesh without_unused(TriangleMesh mesh) {
+  std::vector<std::uint8_t> used(mesh.vertices.size(), 0);
+  for (const auto& corners : mesh.triangles) {
+    for (const Index v : corners) {
+      used[v] = 1;
+    }
+  }
+  std::vector<Index> number(mesh.vertices.size());
+  Index count = 0;
+  for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
+    number[v] = count;
+    if (used[v] != 0) {
+      mesh.vertices[count++] = mesh.vertices[v];
+    }
+  }
+  mesh.vertices.resize(count);
+  for (auto& corners : mesh.triangles) {
+    for (Index& v : corners) {
+      v = number[v];
+    }
+  }
+  return mesh;
+}
+
 std::optional<std::string> why_unfit(const MeshFacts& facts, Boundary boundary) {
   if (facts.triangles == 0) {
     return "it has no triangles";

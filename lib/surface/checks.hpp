@@ -35,6 +35,9 @@ struct MeshFacts {
 /// Cost: linear in the size (quadratic in the number of triangles at one vertex).
 MeshFacts examine(const TriangleMesh& mesh);
 
+/// The same without the vertices that belong to no triangle; the others keep their order.
+TriangleMesh without_unused(TriangleMesh mesh);
+
 enum class Boundary { allowed, forbidden };
 
 /// Why a mesh is not an oriented manifold without degenerate connectivity: one phrase with count and first place

@@ -152,6 +152,25 @@ TEST(FitBars, OpenHalfTorus) {
   }
 }
 
+TEST(FitBars, AJaggedHoleIsMetAsACurve) {
+  TriangleMesh mesh = testing::cylinder(120, 100, 10, 40);
+  std::erase_if(mesh.triangles, [&](const auto& v) {
+    const Vec3 middle = (mesh.vertices[v[0]] + mesh.vertices[v[1]] + mesh.vertices[v[2]]) / 3;
+    return middle.x() > 0 && std::hypot(middle.y(), middle.z() - 20) < 4;
+  });
+  const Target target(mesh);  // the vertices in the hole belong to no triangle
+  ASSERT_EQ(target.boundary().size(), 3U);
+  const RelaxResult result = fitted(target, 0.5, Patch::comas, {}, 2);
+  const double tolerance = 0.005 * target.diagonal();
+  const Curve ends = curved_boundary_of(result.shell), wanted = boundary_of(target.mesh());
+  EXPECT_LE(apart(ends, wanted), tolerance);
+  EXPECT_LE(apart(wanted, ends), tolerance);
+  ASSERT_TRUE(result.distance.boundary);
+  EXPECT_LE(result.distance.boundary->upper, tolerance);
+  EXPECT_GE(result.distance.boundary->upper, 0.999 * apart(wanted, ends));
+  EXPECT_LT(result.shell.triangles.size(), 40U);
+}
+
 TEST(FitBars, DumbbellAtHalfAPercent) {
   const Target target(dumbbell(5));
   const RelaxResult result = fitted(target, 0.5);

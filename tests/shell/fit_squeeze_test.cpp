@@ -67,7 +67,7 @@ TEST(FitSqueeze, WhatIsMissedBothWaysRaisesTheErrorsOfItsPatches) {
     EXPECT_TRUE(!pulled || state.patches[t].error > 0.9) << t;
   }
   for (std::size_t i = before; i < samples.points().size(); ++i) {
-    EXPECT_LT(target.closest(samples.points()[i]).distance, 1e-9);
+    EXPECT_LT(target.closest(samples.points()[i].point).distance, 1e-9);
   }
 }
 
@@ -81,7 +81,7 @@ TEST(FitSqueeze, MissedPointsJoinTheSamples) {
   FitState state = state_of(samples, testing::sphere(2, 10));
   ASSERT_GT(add_missed(samples, state, 0.3), 0U);
   ASSERT_GT(samples.points().size(), before);
-  EXPECT_NEAR((samples.points()[before] - mesh.vertices[1000]).norm(), 0, 0.6);
+  EXPECT_NEAR((samples.points()[before].point - mesh.vertices[1000]).norm(), 0, 0.6);
   const double unaware = state.error();
   state.attach();
   state.measure();

@@ -60,6 +60,8 @@ class Compare(WholeTool):
         self.assertLessEqual(width, 0.01)
         fine = self.run_tool("curved.ply", "sphere.ply")["result"]
         self.assertLess(abs(fine["hausdorff_percent"]["upper"] - curved["hausdorff_percent"]["upper"]), 0.02)
+        self.assertIsNone(curved["boundary_percent"])
+        self.assertNotIn("boundary_percent", flat)
 
     def test_surfaces_in_different_spaces_are_refused(self):
         meshes.write_ply(self.path("ras.ply"), *meshes.sphere(2, 10.0), comments=["SPACE=RAS"])

@@ -127,7 +127,8 @@ class Contract(Case):
         result = record["result"]
         self.assertEqual(list(record["seconds"]), ["total", "read", "relax", "measure", "write"])
         for key in ("shells", "hausdorff_mm", "hausdorff_percent", "one_sided_percent", "mean_percent", "rms_percent",
-                    "flat_hausdorff_percent", "iterations", "min_angle_deg", "self_intersections", "reached"):
+                    "boundary_percent", "flat_hausdorff_percent", "iterations", "min_angle_deg", "self_intersections",
+                    "reached"):
             self.assertIn(key, result)
         self.assertIn(result["shells"], range(46, 49))
         self.assertIsNone(result["reached"])
@@ -366,6 +367,17 @@ class Fit(Case):
         self.assertEqual(len(read_ply(self.out)[1]), result["shells"])
         self.assertEqual(result["self_intersections"], 0)
         self.assertGreater(len(result["iterations"]), 0)
+        # Both ends, as curves, and as whoever measures the file finds them.
+        boundary = result["boundary_percent"]
+        self.assertLessEqual(boundary["upper"], 0.3)
+        self.assertLessEqual(boundary["lower"], boundary["upper"])
+        report = self.path("compare.json")
+        subprocess.run([os.path.join(BIN, "tunica-compare"), "--shell", self.out, self.target, "--report", report],
+                       check=True, capture_output=True, timeout=300)
+        with open(report) as file:
+            measured = json.load(file)["result"]["boundary_percent"]
+        self.assertLessEqual(measured["lower"], boundary["upper"])
+        self.assertGreaterEqual(measured["upper"], boundary["lower"])
 
     def test_count_is_kept_and_threads_do_not_matter(self):
         record, _ = self.relax(self.target, self.target, self.out, "--shells", 60, "--max-iterations", 1, "--threads", 1)
@@ -544,6 +556,7 @@ class Organs(Case):
         record, _ = self.relax(target, target, self.path("shell.ply"), *unit, "--tolerance", "1%")
         result = record["result"]
         self.assertLessEqual(result["hausdorff_percent"]["upper"], 1)
+        self.assertLessEqual(result["boundary_percent"]["upper"], 1)
         self.assertLessEqual(3 * result["shells"], triangles)
         self.assertGreaterEqual(result["min_angle_deg"], 20 - 1e-6)
         self.assertEqual(result["self_intersections"], 0)
