@@ -2,6 +2,7 @@
 #include "cli/tool.hpp"
 #include "io/mesh_file.hpp"
 #include "surface/checks.hpp"
+#include "surface/degenerate.hpp"
 #include "surface/hausdorff.hpp"
 #include "surface/measure.hpp"
 #include "surface/repair.hpp"
@@ -99,6 +100,23 @@ MeshFile read_surface(const fs::path& path, const std::optional<double>& unit_mm
   return file;
 }
 
+// What became of the input's triangles without area, where that is more than the same surface without them.
+void warn_of_changes(const cli::Tool& tool, const fs::path& in, const DecimateResult& result, std::size_t degenerate) {
+  if (result.closed_loops > 0) {
+    tool.warn(fmt::format("{}: {} hole(s) whose rim was a single point are closed", in.string(), result.closed_loops));
+  }
+  if (result.longest_spike > 0) {
+    tool.warn(fmt::format("{}: spikes without area, up to {:.4g} mm long, are taken away from its boundary",
+                          in.string(), result.longest_spike));
+  }
+  if (degenerate > 0) {
+    tool.warn(fmt::format("{} triangle(s) without area are left: {}", degenerate,
+                          result.long_spikes > 0
+                              ? fmt::format("--max-error is too small for {} spike(s) to go", result.long_spikes)
+                              : std::string("without them pieces would be lost, or parts that they join fall apart")));
+  }
+}
+
 // Which requirement was not met, in words; none when all were.
 std::optional<std::string> what_failed(const Arguments& given, const DecimateResult& result) {
   const std::size_t count = result.mesh.triangles.size();
@@ -171,6 +189,8 @@ void run(cli::Tool& tool, const Arguments& given) {
       distance.upper = std::min(distance.upper, coarse.error->upper);
     }
     const MeshFacts facts = examine(coarse.mesh);
+    const std::size_t degenerate = count_degenerate(coarse.mesh);
+    warn_of_changes(tool, given.in, coarse, degenerate);
     tool.result() = {
         {"triangles_in", in.mesh.triangles.size()},
         {"triangles", coarse.mesh.triangles.size()},
@@ -182,6 +202,9 @@ void run(cli::Tool& tool, const Arguments& given) {
         {"manifold", facts.manifold && facts.oriented},
         {"euler", facts.euler},
         {"boundary_loops", facts.boundary_loops},
+        {"degenerate_triangles", degenerate},
+        {"closed_loops", coarse.closed_loops},
+        {"longest_spike_mm", coarse.longest_spike},
         {"diagonal_mm", diagonal_mm},
     };
     if (repairs) {
@@ -215,7 +238,7 @@ void run(cli::Tool& tool, const Arguments& given) {
 int main(int argc, char** argv) {
   cli::Tool tool("decimate",
                  "Quadric edge collapse: fewer triangles for the same surface. Boundaries and topology are kept, no "
-                 "triangle is flipped or degenerate, and the two-sided distance to the input is certified.",
+                 "triangle is flipped, those without area go, and the two-sided distance to the input is certified.",
                  "tunica-decimate surface.ply coarse.ply --triangles 800\n"
                  "  tunica-decimate surface.ply coarse.ply --max-error 0.5% --report decimate.json\n"
                  "  tunica-decimate surface.ply coarse.ply --triangles 800 --min-angle 20");

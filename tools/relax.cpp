@@ -228,9 +228,12 @@ void run(cli::Tool& tool, const Arguments& given) {
     tool.input(given.target);
     Surface surface = given.coarse == given.target ? start : read_surface(given.target, unit_mm);
     ply = ply_options(tool, common_space(start.file, given.coarse, surface.file, given.target));
-    warn_of_mismatch(tool, start.facts, surface.facts);
     coarse = std::move(start.file.mesh);
     target.emplace(std::move(surface.file.mesh));
+    if (start.facts.boundary_loops != surface.facts.boundary_loops) {
+      surface.facts.boundary_loops -= target->point_loops();  // decimation closes them
+    }
+    warn_of_mismatch(tool, start.facts, surface.facts);
   }
   const double diagonal = target->diagonal();
   const double percent = 100 / diagonal;

@@ -111,7 +111,7 @@ private:
         target_(target),
         options_(options),
         angle_(angle.value_or(options.min_angle.value_or(FitLimits{}.angle))),
-        like_target_(same_topology(coarse, target.mesh())),
+        like_target_(same_topology(coarse, target)),
         result_(target, options, width, like_target_) {}
 
   static double width_for(const Target& target, const RelaxOptions& options) {

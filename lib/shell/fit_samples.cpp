@@ -247,7 +247,7 @@ FitSamples::FitSamples(const Target& target, std::size_t shells, bool boundaries
     : target_(target), grid_of_target_(target.mesh()), boundaries_(boundaries && target.boundary_tree()) {
   const auto& mesh = target.mesh();
   std::vector<std::uint8_t> used(mesh.vertices.size(), 0);
-  for (const auto& loop : boundary_loops(mesh.triangles, target.across())) {
+  for (const auto& loop : target.boundary_vertices()) {
     const std::size_t stride =
         std::max<std::size_t>(1, loop.size() / (16 * static_cast<std::size_t>(std::sqrt(shells)) + 64));
     for (std::size_t i = 0; i < loop.size(); i += stride) {

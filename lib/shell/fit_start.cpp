@@ -58,12 +58,16 @@ TriangleMesh decimated(const TriangleMesh& mesh, std::size_t triangles, bool lev
 
 }  // namespace
 
-bool same_topology(const TriangleMesh& a, const TriangleMesh& b) {
-  if (a.triangles == b.triangles) {
+bool same_topology(const TriangleMesh& mesh, const Target& target) {
+  if (mesh.triangles == target.mesh().triangles) {
     return true;
   }
-  const MeshFacts x = examine(a), y = examine(b);
-  return x.components == y.components && x.boundary_loops == y.boundary_loops && x.euler == y.euler;
+  const MeshFacts x = examine(mesh), y = examine(target.mesh());
+  const std::size_t points = target.point_loops();
+  const auto agree = [&](std::size_t closed) {
+    return x.boundary_loops + closed == y.boundary_loops && x.euler == y.euler + static_cast<long>(closed);
+  };
+  return x.components == y.components && (agree(0) || agree(points));
 }
 
 FitStart start_as_given(const TriangleMesh& coarse, const Target& target) {

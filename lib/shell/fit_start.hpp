@@ -12,8 +12,8 @@ struct FitStart {
   bool own_topology = false;  ///< it is COARSE, because its topology is not the target's
 };
 
-/// Whether pieces, boundary loops and handles are as many.
-bool same_topology(const TriangleMesh& a, const TriangleMesh& b);
+/// Whether pieces, boundary loops and handles are as many; loops of the target that are a point may be closed.
+bool same_topology(const TriangleMesh& mesh, const Target& target);
 
 /// COARSE itself, for a fit that keeps its triangles.
 FitStart start_as_given(const TriangleMesh& coarse, const Target& target);

@@ -14,6 +14,7 @@ namespace tunica {
 namespace {
 
 constexpr std::size_t triangles_looked_at = 16;
+constexpr double least_extent = 1e-9;  // of the diagonal: smaller boundary loops are points
 
 // Of a corner from its triangle's centroid.
 double largest_radius(const TriangleMesh& mesh, const std::vector<Vec3>& centroids) {
@@ -88,11 +89,19 @@ Target::Target(TriangleMesh mesh)
       centroid_tree_(centroids_),
       largest_radius_(largest_radius(mesh_, centroids_)) {
   std::vector<std::array<Vec3, 2>> segments;
-  for (const auto& loop : boundary_loops(mesh_.triangles, cover_.across())) {
-    auto& polyline = boundary_.emplace_back();
+  for (auto& loop : boundary_loops(mesh_.triangles, cover_.across())) {
+    std::vector<Vec3> polyline;
+    double extent = 0;
     for (const Index v : loop) {
       polyline.push_back(mesh_.vertices[v]);
+      extent = std::max(extent, (polyline.back() - polyline[0]).norm());
     }
+    if (extent <= least_extent * diagonal_) {
+      ++point_loops_;
+      continue;
+    }
+    boundary_vertices_.push_back(std::move(loop));
+    boundary_.push_back(polyline);
     for (std::size_t i = 0; i < polyline.size(); ++i) {
       segments.push_back({polyline[i], polyline[(i + 1) % polyline.size()]});
     }

@@ -50,8 +50,13 @@ public:
   /// Source: Comas, Duriez, Cotin 2010, section 3; that they face the right side is added here.
   [[nodiscard]] std::optional<Vec3> barycentre_of_three(const Vec3& p, const Vec3& direction, double reach) const;
 
-  /// The boundary as closed polylines, in the direction of the triangles' edges.
+  /// The boundary as closed polylines, in the direction of the triangles' edges. A loop that is a point, as of a pole
+  /// given as a ring of vertices in one place, is none.
   [[nodiscard]] const std::vector<std::vector<Vec3>>& boundary() const { return boundary_; }
+  /// Their vertices.
+  [[nodiscard]] const std::vector<std::vector<Index>>& boundary_vertices() const { return boundary_vertices_; }
+  /// How many loops are a point, and so left out.
+  [[nodiscard]] std::size_t point_loops() const { return point_loops_; }
   /// Their segments, see segments_as_triangles(); nothing without a boundary.
   [[nodiscard]] const std::optional<ClosestPoint>& boundary_tree() const { return boundary_tree_; }
 
@@ -69,6 +74,8 @@ private:
   PointTree centroid_tree_;
   double largest_radius_;  ///< of a corner from its triangle's centroid, mm
   std::vector<std::vector<Vec3>> boundary_;
+  std::vector<std::vector<Index>> boundary_vertices_;
+  std::size_t point_loops_ = 0;
   std::optional<ClosestPoint> boundary_tree_;
 };
 

@@ -29,7 +29,9 @@ constexpr int level_steps = 6;
 /// What a certificate may take: a mesh that needs more counts as one that does not keep the error.
 constexpr std::size_t least_splits = 100'000;
 constexpr std::size_t splits_per_triangle = 4;  // of the target
-constexpr double least_size = 1e-100;           // mm: squares of edges below vanish
+/// Of the error asked for: what spikes may take, so that something is left for the collapses.
+constexpr double most_for_spikes = 0.9;
+constexpr double least_size = 1e-100;  // mm: squares of edges below vanish
 
 // The mesh after the first `steps` collapses; `origins` tells which vertices and triangles came from where.
 TriangleMesh replay(const TriangleMesh& mesh, const std::vector<Collapse>& history, std::size_t steps,
@@ -341,7 +343,9 @@ DecimateResult decimate(const TriangleMesh& mesh, const DecimateOptions& options
   if (count_degenerate(mesh) == mesh.triangles.size()) {
     throw InputError("all of its triangles are without area");
   }
-  const WithoutDegenerate cleaned = without_degenerate_triangles(mesh);
+  constexpr double any_length = std::numeric_limits<double>::infinity();
+  const WithoutDegenerate cleaned =
+      without_degenerate_triangles(mesh, options.max_error ? most_for_spikes * *options.max_error : any_length);
   DecimateOptions within = options;
   if (options.max_error) {
     within.max_error = std::max(0.0, *options.max_error - cleaned.moved);
@@ -351,6 +355,9 @@ DecimateResult decimate(const TriangleMesh& mesh, const DecimateOptions& options
     result.error->lower = std::max(0.0, result.error->lower - cleaned.moved);
     result.error->upper += cleaned.moved;
   }
+  result.closed_loops = cleaned.closed_loops;
+  result.longest_spike = cleaned.longest_spike;
+  result.long_spikes = cleaned.long_spikes;
   return result;
 }
 

@@ -1,6 +1,8 @@
 #include "surface/degenerate.hpp"
 
+#include "surface/closest_point.hpp"
 #include "surface/edit_mesh.hpp"
+#include "surface/incidence.hpp"
 
 #include <Eigen/Geometry>
 
@@ -14,14 +16,28 @@ constexpr double short_edge = 1e-6;    // likewise: what may collapse where no f
 
 class Cleaner {
 public:
-  explicit Cleaner(const TriangleMesh& mesh) : mesh_(mesh) {}
+  Cleaner(const TriangleMesh& mesh, double longest_spike) : mesh_(mesh), longest_spike_(longest_spike) {}
 
   WithoutDegenerate run() {
+    // Each closes loops or leaves fewer triangles: it ends.
+    do {
+      clean();
+    } while (close_point_loops() || take_spikes());
+    result_.mesh = mesh_.mesh();
+    return std::move(result_);
+  }
+
+private:
+  [[nodiscard]] const Vec3& at(Index v) const { return mesh_.positions[v]; }
+  [[nodiscard]] double length(Index u, Index v) const { return (at(u) - at(v)).norm(); }
+  [[nodiscard]] bool is_flat(Index t) const {
+    const auto& c = mesh_.triangles[t];
+    return is_degenerate(at(c[0]), at(c[1]), at(c[2]));
+  }
+
+  void clean() {
     // Each change leaves fewer degenerate triangles or shorter edges: it ends.
-    std::vector<Index> waiting;
-    for (Index t = 0; t < mesh_.triangles.size(); ++t) {
-      waiting.push_back(t);
-    }
+    std::vector<Index> waiting = alive();
     for (bool changed = true; changed;) {
       changed = false;
       std::vector<Index> left;
@@ -39,15 +55,16 @@ public:
       left.erase(std::unique(left.begin(), left.end()), left.end());
       waiting = std::move(left);
     }
-    return {mesh_.mesh(), moved_};
   }
 
-private:
-  [[nodiscard]] const Vec3& at(Index v) const { return mesh_.positions[v]; }
-  [[nodiscard]] double length(Index u, Index v) const { return (at(u) - at(v)).norm(); }
-  [[nodiscard]] bool is_flat(Index t) const {
-    const auto& c = mesh_.triangles[t];
-    return is_degenerate(at(c[0]), at(c[1]), at(c[2]));
+  [[nodiscard]] std::vector<Index> alive() const {
+    std::vector<Index> found;
+    for (Index t = 0; t < mesh_.triangles.size(); ++t) {
+      if (mesh_.is_alive(t)) {
+        found.push_back(t);
+      }
+    }
+    return found;
   }
 
   bool take_out(Index t) {
@@ -90,7 +107,7 @@ private:
         touched_.push_back(mesh_.add_triangle(corners));
       }
     }
-    moved_ += apart;
+    result_.moved += apart;
     return true;
   }
 
@@ -112,7 +129,7 @@ private:
     for (const auto& corners : fresh) {
       touched_.push_back(mesh_.add_triangle(corners));
     }
-    moved_ += height;
+    result_.moved += height;
     return true;
   }
 
@@ -122,12 +139,143 @@ private:
     }
     mesh_.remove_triangle(t);
     mesh_.on_boundary[middle] = 1;
-    moved_ += height;
+    result_.moved += height;
     return true;
   }
 
+  // A loop without extent gets a fan about one more vertex in its place: all of that are needles, and collapse.
+  bool close_point_loops() {
+    TriangleMesh now{mesh_.positions, {}};
+    for (const Index t : alive()) {
+      now.triangles.push_back(mesh_.triangles[t]);
+    }
+    const std::size_t closed_before = result_.closed_loops;
+    for (const auto& loop : boundary_loops(now)) {
+      double extent = 0, longest = 0;
+      for (const Index v : loop) {
+        extent = std::max(extent, length(loop[0], v));
+        std::vector<Index> ring;
+        mesh_.ring(v, ring);
+        for (const Index w : ring) {
+          longest = std::max(longest, length(v, w));
+        }
+      }
+      // Of a piece that is a point nothing would be left.
+      if (longest > 0 && extent <= least_height * longest) {
+        close(loop);
+        result_.moved += extent;
+      }
+    }
+    return result_.closed_loops > closed_before;
+  }
+
+  void close(const std::vector<Index>& loop) {
+    const Index centre = mesh_.add_vertex(Vec3(at(loop[0])), false);
+    for (std::size_t i = 0; i < loop.size(); ++i) {
+      mesh_.add_triangle({loop[(i + 1) % loop.size()], loop[i], centre});
+      mesh_.on_boundary[loop[i]] = 0;
+    }
+    ++result_.closed_loops;
+  }
+
+  bool take_spikes() {
+    const Spikes spikes = find_spikes();
+    double longest = 0;
+    result_.long_spikes = 0;
+    std::vector<std::uint8_t> goes(mesh_.triangles.size(), 0);  // by the root
+    for (const Index t : spikes.triangles) {
+      if (spikes.root[t] != t) {
+        continue;
+      }
+      const bool fits = result_.moved + spikes.length[t] <= longest_spike_;
+      result_.long_spikes += fits ? 0 : 1;
+      goes[t] = fits ? 1 : 0;
+      longest = std::max(longest, fits ? spikes.length[t] : 0);
+    }
+    bool any = false;
+    for (const Index t : spikes.triangles) {
+      if (spikes.root[t] != EditMesh::none && goes[spikes.root[t]] != 0) {
+        mesh_.remove_triangle(t);
+        any = true;
+      }
+    }
+    // Spikes stand side by side: together they move the surface as far as the longest.
+    result_.moved += longest;
+    result_.longest_spike = std::max(result_.longest_spike, longest);
+    return any;
+  }
+
+  struct Spikes {
+    std::vector<Index> triangles;  ///< outer ones first
+    std::vector<Index> root;       ///< #T the triangle by which the spike hangs on the rest; none: of no spike
+    std::vector<double> length;    ///< #T of roots, mm
+  };
+
+  // A flat triangle with one neighbour only is the end of a spike; without it its neighbour may be the next one.
+  [[nodiscard]] Spikes find_spikes() const {
+    Spikes found;
+    const std::size_t count = mesh_.triangles.size();
+    std::vector<Index> holder(count, EditMesh::none);  // the neighbour that a spike's triangle hangs on
+    const auto neighbours_left = [&](Index t) {
+      std::vector<Index> left;
+      const auto& c = mesh_.triangles[t];
+      for (std::size_t k = 0; k < 3; ++k) {
+        const Index across = mesh_.on_edge(c[k], c[(k + 1) % 3])[1];
+        if (across != EditMesh::none && holder[across] == EditMesh::none) {
+          left.push_back(across);
+        }
+      }
+      return left;
+    };
+    std::vector<Index> waiting = alive();
+    for (std::size_t i = 0; i < waiting.size(); ++i) {
+      const Index t = waiting[i];
+      if (holder[t] != EditMesh::none || !is_flat(t)) {
+        continue;
+      }
+      const auto left = neighbours_left(t);
+      if (left.size() == 1) {
+        holder[t] = left[0];
+        found.triangles.push_back(t);
+        waiting.push_back(left[0]);
+      }
+    }
+    found.root.assign(count, EditMesh::none);
+    found.length.assign(count, 0);
+    for (auto it = found.triangles.rbegin(); it != found.triangles.rend(); ++it) {
+      const Index t = *it;
+      const Index held_by = holder[t];
+      if (holder[held_by] != EditMesh::none) {
+        found.root[t] = found.root[held_by];
+      } else if (!is_flat(held_by) || !neighbours_left(held_by).empty()) {
+        found.root[t] = t;
+      }  // else the whole piece is without area
+      if (found.root[t] != EditMesh::none) {
+        double& length = found.length[found.root[t]];
+        length = std::max(length, reach(t, found.root[t], holder[found.root[t]]));
+      }
+    }
+    return found;
+  }
+
+  // How far a triangle reaches from the edge that two others share.
+  [[nodiscard]] double reach(Index t, Index root, Index holder) const {
+    std::vector<Vec3> edge;
+    for (const Index v : mesh_.triangles[root]) {
+      if (mesh_.has(holder, v)) {
+        edge.push_back(at(v));
+      }
+    }
+    double farthest = 0;
+    for (const Index v : mesh_.triangles[t]) {
+      farthest = std::max(farthest, (at(v) - closest_point_on_triangle(at(v), edge[0], edge[1], edge[1])).norm());
+    }
+    return farthest;
+  }
+
   EditMesh mesh_;
-  double moved_ = 0;
+  double longest_spike_;
+  WithoutDegenerate result_;
   std::vector<Index> touched_;
 };
 
@@ -144,6 +292,8 @@ std::size_t count_degenerate(const TriangleMesh& mesh) {
   }));
 }
 
-WithoutDegenerate without_degenerate_triangles(const TriangleMesh& mesh) { return Cleaner(mesh).run(); }
+WithoutDegenerate without_degenerate_triangles(const TriangleMesh& mesh, double longest_spike) {
+  return Cleaner(mesh, longest_spike).run();
+}
 
 }  // namespace tunica

@@ -2,6 +2,7 @@
 
 #include "shell/families.hpp"
 #include "shell/fit_parts.hpp"
+#include "shell/fit_start.hpp"
 #include "shell/shell_distance.hpp"
 
 #include <gtest/gtest.h>
@@ -49,6 +50,34 @@ TEST(BoundaryDistance, OfAShiftedSheetIsTheShift) {
     EXPECT_GE(found->both.upper, 0.25);
     EXPECT_LE(found->both.upper - found->both.lower, width + 1e-9);
   }
+}
+
+TEST(BoundaryDistance, ALoopThatIsAPointIsNoBoundaryOfATarget) {
+  // A cone whose tip is a ring of vertices in one place, and the same with one vertex there.
+  const int around = 16;
+  TriangleMesh cone = testing::cylinder(around, 4, 1, 2);
+  for (Vec3& v : cone.vertices) {
+    v.head<2>() *= (2 - v.z()) / 2;
+  }
+  const Target target(cone);
+  EXPECT_EQ(target.point_loops(), 1U);
+  ASSERT_EQ(target.boundary().size(), 1U);
+  ASSERT_EQ(target.boundary_vertices().size(), 1U);
+  EXPECT_EQ(target.boundary_vertices()[0].size(), 16U);
+  EXPECT_EQ(target.boundary_tree()->closest({0, 0, 2}).point.z(), 0);
+  TriangleMesh closed = cone;
+  const auto tip = static_cast<Index>(4 * around);
+  for (auto& c : closed.triangles) {
+    for (Index& v : c) {
+      v = std::min(v, tip);
+    }
+  }
+  std::erase_if(closed.triangles, [](const auto& c) { return c[0] == c[1] || c[1] == c[2] || c[2] == c[0]; });
+  closed.vertices.resize(tip + 1);
+  EXPECT_TRUE(same_topology(closed, target));
+  EXPECT_TRUE(same_topology(cone, target));
+  EXPECT_FALSE(same_topology(testing::sphere(1), target));
+  EXPECT_EQ(Target(closed).point_loops(), 0U);
 }
 
 TEST(BoundaryDistance, SeesABayThatTheSurfacesDoNot) {

@@ -1,5 +1,7 @@
 """tunica-decimate as its users run it: counts, errors kept, topology of the written file, each exit code."""
+import math
 import os
+import subprocess
 import unittest
 
 import meshes
@@ -157,6 +159,73 @@ class Decimate(WholeTool):
                          [(0, 1, 2), (0, 2, 3), (0, 3, 1), (1, 3, 2)])
         self.run_tool("line.ply", "out.ply", "--triangles", 4, code=3, says="line.ply: all of its triangles are without area")
         self.assertFalse(os.path.exists(self.path("out.ply")))
+
+    def warnings(self, *arguments):
+        """What the tool warns of where it ends with 0."""
+        command = [os.path.join(os.environ["TUNICA_BIN"], "tunica-decimate"), *map(str, arguments), "--force"]
+        run = subprocess.run(command, cwd=self.folder, capture_output=True, text=True)
+        self.assertEqual(run.returncode, 0, run.stderr)
+        return [line for line in run.stderr.splitlines() if "warning" in line]
+
+    def test_poles_that_are_rings_of_vertices_are_closed(self):
+        n, m = 24, 12
+        vertices, triangles = meshes.tube(n, m)
+        for i, (x, y, _) in enumerate(vertices):
+            across = 0.0 if i // n in (0, m) else math.sin(math.pi * (i // n) / m)
+            vertices[i] = (10 * across * x, 10 * across * y, -10 * math.cos(math.pi * (i // n) / m))
+        meshes.write_ply(self.path("in.ply"), vertices, triangles)
+        for goal in [("--triangles", 200), ("--max-error", "2%"), ("--triangles", 200, "--min-angle", 20)]:
+            result = self.run_tool("in.ply", "out.ply", *goal, "--force")["result"]
+            self.assertEqual(result["closed_loops"], 2)
+            self.assertEqual(result["degenerate_triangles"], 0)
+            self.assertEqual((result["euler"], result["boundary_loops"]), (2, 0))
+            self.assertEqual(result["longest_spike_mm"], 0)
+            self.assertLess(result["hausdorff_percent"]["upper"], 5)
+        found = self.warnings("in.ply", "out.ply", "--triangles", 200)
+        self.assertEqual(len(found), 1, found)
+        self.assertIn("2 hole(s) whose rim was a single point are closed", found[0])
+        self.surface("sound.ply")
+        self.assertEqual(self.warnings("sound.ply", "out.ply", "--triangles", 200), [])
+        self.assertEqual(self.run_tool("sound.ply", "out.ply", "--triangles", 200, "--force")["result"]["closed_loops"], 0)
+
+    def test_spikes_without_area_go_as_far_as_the_error_allows(self):
+        n = 12
+        vertices = [(float(i), float(j), 0.3 * math.sin(0.5 * i)) for j in range(n + 1) for i in range(n + 1)]
+        triangles = [t for j in range(n) for i in range(n) for a in [j * (n + 1) + i]
+                     for t in [(a, a + 1, a + n + 2), (a, a + n + 2, a + n + 1)]]
+        last, end, z = n * (n + 1) - 1, (n + 1) ** 2 - 1, vertices[-1][2]
+        for i in range(1, 5):  # a chain along x = n, 2 mm beyond the corner
+            vertices.append((float(n), n + 0.5 * i, z))
+            triangles.append((end, last, len(vertices) - 1) if i % 2 else (last, end, len(vertices) - 1))
+            last, end = end, len(vertices) - 1
+        meshes.write_ply(self.path("in.ply"), vertices, triangles, comments=["units mm"])
+        gone = self.run_tool("in.ply", "out.ply", "--max-error", "2.5mm", "--force")["result"]
+        self.assertEqual(gone["degenerate_triangles"], 0)
+        self.assertAlmostEqual(gone["longest_spike_mm"], 2)
+        self.assertGreater(gone["hausdorff_mm"]["lower"], 1.99)
+        self.assertLessEqual(gone["hausdorff_mm"]["upper"], 2.5)
+        self.assertIn("up to 2 mm long, are taken away", self.warnings("in.ply", "out.ply", "--max-error", "2.5mm")[0])
+        for goal in [("--triangles", 60), ("--triangles", 100, "--min-angle", 20)]:
+            counted = self.run_tool("in.ply", "out.ply", *goal, "--force")["result"]
+            self.assertEqual(counted["degenerate_triangles"], 0)
+            self.assertAlmostEqual(counted["longest_spike_mm"], 2)
+        kept = self.run_tool("in.ply", "out.ply", "--max-error", "0.1mm", "--force")["result"]
+        self.assertGreater(kept["degenerate_triangles"], 0)
+        self.assertEqual(kept["longest_spike_mm"], 0)
+        self.assertLessEqual(kept["hausdorff_mm"]["upper"], 0.1)
+        self.assertIn("--max-error is too small for 1 spike(s) to go",
+                      self.warnings("in.ply", "out.ply", "--max-error", "0.1mm")[0])
+
+    def test_triangles_without_area_that_join_parts_are_counted_and_warned_of(self):
+        # Two squares of two triangles, and between them two triangles on the line y = 0.
+        vertices = [(0.0, 0, 0), (1.0, 0, 0), (1.2, 0, 0), (0.0, 1, 0), (3.0, 0, 0), (2.8, 0, 0), (4.0, 0, 0), (4.0, 1, 0)]
+        triangles = [(0, 1, 3), (1, 2, 3), (4, 6, 7), (4, 7, 5), (2, 1, 4), (2, 4, 5)]
+        meshes.write_ply(self.path("in.ply"), vertices, triangles)
+        result = self.run_tool("in.ply", "out.ply", "--triangles", 6)["result"]
+        self.assertEqual(result["degenerate_triangles"], 2)
+        self.assertEqual((result["euler"], result["boundary_loops"]), (1, 1))
+        found = self.warnings("in.ply", "out.ply", "--triangles", 6)
+        self.assertIn("2 triangle(s) without area are left", found[0])
 
     def test_repair(self):
         vertices, triangles = self.surface()

@@ -121,6 +121,24 @@ class Contract(Case):
         write_ply(self.target, *cylinder(64, 40))
         write_ply(self.coarse, *cylinder(8, 3, radius=10.3))
 
+    def test_a_pole_given_as_a_ring_of_vertices_is_no_boundary(self):
+        vertices, triangles = cylinder(40, 20)
+        z = vertices[:, 2]
+        turn = np.pi * (z - z.min()) / (z.max() - z.min())
+        across = np.sin(turn)
+        across[(z == z.min()) | (z == z.max())] = 0
+        vertices = np.column_stack([vertices[:, :2] * across[:, None], -10 * np.cos(turn)])
+        write_ply(self.target, vertices, triangles)
+        coarse = self.path("closed.ply")
+        subprocess.run([os.path.join(BIN, "tunica-decimate"), self.target, coarse, "--triangles", "60"], check=True,
+                       capture_output=True)
+        for start in (coarse, self.target):
+            record, said = self.relax(start, self.target, self.out, "--tolerance", "0.5%", "--force")
+            self.assertIsNone(record["result"]["boundary_percent"])
+            self.assertTrue(record["result"]["reached"])
+            self.assertNotIn("warning", said)
+            self.assertLess(record["result"]["shells"], 60)
+
     def test_report_holds_every_key_and_the_intervals_are_intervals(self):
         record, _ = self.relax(self.coarse, self.target, self.out, "--map", self.path("map.ply"), "--picture",
                                self.path("map.png"), "--curved", self.path("curved.ply"))
