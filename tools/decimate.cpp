@@ -111,9 +111,8 @@ void warn_of_changes(const cli::Tool& tool, const fs::path& in, const DecimateRe
   }
   if (degenerate > 0) {
     tool.warn(fmt::format("{} triangle(s) without area are left: {}", degenerate,
-                          result.long_spikes > 0
-                              ? fmt::format("--max-error is too small for {} spike(s) to go", result.long_spikes)
-                              : std::string("without them pieces would be lost, or parts that they join fall apart")));
+                          result.long_spikes > 0 ? "--max-error is too small for their spikes to go"
+                                                 : "without them pieces would be lost or parts fall apart"));
   }
 }
 

@@ -180,17 +180,26 @@ private:
 
   bool take_spikes() {
     const Spikes spikes = find_spikes();
-    double longest = 0;
+    double moved = 0;
     result_.long_spikes = 0;
     std::vector<std::uint8_t> goes(mesh_.triangles.size(), 0);  // by the root
     for (const Index t : spikes.triangles) {
       if (spikes.root[t] != t) {
         continue;
       }
-      const bool fits = result_.moved + spikes.length[t] <= longest_spike_;
-      result_.long_spikes += fits ? 0 : 1;
-      goes[t] = fits ? 1 : 0;
-      longest = std::max(longest, fits ? spikes.length[t] : 0);
+      const double reach = spikes.length[t];
+      if (result_.moved + reach > longest_spike_) {
+        ++result_.long_spikes;
+        continue;
+      }
+      goes[t] = 1;
+      moved = std::max(moved, reach);
+      const auto& c = mesh_.triangles[t];
+      const double longest = std::max({length(c[0], c[1]), length(c[1], c[2]), length(c[2], c[0])});
+      // Otherwise it lies on the edge, but for rounding.
+      if (reach > least_height * longest) {
+        result_.longest_spike = std::max(result_.longest_spike, reach);
+      }
     }
     bool any = false;
     for (const Index t : spikes.triangles) {
@@ -200,8 +209,7 @@ private:
       }
     }
     // Spikes stand side by side: together they move the surface as far as the longest.
-    result_.moved += longest;
-    result_.longest_spike = std::max(result_.longest_spike, longest);
+    result_.moved += moved;
     return any;
   }
 

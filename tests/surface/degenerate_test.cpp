@@ -197,6 +197,16 @@ TEST(Degenerate, SpikesGoAndTheirLengthIsTold) {
   }
 }
 
+TEST(Degenerate, WhatLiesOnTheBoundaryIsNoSpike) {
+  TriangleMesh mesh = sheet_with_spike(1);
+  mesh.vertices.back().y() = 0.9 + 1e-17;  // on the edge itself
+  mesh.vertices.back().x() += 1e-16;
+  const WithoutDegenerate clean = without_degenerate_triangles(mesh);
+  EXPECT_EQ(count_degenerate(clean.mesh), 0U);
+  EXPECT_EQ(clean.longest_spike, 0);
+  EXPECT_LE(clean.moved, 1e-15);
+}
+
 TEST(Degenerate, SpikesThatAnErrorForbidsStay) {
   const TriangleMesh mesh = sheet_with_spike(3);
   const WithoutDegenerate kept = without_degenerate_triangles(mesh, 0.49);

@@ -213,7 +213,7 @@ class Decimate(WholeTool):
         self.assertGreater(kept["degenerate_triangles"], 0)
         self.assertEqual(kept["longest_spike_mm"], 0)
         self.assertLessEqual(kept["hausdorff_mm"]["upper"], 0.1)
-        self.assertIn("--max-error is too small for 1 spike(s) to go",
+        self.assertIn("--max-error is too small for their spikes to go",
                       self.warnings("in.ply", "out.ply", "--max-error", "0.1mm")[0])
 
     def test_triangles_without_area_that_join_parts_are_counted_and_warned_of(self):
