@@ -253,7 +253,14 @@ private:
         count = static_cast<std::size_t>(std::sqrt(static_cast<double>(fails) * static_cast<double>(holds)));
       }
     }
-    return best ? *best : found;
+    if (best) {
+      return *best;
+    }
+    // The mesh itself is a last resort.
+    DecimateResult given;
+    given.mesh = replay(mesh_, collapse_.history(), 0);
+    measure(given);
+    return given.error_kept && given.angle_held ? given : found;
   }
 
   DecimateResult attempt(std::size_t count) {
@@ -270,6 +277,11 @@ private:
     }
     DecimateResult found;
     found.mesh = shaped(replay(mesh_, history, all_of_it ? 0 : steps), mesh_, tree_, shape);
+    measure(found);
+    return found;
+  }
+
+  void measure(DecimateResult& found) const {
     found.smallest_angle = smallest_free_angle(found.mesh, mesh_, *options_.min_angle);
     found.angle_held = found.smallest_angle >= *options_.min_angle;
     found.count_reached = !options_.triangles || found.mesh.triangles.size() <= *options_.triangles;
@@ -277,7 +289,6 @@ private:
       found.error = hausdorff(ClosestPoint(found.mesh), tree_, distance_).both;
       found.error_kept = found.error->upper <= *options_.max_error;
     }
-    return found;
   }
 
   const TriangleMesh& mesh_;

@@ -47,6 +47,10 @@ double signed_volume(const TriangleMesh& mesh) {
   return sum / 6;
 }
 
+double angle_degrees(const Vec3& p, const Vec3& a, const Vec3& b) {
+  return std::atan2((a - p).cross(b - p).norm(), (a - p).dot(b - p)) * 180 / std::numbers::pi;
+}
+
 double smallest_angle_degrees(const Vec3& a, const Vec3& b, const Vec3& c) {
   const double doubled_area = (b - a).cross(c - a).norm();
   // atan2 of sine and cosine: acos would lose half the digits of a small angle.

@@ -5,7 +5,6 @@
 #include "surface/measure.hpp"
 #include "surface/surface_walk.hpp"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 
 #include <algorithm>
@@ -19,22 +18,9 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr std::size_t samples_per_triangle = 40;
 constexpr std::size_t most_in_patch = 64;  // triangles of a change; larger ones are refused
 
-Vec3 area_vector(const std::array<Vec3, 3>& c) { return (c[1] - c[0]).cross(c[2] - c[0]); }
-
 double cosine(const Vec3& a, const Vec3& b) {
   const double lengths = a.norm() * b.norm();
   return lengths > 0 ? a.dot(b) / lengths : 1;
-}
-
-// Weights of the corners at the point of a triangle closest to p.
-Vec3 barycentric(const Vec3& point, const std::array<Vec3, 3>& c) {
-  const Vec3 n = area_vector(c);
-  const double squared = n.squaredNorm();
-  if (!(squared > 0)) {
-    return Vec3::Constant(1.0 / 3);
-  }
-  return {n.dot((c[1] - point).cross(c[2] - point)) / squared, n.dot((c[2] - point).cross(c[0] - point)) / squared,
-          n.dot((c[0] - point).cross(c[1] - point)) / squared};
 }
 
 // The edge from corner k of new triangle i as the edge of another one: 3 j + l, or `most_edges` if there is none.
@@ -101,6 +87,7 @@ ShapedMesh::ShapedMesh(const TriangleMesh& mesh, const TriangleMesh& target, Nea
       sample_(std::move(samples.points)),
       on_target_(std::move(samples.on_target)),
       states_(mesh.triangles.size()),
+      is_pinned_(mesh.vertices.size(), 0),
       shape_cost_(mesh.triangles.size(), unknown),
       middle_(mesh.triangles.size(), no_middles) {
   for (std::size_t t = 0; t < states_.size(); ++t) {
@@ -153,7 +140,7 @@ void ShapedMesh::set_weights(const ShapeWeights& weights) {
 
 double ShapedMesh::cost(Index t) const {
   if (shape_cost_[t] < 0) {
-    shape_cost_[t] = shape_cost(corners(mesh_.triangles[t], {}));
+    shape_cost_[t] = shape_cost(mesh_.triangles[t], corners(mesh_.triangles[t], {}));
   }
   return shape_cost_[t] + error_cost(states_[t].error);
 }
@@ -167,8 +154,35 @@ std::array<Vec3, 3> ShapedMesh::corners(const std::array<Index, 3>& triangle, co
 }
 
 double ShapedMesh::smallest_angle(Index t) const {
-  const auto c = corners(mesh_.triangles[t], {});
-  return smallest_angle_degrees(c[0], c[1], c[2]);
+  return smallest_angle(mesh_.triangles[t], corners(mesh_.triangles[t], {}));
+}
+
+double ShapedMesh::smallest_angle(const std::array<Index, 3>& triangle, const std::array<Vec3, 3>& c) const {
+  // Between two pinned vertices a triangle could be flat with a third angle of 180 degrees: it has no excuse.
+  if (std::count_if(triangle.begin(), triangle.end(), [&](Index v) { return is_pinned(v); }) != 1) {
+    return smallest_angle_degrees(c[0], c[1], c[2]);
+  }
+  double smallest = 180;
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (!is_pinned(triangle[k])) {
+      smallest = std::min(smallest, angle_degrees(c[k], c[(k + 1) % 3], c[(k + 2) % 3]));
+    }
+  }
+  return smallest;
+}
+
+bool ShapedMesh::pin(Index vertex, const Vec3& position) {
+  PatchTrial trial;
+  make_move(vertex, position, trial);
+  if (!(evaluate(trial, infinity) < infinity)) {
+    return false;
+  }
+  commit(trial);
+  is_pinned_[vertex] = 1;
+  for (const Index t : mesh_.around[vertex]) {
+    shape_cost_[t] = unknown;
+  }
+  return true;
 }
 
 std::optional<Vec3> ShapedMesh::farthest_sample(Index t) const {
@@ -186,12 +200,12 @@ std::optional<Vec3> ShapedMesh::farthest_sample(Index t) const {
   return farthest;
 }
 
-double ShapedMesh::shape_cost(const std::array<Vec3, 3>& c) const {
+double ShapedMesh::shape_cost(const std::array<Index, 3>& triangle, const std::array<Vec3, 3>& c) const {
   const double quality = radius_ratio(c[0], c[1], c[2]);
   double cost = weights_.quality * (1 - quality);
   // A ratio of 0.9 leaves no angle below 40 degrees: the isosceles triangle has 0.8999 there.
   if (quality < 0.9 && weights_.angle_wanted > 0) {
-    const double lack = 1 - smallest_angle_degrees(c[0], c[1], c[2]) / weights_.angle_wanted;
+    const double lack = 1 - smallest_angle(triangle, c) / weights_.angle_wanted;
     cost += lack > 0 ? weights_.angle * lack * lack : 0;
   }
   return cost;
@@ -331,10 +345,10 @@ bool ShapedMesh::make_flip(Index u, Index v, PatchTrial& trial) const {
 }
 
 bool ShapedMesh::make_collapse(Index u, Index v, PatchTrial& trial) const {
-  if (!mesh_.may_collapse(u, v)) {
+  if (!mesh_.may_collapse(u, v) || (is_pinned(u) && is_pinned(v))) {
     return false;
   }
-  const bool v_is_kept = mesh_.on_boundary[v] != 0 && mesh_.on_boundary[u] == 0;
+  const bool v_is_kept = is_pinned(v) || (mesh_.on_boundary[v] != 0 && mesh_.on_boundary[u] == 0);
   const Index kept = v_is_kept ? v : u;
   const Index gone = v_is_kept ? u : v;
   trial.removed = mesh_.around[kept];
@@ -353,7 +367,8 @@ bool ShapedMesh::make_collapse(Index u, Index v, PatchTrial& trial) const {
     trial.corners.push_back(c);
   }
   trial.moved = kept;
-  trial.position = mesh_.on_boundary[u] == mesh_.on_boundary[v] ? middle(u, v) : mesh_.positions[kept];
+  const bool stays = is_pinned(kept) || mesh_.on_boundary[u] != mesh_.on_boundary[v];
+  trial.position = stays ? mesh_.positions[kept] : middle(u, v);
   return true;
 }
 
@@ -432,6 +447,9 @@ bool ShapedMesh::folds(const PatchTrial& trial) const {
 }
 
 double ShapedMesh::evaluate(PatchTrial& trial, double limit) const {
+  if (is_pinned(trial.moved) && trial.position != mesh_.positions[trial.moved]) {
+    return infinity;
+  }
   double before = 0;
   double most_error = weights_.most_error;
   bool faced_away = false;
@@ -454,7 +472,7 @@ double ShapedMesh::evaluate(PatchTrial& trial, double limit) const {
   std::array<std::array<Vec3, 3>, most_in_patch> c;
   for (std::size_t i = 0; i < count; ++i) {
     c[i] = corners(trial.corners[i], trial);
-    trial.cost[i] = shape_cost(c[i]);
+    trial.cost[i] = shape_cost(trial.corners[i], c[i]);
     total += trial.cost[i];
   }
   if (total >= allowed || folds(trial)) {
@@ -555,6 +573,7 @@ void ShapedMesh::commit(const PatchTrial& trial) {
     // Of a boundary edge only one triangle was cut, in two.
     const bool boundary = trial.removed.size() == 1 && trial.corners.size() == 2;
     mesh_.add_vertex(trial.position, boundary);
+    is_pinned_.push_back(0);
     vertex_error_.push_back(trial.moved_error);
     BoundaryCurves::Place place;
     if (boundary) {
@@ -593,103 +612,6 @@ void ShapedMesh::commit(const PatchTrial& trial) {
   for (std::size_t s = 0; s < trial.samples.size(); ++s) {
     states_[made[trial.owner[s]]].samples.push_back(trial.samples[s]);
   }
-}
-
-struct ShapedMesh::LeastSquares {
-  Mat3 matrix = Mat3::Zero();
-  Vec3 right = Vec3::Zero();
-  Vec3 centre = Vec3::Zero();
-  double area = 0;
-
-  // A triangle with the vertex at corner k.
-  void add_triangle(const std::array<Vec3, 3>& c) {
-    const double weight = area_vector(c).norm();
-    centre += weight * (c[0] + c[1] + c[2]) / 3;
-    area += weight;
-  }
-
-  void add_sample(const Vec3& p, const std::array<Vec3, 3>& c, std::size_t k, double large) {
-    const Vec3 x = closest_point_on_triangle(p, c[0], c[1], c[2]);
-    const double share = barycentric(x, c)[static_cast<Eigen::Index>(k)];
-    const Vec3 residual = p - x;
-    const Vec3 normal = area_vector(c).normalized();
-    const double off = residual.norm();
-    // Beside the triangle's plane only by its edge: then the direction is that of the residual.
-    const Vec3 direction = std::abs(normal.dot(residual)) > 0.5 * off ? normal : Vec3(residual / off);
-    const double relative = off / large;
-    const double weight = share * (0.05 + relative * relative);
-    matrix += weight * share * direction * direction.transpose();
-    right += weight * direction.dot(residual) * direction;
-  }
-
-  [[nodiscard]] Vec3 solve(const Vec3& from, double pull) const {
-    if (!(area > 0)) {
-      return from;
-    }
-    const double shift = pull * std::max(matrix.trace(), std::numeric_limits<double>::min());
-    const Mat3 shifted = matrix + shift * Mat3::Identity();
-    const Vec3 step = shifted.ldlt().solve(right + shift * (centre / area - from));
-    return step.allFinite() ? Vec3(from + step) : from;
-  }
-};
-
-Vec3 ShapedMesh::proposal(Index vertex, double pull) const {
-  LeastSquares fit;
-  for (const Index t : mesh_.around[vertex]) {
-    const auto c = corners(mesh_.triangles[t], {});
-    fit.add_triangle(c);
-    for (const Index s : states_[t].samples) {
-      fit.add_sample(sample_[s], c, mesh_.corner_of(t, vertex), weights_.error);
-    }
-  }
-  return fit.solve(mesh_.positions[vertex], pull);
-}
-
-Vec3 ShapedMesh::proposal(const PatchTrial& trial, double pull) const {
-  LeastSquares fit;
-  const auto corner = [&](std::size_t i) {
-    const auto& c = trial.corners[i];
-    return static_cast<std::size_t>(std::find(c.begin(), c.end(), trial.moved) - c.begin());
-  };
-  for (const auto& triangle : trial.corners) {
-    fit.add_triangle(corners(triangle, trial));
-  }
-  for (std::size_t s = 0; s < trial.samples.size(); ++s) {
-    const std::size_t i = trial.owner[s];
-    if (corner(i) < 3) {
-      fit.add_sample(sample_[trial.samples[s]], corners(trial.corners[i], trial), corner(i), weights_.error);
-    }
-  }
-  return fit.solve(trial.position, pull);
-}
-
-Vec3 ShapedMesh::slide(Index vertex, double fraction) const {
-  Index before = EditMesh::none;
-  Index after = EditMesh::none;
-  for (const Index t : mesh_.around[vertex]) {
-    const auto& c = mesh_.triangles[t];
-    const std::size_t k = mesh_.corner_of(t, vertex);
-    if (mesh_.on_edge(vertex, c[(k + 1) % 3])[1] == EditMesh::none) {
-      after = c[(k + 1) % 3];
-    }
-    if (mesh_.on_edge(c[(k + 2) % 3], vertex)[1] == EditMesh::none) {
-      before = c[(k + 2) % 3];
-    }
-  }
-  if (before == EditMesh::none || after == EditMesh::none) {
-    return mesh_.positions[vertex];
-  }
-  return curves_.point(curves_.between(places_[before], places_[after], fraction));
-}
-
-Vec3 ShapedMesh::middle(Index u, Index v) const {
-  const auto on = mesh_.on_edge(u, v);
-  if (on[0] != EditMesh::none && on[1] != EditMesh::none) {
-    const Vec3 x = 0.5 * (mesh_.positions[u] + mesh_.positions[v]);
-    return nearest_(x, states_[on[0]].guess, exact).point;
-  }
-  const bool forward = on[0] != EditMesh::none;  // the triangle, and so the curve, runs from u to v
-  return curves_.point(curves_.between(places_[forward ? u : v], places_[forward ? v : u], 0.5));
 }
 
 }  // namespace tunica

@@ -4,6 +4,8 @@
 #include "surface/closest_point.hpp"
 #include "surface/edit_mesh.hpp"
 
+#include <Eigen/Geometry>
+
 #include <functional>
 #include <optional>
 
@@ -78,8 +80,14 @@ public:
   /// The point of the target that is farthest from triangle t, of those that belong to it.
   [[nodiscard]] std::optional<Vec3> farthest_sample(Index t) const;
   [[nodiscard]] double cost(Index t) const;
+  /// Degrees, but for the corner at the pinned vertex where there is one.
   [[nodiscard]] double smallest_angle(Index t) const;
   [[nodiscard]] const BoundaryCurves::Place& place(Index vertex) const { return places_[vertex]; }
+
+  /// Moves a boundary vertex to where it stays from here on, at a corner of the target's boundary: no angle there is
+  /// charged for, since the target leaves no choice. Once measure_all() is done. @return false where that would fold
+  bool pin(Index vertex, const Vec3& position);
+  [[nodiscard]] bool is_pinned(Index vertex) const { return vertex < is_pinned_.size() && is_pinned_[vertex] != 0; }
 
   /// Measures a triangle also at its centre and in the middle of its edges. @param nearest may be quick and too far
   void measure_middle(Index t, const NearestPoint& nearest);
@@ -132,8 +140,10 @@ private:
   };
   struct LeastSquares;
 
+  static Vec3 area_vector(const std::array<Vec3, 3>& c) { return (c[1] - c[0]).cross(c[2] - c[0]); }
   [[nodiscard]] std::array<Vec3, 3> corners(const std::array<Index, 3>& triangle, const PatchTrial& trial) const;
-  [[nodiscard]] double shape_cost(const std::array<Vec3, 3>& corners) const;
+  [[nodiscard]] double smallest_angle(const std::array<Index, 3>& triangle, const std::array<Vec3, 3>& corners) const;
+  [[nodiscard]] double shape_cost(const std::array<Index, 3>& triangle, const std::array<Vec3, 3>& corners) const;
   [[nodiscard]] double error_cost(double error) const;
   [[nodiscard]] bool folds(const PatchTrial& trial) const;
   [[nodiscard]] bool faces_away(const std::array<Vec3, 3>& corners, Index guess) const;
@@ -159,6 +169,7 @@ private:
   std::vector<std::uint8_t> on_target_;  // #V of the mesh as given, see TargetSamples
   std::vector<double> vertex_error_;     // #V distance of each vertex to the target
   std::vector<State> states_;
+  std::vector<std::uint8_t> is_pinned_;        // #V
   mutable std::vector<double> shape_cost_;     // #T as far as known
   std::vector<std::array<double, 3>> middle_;  // #T squared distances in the middle of each edge, as far as known
   std::vector<BoundaryCurves::Place> places_;

@@ -9,7 +9,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 namespace tunica {
 namespace {
@@ -25,6 +24,25 @@ constexpr int further_rounds = 6;
 constexpr double most_loss = 4;  // that a collapse may cost so that a split elsewhere may win more
 constexpr double crease_cosine = 0.5;
 
+// The vertices of the boundary where the angle of the surface is below `limit`, degrees.
+std::vector<Vec3> sharp_boundary_corners(const TriangleMesh& mesh, double limit) {
+  std::vector<double> angle(mesh.vertices.size(), 0);
+  for (const auto& c : mesh.triangles) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      angle[c[k]] += angle_degrees(mesh.vertices[c[k]], mesh.vertices[c[(k + 1) % 3]], mesh.vertices[c[(k + 2) % 3]]);
+    }
+  }
+  std::vector<Vec3> found;
+  for (const auto& loop : boundary_loops(mesh)) {
+    for (const Index v : loop) {
+      if (angle[v] < limit) {
+        found.push_back(mesh.vertices[v]);
+      }
+    }
+  }
+  return found;
+}
+
 class Shaper {
 public:
   Shaper(const TriangleMesh& mesh, const TriangleMesh& target, const ClosestPoint& tree, const BoundaryCurves& curves,
@@ -35,6 +53,7 @@ public:
         nearest_(nearest),
         options_(options) {
     state_.measure_all();
+    pin_sharp_corners();
     weights_.error = 1e-3 * diagonal(target);
     weights_.most_error = 0.01 * diagonal(target);
     weights_.angle_wanted = safe_angle * options.min_angle;
@@ -70,6 +89,40 @@ private:
         visit(t);
       }
     }
+  }
+
+  // Where the target's boundary has a corner sharper than the angle asked for, and the mesh has it too, the vertex
+  // there is put into it for good: to widen the corner would cost its tip, and the angle does not count.
+  void pin_sharp_corners() {
+    const std::vector<Vec3> sharp = sharp_boundary_corners(target_, options_.min_angle);
+    if (sharp.empty()) {
+      return;
+    }
+    std::vector<Index> rim;
+    for (Index v = 0; v < mesh().positions.size(); ++v) {
+      if (mesh().on_boundary[v] != 0) {
+        rim.push_back(v);
+      }
+    }
+    for (const Vec3& corner : sharp) {
+      const auto apart = [&](Index v) { return (mesh().positions[v] - corner).squaredNorm(); };
+      const auto closest =
+          std::min_element(rim.begin(), rim.end(), [&](Index l, Index r) { return apart(l) < apart(r); });
+      if (closest != rim.end() && !state_.is_pinned(*closest) && angle_at(*closest, corner) < options_.min_angle) {
+        state_.pin(*closest, corner);
+      }
+    }
+  }
+
+  // Of the mesh at a boundary vertex, if it were in that place.
+  [[nodiscard]] double angle_at(Index vertex, const Vec3& place) const {
+    double angle = 0;
+    for (const Index t : mesh().around[vertex]) {
+      const auto& c = mesh().triangles[t];
+      const std::size_t k = mesh().corner_of(t, vertex);
+      angle += angle_degrees(place, mesh().positions[c[(k + 1) % 3]], mesh().positions[c[(k + 2) % 3]]);
+    }
+    return angle;
   }
 
   void improve() {
@@ -461,9 +514,9 @@ bool has_sharp_sector(const TriangleMesh& mesh, Index v, std::span<const Index> 
     for (std::size_t step = 0; step < triangles.size(); ++step) {
       const std::size_t k = corner(t);
       const Vec3& p = mesh.vertices[v];
-      const Vec3 a = mesh.vertices[mesh.triangles[t][(k + 1) % 3]] - p;
-      const Vec3 b = mesh.vertices[mesh.triangles[t][(k + 2) % 3]] - p;
-      angle += std::atan2(a.cross(b).norm(), a.dot(b)) * 180 / std::numbers::pi;
+      const Vec3& a = mesh.vertices[mesh.triangles[t][(k + 1) % 3]];
+      const Vec3& b = mesh.vertices[mesh.triangles[t][(k + 2) % 3]];
+      angle += angle_degrees(p, a, b);
       const Index other = across[t][(k + 2) % 3];
       if (is_feature(t, other)) {
         break;
@@ -496,11 +549,11 @@ double smallest_free_angle(const TriangleMesh& mesh, const TriangleMesh& target,
   for (const auto& c : mesh.triangles) {
     for (std::size_t k = 0; k < 3; ++k) {
       const Vec3& p = mesh.vertices[c[k]];
-      const Vec3 a = mesh.vertices[c[(k + 1) % 3]] - p;
-      const Vec3 b = mesh.vertices[c[(k + 2) % 3]] - p;
-      const double angle = std::atan2(a.cross(b).norm(), a.dot(b)) * 180 / std::numbers::pi;
+      const Vec3& a = mesh.vertices[c[(k + 1) % 3]];
+      const Vec3& b = mesh.vertices[c[(k + 2) % 3]];
+      const double angle = angle_degrees(p, a, b);
       if (angle < limit) {
-        small.push_back({p, angle, 0.5 * std::min(a.norm(), b.norm())});
+        small.push_back({p, angle, 0.5 * std::min((a - p).norm(), (b - p).norm())});
       } else {
         least = std::min(least, angle);
       }

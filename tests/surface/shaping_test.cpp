@@ -141,6 +141,61 @@ TEST(Shaping, AngleAndErrorTogether) {
   EXPECT_LT(result.mesh.triangles.size(), mesh.triangles.size() / 6);
 }
 
+/// A wavy sheet of 40 by 40 squares of 1 mm with triangles on its rim at y = 0 that stick out 5 mm, 11 degrees sharp.
+TriangleMesh sheet_with_tips(const std::vector<Index>& tips) {
+  TriangleMesh mesh = shapes::plane(40, 40, 40, 40);
+  for (Vec3& v : mesh.vertices) {
+    v.z() = 1.5 * std::sin(0.2 * v.x()) * std::cos(0.2 * v.y());
+  }
+  for (const Index i : tips) {
+    mesh.vertices.emplace_back(0.5 * (mesh.vertices[i] + mesh.vertices[i + 1]) - Vec3(0, 5, 0));
+    mesh.triangles.push_back({i + 1, i, static_cast<Index>(mesh.vertices.size() - 1)});
+  }
+  return mesh;
+}
+
+TEST(Shaping, SharpCornersOfTheBoundaryAreNotWidened) {
+  DecimateOptions options;
+  options.min_angle = 20;
+  options.max_error = 0.2;
+  const std::size_t without = decimate(sheet_with_tips({}), options).mesh.triangles.size();
+  for (const std::vector<Index>& tips : {std::vector<Index>{20}, std::vector<Index>{6, 13, 20, 27, 34}}) {
+    const TriangleMesh mesh = sheet_with_tips(tips);
+    const DecimateResult result = decimate(mesh, options);
+    EXPECT_TRUE(result.error_kept && result.angle_held);
+    EXPECT_GE(result.smallest_angle, 20);
+    EXPECT_LE(distance(result.mesh, mesh), 0.2 + 1.1e-5 * diagonal(mesh));
+    // The rim beside each tip has to be finer than elsewhere.
+    EXPECT_LE(result.mesh.triangles.size(), without + 40 * tips.size());
+    for (std::size_t i = 0; i < tips.size(); ++i) {
+      const Vec3& apex = mesh.vertices[mesh.vertices.size() - 1 - i];
+      EXPECT_EQ(std::count(result.mesh.vertices.begin(), result.mesh.vertices.end(), apex), 1);
+    }
+    expect_same_topology(mesh, result.mesh);
+  }
+}
+
+TEST(Shaping, CornersOfTeethTooSmallForTheResultAreNoExcuse) {
+  // A rim of teeth, 17 degrees sharp, a third as wide as the result's edges are long.
+  TriangleMesh sheet = shapes::plane(160, 40);
+  for (Index i = 1; i < 160; i += 2) {
+    sheet.vertices[i].y() -= 0.04;
+  }
+  const DecimateResult result = decimated_to(sheet, 120, 20);
+  EXPECT_TRUE(result.angle_held);
+  EXPECT_GE(min_angle_degrees(result.mesh), 20);
+}
+
+TEST(Shaping, AMeshThatHoldsTheAngleIsTheLastResortForAnError) {
+  const TriangleMesh mesh = sheet_with_tips({20});
+  DecimateOptions options;
+  options.min_angle = 20;
+  options.max_error = 1e-6;
+  const DecimateResult result = decimate(mesh, options);
+  EXPECT_TRUE(result.error_kept && result.angle_held);
+  EXPECT_EQ(result.mesh.triangles.size(), mesh.triangles.size());
+}
+
 TEST(Shaping, AnAngleThatCannotBeHeldIsSaid) {
   // Two triangles cannot fill a narrow strip well.
   const TriangleMesh strip = shapes::plane(40, 2, 1, 0.02);

@@ -60,6 +60,34 @@ class Decimate(WholeTool):
         self.assertLessEqual(both["hausdorff_percent"]["upper"], 1)
         self.assertLess(both["triangles"], 500)
 
+    def test_min_angle_leaves_sharp_corners_of_the_boundary(self):
+        n = 40
+        for tips, most in [([20], 250), ([6, 13, 20, 27, 34], 400)]:
+            vertices = [(float(i), float(j), 1.5 * math.sin(0.2 * i) * math.cos(0.2 * j))
+                        for j in range(n + 1) for i in range(n + 1)]
+            triangles = [t for j in range(n) for i in range(n) for a in [j * (n + 1) + i]
+                         for t in [(a, a + 1, a + n + 2), (a, a + n + 2, a + n + 1)]]
+            for i in tips:  # 5 mm out, 11 degrees
+                vertices.append((i + 0.5, -5.0, (vertices[i][2] + vertices[i + 1][2]) / 2))
+                triangles.append((i + 1, i, len(vertices) - 1))
+            meshes.write_ply(self.path("in.ply"), vertices, triangles, comments=["units mm"])
+            result = self.run_tool("in.ply", "out.ply", "--min-angle", 20, "--max-error", "0.2mm", "--force")["result"]
+            self.assertLess(result["triangles"], most)
+            self.assertLessEqual(result["hausdorff_mm"]["upper"], 0.2)
+            # The tips are as sharp as they were, but for chords along their sides; nothing else is.
+            self.assertGreater(result["min_angle_deg"], 10)
+            self.assertLess(result["min_angle_deg"], 13)
+            _, rows, faces = meshes.read_ply(self.path("out.ply"))
+            sharp = set()
+            for face in faces:
+                for k in range(3):
+                    p, a, b = (rows[face[(k + m) % 3]] for m in range(3))
+                    u, v = [x - y for x, y in zip(a, p)], [x - y for x, y in zip(b, p)]
+                    cosine = sum(x * y for x, y in zip(u, v)) / math.hypot(*u) / math.hypot(*v)
+                    if cosine > math.cos(math.radians(20)):
+                        sharp.add(tuple(p[:2]))
+            self.assertEqual(sharp, {(i + 0.5, -5.0) for i in tips})
+
     def test_min_angle_that_cannot_be_held(self):
         strip = [(float(x), y, 0.0) for x in range(11) for y in (0.0, 0.2)]
         triangles = [t for i in range(0, 20, 2) for t in ((i, i + 2, i + 3), (i, i + 3, i + 1))]
