@@ -200,7 +200,11 @@ private:
 class ShapedSearch {
 public:
   ShapedSearch(const TriangleMesh& mesh, const DecimateOptions& options, EdgeCollapse collapse)
-      : mesh_(mesh), options_(options), tree_(mesh), collapse_(std::move(collapse)) {
+      : mesh_(mesh),
+        options_(options),
+        sharp_(sharp_corners(mesh, *options.min_angle)),
+        tree_(mesh),
+        collapse_(std::move(collapse)) {
     distance_.width = 1e-3 * options.max_error.value_or(0);
     distance_.samples = 0;
     distance_.max_splits = 2'000'000;
@@ -272,6 +276,7 @@ private:
     ShapingOptions shape;
     shape.min_angle = *options_.min_angle;
     shape.triangles = count;
+    shape.sharp_corners = sharp_;
     if (!options_.max_error) {
       shape.progress = [&](double fraction) { advance(options_.progress, 0.1 + 0.9 * fraction); };
     }
@@ -282,7 +287,7 @@ private:
   }
 
   void measure(DecimateResult& found) const {
-    found.smallest_angle = smallest_free_angle(found.mesh, mesh_, *options_.min_angle);
+    found.smallest_angle = smallest_free_angle(found.mesh, sharp_, *options_.min_angle);
     found.angle_held = found.smallest_angle >= *options_.min_angle;
     found.count_reached = !options_.triangles || found.mesh.triangles.size() <= *options_.triangles;
     if (options_.max_error) {
@@ -293,6 +298,7 @@ private:
 
   const TriangleMesh& mesh_;
   const DecimateOptions& options_;
+  std::vector<SharpCorner> sharp_;
   ClosestPoint tree_;
   EdgeCollapse collapse_;
   HausdorffOptions distance_;

@@ -345,12 +345,15 @@ bool ShapedMesh::make_flip(Index u, Index v, PatchTrial& trial) const {
 }
 
 bool ShapedMesh::make_collapse(Index u, Index v, PatchTrial& trial) const {
-  if (!mesh_.may_collapse(u, v) || (is_pinned(u) && is_pinned(v))) {
+  if (!mesh_.may_collapse(u, v)) {
     return false;
   }
-  const bool v_is_kept = is_pinned(v) || (mesh_.on_boundary[v] != 0 && mesh_.on_boundary[u] == 0);
+  const bool v_is_kept = mesh_.on_boundary[u] == mesh_.on_boundary[v] ? is_pinned(v) : mesh_.on_boundary[v] != 0;
   const Index kept = v_is_kept ? v : u;
   const Index gone = v_is_kept ? u : v;
+  if (is_pinned(gone)) {
+    return false;
+  }
   trial.removed = mesh_.around[kept];
   trial.corners.clear();
   for (const Index t : mesh_.around[gone]) {

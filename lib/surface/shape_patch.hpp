@@ -84,8 +84,9 @@ public:
   [[nodiscard]] double smallest_angle(Index t) const;
   [[nodiscard]] const BoundaryCurves::Place& place(Index vertex) const { return places_[vertex]; }
 
-  /// Moves a boundary vertex to where it stays from here on, at a corner of the target's boundary: no angle there is
-  /// charged for, since the target leaves no choice. Once measure_all() is done. @return false where that would fold
+  /// Moves a vertex to where it stays from here on, at a sharp corner of the target's boundary or creases: its angle in
+  /// a triangle is not charged for, since the target leaves no choice. Once measure_all() is done. @return false where
+  /// that would fold
   bool pin(Index vertex, const Vec3& position);
   [[nodiscard]] bool is_pinned(Index vertex) const { return vertex < is_pinned_.size() && is_pinned_[vertex] != 0; }
 

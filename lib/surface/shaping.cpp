@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace tunica {
 namespace {
@@ -24,23 +25,45 @@ constexpr int further_rounds = 6;
 constexpr double most_loss = 4;  // that a collapse may cost so that a split elsewhere may win more
 constexpr double crease_cosine = 0.5;
 
-// The vertices of the boundary where the angle of the surface is below `limit`, degrees.
-std::vector<Vec3> sharp_boundary_corners(const TriangleMesh& mesh, double limit) {
-  std::vector<double> angle(mesh.vertices.size(), 0);
-  for (const auto& c : mesh.triangles) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      angle[c[k]] += angle_degrees(mesh.vertices[c[k]], mesh.vertices[c[(k + 1) % 3]], mesh.vertices[c[(k + 2) % 3]]);
+// Whether the surface around a vertex has a sector between boundary or crease edges that is narrower than `limit`.
+bool has_sharp_sector(const TriangleMesh& mesh, Index v, std::span<const Index> triangles,
+                      const std::vector<std::array<Index, 3>>& across, double limit) {
+  const auto normal = [&](Index t) {
+    const auto& [i, j, k] = mesh.triangles[t];
+    const Vec3& a = mesh.vertices[i];
+    return Vec3((mesh.vertices[j] - a).cross(mesh.vertices[k] - a).normalized());
+  };
+  const auto corner = [&](Index t) {
+    const auto& c = mesh.triangles[t];
+    return static_cast<std::size_t>(std::find(c.begin(), c.end(), v) - c.begin());
+  };
+  const auto is_feature = [&](Index t, Index other) {
+    return other == no_neighbour || normal(t).dot(normal(other)) < crease_cosine;
+  };
+  for (const Index first : triangles) {
+    // A sector begins at a triangle behind a feature edge, and runs counter-clockwise to the next one.
+    if (!is_feature(first, across[first][corner(first)])) {
+      continue;
     }
-  }
-  std::vector<Vec3> found;
-  for (const auto& loop : boundary_loops(mesh)) {
-    for (const Index v : loop) {
-      if (angle[v] < limit) {
-        found.push_back(mesh.vertices[v]);
+    double angle = 0;
+    Index t = first;
+    for (std::size_t step = 0; step < triangles.size(); ++step) {
+      const std::size_t k = corner(t);
+      const Vec3& p = mesh.vertices[v];
+      const Vec3& a = mesh.vertices[mesh.triangles[t][(k + 1) % 3]];
+      const Vec3& b = mesh.vertices[mesh.triangles[t][(k + 2) % 3]];
+      angle += angle_degrees(p, a, b);
+      const Index other = across[t][(k + 2) % 3];
+      if (is_feature(t, other)) {
+        break;
       }
+      t = other;
+    }
+    if (angle < limit) {
+      return true;
     }
   }
-  return found;
+  return false;
 }
 
 class Shaper {
@@ -53,7 +76,7 @@ public:
         nearest_(nearest),
         options_(options) {
     state_.measure_all();
-    pin_sharp_corners();
+    pin_sharp_corners(mesh);
     weights_.error = 1e-3 * diagonal(target);
     weights_.most_error = 0.01 * diagonal(target);
     weights_.angle_wanted = safe_angle * options.min_angle;
@@ -91,38 +114,37 @@ private:
     }
   }
 
-  // Where the target's boundary has a corner sharper than the angle asked for, and the mesh has it too, the vertex
-  // there is put into it for good: to widen the corner would cost its tip, and the angle does not count.
-  void pin_sharp_corners() {
-    const std::vector<Vec3> sharp = sharp_boundary_corners(target_, options_.min_angle);
-    if (sharp.empty()) {
+  // Where the target has a corner sharper than the angle asked for, and the mesh has it too, the vertex there is put
+  // into it for good: to widen the corner would cost its tip, and the angle does not count.
+  void pin_sharp_corners(TriangleMesh coarse) {
+    if (options_.sharp_corners.empty()) {
       return;
     }
+    const Incidence around = incidence(coarse);
+    const auto across = neighbours(coarse, around);
+    const ClosestPoint tree(coarse);
     std::vector<Index> rim;
-    for (Index v = 0; v < mesh().positions.size(); ++v) {
+    for (Index v = 0; v < coarse.vertices.size(); ++v) {
       if (mesh().on_boundary[v] != 0) {
         rim.push_back(v);
       }
     }
-    for (const Vec3& corner : sharp) {
-      const auto apart = [&](Index v) { return (mesh().positions[v] - corner).squaredNorm(); };
+    for (const SharpCorner& corner : options_.sharp_corners) {
+      const auto& near = coarse.triangles[tree.closest(corner.at).triangle];
+      const std::vector<Index> candidates = corner.on_boundary ? rim : std::vector<Index>(near.begin(), near.end());
+      const auto apart = [&](Index v) { return (coarse.vertices[v] - corner.at).squaredNorm(); };
       const auto closest =
-          std::min_element(rim.begin(), rim.end(), [&](Index l, Index r) { return apart(l) < apart(r); });
-      if (closest != rim.end() && !state_.is_pinned(*closest) && angle_at(*closest, corner) < options_.min_angle) {
-        state_.pin(*closest, corner);
+          std::min_element(candidates.begin(), candidates.end(), [&](Index l, Index r) { return apart(l) < apart(r); });
+      if (closest == candidates.end() || state_.is_pinned(*closest) ||
+          (mesh().on_boundary[*closest] != 0) != corner.on_boundary) {
+        continue;
+      }
+      const Vec3 before = std::exchange(coarse.vertices[*closest], corner.at);
+      const bool has_it = has_sharp_sector(coarse, *closest, around.of(*closest), across, options_.min_angle);
+      if (!has_it || !state_.pin(*closest, corner.at)) {
+        coarse.vertices[*closest] = before;
       }
     }
-  }
-
-  // Of the mesh at a boundary vertex, if it were in that place.
-  [[nodiscard]] double angle_at(Index vertex, const Vec3& place) const {
-    double angle = 0;
-    for (const Index t : mesh().around[vertex]) {
-      const auto& c = mesh().triangles[t];
-      const std::size_t k = mesh().corner_of(t, vertex);
-      angle += angle_degrees(place, mesh().positions[c[(k + 1) % 3]], mesh().positions[c[(k + 2) % 3]]);
-    }
-    return angle;
   }
 
   void improve() {
@@ -489,47 +511,6 @@ private:
   std::vector<std::uint8_t> dirty_, touched_;
 };
 
-// Whether the surface around a vertex has a sector between boundary or crease edges that is narrower than `limit`.
-bool has_sharp_sector(const TriangleMesh& mesh, Index v, std::span<const Index> triangles,
-                      const std::vector<std::array<Index, 3>>& across, double limit) {
-  const auto normal = [&](Index t) {
-    const auto& [i, j, k] = mesh.triangles[t];
-    const Vec3& a = mesh.vertices[i];
-    return Vec3((mesh.vertices[j] - a).cross(mesh.vertices[k] - a).normalized());
-  };
-  const auto corner = [&](Index t) {
-    const auto& c = mesh.triangles[t];
-    return static_cast<std::size_t>(std::find(c.begin(), c.end(), v) - c.begin());
-  };
-  const auto is_feature = [&](Index t, Index other) {
-    return other == no_neighbour || normal(t).dot(normal(other)) < crease_cosine;
-  };
-  for (const Index first : triangles) {
-    // A sector begins at a triangle behind a feature edge, and runs counter-clockwise to the next one.
-    if (!is_feature(first, across[first][corner(first)])) {
-      continue;
-    }
-    double angle = 0;
-    Index t = first;
-    for (std::size_t step = 0; step < triangles.size(); ++step) {
-      const std::size_t k = corner(t);
-      const Vec3& p = mesh.vertices[v];
-      const Vec3& a = mesh.vertices[mesh.triangles[t][(k + 1) % 3]];
-      const Vec3& b = mesh.vertices[mesh.triangles[t][(k + 2) % 3]];
-      angle += angle_degrees(p, a, b);
-      const Index other = across[t][(k + 2) % 3];
-      if (is_feature(t, other)) {
-        break;
-      }
-      t = other;
-    }
-    if (angle < limit) {
-      return true;
-    }
-  }
-  return false;
-}
-
 }  // namespace
 
 TriangleMesh shaped(const TriangleMesh& mesh, const TriangleMesh& target, const ClosestPoint& tree,
@@ -539,7 +520,24 @@ TriangleMesh shaped(const TriangleMesh& mesh, const TriangleMesh& target, const 
   return Shaper(mesh, target, tree, curves, options, nearest).run();
 }
 
-double smallest_free_angle(const TriangleMesh& mesh, const TriangleMesh& target, double limit) {
+std::vector<SharpCorner> sharp_corners(const TriangleMesh& mesh, double limit) {
+  const Incidence around = incidence(mesh);
+  const auto across = neighbours(mesh, around);
+  std::vector<SharpCorner> found;
+  for (Index v = 0; v < mesh.vertices.size(); ++v) {
+    const auto triangles = around.of(v);
+    if (has_sharp_sector(mesh, v, triangles, across, limit)) {
+      const bool on_boundary = std::any_of(triangles.begin(), triangles.end(), [&](Index t) {
+        const auto& c = mesh.triangles[t];
+        return across[t][static_cast<std::size_t>(std::find(c.begin(), c.end(), v) - c.begin())] == no_neighbour;
+      });
+      found.push_back({mesh.vertices[v], on_boundary});
+    }
+  }
+  return found;
+}
+
+double smallest_free_angle(const TriangleMesh& mesh, std::span<const SharpCorner> sharp, double limit) {
   struct Small {
     Vec3 at;
     double angle, reach;
@@ -559,19 +557,9 @@ double smallest_free_angle(const TriangleMesh& mesh, const TriangleMesh& target,
       }
     }
   }
-  if (small.empty()) {
-    return least;
-  }
-  const Incidence around = incidence(target);
-  const auto across = neighbours(target, around);
-  std::vector<Vec3> sharp;
-  for (Index v = 0; v < target.vertices.size(); ++v) {
-    if (has_sharp_sector(target, v, around.of(v), across, limit)) {
-      sharp.push_back(target.vertices[v]);
-    }
-  }
   for (const Small& s : small) {
-    if (std::none_of(sharp.begin(), sharp.end(), [&](const Vec3& p) { return (p - s.at).norm() <= s.reach; })) {
+    if (std::none_of(sharp.begin(), sharp.end(),
+                     [&](const SharpCorner& c) { return (c.at - s.at).norm() <= s.reach; })) {
       least = std::min(least, s.angle);
     }
   }

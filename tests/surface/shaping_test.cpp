@@ -3,6 +3,8 @@
 #include "surface/checks.hpp"
 #include "surface/decimated.hpp"
 #include "surface/incidence.hpp"
+#include "surface/measure.hpp"
+#include "surface/shape_patch.hpp"
 #include "surface/shapes.hpp"
 
 #include <gtest/gtest.h>
@@ -175,6 +177,60 @@ TEST(Shaping, SharpCornersOfTheBoundaryAreNotWidened) {
   }
 }
 
+TEST(Shaping, SharpCornersOfCreasesAreNotWidened) {
+  // A pyramid of 4 by 4 and 20 high: its sides meet in corners of 11 degrees.
+  TriangleMesh pyramid{{{-2, -2, 0}, {2, -2, 0}, {2, 2, 0}, {-2, 2, 0}, {0, 0, 20}, {0, 0, 0}},
+                       {{{0, 1, 4}, {1, 2, 4}, {2, 3, 4}, {3, 0, 4}, {1, 0, 5}, {2, 1, 5}, {3, 2, 5}, {0, 3, 5}}}};
+  for (int i = 0; i < 4; ++i) {
+    pyramid = shapes::split(pyramid);
+  }
+  DecimateOptions options;
+  options.min_angle = 20;
+  options.max_error = 0.1;
+  const DecimateResult result = decimate(pyramid, options);
+  EXPECT_TRUE(result.error_kept && result.angle_held);
+  EXPECT_LE(result.mesh.triangles.size(), 70U);
+  EXPECT_EQ(std::count(result.mesh.vertices.begin(), result.mesh.vertices.end(), Vec3(0, 0, 20)), 1);
+  expect_same_topology(pyramid, result.mesh);
+}
+
+TEST(Shaping, PinnedVerticesStay) {
+  const TriangleMesh sheet = shapes::plane(4, 4);
+  const ClosestPoint tree(sheet);
+  const BoundaryCurves curves(sheet);
+  const NearestPoint nearest = [&tree](const Vec3& p, Index near, double) { return tree.closest(p, near); };
+  ShapedMesh state(sheet, sheet, nearest, sample_target(sheet, sheet, tree), curves);
+  state.measure_all();
+  const Index inner = 6, neighbour = 7, rim = 1;  // (1/4, 1/4), (1/2, 1/4) and (1/4, 0)
+  const Vec3 place(0.3, 0.05, 0);
+  ASSERT_FALSE(state.pin(inner, {0.3, -0.1, 0}));  // that would fold
+  EXPECT_FALSE(state.is_pinned(inner));
+  ASSERT_TRUE(state.pin(inner, place));
+  EXPECT_EQ(state.mesh().positions[inner], place);
+  PatchTrial trial;
+  state.make_move(inner, {0.25, 0.25, 0}, trial);
+  EXPECT_EQ(state.evaluate(trial, 1e300), std::numeric_limits<double>::infinity());
+  EXPECT_FALSE(state.make_collapse(inner, rim, trial));
+  EXPECT_FALSE(state.make_collapse(rim, inner, trial));
+  for (const auto& [u, v] : {std::pair(inner, neighbour), std::pair(neighbour, inner)}) {
+    ASSERT_TRUE(state.make_collapse(u, v, trial));
+    EXPECT_EQ(trial.moved, inner);
+    EXPECT_EQ(trial.position, place);
+  }
+  // The triangle below it is flat there; what it has beside the rim is charged for.
+  for (const Index t : state.mesh().around[inner]) {
+    const auto& c = state.mesh().triangles[t];
+    double smallest = 180;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto& at = state.mesh().positions;
+      if (c[k] != inner) {
+        smallest = std::min(smallest, angle_degrees(at[c[k]], at[c[(k + 1) % 3]], at[c[(k + 2) % 3]]));
+      }
+    }
+    EXPECT_DOUBLE_EQ(state.smallest_angle(t), smallest);
+  }
+}
+
 TEST(Shaping, CornersOfTeethTooSmallForTheResultAreNoExcuse) {
   // A rim of teeth, 17 degrees sharp, a third as wide as the result's edges are long.
   TriangleMesh sheet = shapes::plane(160, 40);
@@ -209,9 +265,9 @@ TEST(Shaping, CornersSharperThanAskedForAreExempt) {
   // A wedge of 10 degrees as one fan: the tip cannot be better, the other angles are what they are.
   const double tip = 10 * std::numbers::pi / 180;
   const TriangleMesh wedge{{{0, 0, 0}, {1, 0, 0}, {std::cos(tip), std::sin(tip), 0}}, {{{0, 1, 2}}}};
-  EXPECT_EQ(smallest_free_angle(wedge, wedge, 20), 60);
+  EXPECT_EQ(smallest_free_angle(wedge, sharp_corners(wedge, 20), 20), 60);
   // The same triangle within a plane has no such excuse.
-  EXPECT_NEAR(smallest_free_angle(wedge, shapes::plane(4, 4), 20), 10, 1e-9);
+  EXPECT_NEAR(smallest_free_angle(wedge, sharp_corners(shapes::plane(4, 4), 20), 20), 10, 1e-9);
 }
 
 TEST(Shaping, TheSameMeshEveryTime) {
