@@ -79,7 +79,7 @@ void declare(cli::Tool& tool, Arguments& given) {
       ->type_name("DEG");
   app.add_option("--max-iterations", given.max_iterations,
                  "at most N iterations (barycentre: 20, with --refine 60; fit: 8 rounds, or 1 to many shells on a "
-                 "smooth target; to a tolerance as many, and 5 of exchanges)")
+                 "smooth target; to a tolerance as many, and no limit of exchanges)")
       ->check(cli::whole_number(1, 100000))
       ->type_name("N");
   app.add_option("--map", given.map, "error map: the curved surface with its distance to the target, PLY")

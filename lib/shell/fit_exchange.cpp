@@ -6,6 +6,7 @@
 #include "shell/fit_cross.hpp"
 #include "shell/fit_detach.hpp"
 #include "shell/fit_edit.hpp"
+#include "shell/fit_minimax.hpp"
 #include "shell/fit_missed.hpp"
 #include "shell/fit_polish.hpp"
 #include "shell/fit_region.hpp"
@@ -30,31 +31,38 @@ constexpr std::size_t most_before_parting = 150;  // of these more, where normal
 constexpr std::size_t most_shells = 600, most_on_coarse_targets = 1300;
 constexpr std::size_t coarse_target = 250;       // triangles per shell: walks on denser ones are what a piece costs
 constexpr int fewest_rings = 1, most_rings = 3;  // of nodes around a merger that move with it
-constexpr int regaining = 4;                     // steps of all nodes of a piece
+constexpr int regaining = 6;                     // steps that lessen the largest error of a piece
 constexpr double loosened = 4;                   // limits: error of a merger before its piece is fitted anew
 constexpr double thin_angle = 5;                 // degrees, for the time being
-constexpr double promising = 1.3, promising_soon = 1.1;  // limits: after one step, and later: more hardly ever recovers
-constexpr double slow = 0.97;                            // of the error is left by a step that brings little
-constexpr std::array<double, 3> joining{1, 0.95, 0.9};   // of the limit
-constexpr int easing = 8;                                // steps of all nodes
-constexpr std::size_t least_kick = 2, shells_per_split = 10;
-constexpr int patience = 2;      // times that bring nothing
-constexpr int certificates = 3;  // per change
+constexpr double promising_at_first = 2;         // limits: after a step of least squares; more hardly ever recovers
+constexpr std::array<double, 6> promising{1.12, 1.06, 1.04, 1.03, 1.02, 1.02};  // limits: foretold of steps after that
+constexpr double spare = 0.97;                          // of the limit: room for what a certificate finds
+constexpr std::array<double, 3> joining{1, 0.95, 0.9};  // of the limit
+constexpr int easing = 8;                               // steps of all nodes
+constexpr int rings_of_a_kick = 2;                      // of nodes around a place
+constexpr std::size_t splits_of_a_kick = 2, fits_after_a_kick = 60;
+constexpr int patience = 2;  // times that bring nothing
+// Of the tolerance. Certificates end with intervals that wide, below it or not: what one finds just below may be above
+// in the next, which looks at more.
+constexpr double certainly = 1 - width_of_certificates;
+constexpr int certificates = 8;  // per change: each tells of points that the samples missed
 
 bool recovers(FitState& piece, double limit) {
-  double before = std::numeric_limits<double>::infinity();
-  for (int i = 0; i < regaining && piece.error() > limit && piece.error() < slow * before; ++i) {
-    before = i == 0 ? before : piece.error();
-    flip_edges(piece, limit);
-    piece.solve(i == 0 ? 4 : 8, 1);
-    place_worst(piece, 0.9 * limit);
-    piece.attach_again();
-    piece.measure();
-    if (piece.error() > (i == 0 ? promising : promising_soon) * limit) {
-      break;
-    }
+  if (piece.error() <= limit) {
+    return true;
   }
-  return piece.error() <= limit;
+  flip_edges(piece, limit);
+  piece.solve(4, 1);
+  piece.attach_again();
+  piece.measure();
+  if (piece.error() > promising_at_first * limit) {
+    return false;
+  }
+  std::array<double, promising.size()> hopeful = promising;
+  for (double& h : hopeful) {
+    h *= limit;
+  }
+  return lessen_largest(piece, spare * limit, regaining, hopeful) <= limit;
 }
 
 /// Fits a piece in which two nodes were merged, or one was taken out. @param shells, before  how many, and their price
@@ -91,14 +99,15 @@ public:
       : samples_(samples),
         state_(state),
         limit_(limit),
-        tolerance_(tolerance),
+        tolerance_(certainly * tolerance),
         crossings_(crossing_shells(state.mesh.shell()).size()),
         changed_(state.mesh.positions.size(), 1) {}
 
-  /// @param most  pieces fitted anew; @return how many were
+  /// Changes anywhere until there is none left to try.
+  /// @param most  pieces fitted anew, since the beginning; @return how many were
   std::size_t run(std::size_t most, std::mt19937& random) {
     for (int rings = fewest_rings; rings <= most_rings;) {
-      const std::size_t before = fits_;
+      const std::size_t before = price(state_);
       auto edges = state_.mesh.edges();
       for (std::size_t i = edges.size(); i > 1; --i) {
         std::swap(edges[i - 1], edges[random() % i]);
@@ -119,12 +128,64 @@ public:
           conclude(done, start);
         }
       }
-      rings += fits_ == before ? 1 : 0;
+      rings += price(state_) < before ? 0 : 1;
+    }
+    return fits_;
+  }
+
+  /// Splits a few edges somewhere and exchanges what is around: what then takes more shells than before is undone.
+  /// @param most  as of run(); @return likewise
+  std::size_t kick(std::size_t most, std::mt19937& random) {
+    const FitState before = state_;
+    const auto changed = changed_;
+    const auto tried = tried_;
+    const std::vector<SamplePoint> points = samples_.points();
+    const std::size_t crossings = crossings_;
+    if (!split_somewhere(random)) {
+      samples_.keep(points.size());
+      return ++fits_;
+    }
+    run(std::min(most, fits_ + fits_after_a_kick), random);
+    if (price(state_) > price(before)) {
+      state_ = before;
+      changed_ = changed;
+      tried_ = tried;
+      crossings_ = crossings;
+      samples_.take_points(points);
     }
     return fits_;
   }
 
 private:
+  /// @return whether that came off
+  bool split_somewhere(std::mt19937& random) {
+    Index node = 0;
+    do {
+      node = static_cast<Index>(random() % state_.mesh.around.size());
+    } while (state_.mesh.around[node].empty());
+    FitRegion region = cut_out(state_, {node}, rings_of_a_kick);
+    FitState& piece = region.state;
+    for (std::size_t i = 0; i < splits_of_a_kick; ++i) {
+      const auto edges = piece.mesh.edges();
+      const auto& [u, v] = edges[random() % edges.size()];
+      if (!piece.mesh.is_cut(u, v)) {
+        split_edge(piece, u, v, loosened * limit_);
+      }
+    }
+    piece.attach_again();
+    piece.measure();
+    if (piece.mesh.alive == region.triangles.size() || !recovers(piece, limit_)) {
+      return false;
+    }
+    mend_angles(piece, limit_);
+    const std::size_t dearer = price(state_) + 2 * splits_of_a_kick;
+    if (auto trial = sound(region, price(piece), dearer)) {
+      accept(std::move(*trial), region.nodes);
+      return true;
+    }
+    return false;
+  }
+
   /// Two nodes to be merged, or one (twice) to be taken out, and the rings around that move with them.
   using Change = std::array<Index, 3>;
 
@@ -202,7 +263,7 @@ private:
       return;
     }
     const std::size_t points = samples_.points().size();
-    if (auto trial = sound(*done.region, done.price_before)) {
+    if (auto trial = sound(*done.region, done.price_before, price(state_))) {
       accept(std::move(*trial), done.region->nodes);
     } else {
       samples_.keep(points);  // what only a piece that failed had to heed costs every other
@@ -210,11 +271,11 @@ private:
   }
 
   /// The whole with a changed piece, where no point is too far off that the samples missed, if need be after further
-  /// steps of the piece.
-  std::optional<FitState> sound(FitRegion& region, std::size_t price_before) {
+  /// steps of the piece. @param price_before, most  of the piece, and of the whole: no more afterwards
+  std::optional<FitState> sound(FitRegion& region, std::size_t price_before, std::size_t most) {
     for (int i = 0; i < certificates; ++i) {
       FitState trial = state_;
-      if (put_back(region, trial) > limit_ || worse(trial)) {
+      if (put_back(region, trial) > limit_ || worse(trial, most)) {
         return {};
       }
       const Box box = around(region);
@@ -264,9 +325,8 @@ private:
     }
   }
 
-  [[nodiscard]] bool worse(const FitState& trial) const {
-    return trial.error() > limit_ || price(trial) > price(state_) ||
-           crossing_shells(trial.mesh.shell()).size() > crossings_;
+  [[nodiscard]] bool worse(const FitState& trial, std::size_t most) const {
+    return trial.error() > limit_ || price(trial) > most || crossing_shells(trial.mesh.shell()).size() > crossings_;
   }
 
   /// What a changed piece may be close to, before and after.
@@ -322,31 +382,11 @@ bool is_certain(const FitState& state, double tolerance) {
 bool take_if_sound(FitSamples& samples, FitState trial, FitState& state, double limit, double tolerance) {
   if (!regains(samples, trial, limit) || price(trial) > price(state) ||
       crossing_shells(trial.mesh.shell()).size() > crossing_shells(state.mesh.shell()).size() ||
-      (!is_certain(trial, tolerance) && is_certain(state, tolerance))) {
+      (!is_certain(trial, certainly * tolerance) && is_certain(state, tolerance))) {
     return false;
   }
   state = std::move(trial);
   return true;
-}
-
-/// Exchanges until nothing comes of it any more, with the room that less error everywhere gives in between.
-/// @param left  pieces that may be fitted anew; @return how many of these are left
-std::size_t dig(FitSamples& samples, FitState& state, double limit, double tolerance, std::size_t left,
-                std::mt19937& random) {
-  for (int fruitless = 0; fruitless < patience && left > 0;) {
-    const std::size_t before = price(state);
-    FitState squeezed = state;
-    squeeze(samples, squeezed, limit);
-    if (price(squeezed) < before) {
-      take_if_sound(samples, std::move(squeezed), state, limit, tolerance);
-    }
-    left -= Exchange(samples, state, limit, tolerance).run(left, random);
-    FitState eased = state;
-    settle(eased, easing);
-    take_if_sound(samples, std::move(eased), state, limit, tolerance);
-    fruitless = price(state) < before ? 0 : fruitless + 1;
-  }
-  return left;
 }
 
 /// Joins normals as long as the error allows. One after the other they may ask too much of those that follow: then
@@ -363,74 +403,96 @@ void join_again(FitSamples& samples, FitState& state, double limit, double toler
   }
 }
 
-/// A mesh of shells from which a search may end elsewhere: some edges at random are split.
-std::optional<FitState> kicked(FitSamples& samples, const FitState& from, double limit, double tolerance,
-                               std::mt19937& random) {
-  FitState state = from;
-  const auto edges = state.mesh.edges();
-  const std::size_t splits = std::max(least_kick, from.mesh.alive / shells_per_split);
-  for (std::size_t i = 0; i < splits; ++i) {
-    const auto& [u, v] = edges[random() % edges.size()];
-    if (state.mesh.on_edge(u, v).count() > 0) {
-      split_edge(state, u, v, limit);
+/// The search of exchange_pieces(), with what is left of its budget.
+class Search {
+public:
+  Search(FitSamples& samples, FitState& state, const ExchangeOptions& options)
+      : samples_(samples),
+        state_(state),
+        options_(options),
+        all_(std::clamp(fits_per_shell * state.mesh.alive, fewest_fits, most_fits)),
+        left_(all_),
+        rounds_(options.rounds),
+        least_(price(state)) {}
+
+  void before_parting() {
+    Exchange(samples_, state_, options_.limit, options_.tolerance).run(most_before_parting, random_);
+    least_ = price(state_);
+  }
+
+  /// Exchanges until nothing comes of it any more, with the room that less error everywhere gives in between; then
+  /// after kicks.
+  void run() {
+    const auto& [limit, tolerance, kink, rounds, on_better, progress] = options_;
+    for (int fruitless = 0; fruitless < patience && goes_on();) {
+      const std::size_t before = price(state_);
+      FitState squeezed = state_;
+      squeeze(samples_, squeezed, limit);
+      if (price(squeezed) < before) {
+        take_if_sound(samples_, std::move(squeezed), state_, limit, tolerance);
+      }
+      left_ -= Exchange(samples_, state_, limit, tolerance).run(left_, random_);
+      FitState eased = state_;
+      settle(eased, easing);
+      lessen_largest(eased, 0, easing);
+      take_if_sound(samples_, std::move(eased), state_, limit, tolerance);
+      fruitless = price(state_) < before ? 0 : fruitless + 1;
+      tell();
+    }
+    Exchange kicked(samples_, state_, limit, tolerance);
+    for (const std::size_t most = left_; goes_on();) {
+      left_ = most - kicked.kick(most, random_);
+      tell();
     }
   }
-  rid_of_thin(state, limit, 2 * from.mesh.alive + 2 * splits);
-  state.attach();
-  state.measure();
-  if (!regains(samples, state, limit) || crossing_shells(state.mesh.shell()).size() > 0 ||
-      !is_certain(state, tolerance)) {
-    return {};
+
+private:
+  bool goes_on() { return left_ > 0 && rounds_-- > 0; }
+
+  void tell() {
+    advance(options_.progress, 1 - static_cast<double>(left_) / static_cast<double>(all_));
+    if (price(state_) < least_ && options_.on_better) {
+      options_.on_better(state_);
+    }
+    least_ = std::min(least_, price(state_));
   }
-  return state;
-}
+
+  FitSamples& samples_;
+  FitState& state_;
+  const ExchangeOptions& options_;
+  std::mt19937 random_;
+  std::size_t all_, left_;  // pieces that may be fitted anew
+  int rounds_;
+  std::size_t least_;  // price that was told of
+};
 
 }  // namespace
 
 void exchange_pieces(FitSamples& samples, FitState& state, const ExchangeOptions& options) {
-  const auto& [limit, tolerance, kink, tries, on_better, progress] = options;
   const bool coarse = samples.target().mesh().triangles.size() < coarse_target * state.mesh.alive;
   if (state.mesh.alive > (coarse ? most_on_coarse_targets : most_shells)) {
     return;
   }
-  const bool parting = kink > 0 && state.mesh.kind == Patch::comas;
-  std::mt19937 random;
-  const std::size_t all = std::clamp(fits_per_shell * state.mesh.alive, fewest_fits, most_fits);
-  std::size_t left = all;
-  if (parting) {
-    Exchange(samples, state, limit, tolerance).run(most_before_parting, random);
-  }
+  const bool parting = options.kink > 0 && state.mesh.kind == Patch::comas;
   FitState best = state;
-  const std::vector<SamplePoint> points = samples.points();
-  std::vector<SamplePoint> points_of_best = points;
-  for (int i = 0; i < tries && left > 0; ++i) {
-    advance(progress, 1 - static_cast<double>(left) / static_cast<double>(all));
-    samples.take_points(points_of_best);
-    std::optional<FitState> trial = i == 0 ? best : kicked(samples, best, limit, tolerance, random);
-    if (!trial) {
-      samples.take_points(points);
-      trial = state;
-    }
-    if (parting) {
-      trial->limits.kink = kink;
-      part_normals(*trial);
-    }
-    left = dig(samples, *trial, limit, tolerance, left, random);
-    if (price(*trial) < price(best) && trial->error() <= limit) {
-      best = std::move(*trial);
-      points_of_best = samples.points();
-      if (on_better) {
-        on_better(best);
-      }
-    }
+  std::vector<SamplePoint> points = samples.points();
+  Search search(samples, best, options);
+  if (parting) {
+    search.before_parting();
+    state = best;
+    points = samples.points();
+    best.limits.kink = options.kink;
+    part_normals(best);
   }
-  samples.take_points(std::move(points_of_best));
-  if (price(best) < price(state)) {
-    if (parting) {
-      join_again(samples, best, limit, tolerance);
-    }
-    state = std::move(best);
+  search.run();
+  if (!(price(best) < price(state)) || best.error() > options.limit) {
+    samples.take_points(std::move(points));
+    return;
   }
+  if (parting) {
+    join_again(samples, best, options.limit, options.tolerance);
+  }
+  state = std::move(best);
 }
 
 }  // namespace tunica

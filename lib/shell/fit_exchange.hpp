@@ -4,6 +4,7 @@
 #include "shell/fit_state.hpp"
 
 #include <functional>
+#include <limits>
 
 namespace tunica {
 
@@ -11,24 +12,24 @@ struct ExchangeOptions {
   double limit = 0;      ///< mm: no error of the samples is above it
   double tolerance = 0;  ///< mm: what certificates are to hold
   double kink = 0;       ///< degrees by which normals that meet at a node may part; 0: not at all
-  int tries = 5;         ///< meshes to search from: the given one, then the best of them with edges split at random
+  int rounds = std::numeric_limits<int>::max();         ///< searches at most: of the whole, then after kicks
   std::function<void(const FitState&)> on_better = {};  ///< told of every one with fewer shells
   Progress progress = {};
 };
 
 /// Fewer shells by changes of small pieces, each by itself: an edge taken at random is merged, or one of its nodes
 /// taken out where that is not possible, whatever that does to errors and angles for the time being, and the piece
-/// around it is fitted anew, if need be with a split where it is then worst. What is neither dearer (see price()) nor
-/// above `limit` (mm) nor crosses more is kept, so that also steps that bring nothing lead on to others, where a
-/// certificate of the surroundings finds nothing above `tolerance` (mm). Larger pieces once no smaller one is left that
-/// has changed since it was tried. Eight changes are tried at once, one of them is kept. Then the same with normals
-/// that may part, at corners that meet at a node, by `kink` degrees (none for 0): every patch follows the target more
-/// closely, so that fewer do; what the limit does not ask for is joined again, and the state keeps FitLimits::kink. Not
-/// for watertight patches: their edges follow the normals of both sides. Once that brings nothing more, edges of the
-/// best are split at random, to search from there. Deterministic, whatever the number of threads. Parallel. Cost: six
-/// pieces per shell are fitted anew, at least 600 and at most 6,000, some 20 ms each: what is far off after a step or
-/// two is given up. Of more than 600 shells none, of more than 1,300 where the target has fewer than 250 triangles per
-/// shell.
+/// around it is fitted anew so that its largest error is least (see lessen_largest()), if need be with a split where it
+/// is then worst. What is neither dearer (see price()) nor above `limit` (mm) nor crosses more is kept, so that also
+/// steps that bring nothing lead on to others, where a certificate of the surroundings finds nothing above `tolerance`
+/// (mm). Larger pieces once a round of smaller ones brought nothing. Eight changes are tried at once, one of them is
+/// kept. All that with normals that may part, at corners that meet at a node, by `kink` degrees (none for 0): every
+/// patch follows the target more closely, so that fewer do; what the limit does not ask for is joined again, and the
+/// state keeps FitLimits::kink. Not for watertight patches: their edges follow the normals of both sides. Once that
+/// brings nothing more, edges are split somewhere, to search on there: what does not come back to as few is undone.
+/// Deterministic, whatever the number of threads. Parallel. Cost: six pieces per shell are fitted anew, at least 600
+/// and at most 6,000, some 30 ms each: where too large an error is foretold they are given up. Of more than 600 shells
+/// none, of more than 1,300 where the target has fewer than 250 triangles per shell.
 void exchange_pieces(FitSamples& samples, FitState& state, const ExchangeOptions& options);
 
 }  // namespace tunica

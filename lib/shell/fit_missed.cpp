@@ -20,7 +20,6 @@ constexpr double grid_points = 60'000;              // of all patches
 constexpr int coarsest_grid = 8, finest_grid = 12;  // ridges of a coarse target lie between the points of a coarse grid
 constexpr int gap_points = 11;                      // per edge
 constexpr double narrow = 0.05;                     // of the limit: gaps that add nothing
-constexpr double width_of_certificates = 0.005;     // of the tolerance
 constexpr std::size_t most_added = 2000;            // points, at once
 constexpr int boundary_chords = 16;                 // per edge, for a look at the boundary
 constexpr double exact = 1.025;  // limits: what is looked at above gaps is the worst, so with less margin

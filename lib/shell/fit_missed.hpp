@@ -5,6 +5,9 @@
 
 namespace tunica {
 
+/// Of the tolerance: how wide the intervals are that holds_within() ends with.
+inline constexpr double width_of_certificates = 0.005;
+
 /// Points of the target farther from the curved surface than `limit` (mm), or of its boundary from the curved edges
 /// there, join the samples; the state has to be
 /// attached and measured anew to heed them. Of more than 2,000 an even share joins. @return how many

@@ -3,11 +3,13 @@
 
 #include "shell/fit_cross.hpp"
 #include "shell/fit_edit.hpp"
+#include "shell/fit_minimax.hpp"
 #include "shell/fit_missed.hpp"
 #include "shell/fit_shape.hpp"
 #include "shell/fit_worst.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace tunica {
@@ -17,7 +19,12 @@ constexpr double first_part = 0.05;             // of the shells: how many fewer
 constexpr double loosened = 1.5;                // limits: error of a merger that all nodes together may make good
 constexpr std::size_t squeezed_shells = 2'500;  // of all tries: what they may cost
 constexpr std::size_t least_squeezes = 1, most_squeezes = 12;
-constexpr int regaining = 8;  // steps of all nodes
+constexpr int regaining = 8;                 // steps of all nodes
+constexpr std::size_t minimax_shells = 600;  // of more, factorisations are what steps cost
+constexpr std::array<double, 8> promising{1.12, 1.06, 1.04, 1.03, 1.02, 1.02, 1.02, 1.02};  // limits: foretold of steps
+constexpr int minimax_tries = 2;
+constexpr double hopeful = 1.6;  // limits: errors that lessening the largest may bring within
+constexpr double spare = 0.98;   // of the limit: room for what further points find
 constexpr int few_splits = 3;
 constexpr int looks = 12;  // for points that the samples missed
 
@@ -29,12 +36,20 @@ std::size_t price(const FitState& state) {
 
 bool regains(FitSamples& samples, FitState& state, double limit) {
   for (int look = 0; look < looks; ++look) {
-    for (int i = 0; i < regaining && state.error() > limit; ++i) {
+    for (int i = 0, minimax = 0; i < regaining && minimax < minimax_tries && state.error() > limit; ++i) {
       flip_edges(state, limit);
       state.solve(i == 0 ? 4 : 8, 1);
       place_worst(state, 0.9 * limit);
       state.attach();
       state.measure();
+      if (i > 0 && state.mesh.alive <= minimax_shells && state.error() < hopeful * limit) {
+        std::array<double, promising.size()> at_most = promising;
+        for (double& error : at_most) {
+          error *= limit;
+        }
+        lessen_largest(state, spare * limit, promising.size(), at_most);
+        ++minimax;
+      }
     }
     if (state.error() > limit) {
       return false;

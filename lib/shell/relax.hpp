@@ -43,7 +43,8 @@ struct RelaxOptions {
   /// tolerance 10 or 5 where plain decimation makes needles, as along cylinders, and that saves a quarter of the
   /// shells. From 1 to 30.
   std::optional<double> min_angle;
-  std::optional<int> max_iterations;  ///< none: 20, with refine 60; fit: 8 rounds, see fit(), and 5 of exchanges
+  std::optional<int> max_iterations;  ///< none: 20, with refine 60; fit: 8 rounds, see fit(), and as many of exchanges
+                                      ///< as these take
   std::optional<double> width;        ///< mm: of the measured intervals; none: 0.01 % of the target's diagonal
   /// Tells how it goes; the mesh is the best one until then.
   std::function<void(const RelaxIteration&, const ShellMesh&)> on_iteration;
