@@ -45,8 +45,8 @@ void declare(cli::Tool& tool, Arguments& given) {
       ->type_name("DEG");
   app.add_flag(
       "--repair", given.repair,
-      "mend an IN that is no oriented manifold: drop double and degenerate triangles, turn those that face the "
-      "wrong way, take apart what meets at too many; holes stay");
+      "mend an IN that is no oriented manifold: drop double triangles and pieces without area, turn triangles that "
+      "face the wrong way, take apart what meets at too many; holes stay");
 }
 
 std::optional<std::size_t> wanted_triangles(const Arguments& given) {
@@ -119,6 +119,12 @@ void warn_of_changes(const cli::Tool& tool, const fs::path& in, const DecimateRe
 // Which requirement was not met, in words; none when all were.
 std::optional<std::string> what_failed(const Arguments& given, const DecimateResult& result) {
   const std::size_t count = result.mesh.triangles.size();
+  if (!result.error_kept && result.long_spikes > 0) {
+    return fmt::format(
+        "its spikes without area, up to {:.4g} mm long, cannot stay with --min-angle nor go within "
+        "--max-error; allow more error",
+        result.longest_spike);
+  }
   if (!result.error_kept) {
     return fmt::format("the error asked for by --max-error is below what double precision can certify ({:.3g} mm)",
                        result.error->upper);

@@ -9,6 +9,7 @@
 #include "shell/curved_surface.hpp"
 #include "shell/fit_cross.hpp"
 #include "surface/checks.hpp"
+#include "surface/degenerate.hpp"
 #include "surface/hausdorff.hpp"
 #include "surface/measure.hpp"
 
@@ -16,6 +17,7 @@
 
 #include <cmath>
 #include <tuple>
+#include <utility>
 
 namespace fs = std::filesystem;
 using namespace tunica;
@@ -25,8 +27,10 @@ namespace {
 constexpr double interval_width = 1e-4;  // of the diagonal: what the report certifies
 constexpr double rounding = 1e-9;        // of the diagonal: by which a certified interval may be wider than asked
 constexpr double curved_deviation =
-    0.8e-5;                          // of the diagonal; the contract of --curved, 1e-5, may be taken of either surface
-constexpr double largest_kink = 90;  // degrees
+    0.8e-5;  // of the diagonal; the contract of --curved, 1e-5, may be taken of either surface
+constexpr double most_for_spikes = 0.9;             // of the tolerance
+constexpr double usual_angle = 20;                  // degrees
+constexpr double largest_kink = 90;                 // degrees
 constexpr double least_angle = 1, most_angle = 30;  // degrees
 constexpr std::size_t map_triangles = 200'000;
 
@@ -75,7 +79,7 @@ void declare(cli::Tool& tool, Arguments& given) {
   app.add_option(
          "--min-angle", given.min_angle,
          "fit: degrees that the angles of the shells keep where folds, rims and creases allow it (default 20; to "
-         "a --tolerance 10 or 5 along cylinders, where that saves a quarter of the shells)")
+         "a --tolerance less where that saves shells: 10 or 5 along cylinders, and any where flat ones are as few)")
       ->type_name("DEG");
   app.add_option("--max-iterations", given.max_iterations,
                  "at most N iterations (barycentre: 20, with --refine 60; fit: 8 rounds, or 1 to many shells on a "
@@ -130,10 +134,27 @@ std::optional<double> degrees(const std::string& option, const std::optional<std
 struct Surface {
   MeshFile file;
   MeshFacts facts;
+  std::optional<TriangleMesh> with_spikes;  ///< as it was given, where spikes were taken away
+  double moved = 0;                         ///< mm, by that
 };
 
-Surface read_surface(const fs::path& path, const std::optional<double>& unit_mm) {
-  Surface surface{read_mesh(path, unit_mm, true), {}};
+// Shells have area: what hangs on a surface without any can only be taken away.
+void take_spikes(const cli::Tool& tool, const fs::path& path, Surface& surface) {
+  TriangleMesh& mesh = surface.file.mesh;
+  if (count_degenerate(mesh) == 0) {
+    return;
+  }
+  WithoutDegenerate cleaned = without_degenerate_triangles(mesh);
+  if (cleaned.longest_spike > 0) {
+    tool.warn(fmt::format("{}: spikes without area, up to {:.4g} mm long, are taken away from its boundary",
+                          path.string(), cleaned.longest_spike));
+    surface.moved = cleaned.moved;
+    surface.with_spikes = std::exchange(mesh, std::move(cleaned.mesh));
+  }
+}
+
+Surface read_surface(const cli::Tool& tool, const fs::path& path, const std::optional<double>& unit_mm) {
+  Surface surface{read_mesh(path, unit_mm, true), {}, {}, 0};
   surface.facts = examine(surface.file.mesh);
   if (const auto why = why_unfit(surface.facts)) {
     throw InputError(path.string() + ": " + *why + "; repair it first");
@@ -141,6 +162,7 @@ Surface read_surface(const fs::path& path, const std::optional<double>& unit_mm)
   if (!(diagonal(surface.file.mesh) > 0)) {
     throw InputError(path.string() + ": the mesh has no extent");
   }
+  take_spikes(tool, path, surface);
   return surface;
 }
 
@@ -159,6 +181,35 @@ Json interval(const Interval& mm, double scale) { return {{"lower", mm.lower * s
 
 Interval intersection(const Interval& a, const Interval& b) {
   return {std::max(a.lower, b.lower), std::min(a.upper, b.upper)};
+}
+
+// What relax() proved is narrowed where it is too wide.
+// @param whole  the target with its spikes; relax() knew it without them, `moved` mm from it at most
+ShellDistance certified_distance(const RelaxResult& relaxed, const Target& whole, double moved,
+                                 const ShellDistanceOptions& measuring) {
+  const auto widened = [&](const Interval& known) {
+    return Interval{std::max(0.0, known.lower - moved), known.upper + moved};
+  };
+  ShellDistance distance = relaxed.distance;
+  for (Interval* known : {&distance.both, &distance.shell_to_target, &distance.target_to_shell}) {
+    *known = widened(*known);
+  }
+  const auto narrow = [&](const Interval& known) {
+    return known.upper - known.lower <= measuring.width + rounding * whole.diagonal();
+  };
+  if (!narrow(distance.shell_to_target) || !narrow(distance.target_to_shell)) {
+    // Both intervals are certain, so their intersection is.
+    const ShellDistance measured = shell_distance(relaxed.shell, whole, measuring);
+    distance.both = intersection(distance.both, measured.both);
+    distance.shell_to_target = intersection(distance.shell_to_target, measured.shell_to_target);
+    distance.target_to_shell = intersection(distance.target_to_shell, measured.target_to_shell);
+  }
+  std::tie(distance.mean, distance.rms) = mean_distance(relaxed.shell, whole);
+  if (const auto between = boundary_distance(boundary_curves(relaxed.shell), whole, measuring.width)) {
+    const auto& known = relaxed.distance.boundary;
+    distance.boundary = known ? intersection(between->both, widened(*known)) : between->both;
+  }
+  return distance;
 }
 
 PlyOptions ply_options(const cli::Tool& tool, const std::string& space) {
@@ -220,22 +271,28 @@ void run(cli::Tool& tool, const Arguments& given) {
     unit_mm = parse_length_unit(*given.mesh_unit);
   }
   TriangleMesh coarse;
-  std::optional<Target> target;
+  std::optional<Target> target, with_spikes;
+  double moved = 0;  // of the target, mm: by taking its spikes
   PlyOptions ply;
   {
     const auto stage = tool.stage("read");
-    Surface start = read_surface(tool.input(given.coarse), unit_mm);
+    Surface start = read_surface(tool, tool.input(given.coarse), unit_mm);
     tool.input(given.target);
-    Surface surface = given.coarse == given.target ? start : read_surface(given.target, unit_mm);
+    Surface surface = given.coarse == given.target ? start : read_surface(tool, given.target, unit_mm);
     ply = ply_options(tool, common_space(start.file, given.coarse, surface.file, given.target));
     coarse = std::move(start.file.mesh);
     target.emplace(std::move(surface.file.mesh));
+    if (surface.with_spikes) {
+      with_spikes.emplace(*std::move(surface.with_spikes));
+      moved = surface.moved;
+    }
     if (start.facts.boundary_loops != surface.facts.boundary_loops) {
       surface.facts.boundary_loops -= target->point_loops();  // decimation closes them
     }
     warn_of_mismatch(tool, start.facts, surface.facts);
   }
-  const double diagonal = target->diagonal();
+  const Target& whole = with_spikes ? *with_spikes : *target;  // what distances are to
+  const double diagonal = whole.diagonal();
   const double percent = 100 / diagonal;
 
   const auto keep_partial = [&](const ShellMesh& shell) {
@@ -244,6 +301,7 @@ void run(cli::Tool& tool, const Arguments& given) {
     write_ply(fs::path(given.out.string() + ".part"), shell, always);
   };
   ShellMesh best;
+  std::optional<double> tolerance;  // mm
   RelaxOptions options;
   options.method = given.method == "fit" ? RelaxMethod::fit : RelaxMethod::barycentre;
   options.surface = given.surface == "watertight" ? Patch::watertight : Patch::comas;
@@ -256,7 +314,8 @@ void run(cli::Tool& tool, const Arguments& given) {
   options.width = interval_width * diagonal;
   options.progress = tool.progress("relax");
   if (given.tolerance) {
-    options.tolerance = given.tolerance->millimetres(diagonal);
+    tolerance = given.tolerance->millimetres(diagonal);
+    options.tolerance = moved < most_for_spikes * *tolerance ? *tolerance - moved : *tolerance;
   }
   options.on_iteration = [&](const RelaxIteration& iteration, const ShellMesh& so_far) {
     best = so_far;
@@ -274,6 +333,8 @@ void run(cli::Tool& tool, const Arguments& given) {
   } catch (const Interrupted&) {
     if (!best.triangles.empty()) {
       keep_partial(best);
+      tool.warn(
+          fmt::format("the best mesh so far, {} shells, is in {}.part", best.triangles.size(), given.out.string()));
     }
     throw;
   } catch (const InputError& error) {
@@ -284,28 +345,16 @@ void run(cli::Tool& tool, const Arguments& given) {
   }
 
   ShellDistance distance;
-  std::optional<Interval> boundary;
   {
     const auto stage = tool.stage("measure");
     ShellDistanceOptions measuring;
     measuring.width = interval_width * diagonal;
-    if (options.tolerance) {
-      measuring.width = std::min(measuring.width, *options.tolerance / 20);
+    if (tolerance) {
+      measuring.width = std::min(measuring.width, *tolerance / 20);
     }
-    const ShellDistance flat = flat_distance(relaxed.shell, *target, measuring);
+    const ShellDistance flat = flat_distance(relaxed.shell, whole, measuring);
     measuring.progress = tool.progress("measure");
-    distance = relaxed.distance;
-    const auto narrow = [&](const Interval& known) {
-      return known.upper - known.lower <= measuring.width + rounding * diagonal;
-    };
-    if (!narrow(distance.shell_to_target) || !narrow(distance.target_to_shell)) {
-      distance = shell_distance(relaxed.shell, *target, measuring);
-    }
-    std::tie(distance.mean, distance.rms) = mean_distance(relaxed.shell, *target);
-    // Both intervals are certain, so their intersection is: what relax() proved is not taken back.
-    distance.both = intersection(distance.both, relaxed.distance.both);
-    distance.shell_to_target = intersection(distance.shell_to_target, relaxed.distance.shell_to_target);
-    distance.target_to_shell = intersection(distance.target_to_shell, relaxed.distance.target_to_shell);
+    distance = certified_distance(relaxed, whole, moved, measuring);
 
     Json& result = tool.result();
     result["shells"] = relaxed.shell.triangles.size();
@@ -313,10 +362,7 @@ void run(cli::Tool& tool, const Arguments& given) {
     result["hausdorff_percent"] = interval(distance.both, percent);
     result["one_sided_percent"] = {{"shell_to_target", interval(distance.shell_to_target, percent)},
                                    {"target_to_shell", interval(distance.target_to_shell, percent)}};
-    if (const auto between = boundary_distance(boundary_curves(relaxed.shell), *target, measuring.width)) {
-      boundary = intersection(between->both, relaxed.distance.boundary.value_or(between->both));
-    }
-    result["boundary_percent"] = boundary ? interval(*boundary, percent) : Json();
+    result["boundary_percent"] = distance.boundary ? interval(*distance.boundary, percent) : Json();
     result["mean_percent"] = distance.mean * percent;
     result["rms_percent"] = distance.rms * percent;
     result["flat_hausdorff_percent"] = interval(flat.both, percent);
@@ -333,9 +379,14 @@ void run(cli::Tool& tool, const Arguments& given) {
           "the smallest angle is {:.3g} degrees: folds, rims or creases do not allow {:.3g} everywhere, or the error "
           "would be larger",
           angle, *options.min_angle));
+    } else if (options.method == RelaxMethod::fit && !options.min_angle && angle < usual_angle) {
+      tool.warn(fmt::format("the smallest angle is {:.3g} degrees, below the usual {:.0f}: {}", angle, usual_angle,
+                            tolerance ? "so it takes fewer shells (--min-angle says otherwise), or folds, rims or "
+                                        "creases do not allow more"
+                                      : "folds, rims or creases do not allow more, or the error would be larger"));
     }
     result["self_intersections"] = crossing_shells(relaxed.shell).size();
-    result["reached"] = relaxed.reached ? Json(*relaxed.reached) : Json();
+    result["reached"] = relaxed.reached ? Json(*relaxed.reached && distance.both.upper <= *tolerance) : Json();
     result["stopped"] = relaxed.stopped;
     result["edges_turned"] = relaxed.flips;
     result["diagonal_mm"] = diagonal;
@@ -353,18 +404,26 @@ void run(cli::Tool& tool, const Arguments& given) {
                     "allowed; the best mesh is in {}.part",
                     given.target.string(), relaxed.shell.triangles.size(), *most, given.out.string()));
   }
-  if (options.tolerance && !*relaxed.reached) {
+  if (tolerance && !(*relaxed.reached && distance.both.upper <= *tolerance)) {
     keep_partial(relaxed.shell);
     throw RequirementError(fmt::format(
         "{}: the tolerance of {:.4g} % is not reached: {:.4g} %{} with {} shells ({}); the best mesh is {}.part. {}",
-        given.out.string(), percent * *options.tolerance, percent * distance.both.upper,
-        boundary && options.method == RelaxMethod::fit
-            ? fmt::format(", {:.4g} % of the boundaries", percent * boundary->upper)
+        given.out.string(), percent * *tolerance, percent * distance.both.upper,
+        distance.boundary && options.method == RelaxMethod::fit
+            ? fmt::format(", {:.4g} % of the boundaries", percent * distance.boundary->upper)
             : "",
         relaxed.shell.triangles.size(), relaxed.stopped, given.out.string(),
-        options.method == RelaxMethod::fit ? "Allow more shells or iterations, or a wider tolerance"
-        : given.refine                     ? "Allow more shells or iterations"
-                                           : "Add --refine, or take a coarse mesh with more triangles"));
+        moved > 0                            ? "Its target has spikes without area, which no shells reach"
+        : options.method == RelaxMethod::fit ? "Allow more shells or iterations, or a wider tolerance"
+        : given.refine                       ? "Allow more shells or iterations"
+                                             : "Add --refine, or take a coarse mesh with more triangles"));
+  }
+  if (const std::size_t without_area = count_without_area(relaxed.shell); without_area > 0) {
+    keep_partial(relaxed.shell);
+    throw RequirementError(
+        fmt::format("{}: {} shell(s) have no area, as the surface has none there; the best mesh is "
+                    "{}.part. Make the surface anew, or take such parts away first",
+                    given.out.string(), without_area, given.out.string()));
   }
   require_fit(relaxed.shell, given.out.string());
   std::vector<fs::path> written;
@@ -376,7 +435,7 @@ void run(cli::Tool& tool, const Arguments& given) {
       written.push_back(*given.curved);
     }
     if (given.map || given.picture) {
-      write_maps(tool, given, relaxed.shell, *target, distance, ply, written);
+      write_maps(tool, given, relaxed.shell, whole, distance, ply, written);
     }
   } catch (...) {
     // Of a run that failed nothing looks finished.

@@ -13,8 +13,6 @@
 namespace tunica {
 namespace {
 
-/// A triangle whose height is below this part of its longest edge has no usable stiffness in double precision.
-constexpr double least_height = 1e-6;
 constexpr double largest_imbalance = 1e-3;
 
 std::string place(const Vec3& p) { return fmt::format("({:.6g}, {:.6g}, {:.6g}) mm", p.x(), p.y(), p.z()); }
@@ -84,10 +82,7 @@ void check_triangles(const ShellBody& body) {
       }
     }
     const Vec3& a = mesh.vertices[v[0]];
-    const Vec3 ab = mesh.vertices[v[1]] - a;
-    const Vec3 ac = mesh.vertices[v[2]] - a;
-    const double squared_longest = std::max({ab.squaredNorm(), ac.squaredNorm(), (ac - ab).squaredNorm()});
-    if (!(ab.cross(ac).norm() > least_height * squared_longest)) {
+    if (!has_area({a, mesh.vertices[v[1]], mesh.vertices[v[2]]})) {
       refuse(body, fmt::format("element {} (nodes {}, {}, {}) at {} is degenerate: it has no area; mend the mesh", t,
                                v[0], v[1], v[2], place(a)));
     }

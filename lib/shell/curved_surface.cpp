@@ -18,6 +18,7 @@ namespace tunica {
 namespace {
 
 constexpr std::size_t patches_per_block = 64;
+constexpr double least_height = 1e-6;  // of the longest edge: less has no usable stiffness in double precision
 constexpr double crease_squared = 0.12061475842818326;  // (2 sin 10 degrees)^2: normals 20 degrees apart
 
 // Cubic Bernstein polynomials and derivatives in the order of CubicPatch::control, l = (l1, l2, l3).
@@ -332,6 +333,19 @@ double normal_agreement(const ShellMesh& shell, std::size_t triangle) {
   return normal_agreement(corners_of(shell, triangle), normals_of(shell, triangle));
 }
 
+bool has_area(const std::array<Vec3, 3>& corners) {
+  const Vec3 u = corners[1] - corners[0], v = corners[2] - corners[0];
+  return u.cross(v).norm() > least_height * std::max({u.squaredNorm(), v.squaredNorm(), (v - u).squaredNorm()});
+}
+
+std::size_t count_without_area(const ShellMesh& shell) {
+  std::size_t count = 0;
+  for (std::size_t t = 0; t < shell.triangles.size(); ++t) {
+    count += has_area(corners_of(shell, t)) ? 0 : 1;
+  }
+  return count;
+}
+
 void require_fit(const ShellMesh& shell, const std::string& name) {
   const auto is_unit = [](const Vec3& n) { return std::abs(n.squaredNorm() - 1) < 1e-6; };  // false for NaN
   if (shell.normals.size() != shell.vertices.size() && shell.corner_normals.size() != shell.triangles.size()) {
@@ -353,23 +367,23 @@ void require_fit(const ShellMesh& shell, const std::string& name) {
       }
     }
     const auto corners = corners_of(shell, t);
+    const Vec3 at = (corners[0] + corners[1] + corners[2]) / 3;
+    if (!has_area(corners)) {
+      throw InputError(fmt::format("{}: triangle {} at ({:.6g}, {:.6g}, {:.6g}) mm has no area; remove it", name, t,
+                                   at.x(), at.y(), at.z()));
+    }
     const double agreement = normal_agreement(shell, t);
     if (!(agreement >= least_normal_agreement)) {
-      const Vec3 at = (corners[0] + corners[1] + corners[2]) / 3;
-      const bool has_area =
-          (corners[1] - corners[0]).cross(corners[2] - corners[0]).stableNormalized().squaredNorm() > 0.5;
-      if (has_area && agreement < 0) {
+      if (agreement < 0) {
         throw InputError(
             fmt::format("{}: triangle {} at ({:.6g}, {:.6g}, {:.6g}) mm has a normal N that opposes it "
                         "(N·n = {:.3g}); turn the normal or the triangle round",
                         name, t, at.x(), at.y(), at.z(), agreement));
       }
-      throw InputError(!has_area
-                           ? fmt::format("{}: triangle {} at ({:.6g}, {:.6g}, {:.6g}) mm has no area; remove it", name,
-                                         t, at.x(), at.y(), at.z())
-                           : fmt::format("{}: triangle {} at ({:.6g}, {:.6g}, {:.6g}) mm has a normal N nearly in its "
-                                         "plane (N·n = {:.3g}, at least {} is needed); relax the mesh again",
-                                         name, t, at.x(), at.y(), at.z(), agreement, least_normal_agreement));
+      throw InputError(
+          fmt::format("{}: triangle {} at ({:.6g}, {:.6g}, {:.6g}) mm has a normal N nearly in its "
+                      "plane (N·n = {:.3g}, at least {} is needed); relax the mesh again",
+                      name, t, at.x(), at.y(), at.z(), agreement, least_normal_agreement));
     }
   }
 }

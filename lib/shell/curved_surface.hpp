@@ -88,6 +88,13 @@ double normal_agreement(const ShellMesh& shell, std::size_t triangle);
 /// Errors: InputError that names the first triangle at fault and where it is.
 void require_fit(const ShellMesh& shell, const std::string& name);
 
+/// Whether a facet is more than a line: its height over the longest edge is above 1e-6 of that edge. Less makes no
+/// element.
+bool has_area(const std::array<Vec3, 3>& corners);
+
+/// How many facets have none.
+std::size_t count_without_area(const ShellMesh& shell);
+
 /// A fine triangle mesh of the curved surface. Patches share no vertices: comas patches of adjacent triangles do not
 /// meet exactly (gap O(h^3)), watertight ones do where their numbers of pieces agree. Fine triangles and vertices of
 /// one patch are consecutive.

@@ -327,7 +327,7 @@ private:
         part_crossings(state, limit, most);
         squeeze(samples, state, limit);
       }
-      // What the certificate asked for may have made triangles thin: then the next best is looked at as well.
+      const std::size_t thin = options_.min_angle ? 0 : count_thin(state);
       bool certain = shape_and_certify(samples, state, tolerance, most);
       if (holds && static_cast<double>(state.mesh.alive) < most_by_exchanges * wanted) {
         // What is exchanged is certified where it changes: all is certain if it was so before.
@@ -335,7 +335,8 @@ private:
         result_.note(state);
         certain = shape_and_certify(samples, state, tolerance, most) || certain;
       }
-      if (certain && count_thin(state) == 0) {
+      // What the certificate asked for may have made triangles thin: then the next best is looked at as well.
+      if (certain && count_thin(state) <= thin) {
         break;
       }
     }

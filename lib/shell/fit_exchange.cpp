@@ -26,7 +26,8 @@ namespace tunica {
 namespace {
 
 constexpr std::size_t at_once = 8;  // changes, whatever the number of threads
-constexpr std::size_t fits_per_shell = 6, fewest_fits = 600, most_fits = 6'000;  // of pieces anew: what costs
+// Of pieces anew: what costs.
+constexpr std::size_t fits_per_shell = 6, fewest_fits = 600, most_fits = 6'000, most_fits_per_shell = 20;
 constexpr std::size_t most_before_parting = 150;  // of these more, where normals are to part
 constexpr std::size_t most_shells = 600, most_on_coarse_targets = 1300;
 constexpr std::size_t coarse_target = 250;       // triangles per shell: walks on denser ones are what a piece costs
@@ -35,8 +36,7 @@ constexpr int regaining = 6;                     // steps that lessen the larges
 constexpr double loosened = 4;                   // limits: error of a merger before its piece is fitted anew
 constexpr double thin_angle = 5;                 // degrees, for the time being
 constexpr double promising_at_first = 2;         // limits: after a step of least squares; more hardly ever recovers
-constexpr std::array<double, 6> promising{1.12, 1.06, 1.04, 1.03, 1.02, 1.02};  // limits: foretold of steps after that
-constexpr double spare = 0.97;                          // of the limit: room for what a certificate finds
+constexpr double spare = 0.97;                   // of the limit: room for what a certificate finds
 constexpr std::array<double, 3> joining{1, 0.95, 0.9};  // of the limit
 constexpr int easing = 8;                               // steps of all nodes
 constexpr int rings_of_a_kick = 2;                      // of nodes around a place
@@ -58,11 +58,7 @@ bool recovers(FitState& piece, double limit) {
   if (piece.error() > promising_at_first * limit) {
     return false;
   }
-  std::array<double, promising.size()> hopeful = promising;
-  for (double& h : hopeful) {
-    h *= limit;
-  }
-  return lessen_largest(piece, spare * limit, regaining, hopeful) <= limit;
+  return lessen_largest(piece, spare * limit, regaining, limit) <= limit;
 }
 
 /// Fits a piece in which two nodes were merged, or one was taken out. @param shells, before  how many, and their price
@@ -410,7 +406,8 @@ public:
       : samples_(samples),
         state_(state),
         options_(options),
-        all_(std::clamp(fits_per_shell * state.mesh.alive, fewest_fits, most_fits)),
+        all_(std::clamp(fits_per_shell * state.mesh.alive,
+                        std::min(fewest_fits, most_fits_per_shell * state.mesh.alive), most_fits)),
         left_(all_),
         rounds_(options.rounds),
         least_(price(state)) {}

@@ -2,6 +2,7 @@
 
 #include "core/progress.hpp"
 #include "core/threads.hpp"
+#include "shell/fit_step.hpp"
 #include "surface/measure.hpp"
 
 #include <Eigen/Geometry>
@@ -24,11 +25,11 @@ constexpr double first_damping = 1, least_damping = 1e-3, more_damping = 6, some
                  less_damping = 0.3;
 constexpr double as_foretold = 0.6;  // of the gain: then the next step is damped less
 constexpr int damped_tries = 3;
-constexpr double largest_tilt = 0.3;  // rad
-constexpr double largest_move = 0.3;  // of the mean edge at the node
 constexpr double least_facing = 0.3;  // cosine: a facet turns no farther
 constexpr int mends = 5;              // of moves that break facets
 constexpr double shortened = 0.35;
+// Limits: where more is foretold of the i-th step the error hardly ever comes below the limit.
+constexpr std::array<double, 8> promising{1.12, 1.06, 1.04, 1.03, 1.02, 1.02, 1.02, 1.02};
 constexpr double little = 1e-3;  // of the error: what a step must bring to be followed by another
 
 /// Numbers what may move: x, y, z of nodes, and two tilts of each of their normals.
@@ -376,41 +377,26 @@ void apply(FitState& state, const Unknowns& unknowns, const Eigen::VectorXd& x) 
   const std::size_t nodes = mesh.positions.size();
   std::vector<double> length(nodes, 1);
   std::vector<std::uint8_t> upright(nodes, 0), moves(nodes, 1);
-  std::vector<Index> slots, sectors;
-  std::vector<Vec3> normals;
+  std::vector<Index> slots;
+  NodeStep step;
   for (int mend = 0; mend <= mends; ++mend) {
     for (Index v = 0; v < nodes; ++v) {
       if (unknowns.of_node(v) == Unknowns::none || moves[v] == 0) {
         continue;
       }
-      const double edge = mean_edge(old, v);
-      Vec3 move = length[v] * x.segment<3>(unknowns.of_node(v));
-      if (const double far = move.norm(); far > largest_move * edge) {
-        move *= largest_move * edge / far;
-      }
       mesh.slots_of(v, slots);
-      if (upright[v] != 0) {
-        const Vec3& n = old.normals[slots[0]];
-        move = n * n.dot(move);
+      if (length[v] == 0) {
+        take_back(mesh, v, slots, old.positions, old.normals);
+        continue;
       }
-      mesh.positions[v] = old.positions[v] + move;
-      normals.clear();
-      sectors.clear();
+      step.move = length[v] * x.segment<3>(unknowns.of_node(v));
+      step.edge = mean_edge(old, v);
+      step.along = upright[v] != 0 ? std::optional(old.normals[slots[0]]) : std::nullopt;
+      step.tilts.clear();
       for (const Index s : slots) {
-        Vec2 tilt = length[v] * x.segment<2>(unknowns.of_slot(s));
-        if (const double far = tilt.norm(); far > largest_tilt) {
-          tilt *= largest_tilt / far;
-        }
-        const auto axes = tilt_axes(old.normals[s]);
-        normals.push_back((old.normals[s] + tilt[0] * axes[0] + tilt[1] * axes[1]).normalized());
-        sectors.push_back(mesh.sectors[s]);
+        step.tilts.emplace_back(length[v] * x.segment<2>(unknowns.of_slot(s)));
       }
-      if (slots.size() > 1 && length[v] > 0) {
-        hold_together(normals, sectors, state.limits.kink);
-      }
-      for (std::size_t i = 0; i < slots.size(); ++i) {
-        mesh.normals[slots[i]] = length[v] > 0 ? normals[i] : old.normals[slots[i]];
-      }
+      take_step(mesh, v, slots, step, old.positions, old.normals, state.limits.kink);
     }
     std::fill(moves.begin(), moves.end(), 0);
     bool broken = false;
@@ -444,7 +430,7 @@ void apply(FitState& state, const Unknowns& unknowns, const Eigen::VectorXd& x) 
 
 }  // namespace
 
-double lessen_largest(FitState& state, double enough, int steps, std::span<const double> promising) {
+double lessen_largest(FitState& state, double enough, int steps, std::optional<double> limit) {
   const double nothing = 1e-12 * state.samples().target().diagonal();
   double damping = first_damping;
   for (int i = 0; i < steps && state.error() > std::max(enough, nothing); ++i) {
@@ -457,8 +443,8 @@ double lessen_largest(FitState& state, double enough, int steps, std::span<const
     const double before = state.error();
     for (int k = 0; k < damped_tries && !(state.error() < before); ++k) {
       const LinearModel::Step step = model.step(damping);
-      if (static_cast<std::size_t>(i) < promising.size() &&
-          step.largest * before > promising[static_cast<std::size_t>(i)]) {
+      if (limit && static_cast<std::size_t>(i) < promising.size() &&
+          step.largest * before > promising[static_cast<std::size_t>(i)] * *limit) {
         return before;
       }
       FitState trial = state;

@@ -2,7 +2,7 @@
 
 #include "shell/fit_state.hpp"
 
-#include <span>
+#include <optional>
 
 namespace tunica {
 
@@ -13,11 +13,11 @@ namespace tunica {
 /// FitState::attach_again().
 /// @param enough     mm: an error that ends the work
 /// @param steps      at most
-/// @param promising  mm: where more than the i-th is foretold of the i-th step the work ends before it
+/// @param limit      mm: an error to come below; where what is foretold of a step makes that unlikely the work ends
 /// @return the largest error left, mm
 /// Keeps: what FitLimits asks of facets. Source: Osborne, Watson, An algorithm for minimax approximation in the
 /// nonlinear case, Comput. J. 1969; Mehrotra, On the implementation of a primal-dual interior point method, SIAM J.
 /// Optim. 1992. Cost: per step some ten, at most sixty, sparse factorisations of five unknowns per node.
-double lessen_largest(FitState& state, double enough, int steps, std::span<const double> promising = {});
+double lessen_largest(FitState& state, double enough, int steps, std::optional<double> limit = {});
 
 }  // namespace tunica

@@ -19,11 +19,6 @@ constexpr double noted_width = 1.5;    // of the error, on the way
 constexpr double far_from_flat = 0.6;  // of the flat facets that the tolerance would take
 constexpr std::array<double, 5> parts_for_boundaries{1, 0.7, 0.4, 0.2, 0.1};  // of the tolerance
 
-bool has_degenerate(const TriangleMesh& mesh) {
-  const auto normals = facet_normals(mesh);
-  return std::any_of(normals.begin(), normals.end(), [](const Vec3& n) { return n.squaredNorm() < 0.5; });
-}
-
 }  // namespace
 
 FitResult::FitResult(const Target& target, const RelaxOptions& options, double width, bool boundaries)
@@ -90,13 +85,13 @@ void FitResult::no_worse_than_flat(std::optional<double> tolerance, std::size_t 
       decimating.max_error = part * *tolerance;
     }
     const DecimateResult flat = decimate(target_.mesh(), decimating);
-    if (has_degenerate(flat.mesh)) {
+    ShellMesh shell = flat_shells(flat.mesh, options_.surface);
+    if (count_without_area(shell) > 0) {
       if (is_empty()) {
         throw InputError("too many triangles without area: no shells are left without them; make the surface anew");
       }
       return;
     }
-    ShellMesh shell = flat_shells(flat.mesh, options_.surface);
     ShellDistance distance = distance_of(shell);
     if (flat.error) {
       lower_uppers(distance, *flat.error, *flat.error, *flat.error);

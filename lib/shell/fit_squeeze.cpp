@@ -9,7 +9,6 @@
 #include "shell/fit_worst.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 namespace tunica {
@@ -21,7 +20,7 @@ constexpr std::size_t squeezed_shells = 2'500;  // of all tries: what they may c
 constexpr std::size_t least_squeezes = 1, most_squeezes = 12;
 constexpr int regaining = 8;                 // steps of all nodes
 constexpr std::size_t minimax_shells = 600;  // of more, factorisations are what steps cost
-constexpr std::array<double, 8> promising{1.12, 1.06, 1.04, 1.03, 1.02, 1.02, 1.02, 1.02};  // limits: foretold of steps
+constexpr int minimax_steps = 8;
 constexpr int minimax_tries = 2;
 constexpr double hopeful = 1.6;  // limits: errors that lessening the largest may bring within
 constexpr double spare = 0.98;   // of the limit: room for what further points find
@@ -43,11 +42,7 @@ bool regains(FitSamples& samples, FitState& state, double limit) {
       state.attach();
       state.measure();
       if (i > 0 && state.mesh.alive <= minimax_shells && state.error() < hopeful * limit) {
-        std::array<double, promising.size()> at_most = promising;
-        for (double& error : at_most) {
-          error *= limit;
-        }
-        lessen_largest(state, spare * limit, promising.size(), at_most);
+        lessen_largest(state, spare * limit, minimax_steps, limit);
         ++minimax;
       }
     }

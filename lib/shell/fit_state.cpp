@@ -3,6 +3,7 @@
 
 #include "core/progress.hpp"
 #include "core/threads.hpp"
+#include "shell/fit_step.hpp"
 #include "shell/normal_equations.hpp"
 #include "surface/closest_point.hpp"
 #include "surface/measure.hpp"
@@ -17,23 +18,6 @@
 namespace tunica {
 namespace {
 
-/// See hold_together() of normals alone.
-void hold_together(FitMesh& mesh, const std::vector<Index>& slots, double kink) {
-  if (slots.size() < 2) {
-    return;
-  }
-  std::vector<Vec3> normals;
-  std::vector<Index> sectors;
-  for (const Index s : slots) {
-    normals.push_back(mesh.normals[s]);
-    sectors.push_back(mesh.sectors[s]);
-  }
-  tunica::hold_together(normals, sectors, kink);
-  for (std::size_t i = 0; i < slots.size(); ++i) {
-    mesh.normals[slots[i]] = normals[i];
-  }
-}
-
 constexpr std::size_t patches_per_block = 16;
 constexpr int search_level = 3;   // pieces per edge of the surface on which points of the target find their patch
 constexpr int most_steps = 4;     // from patch to patch
@@ -41,8 +25,6 @@ constexpr double on_edge = 1e-9;  // of a patch's parameters
 constexpr int most_cg_steps = 60;
 constexpr double cg_tolerance = 1e-3;
 constexpr double least_weight = 0.1;  // residuals below this part of the largest count alike
-constexpr double largest_tilt = 0.3;  // rad
-constexpr double largest_move = 0.3;  // of the mean edge at the node
 constexpr double none_doubted = std::numeric_limits<double>::infinity();
 constexpr int trials = 6;
 constexpr double doubted = 0.7;  // of the largest error: from there on it is looked at again
@@ -518,34 +500,29 @@ double FitState::solve(int power, double smoothing) {
       length[v] = 0;
     }
   }
+  NodeStep step;
   for (int trial = 0; trial <= trials; ++trial) {
     for (std::size_t v = 0; v < nodes; ++v) {
       if (mesh.around[v].empty() || moved[v] == 0) {
         continue;
       }
-      Vec3 move = length[v] * x.segment<3>(3 * static_cast<Eigen::Index>(v));
-      if (const double far = move.norm(); far > largest_move * edge[v]) {
-        move *= largest_move * edge[v] / far;
-      }
-      if (upright[v] != 0) {
-        const Vec3& n =
-            old_normals[mesh.slots[mesh.around[v][0]][mesh.corner_of(mesh.around[v][0], static_cast<Index>(v))]];
-        move = n * n.dot(move);
-      }
-      mesh.positions[v] = old_positions[v] + move;
       mesh.slots_of(static_cast<Index>(v), of_node);
+      if (length[v] == 0) {
+        take_back(mesh, static_cast<Index>(v), of_node, old_positions, old_normals);
+        continue;
+      }
+      step.move = length[v] * x.segment<3>(3 * static_cast<Eigen::Index>(v));
+      step.edge = edge[v];
+      step.along.reset();
+      if (upright[v] != 0) {
+        const Index first = mesh.around[v][0];
+        step.along = old_normals[mesh.slots[first][mesh.corner_of(first, static_cast<Index>(v))]];
+      }
+      step.tilts.clear();
       for (const Index s : of_node) {
-        Vec2 tilt = length[v] * x.segment<2>(static_cast<Eigen::Index>(tilts + 2 * s));
-        if (const double far = tilt.norm(); far > largest_tilt) {
-          tilt *= largest_tilt / far;
-        }
-        const auto axes = tilt_axes(old_normals[s]);
-        mesh.normals[s] = length[v] > 0 ? Vec3((old_normals[s] + tilt[0] * axes[0] + tilt[1] * axes[1]).normalized())
-                                        : old_normals[s];
+        step.tilts.emplace_back(length[v] * x.segment<2>(static_cast<Eigen::Index>(tilts + 2 * s)));
       }
-      if (length[v] > 0) {
-        hold_together(mesh, of_node, limits.kink);
-      }
+      take_step(mesh, static_cast<Index>(v), of_node, step, old_positions, old_normals, limits.kink);
     }
     std::vector<std::uint8_t> bad(nodes, 0);
     changed_patches(moved, changed);

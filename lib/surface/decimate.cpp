@@ -361,16 +361,28 @@ DecimateResult decimate(const TriangleMesh& mesh, const DecimateOptions& options
     throw InputError("all of its triangles are without area");
   }
   constexpr double any_length = std::numeric_limits<double>::infinity();
-  const WithoutDegenerate cleaned =
-      without_degenerate_triangles(mesh, options.max_error ? most_for_spikes * *options.max_error : any_length);
+  const double for_spikes = options.max_error ? most_for_spikes * *options.max_error : any_length;
+  WithoutDegenerate cleaned = without_degenerate_triangles(mesh, for_spikes);
   DecimateOptions within = options;
   if (options.max_error) {
     within.max_error = std::max(0.0, *options.max_error - cleaned.moved);
+  }
+  if (options.min_angle && cleaned.long_spikes > 0) {
+    // Angles and error cannot both hold: what comes back has the angles.
+    const std::size_t too_long = cleaned.long_spikes;
+    cleaned = without_degenerate_triangles(mesh, any_length);
+    cleaned.long_spikes = too_long;
+    within.max_error = options.max_error;
   }
   DecimateResult result = decimate_sound(cleaned.mesh, within);
   if (result.error) {
     result.error->lower = std::max(0.0, result.error->lower - cleaned.moved);
     result.error->upper += cleaned.moved;
+    result.error_kept = result.error->upper <= *options.max_error;
+  }
+  if (options.min_angle && count_degenerate(result.mesh) > 0) {
+    result.angle_held = false;
+    result.smallest_angle = 0;
   }
   result.closed_loops = cleaned.closed_loops;
   result.longest_spike = cleaned.longest_spike;

@@ -24,7 +24,8 @@ struct DecimateResult {
   std::optional<Interval> error;  ///< mm: what was certified, when `max_error` was asked for
   std::size_t closed_loops = 0;   ///< boundary loops of the input that were a point, see without_degenerate_triangles()
   double longest_spike = 0;       ///< mm, of the spikes without area that were taken away
-  std::size_t long_spikes = 0;    ///< spikes that stayed because `max_error` allows none so long
+  std::size_t long_spikes =
+      0;  ///< spikes that stayed because `max_error` allows none so long; with `min_angle` none do
 };
 
 /// Fewer triangles for the same surface, by quadric edge collapse with optimal placement (see EdgeCollapse).

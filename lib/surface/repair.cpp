@@ -1,6 +1,7 @@
 #include "surface/repair.hpp"
 
 #include "core/error.hpp"
+#include "surface/degenerate.hpp"
 
 #include <Eigen/Geometry>
 
@@ -75,6 +76,7 @@ public:
     turn();
     split();
     cut();
+    drop_pieces_without_area();
     compact();
     return {std::move(mesh_), repairs_};
   }
@@ -281,6 +283,34 @@ private:
     mesh_.triangles[t] = {at(0), at(1), at(2)};
     for (std::size_t i = 2; i + 1 < outline.size(); ++i) {
       mesh_.triangles.push_back({at(0), at(i), at(i + 1)});
+    }
+  }
+
+  void drop_pieces_without_area() {
+    std::vector<Index> piece(mesh_.vertices.size());
+    std::iota(piece.begin(), piece.end(), Index{0});
+    const auto root = [&](Index v) {
+      while (piece[v] != v) {
+        v = piece[v] = piece[piece[v]];
+      }
+      return v;
+    };
+    for (const auto& [i, j, k] : mesh_.triangles) {
+      piece[root(j)] = root(i);
+      piece[root(k)] = root(i);
+    }
+    std::vector<std::uint8_t> has_area(mesh_.vertices.size(), 0);
+    for (const auto& [i, j, k] : mesh_.triangles) {
+      if (!is_degenerate(mesh_.vertices[i], mesh_.vertices[j], mesh_.vertices[k])) {
+        has_area[root(i)] = 1;
+      }
+    }
+    const auto kept = std::remove_if(mesh_.triangles.begin(), mesh_.triangles.end(),
+                                     [&](const auto& t) { return has_area[root(t[0])] == 0; });
+    repairs_.dropped_triangles += static_cast<std::size_t>(mesh_.triangles.end() - kept);
+    mesh_.triangles.erase(kept, mesh_.triangles.end());
+    if (mesh_.triangles.empty()) {
+      throw InputError("no triangle is left when pieces without area are dropped");
     }
   }
 

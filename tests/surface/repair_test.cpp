@@ -148,6 +148,27 @@ TEST(Repair, AnyTrianglesBecomeFit) {
   }
 }
 
+TEST(Repair, PiecesWithoutAreaGoAndNeedlesWithinAPieceStay) {
+  // Two triangles and a cap between them, a piece of two collinear triangles, and one that is a point.
+  const TriangleMesh mesh{{{0, 0, 0},
+                           {2, 0, 0},
+                           {1, 1, 0},
+                           {1, 0, 0},
+                           {1, -1, 0},
+                           {5, 0, 0},
+                           {6, 0, 0},
+                           {7, 0, 0},
+                           {8, 0, 0},
+                           {9, 9, 9},
+                           {9, 9, 9},
+                           {9, 9, 9}},
+                          {{{0, 1, 2}}, {{0, 3, 1}}, {{0, 4, 3}}, {{5, 6, 7}}, {{7, 6, 8}}, {{9, 10, 11}}}};
+  const Repaired result = repaired(mesh);
+  EXPECT_EQ(result.mesh.triangles.size(), 3U);
+  EXPECT_EQ(result.mesh.vertices.size(), 5U);
+  EXPECT_EQ(result.repairs.dropped_triangles, 3U);
+}
+
 TEST(Repair, NothingLeftIsSaid) { EXPECT_THROW(repaired({{{0, 0, 0}, {1, 0, 0}}, {{{0, 1, 1}}}}), InputError); }
 
 }  // namespace

@@ -244,6 +244,34 @@ class Decimate(WholeTool):
         self.assertIn("--max-error is too small for their spikes to go",
                       self.warnings("in.ply", "out.ply", "--max-error", "0.1mm")[0])
 
+    def test_spikes_longer_than_the_error_exclude_an_angle(self):
+        n = 12
+        vertices = [(float(i), float(j), 0.0) for j in range(n + 1) for i in range(n + 1)]
+        triangles = [t for j in range(n) for i in range(n) for a in [j * (n + 1) + i]
+                     for t in [(a, a + 1, a + n + 2), (a, a + n + 2, a + n + 1)]]
+        for end, last in ((n * (n + 1), (n - 1) * (n + 1)), ((n + 1)**2 - 1, n * (n + 1) - 1)):  # beyond two corners
+            triangles.append((last, end, len(vertices))[::1 if end == n * (n + 1) else -1])
+            vertices.append((vertices[end][0], n + 3.0, 0.0))
+        meshes.write_ply(self.path("in.ply"), vertices, triangles, comments=["units mm"])
+        report = self.run_tool("in.ply", "out.ply", "--max-error", "0.3mm", "--min-angle", 20, code=4,
+                               says="spikes without area")
+        self.assertGreater(report["result"]["hausdorff_mm"]["upper"], 2.9)
+        self.assertFalse(self.exists("out.ply"))
+        self.assertLess(len(meshes.read_ply(self.path("out.ply.part"))[2]), 100)
+        self.run_tool("in.ply", "out.ply", "--max-error", "3.5mm", "--min-angle", 20)
+
+    def test_repair_drops_pieces_without_area(self):
+        vertices, triangles = self.surface()
+        loose = [(len(vertices) + 3 * i, len(vertices) + 3 * i + 1, len(vertices) + 3 * i + 2) for i in range(5)]
+        points = [(20.0 + j * j, i, 0.0) for i in range(5) for j in range(3)]
+        meshes.write_ply(self.path("loose.ply"), vertices + points, triangles + loose)
+        result = self.run_tool("loose.ply", "out.ply", "--triangles", 300, "--repair")["result"]
+        self.assertEqual(result["repairs"]["dropped_triangles"], 5)
+        self.assertEqual(result["degenerate_triangles"], 0)
+        meshes.write_ply(self.path("line.ply"), points[:3], [(0, 1, 2)])
+        self.run_tool("line.ply", "line_out.ply", "--triangles", 300, "--repair", code=3,
+                      says="when pieces without area are dropped")
+
     def test_triangles_without_area_that_join_parts_are_counted_and_warned_of(self):
         # Two squares of two triangles, and between them two triangles on the line y = 0.
         vertices = [(0.0, 0, 0), (1.0, 0, 0), (1.2, 0, 0), (0.0, 1, 0), (3.0, 0, 0), (2.8, 0, 0), (4.0, 0, 0), (4.0, 1, 0)]

@@ -361,7 +361,7 @@ class Contract(Case):
             lines.append(run.stderr.readline())
             self.assertTrue(lines[-1], "".join(lines))
         run.send_signal(signal.SIGINT)
-        run.stderr.read()
+        self.assertRegex(run.stderr.read(), r"the best mesh so far, \d+ shells, is in .*\.part")
         self.assertEqual(run.wait(60), 130)
         run.stderr.close()
         self.assertFalse(os.path.exists(self.out))
@@ -437,6 +437,40 @@ class Fit(Case):
             _, error = self.relax(line, line, self.out, *rules, expect=3)
             self.assertRegex(error, "no area|without area")
             self.assertFalse(os.path.exists(self.out))
+
+    def test_spikes_without_area_make_no_shells(self):
+        n = 14
+        vertices = [(x, y, 0.1 * np.sin(0.4 * x)) for y in range(n + 1) for x in range(n + 1)]
+        triangles = [t for y in range(n) for x in range(n) for a in [y * (n + 1) + x]
+                     for t in [(a, a + 1, a + n + 2), (a, a + n + 2, a + n + 1)]]
+        spiked = self.path("spiked.ply")
+        roots = [(y * (n + 1), (y + 1) * (n + 1)) for y in range(2, n - 1, 3)]
+        for _, end in roots:
+            vertices[end] = (-0.5, *vertices[end][1:])
+        for length, rules, expect in ((0.2, ["--tolerance", "2%"], 0), (3, ["--tolerance", "2%"], 4),
+                                      (3, ["--shells", 40], 0), (3, ["--refine", "--tolerance", "20%"], 0),
+                                      (3, ["--method", "barycentre", "--max-iterations", 2], 0)):
+            tips = []  # on the lines of boundary edges
+            for start, end in roots:
+                along = np.subtract(vertices[end], vertices[start])
+                tips.append(np.array(vertices[end]) + length * along / np.linalg.norm(along))
+            write_ply(spiked, vertices + tips, triangles + [(*root, len(vertices) + i) for i, root in enumerate(roots)])
+            record, said = self.relax(spiked, spiked, self.out, *rules, "--force", expect=expect)
+            self.assertIn("spikes without area, up to", said)
+            result = record["result"]
+            self.assertGreater(result["min_angle_deg"], 1)
+            self.assertGreater(result["hausdorff_mm"]["upper"], 0.4 * length)
+            self.assertEqual(result["reached"], {0: True if "--tolerance" in rules else None, 4: False}[expect])
+            if expect == 4:
+                self.assertIn("spikes without area, which no shells reach", said)
+                self.assertLess(len(read_ply(self.out + ".part")[1]), 60)
+
+    def test_angles_below_the_usual_are_told(self):
+        wedge = self.path("wedge.ply")
+        write_ply(wedge, [[0, 0, 0], [40, 0, 0], [40, 4, 0], [20, 6, 0]], [[0, 1, 2], [0, 2, 3]])
+        record, said = self.relax(wedge, wedge, self.out, "--tolerance", "0.5%")
+        self.assertLess(record["result"]["min_angle_deg"], 20)
+        self.assertIn("below the usual 20", said)
 
     def test_more_shells_than_the_target_has_triangles_are_the_target(self):
         record, _ = self.relax(self.target, self.target, self.out, "--shells", 100000)
