@@ -164,8 +164,8 @@ void expect_within(const RelaxResult& result, double target_error, const std::fu
 }
 
 TEST(FitWatertight, AClosedCylinderNeedsAThirdOfTheFlatTriangles) {
-  const Target target(closed_cylinder(128));
-  const double sagitta = 1 - std::cos(pi / 128);
+  const Target target(closed_cylinder(96));
+  const double sagitta = 1 - std::cos(pi / 96);
   const auto distance = [](const Vec3& p) {
     const double r = std::hypot(p.x(), p.y()) - 1, beyond = std::abs(p.z() - 1.5) - 1.5;
     return r > 0 && beyond > 0 ? std::hypot(r, beyond) : std::min(std::abs(r), std::abs(beyond));
