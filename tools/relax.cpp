@@ -74,7 +74,7 @@ void declare(cli::Tool& tool, Arguments& given) {
   app.add_option(
          "--kink", given.kink,
          "fit to a --tolerance, comas: degrees by which the normals of shells that meet at a node may part where "
-         "that saves shells (default 45; 0: several normals only at creases and where facets turn too far for one)")
+         "that saves shells (default 75; 0: several normals only at creases and where facets turn too far for one)")
       ->type_name("DEG");
   app.add_option(
          "--min-angle", given.min_angle,

@@ -3,10 +3,12 @@
 #include "shell/fit_trial.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace tunica {
 namespace {
 
+constexpr double radians_per_degree = 3.14159265358979323846 / 180;
 constexpr double worth_a_crease = 0.6;  // of its error a patch may keep when it gets normals of its own
 
 /// What the triangles across have at the ends of a triangle's edges.
@@ -95,6 +97,26 @@ void part_normals(FitState& state) {
       taken[s] = 1;
     }
   }
+}
+
+double share_parted_by(const FitMesh& mesh, double degrees) {
+  const double cosine = std::cos(degrees * radians_per_degree);
+  std::size_t nodes = 0, parted = 0;
+  std::vector<Index> slots;
+  for (Index v = 0; v < mesh.around.size(); ++v) {
+    if (mesh.around[v].empty()) {
+      continue;
+    }
+    ++nodes;
+    mesh.slots_of(v, slots);
+    const bool far = std::any_of(slots.begin(), slots.end(), [&](Index a) {
+      return std::any_of(slots.begin(), slots.end(), [&](Index b) {
+        return mesh.sectors[a] == mesh.sectors[b] && mesh.normals[a].dot(mesh.normals[b]) < cosine;
+      });
+    });
+    parted += far ? 1 : 0;
+  }
+  return static_cast<double>(parted) / static_cast<double>(nodes);
 }
 
 }  // namespace tunica

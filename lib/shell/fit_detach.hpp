@@ -12,4 +12,7 @@ std::size_t detach_worst(FitState& state, double limit);
 /// Gives every corner a normal of its own. They start alike, and part by at most FitLimits::kink.
 void part_normals(FitState& state);
 
+/// Of the nodes, how many have normals of one sector that part by more than so many degrees.
+double share_parted_by(const FitMesh& mesh, double degrees);
+
 }  // namespace tunica

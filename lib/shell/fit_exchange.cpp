@@ -41,7 +41,10 @@ constexpr std::array<double, 3> joining{1, 0.95, 0.9};  // of the limit
 constexpr int easing = 8;                               // steps of all nodes
 constexpr int rings_of_a_kick = 2;                      // of nodes around a place
 constexpr std::size_t splits_of_a_kick = 2, fits_after_a_kick = 60;
-constexpr int patience = 2;  // times that bring nothing
+constexpr int patience = 2;        // times that bring nothing
+constexpr double first_kink = 45;  // degrees
+constexpr double nearly = 0.95;    // of them
+constexpr double often = 0.02;     // of the nodes
 // Of the tolerance. Certificates end with intervals that wide, below it or not: what one finds just below may be above
 // in the next, which looks at more.
 constexpr double certainly = 1 - width_of_certificates;
@@ -417,18 +420,38 @@ public:
     least_ = price(state_);
   }
 
-  /// Exchanges until nothing comes of it any more, with the room that less error everywhere gives in between; then
-  /// after kicks.
-  void run() {
-    const auto& [limit, tolerance, kink, rounds, on_better, progress] = options_;
-    for (int fruitless = 0; fruitless < patience && goes_on();) {
+  /// Exchanges until nothing comes of it any more; then after kicks. @param parting  normals may part
+  void run(bool parting) {
+    if (parting) {
+      // More than smooth targets ask for only where that shows: there it makes the search end early.
+      state_.limits.kink = std::min(first_kink, options_.kink);
+      exchange(left_ - left_ / 4);
+      if (share_parted_by(state_.mesh, nearly * state_.limits.kink) > often) {
+        state_.limits.kink = options_.kink;
+      }
+    }
+    exchange(0);
+    Exchange kicked(samples_, state_, options_.limit, options_.tolerance);
+    for (const std::size_t most = left_; goes_on(0);) {
+      left_ = most - kicked.kick(most, random_);
+      tell();
+    }
+  }
+
+private:
+  bool goes_on(std::size_t reserve) { return left_ > reserve && rounds_-- > 0; }
+
+  /// Exchanges, with the room that less error everywhere gives in between. @param reserve  of pieces, to be left
+  void exchange(std::size_t reserve) {
+    const double limit = options_.limit, tolerance = options_.tolerance;
+    for (int fruitless = 0; fruitless < patience && goes_on(reserve);) {
       const std::size_t before = price(state_);
       FitState squeezed = state_;
       squeeze(samples_, squeezed, limit);
       if (price(squeezed) < before) {
         take_if_sound(samples_, std::move(squeezed), state_, limit, tolerance);
       }
-      left_ -= Exchange(samples_, state_, limit, tolerance).run(left_, random_);
+      left_ -= Exchange(samples_, state_, limit, tolerance).run(left_ - reserve, random_);
       FitState eased = state_;
       settle(eased, easing);
       lessen_largest(eased, 0, easing);
@@ -436,15 +459,7 @@ public:
       fruitless = price(state_) < before ? 0 : fruitless + 1;
       tell();
     }
-    Exchange kicked(samples_, state_, limit, tolerance);
-    for (const std::size_t most = left_; goes_on();) {
-      left_ = most - kicked.kick(most, random_);
-      tell();
-    }
   }
-
-private:
-  bool goes_on() { return left_ > 0 && rounds_-- > 0; }
 
   void tell() {
     advance(options_.progress, 1 - static_cast<double>(left_) / static_cast<double>(all_));
@@ -478,10 +493,9 @@ void exchange_pieces(FitSamples& samples, FitState& state, const ExchangeOptions
     search.before_parting();
     state = best;
     points = samples.points();
-    best.limits.kink = options.kink;
     part_normals(best);
   }
-  search.run();
+  search.run(parting);
   if (!(price(best) < price(state)) || best.error() > options.limit) {
     samples.take_points(std::move(points));
     return;

@@ -23,13 +23,14 @@ struct ExchangeOptions {
 /// is then worst. What is neither dearer (see price()) nor above `limit` (mm) nor crosses more is kept, so that also
 /// steps that bring nothing lead on to others, where a certificate of the surroundings finds nothing above `tolerance`
 /// (mm). Larger pieces once a round of smaller ones brought nothing. Eight changes are tried at once, one of them is
-/// kept. All that with normals that may part, at corners that meet at a node, by `kink` degrees (none for 0): every
-/// patch follows the target more closely, so that fewer do; what the limit does not ask for is joined again, and the
-/// state keeps FitLimits::kink. Not for watertight patches: their edges follow the normals of both sides. Once that
-/// brings nothing more, edges are split somewhere, to search on there: what does not come back to as few is undone.
-/// Deterministic, whatever the number of threads. Parallel. Cost: six pieces per shell are fitted anew, at least 600
-/// (20 per shell, where that is less) and at most 6,000, some 30 ms each: where too large an error is foretold they are
-/// given up. Of more than 600 shells none, of more than 1,300 where the target has fewer than 250 triangles per shell.
+/// kept. All that with normals that may part, at corners that meet at a node, by `kink` degrees (none for 0; by more
+/// than 45 only where many nodes make use of that, as on targets with folds): every patch follows the target more
+/// closely, so that fewer do; what the limit does not ask for is joined again, and the state keeps FitLimits::kink. Not
+/// for watertight patches: their edges follow the normals of both sides. Once that brings nothing more, edges are split
+/// somewhere, to search on there: what does not come back to as few is undone. Deterministic, whatever the number of
+/// threads. Parallel. Cost: six pieces per shell are fitted anew, at least 600 (20 per shell, where that is less) and
+/// at most 6,000, some 30 ms each: where too large an error is foretold they are given up. Of more than 600 shells
+/// none, of more than 1,300 where the target has fewer than 250 triangles per shell.
 void exchange_pieces(FitSamples& samples, FitState& state, const ExchangeOptions& options);
 
 }  // namespace tunica

@@ -36,9 +36,10 @@ struct RelaxOptions {
   std::optional<std::size_t> max_shells;  ///< for refine and fit
   std::optional<std::size_t> shells;      ///< for fit: at most this many instead of as many as COARSE has
   /// Degrees by which the normals of comas shells that meet at a node may part where that saves shells, for fit to a
-  /// tolerance: 0 where only creases may have several. Where facets turn so far that no single normal serves
-  /// them all, or a patch is far closer with its own, they part all the same.
-  double kink = 45;
+  /// tolerance: 0 where only creases may have several; by more than 45 only where many nodes make use of that. Where
+  /// facets turn so far that no single normal serves them all, or a patch is far closer with its own, they part all the
+  /// same.
+  double kink = 75;
   /// Degrees: what the angles of fit's shells keep where the target's folds, rims and creases allow it. None: 20; to a
   /// tolerance 10 or 5 where plain decimation makes needles, as along cylinders, and that saves a quarter of the
   /// shells. From 1 to 30.

@@ -154,6 +154,26 @@ TEST(FitKink, ACreaseIsNotHeldTogether) {
   EXPECT_LT(largest_kink(state.mesh), 5 + 1e-9);
 }
 
+TEST(FitKink, NodesWhoseNormalsPartFarAreCounted) {
+  const Target target(wavy(3));
+  const FitSamples samples(target, 160);
+  FitState state = state_of(samples, wavy(1));
+  part_normals(state);
+  EXPECT_EQ(share_parted_by(state.mesh, 1e-3), 0);
+  std::vector<Index> slots;
+  for (const Index v : {3U, 5U}) {
+    state.mesh.slots_of(v, slots);
+    const auto axes = tilt_axes(state.mesh.normals[slots[0]]);
+    state.mesh.normals[slots[0]] =
+        (std::cos(degree * 20) * state.mesh.normals[slots[0]] + std::sin(degree * 20) * axes[0]).eval();
+  }
+  EXPECT_DOUBLE_EQ(share_parted_by(state.mesh, 19.9), 2.0 / 42);
+  EXPECT_EQ(share_parted_by(state.mesh, 20.1), 0);
+  state.mesh.slots_of(3, slots);
+  state.mesh.sectors[slots[0]] = 77;  // beyond a crease they may
+  EXPECT_DOUBLE_EQ(share_parted_by(state.mesh, 19.9), 1.0 / 42);
+}
+
 TEST(FitExchange, FewerShellsDoWithinTheSameLimitAndStillFewerWhereNormalsPart) {
   const Target target(wavy(3));
   FitSamples samples(target, 160);
@@ -179,6 +199,26 @@ TEST(FitExchange, FewerShellsDoWithinTheSameLimitAndStillFewerWhereNormalsPart) 
     const MeshFacts facts = examine(flat_facets(result->mesh.shell()));
     EXPECT_FALSE(why_unfit(facts)) << why_unfit(facts).value_or("");
     EXPECT_EQ(facts.euler, 2);
+  }
+}
+
+TEST(FitExchange, NormalsPartByMoreThan45DegreesOnlyWhereManyDo) {
+  const Target target(wavy(4));
+  for (const auto& [limit, start] : {std::pair{1.2, 2}, {0.2, 3}}) {
+    FitSamples samples(target, 160);
+    FitState state = state_of(samples, wavy(start));
+    collapse_to(state, limit);
+    ASSERT_TRUE(regains(samples, state, limit));
+    ExchangeOptions options{limit, limit / 0.97, 75};
+    options.rounds = limit > 1 ? 6 : 2;
+    exchange_pieces(samples, state, options);
+    state.attach();
+    state.measure();
+    EXPECT_LE(state.error(), limit);
+    EXPECT_LE(largest_kink(state.mesh), limit > 1 ? 75 + 1e-9 : 45 + 1e-9) << state.mesh.alive;
+    if (limit > 1) {
+      EXPECT_GT(largest_kink(state.mesh), 45 + 1);
+    }
   }
 }
 
