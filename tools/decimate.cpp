@@ -125,6 +125,12 @@ std::optional<std::string> what_failed(const Arguments& given, const DecimateRes
         "--max-error; allow more error",
         result.longest_spike);
   }
+  if (!result.error_kept && given.min_angle) {
+    return fmt::format(
+        "no mesh was found that keeps both --max-error and --min-angle ({:.3g} mm at {:.3g} degrees); "
+        "allow more error or smaller angles",
+        result.error->upper, result.smallest_angle);
+  }
   if (!result.error_kept) {
     return fmt::format("the error asked for by --max-error is below what double precision can certify ({:.3g} mm)",
                        result.error->upper);
