@@ -355,6 +355,11 @@ void run(cli::Tool& tool, const Arguments& given) {
     const ShellDistance flat = flat_distance(relaxed.shell, whole, measuring);
     measuring.progress = tool.progress("measure");
     distance = certified_distance(relaxed, whole, moved, measuring);
+    const double farthest = relaxed.distance.boundary ? distance.upper() : distance.both.upper;
+    if (moved > 0 && relaxed.reached && farthest > *tolerance) {
+      relaxed.reached = false;
+      relaxed.stopped = "no shells reach the target's spikes without area";
+    }
 
     Json& result = tool.result();
     result["shells"] = relaxed.shell.triangles.size();
@@ -386,7 +391,7 @@ void run(cli::Tool& tool, const Arguments& given) {
                                       : "folds, rims or creases do not allow more, or the error would be larger"));
     }
     result["self_intersections"] = crossing_shells(relaxed.shell).size();
-    result["reached"] = relaxed.reached ? Json(*relaxed.reached && distance.both.upper <= *tolerance) : Json();
+    result["reached"] = relaxed.reached ? Json(*relaxed.reached) : Json();
     result["stopped"] = relaxed.stopped;
     result["edges_turned"] = relaxed.flips;
     result["diagonal_mm"] = diagonal;
@@ -404,7 +409,7 @@ void run(cli::Tool& tool, const Arguments& given) {
                     "allowed; the best mesh is in {}.part",
                     given.target.string(), relaxed.shell.triangles.size(), *most, given.out.string()));
   }
-  if (tolerance && !(*relaxed.reached && distance.both.upper <= *tolerance)) {
+  if (tolerance && !*relaxed.reached) {
     keep_partial(relaxed.shell);
     throw RequirementError(fmt::format(
         "{}: the tolerance of {:.4g} % is not reached: {:.4g} %{} with {} shells ({}); the best mesh is {}.part. {}",
@@ -413,10 +418,9 @@ void run(cli::Tool& tool, const Arguments& given) {
             ? fmt::format(", {:.4g} % of the boundaries", percent * distance.boundary->upper)
             : "",
         relaxed.shell.triangles.size(), relaxed.stopped, given.out.string(),
-        moved > 0                            ? "Its target has spikes without area, which no shells reach"
-        : options.method == RelaxMethod::fit ? "Allow more shells or iterations, or a wider tolerance"
-        : given.refine                       ? "Allow more shells or iterations"
-                                             : "Add --refine, or take a coarse mesh with more triangles"));
+        options.method == RelaxMethod::fit ? "Allow more shells or iterations, or a wider tolerance"
+        : given.refine                     ? "Allow more shells or iterations"
+                                           : "Add --refine, or take a coarse mesh with more triangles"));
   }
   if (const std::size_t without_area = count_without_area(relaxed.shell); without_area > 0) {
     keep_partial(relaxed.shell);
