@@ -28,8 +28,9 @@ constexpr double interval_width = 1e-4;  // of the diagonal: what the report cer
 constexpr double rounding = 1e-9;        // of the diagonal: by which a certified interval may be wider than asked
 constexpr double curved_deviation =
     0.8e-5;  // of the diagonal; the contract of --curved, 1e-5, may be taken of either surface
-constexpr double most_for_spikes = 0.9;             // of the tolerance
-constexpr double usual_angle = 20;                  // degrees
+constexpr double most_for_spikes = 0.9;  // of the tolerance
+constexpr double usual_angle = 20;       // degrees
+constexpr double most_effort = 100;
 constexpr double largest_kink = 90;                 // degrees
 constexpr double least_angle = 1, most_angle = 30;  // degrees
 constexpr std::size_t map_triangles = 200'000;
@@ -43,7 +44,7 @@ struct Arguments {
   std::optional<std::string> mesh_unit;
   bool refine = false;
   std::optional<std::size_t> shells, max_shells;
-  std::optional<std::string> kink, min_angle;
+  std::optional<std::string> kink, min_angle, effort;
   std::optional<int> max_iterations;
 };
 
@@ -81,6 +82,11 @@ void declare(cli::Tool& tool, Arguments& given) {
          "fit: degrees that the angles of the shells keep where folds, rims and creases allow it (default 20; to "
          "a --tolerance less where that saves shells: 10 or 5 along cylinders, and any where flat ones are as few)")
       ->type_name("DEG");
+  app.add_option(
+         "--effort", given.effort,
+         "fit to a --tolerance: how long fewer shells are looked for, times the usual (default 1; 0: a fraction "
+         "of the time for a quarter more shells; at most 100)")
+      ->type_name("X");
   app.add_option("--max-iterations", given.max_iterations,
                  "at most N iterations (barycentre: 20, with --refine 60; fit: 8 rounds, or 1 to many shells on a "
                  "smooth target; to a tolerance as many, and no limit of exchanges)")
@@ -108,6 +114,9 @@ void refuse_contradictions(const Arguments& given) {
   }
   if (given.kink && (!fit || !given.tolerance || given.refine || given.surface != "comas")) {
     throw UsageError("--kink belongs to --method fit with --tolerance, without --refine, and comas patches");
+  }
+  if (given.effort && (!fit || !given.tolerance || given.refine)) {
+    throw UsageError("--effort belongs to --method fit with --tolerance, without --refine");
   }
   if (given.min_angle && !fit) {
     throw UsageError("--min-angle belongs to --method fit");
@@ -259,6 +268,13 @@ void run(cli::Tool& tool, const Arguments& given) {
   refuse_contradictions(given);
   const auto largest_part = degrees("--kink", given.kink, 0, largest_kink);
   const auto min_angle = degrees("--min-angle", given.min_angle, least_angle, most_angle);
+  std::optional<double> effort;
+  if (given.effort) {
+    effort = parse_number(*given.effort);
+    if (!effort || !(*effort >= 0 && *effort <= most_effort)) {
+      throw UsageError(fmt::format("--effort: '{}' is not a number from 0 to {:.0f}", *given.effort, most_effort));
+    }
+  }
   tool.output(given.out, {".ply"});
   for (const auto& [path, ending] : {std::pair(given.map, ".ply"), {given.picture, ".png"}, {given.curved, ".ply"}}) {
     if (path) {
@@ -310,6 +326,7 @@ void run(cli::Tool& tool, const Arguments& given) {
   options.max_shells = given.max_shells;
   options.max_iterations = given.max_iterations;
   options.kink = largest_part.value_or(options.kink);
+  options.effort = effort.value_or(options.effort);
   options.min_angle = min_angle;
   options.width = interval_width * diagonal;
   options.progress = tool.progress("relax");

@@ -344,6 +344,7 @@ private:
 
   ExchangeOptions exchanging(double limit, double tolerance) {
     ExchangeOptions out{limit, tolerance, options_.kink};
+    out.effort = options_.effort;
     out.rounds = options_.max_iterations.value_or(out.rounds);
     out.on_better = [&](const FitState& state) { result_.note(state); };
     out.progress = options_.progress;

@@ -409,14 +409,16 @@ public:
       : samples_(samples),
         state_(state),
         options_(options),
-        all_(std::clamp(fits_per_shell * state.mesh.alive,
-                        std::min(fewest_fits, most_fits_per_shell * state.mesh.alive), most_fits)),
+        all_(
+            fits(options.effort, std::clamp(fits_per_shell * state.mesh.alive,
+                                            std::min(fewest_fits, most_fits_per_shell * state.mesh.alive), most_fits))),
         left_(all_),
         rounds_(options.rounds),
         least_(price(state)) {}
 
   void before_parting() {
-    Exchange(samples_, state_, options_.limit, options_.tolerance).run(most_before_parting, random_);
+    Exchange(samples_, state_, options_.limit, options_.tolerance)
+        .run(fits(options_.effort, most_before_parting), random_);
     least_ = price(state_);
   }
 
@@ -439,6 +441,10 @@ public:
   }
 
 private:
+  static std::size_t fits(double effort, std::size_t usual) {
+    return static_cast<std::size_t>(effort * static_cast<double>(usual));
+  }
+
   bool goes_on(std::size_t reserve) { return left_ > reserve && rounds_-- > 0; }
 
   /// Exchanges, with the room that less error everywhere gives in between. @param reserve  of pieces, to be left
@@ -482,7 +488,7 @@ private:
 
 void exchange_pieces(FitSamples& samples, FitState& state, const ExchangeOptions& options) {
   const bool coarse = samples.target().mesh().triangles.size() < coarse_target * state.mesh.alive;
-  if (state.mesh.alive > (coarse ? most_on_coarse_targets : most_shells)) {
+  if (state.mesh.alive > (coarse ? most_on_coarse_targets : most_shells) || options.effort == 0) {
     return;
   }
   const bool parting = options.kink > 0 && state.mesh.kind == Patch::comas;

@@ -12,6 +12,7 @@ struct ExchangeOptions {
   double limit = 0;      ///< mm: no error of the samples is above it
   double tolerance = 0;  ///< mm: what certificates are to hold
   double kink = 0;       ///< degrees by which normals that meet at a node may part; 0: not at all
+  double effort = 1;     ///< times the pieces that are fitted anew
   int rounds = std::numeric_limits<int>::max();         ///< searches at most: of the whole, then after kicks
   std::function<void(const FitState&)> on_better = {};  ///< told of every one with fewer shells
   Progress progress = {};

@@ -40,6 +40,7 @@ RelaxOptions fitting(double tolerance) {
   RelaxOptions options;
   options.method = RelaxMethod::fit;
   options.tolerance = tolerance;
+  options.effort = 0.1;  // what these tests are about it does not change
   return options;
 }
 

@@ -98,6 +98,8 @@ class Case(unittest.TestCase):
     def relax(self, *arguments, expect=0):
         """Runs the tool, with the class's method when none is named; @return its report and stderr."""
         arguments = [*arguments, *([] if "--method" in arguments else self.method)]
+        if "--tolerance" in arguments and not {"--refine", "barycentre", "--effort"} & set(map(str, arguments)):
+            arguments += ["--effort", "0.1"]  # that shells are the fewest is not what these tests are about
         report = self.path("report.json")
         if os.path.exists(report):
             os.remove(report)
@@ -277,6 +279,10 @@ class Contract(Case):
                       ["--kink", "20"], ["--tolerance", "1%", "--kink", "20", "--refine"],
                       ["--tolerance", "1%", "--kink", "20", "--surface", "watertight"],
                       ["--tolerance", "1%", "--kink", "20", "--method", "barycentre"],
+                      ["--effort", "1"], ["--tolerance", "1%", "--effort", "-1"], ["--tolerance", "1%", "--effort", "nan"],
+                      ["--tolerance", "1%", "--effort", "101"], ["--tolerance", "1%", "--effort", "much"],
+                      ["--tolerance", "1%", "--effort", "1", "--refine"],
+                      ["--tolerance", "1%", "--effort", "1", "--method", "barycentre"],
                       ["--min-angle", "0.5"], ["--min-angle", "31"], ["--min-angle", "nan"], ["--min-angle", "wide"],
                       ["--min-angle", "20", "--method", "barycentre"]):
             self.relax(self.coarse, self.target, self.out, *extra, expect=2)
@@ -528,6 +534,18 @@ class Fit(Case):
             self.assertLess(largest, kink + 1e-4)
         self.assertLess(shells[40], shells[0])
 
+    def test_effort_finds_fewer_shells(self):
+        vertices, triangles = sphere(3)
+        vertices *= 1 + 0.12 * np.sin(vertices[:, :1] / 6) * np.cos(vertices[:, 1:2] / 8)
+        wavy = self.path("wavy.ply")
+        write_ply(wavy, vertices, triangles)
+        shells = {}
+        for effort in (0, 1):
+            record, _ = self.relax(wavy, wavy, self.out, "--tolerance", "1%", "--effort", effort, "--force")
+            self.assertTrue(record["result"]["reached"])
+            shells[effort] = record["result"]["shells"]
+        self.assertLess(shells[1], shells[0])
+
     def test_angles_are_kept_that_are_asked_for(self):
         vertices, triangles = cylinder(60, 24, radius=1, length=4)
         tube = self.path("tube.ply")
@@ -605,7 +623,7 @@ class Organs(Case):
                         "20", "--report", report], check=True, capture_output=True, timeout=300)
         with open(report) as file:
             triangles = json.load(file)["result"]["triangles"]
-        record, _ = self.relax(target, target, self.path("shell.ply"), *unit, "--tolerance", "1%")
+        record, _ = self.relax(target, target, self.path("shell.ply"), *unit, "--tolerance", "1%", "--effort", 1)
         result = record["result"]
         self.assertLessEqual(result["hausdorff_percent"]["upper"], 1)
         self.assertLessEqual(result["boundary_percent"]["upper"], 1)
