@@ -82,10 +82,9 @@ void declare(cli::Tool& tool, Arguments& given) {
          "fit: degrees that the angles of the shells keep where folds, rims and creases allow it (default 20; to "
          "a --tolerance less where that saves shells: 10 or 5 along cylinders, and any where flat ones are as few)")
       ->type_name("DEG");
-  app.add_option(
-         "--effort", given.effort,
-         "fit to a --tolerance: how long fewer shells are looked for, times the usual (default 1; 0: a fraction "
-         "of the time for a quarter more shells; at most 100)")
+  app.add_option("--effort", given.effort,
+                 "fit to a --tolerance: how long fewer shells are looked for, times the usual (default 1; 0: a fifth "
+                 "of the time for a fifth to nine tenths more shells; at most 100)")
       ->type_name("X");
   app.add_option("--max-iterations", given.max_iterations,
                  "at most N iterations (barycentre: 20, with --refine 60; fit: 8 rounds, or 1 to many shells on a "
