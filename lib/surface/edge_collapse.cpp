@@ -1,6 +1,7 @@
 #include "surface/edge_collapse.hpp"
 
 #include "core/error.hpp"
+#include "surface/degenerate.hpp"
 #include "surface/facet_distances.hpp"
 #include "surface/measure.hpp"
 
@@ -11,6 +12,8 @@
 namespace tunica {
 namespace {
 
+/// Twice the area, in a mesh of diagonal 1, from which on a triangle needs no closer look at whether it has any.
+constexpr double most_without_area = 1e-8;
 /// A triangle may turn by at most acos(0.2) = 78 degrees in one collapse.
 constexpr double least_cosine = 0.2;
 /// What a collapse may make of the triangles: cosine of the sharpest fold between neighbours, height over longest edge
@@ -185,13 +188,30 @@ void EdgeCollapse::find_boundary() {
   }
 }
 
+/// The boundary edges of a triangle without area have no plane that would stop their ends from sliding along them: a
+/// spike would be lost at no cost.
+void EdgeCollapse::pin_boundary(HalfEdge triangle) {
+  for (HalfEdge k = triangle; k < triangle + 3; ++k) {
+    if (half_[k].twin == none) {
+      const double squared_length = (vertex_[to(k)].position - vertex_[from(k)].position).squaredNorm();
+      const double weight =
+          aim_ == Aim::few_collapses ? even_boundary_weight : boundary_weight * length_to_quadric(squared_length);
+      for (const Index end : {from(k), to(k)}) {
+        wall_[end] += Quadric::point(vertex_[end].position, weight);
+      }
+    }
+  }
+}
+
 void EdgeCollapse::sum_quadrics() {
   wall_.assign(curves_.empty() ? 0 : vertex_.size(), {});
   for (HalfEdge h = 0; h < half_.size(); h += 3) {
     const Vec3& a = vertex_[half_[h].from].position;
     const Vec3 normal = (vertex_[half_[h + 1].from].position - a).cross(vertex_[half_[h + 2].from].position - a);
     const double doubled_area = normal.norm();
-    if (!(doubled_area > 0)) {
+    if (doubled_area < most_without_area &&
+        is_degenerate(a, vertex_[half_[h + 1].from].position, vertex_[half_[h + 2].from].position)) {
+      pin_boundary(h);
       continue;
     }
     const Vec3 unit = normal / doubled_area;

@@ -112,6 +112,7 @@ private:
   [[nodiscard]] bool connect(const TriangleMesh& mesh);
   [[nodiscard]] bool has_one_fan_per_vertex() const;
   void find_boundary();
+  void pin_boundary(HalfEdge triangle);
   void sum_quadrics();
   void fill_heap();
   void sweep(std::size_t triangles, const Progress& progress);
