@@ -63,11 +63,22 @@ inline constexpr std::size_t most_certified_pieces = 2'000'000;
 /// far they bulge from it, and cut where that does not do.
 OneSided shell_to_target(const std::vector<CubicPatch>& patches, const Target& target, const Aim& aim);
 
+/// Triangles, neighbours in space mostly one after the other.
+struct SurfaceInOrder {
+  const std::vector<Vec3>& vertices;                    ///< #V
+  const std::vector<std::array<Index, 3>>& triangles;  ///< #F
+  const std::vector<Index>& order;                      ///< #F, all of them
+
+  static SurfaceInOrder of(const Target& target) {
+    return {target.tree().vertices(), target.tree().triangles(), target.tree().spatial_order()};
+  }
+};
+
 /// From the target to the curved surface: a piece of a triangle of the target is bounded by the part of one patch
 /// between the feet of its corners, point by point at equal parameters, and cut where that does not do, at first along
 /// the edge between the patches of its corners.
 /// @param expected  mm: roughly what the distance is; how well it is known decides about the time only
-OneSided target_to_shell(const ShellMesh& shell, const std::vector<CubicPatch>& patches, const Target& target,
+OneSided target_to_shell(const ShellMesh& shell, const std::vector<CubicPatch>& patches, const SurfaceInOrder& target,
                          const Aim& aim, double expected);
 
 }  // namespace tunica

@@ -31,6 +31,7 @@ constexpr std::size_t few = 600;   // triangles: from so few slivers hardly any 
 constexpr std::size_t affordable = 1300;  // triangles of a start: further searches cost little
 constexpr int search_patience = 2;        // rounds that leave as many shells
 constexpr double finer_start_error = 1.5;
+constexpr double stand_in_error = 0.04;  // tolerances: of what stands in for a dense target
 constexpr double limited_by_target =
     0.6;                               // of its triangles: a start that needs more follows its facets, not its shape
 constexpr double expected_gain = 3;    // shells of the start per shell of the result
@@ -104,15 +105,15 @@ public:
   }
 
 private:
-  /// @param angle  degrees, instead of 20 or what was asked for
+  /// @param angle  degrees, instead of 20 or what was asked for; @param real  see FitResult
   Fitting(const TriangleMesh& coarse, const Target& target, const RelaxOptions& options, double width,
-          std::optional<double> angle = {})
+          std::optional<double> angle = {}, const Target* real = nullptr)
       : coarse_(coarse),
         target_(target),
         options_(options),
         angle_(angle.value_or(options.min_angle.value_or(FitLimits{}.angle))),
         like_target_(same_topology(coarse, target)),
-        result_(target, options, width, like_target_) {}
+        result_(target, options, width, like_target_, real) {}
 
   static double width_for(const Target& target, const RelaxOptions& options) {
     const double width = options.width.value_or(default_width * target.diagonal());
@@ -240,24 +241,60 @@ private:
   }
 
   void whole_to_tolerance(double tolerance) {
-    const FitStart start = like_target_
-                               ? start_of_fit(target_, start_error * tolerance, few, finer_start_error * tolerance)
-                               : start_as_given(coarse_, target_);
-    // Flat errors fall as 1 / count. Where curved shells need as many, flat facets are the answer.
+    const auto stand_in = like_target_ ? stand_in_for(target_, stand_in_error * tolerance) : std::nullopt;
+    const FitStart start = stand_in ? by_stand_in(*stand_in, tolerance) : fewest_to_tolerance(tolerance);
+    result_.no_worse_than_flat(tolerance, max_index, start);
+  }
+
+  /// Fits what stands in for the target, closer by what is between the two, and mends what is too far from the target
+  /// itself. @return the start of the search
+  FitStart by_stand_in(const FitStart& stand_in, double tolerance) {
+    const Target target(stand_in.mesh);
+    Fitting fitting(target.mesh(), target, options_, result_.width(), angle_, &target_);
+    FitStart start = fitting.fewest_to_tolerance(tolerance - stand_in.flat_error);
+    result_.add_iterations(fitting.result_.found.iterations);
+    const ShellMesh& shell = fitting.result_.found.shell;
+    if (shell.triangles.empty()) {
+      return fewest_to_tolerance(tolerance);
+    }
+    const ShellDistance distance = result_.distance_of(shell, tolerance);
+    if (distance.upper() <= tolerance) {
+      result_.take(shell, distance);
+      return start;
+    }
+    if (!fitting.result_.mesh()) {
+      return fewest_to_tolerance(tolerance);
+    }
+    FitSamples samples(target_, guess(static_cast<double>(shell.triangles.size())), like_target_);
+    FitState state(samples, *fitting.result_.mesh(), limits());
+    state.attach();
+    state.measure();
+    regains(samples, state, margin * tolerance);
+    make_certain(samples, state, tolerance, most_for(start, tolerance));
+    return start;
+  }
+
+  /// Flat errors fall as 1 / count. Where curved shells need as many, flat facets are the answer.
+  [[nodiscard]] std::size_t most_for(const FitStart& start, double tolerance) const {
     const double flat_count = static_cast<double>(start.mesh.triangles.size()) * start.flat_error / tolerance;
-    const std::size_t most =
-        options_.min_angle ? max_index : static_cast<std::size_t>(std::clamp(flat_count, 64.0, 1e9));
+    return options_.min_angle ? max_index : static_cast<std::size_t>(std::clamp(flat_count, 64.0, 1e9));
+  }
+
+  /// @return the start of the search; none is made where that has nearly as many triangles as the target
+  FitStart fewest_to_tolerance(double tolerance) {
+    FitStart start = like_target_ ? start_of_fit(target_, start_error * tolerance, few, finer_start_error * tolerance)
+                                  : start_as_given(coarse_, target_);
     if (!start.own_topology && static_cast<double>(start.mesh.triangles.size()) >
                                    limited_by_target * static_cast<double>(target_.mesh().triangles.size())) {
-      result_.no_worse_than_flat(tolerance, max_index, start);
-      return;
+      return start;
     }
+    const std::size_t most = most_for(start, tolerance);
     if (!options_.min_angle && is_of_needles(start.mesh)) {
       long_shells(start, tolerance, most);
     } else {
       search_from(start, tolerance, most);
     }
-    result_.no_worse_than_flat(tolerance, max_index, start);
+    return start;
   }
 
   /// Shells as long as decimation's needles where that saves many.

@@ -29,7 +29,7 @@ constexpr std::size_t at_once = 8;  // changes, whatever the number of threads
 // Of pieces anew: what costs.
 constexpr std::size_t fits_per_shell = 6, fewest_fits = 600, most_fits = 6'000, most_fits_per_shell = 20;
 constexpr std::size_t most_before_parting = 150;  // of these more, where normals are to part
-constexpr std::size_t most_shells = 600, most_on_coarse_targets = 1300;
+constexpr std::size_t most_shells = 60000, most_on_coarse_targets = 130000;
 constexpr std::size_t coarse_target = 250;       // triangles per shell: walks on denser ones are what a piece costs
 constexpr int fewest_rings = 1, most_rings = 3;  // of nodes around a merger that move with it
 constexpr int regaining = 6;                     // steps that lessen the largest error of a piece
@@ -48,6 +48,7 @@ constexpr double often = 0.02;     // of the nodes
 // Of the tolerance. Certificates end with intervals that wide, below it or not: what one finds just below may be above
 // in the next, which looks at more.
 constexpr double certainly = 1 - width_of_certificates;
+constexpr std::size_t changes_between_attaching = 64;  // shells per change that all points are attached after
 constexpr int certificates = 8;  // per change: each tells of points that the samples missed
 
 bool recovers(FitState& piece, double limit) {
@@ -126,6 +127,9 @@ public:
           }
           conclude(done, start);
         }
+        if (now_ >= attached_ + 1 + state_.mesh.alive / changes_between_attaching) {
+          attach_all_again();
+        }
       }
       rings += price(state_) < before ? 0 : 1;
     }
@@ -179,7 +183,7 @@ private:
     mend_angles(piece, limit_);
     const std::size_t dearer = price(state_) + 2 * splits_of_a_kick;
     if (auto trial = sound(region, price(piece), dearer)) {
-      accept(std::move(*trial), region.nodes);
+      accept(std::move(*trial), region);
       return true;
     }
     return false;
@@ -249,9 +253,10 @@ private:
     return true;
   }
 
-  /// @param start  of the attempts made at once: after one that came off, another is made anew some time
+  /// @param start  of the attempts made at once: what another of them has changed since is tried anew some time
   void conclude(Attempt& done, std::size_t start) {
-    if (now_ > start && done.fits) {
+    if (done.fits && std::any_of(done.region->nodes.begin(), done.region->nodes.end(),
+                                 [&](Index node) { return changed_[node] > start; })) {
       return;
     }
     for (const Change& change : done.looked_at) {
@@ -263,7 +268,7 @@ private:
     }
     const std::size_t points = samples_.points().size();
     if (auto trial = sound(*done.region, done.price_before, price(state_))) {
-      accept(std::move(*trial), done.region->nodes);
+      accept(std::move(*trial), *done.region);
     } else {
       samples_.keep(points);  // what only a piece that failed had to heed costs every other
     }
@@ -274,17 +279,16 @@ private:
   std::optional<FitState> sound(FitRegion& region, std::size_t price_before, std::size_t most) {
     for (int i = 0; i < certificates; ++i) {
       FitState trial = state_;
-      if (put_back(region, trial) > limit_ || worse(trial, most)) {
+      if (put_back(region, trial) > limit_ || trial.error() > limit_ || price(trial) > most) {
         return {};
       }
       const Box box = around(region);
+      if (crossings_with(trial, box) > crossings_) {
+        return {};
+      }
       std::vector<SamplePoint> missed = missed_within(trial, box, limit_);
       if (missed.empty() && holds_within(trial, box, tolerance_, missed)) {
-        // The samples must see that as well, or steps of all nodes would start above the limit. From patch to patch:
-        // attached to a tessellation's nearest triangle, some would be far off that are not.
-        trial.attach_again();
-        trial.measure();
-        return trial.error() <= limit_ ? std::optional(std::move(trial)) : std::nullopt;
+        return trial;
       }
       attach_to_closest(missed, region.state);
       region.state.measure();
@@ -324,8 +328,25 @@ private:
     }
   }
 
-  [[nodiscard]] bool worse(const FitState& trial, std::size_t most) const {
-    return trial.error() > limit_ || price(trial) > most || crossing_shells(trial.mesh.shell()).size() > crossings_;
+  /// How many pairs cross in a trial that differs from the state only within a box.
+  [[nodiscard]] std::size_t crossings_with(const FitState& trial, const Box& box) const {
+    const auto near = [&](const FitState& state) {
+      return crossing_shells(shells_near(state.mesh.shell(), box, 0)).size();
+    };
+    const std::size_t now = near(trial);
+    return crossings_ == 0 ? now : crossings_ + now - near(state_);
+  }
+
+  /// Points of the target may be closer to a patch beyond what has changed. From patch to patch: attached to a
+  /// tessellation's nearest triangle, some would be far off that are not.
+  void attach_all_again() {
+    attached_ = now_;
+    FitState again = state_;
+    again.attach_again();
+    again.measure();
+    if (again.error() <= limit_) {
+      state_ = std::move(again);
+    }
   }
 
   /// What a changed piece may be close to, before and after.
@@ -345,18 +366,18 @@ private:
     return box;
   }
 
-  void accept(FitState trial, const std::vector<Index>& nodes) {
+  void accept(FitState trial, const FitRegion& region) {
     ++now_;
+    crossings_ = crossings_with(trial, around(region));
     const std::size_t before = changed_.size();
     changed_.resize(trial.mesh.positions.size(), now_);
     for (std::size_t i = 0; i < before; ++i) {
       changed_[i] = trial.mesh.positions[i] == state_.mesh.positions[i] ? changed_[i] : now_;
     }
-    for (const Index node : nodes) {
+    for (const Index node : region.nodes) {
       changed_[node] = now_;
     }
     state_ = std::move(trial);
-    crossings_ = std::min(crossings_, crossing_shells(state_.mesh.shell()).size());
   }
 
   static constexpr double everywhere = std::numeric_limits<double>::infinity();
@@ -366,6 +387,7 @@ private:
   double limit_, tolerance_;
   std::size_t crossings_;
   std::size_t fits_ = 0, now_ = 1;    // changes so far
+  std::size_t attached_ = 1;          // when all points were, last
   std::vector<std::size_t> changed_;  // when each node was last
   std::map<Change, std::size_t> tried_;
 };

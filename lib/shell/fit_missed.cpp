@@ -124,33 +124,6 @@ std::vector<Missed> far_boundary_points(const FitState& state, const Box& box, d
   return found;
 }
 
-/// The shells that come as close as `reach` (mm) to a box, so all that its points can have within that. All of them
-/// where patches follow the normals across their edges.
-ShellMesh shells_near(ShellMesh shell, const Box& box, double reach) {
-  if (shell.patch == Patch::watertight) {
-    return shell;
-  }
-  const Box wide{box.lower - Vec3::Constant(reach), box.upper + Vec3::Constant(reach)};
-  const std::vector<CubicPatch> patches = curved_patches(shell);
-  ShellMesh near = shell;
-  near.triangles.clear();
-  near.corner_normals.clear();
-  for (std::size_t t = 0; t < patches.size(); ++t) {
-    Box hull{patches[t].control[0], patches[t].control[0]};
-    for (const Vec3& p : patches[t].control) {
-      hull.lower = hull.lower.cwiseMin(p);
-      hull.upper = hull.upper.cwiseMax(p);
-    }
-    if ((hull.lower.array() <= wide.upper.array()).all() && (hull.upper.array() >= wide.lower.array()).all()) {
-      near.triangles.push_back(shell.triangles[t]);
-      if (!shell.corner_normals.empty()) {
-        near.corner_normals.push_back(shell.corner_normals[t]);
-      }
-    }
-  }
-  return near;
-}
-
 /// Where patches part sideways and are off as well, the target above the gap is farther from both than either measure
 /// says: its points there that are too far off.
 std::vector<Vec3> missed_over_gaps(const FitState& state, const std::vector<std::array<Index, 2>>& edges,
@@ -191,6 +164,31 @@ std::vector<Vec3> missed_over_gaps(const FitState& state, const std::vector<std:
 }
 
 }  // namespace
+
+ShellMesh shells_near(ShellMesh shell, const Box& box, double reach) {
+  if (shell.patch == Patch::watertight) {
+    return shell;
+  }
+  const Box wide{box.lower - Vec3::Constant(reach), box.upper + Vec3::Constant(reach)};
+  const std::vector<CubicPatch> patches = curved_patches(shell);
+  ShellMesh near = shell;
+  near.triangles.clear();
+  near.corner_normals.clear();
+  for (std::size_t t = 0; t < patches.size(); ++t) {
+    Box hull{patches[t].control[0], patches[t].control[0]};
+    for (const Vec3& p : patches[t].control) {
+      hull.lower = hull.lower.cwiseMin(p);
+      hull.upper = hull.upper.cwiseMax(p);
+    }
+    if ((hull.lower.array() <= wide.upper.array()).all() && (hull.upper.array() >= wide.lower.array()).all()) {
+      near.triangles.push_back(shell.triangles[t]);
+      if (!shell.corner_normals.empty()) {
+        near.corner_normals.push_back(shell.corner_normals[t]);
+      }
+    }
+  }
+  return near;
+}
 
 std::size_t add_missed(FitSamples& samples, FitState& state, double limit, bool both_ways) {
   std::vector<Index> triangles;
@@ -280,8 +278,9 @@ bool holds_within(const FitState& state, const Box& box, double tolerance, std::
     }
   }
   TriangleMesh part;
-  std::vector<Index> number(target.mesh().vertices.size(), no_index);
-  for (auto corners : target.mesh().triangles) {
+  std::vector<Index> number(target.mesh().vertices.size(), no_index), order;
+  for (const Index t : target.tree().spatial_order()) {
+    auto corners = target.mesh().triangles[t];
     if (std::none_of(corners.begin(), corners.end(),
                      [&](Index v) { return is_within(box, target.mesh().vertices[v]); })) {
       continue;
@@ -293,12 +292,15 @@ bool holds_within(const FitState& state, const Box& box, double tolerance, std::
       }
       v = number[v];
     }
+    order.push_back(static_cast<Index>(part.triangles.size()));
     part.triangles.push_back(corners);
   }
   const Aim aim{width_of_certificates * tolerance, tolerance, 0};
   const OneSided from_shell = here.empty() ? OneSided{} : shell_to_target(here, target, aim);
   const OneSided from_target =
-      part.triangles.empty() ? OneSided{} : target_to_shell(shell, patches, Target(part), aim, state.error());
+      part.triangles.empty()
+          ? OneSided{}
+          : target_to_shell(shell, patches, {part.vertices, part.triangles, order}, aim, state.error());
   farthest.clear();
   if (from_shell.distance.upper > tolerance) {
     farthest.push_back({target.closest(from_shell.farthest).point});

@@ -17,6 +17,10 @@ inline constexpr double width_of_certificates = 0.005;
 /// some 0.1 s more.
 std::size_t add_missed(FitSamples& samples, FitState& state, double limit, bool both_ways = false);
 
+/// The shells that come as close as `reach` (mm) to a box, so all that its points can have within that. All of them
+/// where patches follow the normals across their edges.
+ShellMesh shells_near(ShellMesh shell, const Box& box, double reach);
+
 /// What add_missed() finds one way within a box, without adding it. Cost: as there, but of the points outside only a
 /// comparison.
 std::vector<SamplePoint> missed_within(const FitState& state, const Box& box, double limit);

@@ -21,8 +21,13 @@ constexpr std::array<double, 5> parts_for_boundaries{1, 0.7, 0.4, 0.2, 0.1};  //
 
 }  // namespace
 
-FitResult::FitResult(const Target& target, const RelaxOptions& options, double width, bool boundaries)
-    : target_(target), options_(options), width_(width), boundaries_(boundaries && target.boundary_tree()) {}
+FitResult::FitResult(const Target& target, const RelaxOptions& options, double width, bool boundaries,
+                     const Target* real)
+    : target_(target),
+      real_(real != nullptr ? *real : target),
+      options_(options),
+      width_(width),
+      boundaries_(boundaries && target.boundary_tree()) {}
 
 bool FitResult::certify(const FitState& state, std::optional<double> tolerance) {
   ShellMesh shell = state.mesh.shell();
@@ -56,6 +61,7 @@ bool FitResult::certify(const FitState& state, std::optional<double> tolerance) 
   if (is_empty() || better) {
     take(std::move(shell), distance);
     price_ = price(state);
+    mesh_ = state.mesh;
   }
   return within;
 }
@@ -115,13 +121,14 @@ void FitResult::no_worse_than_flat(std::optional<double> tolerance, std::size_t 
 void FitResult::take(ShellMesh shell, const ShellDistance& distance) {
   found.shell = std::move(shell);
   found.distance = distance;
+  mesh_.reset();
 }
 
 void FitResult::note(const FitState& state) {
   const ShellMesh shell = state.mesh.shell();
   ShellDistanceOptions measuring;
   measuring.width = std::max(width_, noted_width * state.error());
-  record(shell, shell_distance(shell, target_, measuring).both);
+  record(shell, shell_distance(shell, real_, measuring).both);
 }
 
 void FitResult::record(const ShellMesh& shell, const Interval& distance) {
@@ -141,12 +148,13 @@ void FitResult::add_iterations(const std::vector<RelaxIteration>& of) {
   last_ = std::chrono::steady_clock::now();
 }
 
-ShellDistance FitResult::distance_of(const ShellMesh& shell) const {
+ShellDistance FitResult::distance_of(const ShellMesh& shell, std::optional<double> limit) const {
   ShellDistanceOptions measuring;
   measuring.width = width_;
+  measuring.limit = limit;
   ShellDistance distance = shell_distance(shell, target_, measuring);
   if (boundaries_) {
-    if (const auto between = boundary_distance(boundary_curves(shell), target_, width_)) {
+    if (const auto between = boundary_distance(boundary_curves(shell), target_, width_, limit)) {
       distance.boundary = between->both;
     }
   }

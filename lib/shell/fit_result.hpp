@@ -15,12 +15,16 @@ public:
   /// @param options  of the whole fit: surface, on_iteration; they and the target must live as long
   /// @param width       mm: of certified intervals
   /// @param boundaries  whether the shells' boundary is to be the target's: then the tolerance holds for it as well
-  FitResult(const Target& target, const RelaxOptions& options, double width, bool boundaries);
+  /// @param real  the surface that `target` stands for: what is noted is measured against that
+  FitResult(const Target& target, const RelaxOptions& options, double width, bool boundaries,
+            const Target* real = nullptr);
 
   [[nodiscard]] bool is_empty() const { return found.shell.triangles.empty(); }
   /// Whether there are shells, certainly within the tolerance, mm.
   [[nodiscard]] bool holds(double tolerance) const { return !is_empty() && found.distance.upper() <= tolerance; }
   [[nodiscard]] double width() const { return width_; }
+  /// The shells as they were under edit, where they came so.
+  [[nodiscard]] const std::optional<FitMesh>& mesh() const { return mesh_; }
   /// Whether the shells are the target's flat facets.
   [[nodiscard]] bool is_flat() const { return flat_; }
 
@@ -42,7 +46,8 @@ public:
   void add_iterations(const std::vector<RelaxIteration>& of);
 
   /// The certified distance of shells, mm, with that of the boundaries where it counts.
-  [[nodiscard]] ShellDistance distance_of(const ShellMesh& shell) const;
+  /// @param limit  mm: see ShellDistanceOptions
+  [[nodiscard]] ShellDistance distance_of(const ShellMesh& shell, std::optional<double> limit = {}) const;
 
   /// Where on the target the largest distances were, when last certified; none where that was not looked for.
   [[nodiscard]] const std::vector<SamplePoint>& farthest() const { return farthest_; }
@@ -53,10 +58,12 @@ public:
 
 private:
   const Target& target_;
+  const Target& real_;
   const RelaxOptions& options_;
   double width_;
   bool boundaries_;
   std::size_t price_ = 0;  // of what was found
+  std::optional<FitMesh> mesh_;
   bool flat_ = false;
   std::vector<SamplePoint> farthest_;
   double least_distance_ = 0;

@@ -17,7 +17,8 @@ namespace {
 
 constexpr std::size_t ladder_top = 60'000;    // triangles: the first decimation, where the search for the count starts
 constexpr double surplus = 1.5;               // of triangles, there
-constexpr std::size_t most_samples = 20'000;  // for the sampled error of flat facets
+constexpr std::size_t most_samples = 20'000;  // vertices, and triangles: for the sampled error of flat facets
+constexpr std::size_t part_that_stands_in = 4, fewest_that_stand_in = 20'000;  // triangles
 constexpr double start_agreement = 0.35;      // of a corner's normal with its facet
 constexpr double crease_cosine = 0.8;         // of the angle between two facets: sharper edges may be creases
 constexpr double crease_share = 0.6;          // of that angle is there already close to the edge
@@ -37,7 +38,9 @@ double sampled_error(const TriangleMesh& mesh, const Target& target) {
     largest = std::max(largest, d);
   }
   some.vertices = mesh.vertices;
-  for (const auto& [a, b, c] : mesh.triangles) {
+  const std::size_t skip = std::max<std::size_t>(1, mesh.triangles.size() / most_samples);
+  for (std::size_t t = 0; t < mesh.triangles.size(); t += skip) {
+    const auto& [a, b, c] = mesh.triangles[t];
     some.vertices.emplace_back((mesh.vertices[a] + mesh.vertices[b] + mesh.vertices[c]) / 3);
     some.vertices.emplace_back((mesh.vertices[a] + mesh.vertices[b]) / 2);
     some.vertices.emplace_back((mesh.vertices[b] + mesh.vertices[c]) / 2);
@@ -118,6 +121,30 @@ FitStart start_of_fit(const Target& target, double flat_error, std::size_t few, 
     start.mesh = std::move(coarser);
     start.flat_error = error;
   }
+}
+
+std::optional<FitStart> stand_in_for(const Target& target, double flat_error) {
+  const std::size_t all = target.mesh().triangles.size(), first = all / part_that_stands_in;
+  if (first < fewest_that_stand_in) {
+    return {};
+  }
+  const auto with = [&](const TriangleMesh& finer, std::size_t triangles) {
+    FitStart out;
+    out.mesh = decimated(finer, triangles, false);
+    out.flat_error = sampled_error(out.mesh, target);
+    return out;
+  };
+  FitStart found = with(target.mesh(), first);
+  if (found.flat_error > flat_error) {
+    return {};
+  }
+  const auto enough = static_cast<std::size_t>(surplus * static_cast<double>(first) * found.flat_error / flat_error);
+  if (const std::size_t fewer = std::max(enough, fewest_that_stand_in); fewer < first / 2) {
+    if (FitStart coarser = with(found.mesh, fewer); coarser.flat_error <= flat_error) {
+      found = std::move(coarser);
+    }
+  }
+  return found;
 }
 
 FitMesh prepare_fit(const FitStart& start, const Target& target) {

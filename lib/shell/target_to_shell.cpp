@@ -70,8 +70,8 @@ double difference(const CubicPatch& patch, const Corners& c) {
 
 class FromTarget {
 public:
-  FromTarget(const ShellMesh& shell, const std::vector<CubicPatch>& patches, const Target& target, const Aim& aim,
-             double expected)
+  FromTarget(const ShellMesh& shell, const std::vector<CubicPatch>& patches, const SurfaceInOrder& target,
+             const Aim& aim, double expected)
       : patches_(patches), target_(target), aim_(aim), expected_(expected), search_(shell, patches) {}
 
   OneSided run() {
@@ -127,14 +127,15 @@ private:
   }
 
   std::vector<Piece> first_round() {
-    const ClosestPoint& tree = target_.tree();
-    const auto& order = tree.spatial_order();
+    const std::vector<Vec3>& vertices = target_.vertices;
+    const std::vector<std::array<Index, 3>>& triangles = target_.triangles;
+    const std::vector<Index>& order = target_.order;
     // Every vertex once, neighbours in space one after the other.
-    std::vector<Corner> corners(tree.vertices().size());
+    std::vector<Corner> corners(vertices.size());
     std::vector<Index> used;
     std::vector<std::uint8_t> met(corners.size(), 0);
     for (const Index t : order) {
-      for (const Index v : tree.triangles()[t]) {
+      for (const Index v : triangles[t]) {
         if (met[v] == 0) {
           met[v] = 1;
           used.push_back(v);
@@ -146,7 +147,7 @@ private:
       std::optional<Index> guess;
       SurfaceFoot last;
       for (std::size_t i = begin; i < end; ++i) {
-        const Vec3& p = tree.vertices()[used[i]];
+        const Vec3& p = vertices[used[i]];
         // Beside the last one's foot there mostly is one that is close enough.
         SurfaceFoot foot = search_.near(p, last.patch, last.at);
         if (foot.distance > expected_) {
@@ -179,7 +180,7 @@ private:
       Block& block = blocks[begin / (8 * grain)];
       block.lower = lower_;
       for (std::size_t i = begin; i < end; ++i) {
-        const auto& v = tree.triangles()[order[i]];
+        const auto& v = triangles[order[i]];
         bound({{corners[v[0]], corners[v[1]], corners[v[2]]}, infinity}, block);
       }
     });
@@ -311,7 +312,7 @@ private:
   }
 
   const std::vector<CubicPatch>& patches_;
-  const Target& target_;
+  SurfaceInOrder target_;
   Aim aim_;
   double expected_;
   PatchSearch search_;
@@ -321,7 +322,7 @@ private:
 
 }  // namespace
 
-OneSided target_to_shell(const ShellMesh& shell, const std::vector<CubicPatch>& patches, const Target& target,
+OneSided target_to_shell(const ShellMesh& shell, const std::vector<CubicPatch>& patches, const SurfaceInOrder& target,
                          const Aim& aim, double expected) {
   return FromTarget(shell, patches, target, aim, expected).run();
 }
