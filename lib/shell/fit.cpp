@@ -60,6 +60,8 @@ constexpr double needle = 10;                              // degrees: angles of
 constexpr std::array<double, 2> narrow_angles{10, 5};      // degrees: of shells there
 constexpr std::size_t price_of_an_angle_asked_for = 1000;  // shells
 constexpr double most_by_exchanges = 2;                    // times fewer shells
+constexpr std::size_t many = 600;                          // shells: exchanging pieces of more takes long
+constexpr double much_effort = 1;                          // above: it is done all the same
 constexpr double worth_narrow = 0.75;                      // of the shells with better angles
 
 /// Whether most of the area of a plain decimation is in needles: as along a cylinder, where length costs no error.
@@ -360,13 +362,17 @@ private:
         mend_angles(state, limit);
         holds = regains(samples, state, limit);
       }
-      if (holds) {
+      const bool condensing = holds && options_.effort > 0 && state.mesh.alive > many;
+      if (condensing) {
+        condense_parted(samples, state, exchanging(limit, tolerance));
+      } else if (holds) {
         part_crossings(state, limit, most);
         squeeze(samples, state, limit);
       }
       const std::size_t thin = options_.min_angle ? 0 : count_thin(state);
       bool certain = shape_and_certify(samples, state, tolerance, most);
-      if (holds && static_cast<double>(state.mesh.alive) < most_by_exchanges * wanted) {
+      if (holds && static_cast<double>(state.mesh.alive) < most_by_exchanges * wanted &&
+          (!condensing || options_.effort > much_effort)) {
         // What is exchanged is certified where it changes: all is certain if it was so before.
         exchange_pieces(samples, state, exchanging(limit, tolerance));
         result_.note(state);
@@ -405,7 +411,9 @@ private:
   FitState search(FitSamples& samples, const FitStart& start, double tolerance, std::size_t most, int patience_left) {
     FitState state(samples, prepared(start), limits());
     smooth(state, tolerance, tolerance);
-    const int rounds = options_.max_iterations.value_or(default_rounds);
+    // Condensing many shells does more than further rounds.
+    const bool once = options_.effort > 0 && state.mesh.alive > affordable;
+    const int rounds = options_.max_iterations.value_or(once ? 1 : default_rounds);
     const double limit = margin * tolerance;
     repair(state, limit, most);
     mend_angles(state, limit);

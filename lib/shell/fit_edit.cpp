@@ -1,5 +1,6 @@
 #include "shell/fit_edit.hpp"
 
+#include "core/threads.hpp"
 #include "shell/fit_trial.hpp"
 #include "surface/measure.hpp"
 
@@ -15,6 +16,7 @@ namespace {
 
 constexpr double least_split_angle = 3;  // degrees, where nothing better can be had
 constexpr double good_enough = 0.5;      // of the limit: edges of closer patches stay
+constexpr std::size_t evaluated_at_once = 8;  // mergers, whatever the number of threads
 constexpr double far_behind = 1.5;       // times the least error known: mergers that need not be placed well yet
 
 class Collapser {
@@ -284,7 +286,7 @@ std::size_t collapse_edges(FitState& state, double limit, std::size_t shells, co
     }
   };
   FitMesh& mesh = state.mesh;
-  Collapser collapser(state, limit);
+  std::vector<Collapser> collapsers(evaluated_at_once, Collapser(state, limit));
   std::vector<unsigned> version(mesh.positions.size(), 1);
   std::priority_queue<Candidate> queue;
   std::vector<PlacedNode> evaluations;
@@ -301,25 +303,48 @@ std::size_t collapse_edges(FitState& state, double limit, std::size_t shells, co
   }
   const std::size_t before = mesh.alive;
   std::size_t gone = 0;
+  const auto is_known = [&](const Candidate& c) { return c.version == current(c.u, c.v); };
+  std::vector<Candidate> some;
   while (!queue.empty() && mesh.alive > shells) {
+    // The cheapest that are only guessed are evaluated several at a time, in parallel.
+    some.clear();
+    while (!queue.empty() && some.size() < evaluated_at_once && queue.top().error <= limit && !is_known(queue.top())) {
+      const Candidate& c = queue.top();
+      if (!mesh.around[c.u].empty() && !mesh.around[c.v].empty()) {
+        some.push_back(c);
+      }
+      queue.pop();
+    }
+    if (!some.empty()) {
+      const double next = queue.empty() ? limit : queue.top().error;
+      parallel_for_blocks(some.size(), 1, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+          Candidate& c = some[i];
+          c.error = collapsers[i].evaluate(c.u, c.v, far_behind * std::max(c.error, next));
+        }
+      });
+      for (std::size_t i = 0; i < some.size(); ++i) {
+        Candidate& c = some[i];
+        if (c.error <= limit) {
+          c.version = current(c.u, c.v);
+          c.evaluated = evaluations.size();
+          evaluations.push_back(collapsers[i].placed_node());
+          queue.push(c);
+        }
+      }
+      continue;
+    }
+    if (queue.empty()) {
+      break;
+    }
     Candidate c = queue.top();
     queue.pop();
     if (mesh.around[c.u].empty() || mesh.around[c.v].empty() || c.error > limit) {
       continue;
     }
-    const double known = c.error;
-    const bool fresh = c.version == current(c.u, c.v);
-    const double next = queue.empty() ? limit : queue.top().error;
-    const double far = far_behind * std::max(known, next);
-    c.error = fresh ? collapser.evaluate_at(c.u, c.v, evaluations[c.evaluated]) : collapser.evaluate(c.u, c.v, far);
-    if (!(c.error <= limit) || !std::isfinite(c.error)) {
-      continue;
-    }
-    if (!fresh && !queue.empty() && c.error > 1.001 * std::max(known, next)) {
-      c.version = current(c.u, c.v);
-      c.evaluated = evaluations.size();
-      evaluations.push_back(collapser.placed_node());
-      queue.push(c);
+    Collapser& collapser = collapsers[0];
+    c.error = collapser.evaluate_at(c.u, c.v, evaluations[c.evaluated]);
+    if (!(c.error <= limit)) {
       continue;
     }
     collapser.commit(c.u, c.v);

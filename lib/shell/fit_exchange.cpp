@@ -29,8 +29,7 @@ constexpr std::size_t at_once = 8;  // changes, whatever the number of threads
 // Of pieces anew: what costs.
 constexpr std::size_t fits_per_shell = 6, fewest_fits = 600, most_fits = 6'000, most_fits_per_shell = 20;
 constexpr std::size_t most_before_parting = 150;  // of these more, where normals are to part
-constexpr std::size_t most_shells = 60000, most_on_coarse_targets = 130000;
-constexpr std::size_t coarse_target = 250;       // triangles per shell: walks on denser ones are what a piece costs
+constexpr int condensing = 8;                    // rounds
 constexpr int fewest_rings = 1, most_rings = 3;  // of nodes around a merger that move with it
 constexpr int regaining = 6;                     // steps that lessen the largest error of a piece
 constexpr double loosened = 4;                   // limits: error of a merger before its piece is fitted anew
@@ -392,22 +391,40 @@ private:
   std::map<Change, std::size_t> tried_;
 };
 
-bool is_certain(const FitState& state, double tolerance) {
+/// Whether a state is certainly within the tolerance, after steps of all nodes that meet what certificates find.
+bool becomes_certain(FitSamples& samples, FitState& state, double limit, double tolerance) {
   constexpr double everywhere = std::numeric_limits<double>::infinity();
-  std::vector<SamplePoint> farthest;
-  return holds_within(state, {Vec3::Constant(-everywhere), Vec3::Constant(everywhere)}, tolerance, farthest);
+  const Box all{Vec3::Constant(-everywhere), Vec3::Constant(everywhere)};
+  for (int i = 0; i < certificates && regains(samples, state, limit); ++i) {
+    std::vector<SamplePoint> farthest;
+    if (holds_within(state, all, certainly * tolerance, farthest)) {
+      return true;
+    }
+    add_missed(samples, state, limit, true);
+    for (const SamplePoint& point : farthest) {
+      samples.add(point);
+    }
+    state.attach();
+    state.measure();
+    if (state.error() <= limit) {
+      return false;  // what is wrong is not seen
+    }
+    lessen_largest(state, spare * limit, regaining, limit);
+  }
+  return false;
 }
 
 /// Takes a changed state when steps of all nodes bring it within the limit, it is no dearer, crosses no more, and is
-/// certainly within the tolerance, if what it was made from is.
+/// certainly within the tolerance.
 bool take_if_sound(FitSamples& samples, FitState trial, FitState& state, double limit, double tolerance) {
-  if (!regains(samples, trial, limit) || price(trial) > price(state) ||
-      crossing_shells(trial.mesh.shell()).size() > crossing_shells(state.mesh.shell()).size() ||
-      (!is_certain(trial, certainly * tolerance) && is_certain(state, tolerance))) {
-    return false;
+  const std::size_t points = samples.points().size();
+  if (becomes_certain(samples, trial, limit, tolerance) && price(trial) <= price(state) &&
+      crossing_shells(trial.mesh.shell()).size() <= crossing_shells(state.mesh.shell()).size()) {
+    state = std::move(trial);
+    return true;
   }
-  state = std::move(trial);
-  return true;
+  samples.keep(points);
+  return false;
 }
 
 /// Joins normals as long as the error allows. One after the other they may ask too much of those that follow: then
@@ -474,16 +491,15 @@ private:
     const double limit = options_.limit, tolerance = options_.tolerance;
     for (int fruitless = 0; fruitless < patience && goes_on(reserve);) {
       const std::size_t before = price(state_);
-      FitState squeezed = state_;
-      squeeze(samples_, squeezed, limit);
-      if (price(squeezed) < before) {
-        take_if_sound(samples_, std::move(squeezed), state_, limit, tolerance);
+      FitState condensed = state_;
+      condense(samples_, condensed, limit, condensing, {});
+      squeeze(samples_, condensed, limit);
+      if (price(condensed) == before) {
+        settle(condensed, easing);
+        lessen_largest(condensed, 0, easing);
       }
+      take_if_sound(samples_, std::move(condensed), state_, limit, tolerance);
       left_ -= Exchange(samples_, state_, limit, tolerance).run(left_ - reserve, random_);
-      FitState eased = state_;
-      settle(eased, easing);
-      lessen_largest(eased, 0, easing);
-      take_if_sound(samples_, std::move(eased), state_, limit, tolerance);
       fruitless = price(state_) < before ? 0 : fruitless + 1;
       tell();
     }
@@ -508,9 +524,23 @@ private:
 
 }  // namespace
 
+void condense_parted(FitSamples& samples, FitState& state, const ExchangeOptions& options) {
+  const int rounds = std::min(options.rounds, static_cast<int>(std::ceil(options.effort * condensing)));
+  if (options.kink == 0 || state.mesh.kind != Patch::comas) {
+    condense(samples, state, options.limit, rounds, options.progress);
+    return;
+  }
+  state.limits.kink = std::min(first_kink, options.kink);
+  part_normals(state);
+  condense(samples, state, options.limit, rounds, options.progress);
+  if (options.kink > first_kink && share_parted_by(state.mesh, nearly * first_kink) > often) {
+    state.limits.kink = options.kink;
+    condense(samples, state, options.limit, rounds, options.progress);
+  }
+}
+
 void exchange_pieces(FitSamples& samples, FitState& state, const ExchangeOptions& options) {
-  const bool coarse = samples.target().mesh().triangles.size() < coarse_target * state.mesh.alive;
-  if (state.mesh.alive > (coarse ? most_on_coarse_targets : most_shells) || options.effort == 0) {
+  if (options.effort == 0) {
     return;
   }
   const bool parting = options.kink > 0 && state.mesh.kind == Patch::comas;

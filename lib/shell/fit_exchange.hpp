@@ -30,8 +30,12 @@ struct ExchangeOptions {
 /// for watertight patches: their edges follow the normals of both sides. Once that brings nothing more, edges are split
 /// somewhere, to search on there: what does not come back to as few is undone. Deterministic, whatever the number of
 /// threads. Parallel. Cost: six pieces per shell are fitted anew, at least 600 (20 per shell, where that is less) and
-/// at most 6,000, some 30 ms each: where too large an error is foretold they are given up. Of more than 600 shells
-/// none, of more than 1,300 where the target has fewer than 250 triangles per shell.
+/// at most 6,000, some 30 ms each: where too large an error is foretold they are given up.
 void exchange_pieces(FitSamples& samples, FitState& state, const ExchangeOptions& options);
+
+/// What takes most of what exchanges bring in a fraction of their time, for meshes of many shells: normals may part at
+/// once (see above), and all nodes together make mergers good, see condense(). The state need not be certain before,
+/// and is not afterwards; normals stay parted.
+void condense_parted(FitSamples& samples, FitState& state, const ExchangeOptions& options);
 
 }  // namespace tunica
