@@ -493,7 +493,6 @@ private:
       const std::size_t before = price(state_);
       FitState condensed = state_;
       condense(samples_, condensed, limit, condensing, {});
-      squeeze(samples_, condensed, limit);
       if (price(condensed) == before) {
         settle(condensed, easing);
         lessen_largest(condensed, 0, easing);

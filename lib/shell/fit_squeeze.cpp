@@ -26,7 +26,8 @@ constexpr int minimax_tries = 2;
 constexpr double hopeful = 1.6;  // limits: errors that lessening the largest may bring within
 constexpr double spare = 0.98;   // of the limit: room for what further points find
 constexpr int few_splits = 3;
-constexpr int lessening = 2;         // steps of all nodes that lessen the largest error, between mergers
+constexpr int most_lessening = 6, least_lessening = 2;  // steps of all nodes that lessen the largest error, between mergers
+constexpr std::size_t lessened_shells = 2'000;          // of all these steps: what they may cost
 constexpr double first_use = 0.6;    // of the room that less error gives: how much of it mergers use up
 constexpr double more_use = 1.1, less_use = 0.6;
 constexpr int condensing_patience = 3;  // mergers that nothing makes good
@@ -126,7 +127,7 @@ void condense(FitSamples& samples, FitState& state, double limit, int rounds, co
     if (trial.error() > limit) {
       turn_and_place(trial, 8, limit);
     }
-    lessen_largest(trial, 0, lessening);
+    lessen_largest(trial, 0, std::clamp(static_cast<int>(lessened_shells / trial.mesh.alive), least_lessening, most_lessening));
   };
   lessen(state);
   FitState before = state;
