@@ -325,7 +325,7 @@ std::size_t collapse_edges(FitState& state, double limit, std::size_t shells, co
       });
       for (std::size_t i = 0; i < some.size(); ++i) {
         Candidate& c = some[i];
-        if (c.error <= limit) {
+        if (c.error <= limit && std::isfinite(c.error)) {
           c.version = current(c.u, c.v);
           c.evaluated = evaluations.size();
           evaluations.push_back(collapsers[i].placed_node());
@@ -344,7 +344,7 @@ std::size_t collapse_edges(FitState& state, double limit, std::size_t shells, co
     }
     Collapser& collapser = collapsers[0];
     c.error = collapser.evaluate_at(c.u, c.v, evaluations[c.evaluated]);
-    if (!(c.error <= limit)) {
+    if (!(c.error <= limit) || !std::isfinite(c.error)) {
       continue;
     }
     collapser.commit(c.u, c.v);

@@ -40,8 +40,8 @@ struct RelaxOptions {
   /// facets turn so far that no single normal serves them all, or a patch is far closer with its own, they part all the
   /// same.
   double kink = 75;
-  /// For fit to a tolerance: how long fewer shells are looked for, times the usual (see exchange_pieces()). 0: not by
-  /// exchanges at all.
+  /// For fit to a tolerance: how long fewer shells are looked for, times the usual (see condense_parted() and, of up to
+  /// 600 shells, or with more than 1 of any number, exchange_pieces()). 0: by neither.
   double effort = 1;
   /// Degrees: what the angles of fit's shells keep where the target's folds, rims and creases allow it. None: 20; to a
   /// tolerance 10 or 5 where plain decimation makes needles, as along cylinders, and that saves a quarter of the
