@@ -65,9 +65,9 @@ OneSided shell_to_target(const std::vector<CubicPatch>& patches, const Target& t
 
 /// Triangles, neighbours in space mostly one after the other.
 struct SurfaceInOrder {
-  const std::vector<Vec3>& vertices;                    ///< #V
+  const std::vector<Vec3>& vertices;                   ///< #V
   const std::vector<std::array<Index, 3>>& triangles;  ///< #F
-  const std::vector<Index>& order;                      ///< #F, all of them
+  const std::vector<Index>& order;                     ///< #F, all of them
 
   static SurfaceInOrder of(const Target& target) {
     return {target.tree().vertices(), target.tree().triangles(), target.tree().spatial_order()};

@@ -46,7 +46,7 @@ ShellDistance curved_hausdorff(const ShellMesh& shell, const Target& target, con
   ShellDistance out;
   const OneSided from_shell = shell_to_target(patches, target, aim);
   tunica::advance(options.progress, 0.5);
-  const OneSided from_target = 
+  const OneSided from_target =
       target_to_shell(shell, patches, SurfaceInOrder::of(target), aim, from_shell.distance.lower);
   out.shell_to_target = from_shell.distance;
   out.target_to_shell = from_target.distance;

@@ -1,6 +1,7 @@
 #include "shell/fit.hpp"
 
 #include "shell/curved_surface.hpp"
+#include "shell/fit_condense.hpp"
 #include "shell/fit_cross.hpp"
 #include "shell/fit_edit.hpp"
 #include "shell/fit_exchange.hpp"
@@ -364,7 +365,10 @@ private:
       }
       const bool condensing = holds && options_.effort > 0 && state.mesh.alive > many;
       if (condensing) {
-        condense_parted(samples, state, exchanging(limit, tolerance));
+        const int rounds = static_cast<int>(std::ceil(options_.effort * usual_condensing));
+        condense_parted(
+            samples, state,
+            {limit, options_.kink, std::min(rounds, options_.max_iterations.value_or(rounds)), options_.progress});
       } else if (holds) {
         part_crossings(state, limit, most);
         squeeze(samples, state, limit);

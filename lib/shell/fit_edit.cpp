@@ -14,10 +14,10 @@
 namespace tunica {
 namespace {
 
-constexpr double least_split_angle = 3;  // degrees, where nothing better can be had
-constexpr double good_enough = 0.5;      // of the limit: edges of closer patches stay
+constexpr double least_split_angle = 3;       // degrees, where nothing better can be had
+constexpr double good_enough = 0.5;           // of the limit: edges of closer patches stay
 constexpr std::size_t evaluated_at_once = 8;  // mergers, whatever the number of threads
-constexpr double far_behind = 1.5;       // times the least error known: mergers that need not be placed well yet
+constexpr double far_behind = 1.5;            // times the least error known: mergers that need not be placed well yet
 
 class Collapser {
 public:

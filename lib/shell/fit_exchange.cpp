@@ -3,6 +3,7 @@
 #include "shell/fit_exchange.hpp"
 
 #include "core/threads.hpp"
+#include "shell/fit_condense.hpp"
 #include "shell/fit_cross.hpp"
 #include "shell/fit_detach.hpp"
 #include "shell/fit_edit.hpp"
@@ -29,26 +30,22 @@ constexpr std::size_t at_once = 8;  // changes, whatever the number of threads
 // Of pieces anew: what costs.
 constexpr std::size_t fits_per_shell = 6, fewest_fits = 600, most_fits = 6'000, most_fits_per_shell = 20;
 constexpr std::size_t most_before_parting = 150;  // of these more, where normals are to part
-constexpr int condensing = 8;                    // rounds
-constexpr int fewest_rings = 1, most_rings = 3;  // of nodes around a merger that move with it
-constexpr int regaining = 6;                     // steps that lessen the largest error of a piece
-constexpr double loosened = 4;                   // limits: error of a merger before its piece is fitted anew
-constexpr double thin_angle = 5;                 // degrees, for the time being
-constexpr double promising_at_first = 2;         // limits: after a step of least squares; more hardly ever recovers
-constexpr double spare = 0.97;                   // of the limit: room for what a certificate finds
+constexpr int fewest_rings = 1, most_rings = 3;   // of nodes around a merger that move with it
+constexpr int regaining = 6;                      // steps that lessen the largest error of a piece
+constexpr double loosened = 4;                    // limits: error of a merger before its piece is fitted anew
+constexpr double thin_angle = 5;                  // degrees, for the time being
+constexpr double promising_at_first = 2;          // limits: after a step of least squares; more hardly ever recovers
+constexpr double spare = 0.97;                    // of the limit: room for what a certificate finds
 constexpr std::array<double, 3> joining{1, 0.95, 0.9};  // of the limit
 constexpr int easing = 8;                               // steps of all nodes
 constexpr int rings_of_a_kick = 2;                      // of nodes around a place
 constexpr std::size_t splits_of_a_kick = 2, fits_after_a_kick = 60;
-constexpr int patience = 2;        // times that bring nothing
-constexpr double first_kink = 45;  // degrees
-constexpr double nearly = 0.95;    // of them
-constexpr double often = 0.02;     // of the nodes
+constexpr int patience = 2;  // times that bring nothing
 // Of the tolerance. Certificates end with intervals that wide, below it or not: what one finds just below may be above
 // in the next, which looks at more.
 constexpr double certainly = 1 - width_of_certificates;
 constexpr std::size_t changes_between_attaching = 64;  // shells per change that all points are attached after
-constexpr int certificates = 8;  // per change: each tells of points that the samples missed
+constexpr int certificates = 8;                        // per change: each tells of points that the samples missed
 
 bool recovers(FitState& piece, double limit) {
   if (piece.error() <= limit) {
@@ -465,9 +462,9 @@ public:
   void run(bool parting) {
     if (parting) {
       // More than smooth targets ask for only where that shows: there it makes the search end early.
-      state_.limits.kink = std::min(first_kink, options_.kink);
+      state_.limits.kink = std::max(state_.limits.kink, std::min(first_kink, options_.kink));
       exchange(left_ - left_ / 4);
-      if (share_parted_by(state_.mesh, nearly * state_.limits.kink) > often) {
+      if (many_part_by(state_.mesh, state_.limits.kink)) {
         state_.limits.kink = options_.kink;
       }
     }
@@ -492,7 +489,7 @@ private:
     for (int fruitless = 0; fruitless < patience && goes_on(reserve);) {
       const std::size_t before = price(state_);
       FitState condensed = state_;
-      condense(samples_, condensed, limit, condensing, {});
+      condense(samples_, condensed, limit, usual_condensing, {});
       if (price(condensed) == before) {
         settle(condensed, easing);
         lessen_largest(condensed, 0, easing);
@@ -523,21 +520,6 @@ private:
 
 }  // namespace
 
-void condense_parted(FitSamples& samples, FitState& state, const ExchangeOptions& options) {
-  const int rounds = std::min(options.rounds, static_cast<int>(std::ceil(options.effort * condensing)));
-  if (options.kink == 0 || state.mesh.kind != Patch::comas) {
-    condense(samples, state, options.limit, rounds, options.progress);
-    return;
-  }
-  state.limits.kink = std::min(first_kink, options.kink);
-  part_normals(state);
-  condense(samples, state, options.limit, rounds, options.progress);
-  if (options.kink > first_kink && share_parted_by(state.mesh, nearly * first_kink) > often) {
-    state.limits.kink = options.kink;
-    condense(samples, state, options.limit, rounds, options.progress);
-  }
-}
-
 void exchange_pieces(FitSamples& samples, FitState& state, const ExchangeOptions& options) {
   if (options.effort == 0) {
     return;
@@ -546,7 +528,7 @@ void exchange_pieces(FitSamples& samples, FitState& state, const ExchangeOptions
   FitState best = state;
   std::vector<SamplePoint> points = samples.points();
   Search search(samples, best, options);
-  if (parting) {
+  if (parting && state.limits.kink == 0) {
     search.before_parting();
     state = best;
     points = samples.points();

@@ -33,9 +33,4 @@ struct ExchangeOptions {
 /// at most 6,000, some 30 ms each: where too large an error is foretold they are given up.
 void exchange_pieces(FitSamples& samples, FitState& state, const ExchangeOptions& options);
 
-/// What takes most of what exchanges bring in a fraction of their time, for meshes of many shells: normals may part at
-/// once (see above), and all nodes together make mergers good, see condense(). The state need not be certain before,
-/// and is not afterwards; normals stay parted.
-void condense_parted(FitSamples& samples, FitState& state, const ExchangeOptions& options);
-
 }  // namespace tunica

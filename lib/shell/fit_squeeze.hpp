@@ -1,6 +1,5 @@
 #pragma once
 
-#include "core/progress.hpp"
 #include "shell/fit_state.hpp"
 
 namespace tunica {
@@ -20,12 +19,6 @@ bool regains_with_few(FitSamples& samples, FitState& state, double limit, std::s
 /// Finds fewer shells by mergers that no single node can make good but all nodes together do: many at once, then ever
 /// fewer. No error gets above `limit` (mm), and no more shells cross. Cost: 12 searches at most, 2 of many shells.
 void squeeze(FitSamples& samples, FitState& state, double limit);
-
-/// Finds fewer shells by less error everywhere: steps of all nodes lessen the largest error (see lessen_largest()), part
-/// of the room that this leaves is used up by mergers, cheapest first, whatever their error, and further steps make
-/// them good. What no samples saw joins them in every round. It ends with the largest error as small as it gets, below
-/// `limit` (mm) where it was so. Cost: a round some 2 ms per shell.
-void condense(FitSamples& samples, FitState& state, double limit, int rounds, const Progress& progress);
 
 /// Mends thin triangles, if need be by way of larger errors that all nodes together make good, as long as that lowers
 /// the price. @param limit  mm; @param most  shells

@@ -19,10 +19,10 @@ constexpr std::size_t ladder_top = 60'000;    // triangles: the first decimation
 constexpr double surplus = 1.5;               // of triangles, there
 constexpr std::size_t most_samples = 20'000;  // vertices, and triangles: for the sampled error of flat facets
 constexpr std::size_t part_that_stands_in = 4, fewest_that_stand_in = 20'000;  // triangles
-constexpr double start_agreement = 0.35;      // of a corner's normal with its facet
-constexpr double crease_cosine = 0.8;         // of the angle between two facets: sharper edges may be creases
-constexpr double crease_share = 0.6;          // of that angle is there already close to the edge
-constexpr double close_by = 0.08;             // of the height of the triangle
+constexpr double start_agreement = 0.35;                                       // of a corner's normal with its facet
+constexpr double crease_cosine = 0.8;  // of the angle between two facets: sharper edges may be creases
+constexpr double crease_share = 0.6;   // of that angle is there already close to the edge
+constexpr double close_by = 0.08;      // of the height of the triangle
 
 /// Largest sampled distance between flat facets and target, both ways.
 double sampled_error(const TriangleMesh& mesh, const Target& target) {

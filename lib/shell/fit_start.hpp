@@ -27,8 +27,9 @@ FitStart start_of_fit(const Target& target, std::size_t triangles);
 /// about `finer_error`.
 FitStart start_of_fit(const Target& target, double flat_error, std::size_t few, double finer_error);
 
-/// A decimation of a dense target with at most a quarter of its triangles and about the distance `flat_error` (mm): what
-/// is closest is found much sooner there. None where the target has fewer than 80,000 or its facets matter so much.
+/// A decimation of a dense target with at most a quarter of its triangles and about the distance `flat_error` (mm):
+/// what is closest is found much sooner there. None where the target has fewer than 80,000 or its facets matter so
+/// much.
 std::optional<FitStart> stand_in_for(const Target& target, double flat_error);
 
 /// The start as a mesh under edit, with the target's normals at its nodes: several at a node where sharp creases of the

@@ -1,7 +1,7 @@
 // Many shells become fewer by less error everywhere, and dense targets are fitted by what stands in for them.
+#include "shell/fit_condense.hpp"
 #include "shell/fit.hpp"
 #include "shell/fit_cross.hpp"
-#include "shell/fit_exchange.hpp"
 #include "shell/fit_squeeze.hpp"
 #include "shell/fit_start.hpp"
 #include "shell/fit_states.hpp"
@@ -40,7 +40,7 @@ TEST(FitCondense, LessErrorEverywhereMakesRoomForMergersAndMoreSoWhereNormalsPar
   condense(samples, condensed, limit, 8, {});
   EXPECT_LE(condensed.mesh.alive, 0.9 * static_cast<double>(state.mesh.alive));
   expect_sound_ball(condensed, limit);
-  ExchangeOptions options{limit, limit / 0.97, 45};
+  CondenseOptions options{limit, 45};
   condense_parted(samples, state, options);
   EXPECT_LE(state.mesh.alive, condensed.mesh.alive);
   EXPECT_EQ(state.limits.kink, 45);

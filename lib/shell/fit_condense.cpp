@@ -1,0 +1,107 @@
+#include "shell/fit_condense.hpp"
+
+#include "shell/fit_detach.hpp"
+#include "shell/fit_edit.hpp"
+#include "shell/fit_minimax.hpp"
+#include "shell/fit_missed.hpp"
+#include "shell/fit_shape.hpp"
+#include "shell/fit_squeeze.hpp"
+#include "shell/fit_worst.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace tunica {
+namespace {
+
+constexpr double loosened = 1.5;  // limits: error of a merger that steps of all nodes may make good
+constexpr double spare = 0.98;    // of the limit: room for what further points find
+constexpr int minimax_steps = 8;
+constexpr int most_lessening = 6, least_lessening = 2;  // steps that lessen the largest error, between mergers
+constexpr std::size_t lessened_shells = 2'000;          // of all these steps: what they may cost
+constexpr double first_use = 0.6;                       // of the room that less error gives: what mergers use up
+constexpr double more_use = 1.1, less_use = 0.6;
+constexpr int patience = 3;        // mergers that nothing makes good
+constexpr double headroom = 0.95;  // of the limit: closer than that certificates find too much
+constexpr double nearly = 0.95;    // of the degrees that normals may part by
+constexpr double often = 0.02;     // of the nodes
+
+/// Turns edges, moves all nodes, and places the worst ones anew.
+void turn_and_place(FitState& state, int power, double limit) {
+  flip_edges(state, limit);
+  state.solve(power, 1);
+  place_worst(state, 0.9 * limit);
+  state.attach_again();
+  state.measure();
+}
+
+}  // namespace
+
+void condense(FitSamples& samples, FitState& state, double limit, int rounds, const Progress& progress) {
+  const auto lessen = [&](FitState& trial) {
+    add_missed(samples, trial, limit, true);
+    trial.attach();
+    trial.measure();
+    if (trial.error() > limit) {
+      turn_and_place(trial, 8, limit);
+    }
+    lessen_largest(trial, 0,
+                   std::clamp(static_cast<int>(lessened_shells / trial.mesh.alive), least_lessening, most_lessening));
+  };
+  lessen(state);
+  FitState before = state;
+  double use = first_use;
+  for (int round = 0, failures = 0; round < rounds && failures < patience; ++round) {
+    advance(progress, static_cast<double>(round) / rounds);
+    // Errors go with the square of the area of a shell.
+    const double room = std::max(0.0, 1 - std::sqrt(state.error() / limit));
+    const auto fewer = static_cast<std::size_t>(use * room * static_cast<double>(state.mesh.alive));
+    if (fewer < 2) {
+      break;
+    }
+    FitState trial = state;
+    collapse_edges(trial, loosened * limit, state.mesh.alive - fewer, {});
+    trial.attach();
+    trial.measure();
+    turn_and_place(trial, 4, limit);
+    lessen_largest(trial, spare * limit, minimax_steps, limit);
+    mend_angles(trial, limit);
+    bool better = trial.error() <= limit && price(trial) < price(state);
+    if (better) {
+      lessen(trial);
+      better = trial.error() <= limit;
+    }
+    if (better) {
+      before = std::exchange(state, std::move(trial));
+      use = std::min(1.0, more_use * use);
+      failures = 0;
+    } else {
+      use *= less_use;
+      ++failures;
+    }
+  }
+  lessen(state);
+  if (state.error() > headroom * limit && price(before) > price(state)) {
+    state = std::move(before);
+    lessen(state);
+  }
+}
+
+bool many_part_by(const FitMesh& mesh, double kink) { return share_parted_by(mesh, nearly * kink) > often; }
+
+void condense_parted(FitSamples& samples, FitState& state, const CondenseOptions& options) {
+  if (options.kink == 0 || state.mesh.kind != Patch::comas) {
+    condense(samples, state, options.limit, options.rounds, options.progress);
+    return;
+  }
+  state.limits.kink = std::min(first_kink, options.kink);
+  part_normals(state);
+  condense(samples, state, options.limit, options.rounds, options.progress);
+  if (options.kink > first_kink && many_part_by(state.mesh, first_kink)) {
+    state.limits.kink = options.kink;
+    condense(samples, state, options.limit, options.rounds, options.progress);
+  }
+}
+
+}  // namespace tunica
