@@ -62,8 +62,10 @@ constexpr std::array<double, 2> narrow_angles{10, 5};      // degrees: of shells
 constexpr std::size_t price_of_an_angle_asked_for = 1000;  // shells
 constexpr double most_by_exchanges = 2;                    // times fewer shells
 constexpr std::size_t many = 600;                          // shells: exchanging pieces of more takes long
-constexpr double much_effort = 1;                          // above: it is done all the same
-constexpr double worth_narrow = 0.75;                      // of the shells with better angles
+// Of more, certificates find something else each time after steps of all nodes.
+constexpr std::size_t too_many = 2000;
+constexpr double much_effort = 1;      // above: it is done all the same
+constexpr double worth_narrow = 0.75;  // of the shells with better angles
 
 /// Whether most of the area of a plain decimation is in needles: as along a cylinder, where length costs no error.
 bool is_of_needles(const TriangleMesh& mesh) {
@@ -363,20 +365,16 @@ private:
         mend_angles(state, limit);
         holds = regains(samples, state, limit);
       }
-      const bool condensing = holds && options_.effort > 0 && state.mesh.alive > many;
-      if (condensing) {
-        const int rounds = static_cast<int>(std::ceil(options_.effort * usual_condensing));
-        condense_parted(
-            samples, state,
-            {limit, options_.kink, std::min(rounds, options_.max_iterations.value_or(rounds)), options_.progress});
-      } else if (holds) {
+      const bool condensing = holds && options_.effort > 0 && state.mesh.alive > many && state.mesh.alive <= too_many;
+      const bool condensed = condensing && condense_certainly(samples, state, tolerance, most);
+      if (holds && !condensed) {
         part_crossings(state, limit, most);
         squeeze(samples, state, limit);
       }
       const std::size_t thin = options_.min_angle ? 0 : count_thin(state);
-      bool certain = shape_and_certify(samples, state, tolerance, most);
+      bool certain = condensed || shape_and_certify(samples, state, tolerance, most);
       if (holds && static_cast<double>(state.mesh.alive) < most_by_exchanges * wanted &&
-          (!condensing || options_.effort > much_effort)) {
+          (state.mesh.alive <= many || options_.effort > much_effort)) {
         // What is exchanged is certified where it changes: all is certain if it was so before.
         exchange_pieces(samples, state, exchanging(limit, tolerance));
         result_.note(state);
@@ -387,6 +385,24 @@ private:
         break;
       }
     }
+  }
+
+  /// @return whether the tolerance holds for what it became; else it is as it was
+  bool condense_certainly(FitSamples& samples, FitState& state, double tolerance, std::size_t most) {
+    const std::vector<SamplePoint> points = samples.points();
+    const int rounds = static_cast<int>(std::ceil(options_.effort * usual_condensing));
+    FitState trial = state;
+    condense_parted(samples, trial,
+                    {margin * tolerance, options_.kink, std::min(rounds, options_.max_iterations.value_or(rounds)),
+                     options_.progress});
+    if (shape_and_certify(samples, trial, tolerance, most)) {
+      state = std::move(trial);
+      return true;
+    }
+    samples.take_points(points);
+    state.attach();
+    state.measure();
+    return false;
   }
 
   ExchangeOptions exchanging(double limit, double tolerance) {
@@ -416,7 +432,8 @@ private:
     FitState state(samples, prepared(start), limits());
     smooth(state, tolerance, tolerance);
     // Condensing many shells does more than further rounds.
-    const bool once = options_.effort > 0 && state.mesh.alive > affordable;
+    const bool once =
+        options_.effort > 0 && state.mesh.alive > affordable && state.mesh.alive <= expected_gain * too_many;
     const int rounds = options_.max_iterations.value_or(once ? 1 : default_rounds);
     const double limit = margin * tolerance;
     repair(state, limit, most);
