@@ -57,27 +57,15 @@ constexpr int local_mending = 3;        // certificates, before less error is as
 constexpr double most_tightening = 0.95, least_tightening = 0.985;  // of the limit, where certificates find more
 constexpr std::array<double, 6> parts_of_tolerance{0.95, 0.9, 0.8, 0.65, 0.5, 0.25};  // to part sheets that cross
 constexpr double good_enough_angle = 0.9;                                             // of the limit
-constexpr double needle = 10;                              // degrees: angles of a plain decimation, along cylinders
-constexpr std::array<double, 2> narrow_angles{10, 5};      // degrees: of shells there
-constexpr std::size_t price_of_an_angle_asked_for = 1000;  // shells
-constexpr double most_by_exchanges = 2;                    // times fewer shells
-constexpr std::size_t many = 600;                          // shells: exchanging pieces of more takes long
-// Of more, certificates find something else each time after steps of all nodes.
-constexpr std::size_t too_many = 2000;
-constexpr double much_effort = 1;      // above: it is done all the same
-constexpr double worth_narrow = 0.75;  // of the shells with better angles
-
-/// Whether most of the area of a plain decimation is in needles: as along a cylinder, where length costs no error.
-bool is_of_needles(const TriangleMesh& mesh) {
-  double of_needles = 0, area = 0;
-  for (const auto& [a, b, c] : mesh.triangles) {
-    const Vec3 &p = mesh.vertices[a], &q = mesh.vertices[b], &r = mesh.vertices[c];
-    const double its_area = (q - p).cross(r - p).norm();
-    area += its_area;
-    of_needles += smallest_angle_degrees(p, q, r) < needle ? its_area : 0;
-  }
-  return of_needles > area / 2;
-}
+constexpr std::array<double, 2> narrow_angles{10, 5};                                 // degrees: of shells there
+constexpr std::size_t price_of_an_angle_asked_for = 1000;                             // shells
+constexpr double most_by_exchanges = 2;                                               // times fewer shells
+constexpr std::size_t many = 600;           // shells: exchanging pieces of more takes long
+constexpr std::size_t too_many = 2000;      // shells: their condensed mesh hardly becomes certain
+constexpr int most_mends = 20;              // of a condensed mesh, by certificates
+constexpr std::size_t coarse_target = 250;  // triangles per shell
+constexpr double much_effort = 1;           // above: it is done all the same
+constexpr double worth_narrow = 0.75;       // of the shells with better angles
 
 class Fitting {
 public:
@@ -115,6 +103,7 @@ private:
           std::optional<double> angle = {}, const Target* real = nullptr)
       : coarse_(coarse),
         target_(target),
+        real_(real != nullptr ? *real : target),
         options_(options),
         angle_(angle.value_or(options.min_angle.value_or(FitLimits{}.angle))),
         like_target_(same_topology(coarse, target)),
@@ -293,8 +282,7 @@ private:
                                    limited_by_target * static_cast<double>(target_.mesh().triangles.size())) {
       return start;
     }
-    const std::size_t most = most_for(start, tolerance);
-    if (!options_.min_angle && is_of_needles(start.mesh)) {
+    if (const std::size_t most = most_for(start, tolerance); !options_.min_angle && is_of_needles(start.mesh)) {
       long_shells(start, tolerance, most);
     } else {
       search_from(start, tolerance, most);
@@ -374,7 +362,7 @@ private:
       const std::size_t thin = options_.min_angle ? 0 : count_thin(state);
       bool certain = condensed || shape_and_certify(samples, state, tolerance, most);
       if (holds && static_cast<double>(state.mesh.alive) < most_by_exchanges * wanted &&
-          (state.mesh.alive <= many || options_.effort > much_effort)) {
+          worth_exchanging(state.mesh.alive)) {
         // What is exchanged is certified where it changes: all is certain if it was so before.
         exchange_pieces(samples, state, exchanging(limit, tolerance));
         result_.note(state);
@@ -387,6 +375,12 @@ private:
     }
   }
 
+  /// Pieces of so many shells: each costs more where the target is dense.
+  [[nodiscard]] bool worth_exchanging(std::size_t shells) const {
+    const bool coarse = real_.mesh().triangles.size() < coarse_target * shells;
+    return shells <= (coarse ? affordable : many) || options_.effort > much_effort;
+  }
+
   /// @return whether the tolerance holds for what it became; else it is as it was
   bool condense_certainly(FitSamples& samples, FitState& state, double tolerance, std::size_t most) {
     const std::vector<SamplePoint> points = samples.points();
@@ -395,6 +389,16 @@ private:
     condense_parted(samples, trial,
                     {margin * tolerance, options_.kink, std::min(rounds, options_.max_iterations.value_or(rounds)),
                      options_.progress});
+    // Steps of all nodes would leave something else behind each time.
+    for (int i = 0; i < most_mends && trial.error() <= margin * tolerance && !result_.certify(trial, tolerance); ++i) {
+      for (const SamplePoint& point : result_.farthest()) {
+        samples.add(point);
+      }
+      trial.attach();
+      trial.measure();
+      add_missed(samples, trial, margin * tolerance, true);
+      mend_pieces(trial, margin * tolerance);
+    }
     if (shape_and_certify(samples, trial, tolerance, most)) {
       state = std::move(trial);
       return true;
@@ -680,6 +684,7 @@ private:
 
   const TriangleMesh& coarse_;
   const Target& target_;
+  const Target& real_;  // what it stands for
   const RelaxOptions& options_;
   double angle_;      // degrees
   bool like_target_;  // COARSE has the target's topology

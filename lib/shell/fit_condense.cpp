@@ -4,13 +4,13 @@
 #include "shell/fit_edit.hpp"
 #include "shell/fit_minimax.hpp"
 #include "shell/fit_missed.hpp"
+#include "shell/fit_region.hpp"
 #include "shell/fit_shape.hpp"
 #include "shell/fit_squeeze.hpp"
 #include "shell/fit_worst.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
 namespace tunica {
 namespace {
@@ -18,12 +18,13 @@ namespace {
 constexpr double loosened = 1.5;  // limits: error of a merger that steps of all nodes may make good
 constexpr double spare = 0.98;    // of the limit: room for what further points find
 constexpr int minimax_steps = 8;
+constexpr int most_rings = 3;                           // of nodes around a patch that move with its own
 constexpr int most_lessening = 6, least_lessening = 2;  // steps that lessen the largest error, between mergers
 constexpr std::size_t lessened_shells = 2'000;          // of all these steps: what they may cost
 constexpr double first_use = 0.6;                       // of the room that less error gives: what mergers use up
 constexpr double more_use = 1.1, less_use = 0.6;
 constexpr int patience = 3;        // mergers that nothing makes good
-constexpr double headroom = 0.95;  // of the limit: closer than that certificates find too much
+constexpr double headroom = 0.86;  // of the limit: closer than that certificates find too much
 constexpr double nearly = 0.95;    // of the degrees that normals may part by
 constexpr double often = 0.02;     // of the nodes
 
@@ -50,7 +51,7 @@ void condense(FitSamples& samples, FitState& state, double limit, int rounds, co
                    std::clamp(static_cast<int>(lessened_shells / trial.mesh.alive), least_lessening, most_lessening));
   };
   lessen(state);
-  FitState before = state;
+  FitState roomy = state;
   double use = first_use;
   for (int round = 0, failures = 0; round < rounds && failures < patience; ++round) {
     advance(progress, static_cast<double>(round) / rounds);
@@ -73,7 +74,10 @@ void condense(FitSamples& samples, FitState& state, double limit, int rounds, co
       better = trial.error() <= limit;
     }
     if (better) {
-      before = std::exchange(state, std::move(trial));
+      state = std::move(trial);
+      if (state.error() <= headroom * limit) {
+        roomy = state;
+      }
       use = std::min(1.0, more_use * use);
       failures = 0;
     } else {
@@ -81,11 +85,34 @@ void condense(FitSamples& samples, FitState& state, double limit, int rounds, co
       ++failures;
     }
   }
-  lessen(state);
-  if (state.error() > headroom * limit && price(before) > price(state)) {
-    state = std::move(before);
-    lessen(state);
+  if (state.error() > headroom * limit) {
+    state = std::move(roomy);
   }
+  lessen(state);
+}
+
+std::size_t mend_pieces(FitState& state, double limit) {
+  std::size_t left = 0;
+  for (Index t = 0; t < state.mesh.triangles.size(); ++t) {
+    if (!state.mesh.is_alive(t) || state.patches[t].error <= limit) {
+      continue;
+    }
+    const std::array<Index, 3> corners = state.mesh.triangles[t];
+    bool mended = false;
+    for (int rings = 0; rings < most_rings && !mended; ++rings) {
+      FitRegion region = cut_out(state, {corners.begin(), corners.end()}, rings);
+      lessen_largest(region.state, 0, most_lessening);
+      if (region.state.error() <= limit) {
+        FitState trial = state;
+        if (put_back(region, trial) <= limit) {
+          state = std::move(trial);
+          mended = true;
+        }
+      }
+    }
+    left += mended ? 0 : 1;
+  }
+  return left;
 }
 
 bool many_part_by(const FitMesh& mesh, double kink) { return share_parted_by(mesh, nearly * kink) > often; }

@@ -5,6 +5,7 @@
 #include "surface/checks.hpp"
 #include "surface/decimate.hpp"
 #include "surface/hausdorff.hpp"
+#include "surface/measure.hpp"
 
 #include <Eigen/Geometry>
 
@@ -59,7 +60,20 @@ TriangleMesh decimated(const TriangleMesh& mesh, std::size_t triangles, bool lev
   return decimate(mesh, options).mesh;
 }
 
+constexpr double needle = 10;  // degrees
+
 }  // namespace
+
+bool is_of_needles(const TriangleMesh& mesh) {
+  double of_needles = 0, area = 0;
+  for (const auto& [a, b, c] : mesh.triangles) {
+    const Vec3 &p = mesh.vertices[a], &q = mesh.vertices[b], &r = mesh.vertices[c];
+    const double its_area = (q - p).cross(r - p).norm();
+    area += its_area;
+    of_needles += smallest_angle_degrees(p, q, r) < needle ? its_area : 0;
+  }
+  return of_needles > area / 2;
+}
 
 bool same_topology(const TriangleMesh& mesh, const Target& target) {
   if (mesh.triangles == target.mesh().triangles) {

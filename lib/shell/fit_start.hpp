@@ -14,6 +14,9 @@ struct FitStart {
   bool own_topology = false;  ///< it is COARSE, because its topology is not the target's
 };
 
+/// Whether most of the area of a plain decimation is in needles: as along a cylinder, where length costs no error.
+bool is_of_needles(const TriangleMesh& mesh);
+
 /// Whether pieces, boundary loops and handles are as many; loops of the target that are a point may be closed.
 bool same_topology(const TriangleMesh& mesh, const Target& target);
 
