@@ -18,7 +18,7 @@ constexpr double first_part = 0.05;             // of the shells: how many fewer
 constexpr double loosened = 1.5;                // limits: error of a merger that all nodes together may make good
 constexpr std::size_t squeezed_shells = 2'500;  // of all tries: what they may cost
 constexpr std::size_t least_squeezes = 1, most_squeezes = 12;
-constexpr int regaining = 8;                  // steps of all nodes
+constexpr int regaining = 8;                 // steps of all nodes
 constexpr std::size_t minimax_shells = 600;  // of more, factorisations are what steps cost
 constexpr int minimax_steps = 8;
 constexpr int minimax_tries = 2;

@@ -48,6 +48,26 @@ TEST(FitCondense, LessErrorEverywhereMakesRoomForMergersAndMoreSoWhereNormalsPar
   expect_sound_ball(state, limit);
 }
 
+TEST(FitCondense, PiecesAreMendedWithoutTheOthers) {
+  const Target target(testing::sphere(4, 10));
+  FitSamples samples(target, 320);
+  FitState state = state_of(samples, testing::sphere(2, 10));
+  const double limit = 1.5 * state.error();
+  state.mesh.positions[0] *= 1.05;
+  state.attach_again();
+  state.measure();
+  ASSERT_GT(state.error(), 2 * limit);
+  const std::vector<Vec3> before = state.mesh.positions;
+  EXPECT_EQ(mend_pieces(state, limit), 0U);
+  EXPECT_LE(state.error(), limit);
+  std::size_t moved = 0;
+  for (std::size_t v = 0; v < before.size(); ++v) {
+    moved += state.mesh.positions[v] != before[v] ? 1 : 0;
+  }
+  EXPECT_GT(moved, 0U);
+  EXPECT_LT(moved, before.size() / 4);
+}
+
 TEST(FitCondense, MergersOfAllThatCanGoEnd) {
   // Without its caps: what is left at two boundaries cannot go.
   TriangleMesh open = wavy(3);
