@@ -11,8 +11,9 @@ namespace tunica {
 /// topology differs from the target's: then COARSE's is meant). Then in turn: edges collapse, cheapest first by the
 /// curved error that their placed node would have; edges turn; all nodes and normals move at once by Gauss-Newton on
 /// powers of the residuals; patches that are too far off are split; nodes slide where
-/// angles are small. Last, mergers that no single node makes good are tried with all nodes together (fit_squeeze.hpp),
-/// and small pieces are changed and fitted by themselves (fit_exchange.hpp). Where the target has a sharp crease,
+/// angles are small. Last, mergers that no single node makes good are tried with all nodes together (fit_squeeze.hpp;
+/// of many shells fit_condense.hpp), and small pieces are changed and fitted by themselves (fit_exchange.hpp). What
+/// stands in for a dense target (fit_start.hpp) is fitted in its place. Where the target has a sharp crease,
 /// shells carry a normal per corner; to a tolerance also where that saves shells (RelaxOptions::kink). A certified
 /// distance ends it.
 ///
