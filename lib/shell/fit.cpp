@@ -61,8 +61,8 @@ constexpr std::array<double, 2> narrow_angles{10, 5};                           
 constexpr std::size_t price_of_an_angle_asked_for = 1000;                             // shells
 constexpr double most_by_exchanges = 2;                                               // times fewer shells
 constexpr std::size_t many = 600;           // shells: exchanging pieces of more takes long
-constexpr std::size_t too_many = 2000;      // shells: their condensed mesh hardly becomes certain
-constexpr int most_mends = 20;              // of a condensed mesh, by certificates
+constexpr std::size_t too_many = 6000;      // shells: their condensed mesh hardly becomes certain
+constexpr int most_mends = 50;              // of a condensed mesh, by certificates
 constexpr std::size_t coarse_target = 250;  // triangles per shell
 constexpr double much_effort = 1;           // above: it is done all the same
 constexpr double worth_narrow = 0.75;       // of the shells with better angles
@@ -436,8 +436,7 @@ private:
     FitState state(samples, prepared(start), limits());
     smooth(state, tolerance, tolerance);
     // Condensing many shells does more than further rounds.
-    const bool once =
-        options_.effort > 0 && state.mesh.alive > affordable && state.mesh.alive <= expected_gain * too_many;
+    const bool once = options_.effort > 0 && state.mesh.alive > affordable && state.mesh.alive <= 3 * too_many / 2;
     const int rounds = options_.max_iterations.value_or(once ? 1 : default_rounds);
     const double limit = margin * tolerance;
     repair(state, limit, most);
