@@ -61,7 +61,7 @@ constexpr std::array<double, 2> narrow_angles{10, 5};                           
 constexpr std::size_t price_of_an_angle_asked_for = 1000;                             // shells
 constexpr double most_by_exchanges = 2;                                               // times fewer shells
 constexpr std::size_t many = 600;           // shells: exchanging pieces of more takes long
-constexpr std::size_t too_many = 6000;      // shells: their condensed mesh hardly becomes certain
+constexpr std::size_t too_many = 6000;      // shells: of more no condensed mesh was tried
 constexpr int most_mends = 50;              // of a condensed mesh, by certificates
 constexpr std::size_t coarse_target = 250;  // triangles per shell
 constexpr double much_effort = 1;           // above: it is done all the same

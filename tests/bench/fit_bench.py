@@ -374,8 +374,8 @@ def named_targets(cases, arguments, folder):
     cases.count("aneurysm_tube", folder / "aneurysm_tube.ply", 772, None, unit=(), seconds=1)
     for percent, flat in ((1, 38), (0.1, 207)):
         cases.tolerance("capped_cylinder", folder / "capped_cylinder.ply", percent, most=flat)
-    cases.tolerance("bumpy", folder / "bumpy.ply", 0.5)
-    cases.tolerance("bumpy", folder / "bumpy.ply", 0.1)
+    for percent in FACTORS:
+        cases.tolerance("bumpy", folder / "bumpy.ply", percent)
 
 
 def papers(cases, data):
