@@ -136,8 +136,9 @@ std::optional<std::string> what_failed(const Arguments& given, const DecimateRes
                        result.error->upper);
   }
   if (!result.angle_held) {
-    return fmt::format("the smallest angle that could be reached is {:.3g} degrees; lower --min-angle or allow more {}",
-                       result.smallest_angle, given.max_error ? "error" : "triangles");
+    return fmt::format(
+        "the smallest angle that could be reached{} is {:.3g} degrees; lower --min-angle or allow more {}",
+        given.max_error ? " within the error" : "", result.smallest_angle, given.max_error ? "error" : "triangles");
   }
   if (!result.count_reached && given.max_error) {
     return fmt::format("{} triangles are the fewest found that keep --max-error; raise one of the two", count);

@@ -30,6 +30,7 @@ constexpr double curved_deviation =
     0.8e-5;  // of the diagonal; the contract of --curved, 1e-5, may be taken of either surface
 constexpr double most_for_spikes = 0.9;  // of the tolerance
 constexpr double usual_angle = 20;       // degrees
+constexpr double rounded_up = 0.9975;    // of it: what prints as less
 constexpr double most_effort = 100;
 constexpr double largest_kink = 90;                 // degrees
 constexpr double least_angle = 1, most_angle = 30;  // degrees
@@ -165,7 +166,8 @@ Surface read_surface(const cli::Tool& tool, const fs::path& path, const std::opt
   Surface surface{read_mesh(path, unit_mm, true), {}, {}, 0};
   surface.facts = examine(surface.file.mesh);
   if (const auto why = why_unfit(surface.facts)) {
-    throw InputError(path.string() + ": " + *why + "; repair it first");
+    throw InputError(path.string() + ": " + *why +
+                     "; mend it with tunica-decimate --repair, --triangles as many as it has to keep all");
   }
   if (!(diagonal(surface.file.mesh) > 0)) {
     throw InputError(path.string() + ": the mesh has no extent");
@@ -400,7 +402,7 @@ void run(cli::Tool& tool, const Arguments& given) {
           "the smallest angle is {:.3g} degrees: folds, rims or creases do not allow {:.3g} everywhere, or the error "
           "would be larger",
           angle, *options.min_angle));
-    } else if (options.method == RelaxMethod::fit && !options.min_angle && angle < usual_angle) {
+    } else if (options.method == RelaxMethod::fit && !options.min_angle && angle < rounded_up * usual_angle) {
       tool.warn(fmt::format("the smallest angle is {:.3g} degrees, below the usual {:.0f}: {}", angle, usual_angle,
                             tolerance ? "so it takes fewer shells (--min-angle says otherwise), or folds, rims or "
                                         "creases do not allow more"

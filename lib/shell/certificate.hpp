@@ -2,10 +2,13 @@
 
 #include "core/types.hpp"
 #include "shell/curved_surface.hpp"
+#include "shell/shell_distance.hpp"
 #include "shell/target.hpp"
 
 #include <algorithm>
+#include <map>
 #include <optional>
+#include <utility>
 #include <vector>
 
 /// The two directions of curved_hausdorff().
@@ -16,12 +19,22 @@ struct Aim {
   double width;                 ///< mm: upper - lower wanted
   std::optional<double> limit;  ///< mm: whether the distance is at most this is all that matters
   double uncertainty;           ///< mm: rounding, one-sided
+  bool list_beyond = false;     ///< see ShellDistanceOptions; then there is a limit
 
   /// mm: an upper bound that does, when the distance is certainly at least `lower`
   [[nodiscard]] double enough(double lower) const {
+    if (list_beyond) {
+      return std::max(std::min(lower, *limit) + width, *limit - uncertainty);
+    }
     return limit ? std::max(lower + width, *limit - uncertainty) : lower + width;
   }
-  [[nodiscard]] bool decided_above(double lower) const { return limit && lower - uncertainty > *limit; }
+  [[nodiscard]] bool decided_above(double lower) const { return limit && !list_beyond && lower - uncertainty > *limit; }
+  /// Whether a place so far off is listed: those just below the limit too, which leave the answer open.
+  [[nodiscard]] bool is_listed(double distance) const { return list_beyond && distance > nearly * *limit; }
+  /// Whether a piece with a point so far off need not be cut any more.
+  [[nodiscard]] bool is_beyond(double distance) const { return list_beyond && distance - uncertainty > *limit; }
+
+  static constexpr double nearly = 0.985;
 };
 
 /// Largest distance from one surface to another, mm.
@@ -29,13 +42,40 @@ struct OneSided {
   Interval distance;
   Vec3 farthest = Vec3::Zero();  ///< a point whose distance is at least distance.lower
   Vec3 closest = Vec3::Zero();   ///< the point of the other surface closest to it
+  std::vector<FarPlace> beyond;  ///< where asked for: places beyond the limit, the farthest found of each patch
+};
+
+/// The farthest place found of each patch.
+class FarPlaces {
+public:
+  void add(double distance, const FarPlace& place) {
+    const auto [found, is_first] = of_patch_.emplace(place.patch, std::pair(distance, place));
+    if (!is_first && distance > found->second.first) {
+      found->second = {distance, place};
+    }
+  }
+  [[nodiscard]] std::vector<FarPlace> all() const {
+    std::vector<FarPlace> places;
+    for (const auto& [patch, found] : of_patch_) {
+      places.push_back(found.second);
+    }
+    return places;
+  }
+
+private:
+  std::map<Index, std::pair<double, FarPlace>> of_patch_;
 };
 
 /// Gathers what blocks of pieces found, in their order: raises the bounds, and keeps the pieces that are not settled.
-/// @param lower  mm: certain distance so far, of the place `farthest`; settled  mm: largest bound of a settled piece
+/// @param lower  mm: certain distance so far, of the place `farthest`; settled  mm: largest bound of a settled piece;
+/// beyond  what blocks listed
 template <typename Block, typename Place>
-auto collected(const std::vector<Block>& blocks, const Aim& aim, double& lower, double& settled, Place& farthest) {
+auto collected(const std::vector<Block>& blocks, const Aim& aim, double& lower, double& settled, Place& farthest,
+               FarPlaces& beyond) {
   for (const Block& block : blocks) {
+    for (const auto& [distance, place] : block.beyond) {
+      beyond.add(distance, place);
+    }
     if (block.lower > lower) {
       lower = block.lower;
       farthest = block.farthest;

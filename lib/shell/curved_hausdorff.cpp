@@ -42,14 +42,15 @@ void require_finite(const ShellMesh& shell, const std::vector<CubicPatch>& patch
 ShellDistance curved_hausdorff(const ShellMesh& shell, const Target& target, const ShellDistanceOptions& options) {
   const std::vector<CubicPatch> patches = curved_patches(shell);
   require_finite(shell, patches);
-  const Aim aim{options.width, options.limit, rounding_of(shell, target)};
+  const Aim aim{options.width, options.limit, rounding_of(shell, target), options.list_beyond && options.limit};
   ShellDistance out;
-  const OneSided from_shell = shell_to_target(patches, target, aim);
+  OneSided from_shell = shell_to_target(patches, target, aim);
   tunica::advance(options.progress, 0.5);
-  const OneSided from_target =
-      target_to_shell(shell, patches, SurfaceInOrder::of(target), aim, from_shell.distance.lower);
+  OneSided from_target = target_to_shell(shell, patches, SurfaceInOrder::of(target), aim, from_shell.distance.lower);
   out.shell_to_target = from_shell.distance;
   out.target_to_shell = from_target.distance;
+  out.beyond_of_shell = std::move(from_shell.beyond);
+  out.beyond_of_target = std::move(from_target.beyond);
   out.farthest_of_shell = from_shell.farthest;
   out.farthest_of_target = from_target.farthest;
   out.closest_to_farthest_of_target = from_target.closest;

@@ -60,12 +60,12 @@ constexpr double good_enough_angle = 0.9;                                       
 constexpr std::array<double, 2> narrow_angles{10, 5};                                 // degrees: of shells there
 constexpr std::size_t price_of_an_angle_asked_for = 1000;                             // shells
 constexpr double most_by_exchanges = 2;                                               // times fewer shells
-constexpr std::size_t many = 600;           // shells: exchanging pieces of more takes long
-constexpr std::size_t too_many = 6000;      // shells: of more no condensed mesh was tried
-constexpr int most_mends = 50;              // of a condensed mesh, by certificates
-constexpr std::size_t coarse_target = 250;  // triangles per shell
-constexpr double much_effort = 1;           // above: it is done all the same
-constexpr double worth_narrow = 0.75;       // of the shells with better angles
+constexpr std::size_t many = 600;               // shells: exchanging pieces of more takes long
+constexpr std::size_t too_many = 6000;          // shells: of more no condensed mesh was tried
+constexpr std::size_t coarse_target = 500;      // triangles per shell
+constexpr double expected_by_condensing = 0.7;  // of the shells
+constexpr double much_effort = 1;               // above: it is done all the same
+constexpr double worth_narrow = 0.75;           // of the shells with better angles
 
 class Fitting {
 public:
@@ -354,7 +354,7 @@ private:
         holds = regains(samples, state, limit);
       }
       const bool condensing = holds && options_.effort > 0 && state.mesh.alive > many && state.mesh.alive <= too_many;
-      const bool condensed = condensing && condense_certainly(samples, state, tolerance, most);
+      const bool condensed = condensing && becomes_condensed(samples, state, tolerance, most);
       if (holds && !condensed) {
         part_crossings(state, limit, most);
         squeeze(samples, state, limit);
@@ -362,7 +362,7 @@ private:
       const std::size_t thin = options_.min_angle ? 0 : count_thin(state);
       bool certain = condensed || shape_and_certify(samples, state, tolerance, most);
       if (holds && static_cast<double>(state.mesh.alive) < most_by_exchanges * wanted &&
-          worth_exchanging(state.mesh.alive)) {
+          worth_exchanging(state.mesh.alive, condensed)) {
         // What is exchanged is certified where it changes: all is certain if it was so before.
         exchange_pieces(samples, state, exchanging(limit, tolerance));
         result_.note(state);
@@ -375,31 +375,29 @@ private:
     }
   }
 
-  /// Pieces of so many shells: each costs more where the target is dense.
-  [[nodiscard]] bool worth_exchanging(std::size_t shells) const {
-    const bool coarse = real_.mesh().triangles.size() < coarse_target * shells;
-    return shells <= (coarse ? affordable : many) || options_.effort > much_effort;
+  /// In the whole, where exchanges within pieces have not done so.
+  [[nodiscard]] bool worth_exchanging(std::size_t shells, bool condensed) const {
+    return shells <= many || (!condensed && is_coarse_for(shells) && shells <= affordable) ||
+           options_.effort > much_effort;
+  }
+
+  /// Whether looking at the target costs little for so many shells.
+  [[nodiscard]] bool is_coarse_for(std::size_t shells) const {
+    return real_.mesh().triangles.size() < coarse_target * shells;
   }
 
   /// @return whether the tolerance holds for what it became; else it is as it was
-  bool condense_certainly(FitSamples& samples, FitState& state, double tolerance, std::size_t most) {
+  bool becomes_condensed(FitSamples& samples, FitState& state, double tolerance, std::size_t most) {
     const std::vector<SamplePoint> points = samples.points();
     const int rounds = static_cast<int>(std::ceil(options_.effort * usual_condensing));
     FitState trial = state;
-    condense_parted(samples, trial,
-                    {margin * tolerance, options_.kink, std::min(rounds, options_.max_iterations.value_or(rounds)),
-                     options_.progress});
-    // Steps of all nodes would leave something else behind each time.
-    for (int i = 0; i < most_mends && trial.error() <= margin * tolerance && !result_.certify(trial, tolerance); ++i) {
-      for (const SamplePoint& point : result_.farthest()) {
-        samples.add(point);
-      }
-      trial.attach();
-      trial.measure();
-      add_missed(samples, trial, margin * tolerance, true);
-      mend_pieces(trial, margin * tolerance);
-    }
-    if (shape_and_certify(samples, trial, tolerance, most)) {
+    CondenseOptions condensing{margin * tolerance, options_.kink,
+                               std::min(rounds, options_.max_iterations.value_or(rounds))};
+    const auto expected = static_cast<std::size_t>(expected_by_condensing * static_cast<double>(state.mesh.alive));
+    condensing.exchanging = expected > many && is_coarse_for(expected) ? options_.effort : 0;
+    condensing.progress = options_.progress;
+    if (condense_certainly(samples, trial, result_, tolerance, condensing) &&
+        shape_and_certify(samples, trial, tolerance, most)) {
       state = std::move(trial);
       return true;
     }

@@ -1,7 +1,9 @@
 #include "shell/fit_condense.hpp"
 
 #include "shell/fit_detach.hpp"
+#include "shell/fit_divide.hpp"
 #include "shell/fit_edit.hpp"
+#include "shell/fit_exchange.hpp"
 #include "shell/fit_minimax.hpp"
 #include "shell/fit_missed.hpp"
 #include "shell/fit_region.hpp"
@@ -23,10 +25,16 @@ constexpr int most_lessening = 6, least_lessening = 2;  // steps that lessen the
 constexpr std::size_t lessened_shells = 2'000;          // of all these steps: what they may cost
 constexpr double first_use = 0.6;                       // of the room that less error gives: what mergers use up
 constexpr double more_use = 1.1, less_use = 0.6;
-constexpr int patience = 3;        // mergers that nothing makes good
-constexpr double headroom = 0.86;  // of the limit: closer than that certificates find too much
-constexpr double nearly = 0.95;    // of the degrees that normals may part by
-constexpr double often = 0.02;     // of the nodes
+constexpr int patience = 3;             // mergers that nothing makes good
+constexpr double nearly = 0.95;         // of the degrees that normals may part by
+constexpr double often = 0.02;          // of the nodes
+constexpr std::size_t piece = 300;      // shells: of more, all wait for the worst place
+constexpr std::size_t undivided = 450;  // shells
+constexpr int turns = 4, piece_rounds = 4;
+constexpr int exchange_turns = 2;
+constexpr std::size_t exchanges = 3;  // pieces fitted anew per shell and turn
+constexpr int most_mends = 50;        // by certificates
+constexpr int splitting = 4;          // tries to mend what only more shells do
 
 /// Turns edges, moves all nodes, and places the worst ones anew.
 void turn_and_place(FitState& state, int power, double limit) {
@@ -39,10 +47,11 @@ void turn_and_place(FitState& state, int power, double limit) {
 
 }  // namespace
 
-void condense(FitSamples& samples, FitState& state, double limit, int rounds, const Progress& progress) {
+void condense(FitSamples& samples, FitState& state, const CondenseOptions& options) {
+  const double limit = options.limit, enough = options.headroom * options.limit;
   const auto lessen = [&](FitState& trial) {
     add_missed(samples, trial, limit, true);
-    trial.attach();
+    trial.attach_closely();
     trial.measure();
     if (trial.error() > limit) {
       turn_and_place(trial, 8, limit);
@@ -53,8 +62,8 @@ void condense(FitSamples& samples, FitState& state, double limit, int rounds, co
   lessen(state);
   FitState roomy = state;
   double use = first_use;
-  for (int round = 0, failures = 0; round < rounds && failures < patience; ++round) {
-    advance(progress, static_cast<double>(round) / rounds);
+  for (int round = 0, failures = 0; round < options.rounds && failures < patience; ++round) {
+    advance(options.progress, static_cast<double>(round) / options.rounds);
     // Errors go with the square of the area of a shell.
     const double room = std::max(0.0, 1 - std::sqrt(state.error() / limit));
     const auto fewer = static_cast<std::size_t>(use * room * static_cast<double>(state.mesh.alive));
@@ -63,7 +72,7 @@ void condense(FitSamples& samples, FitState& state, double limit, int rounds, co
     }
     FitState trial = state;
     collapse_edges(trial, loosened * limit, state.mesh.alive - fewer, {});
-    trial.attach();
+    trial.attach_closely();
     trial.measure();
     turn_and_place(trial, 4, limit);
     lessen_largest(trial, spare * limit, minimax_steps, limit);
@@ -75,7 +84,7 @@ void condense(FitSamples& samples, FitState& state, double limit, int rounds, co
     }
     if (better) {
       state = std::move(trial);
-      if (state.error() <= headroom * limit) {
+      if (state.error() <= enough) {
         roomy = state;
       }
       use = std::min(1.0, more_use * use);
@@ -85,7 +94,7 @@ void condense(FitSamples& samples, FitState& state, double limit, int rounds, co
       ++failures;
     }
   }
-  if (state.error() > headroom * limit) {
+  if (state.error() > enough) {
     state = std::move(roomy);
   }
   lessen(state);
@@ -117,18 +126,84 @@ std::size_t mend_pieces(FitState& state, double limit) {
 
 bool many_part_by(const FitMesh& mesh, double kink) { return share_parted_by(mesh, nearly * kink) > often; }
 
+namespace {
+
+/// The whole, or piece by piece: there errors need no headroom, as what certificates find is mended in the end.
+void condense_all(FitSamples& samples, FitState& state, const CondenseOptions& options) {
+  if (state.mesh.alive < undivided) {
+    condense(samples, state, options);
+    return;
+  }
+  CondenseOptions of_piece = options;
+  of_piece.rounds = std::min(options.rounds, piece_rounds);
+  of_piece.headroom = 1;
+  of_piece.progress = {};
+  state.attach_closely();
+  state.measure();
+  for (int turn = 0; turn < std::min(options.rounds, turns); ++turn) {
+    advance(options.progress, static_cast<double>(turn) / turns);
+    change_pieces(samples, state, piece, turn,
+                  [&](FitSamples& its_samples, FitState& its_state) { condense(its_samples, its_state, of_piece); });
+  }
+}
+
+/// Mends pieces, with more shells where nothing else does.
+void mend(FitState& state, double limit) {
+  for (int i = 0; i < splitting && state.error() > limit; ++i) {
+    if (const std::size_t left = mend_pieces(state, limit); left > 0) {
+      split_worst(state, limit, left);
+      state.attach_again();
+      state.measure();
+    }
+  }
+}
+
+}  // namespace
+
 void condense_parted(FitSamples& samples, FitState& state, const CondenseOptions& options) {
   if (options.kink == 0 || state.mesh.kind != Patch::comas) {
-    condense(samples, state, options.limit, options.rounds, options.progress);
+    condense_all(samples, state, options);
     return;
   }
   state.limits.kink = std::min(first_kink, options.kink);
   part_normals(state);
-  condense(samples, state, options.limit, options.rounds, options.progress);
+  condense_all(samples, state, options);
   if (options.kink > first_kink && many_part_by(state.mesh, first_kink)) {
     state.limits.kink = options.kink;
-    condense(samples, state, options.limit, options.rounds, options.progress);
+    condense_all(samples, state, options);
   }
+}
+
+bool condense_certainly(FitSamples& samples, FitState& state, FitResult& result, double tolerance,
+                        const CondenseOptions& options) {
+  condense_parted(samples, state, options);
+  for (int turn = turns; options.exchanging > 0 && turn < turns + exchange_turns; ++turn) {
+    change_pieces(samples, state, piece, turn, [&](FitSamples& its_samples, FitState& its_state) {
+      const double usual = static_cast<double>(exchanges * its_state.mesh.alive);
+      exchange_in_piece(its_samples, its_state, options.limit, static_cast<std::size_t>(options.exchanging * usual));
+    });
+  }
+  // Steps of all nodes would leave something else behind each time.
+  mend(state, options.limit);
+  for (int i = 0; i < most_mends && state.error() <= options.limit; ++i) {
+    if (result.certify(state, tolerance, true)) {
+      return true;
+    }
+    if (result.farthest().empty() && result.beyond_of_shell().empty()) {
+      break;
+    }
+    for (const SamplePoint& point : result.farthest()) {
+      samples.add(point);
+    }
+    for (const FarPlace& place : result.beyond_of_shell()) {
+      state.patches[place.patch].places.push_back(place.at);
+    }
+    state.attach_closely();
+    state.measure();
+    add_missed(samples, state, options.limit, true);
+    mend(state, options.limit);
+  }
+  return false;
 }
 
 }  // namespace tunica

@@ -91,11 +91,12 @@ void widen(Box& box, const FitState& state, Index t) {
 
 class Exchange {
 public:
-  Exchange(FitSamples& samples, FitState& state, double limit, double tolerance)
+  /// @param tolerance  mm; none: nothing is certified
+  Exchange(FitSamples& samples, FitState& state, double limit, std::optional<double> tolerance)
       : samples_(samples),
         state_(state),
         limit_(limit),
-        tolerance_(certainly * tolerance),
+        tolerance_(tolerance ? std::optional(certainly * *tolerance) : std::nullopt),
         crossings_(crossing_shells(state.mesh.shell()).size()),
         changed_(state.mesh.positions.size(), 1) {}
 
@@ -283,7 +284,9 @@ private:
         return {};
       }
       std::vector<SamplePoint> missed = missed_within(trial, box, limit_);
-      if (missed.empty() && holds_within(trial, box, tolerance_, missed)) {
+      const bool all_met = missed.empty() && (!tolerance_ || holds_within(trial, box, *tolerance_, missed));
+      const bool close = tolerance_ || add_places_beyond(region.state, limit_);
+      if (all_met && close) {
         return trial;
       }
       attach_to_closest(missed, region.state);
@@ -380,7 +383,8 @@ private:
 
   FitSamples& samples_;
   FitState& state_;
-  double limit_, tolerance_;
+  double limit_;
+  std::optional<double> tolerance_;
   std::size_t crossings_;
   std::size_t fits_ = 0, now_ = 1;    // changes so far
   std::size_t attached_ = 1;          // when all points were, last
@@ -489,7 +493,7 @@ private:
     for (int fruitless = 0; fruitless < patience && goes_on(reserve);) {
       const std::size_t before = price(state_);
       FitState condensed = state_;
-      condense(samples_, condensed, limit, usual_condensing, {});
+      condense(samples_, condensed, {limit});
       if (price(condensed) == before) {
         settle(condensed, easing);
         lessen_largest(condensed, 0, easing);
@@ -519,6 +523,11 @@ private:
 };
 
 }  // namespace
+
+void exchange_in_piece(FitSamples& samples, FitState& state, double limit, std::size_t most) {
+  std::mt19937 random;
+  Exchange(samples, state, limit, {}).run(most, random);
+}
 
 void exchange_pieces(FitSamples& samples, FitState& state, const ExchangeOptions& options) {
   if (options.effort == 0) {

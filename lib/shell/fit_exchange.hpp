@@ -33,4 +33,8 @@ struct ExchangeOptions {
 /// at most 6,000, some 30 ms each: where too large an error is foretold they are given up.
 void exchange_pieces(FitSamples& samples, FitState& state, const ExchangeOptions& options);
 
+/// The same once, within a piece of a mesh and without certificates, which would need what is around it: what samples
+/// miss is left to be mended in the whole. Normals part as FitLimits::kink allows. @param most  pieces fitted anew
+void exchange_in_piece(FitSamples& samples, FitState& state, double limit, std::size_t most);
+
 }  // namespace tunica

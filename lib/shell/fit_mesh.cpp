@@ -155,6 +155,22 @@ void FitMesh::remove_triangle(Index t) {
   --alive;
 }
 
+const FitMesh::CutEdge* FitMesh::cut_edge(Index u, Index v) const {
+  const std::array<Index, 2> nodes{std::min(u, v), std::max(u, v)};
+  const auto found = std::lower_bound(cut.begin(), cut.end(), nodes,
+                                      [](const CutEdge& edge, const auto& n) { return edge.nodes < n; });
+  return found != cut.end() && found->nodes == nodes ? &*found : nullptr;
+}
+
+std::optional<std::array<Vec3, 3>> FitMesh::points_beyond(Index u, Index v) const {
+  const CutEdge* edge = cut_edge(u, v);
+  if (edge == nullptr || !edge->points) {
+    return {};
+  }
+  const auto& points = *edge->points;
+  return u < v ? points : std::array<Vec3, 3>{points[2], points[1], points[0]};
+}
+
 bool FitMesh::is_boundary_edge(Index u, Index v) const {
   return on_boundary[u] != 0 && on_boundary[v] != 0 && on_edge(u, v).count() == 1 && !is_cut(u, v);
 }

@@ -58,12 +58,18 @@ struct FitMesh {
   };
   std::vector<RimEdge> rim;  ///< the creases there
 
-  /// The edges at the rim of a piece beyond which there are further triangles, ascending ends, sorted: no boundary.
-  std::vector<std::array<Index, 2>> cut;
+  /// An edge at the rim of a piece beyond which there is a further triangle: no boundary.
+  struct CutEdge {
+    std::array<Index, 2> nodes;                 ///< ascending
+    std::optional<std::array<Vec3, 3>> points;  ///< of the patch beyond, at 1/4, 1/2, 3/4 of the way: not to gape at
+  };
+  std::vector<CutEdge> cut;  ///< ascending
 
-  [[nodiscard]] bool is_cut(Index u, Index v) const {
-    return std::binary_search(cut.begin(), cut.end(), std::array<Index, 2>{std::min(u, v), std::max(u, v)});
-  }
+  [[nodiscard]] bool is_cut(Index u, Index v) const { return cut_edge(u, v) != nullptr; }
+
+  /// The points of the patch beyond a cut edge, from u to v; none where there are none, or the edge is not cut.
+  [[nodiscard]] std::optional<std::array<Vec3, 3>> points_beyond(Index u, Index v) const;
+
   [[nodiscard]] bool is_boundary_edge(Index u, Index v) const;
   [[nodiscard]] EdgeBits boundary_edges(Index t) const;
 
@@ -111,6 +117,9 @@ struct FitMesh {
 
   /// @param kept  when given, the triangle of this mesh that each triangle of the result is
   [[nodiscard]] ShellMesh shell(std::vector<Index>* kept = nullptr) const;
+
+private:
+  [[nodiscard]] const CutEdge* cut_edge(Index u, Index v) const;
 };
 
 }  // namespace tunica

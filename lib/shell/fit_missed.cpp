@@ -267,6 +267,21 @@ std::vector<SamplePoint> missed_within(const FitState& state, const Box& box, do
   return found;
 }
 
+bool add_places_beyond(FitState& state, double limit) {
+  std::vector<Index> triangles;
+  const std::vector<CubicPatch> patches = curved_patches(state.mesh.shell(&triangles));
+  Aim aim{width_of_certificates * limit, limit, 0};
+  aim.list_beyond = true;
+  const OneSided found = shell_to_target(patches, state.samples().target(), aim);
+  if (found.distance.upper <= limit) {
+    return true;
+  }
+  for (const FarPlace& place : found.beyond) {
+    state.patches[triangles[place.patch]].places.push_back(place.at);
+  }
+  return false;
+}
+
 bool holds_within(const FitState& state, const Box& box, double tolerance, std::vector<SamplePoint>& farthest) {
   const Target& target = state.samples().target();
   const ShellMesh shell = shells_near(state.mesh.shell(), box, tolerance);

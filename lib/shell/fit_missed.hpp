@@ -25,6 +25,10 @@ ShellMesh shells_near(ShellMesh shell, const Box& box, double reach);
 /// comparison.
 std::vector<SamplePoint> missed_within(const FitState& state, const Box& box, double limit);
 
+/// Has places of patches that are farther from the target than `limit` (mm) measured from now on; they are looked for
+/// as certificates do. @return whether there are none
+bool add_places_beyond(FitState& state, double limit);
+
 /// Certifies the distance of what lies within a box, both ways, but for rounding, and of the whole boundary where some
 /// of it does.
 /// @param farthest  out: where it is above `tolerance` (mm): the points of the target there, one per direction

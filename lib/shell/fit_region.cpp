@@ -45,27 +45,37 @@ std::vector<FitMesh::RimEdge> creases_beyond(const FitMesh& mesh, const std::vec
 }
 
 /// The edges between these triangles and the others, or those of what they are a piece of themselves.
-std::vector<std::array<Index, 2>> edges_cut(const FitMesh& mesh, const std::vector<Index>& triangles, Numbering& node) {
-  std::vector<std::array<Index, 2>> out;
+std::vector<FitMesh::CutEdge> edges_cut(const FitMesh& mesh, const std::vector<Index>& triangles, Numbering& node,
+                                        bool heed_rim) {
+  std::vector<FitMesh::CutEdge> out;
   for (const Index t : triangles) {
     for (std::size_t k = 0; k < 3; ++k) {
-      const Index u = mesh.triangles[t][k], v = mesh.triangles[t][(k + 1) % 3];
-      const auto pair = mesh.on_edge(u, v);
-      const bool inside = std::all_of(pair.triangle.begin(), pair.triangle.end(), [&](Index other) {
-        return other == no_index || std::binary_search(triangles.begin(), triangles.end(), other);
-      });
-      if (!inside || mesh.is_cut(u, v)) {
-        out.push_back({std::min(node.of(u), node.of(v)), std::max(node.of(u), node.of(v))});
+      Index u = mesh.triangles[t][k], v = mesh.triangles[t][(k + 1) % 3];
+      if (node.of(v) < node.of(u)) {
+        std::swap(u, v);
+      }
+      bool is_cut = mesh.is_cut(u, v);
+      auto points = mesh.points_beyond(u, v);
+      for (const Index other : mesh.on_edge(u, v).triangle) {
+        if (other != no_index && !std::binary_search(triangles.begin(), triangles.end(), other)) {
+          is_cut = true;
+          if (heed_rim) {
+            points = edge_points(mesh.patch(other), mesh.corner_of(other, u), mesh.corner_of(other, v));
+          }
+        }
+      }
+      if (is_cut) {
+        out.push_back({{node.of(u), node.of(v)}, points});
       }
     }
   }
-  std::sort(out.begin(), out.end());
+  std::sort(out.begin(), out.end(), [](const auto& a, const auto& b) { return a.nodes < b.nodes; });
   return out;
 }
 
 }  // namespace
 
-FitRegion cut_out(const FitState& whole, const std::vector<Index>& nodes, int rings) {
+FitRegion cut_out(const FitState& whole, const std::vector<Index>& nodes, int rings, bool heed_rim) {
   const FitMesh& mesh = whole.mesh;
   std::vector<Index> free = nodes, ring, triangles;
   for (int i = 0; i < rings; ++i) {
@@ -109,7 +119,7 @@ FitRegion cut_out(const FitState& whole, const std::vector<Index>& nodes, int ri
   for (std::size_t i = 0; i < node.old().size(); ++i) {
     piece.on_boundary[i] = mesh.on_boundary[node.old()[i]];
   }
-  piece.cut = edges_cut(mesh, triangles, node);
+  piece.cut = edges_cut(mesh, triangles, node, heed_rim);
   if (mesh.kind == Patch::watertight) {
     piece.rim = creases_beyond(mesh, triangles, node);
   }

@@ -15,7 +15,8 @@ struct FitRegion {
 
 /// The triangles around the nodes that are at most `rings` edges away from `nodes`. Cost: linear in the piece and in
 /// the number of nodes and slots of the whole.
-FitRegion cut_out(const FitState& whole, const std::vector<Index>& nodes, int rings);
+/// @param heed_rim  whether patches at the rim are measured by what they gape at beyond it: else only put_back() does
+FitRegion cut_out(const FitState& whole, const std::vector<Index>& nodes, int rings, bool heed_rim = false);
 
 /// Puts a changed piece back and measures it there, where it also meets its neighbours.
 /// @param whole  as it was when the piece was cut out

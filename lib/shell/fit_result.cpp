@@ -29,11 +29,13 @@ FitResult::FitResult(const Target& target, const RelaxOptions& options, double w
       width_(width),
       boundaries_(boundaries && target.boundary_tree()) {}
 
-bool FitResult::certify(const FitState& state, std::optional<double> tolerance) {
-  ShellMesh shell = state.mesh.shell();
+bool FitResult::certify(const FitState& state, std::optional<double> tolerance, bool list_beyond) {
+  std::vector<Index> triangles;
+  ShellMesh shell = state.mesh.shell(&triangles);
   ShellDistanceOptions measuring;
   measuring.width = std::max(width_, state.error() / 20);
   measuring.limit = tolerance;
+  measuring.list_beyond = list_beyond;
   ShellDistance distance = shell_distance(shell, target_, measuring);
   if (tolerance && distance.both.lower <= clearly_below * *tolerance && distance.both.upper > *tolerance) {
     // An open question deserves a closer look, but where the answer would be a narrow one shells are mended sooner.
@@ -43,6 +45,13 @@ bool FitResult::certify(const FitState& state, std::optional<double> tolerance) 
   farthest_.clear();
   if (distance.target_to_shell.lower > 0) {
     farthest_.push_back({distance.farthest_of_target});
+  }
+  for (const FarPlace& place : distance.beyond_of_target) {
+    farthest_.push_back({place.point});
+  }
+  beyond_of_shell_ = std::move(distance.beyond_of_shell);
+  for (FarPlace& place : beyond_of_shell_) {
+    place.patch = triangles[place.patch];
   }
   least_distance_ = distance.both.lower;
   if (boundaries_) {

@@ -30,7 +30,8 @@ public:
 
   /// Takes the mesh when it is better: to a tolerance (mm) cheaper within it, see price(), else closer.
   /// @return whether the tolerance certainly holds
-  bool certify(const FitState& state, std::optional<double> tolerance);
+  /// @param list_beyond  whether farthest() and beyond_of_shell() are to tell of all patches beyond the tolerance
+  bool certify(const FitState& state, std::optional<double> tolerance, bool list_beyond = false);
 
   /// Flat facets instead, where they do better: fewer within the tolerance (mm), or closer with at most so many.
   /// Errors: InputError where nothing else was found and facets have no area.
@@ -51,6 +52,8 @@ public:
 
   /// Where on the target the largest distances were, when last certified; none where that was not looked for.
   [[nodiscard]] const std::vector<SamplePoint>& farthest() const { return farthest_; }
+  /// Places of the mesh under edit beyond the tolerance, where they were to be listed when last certified.
+  [[nodiscard]] const std::vector<FarPlace>& beyond_of_shell() const { return beyond_of_shell_; }
   /// mm: what the last certified distance certainly is at least.
   [[nodiscard]] double least_distance() const { return least_distance_; }
 
@@ -66,6 +69,7 @@ private:
   std::optional<FitMesh> mesh_;
   bool flat_ = false;
   std::vector<SamplePoint> farthest_;
+  std::vector<FarPlace> beyond_of_shell_;  // patches of the mesh under edit
   double least_distance_ = 0;
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };

@@ -15,9 +15,10 @@ constexpr std::size_t most_further_points = 200'000;
 constexpr int coarsest_grid = 4, coarsest_on_facets = 6;
 constexpr std::size_t smooth_from = 64;  // triangles of the target per shell: fewer are felt
 constexpr int finest_grid = 8;
-constexpr double other_wall = 4;  // times as far: beyond that a closest point that faces away is one around a rim
-constexpr double arrival = 1e-6;  // in a patch's parameters: a step to the foot that is the last
-constexpr int most_steps = 12;    // downhill, from triangle to triangle
+constexpr int level_of_pieces = 6;  // at least: coarser ones see too little of what condensing makes of patches
+constexpr double other_wall = 4;    // times as far: beyond that a closest point that faces away is one around a rim
+constexpr double arrival = 1e-6;    // in a patch's parameters: a step to the foot that is the last
+constexpr int most_steps = 12;      // downhill, from triangle to triangle
 constexpr double closer = 1 - 1e-9;
 constexpr int gauss_newton_steps = 2;
 constexpr double beside = 0.7;  // cosine: farther off the normal than this, a distance counts along itself
@@ -244,7 +245,9 @@ void FitSamples::from_gap(const CubicPatch& patch, std::size_t from, std::size_t
 }
 
 FitSamples::FitSamples(const Target& target, std::size_t shells, bool boundaries)
-    : target_(target), grid_of_target_(target.mesh()), boundaries_(boundaries && target.boundary_tree()) {
+    : target_(target),
+      grid_of_target_(std::make_shared<StartGrid>(target.mesh())),
+      boundaries_(boundaries && target.boundary_tree()) {
   const auto& mesh = target.mesh();
   std::vector<std::uint8_t> used(mesh.vertices.size(), 0);
   for (const auto& loop : target.boundary_vertices()) {
@@ -286,12 +289,16 @@ FitSamples::FitSamples(const Target& target, std::size_t shells, bool boundaries
   }
   further_ = points_in_spatial_order(target);
   const int coarsest = mesh.triangles.size() < smooth_from * shells ? coarsest_on_facets : coarsest_grid;
-  const int level = std::clamp(
+  level_ = std::clamp(
       static_cast<int>(std::sqrt(2.0 * static_cast<double>(most_grid_points) / static_cast<double>(shells + 1))) - 2,
       coarsest, finest_grid);
-  for (int i = 0; i <= level; ++i) {
-    for (int j = 0; i + j <= level; ++j) {
-      grid_.emplace_back(static_cast<double>(j) / level, static_cast<double>(i) / level);
+  set_grid();
+}
+
+void FitSamples::set_grid() {
+  for (int i = 0; i <= level_; ++i) {
+    for (int j = 0; i + j <= level_; ++j) {
+      grid_.emplace_back(static_cast<double>(j) / level_, static_cast<double>(i) / level_);
     }
   }
   for (std::size_t i = 0; i < grid_.size(); i += lane_count) {
@@ -302,6 +309,23 @@ FitSamples::FitSamples(const Target& target, std::size_t shells, bool boundaries
   }
 }
 
+FitSamples::FitSamples(const FitSamples& whole, std::vector<SamplePoint> points, std::vector<Vec3> further,
+                       std::vector<Vec3> further_boundary)
+    : target_(whole.target_),
+      grid_of_target_(whole.grid_of_target_),
+      boundaries_(whole.boundaries_),
+      points_(std::move(points)),
+      further_(std::move(further)),
+      further_boundary_(std::move(further_boundary)),
+      level_(std::max(whole.level_, level_of_pieces)) {
+  set_grid();
+}
+
+FitSamples FitSamples::of_piece(std::vector<SamplePoint> points, std::vector<Vec3> further,
+                                std::vector<Vec3> further_boundary) const {
+  return {*this, std::move(points), std::move(further), std::move(further_boundary)};
+}
+
 ClosestPoint::Hit FitSamples::downhill(const Vec3& p, Index start) const {
   const TriangleMesh& mesh = target_.mesh();
   const auto look = [&](Index t) {
@@ -310,9 +334,9 @@ ClosestPoint::Hit FitSamples::downhill(const Vec3& p, Index start) const {
   };
   Index here = start;
   TriangleFoot foot = look(here);
-  if (foot.squared_distance > grid_of_target_.cell() * grid_of_target_.cell()) {
+  if (foot.squared_distance > grid_of_target_->cell() * grid_of_target_->cell()) {
     // Far from where it was the last time.
-    if (const auto other = grid_of_target_.near(p)) {
+    if (const auto other = grid_of_target_->near(p)) {
       if (const TriangleFoot there = look(*other); there.squared_distance < foot.squared_distance) {
         here = *other;
         foot = there;
@@ -380,7 +404,6 @@ void FitSamples::from_patch(const PatchPowers& patch, const Vec3& facing, double
   if (guesses.size() != grid_.size()) {
     guesses.assign(grid_.size(), guesses.empty() ? no_neighbour : guesses[0]);
   }
-  const std::vector<Vec3>& facets = target_.facet_normals();
   Index last = guesses[0];
   std::array<ClosestPoint::Hit, lane_count> hits;
   for (std::size_t i = 0; i < grid_.size(); i += lane_count) {
@@ -409,21 +432,32 @@ void FitSamples::from_patch(const PatchPowers& patch, const Vec3& facing, double
     }
     last = hits[count - 1].triangle;
     for (std::size_t k = 0; k < count; ++k) {
-      const ClosestPoint::Hit& hit = hits[k];
-      const Vec3 p = point(k);
-      const Vec2& at = grid_[i + k];
-      guesses[i + k] = hit.triangle;
-      if (facets[hit.triangle].dot(facing) > 0) {
-        out.push_back(residual(at, p - hit.point, facets[hit.triangle]));
-      } else if (const auto foot = target_.closest_facing(p, facing, other_wall * std::sqrt(hit.squared_distance))) {
-        out.push_back(residual(at, p - foot->point, foot->facet_normal));
-      } else {
-        const Vec3 away = p - hit.point;
-        const double distance = away.norm();
-        out.push_back({at, distance > 0 ? Vec3(away / distance) : facing, distance});
-      }
+      guesses[i + k] = hits[k].triangle;
+      out.push_back(residual_of(grid_[i + k], point(k), hits[k], facing));
     }
   }
+}
+
+void FitSamples::from_places(const CubicPatch& patch, const Vec3& facing, const std::vector<Vec2>& places,
+                             std::vector<Residual>& out) const {
+  for (const Vec2& at : places) {
+    const Vec3 p = patch.point(at);
+    out.push_back(residual_of(at, p, target_.tree().closest(p), facing));
+  }
+}
+
+Residual FitSamples::residual_of(const Vec2& at, const Vec3& p, const ClosestPoint::Hit& hit,
+                                 const Vec3& facing) const {
+  const Vec3& normal = target_.facet_normals()[hit.triangle];
+  if (normal.dot(facing) > 0) {
+    return residual(at, p - hit.point, normal);
+  }
+  if (const auto foot = target_.closest_facing(p, facing, other_wall * std::sqrt(hit.squared_distance))) {
+    return residual(at, p - foot->point, foot->facet_normal);
+  }
+  const Vec3 away = p - hit.point;
+  const double distance = away.norm();
+  return {at, distance > 0 ? Vec3(away / distance) : facing, distance};
 }
 
 void FitSamples::from_target(const CubicPatch& patch, const PatchPowers& powers, const Vec3& facing, EdgeBits boundary,

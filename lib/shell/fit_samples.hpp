@@ -8,6 +8,7 @@
 #include "shell/target.hpp"
 #include "surface/incidence.hpp"
 
+#include <memory>
 #include <optional>
 #include <span>
 
@@ -65,6 +66,11 @@ public:
   /// @param boundaries  whether the shells' boundary is to be the target's; else it is only where they end
   FitSamples(const Target& target, std::size_t shells, bool boundaries = true);
 
+  /// The same measures by other points, such as those that a piece of the shells has to heed, and by a grid that is
+  /// not too coarse for pieces.
+  [[nodiscard]] FitSamples of_piece(std::vector<SamplePoint> points, std::vector<Vec3> further,
+                                    std::vector<Vec3> further_boundary) const;
+
   [[nodiscard]] const std::vector<SamplePoint>& points() const { return points_; }
   [[nodiscard]] const Target& target() const { return target_; }
   [[nodiscard]] bool has_boundaries() const { return boundaries_; }
@@ -92,6 +98,10 @@ public:
   void from_patch(const PatchPowers& patch, const Vec3& facing, double doubted, std::vector<Index>& guesses,
                   std::vector<Residual>& out) const;
 
+  /// The same of further places of the patch. Cost: a search among all triangles of the target each.
+  void from_places(const CubicPatch& patch, const Vec3& facing, const std::vector<Vec2>& places,
+                   std::vector<Residual>& out) const;
+
   /// Appends what makes two neighbours gape: where their edge curves part sideways, the target is bare between them by
   /// half the way. Each side has its own residuals, towards the middle.
   /// @param from, to  corners of the edge in the patch; other  the neighbour's points at 1/4, 1/2, 3/4 of the way
@@ -109,16 +119,23 @@ public:
   [[nodiscard]] Target::Foot foot(const Vec3& p, const Vec3& facing) const;
 
 private:
+  FitSamples(const FitSamples& whole, std::vector<SamplePoint> points, std::vector<Vec3> further,
+             std::vector<Vec3> further_boundary);
+
+  void set_grid();
+  [[nodiscard]] Residual residual_of(const Vec2& at, const Vec3& p, const ClosestPoint::Hit& hit,
+                                     const Vec3& facing) const;
   [[nodiscard]] ClosestPoint::Hit downhill(const Vec3& p, Index start) const;
   /// The same from the given start each, for those of the first `count` points whose foot is not within it.
   void downhill(const LaneVec3& p, std::size_t count, std::array<ClosestPoint::Hit, lane_count>& hits) const;
 
   const Target& target_;
-  StartGrid grid_of_target_;
+  std::shared_ptr<const StartGrid> grid_of_target_;
   bool boundaries_;
   std::vector<SamplePoint> points_;
   std::vector<Vec3> further_;
   std::vector<Vec3> further_boundary_;
+  int level_;  // intervals per edge of the grid of a patch's points
   std::vector<Vec2> grid_;
   std::vector<std::array<Lanes, 2>> grid_lanes_;  // the last ones repeated
 };

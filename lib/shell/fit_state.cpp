@@ -201,6 +201,7 @@ void FitState::measure(Index t, double doubted) {
   const Vec3 facing = facing_of(mesh.corners(t));
   const PatchPowers powers(patch);
   samples_->from_patch(powers, facing, doubted, p.guesses, p.residuals);
+  samples_->from_places(patch, facing, p.places, p.residuals);
   const EdgeBits boundary = mesh.boundary_edges(t);
   samples_->from_target(patch, powers, facing, boundary, p.attached, p.residuals);
   samples_->from_boundary(patch, facing, boundary, p.residuals);
@@ -212,6 +213,8 @@ void FitState::measure(Index t, double doubted) {
       FitSamples::from_gap(patch, k, (k + 1) % 3,
                            edge_points(mesh.patch(other), mesh.corner_of(other, from), mesh.corner_of(other, to)),
                            p.residuals);
+    } else if (const auto beyond = mesh.points_beyond(from, to)) {
+      FitSamples::from_gap(patch, k, (k + 1) % 3, *beyond, p.residuals);
     }
   }
   for (const Residual& r : p.residuals) {

@@ -102,6 +102,9 @@ void link(const FitState& state, const std::vector<std::array<Index, 3>>& nodes,
       if (mesh.is_cut(from, to)) {
         patch.boundary &= static_cast<EdgeBits>(~bit);
       }
+      if (const auto beyond = mesh.points_beyond(from, to); beyond && !watertight) {
+        across.points = beyond;
+      }
       for (const FitMesh::RimEdge& edge : mesh.rim) {
         if (edge.nodes == std::array<Index, 2>{from, to}) {
           set_across(patch, k, 0, edge.normals[0], patch.slot);

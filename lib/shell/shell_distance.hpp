@@ -10,6 +10,13 @@
 
 namespace tunica {
 
+/// A place that is farther from the other surface than it should be.
+struct FarPlace {
+  Vec3 point;
+  Index patch;  ///< of the shells: its own, or that of the closest point
+  Vec2 at;      ///< likewise
+};
+
 /// How far the curved surface of a shell mesh and a target lie apart, mm.
 struct ShellDistance {
   Interval both;  ///< two-sided Hausdorff distance
@@ -20,6 +27,9 @@ struct ShellDistance {
   Vec3 farthest_of_shell = Vec3::Zero();              ///< a point of the curved surface that has shell_to_target.lower
   Vec3 farthest_of_target = Vec3::Zero();             ///< a point of the target that has target_to_shell.lower
   Vec3 closest_to_farthest_of_target = Vec3::Zero();  ///< of the curved surface
+  std::vector<FarPlace> beyond_of_shell = {},
+                        beyond_of_target =
+                            {};  ///< one of each patch beyond the limit or nearly, where these are listed
   /// Two-sided, of the boundary curves; none where either has no boundary, or it was not asked for.
   std::optional<Interval> boundary = {};
 
@@ -31,6 +41,7 @@ struct ShellDistanceOptions {
   double width = 0;             ///< mm: upper - lower wanted of each interval
   bool with_mean = false;       ///< mean and rms too
   std::optional<double> limit;  ///< mm: whether the distance is at most this is all that matters
+  bool list_beyond = false;     ///< and where it is not: in the whole, not only until that is certain
   Progress progress;
 };
 

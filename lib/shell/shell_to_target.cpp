@@ -13,6 +13,7 @@
 namespace tunica {
 namespace {
 
+const FarPlace nowhere{Vec3::Zero(), 0, Vec2::Zero()};
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr std::size_t grain = 256;
 constexpr double bulge_share = 0.25;  // of the distance that settles a piece: what the first cut leaves to bulges
@@ -74,8 +75,9 @@ public:
       settled_ = std::max(settled_, piece.upper);
     }
     return {{std::max(0.0, lower_ - aim_.uncertainty), std::max(lower_, settled_) + aim_.uncertainty},
-            farthest_,
-            tree_.closest(farthest_).point};
+            farthest_.point,
+            tree_.closest(farthest_.point).point,
+            beyond_.all()};
   }
 
 private:
@@ -89,12 +91,13 @@ private:
   };
   struct Block {
     double lower = 0, settled = 0;
-    Vec3 farthest = Vec3::Zero();  // whose distance `lower` is
+    FarPlace farthest = nowhere;  // whose distance `lower` is
     std::vector<Piece> live;
+    std::vector<std::pair<double, FarPlace>> beyond;
     CoverBound::Visited visited;
   };
 
-  static void raise(Block& block, double distance, const Vec3& at) {
+  static void raise(Block& block, double distance, const FarPlace& at) {
     if (distance > block.lower) {
       block.lower = distance;
       block.farthest = at;
@@ -111,11 +114,11 @@ private:
           const Vec3 p = patches_[t].point(b);
           const auto hit = guess ? tree_.closest(p, *guess) : tree_.closest(p);
           guess = hit.triangle;
-          raise(middles[begin / grain], std::sqrt(hit.squared_distance), p);
+          raise(middles[begin / grain], std::sqrt(hit.squared_distance), {p, static_cast<Index>(t), b});
         }
       }
     });
-    collected(middles, aim_, lower_, settled_, farthest_);
+    collected(middles, aim_, lower_, settled_, farthest_, beyond_);
     const double bulge = bulge_share * aim_.enough(lower_);
     std::vector<Block> blocks((patches_.size() + grain - 1) / grain);
     parallel_for_blocks(patches_.size(), grain, [&](std::size_t begin, std::size_t end) {
@@ -124,7 +127,7 @@ private:
         cut_first(static_cast<Index>(t), bulge, blocks[begin / grain]);
       }
     });
-    return collected(blocks, aim_, lower_, settled_, farthest_);
+    return collected(blocks, aim_, lower_, settled_, farthest_, beyond_);
   }
 
   void cut_first(Index t, double bulge, Block& block) const {
@@ -139,11 +142,12 @@ private:
     std::optional<Index> guess;
     for (int r = 0; r <= m; ++r) {
       for (int c = 0; c <= m - r; ++c) {
-        const Vec3 p = patches_[t].point(Vec2(static_cast<double>(c) / m, static_cast<double>(r) / m));
+        const Vec2 at(static_cast<double>(c) / m, static_cast<double>(r) / m);
+        const Vec3 p = patches_[t].point(at);
         const auto hit = guess ? tree_.closest(p, *guess) : tree_.closest(p);
         guess = hit.triangle;
         points.push_back({p, std::sqrt(hit.squared_distance), hit.triangle});
-        raise(block, points.back().distance, p);
+        raise(block, points.back().distance, {p, t, at});
       }
     }
     const auto add = [&](std::array<std::array<int, 2>, 3> corners) {
@@ -168,10 +172,21 @@ private:
     }
   }
 
-  /// Settles the piece or keeps it.
+  /// Settles the piece, keeps or lists it.
   void bound(Piece& piece, Block& block) const {
+    const Corners& c = piece.corners;
+    const auto far =
+        static_cast<std::size_t>(std::max_element(c.distance.begin(), c.distance.end()) - c.distance.begin());
+    if (aim_.is_listed(c.distance[far])) {
+      block.beyond.push_back({c.distance[far], {c.point[far], piece.patch, piece.at[far]}});
+    }
+    if (aim_.is_beyond(c.distance[far])) {
+      const double reach = std::max((c.point[1] - c.point[0]).norm(), (c.point[2] - c.point[0]).norm());
+      block.settled = std::max(block.settled, std::min(piece.upper, c.distance[0] + reach + bulge_of(piece)));
+      return;
+    }
     const double enough = aim_.enough(std::max(lower_, block.lower));
-    const double bulge = flatness(patches_[piece.patch], piece.level) / std::pow(4.0, piece.cuts);
+    const double bulge = bulge_of(piece);
     const double flat = flat_bound(tree_, cover_, piece.corners, std::max(enough - bulge, 0.0), block.visited);
     piece.upper = std::min(piece.upper, flat + bulge);
     if (piece.upper <= enough) {
@@ -181,6 +196,10 @@ private:
     }
   }
 
+  [[nodiscard]] double bulge_of(const Piece& piece) const {
+    return flatness(patches_[piece.patch], piece.level) / std::pow(4.0, piece.cuts);
+  }
+
   std::vector<Piece> refined(const std::vector<Piece>& pieces) {
     std::vector<Block> blocks((pieces.size() + grain - 1) / grain);
     parallel_for_blocks(pieces.size(), grain, [&](std::size_t begin, std::size_t end) {
@@ -188,7 +207,7 @@ private:
         cut(pieces[i], blocks[begin / grain]);
       }
     });
-    return collected(blocks, aim_, lower_, settled_, farthest_);
+    return collected(blocks, aim_, lower_, settled_, farthest_, beyond_);
   }
 
   void cut(const Piece& piece, Block& block) const {
@@ -199,7 +218,7 @@ private:
       middle.at[i] = (piece.at[i] + piece.at[j]) / 2;
       middle.corners.point[i] = patches_[piece.patch].point(middle.at[i]);
       look(tree_, middle.corners, i, piece.corners.nearest[i]);
-      raise(block, middle.corners.distance[i], middle.corners.point[i]);
+      raise(block, middle.corners.distance[i], {middle.corners.point[i], piece.patch, middle.at[i]});
     }
     for (std::size_t i = 0; i < 3; ++i) {
       Piece corner = piece;
@@ -222,7 +241,8 @@ private:
   const CoverBound& cover_;
   Aim aim_;
   double lower_ = 0, settled_ = 0;
-  Vec3 farthest_ = Vec3::Zero();
+  FarPlace farthest_ = nowhere;
+  FarPlaces beyond_;
 };
 
 }  // namespace

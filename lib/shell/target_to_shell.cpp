@@ -88,14 +88,15 @@ public:
           cut(live[i], block);
         }
       });
-      live = collected(blocks, aim_, lower_, settled_, farthest_);
+      live = collected(blocks, aim_, lower_, settled_, farthest_, beyond_);
     }
     for (const Piece& piece : live) {
       settled_ = std::max(settled_, std::min(piece.upper, by_one_corner(piece.corners)));
     }
     return {{std::max(0.0, lower_ - aim_.uncertainty), std::max(lower_, settled_) + aim_.uncertainty},
             farthest_.at,
-            farthest_.foot.point};
+            farthest_.foot.point,
+            beyond_.all()};
   }
 
 private:
@@ -107,6 +108,7 @@ private:
     double lower = 0, settled = 0;
     Corner farthest{Vec3::Zero(), {}};  // whose distance `lower` is
     std::vector<Piece> live;
+    std::vector<std::pair<double, FarPlace>> beyond;
   };
 
   /// No point of a piece is farther from a surface than it is from the foot of a corner.
@@ -184,13 +186,27 @@ private:
         bound({{corners[v[0]], corners[v[1]], corners[v[2]]}, infinity}, block);
       }
     });
-    return collected(blocks, aim_, lower_, settled_, farthest_);
+    return collected(blocks, aim_, lower_, settled_, farthest_, beyond_);
   }
 
-  /// Settles the piece or keeps it.
+  /// Settles the piece, keeps or lists it.
   void bound(Piece piece, Block& block) const {
     const double enough = aim_.enough(block.lower);
     const Corners& c = piece.corners;
+    for (const Corner& corner : c) {
+      SurfaceFoot foot = corner.foot;
+      if (!aim_.is_listed(foot.distance)) {
+        continue;
+      }
+      const double certain = search_.nearest(corner.at, sharp_tolerance * aim_.width, foot);
+      if (aim_.is_listed(certain)) {
+        block.beyond.push_back({foot.distance, {corner.at, foot.patch, foot.at}});
+      }
+      if (aim_.is_beyond(certain)) {
+        block.settled = std::max(block.settled, std::min(piece.upper, by_one_corner(c)));
+        return;
+      }
+    }
     // Against one patch: the one that most corners have their feet on.
     const std::size_t one = c[1].foot.patch == c[2].foot.patch ? 1 : 0;
     const Index patch = c[one].foot.patch;
@@ -318,6 +334,7 @@ private:
   PatchSearch search_;
   double lower_ = 0, settled_ = 0;
   Corner farthest_{Vec3::Zero(), {}};
+  FarPlaces beyond_;
 };
 
 }  // namespace

@@ -19,6 +19,7 @@ namespace tunica {
 namespace {
 
 /// The greedy order's next collapses, of the triangles: from them comes what is spent where the error is largest.
+constexpr std::size_t hopeless_count = 4;  // times the triangles that the error alone takes
 constexpr double more_collapses = 0.1;
 /// Where more than this share of the triangles stays there is no levelling: finding the places that it should mend
 /// would take longer than all collapses.
@@ -233,12 +234,14 @@ private:
     return static_cast<std::size_t>(factor * static_cast<double>(count));
   }
 
-  // The fewest triangles that keep the error and the angle, to some percent.
+  // The fewest triangles that keep the error and the angle, to some percent; where none of those looked at keep both,
+  // the largest angle within the error.
   DecimateResult search(std::size_t count) {
-    std::optional<DecimateResult> best;
+    std::optional<DecimateResult> best, within;
     DecimateResult found;
     std::size_t fails = 0;
     std::size_t holds = mesh_.triangles.size() + 1;
+    std::size_t fewest_within = mesh_.triangles.size();
     for (int step = 0; step < 14; ++step) {
       count = std::clamp(count, fails + 1, std::max(fails + 1, holds - 1));
       found = attempt(std::min(count, mesh_.triangles.size()));
@@ -248,6 +251,14 @@ private:
         best = found;
       } else {
         fails = count;
+        if (found.error_kept && (!within || found.smallest_angle > within->smallest_angle)) {
+          within = found;
+        }
+        fewest_within = found.error_kept ? std::min(fewest_within, count) : fewest_within;
+      }
+      // Where the error has long been kept, more triangles do not mend angles: they follow what is too thin for them.
+      if (!best && fails > hopeless_count * fewest_within) {
+        break;
       }
       if (static_cast<double>(holds) < 1.04 * static_cast<double>(fails) || fails >= mesh_.triangles.size()) {
         break;
@@ -264,7 +275,10 @@ private:
     DecimateResult given;
     given.mesh = replay(mesh_, collapse_.history(), 0);
     measure(given);
-    return given.error_kept && given.angle_held ? given : found;
+    if (given.error_kept && given.angle_held) {
+      return given;
+    }
+    return within ? std::move(*within) : std::move(found);
   }
 
   DecimateResult attempt(std::size_t count) {

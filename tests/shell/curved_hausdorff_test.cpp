@@ -7,7 +7,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <set>
 
 namespace tunica {
 namespace {
@@ -115,6 +117,58 @@ TEST(CurvedHausdorff, SpikeOfTheTargetIsFoundWhicheverSideItIs) {
   EXPECT_LE(found.target_to_shell.lower, 0.5 + 1e-3);
   EXPECT_GE(found.target_to_shell.upper, 0.5 - 1e-3);
   EXPECT_LT(found.shell_to_target.upper, 0.1);
+}
+
+TEST(CurvedHausdorff, AllPatchesBeyondALimitAreListed) {
+  TriangleMesh spiked = testing::sphere(4);
+  const std::vector<Index> spikes{77, 500, 1400};
+  for (const Index v : spikes) {
+    spiked.vertices[v] *= 1.5;
+  }
+  const Target target(spiked);
+  ShellMesh shell = testing::sphere_shell(2);
+  for (const Index v : {Index{5}, Index{90}}) {
+    shell.vertices[v] *= 0.6;
+  }
+  ShellDistanceOptions options;
+  options.width = 1e-3;
+  options.limit = 0.2;
+  options.list_beyond = true;
+  const ShellDistance found = curved_hausdorff(shell, target, options);
+  EXPECT_GT(found.both.lower, 0.2);
+  for (const Index v : spikes) {
+    EXPECT_TRUE(std::any_of(found.beyond_of_target.begin(), found.beyond_of_target.end(),
+                            [&](const FarPlace& place) { return (place.point - spiked.vertices[v]).norm() < 0.35; }));
+  }
+  for (const Index v : {Index{5}, Index{90}}) {
+    EXPECT_TRUE(std::any_of(found.beyond_of_shell.begin(), found.beyond_of_shell.end(), [&](const FarPlace& place) {
+      const auto& corners = shell.triangles[place.patch];
+      return std::find(corners.begin(), corners.end(), v) != corners.end();
+    }));
+  }
+  const std::vector<CubicPatch> patches = curved_patches(shell);
+  std::set<Index> listed;
+  for (const FarPlace& place : found.beyond_of_shell) {
+    EXPECT_TRUE(listed.insert(place.patch).second) << "one of each patch";
+    EXPECT_LT((patches[place.patch].point(place.at) - place.point).norm(), 1e-12);
+    EXPECT_GT(std::sqrt(target.tree().closest(place.point).squared_distance), 0.19);
+  }
+  const Tessellation fine = tessellate(shell, 1e-3);
+  const ClosestPoint tree(fine.mesh);
+  for (const FarPlace& place : found.beyond_of_target) {
+    EXPECT_GT(std::sqrt(tree.closest(place.point).squared_distance), 0.19);
+  }
+  // The interval is what it is without the list, or wider.
+  options.list_beyond = false;
+  options.limit.reset();
+  const ShellDistance plain = curved_hausdorff(shell, target, options);
+  EXPECT_GE(found.both.upper, plain.both.lower);
+  EXPECT_LE(found.both.lower, plain.both.upper);
+  options.list_beyond = true;
+  options.limit = 1;
+  const ShellDistance within = curved_hausdorff(shell, target, options);
+  EXPECT_LE(within.both.upper, 1);
+  EXPECT_TRUE(within.beyond_of_shell.empty() && within.beyond_of_target.empty());
 }
 
 class Bounds : public ::testing::TestWithParam<Patch> {};

@@ -11,6 +11,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -37,8 +38,8 @@ TEST(FitCondense, LessErrorEverywhereMakesRoomForMergersAndMoreSoWhereNormalsPar
   collapse_to(state, limit);
   ASSERT_TRUE(regains(samples, state, limit));
   FitState condensed = state;
-  condense(samples, condensed, limit, 8, {});
-  EXPECT_LE(condensed.mesh.alive, 0.9 * static_cast<double>(state.mesh.alive));
+  condense(samples, condensed, {limit, 0, 8});
+  EXPECT_LE(condensed.mesh.alive, 0.93 * static_cast<double>(state.mesh.alive));
   expect_sound_ball(condensed, limit);
   CondenseOptions options{limit, 45};
   condense_parted(samples, state, options);
@@ -46,6 +47,58 @@ TEST(FitCondense, LessErrorEverywhereMakesRoomForMergersAndMoreSoWhereNormalsPar
   EXPECT_EQ(state.limits.kink, 45);
   EXPECT_LE(testing::largest_kink(state.mesh), 45.01);
   expect_sound_ball(state, limit);
+}
+
+TEST(FitCondense, ManyShellsCondenseInPiecesAndWhatCertificatesFindIsMended) {
+  const Target target(wavy(5));
+  const double tolerance = 0.008, limit = 0.97 * tolerance;
+  FitSamples samples(target, 700);
+  FitState state = state_of(samples, wavy(4));
+  collapse_to(state, limit);
+  ASSERT_TRUE(regains(samples, state, limit));
+  ASSERT_GT(state.mesh.alive, 500U);
+  std::size_t condensed = 0;
+  for (const double exchanging : {0.0, 0.4}) {
+    const RelaxOptions options;
+    FitResult result(target, options, 1e-3 * tolerance, true);
+    FitSamples its_samples = samples;
+    FitState trial(its_samples, state.mesh, state.limits);
+    trial.attach_closely();
+    trial.measure();
+    CondenseOptions condensing{limit, 45};
+    condensing.exchanging = exchanging;
+    ASSERT_TRUE(condense_certainly(its_samples, trial, result, tolerance, condensing));
+    EXPECT_LE(result.found.distance.upper(), tolerance);
+    EXPECT_EQ(result.found.shell.triangles.size(), trial.mesh.alive);
+    const MeshFacts facts = examine(flat_facets(trial.mesh.shell()));
+    EXPECT_FALSE(why_unfit(facts)) << why_unfit(facts).value_or("");
+    EXPECT_EQ(facts.euler, 2);
+    if (exchanging == 0) {
+      condensed = trial.mesh.alive;
+      EXPECT_LE(condensed, 0.92 * static_cast<double>(state.mesh.alive));
+    } else {
+      EXPECT_LT(trial.mesh.alive, condensed);
+    }
+  }
+}
+
+TEST(FitCondense, FurtherPlacesOfAPatchAreMeasuredUntilItIsAnother) {
+  const Target target(testing::sphere(4, 10));
+  FitSamples samples(target, 320);
+  FitState state = state_of(samples, testing::sphere(2, 10));
+  const std::size_t before = state.patches[7].residuals.size();
+  const Vec2 at(0.31, 0.17);
+  state.patches[7].places.push_back(at);
+  state.measure();
+  ASSERT_EQ(state.patches[7].residuals.size(), before + 1);
+  const Vec3 p = state.mesh.patch(7).point(at);
+  EXPECT_TRUE(std::any_of(state.patches[7].residuals.begin(), state.patches[7].residuals.end(), [&](const Residual& r) {
+    return r.at == at && std::abs(std::abs(r.distance) - (target.closest(p).point - p).norm()) < 1e-9;
+  }));
+  state.mesh.positions[state.mesh.triangles[7][0]] *= 1.01;
+  EXPECT_TRUE(move_node(state, state.mesh.triangles[7][0],
+                        10.0 * Vec3(state.mesh.positions[state.mesh.triangles[7][0]]).normalized(), 0, 1e9));
+  EXPECT_TRUE(state.patches[7].places.empty());
 }
 
 TEST(FitCondense, PiecesAreMendedWithoutTheOthers) {

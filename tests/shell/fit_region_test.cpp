@@ -1,5 +1,6 @@
 #include "shell/fit_region.hpp"
 
+#include "shell/fit_detach.hpp"
 #include "shell/fit_edit.hpp"
 #include "shell/fit_states.hpp"
 #include "surface/checks.hpp"
@@ -7,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <tuple>
 
 namespace tunica {
@@ -52,6 +54,41 @@ TEST(FitRegion, PutBackUnchangedNothingHasChanged) {
     EXPECT_NEAR(after[i][9], before[i][9], 1e-9);
   }
   EXPECT_FALSE(why_unfit(examine(flat_facets(state.mesh.shell()))));
+}
+
+TEST(FitRegion, PatchesAtTheRimGapeAtWhatIsBeyond) {
+  const Target target(wavy(4));
+  const FitSamples samples(target, 320);
+  FitState state = state_of(samples, wavy(2));
+  state.limits.kink = 45;
+  part_normals(state);
+  for (std::size_t s = 0; s < state.mesh.normals.size(); ++s) {
+    const double a = 3.1 * static_cast<double>(s);
+    state.mesh.normals[s] =
+        (state.mesh.normals[s] + 0.3 * Vec3(std::sin(a), std::cos(1.7 * a), std::sin(2.3 * a))).normalized();
+  }
+  state.measure();
+  std::size_t blind = 0;
+  for (const bool heed_rim : {false, true}) {
+    FitRegion region = cut_out(state, {3}, 1, heed_rim);
+    region.state.measure();
+    for (std::size_t i = 0; i < region.triangles.size(); ++i) {
+      const double own = region.state.patches[i].error, whole = state.patches[region.triangles[i]].error;
+      if (heed_rim) {
+        EXPECT_NEAR(own, whole, 1e-9);
+      } else {
+        EXPECT_LE(own, whole + 1e-9);
+        blind += own < 0.99 * whole ? 1 : 0;
+      }
+    }
+    for (const auto& edge : region.state.mesh.cut) {
+      const auto there = region.state.mesh.points_beyond(edge.nodes[0], edge.nodes[1]);
+      const auto back = region.state.mesh.points_beyond(edge.nodes[1], edge.nodes[0]);
+      ASSERT_EQ(there.has_value(), heed_rim);
+      EXPECT_TRUE(!there || ((*there)[0] == (*back)[2] && (*there)[2] == (*back)[0]));
+    }
+  }
+  EXPECT_GT(blind, 0U);
 }
 
 TEST(FitRegion, TheRimIsHeld) {

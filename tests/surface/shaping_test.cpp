@@ -251,6 +251,22 @@ TEST(Shaping, AMeshThatHoldsTheAngleIsTheLastResortForAnError) {
   EXPECT_EQ(result.mesh.triangles.size(), mesh.triangles.size());
 }
 
+TEST(Shaping, WhereTheAngleIsOutOfReachTheBestWithinTheErrorComesBack) {
+  // A lens whose rim is thinner than any triangle that the error allows.
+  TriangleMesh lens = shapes::sphere(4);
+  for (Vec3& p : lens.vertices) {
+    p.z() *= 0.025;
+  }
+  DecimateOptions options;
+  options.min_angle = 20;
+  options.max_error = 0.01 * diagonal(lens);
+  const DecimateResult result = decimate(lens, options);
+  EXPECT_FALSE(result.angle_held);
+  EXPECT_TRUE(result.error_kept);
+  EXPECT_GT(result.smallest_angle, 0.3);
+  EXPECT_LT(result.mesh.triangles.size(), 9 * lens.triangles.size() / 10);
+}
+
 TEST(Shaping, AnAngleThatCannotBeHeldIsSaid) {
   // Two triangles cannot fill a narrow strip well.
   const TriangleMesh strip = shapes::plane(40, 2, 1, 0.02);
