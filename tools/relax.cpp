@@ -85,7 +85,7 @@ void declare(cli::Tool& tool, Arguments& given) {
       ->type_name("DEG");
   app.add_option("--effort", given.effort,
                  "fit to a --tolerance: how long fewer shells are looked for, times the usual (default 1; 0: a fifth "
-                 "of the time for a fifth to nine tenths more shells; at most 100)")
+                 "of the time, or less, for a fifth to nine tenths more shells; at most 100)")
       ->type_name("X");
   app.add_option("--max-iterations", given.max_iterations,
                  "at most N iterations (barycentre: 20, with --refine 60; fit: 8 rounds, or 1 to many shells on a "

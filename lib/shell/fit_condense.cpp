@@ -177,8 +177,10 @@ void condense_parted(FitSamples& samples, FitState& state, const CondenseOptions
 bool condense_certainly(FitSamples& samples, FitState& state, FitResult& result, double tolerance,
                         const CondenseOptions& options) {
   condense_parted(samples, state, options);
-  for (int turn = turns; options.exchanging > 0 && turn < turns + exchange_turns; ++turn) {
-    change_pieces(samples, state, piece, turn, [&](FitSamples& its_samples, FitState& its_state) {
+  const int exchanging = options.exchanging > 0 ? std::min(options.rounds, exchange_turns) : 0;
+  for (int turn = 0; turn < exchanging; ++turn) {
+    advance(options.progress, static_cast<double>(turn) / exchange_turns);
+    change_pieces(samples, state, piece, turns + turn, [&](FitSamples& its_samples, FitState& its_state) {
       const double usual = static_cast<double>(exchanges * its_state.mesh.alive);
       exchange_in_piece(its_samples, its_state, options.limit, static_cast<std::size_t>(options.exchanging * usual));
     });
