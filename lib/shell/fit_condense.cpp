@@ -26,6 +26,7 @@ constexpr std::size_t lessened_shells = 2'000;          // of all these steps: w
 constexpr double first_use = 0.6;                       // of the room that less error gives: what mergers use up
 constexpr double more_use = 1.1, less_use = 0.6;
 constexpr int patience = 3;             // mergers that nothing makes good
+constexpr double headroom = 0.86;       // of the limit: closer than that certificates find too much
 constexpr double nearly = 0.95;         // of the degrees that normals may part by
 constexpr double often = 0.02;          // of the nodes
 constexpr std::size_t piece = 300;      // shells: of more, all wait for the worst place
@@ -48,10 +49,11 @@ void turn_and_place(FitState& state, int power, double limit) {
 }  // namespace
 
 void condense(FitSamples& samples, FitState& state, const CondenseOptions& options) {
-  const double limit = options.limit, enough = options.headroom * options.limit;
+  const double limit = options.limit, enough = options.is_piece ? limit : headroom * limit;
+  const auto attach = [&](FitState& trial) { options.is_piece ? trial.attach_closely() : trial.attach(); };
   const auto lessen = [&](FitState& trial) {
     add_missed(samples, trial, limit, true);
-    trial.attach_closely();
+    attach(trial);
     trial.measure();
     if (trial.error() > limit) {
       turn_and_place(trial, 8, limit);
@@ -72,7 +74,7 @@ void condense(FitSamples& samples, FitState& state, const CondenseOptions& optio
     }
     FitState trial = state;
     collapse_edges(trial, loosened * limit, state.mesh.alive - fewer, {});
-    trial.attach_closely();
+    attach(trial);
     trial.measure();
     turn_and_place(trial, 4, limit);
     lessen_largest(trial, spare * limit, minimax_steps, limit);
@@ -136,7 +138,7 @@ void condense_all(FitSamples& samples, FitState& state, const CondenseOptions& o
   }
   CondenseOptions of_piece = options;
   of_piece.rounds = std::min(options.rounds, piece_rounds);
-  of_piece.headroom = 1;
+  of_piece.is_piece = true;
   of_piece.progress = {};
   state.attach_closely();
   state.measure();

@@ -12,8 +12,10 @@ struct CondenseOptions {
   double limit = 0;  ///< mm: no error of the samples is above it
   double kink = 0;   ///< degrees by which normals that meet at a node may part; 0: not at all
   int rounds = usual_condensing;
-  double headroom = 0.86;  ///< of the limit: what ends closer to it, certificates find too much of, and is given up
-  double exchanging = 0;   ///< of the usual effort: shells of pieces are exchanged afterwards
+  /// Whether the mesh is a piece of many shells: then it may end close to the limit, as what certificates find is
+  /// mended in the whole; else what ends there is given up.
+  bool is_piece = false;
+  double exchanging = 0;  ///< of the usual effort: shells of pieces are exchanged afterwards
   Progress progress = {};
 };
 
