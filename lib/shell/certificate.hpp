@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <map>
 #include <optional>
-#include <utility>
 #include <vector>
 
 /// The two directions of curved_hausdorff().
@@ -48,22 +47,22 @@ struct OneSided {
 /// The farthest place found of each patch.
 class FarPlaces {
 public:
-  void add(double distance, const FarPlace& place) {
-    const auto [found, is_first] = of_patch_.emplace(place.patch, std::pair(distance, place));
-    if (!is_first && distance > found->second.first) {
-      found->second = {distance, place};
+  void add(const FarPlace& place) {
+    const auto [found, is_first] = of_patch_.emplace(place.patch, place);
+    if (!is_first && place.distance > found->second.distance) {
+      found->second = place;
     }
   }
   [[nodiscard]] std::vector<FarPlace> all() const {
     std::vector<FarPlace> places;
-    for (const auto& [patch, found] : of_patch_) {
-      places.push_back(found.second);
+    for (const auto& [patch, place] : of_patch_) {
+      places.push_back(place);
     }
     return places;
   }
 
 private:
-  std::map<Index, std::pair<double, FarPlace>> of_patch_;
+  std::map<Index, FarPlace> of_patch_;
 };
 
 /// Gathers what blocks of pieces found, in their order: raises the bounds, and keeps the pieces that are not settled.
@@ -73,8 +72,8 @@ template <typename Block, typename Place>
 auto collected(const std::vector<Block>& blocks, const Aim& aim, double& lower, double& settled, Place& farthest,
                FarPlaces& beyond) {
   for (const Block& block : blocks) {
-    for (const auto& [distance, place] : block.beyond) {
-      beyond.add(distance, place);
+    for (const FarPlace& place : block.beyond) {
+      beyond.add(place);
     }
     if (block.lower > lower) {
       lower = block.lower;

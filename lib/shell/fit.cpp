@@ -375,15 +375,14 @@ private:
     }
   }
 
-  /// In the whole, where exchanges within pieces have not done so.
+  /// In the whole: condensed meshes of many shells were exchanged within pieces.
   [[nodiscard]] bool worth_exchanging(std::size_t shells, bool condensed) const {
-    return shells <= many || (!condensed && is_coarse_for(shells) && shells <= affordable) ||
-           options_.effort > much_effort;
+    return shells <= many || (!condensed && shells <= affordable && is_affordable_for(shells));
   }
 
-  /// Whether looking at the target costs little for so many shells.
-  [[nodiscard]] bool is_coarse_for(std::size_t shells) const {
-    return real_.mesh().triangles.size() < coarse_target * shells;
+  /// Exchanges: looking at the target costs little for so many shells, or may cost more.
+  [[nodiscard]] bool is_affordable_for(std::size_t shells) const {
+    return real_.mesh().triangles.size() < coarse_target * shells || options_.effort > much_effort;
   }
 
   /// @return whether the tolerance holds for what it became; else it is as it was
@@ -394,10 +393,11 @@ private:
     CondenseOptions condensing{margin * tolerance, options_.kink,
                                std::min(rounds, options_.max_iterations.value_or(rounds))};
     const auto expected = static_cast<std::size_t>(expected_by_condensing * static_cast<double>(state.mesh.alive));
-    condensing.exchanging = expected > many && is_coarse_for(expected) ? options_.effort : 0;
+    condensing.exchanging = expected > many && is_affordable_for(expected) ? options_.effort : 0;
     condensing.progress = options_.progress;
+    const auto is_sound = [&] { return count_thin(trial) == 0 && crossing_shells(trial.mesh.shell()).empty(); };
     if (condense_certainly(samples, trial, result_, tolerance, condensing) &&
-        shape_and_certify(samples, trial, tolerance, most)) {
+        (is_sound() || shape_and_certify(samples, trial, tolerance, most))) {
       state = std::move(trial);
       return true;
     }

@@ -31,7 +31,7 @@ constexpr double nearly = 0.95;         // of the degrees that normals may part 
 constexpr double often = 0.02;          // of the nodes
 constexpr std::size_t piece = 300;      // shells: of more, all wait for the worst place
 constexpr std::size_t undivided = 450;  // shells
-constexpr int turns = 4, piece_rounds = 4;
+constexpr int turns = 5, piece_rounds = 2;
 constexpr int exchange_turns = 2;
 constexpr std::size_t exchanges = 3;  // pieces fitted anew per shell and turn
 constexpr int most_mends = 50;        // by certificates
@@ -193,9 +193,6 @@ bool condense_certainly(FitSamples& samples, FitState& state, FitResult& result,
     if (result.certify(state, tolerance, true)) {
       return true;
     }
-    if (result.farthest().empty() && result.beyond_of_shell().empty()) {
-      break;
-    }
     for (const SamplePoint& point : result.farthest()) {
       samples.add(point);
     }
@@ -205,6 +202,9 @@ bool condense_certainly(FitSamples& samples, FitState& state, FitResult& result,
     state.attach_closely();
     state.measure();
     add_missed(samples, state, options.limit, true);
+    if (state.error() <= options.limit) {
+      break;  // what is wrong is not seen
+    }
     mend(state, options.limit);
   }
   return false;

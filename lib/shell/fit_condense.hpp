@@ -32,7 +32,7 @@ std::size_t mend_pieces(FitState& state, double limit);
 
 /// What takes most of what exchanges bring in a fraction of their time, for meshes of many shells: normals may part at
 /// once, see exchange_pieces(), and all nodes together make mergers good, see condense(); of more than some 450 shells
-/// those of pieces of 300, four times with other pieces. The state need not be certain before, and is not afterwards;
+/// those of pieces of 300, five times with other pieces. The state need not be certain before, and is not afterwards;
 /// normals stay parted. Cost: linear in the shells, some 10 ms each.
 void condense_parted(FitSamples& samples, FitState& state, const CondenseOptions& options);
 

@@ -1,8 +1,8 @@
 #include "shell/fit_divide.hpp"
 
 #include "core/threads.hpp"
-#include "shell/boundary_distance.hpp"
 #include "shell/curved_surface.hpp"
+#include "shell/fit_boundary_edges.hpp"
 #include "shell/fit_region.hpp"
 #include "shell/patch_search.hpp"
 
@@ -15,8 +15,7 @@ namespace tunica {
 namespace {
 
 constexpr std::size_t grain = 2048;
-constexpr int boundary_chords = 16;  // per edge
-constexpr double turned_by = 1;      // radians
+constexpr double turned_by = 1;  // radians
 
 /// Numbers 0 ... count - 1 of what lies side by side, of as many nodes each: cut at planes across the longest extent.
 class Halving {
@@ -87,24 +86,6 @@ std::vector<Index> closest_triangles(const FitMesh& mesh, const std::vector<Vec3
   return found;
 }
 
-/// The same of the boundary's points and edges; none where there are none.
-std::vector<Index> closest_at_boundary(const FitMesh& mesh, const std::vector<Vec3>& points) {
-  std::vector<CubicCurve> curves;
-  std::vector<Index> triangles, found;
-  for (const FitMesh::BoundaryEdge& edge : mesh.boundary()) {
-    curves.push_back(edge.curve);
-    triangles.push_back(edge.triangle);
-  }
-  if (curves.empty() || points.empty()) {
-    return found;
-  }
-  const ClosestPoint tree(chords_of(curves, boundary_chords).mesh);
-  for (const Vec3& p : points) {
-    found.push_back(triangles[tree.closest(p).triangle / boundary_chords]);
-  }
-  return found;
-}
-
 std::vector<Share> divided(const FitSamples& samples, const FitState& state, std::size_t count, int turn) {
   const FitMesh& mesh = state.mesh;
   const Halving halving(mesh, count, turn);
@@ -137,11 +118,11 @@ std::vector<Share> divided(const FitSamples& samples, const FitState& state, std
       shares[share_of[closest[i]]].further.push_back(further[i]);
     }
   }
-  const auto& boundary = samples.further_boundary_points();
-  const std::vector<Index> closest_edges = closest_at_boundary(mesh, boundary);
-  for (std::size_t i = 0; i < closest_edges.size(); ++i) {
-    if (share_of[closest_edges[i]] != no_index) {
-      shares[share_of[closest_edges[i]]].further_boundary.push_back(boundary[i]);
+  if (const BoundaryEdges edges(mesh); !edges.empty()) {
+    for (const Vec3& p : samples.further_boundary_points()) {
+      if (const Index share = share_of[edges.closest(p).triangle]; share != no_index) {
+        shares[share].further_boundary.push_back(p);
+      }
     }
   }
   std::erase_if(shares, [](const Share& share) { return share.free.empty(); });

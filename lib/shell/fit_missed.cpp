@@ -4,6 +4,7 @@
 #include "shell/boundary_distance.hpp"
 #include "shell/certificate.hpp"
 #include "shell/curved_surface.hpp"
+#include "shell/fit_boundary_edges.hpp"
 #include "shell/patch_search.hpp"
 #include "surface/hausdorff.hpp"
 
@@ -21,7 +22,7 @@ constexpr int coarsest_grid = 8, finest_grid = 12;  // ridges of a coarse target
 constexpr int gap_points = 11;                      // per edge
 constexpr double narrow = 0.05;                     // of the limit: gaps that add nothing
 constexpr std::size_t most_added = 2000;            // points, at once
-constexpr int boundary_chords = 16;                 // per edge, for a look at the boundary
+constexpr std::size_t boundary_chords = 16;         // per edge, for a look at the boundary
 constexpr double exact = 1.025;  // limits: what is looked at above gaps is the worst, so with less margin
 
 const Box everywhere{Vec3::Constant(-std::numeric_limits<double>::infinity()),
@@ -98,24 +99,19 @@ std::vector<FitMesh::BoundaryEdge> boundary_of(const FitState& state) {
 /// @param box  none outside are looked at; @param raise  told of the triangle and the distance
 template <typename Raise>
 std::vector<Missed> far_boundary_points(const FitState& state, const Box& box, double limit, const Raise& raise) {
-  std::vector<CubicCurve> curves;
-  std::vector<Index> triangles;
-  for (const FitMesh::BoundaryEdge& edge : boundary_of(state)) {
-    curves.push_back(edge.curve);
-    triangles.push_back(edge.triangle);
-  }
   std::vector<Missed> found;
-  if (curves.empty()) {
+  if (!state.samples().has_boundaries()) {
     return found;
   }
-  const ClosestPoint tree(chords_of(curves, boundary_chords).mesh);
+  const BoundaryEdges edges(state.mesh, boundary_chords);
+  if (edges.empty()) {
+    return found;
+  }
   for (const Vec3& p : state.samples().further_boundary_points()) {
     if (!is_within(box, p)) {
       continue;
     }
-    const auto hit = tree.closest(p);
-    const double distance = std::sqrt(hit.squared_distance);
-    const Index triangle = triangles[hit.triangle / boundary_chords];
+    const auto [triangle, distance] = edges.closest(p);
     raise(triangle, distance);
     if (distance > limit) {
       found.push_back({p, triangle, distance});

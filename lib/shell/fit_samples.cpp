@@ -289,13 +289,15 @@ FitSamples::FitSamples(const Target& target, std::size_t shells, bool boundaries
   }
   further_ = points_in_spatial_order(target);
   const int coarsest = mesh.triangles.size() < smooth_from * shells ? coarsest_on_facets : coarsest_grid;
-  level_ = std::clamp(
+  set_grid(std::clamp(
       static_cast<int>(std::sqrt(2.0 * static_cast<double>(most_grid_points) / static_cast<double>(shells + 1))) - 2,
-      coarsest, finest_grid);
-  set_grid();
+      coarsest, finest_grid));
 }
 
-void FitSamples::set_grid() {
+void FitSamples::set_grid(int level) {
+  level_ = level;
+  grid_.clear();
+  grid_lanes_.clear();
   for (int i = 0; i <= level_; ++i) {
     for (int j = 0; i + j <= level_; ++j) {
       grid_.emplace_back(static_cast<double>(j) / level_, static_cast<double>(i) / level_);
@@ -309,21 +311,16 @@ void FitSamples::set_grid() {
   }
 }
 
-FitSamples::FitSamples(const FitSamples& whole, std::vector<SamplePoint> points, std::vector<Vec3> further,
-                       std::vector<Vec3> further_boundary)
-    : target_(whole.target_),
-      grid_of_target_(whole.grid_of_target_),
-      boundaries_(whole.boundaries_),
-      points_(std::move(points)),
-      further_(std::move(further)),
-      further_boundary_(std::move(further_boundary)),
-      level_(std::max(whole.level_, level_of_pieces)) {
-  set_grid();
-}
-
 FitSamples FitSamples::of_piece(std::vector<SamplePoint> points, std::vector<Vec3> further,
                                 std::vector<Vec3> further_boundary) const {
-  return {*this, std::move(points), std::move(further), std::move(further_boundary)};
+  FitSamples out = *this;
+  out.points_ = std::move(points);
+  out.further_ = std::move(further);
+  out.further_boundary_ = std::move(further_boundary);
+  if (level_ < level_of_pieces) {
+    out.set_grid(level_of_pieces);
+  }
+  return out;
 }
 
 ClosestPoint::Hit FitSamples::downhill(const Vec3& p, Index start) const {

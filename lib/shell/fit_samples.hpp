@@ -119,10 +119,7 @@ public:
   [[nodiscard]] Target::Foot foot(const Vec3& p, const Vec3& facing) const;
 
 private:
-  FitSamples(const FitSamples& whole, std::vector<SamplePoint> points, std::vector<Vec3> further,
-             std::vector<Vec3> further_boundary);
-
-  void set_grid();
+  void set_grid(int level);
   [[nodiscard]] Residual residual_of(const Vec2& at, const Vec3& p, const ClosestPoint::Hit& hit,
                                      const Vec3& facing) const;
   [[nodiscard]] ClosestPoint::Hit downhill(const Vec3& p, Index start) const;
@@ -135,7 +132,7 @@ private:
   std::vector<SamplePoint> points_;
   std::vector<Vec3> further_;
   std::vector<Vec3> further_boundary_;
-  int level_;  // intervals per edge of the grid of a patch's points
+  int level_ = 0;  // intervals per edge of the grid of a patch's points
   std::vector<Vec2> grid_;
   std::vector<std::array<Lanes, 2>> grid_lanes_;  // the last ones repeated
 };

@@ -3,6 +3,7 @@
 
 #include "core/progress.hpp"
 #include "core/threads.hpp"
+#include "shell/fit_boundary_edges.hpp"
 #include "shell/fit_step.hpp"
 #include "shell/normal_equations.hpp"
 #include "surface/closest_point.hpp"
@@ -70,33 +71,6 @@ double weight_of(double distance, int power, double scale) {
 FitState::FitState(const FitSamples& samples, FitMesh m, const FitLimits& l)
     : mesh(std::move(m)), limits(l), patches(mesh.triangles.size()), samples_(&samples) {}
 
-namespace {
-
-/// The boundary edges of shells, to find which of them is closest.
-class BoundaryEdges {
-public:
-  explicit BoundaryEdges(const FitMesh& mesh) {
-    std::vector<CubicCurve> curves;
-    for (const FitMesh::BoundaryEdge& edge : mesh.boundary()) {
-      curves.push_back(edge.curve);
-      triangles_.push_back(edge.triangle);
-    }
-    if (!curves.empty()) {
-      tree_.emplace(chords_of(curves, chords).mesh);
-    }
-  }
-
-  [[nodiscard]] bool empty() const { return triangles_.empty(); }
-  [[nodiscard]] Index closest(const Vec3& p) const { return triangles_[tree_->closest(p).triangle / chords]; }
-
-private:
-  static constexpr int chords = 8;
-  std::vector<Index> triangles_;
-  std::optional<ClosestPoint> tree_;
-};
-
-}  // namespace
-
 void FitState::attach() {
   std::vector<Index> triangle;
   const ShellMesh shell = mesh.shell(&triangle);
@@ -110,7 +84,7 @@ void FitState::attach() {
     for (std::size_t i = begin; i < end; ++i) {
       const auto& [point, of_boundary] = points[i];
       if (of_boundary && !boundary.empty()) {
-        found[i] = boundary.closest(point);
+        found[i] = boundary.closest(point).triangle;
         continue;
       }
       const auto hit = guess ? tree.closest(point, *guess) : tree.closest(point);
@@ -174,7 +148,7 @@ void FitState::attach_again() {
               {feet.x[k], feet.y[k]}, {feet.point[0][k], feet.point[1][k], feet.point[2][k]}, feet.squared_distance[k]};
           const Index point = attached[i + k];
           home[point] = points[point].of_boundary && !boundary.empty()
-                            ? boundary.closest(points[point].point)
+                            ? boundary.closest(points[point].point).triangle
                             : closer_patch(point, static_cast<Index>(t), foot);
         }
       }

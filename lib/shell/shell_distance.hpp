@@ -13,8 +13,9 @@ namespace tunica {
 /// A place that is farther from the other surface than it should be.
 struct FarPlace {
   Vec3 point;
-  Index patch;  ///< of the shells: its own, or that of the closest point
-  Vec2 at;      ///< likewise
+  Index patch;      ///< of the shells: its own, or that of the closest point
+  Vec2 at;          ///< likewise
+  double distance;  ///< mm
 };
 
 /// How far the curved surface of a shell mesh and a target lie apart, mm.
@@ -27,9 +28,9 @@ struct ShellDistance {
   Vec3 farthest_of_shell = Vec3::Zero();              ///< a point of the curved surface that has shell_to_target.lower
   Vec3 farthest_of_target = Vec3::Zero();             ///< a point of the target that has target_to_shell.lower
   Vec3 closest_to_farthest_of_target = Vec3::Zero();  ///< of the curved surface
-  std::vector<FarPlace> beyond_of_shell = {},
-                        beyond_of_target =
-                            {};  ///< one of each patch beyond the limit or nearly, where these are listed
+  /// Where these are listed: one place of each patch that is beyond the limit or nearly, and of the target likewise.
+  std::vector<FarPlace> beyond_of_shell = {};
+  std::vector<FarPlace> beyond_of_target = {};
   /// Two-sided, of the boundary curves; none where either has no boundary, or it was not asked for.
   std::optional<Interval> boundary = {};
 

@@ -13,7 +13,6 @@
 namespace tunica {
 namespace {
 
-const FarPlace nowhere{Vec3::Zero(), 0, Vec2::Zero()};
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr std::size_t grain = 256;
 constexpr double bulge_share = 0.25;  // of the distance that settles a piece: what the first cut leaves to bulges
@@ -75,8 +74,8 @@ public:
       settled_ = std::max(settled_, piece.upper);
     }
     return {{std::max(0.0, lower_ - aim_.uncertainty), std::max(lower_, settled_) + aim_.uncertainty},
-            farthest_.point,
-            tree_.closest(farthest_.point).point,
+            farthest_,
+            tree_.closest(farthest_).point,
             beyond_.all()};
   }
 
@@ -91,13 +90,13 @@ private:
   };
   struct Block {
     double lower = 0, settled = 0;
-    FarPlace farthest = nowhere;  // whose distance `lower` is
+    Vec3 farthest = Vec3::Zero();  // whose distance `lower` is
     std::vector<Piece> live;
-    std::vector<std::pair<double, FarPlace>> beyond;
+    std::vector<FarPlace> beyond;
     CoverBound::Visited visited;
   };
 
-  static void raise(Block& block, double distance, const FarPlace& at) {
+  static void raise(Block& block, double distance, const Vec3& at) {
     if (distance > block.lower) {
       block.lower = distance;
       block.farthest = at;
@@ -114,7 +113,7 @@ private:
           const Vec3 p = patches_[t].point(b);
           const auto hit = guess ? tree_.closest(p, *guess) : tree_.closest(p);
           guess = hit.triangle;
-          raise(middles[begin / grain], std::sqrt(hit.squared_distance), {p, static_cast<Index>(t), b});
+          raise(middles[begin / grain], std::sqrt(hit.squared_distance), p);
         }
       }
     });
@@ -142,12 +141,11 @@ private:
     std::optional<Index> guess;
     for (int r = 0; r <= m; ++r) {
       for (int c = 0; c <= m - r; ++c) {
-        const Vec2 at(static_cast<double>(c) / m, static_cast<double>(r) / m);
-        const Vec3 p = patches_[t].point(at);
+        const Vec3 p = patches_[t].point(Vec2(static_cast<double>(c) / m, static_cast<double>(r) / m));
         const auto hit = guess ? tree_.closest(p, *guess) : tree_.closest(p);
         guess = hit.triangle;
         points.push_back({p, std::sqrt(hit.squared_distance), hit.triangle});
-        raise(block, points.back().distance, {p, t, at});
+        raise(block, points.back().distance, p);
       }
     }
     const auto add = [&](std::array<std::array<int, 2>, 3> corners) {
@@ -178,7 +176,7 @@ private:
     const auto far =
         static_cast<std::size_t>(std::max_element(c.distance.begin(), c.distance.end()) - c.distance.begin());
     if (aim_.is_listed(c.distance[far])) {
-      block.beyond.push_back({c.distance[far], {c.point[far], piece.patch, piece.at[far]}});
+      block.beyond.push_back({c.point[far], piece.patch, piece.at[far], c.distance[far]});
     }
     if (aim_.is_beyond(c.distance[far])) {
       const double reach = std::max((c.point[1] - c.point[0]).norm(), (c.point[2] - c.point[0]).norm());
@@ -218,7 +216,7 @@ private:
       middle.at[i] = (piece.at[i] + piece.at[j]) / 2;
       middle.corners.point[i] = patches_[piece.patch].point(middle.at[i]);
       look(tree_, middle.corners, i, piece.corners.nearest[i]);
-      raise(block, middle.corners.distance[i], {middle.corners.point[i], piece.patch, middle.at[i]});
+      raise(block, middle.corners.distance[i], middle.corners.point[i]);
     }
     for (std::size_t i = 0; i < 3; ++i) {
       Piece corner = piece;
@@ -241,7 +239,7 @@ private:
   const CoverBound& cover_;
   Aim aim_;
   double lower_ = 0, settled_ = 0;
-  FarPlace farthest_ = nowhere;
+  Vec3 farthest_ = Vec3::Zero();
   FarPlaces beyond_;
 };
 

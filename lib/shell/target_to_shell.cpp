@@ -108,7 +108,7 @@ private:
     double lower = 0, settled = 0;
     Corner farthest{Vec3::Zero(), {}};  // whose distance `lower` is
     std::vector<Piece> live;
-    std::vector<std::pair<double, FarPlace>> beyond;
+    std::vector<FarPlace> beyond;
   };
 
   /// No point of a piece is farther from a surface than it is from the foot of a corner.
@@ -200,7 +200,7 @@ private:
       }
       const double certain = search_.nearest(corner.at, sharp_tolerance * aim_.width, foot);
       if (aim_.is_listed(certain)) {
-        block.beyond.push_back({foot.distance, {corner.at, foot.patch, foot.at}});
+        block.beyond.push_back({corner.at, foot.patch, foot.at, foot.distance});
       }
       if (aim_.is_beyond(certain)) {
         block.settled = std::max(block.settled, std::min(piece.upper, by_one_corner(c)));

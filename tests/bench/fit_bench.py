@@ -299,6 +299,10 @@ class Cases:
     def __init__(self, folder, arguments):
         self.folder, self.arguments, self.cases = folder, arguments, []
 
+    def wants(self, name):
+        """Whether --only asks for cases of that name."""
+        return any(word in name or name in word for word in self.arguments.only.split(","))
+
     def tolerance(self, name, path, percent, *, most=None, angle=None, factor=None, unit=()):
         """most: shells, or none: flat count / factor."""
         self.cases.append((f"{name} {percent:g} %", self.by_tolerance, (path, percent, most, factor, angle, unit)))
@@ -394,14 +398,27 @@ def organs(cases, data, folder):
     if not (data / "volumes").exists():
         print("left out: real organs (--data)")
         return
-    for name, volume, label in (("aorta", "ts_aorta_dissection", 1), ("bladder", "nv_torso_5mm", 11),
-                                ("gallbladder", "nv_torso_5mm", 4)):
+    smooth = ("--smooth", "staircase", "--largest", "--fill-cavities")
+    open_ended = ("--smooth", "staircase", "--open-border")
+    for name, volume, options in (("aorta", "ts_aorta_dissection.nii.gz", ("--label", "1", *smooth)),
+                                  ("false lumen", "ts_aorta_dissection.nii.gz", ("--label", "2", *smooth)),
+                                  ("bladder", "nv_torso_5mm.nii.gz", ("--label", "11", *smooth)),
+                                  ("gallbladder", "nv_torso_5mm.nii.gz", ("--label", "4", *smooth)),
+                                  ("spleen", "nv_torso_5mm.nii.gz", ("--label", "1", *smooth)),
+                                  ("torso's liver", "nv_torso_5mm.nii.gz", ("--label", "6", *smooth)),
+                                  ("torso's stomach", "nv_torso_5mm.nii.gz", ("--label", "7", *smooth)),
+                                  ("vena cava", "nv_torso_5mm.nii.gz", ("--label", "9", *smooth)),
+                                  ("open stomach", "ts_abdomen_multilabel.nii.gz", ("--label", "6", *open_ended)),
+                                  ("level set", "vmtk_aorta_levelset.mha",
+                                   ("--isovalue", "0", "--inside", "below", "--largest"))):
+        if not cases.wants(name):
+            continue
         path = folder / f"{name}.ply"
         if not path.exists():
-            run(["tunica-extract", data / "volumes" / f"{volume}.nii.gz", path, "--label", str(label), "--smooth",
-                 "staircase", "--largest", "--fill-cavities"])
+            run(["tunica-extract", data / "volumes" / volume, path, *options])
         for percent, factor in ((1, 3), (0.3, 4)):
-            cases.tolerance(name, path, percent, most=cases.flat_count(path, percent, ()), angle=ANGLE)
+            flat = cases.flat_count(path, percent, (), ("--min-angle", str(ANGLE)))
+            cases.tolerance(name, path, percent, most=flat and flat / factor, angle=ANGLE)
     for name, file in (("colon", "gca_colon_90_20k.obj"), ("stomach", "openhelp_stomach.stl"),
                        ("sofa aneurysm", "sofa_aneurysm3D_1.off")):
         path, unit = data / "meshes" / file, ("--mesh-unit", "mm")

@@ -312,6 +312,7 @@ class Contract(Case):
             record, error = self.relax(*arguments, self.out, expect=3)
             self.assertIn("bad.ply", error)
             self.assertIn("near (", error)
+            self.assertIn("tunica-decimate --repair", error)
         self.relax(self.path("absent.ply"), self.target, self.out, expect=3)
         with open(self.target, "rb") as file:
             whole = file.read()
