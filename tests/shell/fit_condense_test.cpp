@@ -55,10 +55,9 @@ TEST(FitCondense, ManyShellsCondenseInPiecesAndWhatCertificatesFindIsMended) {
   FitSamples samples(target, 700);
   FitState state = state_of(samples, wavy(4));
   collapse_to(state, limit);
-  ASSERT_TRUE(regains(samples, state, limit));
   ASSERT_GT(state.mesh.alive, 500U);
   std::size_t condensed = 0;
-  for (const double exchanging : {0.0, 0.4}) {
+  for (const double exchanging : {0.0, 1.0}) {
     const RelaxOptions options;
     FitResult result(target, options, 1e-3 * tolerance, true);
     FitSamples its_samples = samples;
