@@ -225,8 +225,8 @@ An output or the report could not be written, or exists and
 .B \-\-force
 was not given.
 .TP
-.BR 130 ", " 143
-Stopped by SIGINT or SIGTERM.
+.BR 129 ", " 130 ", " 143
+Stopped by SIGHUP, SIGINT or SIGTERM.
 .SH FILES
 .TP
 .IR OUTPUT .part

@@ -227,6 +227,9 @@ int Tool::run(int argc, char** argv, const std::function<void()>& body) {
   }
   std::signal(SIGINT, on_signal);
   std::signal(SIGTERM, on_signal);
+  if (std::signal(SIGHUP, on_signal) == SIG_IGN) {
+    std::signal(SIGHUP, SIG_IGN);  // as nohup has it
+  }
   std::signal(SIGXFSZ, SIG_IGN);  // writing past a limit on file sizes is then an error like a full disk
   try {
     if (!report_.empty()) {

@@ -50,7 +50,7 @@ public:
   explicit OutputError(const std::string& message) : Error(ExitCode::output, message) {}
 };
 
-/// SIGINT or SIGTERM arrived; thrown by check_interrupt() at a place where the state is consistent.
+/// SIGHUP, SIGINT or SIGTERM arrived; thrown by check_interrupt() at a place where the state is consistent.
 class Interrupted : public std::exception {
 public:
   explicit Interrupted(int signal) : signal_(signal) {}

@@ -34,6 +34,7 @@ constexpr int fewest_rings = 1, most_rings = 3;   // of nodes around a merger th
 constexpr int regaining = 6;                      // steps that lessen the largest error of a piece
 constexpr double loosened = 4;                    // limits: error of a merger before its piece is fitted anew
 constexpr double thin_angle = 5;                  // degrees, for the time being
+constexpr std::size_t tries_at_thin_ones = 2;     // that fail: the rest hardly ever gets rid of them all
 constexpr double promising_at_first = 2;          // limits: after a step of least squares; more hardly ever recovers
 constexpr double spare = 0.97;                    // of the limit: room for what a certificate finds
 constexpr std::array<double, 3> joining{1, 0.95, 0.9};  // of the limit
@@ -78,7 +79,7 @@ bool fits_again(FitState& piece, std::size_t shells, std::size_t before, double 
     }
   }
   piece.limits.angle = angle;
-  rid_of_thin(piece, limit, shells);
+  rid_of_thin(piece, limit, shells, tries_at_thin_ones);
   return price(piece) <= before && piece.error() <= limit;
 }
 

@@ -178,15 +178,14 @@ std::array<std::array<Index, 2>, 3> edges_of(const FitMesh& mesh, Index t) {
 
 }  // namespace
 
-void rid_of_thin(FitState& state, double limit, std::size_t most) {
-  std::size_t left = mend_angles(state, limit);
-  int fruitless = 0;
-  for (int i = 0; i < most_tries && left > 0; ++i) {
+void rid_of_thin(FitState& state, double limit, std::size_t most, std::size_t patience) {
+  std::size_t left = mend_angles(state, limit), fruitless = 0;
+  for (int i = 0; i < most_tries && left > 0 && left <= 3 * patience; ++i) {
     const auto thin = thin_triangles(state);
-    if (static_cast<std::size_t>(fruitless) >= thin.size()) {
+    if (fruitless >= std::min(patience, thin.size())) {
       return;
     }
-    const auto edges = edges_of(state.mesh, thin[static_cast<std::size_t>(fruitless)]);
+    const auto edges = edges_of(state.mesh, thin[fruitless]);
     bool better = false;
     for (const bool merging : {true, false}) {
       FitState trial = state;

@@ -13,6 +13,7 @@ std::size_t mend_angles(FitState& state, double limit);
 
 /// The same by merging the nodes of a thin triangle's shortest edge, or by a further node on its longest: kept where
 /// fewer thin ones are left and no error is above `limit` (mm). @param most  shells
-void rid_of_thin(FitState& state, double limit, std::size_t most);
+/// @param patience  tries that fail before it gives up; it tries none where more than three times as many are left
+void rid_of_thin(FitState& state, double limit, std::size_t most, std::size_t patience = 16);
 
 }  // namespace tunica

@@ -4,6 +4,7 @@
 #include "surface/measure.hpp"
 
 #include <algorithm>
+#include <map>
 
 namespace tunica {
 
@@ -117,32 +118,39 @@ void link(const FitState& state, const std::vector<std::array<Index, 3>>& nodes,
 
 void make_compatible(Trial& trial) {
   PlacedNode& node = trial.node;
-  if (std::any_of(node.sectors.begin(), node.sectors.end(), [&](Index s) { return s != node.sectors[0]; })) {
-    return;
-  }
-  std::vector<Vec3> facets;
-  std::vector<std::uint8_t> agrees(node.normals.size(), 1);
   const double least = trial.limits.agreement + 0.05;
+  const std::size_t slots = node.normals.size();
+  std::vector<Vec3> facing(slots, Vec3::Zero());  // of all facets of a slot
+  std::vector<std::uint8_t> agrees(slots, 1);
+  std::map<Index, std::vector<Vec3>> of_sector;
   for (const PlacedPatch& p : trial.patches) {
-    auto corners = p.shape.corners;
-    if (p.corner != PlacedPatch::no_corner) {
-      corners[p.corner] = node.position;
+    if (p.corner == PlacedPatch::no_corner) {
+      continue;
     }
-    facets.push_back(facing_of(corners));
-    if (p.corner != PlacedPatch::no_corner && node.normals[p.slot].dot(facets.back()) < least) {
+    auto corners = p.shape.corners;
+    corners[p.corner] = node.position;
+    const Vec3 facet = facing_of(corners);
+    facing[p.slot] += facet;
+    of_sector[node.sectors[p.slot]].push_back(facet);
+    if (node.normals[p.slot].dot(facet) < least) {
       agrees[p.slot] = 0;
     }
   }
-  Vec3 wanted = node.normals[0];
-  for (std::size_t s = 1; s < node.normals.size(); ++s) {
-    wanted += node.normals[s];
-  }
-  if (node.normals.size() > 1) {
-    wanted.stableNormalize();
-  }
-  if (const auto normal = compatible_normal(wanted, facets, least)) {
-    for (std::size_t s = 0; s < node.normals.size(); ++s) {
-      node.normals[s] = agrees[s] != 0 ? node.normals[s] : *normal;
+  for (const auto& [sector, facets] : of_sector) {
+    Vec3 wanted = Vec3::Zero();
+    for (std::size_t s = 0; s < slots; ++s) {
+      wanted += node.sectors[s] == sector ? node.normals[s] : Vec3::Zero();
+    }
+    const auto normal = compatible_normal(wanted.stableNormalized(), facets, least);
+    for (std::size_t s = 0; s < slots; ++s) {
+      if (node.sectors[s] != sector || agrees[s] != 0) {
+        continue;
+      }
+      if (normal) {
+        node.normals[s] = *normal;
+      } else if (trial.limits.kink > 0 && facing[s].norm() > 1e-3) {
+        node.normals[s] = facing[s].normalized();  // as far as these may part: see hold_together()
+      }
     }
   }
 }

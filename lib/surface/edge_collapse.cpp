@@ -25,12 +25,12 @@ constexpr double forbidden = std::numeric_limits<double>::infinity();
 /// Uncertainty of the planes' normals, squared, where shape counts: vertices are drawn to the middle of the area that
 /// they stand for (Trettner, Kobbelt, Fast and robust QEF minimization using probabilistic quadrics, 2020).
 constexpr double normal_variance = 0.02;
-/// Weight of the planes that stand on boundary edges. New boundary vertices lie on the curve, so all of their error is
-/// on one side of it; and a ragged rim is seen before a rough surface.
-constexpr double boundary_weight = 30;
+/// Weight of the planes that stand on boundary edges. With more (30) a wavy rim takes most of the vertices, and open
+/// sheets come out up to twice as far off; with less rims get ragged.
+constexpr double boundary_weight = 0.3;
 /// The same where all planes count alike: for the planes that stand on boundary edges, and for those of the triangles
-/// beside, which are fewer around a boundary vertex than around others (5 and 40 or 20 and 200 do as well).
-constexpr double even_boundary_weight = 100;
+/// beside, which are fewer around a boundary vertex than around others (100 and 5 or 20 and 200 do nearly as well).
+constexpr double even_boundary_weight = 10;
 constexpr double even_rim_weight = 5;
 /// Down to this many times the triangles wanted, edges collapse in sweeps, unless shape counts (rough surfaces then
 /// come out worse by a quarter).

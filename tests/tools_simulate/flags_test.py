@@ -281,7 +281,7 @@ class Stopped(SimulateTest):
             os.remove(self.path("out.hdf.part"))
 
     def test_interrupt_and_terminate(self):
-        for number, code in ((signal.SIGINT, 130), (signal.SIGTERM, 143)):
+        for number, code in ((signal.SIGHUP, 129), (signal.SIGINT, 130), (signal.SIGTERM, 143)):
             running = self.start()
             running.send_signal(number)
             self.assertEqual(running.wait(timeout=60), code)
