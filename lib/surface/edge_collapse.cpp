@@ -25,12 +25,11 @@ constexpr double forbidden = std::numeric_limits<double>::infinity();
 /// Uncertainty of the planes' normals, squared, where shape counts: vertices are drawn to the middle of the area that
 /// they stand for (Trettner, Kobbelt, Fast and robust QEF minimization using probabilistic quadrics, 2020).
 constexpr double normal_variance = 0.02;
-/// Weight of the planes that stand on boundary edges. With more (30) a wavy rim takes most of the vertices, and open
-/// sheets come out up to twice as far off; with less rims get ragged.
-constexpr double boundary_weight = 0.3;
-/// The same where all planes count alike: for the planes that stand on boundary edges, and for those of the triangles
-/// beside, which are fewer around a boundary vertex than around others (100 and 5 or 20 and 200 do nearly as well).
-constexpr double even_boundary_weight = 10;
+/// Weight of the planes that stand on boundary edges, by Aim. With more for the least error (30) a wavy rim takes most
+/// of the vertices, and open sheets come out up to twice as far off; with less (0.1) the rim itself does. With less
+/// where shape counts corners would go rather than good triangles. Where all planes count alike 5 to 100 do.
+constexpr std::array<double, 3> boundary_weight{0.3, 6, 10};
+/// There the planes of the triangles beside, which are fewer around a boundary vertex than around others (5 to 200 do).
 constexpr double even_rim_weight = 5;
 /// Down to this many times the triangles wanted, edges collapse in sweeps, unless shape counts (rough surfaces then
 /// come out worse by a quarter).
@@ -188,14 +187,18 @@ void EdgeCollapse::find_boundary() {
   }
 }
 
+double EdgeCollapse::wall_weight(double squared_length) const {
+  return boundary_weight.at(static_cast<std::size_t>(aim_)) *
+         (aim_ == Aim::few_collapses ? 1 : length_to_quadric(squared_length));
+}
+
 /// The boundary edges of a triangle without area have no plane that would stop their ends from sliding along them: a
 /// spike would be lost at no cost.
 void EdgeCollapse::pin_boundary(HalfEdge triangle) {
   for (HalfEdge k = triangle; k < triangle + 3; ++k) {
     if (half_[k].twin == none) {
       const double squared_length = (vertex_[to(k)].position - vertex_[from(k)].position).squaredNorm();
-      const double weight =
-          aim_ == Aim::few_collapses ? even_boundary_weight : boundary_weight * length_to_quadric(squared_length);
+      const double weight = wall_weight(squared_length);
       for (const Index end : {from(k), to(k)}) {
         wall_[end] += Quadric::point(vertex_[end].position, weight);
       }
@@ -230,8 +233,7 @@ void EdgeCollapse::sum_quadrics() {
         const Vec3 edge = vertex_[to(k)].position - vertex_[from(k)].position;
         const Vec3 outward = edge.cross(unit);
         if (outward.norm() > 0) {
-          const double weight =
-              by_area ? boundary_weight * length_to_quadric(edge.squaredNorm()) : even_boundary_weight;
+          const double weight = wall_weight(edge.squaredNorm());
           Quadric wall = Quadric::plane(outward.normalized(), vertex_[from(k)].position, weight);
           if (!by_area) {
             wall += Quadric::plane(unit, vertex_[from(k)].position, even_rim_weight);

@@ -112,6 +112,7 @@ private:
   [[nodiscard]] bool connect(const TriangleMesh& mesh);
   [[nodiscard]] bool has_one_fan_per_vertex() const;
   void find_boundary();
+  [[nodiscard]] double wall_weight(double squared_length) const;
   void pin_boundary(HalfEdge triangle);
   void sum_quadrics();
   void fill_heap();
