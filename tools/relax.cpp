@@ -41,7 +41,7 @@ struct Arguments {
   std::optional<fs::path> map, picture, curved;
   std::optional<LengthTolerance> tolerance;
   std::string method = "fit";
-  std::string surface = "comas";
+  std::optional<std::string> surface;
   std::optional<std::string> mesh_unit;
   bool refine = false;
   std::optional<std::size_t> shells, max_shells;
@@ -62,8 +62,10 @@ void declare(cli::Tool& tool, Arguments& given) {
          "fit (least error: positions, normals and connectivity are chosen together; the default) or barycentre (the "
          "paper's rule: keeps COARSE's triangles)")
       ->check(CLI::IsMember({"barycentre", "fit"}));
-  app.add_option("--surface", given.surface,
-                 "the patch: comas (the paper's 9-term cubic; the default) or watertight (cubics that meet exactly)")
+  app.add_option(
+         "--surface", given.surface,
+         "the patch: comas (the paper's 9-term cubic) or watertight (cubics that meet exactly); neither given: "
+         "comas, but where fit to a --tolerance finds long shells, as along cylinders, the one that takes fewer")
       ->check(CLI::IsMember({"comas", "watertight"}));
   app.add_flag("--refine", given.refine,
                "keep COARSE's triangles and split them where the distance is above the tolerance (without one: four "
@@ -112,7 +114,7 @@ void refuse_contradictions(const Arguments& given) {
   if (given.max_shells && !given.refine && !(fit && given.tolerance)) {
     throw UsageError("--max-shells limits --refine, or a fit to a --tolerance; else the number of shells is given");
   }
-  if (given.kink && (!fit || !given.tolerance || given.refine || given.surface != "comas")) {
+  if (given.kink && (!fit || !given.tolerance || given.refine || given.surface == "watertight")) {
     throw UsageError("--kink belongs to --method fit with --tolerance, without --refine, and comas patches");
   }
   if (given.effort && (!fit || !given.tolerance || given.refine)) {
@@ -322,6 +324,7 @@ void run(cli::Tool& tool, const Arguments& given) {
   RelaxOptions options;
   options.method = given.method == "fit" ? RelaxMethod::fit : RelaxMethod::barycentre;
   options.surface = given.surface == "watertight" ? Patch::watertight : Patch::comas;
+  options.either_surface = !given.surface && !given.kink;
   options.refine = given.refine;
   options.shells = given.shells;
   options.max_shells = given.max_shells;

@@ -32,11 +32,10 @@ constexpr std::size_t few = 600;   // triangles: from so few slivers hardly any 
 constexpr std::size_t affordable = 1300;  // triangles of a start: further searches cost little
 constexpr int search_patience = 2;        // rounds that leave as many shells
 constexpr double finer_start_error = 1.5;
-constexpr double stand_in_error = 0.04;  // tolerances: of what stands in for a dense target
-constexpr double limited_by_target =
-    0.6;                               // of its triangles: a start that needs more follows its facets, not its shape
-constexpr double expected_gain = 3;    // shells of the start per shell of the result
-constexpr double start_surplus = 1.5;  // triangles of the start per shell wanted
+constexpr double stand_in_error = 0.04;    // tolerances: of what stands in for a dense target
+constexpr double limited_by_target = 0.6;  // of its triangles: a start with more follows its facets, not its shape
+constexpr double expected_gain = 3;        // shells of the start per shell of the result
+constexpr double start_surplus = 1.5;      // triangles of the start per shell wanted
 constexpr std::array<double, 2> other_surpluses{1.25, 2.0};
 constexpr std::size_t few_shells = 400;  // wanted: several starts cost little
 constexpr std::size_t dense = 100;       // triangles of the target per shell: certificates cost as much as a round
@@ -44,8 +43,6 @@ constexpr double margin = 0.97;          // of the tolerance: what samples miss
 constexpr double worth_it = 0.985;       // a round that leaves more than this of the count or error is the last
 constexpr double worth_much = 0.96;      // the same where rounds are slow
 constexpr int patience = 3;              // rounds that bring nothing
-constexpr double uneven_error = 0.6;     // of the largest: patches so far off decide about the distance
-constexpr double uneven_share = 0.1;     // of all patches: fewer than these are a few
 constexpr double mistrusted = 1.15;      // times the samples' error: a certified one that they missed
 constexpr int rough_certificates = 3;
 constexpr double worth_mending = 0.97;  // of the certified distance, by what it missed
@@ -203,7 +200,9 @@ private:
   /// @return whether it became curved
   bool fit_part(const TriangleMesh& part, double tolerance, std::vector<Fitted>& done) {
     const Target target(part);
-    Fitting fitting(part, target, options_, result_.width());
+    RelaxOptions one_patch = options_;
+    one_patch.either_surface = false;
+    Fitting fitting(part, target, one_patch, result_.width());
     fitting.whole_to_tolerance(tolerance);
     RelaxResult& fitted = fitting.result_.found;
     result_.add_iterations(fitted.iterations);
@@ -290,12 +289,16 @@ private:
     return start;
   }
 
-  /// Shells as long as decimation's needles where that saves many.
+  /// Shells as long as decimation's needles where that saves many; watertight ones where either patch will do.
   void long_shells(const FitStart& start, double tolerance, std::size_t most) {
     std::vector<RelaxResult> narrow;
     std::size_t fewest = max_index;
-    for (const double angle : narrow_angles) {
-      Fitting fitting(coarse_, target_, options_, result_.width(), angle);
+    RelaxOptions watertight = options_;
+    watertight.surface = Patch::watertight;
+    for (std::size_t i = 0; i < (options_.either_surface ? 2 : 1) * narrow_angles.size(); ++i) {
+      const bool own = i < narrow_angles.size();
+      Fitting fitting(coarse_, target_, own ? options_ : watertight, result_.width(),
+                      narrow_angles[i % narrow_angles.size()]);
       fitting.search_from(start, tolerance, most);
       result_.add_iterations(fitting.result_.found.iterations);
       if (fitting.result_.holds(tolerance)) {
@@ -304,10 +307,14 @@ private:
       }
     }
     search_from(start, tolerance, most, static_cast<double>(fewest) / worth_narrow);
+    bool is_narrow = min_angle_degrees(flat_facets(result_.found.shell)) < good_enough_angle * angle_;
     for (RelaxResult& found : narrow) {
-      const double enough = worth_narrow * static_cast<double>(result_.found.shell.triangles.size());
-      if (!result_.holds(tolerance) || static_cast<double>(found.shell.triangles.size()) <= enough) {
+      const auto now = static_cast<double>(result_.found.shell.triangles.size());
+      const bool other_patch = is_narrow && found.shell.patch != result_.found.shell.patch;
+      if (!result_.holds(tolerance) ||
+          static_cast<double>(found.shell.triangles.size()) <= (other_patch ? now - 1 : worth_narrow * now)) {
         result_.take(std::move(found.shell), found.distance);
+        is_narrow = true;
       }
     }
   }
@@ -652,14 +659,6 @@ private:
       }
     }
     return fruitless >= patience;
-  }
-
-  /// Whether a few patches are much farther off than the others: shells of the others would serve better there.
-  static bool is_uneven(const FitState& state) {
-    const double far = uneven_error * state.error();
-    const auto far_patches = static_cast<double>(
-        std::count_if(state.patches.begin(), state.patches.end(), [&](const auto& p) { return p.error > far; }));
-    return far_patches < uneven_share * static_cast<double>(state.mesh.alive);
   }
 
   static int settling(std::size_t shells) { return shells < few_shells ? most_settling : some_settling; }

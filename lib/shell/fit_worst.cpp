@@ -5,6 +5,12 @@
 #include <algorithm>
 
 namespace tunica {
+namespace {
+
+constexpr double uneven_error = 0.6;  // of the largest: patches so far off decide about the distance
+constexpr double uneven_share = 0.1;  // of all patches: fewer than these are a few
+
+}  // namespace
 
 std::size_t split_worst(FitState& state, double limit, std::size_t most) {
   FitMesh& mesh = state.mesh;
@@ -63,6 +69,13 @@ std::size_t place_worst(FitState& state, double limit) {
     better += move_node(state, v, mesh.positions[v], 0, 0.99 * -negative) ? 1 : 0;
   }
   return better;
+}
+
+bool is_uneven(const FitState& state) {
+  const double far = uneven_error * state.error();
+  const auto far_patches = static_cast<double>(
+      std::count_if(state.patches.begin(), state.patches.end(), [&](const auto& p) { return p.error > far; }));
+  return far_patches < uneven_share * static_cast<double>(state.mesh.alive);
 }
 
 }  // namespace tunica

@@ -29,7 +29,9 @@ struct RelaxIteration {
 
 struct RelaxOptions {
   RelaxMethod method = RelaxMethod::barycentre;
-  Patch surface = Patch::comas;     ///< what positions and normals are to stand for
+  Patch surface = Patch::comas;  ///< what positions and normals are to stand for
+  /// For fit to a tolerance of a target in one piece: watertight ones as well, where shells are long and fewer do.
+  bool either_surface = false;
   std::optional<double> tolerance;  ///< mm: done when the two-sided distance is certainly at most this
   /// Split where the distance is above the tolerance; without one, everywhere. For fit: keep COARSE's triangles.
   bool refine = false;

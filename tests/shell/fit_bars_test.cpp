@@ -197,6 +197,36 @@ TEST(FitBars, LongShellsServeAlongACylinder) {
   }
 }
 
+TEST(FitBars, WhereEitherPatchWillDoTheOneWithFewerLongShellsIsTaken) {
+  const Target cylinder(testing::cylinder(160, 60, 20, 80));
+  RelaxOptions options;
+  options.method = RelaxMethod::fit;
+  options.tolerance = 0.001 * cylinder.diagonal();
+  options.effort = effort;
+  const RelaxResult comas = relax(cylinder.mesh(), cylinder, options);
+  options.either_surface = true;
+  const RelaxResult either = relax(cylinder.mesh(), cylinder, options);
+  EXPECT_EQ(comas.shell.patch, Patch::comas);
+  EXPECT_EQ(either.shell.patch, Patch::watertight);
+  EXPECT_LT(either.shell.triangles.size(), comas.shell.triangles.size());
+  EXPECT_EQ(either.reached, true);
+  // In several pieces all are of one patch.
+  TriangleMesh two = testing::cylinder(80, 30, 20, 80);
+  const TriangleMesh one = two;
+  for (const Vec3& p : one.vertices) {
+    two.vertices.emplace_back(p + Vec3(100, 0, 0));
+  }
+  for (const auto& [a, b, c] : one.triangles) {
+    const auto first = static_cast<Index>(one.vertices.size());
+    two.triangles.push_back({a + first, b + first, c + first});
+  }
+  const Target pieces(two);
+  options.tolerance = 0.003 * pieces.diagonal();
+  const RelaxResult both = relax(two, pieces, options);
+  EXPECT_EQ(both.shell.patch, Patch::comas);
+  EXPECT_EQ(both.reached, true);
+}
+
 TEST(FitBars, AnglesAskedForAreKeptWhereLongShellsWouldBeFewer) {
   const Target target(testing::cylinder(80, 30, 20, 80));
   const std::size_t any = fitted(target, 0.3, Patch::comas, {}, 5).shell.triangles.size();
