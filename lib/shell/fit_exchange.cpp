@@ -28,20 +28,21 @@ namespace {
 
 constexpr std::size_t at_once = 8;  // changes, whatever the number of threads
 // Of pieces anew: what costs.
-constexpr std::size_t fits_per_shell = 6, fewest_fits = 600, most_fits = 6'000, most_fits_per_shell = 20;
+constexpr std::size_t fits_per_shell = 8, fewest_fits = 600, most_fits = 6'000, most_fits_per_shell = 20;
 constexpr std::size_t most_before_parting = 150;  // of these more, where normals are to part
 constexpr int fewest_rings = 1, most_rings = 3;   // of nodes around a merger that move with it
 constexpr int regaining = 6;                      // steps that lessen the largest error of a piece
 constexpr double loosened = 4;                    // limits: error of a merger before its piece is fitted anew
 constexpr double thin_angle = 5;                  // degrees, for the time being
 constexpr std::size_t tries_at_thin_ones = 2;     // that fail: the rest hardly ever gets rid of them all
+constexpr std::size_t few_thin_ones = 3;          // worth a second time
 constexpr double promising_at_first = 2;          // limits: after a step of least squares; more hardly ever recovers
 constexpr double spare = 0.97;                    // of the limit: room for what a certificate finds
 constexpr std::array<double, 3> joining{1, 0.95, 0.9};  // of the limit
 constexpr int easing = 8;                               // steps of all nodes
 constexpr int rings_of_a_kick = 2;                      // of nodes around a place
 constexpr std::size_t splits_of_a_kick = 2, fits_after_a_kick = 60;
-constexpr int patience = 2;  // times that bring nothing
+constexpr int patience = 1;  // times that bring nothing
 // Of the tolerance. Certificates end with intervals that wide, below it or not: what one finds just below may be above
 // in the next, which looks at more.
 constexpr double certainly = 1 - width_of_certificates;
@@ -80,6 +81,11 @@ bool fits_again(FitState& piece, std::size_t shells, std::size_t before, double 
   }
   piece.limits.angle = angle;
   rid_of_thin(piece, limit, shells, tries_at_thin_ones);
+  if (const std::size_t thin = count_thin(piece); thin > 0 && thin <= few_thin_ones) {
+    // With less error everywhere nodes have room to slide.
+    lessen_largest(piece, 0, regaining);
+    rid_of_thin(piece, limit, shells, tries_at_thin_ones);
+  }
   return price(piece) <= before && piece.error() <= limit;
 }
 

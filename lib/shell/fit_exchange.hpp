@@ -29,7 +29,7 @@ struct ExchangeOptions {
 /// closely, so that fewer do; what the limit does not ask for is joined again, and the state keeps FitLimits::kink. Not
 /// for watertight patches: their edges follow the normals of both sides. Once that brings nothing more, edges are split
 /// somewhere, to search on there: what does not come back to as few is undone. Deterministic, whatever the number of
-/// threads. Parallel. Cost: six pieces per shell are fitted anew, at least 600 (20 per shell, where that is less) and
+/// threads. Parallel. Cost: eight pieces per shell are fitted anew, at least 600 (20 per shell, where that is less) and
 /// at most 6,000, some 30 ms each: where too large an error is foretold they are given up.
 void exchange_pieces(FitSamples& samples, FitState& state, const ExchangeOptions& options);
 
