@@ -42,7 +42,8 @@ constexpr std::array<double, 3> joining{1, 0.95, 0.9};  // of the limit
 constexpr int easing = 8;                               // steps of all nodes
 constexpr int rings_of_a_kick = 2;                      // of nodes around a place
 constexpr std::size_t splits_of_a_kick = 2, fits_after_a_kick = 60;
-constexpr int patience = 1;  // times that bring nothing
+constexpr int patience = 1, patience_with_few = 2;  // times that bring nothing
+constexpr std::size_t few = 40;                     // shells: a kick shakes most of them, and costs as much
 // Of the tolerance. Certificates end with intervals that wide, below it or not: what one finds just below may be above
 // in the next, which looks at more.
 constexpr double certainly = 1 - width_of_certificates;
@@ -497,7 +498,8 @@ private:
   /// Exchanges, with the room that less error everywhere gives in between. @param reserve  of pieces, to be left
   void exchange(std::size_t reserve) {
     const double limit = options_.limit, tolerance = options_.tolerance;
-    for (int fruitless = 0; fruitless < patience && goes_on(reserve);) {
+    const int enough = state_.mesh.alive < few ? patience_with_few : patience;
+    for (int fruitless = 0; fruitless < enough && goes_on(reserve);) {
       const std::size_t before = price(state_);
       FitState condensed = state_;
       condense(samples_, condensed, {limit});
