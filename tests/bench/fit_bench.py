@@ -2,7 +2,7 @@
 """The least-error fit against its bars: shells, certified error, smallest angle and seconds per case.
 
     TUNICA_BIN=build/release/bin tests/bench/fit_bench.py [--targets targets.py] [--data FOLDER] [--only WORD] [--jobs N]
-        [--surface watertight] [--peer build/release/tests/bench/bench_decimate]
+        [--surface comas|watertight] [--peer build/release/tests/bench/bench_decimate]
     TUNICA_BIN=build/release/bin tests/bench/fit_bench.py --scaling docs/charts/fit-scaling.svg
 
 Cases: the analytic targets (a script that writes them, if given), the paper's meshes and real organs (DATA/paper,
@@ -242,6 +242,29 @@ def cone(u, v):
     return r * np.cos(2 * np.pi * u), r * np.sin(2 * np.pi * u), 80 * v
 
 
+def wavy_cap(u, v):
+    a = 2 * np.pi * u
+    r = (3 + 27 * v) * (1 + 0.08 * v * np.sin(7 * a))
+    return r * np.cos(a), r * np.sin(a), 12 * np.cos(r / 14) + r / 15 * np.sin(3 * a)
+
+
+def ribbon(u, v):
+    a, across, turn = 2 * np.pi * u, 10 * (v - 0.5), 3 * np.pi * u
+    r = 20 + across * np.cos(turn)
+    return r * np.cos(a), r * np.sin(a), across * np.sin(turn) + 15 * u
+
+
+def saddle(u, v):
+    x, y = 2 * u - 1, 2 * v - 1
+    return 50 * x, 40 * y, 30 * (x ** 2 - y ** 2) + 4 * np.sin(6 * u + 3 * v)
+
+
+OPEN_SHEETS = {
+    "wavy_cap": lambda: grid(140, 40, wavy_cap),
+    "ribbon": lambda: sheet(240, 20, ribbon),
+    "saddle": lambda: sheet(90, 80, saddle),
+}
+
 DEVELOPABLE = {
     "cylinder_long": lambda: open_cylinder(10, 80, 256, 100),
     "cylinder_short": lambda: open_cylinder(20, 25, 400, 60),
@@ -269,7 +292,7 @@ def own_shapes(folder):
         "kidney": lambda: ball(80, kidney),
         "torus": lambda: grid(120, 240, torus, closed_rows=True),
         "bent_tube": lambda: grid(96, 240, bent_tube),
-    } | DEVELOPABLE)
+    } | OPEN_SHEETS | DEVELOPABLE)
 
 
 def written(folder, shapes):
@@ -331,8 +354,9 @@ class Cases:
         return min(fit, default=count)
 
     def shell(self, key, path, options, unit):
+        surface = ("--surface", self.arguments.surface) if self.arguments.surface else ()
         return run(["tunica-relax", path, path, self.folder / f"{key.replace(' ', '_').replace('%', 'p')}.ply",
-                    "--method", "fit", "--surface", self.arguments.surface, *options, *unit])
+                    "--method", "fit", *surface, *options, *unit])
 
     def by_tolerance(self, key, path, percent, most, factor, angle, unit):
         if most is None:
@@ -464,7 +488,7 @@ def main():
     parser.add_argument("--targets")
     parser.add_argument("--data", default="")
     parser.add_argument("--only", default="")
-    parser.add_argument("--surface", default="comas")
+    parser.add_argument("--surface", help="comas or watertight; none: as the tool sees fit")
     parser.add_argument("--peer", metavar="BENCH_DECIMATE", help="CGAL's decimation for the flat counts, too")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--folder", help="keeps targets and results here")

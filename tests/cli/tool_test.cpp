@@ -33,6 +33,7 @@ protected:
   void TearDown() override {
     fs::remove_all(folder_);
     request_stop(0);
+    std::signal(SIGHUP, SIG_DFL);
     std::signal(SIGINT, SIG_DFL);
     std::signal(SIGTERM, SIG_DFL);
   }
@@ -209,6 +210,17 @@ TEST_F(ToolTest, ASignalStopsAtTheNextCheckAndSaysSo) {
   });
   EXPECT_EQ(outcome.code, 143);
   EXPECT_EQ(outcome.report["ok"], false);
+}
+
+TEST_F(ToolTest, AHangUpStopsUnlessItIsIgnored) {
+  const auto hung_up = [](Tool& tool) {
+    std::raise(SIGHUP);
+    advance(tool.progress("work"), 0.5);
+  };
+  EXPECT_EQ(run({}, hung_up).code, 129);
+  request_stop(0);
+  std::signal(SIGHUP, SIG_IGN);  // as nohup does
+  EXPECT_EQ(run({}, hung_up).code, 0);
 }
 
 TEST_F(ToolTest, ThreadsFromTheEnvironment) {

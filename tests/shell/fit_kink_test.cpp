@@ -8,6 +8,7 @@
 #include "shell/fit_shape.hpp"
 #include "shell/fit_squeeze.hpp"
 #include "shell/fit_states.hpp"
+#include "shell/fit_trial.hpp"
 #include "surface/checks.hpp"
 
 #include <gtest/gtest.h>
@@ -69,6 +70,42 @@ TEST(FitKink, NormalsOfOneSectorAreHeldTogetherAboutTheirMean) {
   hold_together(normals, sectors, 0);
   EXPECT_NEAR(angle_between(normals[0], normals[1]), 0, 1e-6);
   EXPECT_NEAR(angle_between(normals[0], normals[3]), 0, 1e-6);
+}
+
+TEST(FitKink, AtASharpRimEverySideStartsFromANormalThatSuitsIt) {
+  // One facet above and one below the rim of a thin disc: no normal agrees with both.
+  Trial rim;
+  for (const double side : {1.0, -1.0}) {
+    PlacedPatch patch;
+    patch.corner = 0;
+    patch.slot = rim.patches.size();
+    patch.shape.corners = {Vec3::Zero(), Vec3(-1, side, 0.2 * side), Vec3(-1, -side, 0.2 * side)};
+    rim.patches.push_back(patch);
+  }
+  const Vec3 outward(1, 0, 0);
+  rim.node.normals = {outward, outward};
+  rim.node.sectors = {0, 0};
+  const auto agreement = [&](const Trial& trial, std::size_t slot) {
+    return trial.node.normals[slot].dot(facing_of(trial.patches[slot].shape.corners));
+  };
+  Trial shared = rim;
+  make_compatible(shared);
+  EXPECT_EQ(shared.node.normals, rim.node.normals) << "nothing suits";
+  Trial parted = rim;
+  parted.limits.kink = 75;
+  make_compatible(parted);
+  hold_together(parted.node.normals, parted.node.sectors, parted.limits.kink);
+  EXPECT_LT(agreement(rim, 0), 0.2);
+  EXPECT_NEAR(angle_between(parted.node.normals[0], parted.node.normals[1]), 75, 1e-9);
+  EXPECT_GT(agreement(parted, 0), 0.7);
+  EXPECT_GT(agreement(parted, 1), 0.7);
+  // At a crease each sector has normals of its own.
+  Trial creased = rim;
+  creased.node.sectors = {0, 1};
+  creased.node.normals[1] = facing_of(rim.patches[1].shape.corners);
+  make_compatible(creased);
+  EXPECT_GE(agreement(creased, 0), creased.limits.agreement);
+  EXPECT_EQ(creased.node.normals[1], facing_of(rim.patches[1].shape.corners));
 }
 
 TEST(FitKink, PartedNormalsStartAlikePartNoFurtherThanAllowedAndComeCloser) {
