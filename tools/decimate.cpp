@@ -37,7 +37,7 @@ void declare(cli::Tool& tool, Arguments& given) {
       "--max-error", given.max_error,
       "largest distance to IN, both ways, e.g. 0.5% of IN's diagonal or 0.2mm; with --triangles it wins, and "
       "the exit code is 4 when both cannot hold");
-  app.add_option("--mesh-unit", given.mesh_unit, "unit of OBJ, STL and OFF files: mm, cm, m or um")
+  app.add_option("--mesh-unit", given.mesh_unit, "unit of mesh files that do not state one: mm, cm, m or um")
       ->type_name("mm|cm|m|um");
   app.add_option("--min-angle", given.min_angle,
                  "well-shaped triangles for a larger error: no angle below DEG degrees (e.g. 20, at most 40) but where "

@@ -205,18 +205,31 @@ SlabSize slab_size(const Arguments& arguments) {
   return size;
 }
 
+void note_not_finite(VolumeFile& file, const fs::path& path, std::size_t count) {
+  if (count > 0) {
+    file.warnings.push_back(
+        fmt::format("{}: {} of {} voxels are no finite numbers: not-a-number is outside, and a surface beside one lies "
+                    "in the middle",
+                    path.string(), count, file.volume.dims[0] * file.volume.dims[1] * file.volume.dims[2]));
+  }
+}
+
 // Reads the volume slab by slab; the visits count as the stage `doing`.
 VolumeFile read_slabs(cli::Tool& tool, const Arguments& arguments, const char* doing, const SlabVisitor& visit) {
   std::optional<cli::Tool::Stage> reading(std::in_place, tool, "read");
-  return read_volume_slabs(arguments.volume, arguments.volume_options, slab_size(arguments),
-                           [&](const VolumeFile& file, const Volume& slab, std::size_t first_slice) {
-                             reading.reset();
-                             {
-                               const auto stage = tool.stage(doing);
-                               visit(file, slab, first_slice);
-                             }
-                             reading.emplace(tool, "read");
-                           });
+  std::size_t not_finite = 0;
+  VolumeFile read = read_volume_slabs(arguments.volume, arguments.volume_options, slab_size(arguments),
+                                      [&](const VolumeFile& file, const Volume& slab, std::size_t first_slice) {
+                                        reading.reset();
+                                        {
+                                          const auto stage = tool.stage(doing);
+                                          not_finite += count_not_finite(slab);
+                                          visit(file, slab, first_slice);
+                                        }
+                                        reading.emplace(tool, "read");
+                                      });
+  note_not_finite(read, arguments.volume, not_finite);
+  return read;
 }
 
 Contents contents_of(cli::Tool& tool, const Arguments& arguments) {
@@ -604,6 +617,7 @@ Json run_isovalue(cli::Tool& tool, const Arguments& arguments, const Smoothing& 
   if (held) {
     const auto stage = tool.stage("extract");
     mask.emplace(select(file->volume, target.inside));
+    note_not_finite(*file, arguments.volume, count_not_finite(file->volume));
   } else {
     file = read_slabs(tool, arguments, "extract",
                       [&](const VolumeFile& header, const Volume& slab, std::size_t first_slice) {

@@ -98,7 +98,7 @@ void declare(cli::Tool& tool, Arguments& given) {
       ->type_name("OUT.ply");
   app.add_option("--picture", given.picture, "picture of the error map, PNG")->type_name("OUT.png");
   app.add_option("--curved", given.curved, "the curved surface as a fine triangle mesh, PLY")->type_name("OUT.ply");
-  app.add_option("--mesh-unit", given.mesh_unit, "unit of OBJ, STL and OFF files: mm, cm, m or um")
+  app.add_option("--mesh-unit", given.mesh_unit, "unit of mesh files that do not state one: mm, cm, m or um")
       ->type_name("mm|cm|m|um");
 }
 

@@ -394,10 +394,12 @@ void set_geometry(VolumeFile& file, const fs::path& path, const Header& header, 
                   bool has_directions) {
   Eigen::Matrix<double, 3, 4> affine = Eigen::Matrix<double, 3, 4>::Zero();
   Eigen::Index column = 0;
+  std::size_t unknown = 0;  // spacings
   for (const AxisInfo& axis : axes) {
     if (axis.role != Role::space) {
       continue;
     }
+    unknown += axis.spacing ? 0 : 1;
     if (has_directions) {
       affine.col(column) = *axis.direction;
     } else {
@@ -409,7 +411,10 @@ void set_geometry(VolumeFile& file, const fs::path& path, const Header& header, 
   if (!has_directions) {
     file.warnings.push_back(fmt::format(
         "{}: has no space directions: voxels are placed by their {} alone, with axes to the left, back and top",
-        path.string(), find(header, "spacings") != nullptr ? "spacings" : "number (spacing 1 mm)"));
+        path.string(),
+        unknown == 3   ? "number (spacing 1 mm)"
+        : unknown == 0 ? "spacings"
+                       : fmt::format("spacings ({} of 3 unknown: 1 mm)", unknown)));
   }
   if (const std::string* text = find(header, "spaceorigin")) {
     const auto vectors = parse_vectors(path, "space origin", *text);

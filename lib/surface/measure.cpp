@@ -47,6 +47,12 @@ double signed_volume(const TriangleMesh& mesh) {
   return sum / 6;
 }
 
+double longest_edge(const TriangleMesh& mesh, Index triangle) {
+  const auto& [i, j, k] = mesh.triangles[triangle];
+  const Vec3 &a = mesh.vertices[i], &b = mesh.vertices[j], &c = mesh.vertices[k];
+  return std::sqrt(std::max({(b - a).squaredNorm(), (c - a).squaredNorm(), (c - b).squaredNorm()}));
+}
+
 double angle_degrees(const Vec3& p, const Vec3& a, const Vec3& b) {
   return std::atan2((a - p).cross(b - p).norm(), (a - p).dot(b - p)) * 180 / std::numbers::pi;
 }

@@ -27,6 +27,9 @@ double signed_volume(const TriangleMesh& mesh);
 /// Area of a triangle, mm^2.
 double triangle_area(const Vec3& a, const Vec3& b, const Vec3& c);
 
+/// Length of the longest edge of a triangle of a mesh, mm.
+double longest_edge(const TriangleMesh& mesh, Index triangle);
+
 /// The angle at p between the ways to a and b, degrees.
 double angle_degrees(const Vec3& p, const Vec3& a, const Vec3& b);
 

@@ -73,6 +73,7 @@ SurfaceWalk::SurfaceWalk(const TriangleMesh& mesh) : mesh_(mesh), around_(incide
 
 void SurfaceWalk::place_points() {
   constexpr double most_parts = 64;
+  constexpr double most_points = 32;  // per triangle, in the mean
   std::vector<Placed> points;
   points.reserve(mesh_.vertices.size());
   for (Index v = 0; v < mesh_.vertices.size(); ++v) {
@@ -80,13 +81,20 @@ void SurfaceWalk::place_points() {
       points.push_back({mesh_.vertices[v], around_.of(v)[0]});
     }
   }
+  const auto parts_of = [&](Index t) { return std::min(longest_edge(mesh_, t) * cells_per_mm_, most_parts); };
+  double total = 0;
+  for (Index t = 0; t < mesh_.triangles.size(); ++t) {
+    total += 0.5 * std::pow(std::floor(parts_of(t)), 2);
+  }
+  // Needles would get thousands of points each, on hardly any surface.
+  const double most = most_points * static_cast<double>(mesh_.triangles.size());
+  const double thinner = total > most ? std::sqrt(most / total) : 1;
   for (Index t = 0; t < mesh_.triangles.size(); ++t) {
     const auto& [i, j, k] = mesh_.triangles[t];
     const Vec3& a = mesh_.vertices[i];
     const Vec3 ab = mesh_.vertices[j] - a;
     const Vec3 ac = mesh_.vertices[k] - a;
-    const double longest = std::sqrt(std::max({ab.squaredNorm(), ac.squaredNorm(), (ac - ab).squaredNorm()}));
-    const int parts = static_cast<int>(std::min(longest * cells_per_mm_, most_parts));
+    const int parts = static_cast<int>(thinner * parts_of(t));
     for (int x = 0; x < parts; ++x) {
       for (int y = 0; x + y < parts && parts > 1; ++y) {
         points.push_back({a + ((x + 1.0 / 3) * ab + (y + 1.0 / 3) * ac) / parts, t});

@@ -8,6 +8,7 @@
 #include <Eigen/LU>
 
 #include <algorithm>
+#include <atomic>
 #include <bit>
 #include <cmath>
 #include <limits>
@@ -174,6 +175,29 @@ Mask select(const Volume& volume, const Inside& rule) {
   Mask mask(volume.dims, volume.affine);
   select(volume, 0, rule, mask);
   return mask;
+}
+
+std::size_t count_not_finite(const Volume& volume) {
+  return std::visit(
+      [](const auto& values) -> std::size_t {
+        using T = typename std::decay_t<decltype(values)>::value_type;
+        if constexpr (std::is_floating_point_v<T>) {
+          constexpr std::size_t block = 1 << 16;
+          std::atomic<std::size_t> count = 0;
+          parallel_for_blocks(values.size(), block, [&](std::size_t begin, std::size_t end) {
+            check_interrupt();
+            std::size_t here = 0;
+            for (std::size_t i = begin; i < end; ++i) {
+              here += std::isfinite(values[i]) ? 0 : 1;
+            }
+            count += here;
+          });
+          return count;
+        } else {
+          return 0;
+        }
+      },
+      volume.data);
 }
 
 std::size_t count_voxels(const Mask& mask) {

@@ -65,6 +65,9 @@ Mask select(const Volume& volume, const Inside& rule);
 /// The same for the slices [first_slice, first_slice + slab.dims[2]) of a larger volume, into its mask.
 void select(const Volume& slab, std::size_t first_slice, const Inside& rule, Mask& mask);
 
+/// Number of samples that are no finite number: NaN, or infinite. Of whole numbers none is. Cost: one pass. Parallel.
+std::size_t count_not_finite(const Volume& volume);
+
 /// Number of voxels inside.
 std::size_t count_voxels(const Mask& mask);
 

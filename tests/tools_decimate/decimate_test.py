@@ -125,6 +125,14 @@ class Decimate(WholeTool):
             self.assertLess(abs((x * x + y * y) ** 0.5 - 1), 0.002)
         self.assertEqual(meshes.euler(triangles), 0)
 
+    def test_a_fan_of_needles_takes_as_much_memory_as_any_mesh(self):
+        n = 12_000
+        rim = [(20 * math.cos(2 * math.pi * i / n), 20 * math.sin(2 * math.pi * i / n), 0.0) for i in range(n)]
+        meshes.write_ply(self.path("fan.ply"), [(0.0, 0.0, 5.0)] + rim, [(0, 1 + i, 1 + (i + 1) % n) for i in range(n)])
+        report = self.run_tool("fan.ply", "out.ply", "--triangles", 1200)
+        self.assertEqual(report["result"]["triangles"], 1200)
+        self.assertLess(report["peak_mib"], 90)
+
     def test_units(self):
         vertices, triangles = meshes.sphere(3)
         meshes.write_obj(self.path("in.obj"), vertices, triangles)

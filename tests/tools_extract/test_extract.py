@@ -314,6 +314,18 @@ class Choices(ExtractTest):
         self.run_tool(path, self.out, "--isovalue", 0)
         self.assertAlmostEqual(Ply(self.out).volume(), below.volume(), places=6)
 
+    def test_voxels_that_are_no_finite_numbers_are_counted_and_warned_of(self):
+        index = numpy.indices((16, 17, 18)).astype(float)
+        values = (5 - numpy.sqrt(((index - 8.1) ** 2).sum(axis=0))).astype(numpy.float32)
+        values[8, 8, 3], values[0, 0, 0], values[1, 1, 1] = numpy.nan, numpy.inf, -numpy.inf
+        path = self.nifti(values)
+        for selection in (["--isovalue", 0], ["--isovalue", 0, "--slab", 4], ["--isovalue", 0, "--smooth", "1mm"],
+                          ["--label", repr(float(values[2, 2, 2]))]):
+            record, stderr = self.run_tool(path, self.out, *selection)
+            self.assertIn("3 of 4896 voxels are no finite numbers", stderr)
+            self.assertEqual(len([w for w in record["result"]["warnings"] if "no finite numbers" in w]), 1)
+            self.assertTrue(numpy.isfinite(Ply(self.out).vertices).all())
+
     def test_isovalue_that_equals_samples_gives_no_degenerate_triangle(self):
         index = numpy.indices((12, 12, 12)).astype(numpy.int16)
         distance = numpy.abs(index - 6).sum(axis=0)

@@ -63,6 +63,19 @@ TYPED_TEST(MaskOfType, AgreesWithTheRuleVoxelByVoxel) {
   }
 }
 
+TYPED_TEST(MaskOfType, CountsWhatIsNoFiniteNumber) {
+  Volume volume;
+  const auto values = awkward_values<TypeParam>();
+  volume.dims = {values.size(), 1, 1};
+  volume.data = values;
+  std::size_t expected = 0;
+  for (const TypeParam value : values) {
+    expected += std::isfinite(static_cast<double>(value)) ? 0 : 1;
+  }
+  EXPECT_EQ(count_not_finite(volume), expected);
+  EXPECT_EQ(expected >= 3, std::is_floating_point_v<TypeParam>);
+}
+
 TEST(Mask, NeighbouringLabelsBeyondDoublePrecisionStayApart) {
   Volume volume;
   volume.dims = {3, 1, 1};
