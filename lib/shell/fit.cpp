@@ -12,6 +12,8 @@
 #include "shell/fit_shape.hpp"
 #include "shell/fit_squeeze.hpp"
 #include "shell/fit_start.hpp"
+#include "shell/fit_task.hpp"
+#include "shell/fit_to_count.hpp"
 #include "shell/fit_worst.hpp"
 #include "surface/decimate.hpp"
 #include "surface/measure.hpp"
@@ -35,18 +37,11 @@ constexpr double finer_start_error = 1.5;
 constexpr double stand_in_error = 0.04;    // tolerances: of what stands in for a dense target
 constexpr double limited_by_target = 0.6;  // of its triangles: a start with more follows its facets, not its shape
 constexpr double expected_gain = 3;        // shells of the start per shell of the result
-constexpr double start_surplus = 1.5;      // triangles of the start per shell wanted
-constexpr std::array<double, 2> other_surpluses{1.25, 2.0};
-constexpr std::size_t few_shells = 400;  // wanted: several starts cost little
-constexpr std::size_t dense = 100;       // triangles of the target per shell: certificates cost as much as a round
-constexpr double margin = 0.97;          // of the tolerance: what samples miss
-constexpr double worth_it = 0.985;       // a round that leaves more than this of the count or error is the last
-constexpr double worth_much = 0.96;      // the same where rounds are slow
-constexpr int patience = 3;              // rounds that bring nothing
-constexpr double mistrusted = 1.15;      // times the samples' error: a certified one that they missed
-constexpr int rough_certificates = 3;
-constexpr double worth_mending = 0.97;  // of the certified distance, by what it missed
-constexpr int most_settling = 20, some_settling = 4;
+constexpr std::size_t dense = 100;         // triangles of the target per shell: certificates cost as much as a round
+constexpr double margin = 0.97;            // of the tolerance: what samples miss
+constexpr double worth_it = 0.985;         // a round that leaves more than this of the count or error is the last
+constexpr double worth_much = 0.96;        // the same where rounds are slow
+constexpr int patience = 3;                // rounds that bring nothing
 constexpr int certificates = 10;
 constexpr double hopeless = 2;          // times the limit: more shells will not mend it
 constexpr double worth_a_search = 1.5;  // tolerances: error of as many shells as are allowed
@@ -72,7 +67,7 @@ public:
   RelaxResult run() {
     const std::optional<std::size_t> most = options_.shells ? options_.shells : options_.max_shells;
     if (!options_.tolerance) {
-      to_count(most.value_or((options_.refine ? 4 : 1) * coarse_.triangles.size()));
+      fit_to_count(task(), most.value_or((options_.refine ? 4 : 1) * coarse_.triangles.size()), result_);
       return std::move(result_.found);
     }
     if (options_.refine && coarse_refined(*options_.tolerance, most.value_or(max_index))) {
@@ -81,7 +76,7 @@ public:
       return std::move(result_.found);
     }
     if (most) {
-      to_count(*most);
+      fit_to_count(task(), *most, result_);
       if (result_.found.distance.upper() <= worth_a_search * *options_.tolerance) {
         take_fewest(*most);
       }
@@ -291,32 +286,39 @@ private:
 
   /// Shells as long as decimation's needles where that saves many; watertight ones where either patch will do.
   void long_shells(const FitStart& start, double tolerance, std::size_t most) {
-    std::vector<RelaxResult> narrow;
-    std::size_t fewest = max_index;
     RelaxOptions watertight = options_;
     watertight.surface = Patch::watertight;
-    for (std::size_t i = 0; i < (options_.either_surface ? 2 : 1) * narrow_angles.size(); ++i) {
-      const bool own = i < narrow_angles.size();
-      Fitting fitting(coarse_, target_, own ? options_ : watertight, result_.width(),
-                      narrow_angles[i % narrow_angles.size()]);
-      fitting.search_from(start, tolerance, most);
-      result_.add_iterations(fitting.result_.found.iterations);
-      if (fitting.result_.holds(tolerance)) {
-        fewest = std::min(fewest, fitting.result_.found.shell.triangles.size());
-        narrow.push_back(std::move(fitting.result_.found));
+    std::vector<const RelaxOptions*> patches{&options_};
+    if (options_.either_surface) {
+      patches.push_back(&watertight);
+    }
+    std::vector<RelaxResult> narrow;
+    std::size_t fewest = max_index;
+    for (const RelaxOptions* options : patches) {
+      for (const double angle : narrow_angles) {
+        Fitting fitting(coarse_, target_, *options, result_.width(), angle);
+        fitting.search_from(start, tolerance, most);
+        result_.add_iterations(fitting.result_.found.iterations);
+        if (fitting.result_.holds(tolerance)) {
+          fewest = std::min(fewest, fitting.result_.found.shell.triangles.size());
+          narrow.push_back(std::move(fitting.result_.found));
+        }
       }
     }
     search_from(start, tolerance, most, static_cast<double>(fewest) / worth_narrow);
-    bool is_narrow = min_angle_degrees(flat_facets(result_.found.shell)) < good_enough_angle * angle_;
     for (RelaxResult& found : narrow) {
-      const auto now = static_cast<double>(result_.found.shell.triangles.size());
-      const bool other_patch = is_narrow && found.shell.patch != result_.found.shell.patch;
-      if (!result_.holds(tolerance) ||
-          static_cast<double>(found.shell.triangles.size()) <= (other_patch ? now - 1 : worth_narrow * now)) {
+      if (!result_.holds(tolerance) || is_worth_its_angles(found.shell, result_.found.shell)) {
         result_.take(std::move(found.shell), found.distance);
-        is_narrow = true;
       }
     }
+  }
+
+  /// Narrow shells save a quarter, or where there are narrow ones already any by which another patch needs fewer.
+  [[nodiscard]] bool is_worth_its_angles(const ShellMesh& narrow, const ShellMesh& now) const {
+    const bool is_narrow = min_angle_degrees(flat_facets(now)) < good_enough_angle * angle_;
+    return is_narrow && narrow.patch != now.patch ? narrow.triangles.size() < now.triangles.size()
+                                                  : static_cast<double>(narrow.triangles.size()) <=
+                                                        worth_narrow * static_cast<double>(now.triangles.size());
   }
 
   /// The fewest shells found within the tolerance, from one decimation of the target or several.
@@ -557,111 +559,7 @@ private:
     return held;
   }
 
-  void to_count(std::size_t shells) {
-    const bool all = shells >= target_.mesh().triangles.size();
-    const auto start_for = [&](double triangles) {
-      return like_target_ ? start_of_fit(target_, static_cast<std::size_t>(triangles))
-                          : start_as_given(coarse_, target_);
-    };
-    const auto wanted = static_cast<double>(shells);
-    const FitStart start = start_for(all ? wanted : start_surplus * wanted);
-    if (all && !start.own_topology) {
-      result_.found.stopped = "the target has no more triangles than shells are allowed";
-      result_.no_worse_than_flat({}, shells, start);
-      return;
-    }
-    FitSamples samples(target_, guess(wanted), like_target_);
-    FitState best = settled(samples, start, shells);
-    // A greedy search ends elsewhere from elsewhere, with few shells or on rough targets by much.
-    const bool worth_exchanging = shells < few_shells || is_uneven(best);
-    std::vector<double> surpluses;
-    if (worth_exchanging && shells < affordable && !start.own_topology) {
-      surpluses.assign(other_surpluses.begin(), other_surpluses.end());
-    }
-    const double part = 1.0 / static_cast<double>(1 + surpluses.size());
-    const int rounds = options_.max_iterations.value_or(worth_exchanging ? default_rounds : 1);
-    bool exhausted = exchange(best, shells, rounds, {0, part});
-    for (std::size_t i = 0; i < surpluses.size(); ++i) {
-      FitState state = settled(samples, start_for(surpluses[i] * wanted), shells);
-      const double begin = part * static_cast<double>(i + 1);
-      const bool its_exhausted = exchange(state, shells, rounds, {begin, begin + part});
-      if (state.mesh.alive <= shells && (state.error() < best.error() || best.mesh.alive > shells)) {
-        best = std::move(state);
-        exhausted = its_exhausted;
-      }
-    }
-    // What samples missed is worth a few more certificates and rounds where the target is rough.
-    double known = std::numeric_limits<double>::infinity();
-    for (int i = 0; i < rough_certificates; ++i) {
-      part_crossings(best, best.error(), shells);
-      result_.certify(best, std::nullopt);
-      const double now = result_.found.distance.both.lower;
-      if (now <= mistrusted * best.error() || now > worth_mending * known ||
-          add_missed(samples, best, best.error(), true) == 0) {
-        break;
-      }
-      known = now;
-      best.attach();
-      best.measure();
-      polish(best, best.error(), 3);
-      if (!options_.max_iterations) {
-        exhausted = exchange(best, shells, default_rounds, {part, 1});
-      }
-    }
-    result_.record(result_.found.shell, result_.found.distance.both);
-    result_.found.stopped = exhausted ? "further rounds bring too little" : "the limit of rounds was reached";
-    result_.no_worse_than_flat({}, shells, start);
-  }
-
-  /// So many shells from one start, all nodes settled.
-  FitState settled(FitSamples& samples, FitStart start, std::size_t shells) const {
-    FitState state(samples, prepared(start), limits());
-    // Few shells for a rough target: normals of their own would fit its ripples, and stay.
-    smooth(state, 0.1 * start.flat_error, 0.5 * start.flat_error);
-    constexpr double any = std::numeric_limits<double>::infinity();
-    collapse_edges(state, any, shells, {});
-    if (state.mesh.alive > shells && !start.own_topology) {
-      // So near the smallest mesh there is only decimation knows the way.
-      start = start_of_fit(target_, shells);
-      state = FitState(samples, prepared(start), limits());
-      smooth(state, 0.1 * start.flat_error, 0.5 * start.flat_error);
-    }
-    settle(state, settling(shells));
-    mend_angles(state, 0.97 * state.error());
-    return state;
-  }
-
-  /// Exchanges shells between where they are hardly needed and where the error is largest, more or fewer in turn, as
-  /// long as that brings the closest of so many closer.
-  /// @param done  of the whole fit, before and after
-  /// @return whether the last rounds brought nothing
-  bool exchange(FitState& best, std::size_t shells, int rounds, const std::array<double, 2>& done) {
-    int fruitless = 0;
-    bool noted = false;
-    for (int round = 1; round < rounds && fruitless < patience; ++round) {
-      if (!noted) {
-        result_.note(best);
-        noted = true;
-      }
-      advance(options_.progress, done[0] + (done[1] - done[0]) * static_cast<double>(round) / rounds);
-      FitState state = best;
-      const double error = state.error();
-      const std::array<std::size_t, 3> amounts{shells / 40, 1, shells / 15};
-      split_worst(state, 0.7 * error, std::max<std::size_t>(1, amounts[static_cast<std::size_t>(fruitless) % 3]));
-      polish(state, error, 1);
-      collapse_edges(state, std::numeric_limits<double>::infinity(), shells, {});
-      settle(state, settling(shells));
-      const bool better = state.mesh.alive <= shells && (state.error() < best.error() || best.mesh.alive > shells);
-      fruitless = better && state.error() < worth_it * best.error() ? 0 : fruitless + 1;
-      if (better) {
-        best = std::move(state);
-        noted = false;
-      }
-    }
-    return fruitless >= patience;
-  }
-
-  static int settling(std::size_t shells) { return shells < few_shells ? most_settling : some_settling; }
+  [[nodiscard]] FitTask task() const { return {coarse_, target_, options_, like_target_, limits()}; }
 
   [[nodiscard]] FitLimits limits() const {
     FitLimits out;
@@ -670,13 +568,9 @@ private:
     return out;
   }
 
-  [[nodiscard]] FitMesh prepared(const FitStart& start) const {
-    FitMesh mesh = prepare_fit(start, target_);
-    mesh.kind = options_.surface;
-    return mesh;
-  }
+  [[nodiscard]] FitMesh prepared(const FitStart& start) const { return task().prepared(start); }
 
-  static std::size_t guess(double shells) { return static_cast<std::size_t>(std::max(8.0, shells)); }
+  static std::size_t guess(double shells) { return FitTask::samples_for(shells); }
 
   const TriangleMesh& coarse_;
   const Target& target_;

@@ -259,10 +259,17 @@ def saddle(u, v):
     return 50 * x, 40 * y, 30 * (x ** 2 - y ** 2) + 4 * np.sin(6 * u + 3 * v)
 
 
+def saddle_sector(u, v):
+    """Three fifths of a ring: its rims curve within the surface, which no patch from positions and normals does."""
+    r, a = 0.2 + 0.8 * u, 4.5 * v
+    return 50 * r * np.cos(a), 50 * r * np.sin(a), 10 * r ** 2 * np.cos(2 * a)
+
+
 OPEN_SHEETS = {
     "wavy_cap": lambda: grid(140, 40, wavy_cap),
     "ribbon": lambda: sheet(240, 20, ribbon),
     "saddle": lambda: sheet(90, 80, saddle),
+    "sector": lambda: sheet(100, 360, saddle_sector),
 }
 
 DEVELOPABLE = {
