@@ -183,6 +183,7 @@ bool are_labels(const std::optional<std::vector<Label>>& labels) {
 
 // What the messages about a choice need, of a volume that may not be at hand.
 struct Contents {
+  std::vector<std::string> warnings;
   std::optional<std::vector<Label>> labels;  // none: a grey volume
   Interval values{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
 };
@@ -243,6 +244,7 @@ Contents contents_of(cli::Tool& tool, const Arguments& arguments) {
         index->add(slab, first_slice);
         widen(contents.values, slab);
       });
+  contents.warnings = file.warnings;
   contents.labels = index->labels(file.volume.label_names);
   if (!are_labels(contents.labels)) {
     contents.labels.reset();
@@ -662,9 +664,11 @@ void run(cli::Tool& tool, Arguments& arguments) {
   }
   tool.input(arguments.volume);
   if (arguments.info) {
-    const VolumeFile header = read_volume_header(arguments.volume, arguments.volume_options);
+    VolumeFile header = read_volume_header(arguments.volume, arguments.volume_options);
+    const Contents contents = contents_of(tool, arguments);
+    header.warnings = contents.warnings;
     note_file(tool, header);
-    print_info(tool, arguments.volume, header, contents_of(tool, arguments));
+    print_info(tool, arguments.volume, header, contents);
   } else if (arguments.label) {
     set_result(tool, run_label(tool, arguments, smoothing));
   } else if (arguments.isovalue) {

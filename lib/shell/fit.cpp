@@ -316,9 +316,10 @@ private:
   /// Narrow shells save a quarter, or where there are narrow ones already any by which another patch needs fewer.
   [[nodiscard]] bool is_worth_its_angles(const ShellMesh& narrow, const ShellMesh& now) const {
     const bool is_narrow = min_angle_degrees(flat_facets(now)) < good_enough_angle * angle_;
-    return is_narrow && narrow.patch != now.patch ? narrow.triangles.size() < now.triangles.size()
-                                                  : static_cast<double>(narrow.triangles.size()) <=
-                                                        worth_narrow * static_cast<double>(now.triangles.size());
+    if (is_narrow && narrow.patch != now.patch) {
+      return narrow.triangles.size() < now.triangles.size();
+    }
+    return static_cast<double>(narrow.triangles.size()) <= worth_narrow * static_cast<double>(now.triangles.size());
   }
 
   /// The fewest shells found within the tolerance, from one decimation of the target or several.

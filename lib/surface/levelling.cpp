@@ -3,6 +3,7 @@
 #include "surface/facet_distances.hpp"
 #include "surface/measure.hpp"
 #include "surface/shape_patch.hpp"
+#include "surface/subdivide.hpp"
 #include "surface/surface_walk.hpp"
 
 #include <algorithm>
@@ -88,22 +89,16 @@ private:
   // Target triangles that are as large as the mesh's need points within. The mesh's mean edge is 1.5 steps long.
   void add_within() {
     const double step = std::sqrt(area(mesh_) / static_cast<double>(mesh_.triangles.size()));
-    std::vector<double> parts_of(target_.triangles.size(), 0);
-    double total = 0;
-    for (Index t = 0; t < target_.triangles.size(); ++t) {
-      const double longest = longest_edge(target_, t);
-      if (longest > large_triangle * step) {
-        parts_of[t] = std::min(std::ceil(longest / step), most_parts);
-        total += 0.5 * parts_of[t] * parts_of[t];
-      }
-    }
-    // Needles are long, and hardly any surface.
-    const auto most = static_cast<double>(many_vertices * mesh_.triangles.size());
-    const double thinner = total > most ? std::sqrt(most / total) : 1;
+    const std::vector<int> parts_of = parts_for_points(
+        target_,
+        [&](double longest) {
+          return longest > large_triangle * step ? std::min(std::ceil(longest / step), most_parts) : 0;
+        },
+        static_cast<double>(many_vertices * mesh_.triangles.size()));
     for (Index t = 0; t < target_.triangles.size(); ++t) {
       const auto& c = target_.triangles[t];
       const std::array<Vec3, 3> p{target_.vertices[c[0]], target_.vertices[c[1]], target_.vertices[c[2]]};
-      const int parts = static_cast<int>(thinner * parts_of[t]);
+      const int parts = parts_of[t];
       for (int i = 0; i <= parts; ++i) {
         for (int j = i == 0 ? 1 : 0; i + j <= parts && i < parts && j < parts; ++j) {
           given_.push_back(

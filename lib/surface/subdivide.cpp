@@ -1,6 +1,7 @@
 #include "surface/subdivide.hpp"
 
 #include "core/error.hpp"
+#include "surface/measure.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,19 +9,14 @@
 namespace tunica {
 namespace {
 
-double longest_edge_of(const TriangleMesh& mesh, const std::array<Index, 3>& t) {
-  const auto& v = mesh.vertices;
-  return std::max({(v[t[1]] - v[t[0]]).norm(), (v[t[2]] - v[t[1]]).norm(), (v[t[0]] - v[t[2]]).norm()});
-}
-
 std::size_t pieces_per_edge(double length, double longest_edge) {
   return static_cast<std::size_t>(std::clamp(std::ceil(length / longest_edge), 1.0, 1000.0));
 }
 
 std::size_t count(const TriangleMesh& mesh, double longest_edge) {
   std::size_t sum = 0;
-  for (const auto& triangle : mesh.triangles) {
-    const std::size_t k = pieces_per_edge(longest_edge_of(mesh, triangle), longest_edge);
+  for (Index t = 0; t < mesh.triangles.size(); ++t) {
+    const std::size_t k = pieces_per_edge(tunica::longest_edge(mesh, t), longest_edge);
     sum += k * k;
   }
   return sum;
@@ -34,8 +30,9 @@ TriangleMesh subdivided(const TriangleMesh& mesh, double longest_edge, std::size
     longest_edge *= 1.25;
   }
   TriangleMesh fine{mesh.vertices, {}};
-  for (const auto& triangle : mesh.triangles) {
-    const std::size_t k = pieces_per_edge(longest_edge_of(mesh, triangle), longest_edge);
+  for (Index t = 0; t < mesh.triangles.size(); ++t) {
+    const auto& triangle = mesh.triangles[t];
+    const std::size_t k = pieces_per_edge(tunica::longest_edge(mesh, t), longest_edge);
     if (k == 1) {
       fine.triangles.push_back(triangle);
       continue;
@@ -65,6 +62,19 @@ TriangleMesh subdivided(const TriangleMesh& mesh, double longest_edge, std::size
     }
   }
   return fine;
+}
+
+std::vector<int> parts_for_points(const TriangleMesh& mesh, const std::function<double(double)>& parts, double most) {
+  std::vector<double> wanted(mesh.triangles.size());
+  double points = 0;
+  for (Index t = 0; t < mesh.triangles.size(); ++t) {
+    wanted[t] = parts(longest_edge(mesh, t));
+    points += 0.5 * wanted[t] * wanted[t];
+  }
+  const double share = points > most ? std::sqrt(most / points) : 1;
+  std::vector<int> out(wanted.size());
+  std::transform(wanted.begin(), wanted.end(), out.begin(), [&](double p) { return static_cast<int>(share * p); });
+  return out;
 }
 
 }  // namespace tunica

@@ -1,6 +1,7 @@
 #include "surface/surface_walk.hpp"
 
 #include "surface/measure.hpp"
+#include "surface/subdivide.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -81,20 +82,15 @@ void SurfaceWalk::place_points() {
       points.push_back({mesh_.vertices[v], around_.of(v)[0]});
     }
   }
-  const auto parts_of = [&](Index t) { return std::min(longest_edge(mesh_, t) * cells_per_mm_, most_parts); };
-  double total = 0;
-  for (Index t = 0; t < mesh_.triangles.size(); ++t) {
-    total += 0.5 * std::pow(std::floor(parts_of(t)), 2);
-  }
-  // Needles would get thousands of points each, on hardly any surface.
-  const double most = most_points * static_cast<double>(mesh_.triangles.size());
-  const double thinner = total > most ? std::sqrt(most / total) : 1;
+  const std::vector<int> parts_of = parts_for_points(
+      mesh_, [&](double longest) { return std::min(longest * cells_per_mm_, most_parts); },
+      most_points * static_cast<double>(mesh_.triangles.size()));
   for (Index t = 0; t < mesh_.triangles.size(); ++t) {
     const auto& [i, j, k] = mesh_.triangles[t];
     const Vec3& a = mesh_.vertices[i];
     const Vec3 ab = mesh_.vertices[j] - a;
     const Vec3 ac = mesh_.vertices[k] - a;
-    const int parts = static_cast<int>(thinner * parts_of(t));
+    const int parts = parts_of[t];
     for (int x = 0; x < parts; ++x) {
       for (int y = 0; x + y < parts && parts > 1; ++y) {
         points.push_back({a + ((x + 1.0 / 3) * ab + (y + 1.0 / 3) * ac) / parts, t});

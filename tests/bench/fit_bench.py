@@ -260,7 +260,7 @@ def saddle(u, v):
 
 
 def saddle_sector(u, v):
-    """Three fifths of a ring: its rims curve within the surface, which no patch from positions and normals does."""
+    """Seven tenths of a ring: its rims curve within the surface, which no patch from positions and normals does."""
     r, a = 0.2 + 0.8 * u, 4.5 * v
     return 50 * r * np.cos(a), 50 * r * np.sin(a), 10 * r ** 2 * np.cos(2 * a)
 

@@ -2,7 +2,9 @@
 
 #include "surface/closest_point.hpp"
 #include "surface/facet_distances.hpp"
+#include "surface/measure.hpp"
 #include "surface/shapes.hpp"
+#include "surface/subdivide.hpp"
 
 #include <gtest/gtest.h>
 
@@ -10,6 +12,28 @@
 
 namespace tunica {
 namespace {
+
+TEST(PartsForPoints, AreAsWantedUnlessThatWouldBeTooManyPoints) {
+  TriangleMesh mesh = shapes::plane(2, 1);
+  mesh.vertices[0] = {-3, 0, 0};  // the two triangles beside are long
+  const auto wanted = [](double longest) { return 4 * longest; };
+  const std::vector<int> plenty = parts_for_points(mesh, wanted, 1e6);
+  double points = 0;
+  for (Index t = 0; t < mesh.triangles.size(); ++t) {
+    EXPECT_EQ(plenty[t], static_cast<int>(wanted(longest_edge(mesh, t))));
+    points += 0.5 * plenty[t] * plenty[t];
+  }
+  EXPECT_GT(points, 100);
+  const std::vector<int> few = parts_for_points(mesh, wanted, 30);
+  double left = 0;
+  for (Index t = 0; t < mesh.triangles.size(); ++t) {
+    EXPECT_LT(few[t], plenty[t]);
+    EXPECT_GT(few[t], 0);
+    left += 0.5 * few[t] * few[t];
+  }
+  EXPECT_LE(left, 30);
+  EXPECT_GT(left, 10);
+}
 
 TEST(SurfaceWalk, NeverNearerThanTheClosestPointAndMostlyThere) {
   std::mt19937 random(3);

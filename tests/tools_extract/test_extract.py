@@ -325,6 +325,7 @@ class Choices(ExtractTest):
             self.assertIn("3 of 4896 voxels are no finite numbers", stderr)
             self.assertEqual(len([w for w in record["result"]["warnings"] if "no finite numbers" in w]), 1)
             self.assertTrue(numpy.isfinite(Ply(self.out).vertices).all())
+        self.assertIn("3 of 4896 voxels are no finite numbers", self.run_tool(path, "--info")[1])
 
     def test_isovalue_that_equals_samples_gives_no_degenerate_triangle(self):
         index = numpy.indices((12, 12, 12)).astype(numpy.int16)
