@@ -4,6 +4,7 @@
 #include "cli/usage.hpp"
 #include "core/quantity.hpp"
 #include "io/mesh_file.hpp"
+#include "io/mesh_pair.hpp"
 #include "io/picture.hpp"
 #include "shell/boundary_distance.hpp"
 #include "shell/curved_surface.hpp"
@@ -298,6 +299,8 @@ void run(cli::Tool& tool, const Arguments& given) {
     Surface start = read_surface(tool, tool.input(given.coarse), unit_mm);
     tool.input(given.target);
     Surface surface = given.coarse == given.target ? start : read_surface(tool, given.target, unit_mm);
+    require_same_scale(start.file, given.coarse, surface.file, given.target, unit_mm);
+    require_near(start.file, given.coarse, surface.file, given.target);
     ply = ply_options(tool, common_space(start.file, given.coarse, surface.file, given.target));
     coarse = std::move(start.file.mesh);
     target.emplace(std::move(surface.file.mesh));

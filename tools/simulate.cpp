@@ -7,6 +7,7 @@
 #include "io/scene.hpp"
 #include "io/scene_file.hpp"
 #include "mechanics/curved_displacement.hpp"
+#include "mechanics/doubts.hpp"
 #include "mechanics/solve.hpp"
 
 #include <fmt/format.h>
@@ -269,13 +270,14 @@ Scene scene_of_flags(const Arguments& a) {
   return scene;
 }
 
-// Mechanics knows bodies, not files: says which file a refused or unsolved model came from.
+// Mechanics knows bodies, and where some of them were said: says which file a refused or unsolved model came from.
 template <typename Work>
 auto naming(const fs::path& file, const Work& work) {
   try {
     return work();
   } catch (const InputError& error) {
-    throw InputError(fmt::format("{}: {}", file.string(), error.what()));
+    const std::string what = error.what();
+    throw InputError(what.starts_with(file.string() + ":") ? what : fmt::format("{}: {}", file.string(), what));
   } catch (const RequirementError& error) {
     throw RequirementError(fmt::format("{}: {}", file.string(), error.what()));
   }
@@ -570,6 +572,9 @@ void simulate(cli::Tool& tool, const Arguments& a) {
   prepare_result(tool.result(), model);
   const fs::path& subject = inputs.front();
   naming(subject, [&] { check_model(model, scene.run); });
+  for (const std::string& doubt : doubts(model, scene.run)) {
+    tool.warn(doubt);
+  }
   if (a.check) {
     fmt::print("{}", scene_text(scene));
     return;

@@ -292,6 +292,7 @@ void Tool::write_report(bool ok, const std::string& error) {
       {"version", version},
       {"ok", ok},
       {"error", error.empty() ? Json() : Json(error)},
+      {"warnings", warnings_},
       {"command", command_},
       {"inputs", inputs_},
       {"outputs", outputs},
@@ -402,6 +403,7 @@ void Tool::detail(const std::string& text) const {
 }
 
 void Tool::warn(const std::string& text) const {
+  warnings_.push_back(one_line(text));
   if (!quiet_) {
     fmt::print(stderr, "{}tunica-{}: warning: {}\n", bar_open_ ? "\n" : "", verb_, one_line(text));
   }

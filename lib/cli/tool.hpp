@@ -86,7 +86,8 @@ public:
   /// A callback that draws a bar on a terminal, prints a line now and then elsewhere, and is silent with --quiet.
   [[nodiscard]] Progress progress(const std::string& doing);
 
-  /// A line on stderr: always but with --quiet (`note`), only with --verbose (`detail`), a warning.
+  /// A line on stderr: always but with --quiet (`note`), only with --verbose (`detail`), a warning; the last stands in
+  /// the report too, also with --quiet.
   void note(const std::string& text) const;
   void detail(const std::string& text) const;
   void warn(const std::string& text) const;
@@ -118,6 +119,7 @@ private:
   bool bar_open_ = false;
   std::vector<std::pair<std::filesystem::path, bool>> claimed_;  ///< resolved files of the run; written or read
   Json inputs_ = Json::array();
+  mutable Json warnings_ = Json::array();  ///< warn() says, it does not change the tool
   std::vector<std::filesystem::path> outputs_;
   Json seconds_ = Json::object();
   Json result_ = Json::object();

@@ -371,7 +371,9 @@ struct RunJournal::Implementation {
       unpack(kept_size);
       checkpoint_members(unpack, checkpoint.emplace());
       unpack.require_end();
-      if (of_identity != identity_checksum) {
+      // Every step leaves its seconds, so the size of the file bounds how many there can be.
+      const Summary& summary = checkpoint->summary;
+      if (of_identity != identity_checksum || summary.steps != summary.seconds_per_step.size()) {
         throw Damaged();
       }
     } catch (const Damaged&) {

@@ -1,4 +1,5 @@
 #include "core/error.hpp"
+#include "mechanics/doubts.hpp"
 #include "mechanics/run.hpp"
 #include "mechanics/supports.hpp"
 #include "shell/curved_surface.hpp"
@@ -18,7 +19,7 @@ constexpr double largest_imbalance = 1e-3;
 std::string place(const Vec3& p) { return fmt::format("({:.6g}, {:.6g}, {:.6g}) mm", p.x(), p.y(), p.z()); }
 
 [[noreturn]] void refuse(const ShellBody& body, const std::string& what) {
-  throw InputError(fmt::format("{}: {}", body.name, what));
+  throw InputError(fmt::format("{}{}: {}", body.said_at.empty() ? "" : body.said_at + ": ", body.name, what));
 }
 
 void check_body(const ShellBody& body) {
@@ -53,6 +54,7 @@ void check_body(const ShellBody& body) {
     high = high.cwiseMax(x);
   }
   const double size = (high - low).maxCoeff();
+  const double diagonal = (high - low).norm();
   for (std::size_t i = 0; i < body.thickness.size(); ++i) {
     if (!(body.thickness[i] > 0) || !std::isfinite(body.thickness[i])) {
       refuse(body, fmt::format("the thickness at node {} is {:.6g} mm: it must be positive", i, body.thickness[i]));
@@ -62,6 +64,11 @@ void check_body(const ShellBody& body) {
              fmt::format("the thickness at node {} is {:.6g} mm, less than {:.0e} of the shell's size: its bending "
                          "stiffness would be lost in round-off",
                          i, body.thickness[i], least_thinness));
+    }
+    if (body.thickness[i] > diagonal) {
+      refuse(body, fmt::format("the thickness at node {} is {:.6g} mm, more than the {:.6g} mm that the whole body "
+                               "measures: it is no shell; is its unit right?",
+                               i, body.thickness[i], diagonal));
     }
   }
 }
@@ -111,7 +118,7 @@ void check_triangles(const ShellBody& body) {
     refuse(body, fmt::format("{} normals for {} nodes", mesh.normals.size(), mesh.vertices.size()));
   }
   if (body.curved && body.rest == Rest::curved) {
-    require_fit(mesh, body.name);
+    require_fit(mesh, body.said_at.empty() ? body.name : body.said_at + ": " + body.name);
   }
 }
 
@@ -179,19 +186,6 @@ void check_load_factors(const StaticRun& run) {
   if (run.load_factors.empty()) {
     throw InputError("a static run needs at least one load factor");
   }
-}
-
-bool prescribes(const Fix& fix) {
-  for (int c = 0; c < 3; ++c) {
-    if (fix.translation[static_cast<std::size_t>(c)] && fix.displacement[c] != 0) {
-      return true;
-    }
-  }
-  return false;
-}
-
-bool is_loaded(const Model& model) {
-  return !model.loads.empty() || std::any_of(model.fixes.begin(), model.fixes.end(), prescribes);
 }
 
 /// Whether a state of rest is looked for, so that nothing may move freely.

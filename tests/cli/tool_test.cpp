@@ -80,7 +80,8 @@ TEST_F(ToolTest, AReportHoldsTheKeysOfTheContract) {
   });
   EXPECT_EQ(outcome.code, 0) << outcome.error;
   for (const char* key :
-       {"tool", "version", "ok", "error", "command", "inputs", "outputs", "seconds", "peak_mib", "threads", "result"}) {
+       {"tool", "version", "ok", "error", "warnings", "command", "inputs", "outputs", "seconds", "peak_mib", "threads",
+        "result"}) {
     EXPECT_TRUE(outcome.report.contains(key)) << key;
   }
   EXPECT_EQ(outcome.report["ok"], true);
@@ -89,6 +90,21 @@ TEST_F(ToolTest, AReportHoldsTheKeysOfTheContract) {
   EXPECT_EQ(outcome.report["result"]["pressure"], -90.0);
   EXPECT_EQ(outcome.report["inputs"][0]["sha256"].get<std::string>().size(), 64U);
   EXPECT_GE(outcome.report["seconds"]["total"].get<double>(), outcome.report["seconds"]["read"].get<double>());
+}
+
+TEST_F(ToolTest, WarningsStandInTheReportAlsoWhereNothingIsPrinted) {
+  const auto doubting = [](Tool& tool) {
+    tool.warn("the first\nin two lines");
+    tool.warn("the second");
+  };
+  const auto said = run({"--report", report()}, doubting);
+  EXPECT_EQ(said.report["warnings"], Json::array({"the first in two lines", "the second"}));
+  EXPECT_THAT(said.error, HasSubstr("warning: the second"));
+  const auto quiet = run({"--report", report(), "--force", "--quiet"}, doubting);
+  EXPECT_EQ(quiet.report["warnings"].size(), 2U);
+  EXPECT_EQ(quiet.error, "");
+  fs::remove(report());
+  EXPECT_EQ(run({"--report", report()}).report["warnings"], Json::array());
 }
 
 TEST_F(ToolTest, ExitCodesAndReportsOfEveryKindOfError) {

@@ -3,9 +3,11 @@ import os
 import random
 import shutil
 import signal
+import struct
 import subprocess
 import time
 import unittest
+import zlib
 
 import h5py
 import numpy as np
@@ -277,6 +279,21 @@ nearest = ["0mm", "0mm", "10mm"]
         self.run_tool("--resume", "out.hdf.part")
         self.run_tool("ball.ply", "whole.hdf", *DYNAMIC)
         self.assert_same("whole.hdf", "out.hdf")
+
+    def test_a_forged_count_of_steps_is_no_run(self):
+        """Its checksum holds, yet no file of this size can have seen so many steps."""
+        self.interrupted()
+        with open(self.path(LEFT[2]), "r+b") as file:
+            checkpoint = file.read()
+            head = checkpoint.index(b"\n") + 1  # then the checksum, of all that follows
+            steps = head + 4 + 4 + 8 + 8 + 8  # identity, states, their bytes, degrees of freedom
+            count = struct.unpack_from("<Q", checkpoint, steps)[0]
+            self.assertTrue(0 < count < 150, count)
+            content = checkpoint[head + 4:steps] + struct.pack("<Q", 3 * 10**16) + checkpoint[steps + 8:]
+            file.seek(head)
+            file.write(struct.pack("<I", zlib.crc32(content)) + content)
+        self.run_tool("--resume", "out.hdf.part", expect=3)
+        self.assertIn(f"{LEFT[2]}: is damaged", self.done.stderr)
 
     def test_before_the_first_checkpoint_it_begins_again(self):
         self.interrupted()
