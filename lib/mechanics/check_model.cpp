@@ -188,17 +188,24 @@ void check_load_factors(const StaticRun& run) {
   }
 }
 
+void require_load(const Model& model, const char* kind) {
+  if (!is_loaded(model)) {
+    const std::string zero = model.loads.empty() ? "" : model.loads.front().said_at;
+    throw InputError(fmt::format("{}{} needs a load or a prescribed displacement{}", zero.empty() ? "" : zero + ": ",
+                                 kind, model.loads.empty() ? "" : ", and this is zero"));
+  }
+}
+
 /// Whether a state of rest is looked for, so that nothing may move freely.
 bool finds_rest(const Model& model, const RunSettings& settings) {
   return std::holds_alternative<StaticRun>(settings.kind) || std::holds_alternative<BucklingRun>(settings.kind) ||
          std::holds_alternative<ArcLengthRun>(settings.kind) ||
-         (std::holds_alternative<FrequencyRun>(settings.kind) && is_loaded(model));
+         (std::holds_alternative<FrequencyRun>(settings.kind) &&
+          (!model.loads.empty() || std::any_of(model.fixes.begin(), model.fixes.end(), prescribes)));
 }
 
 void check_path(const Model& model, const ArcLengthRun& run) {
-  if (!is_loaded(model)) {
-    throw InputError("arc length needs a load or a prescribed displacement");
-  }
+  require_load(model, "arc length");
   const auto ramped = [](const auto& item) { return !item.ramp.points.empty(); };
   if (std::any_of(model.loads.begin(), model.loads.end(), ramped) ||
       std::any_of(model.fixes.begin(), model.fixes.end(), ramped)) {
@@ -227,9 +234,7 @@ void check_run(const Model& model, const RunSettings& settings) {
     require_densities(model, "a run for frequencies");
     check_load_factors(frequencies->preload);
   } else if (std::holds_alternative<BucklingRun>(settings.kind)) {
-    if (!is_loaded(model)) {
-      throw InputError("buckling needs a load or a prescribed displacement");
-    }
+    require_load(model, "buckling");
   } else if (const auto* path = std::get_if<ArcLengthRun>(&settings.kind)) {
     check_path(model, *path);
   } else {

@@ -136,6 +136,16 @@ TEST(CheckModel, NamesWhereABodyWasSaid) {
   expect_refused(model, "scene:3:1: shell: the piece with node 0");
 }
 
+TEST(CheckModel, BucklingAndPathsNeedALoadThatIsNotZero) {
+  Model model = plate();
+  model.loads[0] = {0, PressureLoad{0, true}, {}, "scene:8:1"};
+  RunSettings settings = linear_run();
+  settings.kind = BucklingRun{};
+  expect_refused(model, "scene:8:1: buckling needs a load", settings);
+  settings.kind = ArcLengthRun{};
+  expect_refused(model, "scene:8:1: arc length needs a load", settings);
+}
+
 TEST(CheckModel, RefusesAWallThickerThanTheWholeBody) {
   Model model = plate();
   model.shells[0].thickness = {100};  // 1 m for 1 cm, say
