@@ -482,23 +482,23 @@ void print_info(cli::Tool& tool, const fs::path& path, const VolumeFile& file, c
   const Volume& volume = file.volume;
   const auto& labels = contents.labels;
   const Interval& range = contents.values;
-  fmt::print("{}\n", path.string());
-  fmt::print("format       {}, {}\n", file.format, file.datatype);
-  fmt::print("dims         {} x {} x {}\n", volume.dims[0], volume.dims[1], volume.dims[2]);
-  fmt::print("spacing      {:.6g} x {:.6g} x {:.6g} mm\n", file.spacing.x(), file.spacing.y(), file.spacing.z());
-  fmt::print("orientation  {} (from {})\n", file.orientation, file.transform);
+  std::string text = path.string() + "\n";
+  text += fmt::format("format       {}, {}\n", file.format, file.datatype);
+  text += fmt::format("dims         {} x {} x {}\n", volume.dims[0], volume.dims[1], volume.dims[2]);
+  text += fmt::format("spacing      {:.6g} x {:.6g} x {:.6g} mm\n", file.spacing.x(), file.spacing.y(), file.spacing.z());
+  text += fmt::format("orientation  {} (from {})\n", file.orientation, file.transform);
   if (file.frames > 1) {
-    fmt::print("frames       {}\n", file.frames);
+    text += fmt::format("frames       {}\n", file.frames);
   }
   if (file.layers > 1) {
-    fmt::print("layers       {}\n", file.layers);
+    text += fmt::format("layers       {}\n", file.layers);
   }
-  fmt::print("values       {:.6g} .. {:.6g}\n", range.lower, range.upper);
+  text += fmt::format("values       {:.6g} .. {:.6g}\n", range.lower, range.upper);
   Json list = Json::array();
   if (labels) {
-    fmt::print("labels       {}\n", labels->size());
+    text += fmt::format("labels       {}\n", labels->size());
     for (const Label& label : *labels) {
-      fmt::print("  {:<8} {:>12} voxels {:>14.1f} mm3  {}\n", label.value, label.voxels, label.volume_mm3,
+      text += fmt::format("  {:<8} {:>12} voxels {:>14.1f} mm3  {}\n", label.value, label.voxels, label.volume_mm3,
                  comment(label.name));
       list.push_back({{"label", label.value},
                       {"voxels", label.voxels},
@@ -506,7 +506,7 @@ void print_info(cli::Tool& tool, const fs::path& path, const VolumeFile& file, c
                       {"name", label.name.empty() ? Json() : Json(label.name)}});
     }
   } else {
-    fmt::print("labels       none: a grey volume\n");
+    text += fmt::format("labels       none: a grey volume\n");
   }
   Json& result = tool.result();
   result = undefined_result();
@@ -520,6 +520,7 @@ void print_info(cli::Tool& tool, const fs::path& path, const VolumeFile& file, c
   result["layers"] = file.layers;
   result["values"] = {range.lower, range.upper};
   result["labels"] = labels ? list : Json();
+  tool.print(text);
 }
 
 void note_file(cli::Tool& tool, const VolumeFile& file) {

@@ -318,9 +318,10 @@ void run(cli::Tool& tool, const Arguments& given) {
   const double percent = 100 / diagonal;
 
   const auto keep_partial = [&](const ShellMesh& shell) {
-    PlyOptions always = ply;
-    always.overwrite = true;
-    write_ply(fs::path(given.out.string() + ".part"), shell, always);
+    PlyOptions partial = ply;
+    partial.partial = true;
+    partial.overwrite = true;
+    write_ply(given.out, shell, partial);
   };
   ShellMesh best;
   std::optional<double> tolerance;  // mm

@@ -434,8 +434,6 @@ void report_summary(Json& result, const Summary& summary, bool converged, std::o
   }
 }
 
-fs::path partial(fs::path out) { return out += ".part"; }
-
 // The scene, from wherever the command line says; what it was read from is registered.
 Scene read_scene_of_run(cli::Tool& tool, const Arguments& a, const std::optional<RunJournal>& before,
                         std::vector<fs::path>& inputs) {
@@ -576,12 +574,12 @@ void simulate(cli::Tool& tool, const Arguments& a) {
     tool.warn(doubt);
   }
   if (a.check) {
-    fmt::print("{}", scene_text(scene));
+    tool.print(scene_text(scene));
     return;
   }
   const RunIdentity identity = identity_of_run(tool, scene, inputs, drawing);
   if (!journal) {
-    journal.emplace(RunJournal::create(partial(out), identity));
+    journal.emplace(RunJournal::create(part_of(out), identity));
   } else if (const std::string differs = difference(journal->identity(), identity); !differs.empty()) {
     throw InputError(fmt::format("{}: is another run: {}", a.resume.string(), differs));
   }
