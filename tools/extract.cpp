@@ -485,7 +485,8 @@ void print_info(cli::Tool& tool, const fs::path& path, const VolumeFile& file, c
   std::string text = path.string() + "\n";
   text += fmt::format("format       {}, {}\n", file.format, file.datatype);
   text += fmt::format("dims         {} x {} x {}\n", volume.dims[0], volume.dims[1], volume.dims[2]);
-  text += fmt::format("spacing      {:.6g} x {:.6g} x {:.6g} mm\n", file.spacing.x(), file.spacing.y(), file.spacing.z());
+  text +=
+      fmt::format("spacing      {:.6g} x {:.6g} x {:.6g} mm\n", file.spacing.x(), file.spacing.y(), file.spacing.z());
   text += fmt::format("orientation  {} (from {})\n", file.orientation, file.transform);
   if (file.frames > 1) {
     text += fmt::format("frames       {}\n", file.frames);
@@ -499,7 +500,7 @@ void print_info(cli::Tool& tool, const fs::path& path, const VolumeFile& file, c
     text += fmt::format("labels       {}\n", labels->size());
     for (const Label& label : *labels) {
       text += fmt::format("  {:<8} {:>12} voxels {:>14.1f} mm3  {}\n", label.value, label.voxels, label.volume_mm3,
-                 comment(label.name));
+                          comment(label.name));
       list.push_back({{"label", label.value},
                       {"voxels", label.voxels},
                       {"volume_mm3", label.volume_mm3},

@@ -446,7 +446,7 @@ Progress Tool::progress(const std::string& doing) {
   const bool terminal = ::isatty(STDERR_FILENO) == 1;
   return [this, doing, terminal, shown = std::make_shared<Shown>()](double fraction) {
     // What turns out to be more work than it looked waits until it has caught up.
-    shown->most = std::max(shown->most, std::min(1.0, fraction));
+    shown->most = std::max(shown->most, std::min(fraction, 1.0));
     const auto now = std::chrono::steady_clock::now();
     const auto pause = terminal ? std::chrono::milliseconds(100) : std::chrono::milliseconds(10'000);
     if (now - shown->last < pause) {
@@ -466,9 +466,7 @@ Progress Tool::progress(const std::string& doing) {
   };
 }
 
-void Tool::say_line(const std::string& text) const {
-  say((std::exchange(bar_open_, false) ? "\n" : "") + text);
-}
+void Tool::say_line(const std::string& text) const { say((std::exchange(bar_open_, false) ? "\n" : "") + text); }
 
 void Tool::note(const std::string& text) const {
   if (!quiet_) {

@@ -8,14 +8,15 @@
 
 namespace tunica {
 
-/// The right to write the file NAME.part: a lock on the file itself, which other programs that ask for it respect. It ends
-/// with the last holder of the pointer, or of the process, however that ends. A file that is then still empty is removed.
+/// The right to write the file NAME.part: a lock on the file itself, which other programs that ask for it respect. It
+/// ends with the last holder of the pointer, or of the process, however that ends. A file that is then still empty is
+/// removed.
 class PartLock {
 public:
-  /// Creates the file where it is not there; keeps its bytes where it is. Whoever asks in the process that holds it gets
-  /// the same lock.
-  /// Errors: OutputError when another process holds it, or when the file cannot be opened for writing or is anything but
-  /// a regular file with this one name: links are not followed, and a pipe is not waited for.
+  /// Creates the file where it is not there; keeps its bytes where it is. Whoever asks in the process that holds it
+  /// gets the same lock. Errors: OutputError when another process holds it, or when the file cannot be opened for
+  /// writing or is anything but a regular file with this one name: links are not followed, and a pipe is not waited
+  /// for.
   static std::shared_ptr<PartLock> take(const std::filesystem::path& part);
 
   ~PartLock();

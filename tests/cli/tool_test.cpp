@@ -9,9 +9,11 @@
 #include <gtest/gtest.h>
 
 #include <fcntl.h>
+#include <poll.h>
 #include <pty.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cmath>
@@ -45,7 +47,7 @@ protected:
     std::signal(SIGTERM, SIG_DFL);
   }
 
-  Outcome run(std::vector<std::string> arguments, const std::function<void(Tool&)>& body) {
+  static int exit_code(std::vector<std::string> arguments, const std::function<void(Tool&)>& body) {
     Tool tool("test", "A tool.", "tunica-test a b");
     std::optional<double> pressure;
     tool.quantity("--pressure", pressure, dimension::pressure, "a pressure");
@@ -55,14 +57,18 @@ protected:
     for (auto& argument : arguments) {
       argv.push_back(argument.data());
     }
-    Outcome outcome;
-    testing::internal::CaptureStderr();
-    outcome.code = tool.run(static_cast<int>(argv.size()), argv.data(), [&] {
+    return tool.run(static_cast<int>(argv.size()), argv.data(), [&] {
       if (pressure) {
         tool.result()["pressure"] = *pressure;
       }
       body(tool);
     });
+  }
+
+  Outcome run(std::vector<std::string> arguments, const std::function<void(Tool&)>& body) {
+    Outcome outcome;
+    testing::internal::CaptureStderr();
+    outcome.code = exit_code(std::move(arguments), body);
     outcome.error = testing::internal::GetCapturedStderr();
     if (fs::exists(report())) {
       outcome.report = Json::parse(read_file(report()));
@@ -217,11 +223,11 @@ TEST_F(ToolTest, WhereAnOutputIsKeptUntilItIsWholeNoInputIs) {
     }
     fs::remove(folder_ / name);
   }
-  EXPECT_EQ(run({}, [&](Tool& tool) {
-              tool.output(folder_ / "out");
-              tool.output(folder_ / "out.part");
-            }).code,
-            2);
+  const auto both = [&](Tool& tool) {
+    tool.output(folder_ / "out");
+    tool.output(folder_ / "out.part");
+  };
+  EXPECT_EQ(run({"--force"}, both).code, 2);
   EXPECT_FALSE(fs::exists(folder_ / "out.part"));
 }
 
@@ -303,7 +309,8 @@ TEST_F(ToolTest, AReportThatCannotBeWrittenIsFailure) {
 TEST_F(ToolTest, AnOlderReportNeverSpeaksForARun) {
   const std::string fine = R"({"ok": true})";
   write_file(report(), fine, false);
-  EXPECT_EXIT(run({"--report", report(), "--force"}, [](Tool&) { std::_Exit(7); }), testing::ExitedWithCode(7), "");
+  EXPECT_EXIT(exit_code({"--report", report(), "--force"}, [](Tool&) { std::_Exit(7); }), testing::ExitedWithCode(7),
+              "");
   EXPECT_FALSE(fs::exists(report())) << "as after kill -9";
   write_file(report(), fine, true);
   EXPECT_EQ(run({"--report", report(), "--force", "--nonsense"}).report["ok"], false);
@@ -356,7 +363,7 @@ TEST_F(ToolTest, WordsThatCannotBeSaidCostNeitherWorkNorExitCode) {
           throw InputError("why");
         }
       };
-      EXPECT_EXIT(std::exit(run({"--report", report()}, body).code), testing::ExitedWithCode(code), "");
+      EXPECT_EXIT(std::_Exit(exit_code({"--report", report()}, body)), testing::ExitedWithCode(code), "");
       EXPECT_EQ(Json::parse(read_file(report()))["ok"], code == 0);
       EXPECT_EQ(read_file(folder_ / "out"), "the work");
     }
@@ -365,16 +372,16 @@ TEST_F(ToolTest, WordsThatCannotBeSaidCostNeitherWorkNorExitCode) {
 
 TEST_F(ToolTest, AnAnswerThatIsLostIsAnOutputError) {
   for (const Lost how : {Lost::full, Lost::closed, Lost::without_reader}) {
-    const auto code_of = [&](const std::vector<std::string>& arguments) {
+    const auto ask = [&](const std::vector<std::string>& arguments) {
       lose(STDOUT_FILENO, how);
-      std::exit(run(arguments, [](Tool& tool) { tool.print("the answer"); }).code);
+      std::_Exit(exit_code(arguments, [](Tool& tool) { tool.print("the answer"); }));
     };
     fs::remove(report());
-    EXPECT_EXIT(code_of({"--report", report()}), testing::ExitedWithCode(5), "");
+    EXPECT_EXIT(ask({"--report", report()}), testing::ExitedWithCode(5), "");
     EXPECT_EQ(Json::parse(read_file(report()))["ok"], false);
-    EXPECT_EXIT(code_of({"--help"}), testing::ExitedWithCode(5), "");
-    EXPECT_EXIT(code_of({"--version"}), testing::ExitedWithCode(5), "");
-    EXPECT_EXIT(code_of({"--documentation", "man"}), testing::ExitedWithCode(5), "");
+    EXPECT_EXIT(ask({"--help"}), testing::ExitedWithCode(5), "");
+    EXPECT_EXIT(ask({"--version"}), testing::ExitedWithCode(5), "");
+    EXPECT_EXIT(ask({"--documentation", "man"}), testing::ExitedWithCode(5), "");
   }
 }
 
@@ -395,10 +402,7 @@ TEST_F(ToolTest, NoFileOfTheRunGetsTheWords) {
           ::close(descriptor);
         }
       }
-      Tool tool("test", "A tool.", "tunica-test");
-      std::string name = "tunica-test", force = "--force";
-      std::array<char*, 2> argv{name.data(), force.data()};
-      std::_Exit(tool.run(2, argv.data(), [&] { body(tool); }));
+      std::_Exit(exit_code({"--force"}, body));
     };
     EXPECT_EXIT(attempt(), testing::ExitedWithCode(0), "") << closed;
     EXPECT_EQ(read_file(folder_ / "out"), "abc") << closed;
@@ -418,8 +422,11 @@ TEST_F(ToolTest, ProgressNeverRunsBackwards) {
   }
   ::dup2(standard_error, STDERR_FILENO);
   ::close(standard_error);
-  std::string shown(4096, '\0');
-  shown.resize(static_cast<std::size_t>(::read(ours, shown.data(), shown.size())));
+  std::string shown;
+  for (pollfd ready{ours, POLLIN, 0}; std::ranges::count(shown, ']') < 4 && ::poll(&ready, 1, 10'000) == 1;) {
+    std::array<char, 4096> bytes{};
+    shown.append(bytes.data(), static_cast<std::size_t>(::read(ours, bytes.data(), bytes.size())));
+  }
   ::close(ours);
   ::close(terminal);
   std::vector<double> percent;
