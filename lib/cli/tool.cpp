@@ -285,7 +285,11 @@ int Tool::perform(const std::function<void()>& body) {
   } catch (const std::bad_alloc&) {
     return finish(ExitCode::memory, out_of_memory("out of memory: give it more, or a smaller input"));
   } catch (const std::exception& error) {
-    return finish(ExitCode::internal, error.what());
+    // TBB has no type for it.
+    return std::string_view(error.what()).find("pthread_create") != std::string_view::npos
+               ? finish(ExitCode::memory,
+                        out_of_memory("no thread can be started: give it more memory, or --threads 1"))
+               : finish(ExitCode::internal, error.what());
   }
 }
 

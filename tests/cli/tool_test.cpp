@@ -149,6 +149,9 @@ TEST_F(ToolTest, OutOfMemorySaysWhereAndWhatToDo) {
   EXPECT_THAT(outcome.error, HasSubstr((folder_ / "in").string() + ": out of memory: give it more, or"));
   EXPECT_THAT(outcome.error, HasSubstr("stage solve"));
   EXPECT_EQ(outcome.report["ok"], false);
+  const auto threadless = run({}, [](Tool&) { throw std::runtime_error("pthread_create has failed: try again"); });
+  EXPECT_EQ(threadless.code, 6);
+  EXPECT_THAT(threadless.error, HasSubstr("--threads 1"));
 }
 
 TEST_F(ToolTest, UsageErrors) {
