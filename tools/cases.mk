@@ -29,7 +29,7 @@ from_extract := extract $(from_decimate)
 # $(call stage,case,stage): removes what this stage and the later ones left, notes what this one depends on and when it
 # began, runs the command where the user stands, and keeps its exit code: none is left by one that was killed.
 define stage
-	@echo '$(1): $(2)'
+	@echo '$(1): $(2)' || :
 	@: > $(1)/$(2).exit; rm -f $(foreach later,$(from_$(2)),$(addprefix $(1)/out/,$(files_$(later)) $(later).json \
 	  $(later).log .$(later).flags)) && cp $(1)/$(2).flags $(1)/out/.$(2).flags
 	@( cd "$$TUNICA_FROM" && $(RUN) $(file < $(1)/$(2).command) --threads $(THREADS) ) 2> $(1)/out/$(2).log; code=$$?; \
