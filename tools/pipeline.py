@@ -5,7 +5,7 @@ make and the shell cannot hold any name a file may have, so they see none. For e
 called by a harmless name, with
   out              a link to the case's own folder, OUT/<volume stem>/<label>
   STAGE.command    the command of the stage, its words quoted for the shell
-  STAGE.flags      what its result depends on besides the files make sees; as old as can be when the result is up to date
+  STAGE.flags      what its result depends on besides the files make sees; as old as can be when that has not changed
   STAGE.exit       the exit code of the stage in this run; empty while it runs
   done             there when every stage is up to date
 and cases.mk, run in OUT/.run, knows the rest. Settings are environment variables, set by Makefile.pipeline.
@@ -170,14 +170,14 @@ def stage_flags(label):
 
 def stage_commands(case, binaries, flags):
     """Per stage its command, as text for the shell."""
-    volume = path_word(case.volume)
     surface, coarse, shell, picture, result, facts = (
-        os.path.join(case.folder, name) for name in ("surface.ply", "coarse.ply", "shell.ply", "map.png", "result.hdf", "extract.json"))
-    words = {"extract": [volume, surface], "decimate": [surface, coarse],
+        os.path.join(case.folder, name)
+        for name in ("surface.ply", "coarse.ply", "shell.ply", "map.png", "result.hdf", "extract.json"))
+    words = {"extract": [path_word(case.volume), surface], "decimate": [surface, coarse],
              "relax": [coarse, surface, shell, "--picture", picture], "simulate": [shell, result]}
     # Whether there is a boundary to hold is known once the surface is.
-    chosen_fix = "" if setting("FIX") else (
-        f" --fix \"$(if grep -q '\"closed\": *true' {shlex.quote(facts)}; then echo rigid-motions; else echo boundary; fi)\"")
+    is_closed = f"grep -q '\"closed\": *true' {shlex.quote(facts)}"
+    chosen_fix = "" if setting("FIX") else f' --fix "$(if {is_closed}; then echo rigid-motions; else echo boundary; fi)"'
     commands = {}
     for stage, stage_words in words.items():
         tool = os.path.join(binaries, f"tunica-{stage}")
@@ -187,7 +187,7 @@ def stage_commands(case, binaries, flags):
     return commands
 
 
-# ---------------------------------------------------------------------------------------------------- what is up to date
+# ------------------------------------------------------------------------------------------------ what is up to date
 
 def read_text(path):
     try:
@@ -217,14 +217,16 @@ def changed_since(entry, start_ns):
         info = os.stat(entry["path"])
         if info.st_mtime_ns >= start_ns:
             return True
-        return info.st_ctime_ns >= start_ns and os.path.isfile(entry["path"]) and sha256(entry["path"]) != entry["sha256"]
+        return info.st_ctime_ns >= start_ns and sha256(entry["path"]) != entry["sha256"]
+    except IsADirectoryError:
+        return False  # the report names its files, too
     except (OSError, KeyError, TypeError, ValueError):
         return True
 
 
 def is_up_to_date(case, stage, remembered):
-    """Whether a stage left its files and a good report, had these flags, and nothing it read has changed since it began:
-    the report names all of that, data beside a header and slices of a folder too."""
+    """Whether a stage left its files and a good report, had these flags, and read nothing that has changed since: the
+    report names all of that, data beside a header and slices of a folder too."""
     try:
         start_ns = os.stat(os.path.join(case.folder, f".{stage}.flags")).st_mtime_ns
     except OSError:
@@ -238,7 +240,7 @@ def is_up_to_date(case, stage, remembered):
     return isinstance(inputs, list) and not any(changed_since(entry, start_ns) for entry in inputs)
 
 
-def plan_case(case, run, binaries, dry):
+def plan_case(case, binaries, dry):
     """Writes the case's folder for cases.mk. Errors: OSError when a folder cannot be made."""
     if not dry:
         os.makedirs(case.folder, exist_ok=True)
@@ -267,7 +269,7 @@ def volume_changed(case):
 
 
 def plan_cases(cases, run, binaries, dry):
-    """Plans all cases that are not refused; one whose folder cannot be made is refused, too."""
+    """Plans all cases that are not refused, and says which are; one whose folder cannot be made is refused, too."""
     os.symlink(os.path.abspath(binaries), os.path.join(run, "bin"))
     used = set()
     for case in cases:
@@ -282,17 +284,21 @@ def plan_cases(cases, run, binaries, dry):
         used.add(name)
         case.plan = os.path.join(run, name)
         try:
-            plan_case(case, run, binaries, dry)
+            plan_case(case, binaries, dry)
         except OSError as error:
             shutil.rmtree(case.plan, ignore_errors=True)
             case.refused = f"{case.folder}: cannot be written: {error.strerror}"
-    write_text(os.path.join(run, "cases"), "\n".join(os.path.relpath(case.plan, run) for case in cases if not case.refused))
+    for case in cases:
+        if case.refused:
+            say(case.refused)
+    planned = [os.path.relpath(case.plan, run) for case in cases if not case.refused]
+    write_text(os.path.join(run, "cases"), "\n".join(planned))
 
 
 # ------------------------------------------------------------------------------------------------------------- the run
 
 def lock(out):
-    """Waits until no other run is at work in OUT, and lets none begin before this process and its children have ended."""
+    """Waits until no other run is at work in OUT, and lets none begin before this process and its children end."""
     descriptor = os.open(os.path.join(out, ".lock"), os.O_RDWR | os.O_CREAT, 0o666)
     os.set_inheritable(descriptor, True)
     try:
@@ -315,18 +321,21 @@ def say(text):
 
 
 def run_make(make, run):
-    """Lets make do what is planned. A signal is left to make, which ends its jobs: the summary is written after that.
+    """Lets make do what is planned, in a process group of its own: a signal that stops this process is passed on to all
+    of the group, as a terminal does, since make's own jobs would leave their commands at work. The summary comes after.
     @return make's exit code, and the signal that stopped this process, if any"""
     rules = os.path.join(os.path.dirname(os.path.abspath(__file__)), "cases.mk")
     environment = dict(os.environ, TUNICA_FROM=os.getcwd())
     child = subprocess.Popen([*shlex.split(make), "--no-print-directory", "-f", rules], cwd=run, env=environment,
-                             close_fds=False)
+                             close_fds=False, stdin=subprocess.DEVNULL, preexec_fn=os.setpgrp)
     stopped = []
 
     def pass_on(number, _):
         stopped.append(number)
-        if number != signal.SIGINT:  # which the terminal has sent to make, too
-            child.send_signal(number)
+        try:
+            os.killpg(child.pid, number)
+        except ProcessLookupError:
+            pass  # all have ended
 
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         if signal.getsignal(number) is not signal.SIG_IGN:

@@ -364,7 +364,8 @@ class Names(WithStubs):
             shutil.rmtree(self.out)
 
     def test_whole_name_in_the_list_is_never_expanded(self):
-        for name in ("a$(shell touch pwned)b.nii", "$(PRESSURE).nii", "$$.nii", "`touch pwned`.nii", "a#b.nii", "[x].nii"):
+        for name in ("a$(shell touch pwned)b.nii", "$(PRESSURE).nii", "$$.nii", "`touch pwned`.nii", "a#b.nii",
+                     "[x].nii"):
             (self.folder / name).write_text("a volume")
             done = self.make(VOLUMES=name, LABEL=1, **LOAD)
             self.assertEqual(done.returncode, 0, done.stderr)
@@ -388,6 +389,7 @@ class Names(WithStubs):
             refused = [row for row in rows.values() if row["message"] != "done"]
             self.assertEqual([(row["stage"], row["exit"]) for row in refused], [("none", "2")] * 2)
             self.assertIn(r"scans/a\nb.nii.gz: has a control character", refused[0]["message"])
+            self.assertIn(r"pipeline: scans/tab\t.nii.gz: has a control character", done.stderr)
             shutil.rmtree(self.out)
 
     def test_names_of_the_pipelines_own_files_are_refused(self):
@@ -416,7 +418,8 @@ class Names(WithStubs):
         self.assertIn("cannot be written", rows["a/1"]["message"])
 
     def test_settings_are_single_words(self):
-        done = self.make(VOLUMES="a.nii.gz", LABEL=1, FIX="below z=-1mm; touch pwned", **{**LOAD, "PRESSURE": "$(touch pwned)"})
+        done = self.make(VOLUMES="a.nii.gz", LABEL=1, FIX="below z=-1mm; touch pwned",
+                         **{**LOAD, "PRESSURE": "$(touch pwned)"})
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn("--fix below z=-1mm; touch pwned --pressure $(touch pwned) ", self.calls()[3])
         self.assertFalse(list(self.folder.rglob("pwned*")))
@@ -491,12 +494,14 @@ class Runs(WithStubs):
             self.assertEqual(self.make("-j2", SHELLS=attempt, **self.ARGUMENTS).returncode, 0)
             self.assertEqual(self.calls(), [])
 
-    def test_a_stopped_run_says_so(self):
-        run = self.start("-j2", environment={"STUB_SECONDS": "1"}, **self.ARGUMENTS)
+    def test_a_stopped_run_says_so_and_leaves_nothing_at_work(self):
+        run = self.start("-j2", environment={"STUB_SECONDS": "1000"}, **self.ARGUMENTS)
         self.wait_for(2)
         os.kill(run.pid, signal.SIGTERM)
-        stdout, stderr = run.communicate()
+        stdout, stderr = run.communicate(timeout=100)
         self.assertNotEqual(run.returncode, 0)
+        with open(self.out / ".lock") as file:
+            fcntl.flock(file, fcntl.LOCK_EX)  # the last process of the run has ended
         self.assertNotIn("Traceback", stderr)
         self.assertNotIn("done", stdout)
         self.assertEqual({row["message"] for row in self.summary().values()}, {"stopped while it ran", "not run"})
