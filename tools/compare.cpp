@@ -306,7 +306,7 @@ int main(int argc, char** argv) {
       "Two-sided Hausdorff distance of two surfaces, flat or curved, as an interval that certainly holds the "
       "true value.",
       "tunica-compare coarse.ply surface.ply --max 1%\n"
-      "  tunica-compare shell.ply surface.ply --shell --picture map.png --report compare.json");
+      "  tunica-compare shell.ply surface.ply --shell --picture compare.png --report compare.json");
   Arguments given;
   declare(tool, given);
   tool.stages({"read", "compare"});

@@ -686,9 +686,9 @@ void run(cli::Tool& tool, Arguments& arguments) {
 
 int main(int argc, char** argv) {
   cli::Tool tool("extract", "Marching cubes: the closed surface of a label, or of an isovalue, in world millimetres.",
-                 "tunica-extract organs.nii.gz aorta.ply --label 1 --largest\n"
-                 "  tunica-extract ct.nii.gz bone.ply --isovalue 200\n"
-                 "  tunica-extract slices/ organ.ply --label 255 --spacing 0.5,0.5,1.25");
+                 "tunica-extract aneurysm.nii.gz --info\n"
+                 "  tunica-extract aneurysm.nii.gz surface.ply --label 1 --largest --open-border --smooth staircase\n"
+                 "  tunica-extract aneurysm.nii.gz grey.ply --isovalue 0.5 --smooth 1mm");
   Arguments arguments;
   declare(tool.arguments(), arguments);
   tool.stages({"read", "smooth", "extract", "write"});

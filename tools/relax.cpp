@@ -483,9 +483,9 @@ int main(int argc, char** argv) {
       "relax",
       "Moves a coarse mesh onto its target as curved shells, and certifies the distance of the curved surface "
       "to the target, both ways.",
-      "tunica-relax coarse.ply surface.ply shell.ply --tolerance 1% --refine --picture map.png\n"
-      "tunica-relax coarse.obj surface.obj shell.ply --mesh-unit mm --max-iterations 5\n"
-      "tunica-relax surface.ply surface.ply shell.ply --method fit --tolerance 0.3%");
+      "tunica-relax coarse.ply surface.ply shell.ply --tolerance 1% --refine --picture map.png --report relax.json\n"
+      "tunica-relax coarse.ply surface.ply paper.ply --method barycentre --max-iterations 5\n"
+      "tunica-relax surface.ply surface.ply quick.ply --tolerance 1% --effort 0");
   Arguments given;
   declare(tool, given);
   tool.stages({"read", "relax", "measure", "write"});

@@ -686,9 +686,8 @@ int main(int argc, char** argv) {
   cli::Tool tool("simulate", "Pressure load on thin curved shells, static or dynamic.",
                  "tunica-simulate shell.ply result.hdf --young 1MPa --poisson 0.45 --thickness 1.5mm --pressure 1kPa "
                  "--fix boundary --static\n"
-                 "  tunica-simulate shell.ply result.hdf --young 1MPa --poisson 0.45 --thickness 1.5mm --density "
-                 "1100kg/m3 --pressure 100mmHg --fix 'below z=-10mm' --duration 2s --step 40ms --ramp 1s\n"
-                 "  tunica-simulate --scene scene.toml result.hdf");
+                 "  tunica-simulate shell.ply motion.hdf --young 1MPa --poisson 0.45 --thickness 1.5mm --density "
+                 "1100kg/m3 --pressure 1kPa --fix boundary --duration 100ms --step 10ms --ramp 50ms");
   Arguments arguments;
   declare(tool, arguments);
   tool.stages({"read", "setup", "solve", "write"});
