@@ -120,25 +120,30 @@ bool EdgeCollapse::connect(const TriangleMesh& mesh) {
       half_[corner++].from = number_[v];
     }
   }
-  // The edges known so far at their lower end, each as the higher end and the edge before it in the same list.
+  // The edges known so far at their end with fewer triangles, each as the far end and the edge before it in the same
+  // list.
   struct Known {
-    Index higher, before;
+    Index far, before;
   };
+  std::vector<Index> valence(vertex_.size(), 0);
+  for (const Half& half : half_) {
+    ++valence[half.from];
+  }
   std::vector<Known> known;
   known.reserve(half_.size() / 2 + 1);
   half_of_.reserve(half_.size() / 2 + 1);
   std::vector<Index> last(vertex_.size(), none);
   for (HalfEdge h = 0; h < half_.size(); ++h) {
-    const Index lower = std::min(from(h), to(h));
-    const Index higher = std::max(from(h), to(h));
-    Index edge = last[lower];
-    while (edge != none && known[edge].higher != higher) {
+    const auto [near, far] = std::minmax(
+        {from(h), to(h)}, [&](Index u, Index v) { return std::pair(valence[u], u) < std::pair(valence[v], v); });
+    Index edge = last[near];
+    while (edge != none && known[edge].far != far) {
       edge = known[edge].before;
     }
     if (edge == none) {
       half_[h].edge = static_cast<Index>(known.size());
-      known.push_back({higher, last[lower]});
-      last[lower] = half_[h].edge;
+      known.push_back({far, last[near]});
+      last[near] = half_[h].edge;
       half_of_.push_back(h);
       continue;
     }
@@ -642,11 +647,8 @@ void EdgeCollapse::unlink(HalfEdge spoke, HalfEdge rim) {
 /// Stores a half-edge that leaves the vertex: of a boundary vertex the one that lies on the boundary.
 void EdgeCollapse::set_outgoing(Index vertex, HalfEdge any) {
   HalfEdge h = any;
-  while (half_[h].twin != none) {
+  while (vertex_[vertex].curve != none && half_[h].twin != none) {
     h = next(half_[h].twin);
-    if (h == any) {
-      break;
-    }
   }
   vertex_[vertex].outgoing = h;
 }
@@ -687,9 +689,15 @@ void EdgeCollapse::collapse(HalfEdge h, const Target& chosen) {
     return from(half) == vertex ? half : next(half);
   };
   set_outgoing(u, leaving(u, half_[previous(h)].edge));
-  set_outgoing(a, leaving(a, half_[previous(h)].edge));
+  // Many triangles may stand around the corners opposite the edge: they are walked only where none is at hand.
+  const auto keep_outgoing = [&](Index apex, HalfEdge dead, HalfEdge spoke) {
+    if (vertex_[apex].outgoing / 3 == dead / 3 || vertex_[apex].curve == none) {
+      set_outgoing(apex, leaving(apex, half_[spoke].edge));
+    }
+  };
+  keep_outgoing(a, h, previous(h));
   if (b != none) {
-    set_outgoing(b, leaving(b, half_[next(o)].edge));
+    keep_outgoing(b, o, next(o));
   }
   history_.push_back({given_[u], given_[v], static_cast<Index>(triangles_), centre_ + scale_ * chosen.position});
 }
