@@ -34,6 +34,9 @@ constexpr double even_rim_weight = 5;
 /// Down to this many times the triangles wanted, edges collapse in sweeps, unless shape counts (rough surfaces then
 /// come out worse by a quarter).
 constexpr std::size_t sweep_factor = 8;
+/// An edge waits while more triangles stand around its ends: to look at all of them for each of as many edges would
+/// take the square of their number. Other edges there lessen them first; ordinary vertices have six.
+constexpr Index most_around = 256;
 /// How strongly a new vertex is held near the middle of its edge where the quadric is flat. Where few planes have met
 /// it must be weak: on a fine mesh even what looks flat is curved, and the held vertices are the first to be off.
 constexpr double pull = 1e-5;
@@ -125,17 +128,17 @@ bool EdgeCollapse::connect(const TriangleMesh& mesh) {
   struct Known {
     Index far, before;
   };
-  std::vector<Index> valence(vertex_.size(), 0);
   for (const Half& half : half_) {
-    ++valence[half.from];
+    ++vertex_[half.from].triangles;
   }
   std::vector<Known> known;
   known.reserve(half_.size() / 2 + 1);
   half_of_.reserve(half_.size() / 2 + 1);
   std::vector<Index> last(vertex_.size(), none);
   for (HalfEdge h = 0; h < half_.size(); ++h) {
-    const auto [near, far] = std::minmax(
-        {from(h), to(h)}, [&](Index u, Index v) { return std::pair(valence[u], u) < std::pair(valence[v], v); });
+    const auto [near, far] = std::minmax({from(h), to(h)}, [&](Index u, Index v) {
+      return std::pair(vertex_[u].triangles, u) < std::pair(vertex_[v].triangles, v);
+    });
     Index edge = last[near];
     while (edge != none && known[edge].far != far) {
       edge = known[edge].before;
@@ -509,39 +512,6 @@ EdgeCollapse::Target EdgeCollapse::best_on_curve(HalfEdge h, const Quadric& q) c
   return best;
 }
 
-/// The costs of edges in their best places, `forbidden` for those that cannot collapse: inner ones several at once.
-void EdgeCollapse::costs_of(const std::vector<Index>& edges, std::vector<double>& costs) const {
-  costs.assign(edges.size(), forbidden);
-  std::array<HalfEdge, lane_count> together{};
-  std::array<std::size_t, lane_count> place{};
-  std::size_t waiting = 0;
-  const auto flush = [&] {
-    for (std::size_t k = waiting; k < lane_count; ++k) {
-      together[k] = together[0];
-    }
-    const Lanes found = inner_costs(together);
-    for (std::size_t k = 0; k < waiting; ++k) {
-      costs[place[k]] = found[k];
-    }
-    waiting = 0;
-  };
-  for (std::size_t i = 0; i < edges.size(); ++i) {
-    const HalfEdge h = half_of_[edges[i]];
-    if (vertex_[from(h)].curve == none && vertex_[to(h)].curve == none) {
-      together[waiting] = h;
-      place[waiting++] = i;
-      if (waiting == lane_count) {
-        flush();
-      }
-    } else if (const auto found = target(h, Placement::best)) {
-      costs[i] = found->cost();
-    }
-  }
-  if (waiting > 0) {
-    flush();
-  }
-}
-
 void EdgeCollapse::evaluate(Index edge, Placement placement) {
   placement_[edge] = placement;
   if (const auto found = target(half_of_[edge], placement)) {
@@ -557,6 +527,9 @@ void EdgeCollapse::evaluate(Index edge, Placement placement) {
 bool EdgeCollapse::keeps_topology(HalfEdge h) {
   const Index u = from(h);
   const Index v = to(h);
+  if (vertex_[u].triangles + vertex_[v].triangles > most_around) {
+    return false;
+  }
   const std::size_t expected = half_[h].twin == none ? 1 : 2;
   ++stamp_;
   neighbours_of(u, [&](Index w) { vertex_[w].mark = stamp_; });
@@ -566,14 +539,7 @@ bool EdgeCollapse::keeps_topology(HalfEdge h) {
     return false;
   }
   const auto keeps_enough = [&](Index apex) {
-    const std::size_t needed = vertex_[apex].curve == none ? 4 : 2;  // triangles: one more neighbour at a boundary
-    std::size_t triangles = 0;
-    HalfEdge spoke = vertex_[apex].outgoing;
-    do {
-      ++triangles;
-      spoke = half_[previous(spoke)].twin;
-    } while (triangles < needed && spoke != none && spoke != vertex_[apex].outgoing);
-    return triangles >= needed;
+    return vertex_[apex].triangles >= (vertex_[apex].curve == none ? 4 : 2);  // one more neighbour at a boundary
   };
   return keeps_enough(from(previous(h))) && (half_[h].twin == none || keeps_enough(from(previous(half_[h].twin))));
 }
@@ -665,11 +631,15 @@ void EdgeCollapse::collapse(HalfEdge h, const Target& chosen) {
   half_of_[half_[h].edge] = none;
   unlink(previous(h), next(h));
   triangles_ -= 1;
+  vertex_[a].triangles -= 1;
+  vertex_[u].triangles += vertex_[v].triangles - 2;
   Index b = none;
   if (o != none) {
     b = from(previous(o));
     unlink(next(o), previous(o));
     triangles_ -= 1;
+    vertex_[b].triangles -= 1;
+    vertex_[u].triangles -= 2;
   }
   vertex_[u].position = chosen.position;
   vertex_[u].quadric += vertex_[v].quadric;
