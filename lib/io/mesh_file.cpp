@@ -1,8 +1,8 @@
 // Which reader takes a file, and what holds for a mesh whatever its format.
 //
-// Each format has a reader of its own: assimp 5.2, which knows them all, keeps coordinates as floats, hangs or crashes on
-// cut PLY files and drops their further properties, takes OBJ apart into single triangles, and takes time and memory out
-// of proportion for small GLB files.
+// Each format has a reader of its own: assimp 5.2, which knows them all, keeps coordinates as floats, hangs or crashes
+// on cut PLY files and drops their further properties, takes OBJ apart into single triangles, and takes time and memory
+// out of proportion for small GLB files.
 #include "io/mesh_file.hpp"
 
 #include "core/error.hpp"

@@ -45,6 +45,7 @@ public:
 /// Errors: InputError naming the file: it cannot be read, or is neither TIFF nor PNG.
 std::unique_ptr<SliceFile> open_slices(const std::filesystem::path& path);
 
+/// As open_slices(), of a file that looks like the one or the other.
 std::unique_ptr<SliceFile> open_tiff(const std::filesystem::path& path);
 std::unique_ptr<SliceFile> open_png(const std::filesystem::path& path);
 

@@ -59,8 +59,8 @@ struct SlabSize {
 VolumeFile read_volume_slabs(const std::filesystem::path& path, const VolumeOptions& options, const SlabSize& size,
                              const SlabVisitor& visit);
 
-/// What read_volume() returns, but for the voxels, which are not read: its data is empty, of their type. Errors: as read_volume(), but for those about
-/// the voxels themselves and the end of the file.
+/// What read_volume() returns, but for the voxels, which are not read: its data is empty, of their type. Errors: as
+/// read_volume(), but for those about the voxels themselves and the end of the file.
 VolumeFile read_volume_header(const std::filesystem::path& path, const VolumeOptions& options = {});
 
 /// Writes NIfTI-1, gzip-compressed when the name ends in ".gz". World transform as sform (float32), and as qform too

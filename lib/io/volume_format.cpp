@@ -528,11 +528,6 @@ Volume::Data make_voxels(VoxelType type, std::size_t count) {
   return with_type(type, [&](auto zero) { return Volume::Data(std::vector<decltype(zero)>(count)); });
 }
 
-void set_type(VolumeFile& file, VoxelType type) {
-  file.datatype = name_of(type);
-  file.volume.data = make_voxels(type, 0);
-}
-
 std::size_t SlabSink::slices(const std::array<std::size_t, 3>& dims, VoxelType type) const {
   const std::uint64_t slice = static_cast<std::uint64_t>(dims[0]) * dims[1] * size_of(type);
   return std::clamp<std::uint64_t>(std::min<std::uint64_t>(size.bytes / slice, size.slices.value_or(dims[2])), 1,
