@@ -15,8 +15,6 @@
 
 #include <Eigen/LU>
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -88,8 +86,8 @@ void declare(CLI::App& app, Arguments& arguments) {
   app.add_option("--spacing", arguments.spacing, "mm per column, row and slice of a slice stack")->type_name("X,Y,Z");
   app.add_option(
          "--slab", arguments.slab,
-         "read N slices at a time and never hold the whole volume; the same surface (default: labels 64 MiB at a "
-         "time, a grey volume at once unless it is larger than half the memory)")
+         "read N slices at a time and never hold the whole volume; the same surface (default: 64 MiB at a time, a grey "
+         "volume up to 1 GiB at once)")
       ->check(cli::whole_number(1))
       ->type_name("N");
   app.add_flag("--info", arguments.info, "print size, spacing, orientation and labels with volumes, and stop");
@@ -598,12 +596,13 @@ void run_all_labels(cli::Tool& tool, const Arguments& arguments, const Smoothing
   tool.result()["labels"] = results;
 }
 
-// The values of a grey volume are held while they leave room for the rest, or where they are smoothed.
+// The values of a grey volume are held where they are smoothed, or where that spares a second reading for little: a
+// quarter of the memory that a case of the pipeline has.
 bool hold_values(const Arguments& arguments, const Smoothing& smoothing, const VolumeFile& header) {
-  const auto memory = static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
-  constexpr double most_bytes = 8;  // of a voxel
+  constexpr std::size_t most_bytes = std::size_t{1} << 30;
+  const std::size_t voxel_bytes = std::visit([](const auto& values) { return sizeof(values[0]); }, header.volume.data);
   return smoothing.kind == Smoothing::Kind::gaussian ||
-         (!arguments.slab && most_bytes * static_cast<double>(header.volume.voxels()) < 0.5 * memory);
+         (!arguments.slab && header.volume.voxels() <= most_bytes / voxel_bytes);
 }
 
 Json run_isovalue(cli::Tool& tool, const Arguments& arguments, const Smoothing& smoothing) {

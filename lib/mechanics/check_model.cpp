@@ -81,6 +81,7 @@ void check_triangles(const ShellBody& body) {
   edges.reserve(3 * mesh.triangles.size());
   const auto key = [](Index a, Index b) { return (std::uint64_t{a} << 32) | b; };
   std::set<std::array<Index, 3>> seen;
+  std::string inconsistent;  // said only when no third triangle meets there
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     const auto& v = mesh.triangles[t];
     for (const Index i : v) {
@@ -107,12 +108,16 @@ void check_triangles(const ShellBody& body) {
                                  from, to, place(mesh.vertices[from]), t));
       }
       const auto [other, is_new] = half_edges.emplace(key(from, to), t);
-      if (!is_new) {
-        refuse(body, fmt::format("elements {} and {} at {} have inconsistent orientation: the normals of one point "
-                                 "inward; orient the mesh",
-                                 other->second, t, place(mesh.vertices[from])));
+      if (!is_new && inconsistent.empty()) {
+        inconsistent = fmt::format(
+            "elements {} and {} at {} have inconsistent orientation: the normals of one point "
+            "inward; orient the mesh",
+            other->second, t, place(mesh.vertices[from]));
       }
     }
+  }
+  if (!inconsistent.empty()) {
+    refuse(body, inconsistent);
   }
   if (body.curved && mesh.corner_normals.empty() && mesh.normals.size() != mesh.vertices.size()) {
     refuse(body, fmt::format("{} normals for {} nodes", mesh.normals.size(), mesh.vertices.size()));

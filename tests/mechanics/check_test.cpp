@@ -45,6 +45,23 @@ TEST(CheckModel, NamesAFlippedElement) {
   expect_refused(model, "inconsistent orientation");
 }
 
+TEST(CheckModel, NamesAnEdgeOfThreeElementsAsThatWhateverTheirOrder) {
+  Model model = plate();
+  ShellMesh& mesh = model.shells[0].mesh;
+  const auto runs = [](const std::array<Index, 3>& t, Index from, Index to) {
+    return (t[0] == from && t[1] == to) || (t[1] == from && t[2] == to) || (t[2] == from && t[0] == to);
+  };
+  const auto inner = std::find_if(mesh.triangles.begin(), mesh.triangles.end(), [&](const auto& t) {
+    return std::any_of(mesh.triangles.begin(), mesh.triangles.end(),
+                       [&](const auto& s) { return runs(s, t[1], t[0]); });
+  });
+  ASSERT_NE(inner, mesh.triangles.end());
+  mesh.vertices.emplace_back(0.5, 0.5, 1.0);
+  mesh.triangles.insert(mesh.triangles.begin(),
+                        {(*inner)[0], (*inner)[1], static_cast<Index>(mesh.vertices.size() - 1)});
+  expect_refused(model, "non-manifold");
+}
+
 TEST(CheckModel, NamesADoubleElement) {
   Model model = plate();
   model.shells[0].mesh.triangles.push_back(model.shells[0].mesh.triangles[4]);
