@@ -485,7 +485,7 @@ int main(int argc, char** argv) {
       "to the target, both ways.",
       "tunica-relax coarse.ply surface.ply shell.ply --tolerance 1% --refine --picture map.png --report relax.json\n"
       "tunica-relax coarse.ply surface.ply paper.ply --method barycentre --max-iterations 5\n"
-      "tunica-relax surface.ply surface.ply quick.ply --tolerance 1% --effort 0");
+      "tunica-relax coarse.ply surface.ply quick.ply --shells 200");
   Arguments given;
   declare(tool, given);
   tool.stages({"read", "relax", "measure", "write"});
