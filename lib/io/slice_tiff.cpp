@@ -100,7 +100,14 @@ public:
   }
 
   void decode(char* to) override {
-    if (TIFFIsTiled(tiff_.get()) != 0) {
+    starts_.clear();
+    const bool tiled = TIFFIsTiled(tiff_.get()) != 0;
+    const std::uint32_t parts = tiled ? TIFFNumberOfTiles(tiff_.get()) : TIFFNumberOfStrips(tiff_.get());
+    for (std::uint32_t part = 0; part < parts && !compressed_; ++part) {
+      starts_.push_back(TIFFGetStrileOffset(tiff_.get(), part));
+    }
+    std::sort(starts_.begin(), starts_.end());
+    if (tiled) {
       decode_tiles(to);
     } else {
       decode_strips(to);
@@ -211,8 +218,12 @@ private:
   }
 
   void require(const char* what, std::uint32_t index, tmsize_t got, std::uint64_t wanted) {
-    // What is not compressed is read on behind the strip's end.
-    const bool too_short = !compressed_ && TIFFGetStrileByteCount(tiff_.get(), index) < wanted;
+    // What is not compressed is read on behind the strip's end, into the next one where libtiff takes the byte counts
+    // for wrong ones.
+    const std::uint64_t start = TIFFGetStrileOffset(tiff_.get(), index);
+    const auto next = std::upper_bound(starts_.begin(), starts_.end(), start);
+    const bool too_short = !compressed_ && (TIFFGetStrileByteCount(tiff_.get(), index) < wanted ||
+                                            (next != starts_.end() && *next - start < wanted));
     if (got < 0 || static_cast<std::uint64_t>(got) != wanted || too_short || complained_) {
       refuse(fmt::format("cannot be decoded: its {} {} is truncated or corrupt; get the file again", what, index));
     }
@@ -265,8 +276,9 @@ private:
   std::optional<std::size_t> page_;
   SliceHeader header_;
   bool compressed_ = false;
-  double most_bytes_ = 0;  // that the file can hold when it is compressed like this page
-  double needed_ = 0;      // bytes of the file for all pages so far
+  std::vector<std::uint64_t> starts_;  // of the strips or tiles of a page that is not compressed, sorted
+  double most_bytes_ = 0;              // that the file can hold when it is compressed like this page
+  double needed_ = 0;                  // bytes of the file for all pages so far
   std::unique_ptr<TIFF, void (*)(TIFF*)> tiff_;
 };
 

@@ -3,10 +3,12 @@ parsed here and compared with the voxels as numpy and nibabel see them."""
 import json
 import os
 import pathlib
+import struct
 import subprocess
 import sys
 import tempfile
 import unittest
+import zlib
 
 import nibabel
 import numpy
@@ -492,6 +494,32 @@ class Damage(ExtractTest):
         record, stderr = self.run_tool(path, self.out, "--label", 1, code=3)
         self.assertIn("truncated", stderr)
         self.assertLess(record["peak_mib"], 200)
+
+    def test_a_damaged_strip_is_no_black_one(self):
+        noise = (numpy.random.default_rng(5).random((40, 50)) > 0.5).astype(numpy.uint8).tobytes()
+        for damaged in (False, True):
+            packed = bytearray(zlib.compress(noise))
+            if damaged:
+                packed[len(packed) // 2:-8] = b"\xff" * (len(packed) - len(packed) // 2 - 8)
+            path = self.folder / "v.tif"
+            path.write_bytes(deflated_tiff(50, 40, bytes(packed), pages=3))
+            words = (path, self.out, "--label", 1, "--spacing", "1,1,1")
+            if damaged:
+                self.refuse(3, *words, saying="strip 0 is truncated or corrupt; get the file again")
+            else:
+                self.run_tool(*words)
+
+
+def deflated_tiff(width, height, packed, pages):
+    """Pages of bytes that are one strip each, the same one."""
+    data = b"II*\0" + struct.pack("<I", 8 + len(packed)) + packed
+    for page in range(pages):
+        tags = [(256, width), (257, height), (258, 8), (259, 8), (262, 1), (273, 8), (277, 1), (278, height),
+                (279, len(packed))]
+        directory = struct.pack("<H", len(tags)) + b"".join(struct.pack("<HHII", tag, 4, 1, value) for tag, value in tags)
+        following = len(data) + len(directory) + 4 if page + 1 < pages else 0
+        data += directory + struct.pack("<I", following)
+    return data
 
 
 @unittest.skipUnless((SHARED / "volumes").is_dir(), f"the shared volumes are absent ({SHARED})")
