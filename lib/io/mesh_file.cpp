@@ -102,6 +102,9 @@ void require_valid(const MeshFile& file, const std::string& name) {
 }
 
 void require_unit_normal(Vec3& normal, const std::string& name, const std::string& place) {
+  if (!normal.allFinite()) {
+    throw InputError(fmt::format("{}: the normal of {} has components that are no numbers", name, place));
+  }
   const double length = normal.norm();
   if (!(std::abs(length - 1) <= unit_length_tolerance)) {
     throw InputError(fmt::format("{}: the normal of {} has the length {}, 1 is expected", name, place, length));

@@ -244,12 +244,14 @@ nearest = ["0mm", "0mm", "10mm"]
         self.refused("--resume", "out.hdf.part", says="out.hdf.part.states")
         os.remove(self.path("out.hdf.part"))
         self.interrupted()
-        os.rename(self.path("out.hdf.part"), self.path("away"))
+        for name in LEFT:
+            os.rename(self.path(name), self.path("away." + name))
         self.refused("--resume", "out.hdf.part", says="no such file")
         self.write("out.hdf", "a result")
         self.run_tool("--resume", "out.hdf.part", expect=3)
         self.assertIn("is complete, there is nothing to resume", self.done.stderr)
-        os.rename(self.path("away"), self.path("out.hdf.part"))
+        for name in LEFT:
+            os.rename(self.path("away." + name), self.path(name))
         self.run_tool("--resume", "out.hdf.part", expect=5)  # never replaced unasked
         os.remove(self.path("out.hdf"))
         self.run_tool("--resume", "out.hdf.part")
