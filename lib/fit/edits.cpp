@@ -1,0 +1,649 @@
+// Every edit is a trial: patches in place of others, one node placed by least squares, all beside the mesh.
+#include "fit/edits.hpp"
+
+#include "core/threads.hpp"
+#include "fit/least_squares.hpp"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+#include <queue>
+
+namespace tunica {
+namespace {
+
+constexpr double joins_features = 0.1;    // shortfall of an edge between two features: as an angle of two thirds
+constexpr double hopeless = 8;            // times the limit after the first step
+constexpr int placing_steps = 3;          // of least squares, then largest errors, twice
+constexpr int largest_power = 6;          // of the residuals, where the largest counts
+constexpr std::size_t tried_at_once = 8;  // collapses, whatever the number of threads
+constexpr double worth_it = 0.97;         // of an error or a shortfall
+
+Vec2 middle_of_edge(std::size_t k) {
+  const std::array<Vec2, 3> middles{Vec2(0.5, 0), Vec2(0.5, 0.5), Vec2(0, 0.5)};
+  return middles[k];
+}
+
+/// The edge of a patch between two of its nodes.
+std::size_t edge_of(const FitPatch& p, Index u, Index v) {
+  const std::size_t a = p.corner_of(u), b = p.corner_of(v);
+  return b == (a + 1) % 3 ? a : b;
+}
+
+double size_shortfall(double longest, double neighbours, double ratio) {
+  const double excess = neighbours > 0 ? std::max(longest / neighbours, neighbours / longest) / ratio - 1 : 0;
+  return excess > 0 ? excess * excess : 0;
+}
+
+/// Shapes of the patches to be removed, as they are.
+double shortfall_of(const FitMesh& mesh, const std::vector<Index>& patches, const ShapeLimits& limits) {
+  double sum = 0;
+  for (const Index t : patches) {
+    const FitPatch& p = mesh.patches[t];
+    sum += shape_shortfall(mesh, p, limits);
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Index u = p.nodes[k], v = p.nodes[(k + 1) % 3];
+      const auto pair = mesh.on_edge(u, v);
+      const Index other = pair[0] == t ? pair[1] : pair[0];
+      if (other == no_index) {
+        continue;
+      }
+      sum += size_shortfall(mesh.longest_edge(p), mesh.longest_edge(mesh.patches[other]), limits.size_ratio);
+      if (!p.is_creased(k) && mesh.rank(u) > 0 && mesh.rank(v) > 0) {
+        sum += joins_features;
+      }
+    }
+  }
+  return sum;
+}
+
+/// Builds the piece of an edit and says what its patches' shapes lack.
+class PieceBuilder {
+public:
+  PieceBuilder(const FitMesh& mesh, const ShapeLimits& limits, Trial& trial)
+      : mesh_(mesh), limits_(limits), trial_(trial), piece_(trial.piece) {}
+
+  void build() {
+    const Edit& edit = trial_.edit;
+    piece_.kind = mesh_.kind;
+    for (const Edit::Added& added : edit.added) {
+      FitPatch p;
+      for (std::size_t k = 0; k < 3; ++k) {
+        p.nodes[k] = local_node(added.nodes[k]);
+        p.slots[k] = local_slot(added.slots[k], p.nodes[k]);
+      }
+      p.guesses = mesh_.patches[added.like].guesses;
+      piece_.patches.push_back(std::move(p));
+    }
+    outside_.assign(edit.added.size(), {0, 0, 0});
+    inside_.assign(edit.added.size(), {no_index, no_index, no_index});
+    joins_.assign(edit.added.size(), 0);
+    for (std::size_t i = 0; i < edit.added.size(); ++i) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        look_across(i, k);
+      }
+    }
+    for (const Index t : edit.removed) {
+      const auto& attached = mesh_.patches[t].attached;
+      piece_.points.insert(piece_.points.end(), attached.begin(), attached.end());
+    }
+    std::sort(piece_.points.begin(), piece_.points.end());
+  }
+
+  [[nodiscard]] double shortfall() const {
+    double sum = 0;
+    for (std::size_t i = 0; i < piece_.patches.size(); ++i) {
+      const FitPatch& p = piece_.patches[i];
+      sum += shape_shortfall(piece_, p, limits_) + joins_[i];
+      for (std::size_t k = 0; k < 3; ++k) {
+        const double neighbours =
+            inside_[i][k] != no_index ? piece_.longest_edge(piece_.patches[inside_[i][k]]) : outside_[i][k];
+        sum += size_shortfall(piece_.longest_edge(p), neighbours, limits_.size_ratio);
+      }
+    }
+    return sum;
+  }
+
+private:
+  Index local_node(Index node) {
+    auto& known = trial_.nodes;
+    const auto at = std::find(known.begin(), known.end(), node);
+    if (at != known.end()) {
+      return static_cast<Index>(at - known.begin());
+    }
+    known.push_back(node);
+    const bool moves = node == trial_.edit.node;
+    piece_.positions.push_back(moves ? trial_.edit.starts[0] : mesh_.positions[node]);
+    piece_.free.push_back(moves ? 1 : 0);
+    return static_cast<Index>(known.size() - 1);
+  }
+
+  Index local_slot(Index slot, Index node) {
+    auto& known = trial_.slots;
+    const auto at = std::find(known.begin(), known.end(), slot);
+    if (at != known.end()) {
+      return static_cast<Index>(at - known.begin());
+    }
+    known.push_back(slot);
+    const auto& starts = trial_.edit.normals;
+    const auto start = std::find_if(starts.begin(), starts.end(), [&](const auto& s) { return s.first == slot; });
+    piece_.normals.push_back(start != starts.end() ? start->second : mesh_.normals[slot]);
+    piece_.node_of_slot.push_back(node);
+    return static_cast<Index>(known.size() - 1);
+  }
+
+  void look_across(std::size_t i, std::size_t k) {
+    const Edit& edit = trial_.edit;
+    const Index u = edit.added[i].nodes[k], v = edit.added[i].nodes[(k + 1) % 3];
+    FitPatch& p = piece_.patches[i];
+    p.across[k] = {p.slots[k], p.slots[(k + 1) % 3]};
+    for (std::size_t j = 0; j < edit.added.size(); ++j) {
+      const FitPatch& q = piece_.patches[j];
+      const std::size_t a = q.corner_of(p.nodes[k]);
+      if (j != i && q.has(p.nodes[k]) && q.nodes[(a + 2) % 3] == p.nodes[(k + 1) % 3]) {
+        inside_[i][k] = static_cast<Index>(j);
+        p.across[k] = {q.slots[a], q.slots[(a + 2) % 3]};
+      }
+    }
+    Index other = no_index;
+    if (inside_[i][k] == no_index && u < mesh_.around.size() && v < mesh_.around.size()) {
+      for (const Index t : mesh_.on_edge(u, v)) {
+        if (t != no_index && std::find(edit.removed.begin(), edit.removed.end(), t) == edit.removed.end()) {
+          other = t;
+        }
+      }
+    }
+    if (other != no_index) {
+      const FitPatch& q = mesh_.patches[other];
+      p.across[k] = {local_slot(q.slots[q.corner_of(u)], p.nodes[k]),
+                     local_slot(q.slots[q.corner_of(v)], p.nodes[(k + 1) % 3])};
+      outside_[i][k] = mesh_.longest_edge(q);
+    } else if (inside_[i][k] == no_index) {
+      p.boundary |= static_cast<EdgeBits>(1U << k);
+    }
+    const auto is_on_feature = [&](Index node) { return (node == edit.node ? edit.rank : mesh_.rank(node)) > 0; };
+    if ((p.boundary >> k & 1) == 0 && !p.is_creased(k) && is_on_feature(u) && is_on_feature(v)) {
+      joins_[i] += joins_features;
+    }
+  }
+
+  const FitMesh& mesh_;
+  const ShapeLimits& limits_;
+  Trial& trial_;
+  FitPiece& piece_;
+  std::vector<std::array<double, 3>> outside_;  // longest edges of neighbours
+  std::vector<std::array<Index, 3>> inside_;    // neighbours within the piece
+  std::vector<double> joins_;
+};
+
+double largest_error(const FitPiece& piece) {
+  double largest = 0;
+  for (const FitPatch& p : piece.patches) {
+    largest = std::max(largest, p.error);
+  }
+  return largest;
+}
+
+}  // namespace
+
+Trial tried(const FitMesh& mesh, const FitSamples& samples, const FitLimits& limits, Edit edit, int steps) {
+  Trial trial;
+  trial.edit = std::move(edit);
+  for (const Index t : trial.edit.removed) {
+    trial.error_before = std::max(trial.error_before, mesh.patches[t].error);
+  }
+  trial.shortfall_before = shortfall_of(mesh, trial.edit.removed, limits.shape);
+  trial.error = std::numeric_limits<double>::infinity();
+  FitPiece& piece = trial.piece;
+  PieceBuilder builder(mesh, limits.shape, trial);
+  builder.build();
+  const auto keeps_shape = [&] {
+    trial.shortfall = builder.shortfall();
+    return trial.shortfall <= trial.shortfall_before + 1e-6;
+  };
+  bool sound = keeps_shape();
+  for (std::size_t i = 1; i < trial.edit.starts.size() && !sound; ++i) {
+    const auto moved = std::find(piece.free.begin(), piece.free.end(), 1) - piece.free.begin();
+    piece.positions[static_cast<std::size_t>(moved)] = trial.edit.starts[i];
+    sound = keeps_shape();
+  }
+  if (!sound) {
+    return trial;
+  }
+  samples.attach(piece);
+  for (FitPatch& p : piece.patches) {
+    samples.measure(piece, p, limits.error);
+  }
+  SquaresOptions squares;
+  squares.shape = limits.shape;
+  squares.doubted = limits.error;
+  for (int step = 0; step < steps && trial.edit.node != no_index; ++step) {
+    squares.power = step == 0 ? 2 : largest_power;
+    if (least_squares_step(piece, samples, squares) >= 1 || largest_error(piece) > hopeless * limits.error) {
+      break;
+    }
+  }
+  if (keeps_shape()) {
+    trial.error = largest_error(piece);
+  }
+  return trial;
+}
+
+void apply(FitMesh& mesh, Trial&& trial) {
+  const Edit& edit = trial.edit;
+  for (const Index t : edit.removed) {
+    mesh.remove_patch(t);
+  }
+  if (edit.node != no_index && edit.node >= mesh.positions.size()) {
+    mesh.positions.emplace_back();
+    mesh.free.push_back(1);
+    mesh.around.emplace_back();
+  }
+  for (const auto& [slot, normal] : edit.normals) {
+    if (slot >= mesh.normals.size()) {
+      mesh.normals.push_back(normal);
+      mesh.node_of_slot.push_back(edit.node);
+    }
+  }
+  for (std::size_t v = 0; v < trial.nodes.size(); ++v) {
+    if (trial.piece.free[v] != 0) {
+      mesh.positions[trial.nodes[v]] = trial.piece.positions[v];
+    }
+  }
+  for (std::size_t s = 0; s < trial.slots.size(); ++s) {
+    mesh.normals[trial.slots[s]] = trial.piece.normals[s];
+  }
+  std::vector<Index> changed;
+  for (std::size_t i = 0; i < edit.added.size(); ++i) {
+    const Index t = mesh.add_patch(edit.added[i].nodes, edit.added[i].slots);
+    FitPatch &to = mesh.patches[t], &from = trial.piece.patches[i];
+    to.attached = std::move(from.attached);
+    to.guesses = std::move(from.guesses);
+    to.residuals = std::move(from.residuals);
+    to.error = from.error;
+    changed.push_back(t);
+  }
+  for (std::size_t i = 0, count = changed.size(); i < count; ++i) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const FitPatch& p = mesh.patches[changed[i]];
+      for (const Index t : mesh.on_edge(p.nodes[k], p.nodes[(k + 1) % 3])) {
+        if (t != no_index) {
+          changed.push_back(t);
+        }
+      }
+    }
+  }
+  for (const Index t : changed) {
+    mesh.refresh(t);
+  }
+}
+
+std::optional<Edit> collapse(const FitMesh& mesh, const FitSamples& samples, Index u, Index v) {
+  const auto pair = mesh.on_edge(u, v);
+  const std::size_t on_edge = pair[1] != no_index ? 2 : 1;
+  const auto ring_u = mesh.ring(u), ring_v = mesh.ring(v);
+  std::vector<Index> common;
+  std::set_intersection(ring_u.begin(), ring_u.end(), ring_v.begin(), ring_v.end(), std::back_inserter(common));
+  if (common.size() != on_edge || mesh.alive <= 4 || ring_u.size() + ring_v.size() < on_edge + 5) {
+    return {};
+  }
+  for (const Index w : common) {
+    const bool at_boundary = mesh.ring(w).size() > mesh.around[w].size();
+    if (mesh.around[w].size() <= (at_boundary ? 1U : 3U)) {
+      return {};
+    }
+  }
+  // The end that is more than the other stays; it takes the other's place in all patches.
+  const int rank_u = mesh.rank(u), rank_v = mesh.rank(v), along = mesh.is_feature(u, v) ? 1 : 0;
+  const Index kept = rank_u >= rank_v ? u : v, gone = rank_u >= rank_v ? v : u;
+  if (std::min(rank_u, rank_v) != along) {
+    return {};
+  }
+  Edit edit;
+  edit.node = kept;
+  edit.rank = std::max(rank_u, rank_v);
+  const auto slot_at = [&](Index t, Index node) { return mesh.patches[t].slots[mesh.patches[t].corner_of(node)]; };
+  std::vector<std::pair<Index, Index>> becomes;  // slots of the node that goes: those it becomes
+  for (std::size_t i = 0; i < on_edge; ++i) {
+    becomes.emplace_back(slot_at(pair[i], gone), slot_at(pair[i], kept));
+  }
+  edit.removed.assign(pair.begin(), pair.begin() + static_cast<std::ptrdiff_t>(on_edge));
+  for (const Index node : {kept, gone}) {
+    for (const Index t : mesh.around[node]) {
+      if (t == pair[0] || t == pair[1]) {
+        continue;
+      }
+      edit.removed.push_back(t);
+      Edit::Added added{mesh.patches[t].nodes, mesh.patches[t].slots, t};
+      if (node == gone) {
+        const std::size_t k = mesh.patches[t].corner_of(gone);
+        const auto to =
+            std::find_if(becomes.begin(), becomes.end(), [&](const auto& b) { return b.first == added.slots[k]; });
+        if (to == becomes.end()) {
+          return {};
+        }
+        added.nodes[k] = kept;
+        added.slots[k] = to->second;
+      }
+      edit.added.push_back(added);
+    }
+  }
+  const bool equal = rank_u == rank_v;
+  for (const auto& [of_gone, of_kept] : becomes) {
+    const Vec3 mean = mesh.normals[of_gone] + mesh.normals[of_kept];
+    edit.normals.emplace_back(of_kept, equal && mean.norm() > 1 ? Vec3(mean.normalized()) : mesh.normals[of_kept]);
+  }
+  if (!equal) {
+    edit.starts = {mesh.positions[kept]};
+    return edit;
+  }
+  const Vec3 middle = (mesh.positions[u] + mesh.positions[v]) / 2;
+  const Vec3& normal = edit.normals[0].second;
+  edit.starts = {along != 0 ? middle : samples.foot(middle, normal).point, mesh.positions[u], mesh.positions[v]};
+  if (along == 0) {
+    Vec3 sum = Vec3::Zero();
+    double count = 0;
+    for (const auto* ring : {&ring_u, &ring_v}) {
+      for (const Index w : *ring) {
+        sum += w == u || w == v ? Vec3(Vec3::Zero()) : mesh.positions[w];
+        count += w == u || w == v ? 0 : 1;
+      }
+    }
+    edit.starts.push_back(samples.foot(sum / count, normal).point);
+  }
+  return edit;
+}
+
+std::optional<Edit> flip(const FitMesh& mesh, Index u, Index v) {
+  const auto [s, t] = mesh.on_edge(u, v);
+  if (t == no_index || mesh.is_feature(u, v)) {
+    return {};
+  }
+  const FitPatch &p = mesh.patches[s], &q = mesh.patches[t];
+  // p: a b c; q: b a d.
+  const std::size_t k = edge_of(p, u, v), l = edge_of(q, u, v);
+  const Index a = p.nodes[k], b = p.nodes[(k + 1) % 3], c = p.nodes[(k + 2) % 3], d = q.nodes[(l + 2) % 3];
+  const auto fewest = [&](Index node) { return mesh.ring(node).size() > mesh.around[node].size() ? 1U : 3U; };
+  if (c == d || mesh.on_edge(c, d)[0] != no_index || mesh.around[a].size() <= fewest(a) ||
+      mesh.around[b].size() <= fewest(b)) {
+    return {};
+  }
+  const Index slot_a = p.slots[k], slot_b = p.slots[(k + 1) % 3], slot_c = p.slots[(k + 2) % 3],
+              slot_d = q.slots[(l + 2) % 3];
+  Edit edit;
+  edit.removed = {s, t};
+  edit.added = {{{a, d, c}, {slot_a, slot_d, slot_c}, s}, {{d, b, c}, {slot_d, slot_b, slot_c}, t}};
+  return edit;
+}
+
+Edit split(const FitMesh& mesh, Index u, Index v) {
+  Edit edit;
+  edit.node = static_cast<Index>(mesh.positions.size());
+  edit.rank = mesh.is_feature(u, v) ? 1 : 0;
+  Vec3 place = Vec3::Zero();
+  double sides = 0;
+  for (const Index t : mesh.on_edge(u, v)) {
+    if (t == no_index) {
+      continue;
+    }
+    const FitPatch& p = mesh.patches[t];
+    const std::size_t k = edge_of(p, u, v);
+    const CubicPatch surface = mesh.surface(p);
+    const Vec3 normal = surface.normal(middle_of_edge(k));
+    place += surface.point(middle_of_edge(k));
+    if (edit.normals.empty() || edit.rank > 0) {
+      edit.normals.emplace_back(static_cast<Index>(mesh.normals.size() + edit.normals.size()), normal);
+    } else {
+      edit.normals[0].second = (edit.normals[0].second + normal).normalized();
+    }
+    sides += 1;
+    edit.removed.push_back(t);
+    for (const std::size_t end : {k, (k + 1) % 3}) {
+      Edit::Added half{p.nodes, p.slots, t};
+      half.nodes[end] = edit.node;
+      half.slots[end] = edit.normals.back().first;
+      edit.added.push_back(half);
+    }
+  }
+  edit.starts = {place / sides, (mesh.positions[u] + mesh.positions[v]) / 2};
+  return edit;
+}
+
+Edit move(const FitMesh& mesh, Index node, const Vec3& start) {
+  Edit edit;
+  edit.node = node;
+  edit.rank = mesh.rank(node);
+  edit.starts = {start};
+  edit.removed = mesh.around[node];
+  for (const Index t : edit.removed) {
+    const FitPatch& p = mesh.patches[t];
+    edit.added.push_back({p.nodes, p.slots, t});
+  }
+  return edit;
+}
+
+namespace {
+
+/// An edge that may go, and what that is known or guessed to cost.
+struct Candidate {
+  double error;
+  Index u, v;
+  unsigned version;  // of its surroundings when it was tried; 0: never
+  bool operator<(const Candidate& o) const {
+    return error != o.error ? error > o.error : u != o.u ? u > o.u : v > o.v;
+  }
+};
+
+/// Edges in the order of their errors; tried when their turn comes, tried again when what surrounds them has changed.
+class CollapseQueue {
+public:
+  CollapseQueue(FitMesh& mesh, const FitSamples& samples, const FitLimits& limits)
+      : mesh_(mesh), samples_(samples), limits_(limits), version_(mesh.positions.size(), 1) {
+    for (const auto& [u, v] : mesh.edges()) {
+      push_guess(u, v);
+    }
+  }
+
+  /// @return whether an edge collapsed
+  bool collapse_next() {
+    while (!queue_.empty()) {
+      if (!is_known(queue_.top())) {
+        try_some();
+        continue;
+      }
+      const Candidate best = queue_.top();
+      queue_.pop();
+      if (mesh_.around[best.u].empty() || mesh_.around[best.v].empty()) {
+        continue;
+      }
+      auto edit = collapse(mesh_, samples_, best.u, best.v);
+      Trial trial = tried(mesh_, samples_, limits_, *std::move(edit), placing_steps);
+      if (!(trial.error <= limits_.error)) {
+        continue;
+      }
+      const Index kept = trial.edit.node;
+      apply(mesh_, std::move(trial));
+      ++version_[kept];
+      const auto ring = mesh_.ring(kept);
+      for (const Index w : ring) {
+        ++version_[w];
+      }
+      for (const Index w : ring) {
+        push_guess(kept, w);
+      }
+      return true;
+    }
+    return false;
+  }
+
+private:
+  [[nodiscard]] unsigned now(Index u, Index v) const { return version_[u] + version_[v]; }
+  [[nodiscard]] bool is_known(const Candidate& c) const { return c.version == now(c.u, c.v); }
+
+  /// Below the truth: the largest error around.
+  void push_guess(Index u, Index v) {
+    double error = 0;
+    for (const Index node : {u, v}) {
+      for (const Index t : mesh_.around[node]) {
+        error = std::max(error, mesh_.patches[t].error);
+      }
+    }
+    queue_.push({error, std::min(u, v), std::max(u, v), 0});
+  }
+
+  void try_some() {
+    std::vector<Candidate> some;
+    while (!queue_.empty() && some.size() < tried_at_once && !is_known(queue_.top())) {
+      const Candidate c = queue_.top();
+      queue_.pop();
+      if (c.error <= limits_.error && !mesh_.around[c.u].empty() && !mesh_.around[c.v].empty()) {
+        some.push_back(c);
+      }
+    }
+    parallel_for_blocks(some.size(), 1, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        auto edit = collapse(mesh_, samples_, some[i].u, some[i].v);
+        some[i].error = edit ? tried(mesh_, samples_, limits_, *std::move(edit), placing_steps).error
+                             : std::numeric_limits<double>::infinity();
+      }
+    });
+    for (Candidate& c : some) {
+      if (std::isfinite(c.error) && c.error <= limits_.error) {
+        c.version = now(c.u, c.v);
+        queue_.push(c);
+      }
+    }
+  }
+
+  FitMesh& mesh_;
+  const FitSamples& samples_;
+  const FitLimits& limits_;
+  std::vector<unsigned> version_;
+  std::priority_queue<Candidate> queue_;
+};
+
+}  // namespace
+
+void collapse_edges(FitMesh& mesh, const FitSamples& samples, const FitLimits& limits, std::size_t shells,
+                    const Progress& progress) {
+  CollapseQueue queue(mesh, samples, limits);
+  const std::size_t before = mesh.alive;
+  while (mesh.alive > shells && queue.collapse_next()) {
+    tunica::advance(progress, 1 - static_cast<double>(mesh.alive) / static_cast<double>(before));
+  }
+}
+
+void flip_edges(FitMesh& mesh, const FitSamples& samples, const FitLimits& limits) {
+  for (const auto& [u, v] : mesh.edges()) {
+    if (auto edit = flip(mesh, u, v)) {
+      Trial trial = tried(mesh, samples, limits, *std::move(edit), 0);
+      if (trial.error < worth_it * trial.error_before) {
+        apply(mesh, std::move(trial));
+      }
+    }
+  }
+}
+
+namespace {
+
+/// The edits that may mend a patch, the gentlest first.
+std::vector<Edit> mendings(const FitMesh& mesh, const FitSamples& samples, Index t, bool may_split) {
+  std::vector<Edit> out;
+  const FitPatch& p = mesh.patches[t];
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (auto edit = flip(mesh, p.nodes[k], p.nodes[(k + 1) % 3])) {
+      out.push_back(*std::move(edit));
+    }
+  }
+  for (const Index v : p.nodes) {
+    if (mesh.rank(v) == 0) {
+      const auto ring = mesh.ring(v);
+      Vec3 sum = Vec3::Zero();
+      for (const Index w : ring) {
+        sum += mesh.positions[w];
+      }
+      const Vec3 middle = samples.foot(sum / static_cast<double>(ring.size()), mesh.facing(p)).point;
+      out.push_back(move(mesh, v, middle));
+      out.push_back(move(mesh, v, (middle + mesh.positions[v]) / 2));
+    }
+  }
+  std::size_t longest = 0;
+  double length = 0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Index u = p.nodes[k], v = p.nodes[(k + 1) % 3];
+    if (auto edit = collapse(mesh, samples, u, v)) {
+      out.push_back(*std::move(edit));
+    }
+    if (const double its = (mesh.positions[u] - mesh.positions[v]).norm(); its > length) {
+      length = its;
+      longest = k;
+    }
+  }
+  if (may_split) {
+    out.push_back(split(mesh, p.nodes[longest], p.nodes[(longest + 1) % 3]));
+  }
+  return out;
+}
+
+}  // namespace
+
+void mend_shapes(FitMesh& mesh, const FitSamples& samples, const FitLimits& limits, std::size_t most) {
+  std::vector<std::pair<double, Index>> wanting;
+  for (Index t = 0; t < mesh.patches.size(); ++t) {
+    if (mesh.patches[t].is_alive()) {
+      if (const double shortfall = shortfall_of(mesh, {t}, limits.shape); shortfall > 0) {
+        wanting.emplace_back(-shortfall, t);
+      }
+    }
+  }
+  std::sort(wanting.begin(), wanting.end());
+  for (const auto& [shortfall, t] : wanting) {
+    if (!mesh.patches[t].is_alive() || shortfall_of(mesh, {t}, limits.shape) <= 0) {
+      continue;
+    }
+    for (Edit& edit : mendings(mesh, samples, t, mesh.alive + 2 <= most)) {
+      Trial trial = tried(mesh, samples, limits, std::move(edit), placing_steps);
+      if (trial.error <= std::max(limits.error, trial.error_before) &&
+          trial.shortfall < worth_it * trial.shortfall_before) {
+        apply(mesh, std::move(trial));
+        break;
+      }
+    }
+  }
+}
+
+std::size_t split_worst(FitMesh& mesh, const FitSamples& samples, const FitLimits& limits, std::size_t count) {
+  std::vector<std::pair<double, Index>> worst;
+  for (Index t = 0; t < mesh.patches.size(); ++t) {
+    if (mesh.patches[t].is_alive() && mesh.patches[t].error > limits.error) {
+      worst.emplace_back(-mesh.patches[t].error, t);
+    }
+  }
+  std::sort(worst.begin(), worst.end());
+  std::size_t done = 0;
+  for (const auto& [error, t] : worst) {
+    const FitPatch& p = mesh.patches[t];
+    if (done >= count || !p.is_alive() || p.error != -error) {
+      continue;
+    }
+    std::size_t longest = 0;
+    for (std::size_t k = 1; k < 3; ++k) {
+      const auto length = [&](std::size_t e) {
+        return (mesh.positions[p.nodes[(e + 1) % 3]] - mesh.positions[p.nodes[e]]).norm();
+      };
+      longest = length(k) > length(longest) ? k : longest;
+    }
+    FitLimits anything = limits;
+    anything.shape.min_angle = limits.shape.min_angle / 2;  // a half's angles may be, for the while
+    Trial trial = tried(mesh, samples, anything, split(mesh, p.nodes[longest], p.nodes[(longest + 1) % 3]),
+                        placing_steps);
+    if (std::isfinite(trial.error)) {
+      apply(mesh, std::move(trial));
+      ++done;
+    }
+  }
+  return done;
+}
+
+}  // namespace tunica

@@ -1,0 +1,285 @@
+#include "fit/fit.hpp"
+
+#include "core/error.hpp"
+#include "fit/edits.hpp"
+#include "fit/least_squares.hpp"
+#include "fit/start.hpp"
+#include "shell/boundary_distance.hpp"
+#include "shell/curved_hausdorff.hpp"
+#include "shell/refine.hpp"
+#include "surface/checks.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+namespace tunica {
+namespace {
+
+constexpr double default_width = 1e-4;  // of the diagonal: of certified intervals
+constexpr double margin = 0.97;         // of the tolerance: what the samples may say, for they miss a little
+constexpr double start_error = 0.5;     // of the tolerance: flat error of the mesh that the search starts from
+constexpr double surplus = 1.5;         // of triangles at the start of a search for a count
+constexpr double longest_edge = 2;      // of the mean: no region without nodes of its own
+constexpr int mean_power = 2, largest_power = 8;  // of residuals: the mean counts, or the largest
+constexpr double smoothing = 0.1;       // of the stiffness against sliding
+constexpr int default_rounds = 8;
+constexpr int certificates = 12;
+constexpr double worth_it = 0.985;      // a round that leaves more than this brings nothing
+constexpr std::size_t fewest_sampled = 8;  // shells: as few want no fewer points of the target
+constexpr double exchanged = 1.0 / 40;  // of the shells, in a round
+
+class Fitting {
+public:
+  Fitting(const TriangleMesh& coarse, const Target& target, const FitOptions& options)
+      : coarse_(without_unused(coarse)), target_(target), options_(options), like_target_(same_topology(coarse_, target)) {
+    limits_.shape.min_angle = options.min_angle;
+    width_ = options.width.value_or(default_width * target.diagonal());
+    if (options.tolerance) {
+      width_ = std::min(width_, *options.tolerance / 10);
+    }
+  }
+
+  RelaxResult run() {
+    if (options_.refine && !options_.tolerance) {
+      split_everywhere();
+    } else if (options_.tolerance) {
+      to_tolerance(*options_.tolerance);
+    } else {
+      to_count(options_.shells.value_or(coarse_.triangles.size()));
+    }
+    return std::move(result_);
+  }
+
+private:
+  [[nodiscard]] std::size_t most() const {
+    return options_.max_shells.value_or(options_.tolerance ? options_.shells.value_or(max_index) : max_index);
+  }
+
+  [[nodiscard]] FitMesh started(const TriangleMesh& mesh) const {
+    return FitMesh(shells_on(target_, mesh, options_.surface));
+  }
+
+  [[nodiscard]] FitSamples samples_for(double shells) const {
+    return {target_, std::max(fewest_sampled, static_cast<std::size_t>(shells)), like_target_};
+  }
+
+  /// Least squares of all nodes. @return the largest error left, mm
+  double settle(FitMesh& mesh, const FitSamples& samples, int power, int steps) const {
+    samples.attach(mesh);
+    double error = samples.measure(mesh);
+    for (int i = 0; i < steps; ++i) {
+      SquaresOptions squares;
+      squares.shape = limits_.shape;
+      squares.power = power;
+      squares.smoothing = smoothing;
+      const double left = least_squares_step(mesh, samples, squares);
+      samples.attach(mesh);
+      error = samples.measure(mesh);
+      if (left > worth_it) {
+        break;
+      }
+    }
+    return error;
+  }
+
+  void improve(FitMesh& mesh, const FitSamples& samples) {
+    limits_.shape.longest = longest_edge * mesh.mean_edge();
+    flip_edges(mesh, samples, limits_);
+    mend_shapes(mesh, samples, limits_, most());
+  }
+
+  /// Certifies, keeps what is better, and notes it.
+  ShellDistance certified(const ShellMesh& shell) {
+    ShellDistanceOptions measuring;
+    measuring.width = width_;
+    measuring.limit = options_.tolerance;
+    measuring.list_beyond = options_.tolerance.has_value();
+    ShellDistance distance = curved_hausdorff(shell, target_, measuring);
+    if (like_target_) {
+      if (const auto between = boundary_distance(boundary_curves(shell), target_, width_, options_.tolerance)) {
+        distance.boundary = between->both;
+      }
+    }
+    const bool holds = options_.tolerance && distance.upper() <= *options_.tolerance;
+    const bool held = result_.reached.value_or(false);
+    const bool is_better = result_.shell.triangles.empty() || (holds && !held) ||
+                           (holds == held && (holds ? shell.triangles.size() < result_.shell.triangles.size()
+                                                    : distance.upper() < result_.distance.upper()));
+    if (is_better) {
+      result_.shell = shell;
+      result_.distance = distance;
+      if (options_.tolerance) {
+        result_.reached = holds;
+      }
+    }
+    const auto now = std::chrono::steady_clock::now();
+    result_.iterations.push_back(
+        {shell.triangles.size(), distance.both, std::chrono::duration<double>(now - last_).count(), {}});
+    last_ = now;
+    if (options_.on_iteration) {
+      options_.on_iteration(result_.iterations.back(), result_.shell);
+    }
+    return distance;
+  }
+
+  void to_tolerance(double tolerance) {
+    limits_.error = margin * tolerance;
+    const bool keep_coarse = options_.refine || !like_target_;
+    FitMesh mesh = started(keep_coarse ? coarse_ : decimation_within(target_, start_error * tolerance));
+    FitSamples samples = samples_for(static_cast<double>(mesh.alive) / (keep_coarse ? 1 : 3));
+    settle(mesh, samples, mean_power, 4);
+    improve(mesh, samples);
+    if (!options_.refine) {
+      fewer(mesh, samples);
+    }
+    make_certain(mesh, samples, tolerance);
+  }
+
+  /// Collapses and settles in turn as long as that leaves fewer shells.
+  void fewer(FitMesh& mesh, const FitSamples& samples) {
+    const int rounds = options_.max_iterations.value_or(default_rounds);
+    for (int round = 0; round < rounds; ++round) {
+      const std::size_t before = mesh.alive;
+      collapse_edges(mesh, samples, limits_, 4, options_.progress);
+      settle(mesh, samples, largest_power, 3);
+      improve(mesh, samples);
+      if (static_cast<double>(mesh.alive) > worth_it * static_cast<double>(before)) {
+        break;
+      }
+    }
+  }
+
+  /// What the samples miss is found by a certificate, added to them, and mended; where that does not do, split.
+  void make_certain(FitMesh& mesh, FitSamples& samples, double tolerance) {
+    result_.stopped = "further splits bring too little";
+    for (int i = 0; i < certificates; ++i) {
+      std::vector<Index> patch_of;
+      const ShellDistance distance = certified(mesh.shell(&patch_of));
+      if (distance.upper() <= tolerance) {
+        result_.stopped = "the tolerance holds";
+        return;
+      }
+      if (i > 1) {
+        limits_.error *= std::clamp(tolerance / distance.upper(), 0.9, 0.99);
+      }
+      for (const FarPlace& place : distance.beyond_of_target) {
+        samples.add({place.point});
+      }
+      settle(mesh, samples, largest_power, 2);
+      if (i > 0) {
+        for (const FarPlace& place : distance.beyond_of_shell) {
+          double& error = mesh.patches[patch_of[place.patch]].error;
+          error = std::max(error, place.distance);
+        }
+      }
+      if (mesh.alive >= most()) {
+        result_.stopped = "the limit of shells was reached";
+        return;
+      }
+      split_worst(mesh, samples, limits_, (most() - mesh.alive) / 2);
+      settle(mesh, samples, largest_power, 2);
+      improve(mesh, samples);
+    }
+  }
+
+  /// Shells move from where they are hardly needed to where the error is largest.
+  void to_count(std::size_t shells) {
+    FitMesh mesh = started(like_target_ ? decimation(target_, static_cast<std::size_t>(surplus * static_cast<double>(shells)))
+                                        : coarse_);
+    const FitSamples samples = samples_for(static_cast<double>(shells));
+    settle(mesh, samples, mean_power, 3);
+    const auto reduced = [&](FitMesh& state) {
+      limits_.shape.longest = longest_edge * state.mean_edge() *
+                              std::sqrt(static_cast<double>(state.alive) / static_cast<double>(shells));
+      limits_.error = std::numeric_limits<double>::infinity();
+      collapse_edges(state, samples, limits_, shells, options_.progress);
+      limits_.error = settle(state, samples, largest_power, 4);
+      flip_edges(state, samples, limits_);
+      mend_shapes(state, samples, limits_, shells);
+      return limits_.error = settle(state, samples, largest_power, 1);
+    };
+    double error = reduced(mesh);
+    const int rounds = options_.max_iterations.value_or(default_rounds);
+    result_.stopped = "the limit of rounds was reached";
+    for (int round = 1; round < rounds; ++round) {
+      FitMesh other = mesh;
+      limits_.error = error / 2;
+      split_worst(other, samples, limits_,
+                  std::max<std::size_t>(1, static_cast<std::size_t>(exchanged * static_cast<double>(shells))));
+      const double now = reduced(other);
+      if (other.alive > shells || now > worth_it * error) {
+        result_.stopped = "further rounds bring too little";
+        break;
+      }
+      mesh = std::move(other);
+      error = now;
+    }
+    certified(mesh.shell());
+  }
+
+  void split_everywhere() {
+    FitMesh mesh = started(coarse_);
+    FitSamples samples = samples_for(static_cast<double>(mesh.alive));
+    settle(mesh, samples, mean_power, 3);
+    certified(mesh.shell());
+    result_.stopped = "the limit of iterations was reached";
+    for (int level = 1; level < options_.max_iterations.value_or(max_index); ++level) {
+      if (4 * result_.shell.triangles.size() > most()) {
+        result_.stopped = "the limit of shells was reached";
+        break;
+      }
+      tunica::advance(options_.progress, 0);
+      certified(refit(result_.shell, target_, options_.min_angle));
+    }
+  }
+
+  TriangleMesh coarse_;
+  const Target& target_;
+  const FitOptions& options_;
+  bool like_target_;  // COARSE has the target's topology: its boundaries are the target's
+  double width_;
+  FitLimits limits_;
+  RelaxResult result_;
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
+
+}  // namespace
+
+RelaxResult fit(const TriangleMesh& coarse, const Target& target, const FitOptions& options) {
+  return Fitting(coarse, target, options).run();
+}
+
+ShellMesh refit(const ShellMesh& shell, const Target& target, double min_angle) {
+  FitMesh mesh(split_shells(shell, std::vector<Split>(shell.triangles.size(), Split::all_edges)));
+  const FitSamples samples(target, mesh.alive, true);
+  SquaresOptions squares;
+  squares.shape.min_angle = min_angle;
+  squares.smoothing = smoothing;
+  for (int step = 0; step < 2; ++step) {
+    samples.attach(mesh);
+    samples.measure(mesh);
+    least_squares_step(mesh, samples, squares);
+  }
+  return mesh.shell();
+}
+
+void fit_normals(const Target& target, ShellMesh& shell) {
+  FitMesh mesh(shell);
+  const FitSamples samples(target, mesh.alive, true);
+  SquaresOptions squares;
+  squares.positions = false;
+  for (const int power : {mean_power, largest_power, largest_power}) {
+    samples.attach(mesh);
+    samples.measure(mesh);
+    squares.power = power;
+    least_squares_step(mesh, samples, squares);
+  }
+  for (std::size_t s = 0; s < mesh.normals.size(); ++s) {
+    shell.normals[mesh.node_of_slot[s]] = mesh.normals[s];
+  }
+}
+
+}  // namespace tunica
