@@ -3,6 +3,7 @@
 
 #include "core/threads.hpp"
 #include "fit/least_squares.hpp"
+#include "surface/measure.hpp"
 
 #include <Eigen/Geometry>
 
@@ -17,6 +18,8 @@ constexpr double joins_features = 0.1;    // shortfall of an edge between two fe
 constexpr double hopeless = 8;            // times the limit after the first step
 constexpr int placing_steps = 3;          // of least squares, then largest errors, twice
 constexpr int largest_power = 6;          // of the residuals, where the largest counts
+constexpr int spreading_steps = 4;        // with the nodes around free: of least squares and smoothing
+constexpr double spreading = 1;           // of the stiffness: smoothing, there
 constexpr std::size_t tried_at_once = 8;  // collapses, whatever the number of threads
 constexpr double worth_it = 0.97;         // of an error or a shortfall
 
@@ -113,9 +116,10 @@ private:
       return static_cast<Index>(at - known.begin());
     }
     known.push_back(node);
+    const auto& others = trial_.edit.others;
     const bool moves = node == trial_.edit.node;
     piece_.positions.push_back(moves ? trial_.edit.starts[0] : mesh_.positions[node]);
-    piece_.free.push_back(moves ? 1 : 0);
+    piece_.free.push_back(moves || std::find(others.begin(), others.end(), node) != others.end() ? 1 : 0);
     return static_cast<Index>(known.size() - 1);
   }
 
@@ -177,6 +181,15 @@ private:
   std::vector<double> joins_;
 };
 
+double smallest_angle(const FitPiece& piece, const std::vector<Index>& patches) {
+  double least = 180;
+  for (const Index t : patches) {
+    const auto c = piece.corners(piece.patches[t]);
+    least = std::min(least, smallest_angle_degrees(c[0], c[1], c[2]));
+  }
+  return least;
+}
+
 double largest_error(const FitPiece& piece) {
   double largest = 0;
   for (const FitPatch& p : piece.patches) {
@@ -204,11 +217,12 @@ Trial tried(const FitMesh& mesh, const FitSamples& samples, const FitLimits& lim
   };
   bool sound = keeps_shape();
   for (std::size_t i = 1; i < trial.edit.starts.size() && !sound; ++i) {
-    const auto moved = std::find(piece.free.begin(), piece.free.end(), 1) - piece.free.begin();
+    const auto moved = std::find(trial.nodes.begin(), trial.nodes.end(), trial.edit.node) - trial.nodes.begin();
     piece.positions[static_cast<std::size_t>(moved)] = trial.edit.starts[i];
     sound = keeps_shape();
   }
-  if (!sound) {
+  const bool wide = !trial.edit.others.empty();
+  if (!sound && !wide) {
     return trial;
   }
   samples.attach(piece);
@@ -219,7 +233,9 @@ Trial tried(const FitMesh& mesh, const FitSamples& samples, const FitLimits& lim
   squares.shape = limits.shape;
   squares.doubted = limits.error;
   for (int step = 0; step < steps && trial.edit.node != no_index; ++step) {
-    squares.power = step == 0 ? 2 : largest_power;
+    const bool spreads = wide && step < steps - 1;
+    squares.power = step == 0 || spreads ? 2 : largest_power;
+    squares.smoothing = spreads ? spreading : 0;
     if (least_squares_step(piece, samples, squares) >= 1 || largest_error(piece) > hopeless * limits.error) {
       break;
     }
@@ -410,6 +426,31 @@ Edit split(const FitMesh& mesh, Index u, Index v) {
   return edit;
 }
 
+Edit widened(const FitMesh& mesh, Edit edit) {
+  for (const Edit::Added& added : edit.added) {
+    for (const Index v : added.nodes) {
+      if (v != edit.node && std::find(edit.others.begin(), edit.others.end(), v) == edit.others.end()) {
+        edit.others.push_back(v);
+      }
+    }
+  }
+  std::vector<Index> beyond;
+  for (const Index v : edit.others) {
+    for (const Index t : mesh.around[v]) {
+      if (std::find(edit.removed.begin(), edit.removed.end(), t) == edit.removed.end()) {
+        beyond.push_back(t);
+      }
+    }
+  }
+  std::sort(beyond.begin(), beyond.end());
+  beyond.erase(std::unique(beyond.begin(), beyond.end()), beyond.end());
+  for (const Index t : beyond) {
+    edit.removed.push_back(t);
+    edit.added.push_back({mesh.patches[t].nodes, mesh.patches[t].slots, t});
+  }
+  return edit;
+}
+
 Edit move(const FitMesh& mesh, Index node, const Vec3& start) {
   Edit edit;
   edit.node = node;
@@ -457,15 +498,14 @@ public:
       if (mesh_.around[best.u].empty() || mesh_.around[best.v].empty()) {
         continue;
       }
-      auto edit = collapse(mesh_, samples_, best.u, best.v);
-      Trial trial = tried(mesh_, samples_, limits_, *std::move(edit), placing_steps);
+      Trial trial = attempt(best);
       if (!(trial.error <= limits_.error)) {
         continue;
       }
       const Index kept = trial.edit.node;
       apply(mesh_, std::move(trial));
-      ++version_[kept];
       const auto ring = mesh_.ring(kept);
+      ++version_[kept];
       for (const Index w : ring) {
         ++version_[w];
       }
@@ -480,6 +520,16 @@ public:
 private:
   [[nodiscard]] unsigned now(Index u, Index v) const { return version_[u] + version_[v]; }
   [[nodiscard]] bool is_known(const Candidate& c) const { return c.version == now(c.u, c.v); }
+
+  [[nodiscard]] Trial attempt(const Candidate& c) const {
+    auto edit = collapse(mesh_, samples_, c.u, c.v);
+    if (!edit) {
+      Trial none;
+      none.error = std::numeric_limits<double>::infinity();
+      return none;
+    }
+    return tried(mesh_, samples_, limits_, *std::move(edit), placing_steps);
+  }
 
   /// Below the truth: the largest error around.
   void push_guess(Index u, Index v) {
@@ -503,9 +553,7 @@ private:
     }
     parallel_for_blocks(some.size(), 1, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
-        auto edit = collapse(mesh_, samples_, some[i].u, some[i].v);
-        some[i].error = edit ? tried(mesh_, samples_, limits_, *std::move(edit), placing_steps).error
-                             : std::numeric_limits<double>::infinity();
+        some[i].error = attempt(some[i]).error;
       }
     });
     for (Candidate& c : some) {
@@ -537,8 +585,11 @@ void collapse_edges(FitMesh& mesh, const FitSamples& samples, const FitLimits& l
 void flip_edges(FitMesh& mesh, const FitSamples& samples, const FitLimits& limits) {
   for (const auto& [u, v] : mesh.edges()) {
     if (auto edit = flip(mesh, u, v)) {
+      const double angle = smallest_angle(mesh, edit->removed);
       Trial trial = tried(mesh, samples, limits, *std::move(edit), 0);
-      if (trial.error < worth_it * trial.error_before) {
+      if (trial.error < worth_it * trial.error_before ||
+          (trial.error <= std::max(worth_it * limits.error, trial.error_before) &&
+           smallest_angle(trial.piece, {0, 1}) > angle)) {
         apply(mesh, std::move(trial));
       }
     }
@@ -602,13 +653,25 @@ void mend_shapes(FitMesh& mesh, const FitSamples& samples, const FitLimits& limi
     if (!mesh.patches[t].is_alive() || shortfall_of(mesh, {t}, limits.shape) <= 0) {
       continue;
     }
-    for (Edit& edit : mendings(mesh, samples, t, mesh.alive + 2 <= most)) {
-      Trial trial = tried(mesh, samples, limits, std::move(edit), placing_steps);
+    std::optional<Trial> best;
+    const auto consider = [&](Edit edit) {
+      const bool wide = !edit.others.empty();
+      Trial trial = tried(mesh, samples, limits, std::move(edit), wide ? spreading_steps : placing_steps);
+      const double gain = trial.shortfall_before - trial.shortfall;
       if (trial.error <= std::max(limits.error, trial.error_before) &&
-          trial.shortfall < worth_it * trial.shortfall_before) {
-        apply(mesh, std::move(trial));
-        break;
+          gain > std::max((1 - worth_it) * trial.shortfall_before, best ? best->shortfall_before - best->shortfall : 0.0)) {
+        best = std::move(trial);
       }
+    };
+    auto edits = mendings(mesh, samples, t, mesh.alive + 2 <= most);
+    for (const Edit& edit : edits) {
+      consider(edit);
+    }
+    for (std::size_t i = 0; i < edits.size() && !best; ++i) {
+      consider(widened(mesh, std::move(edits[i])));
+    }
+    if (best) {
+      apply(mesh, *std::move(best));
     }
   }
 }
@@ -627,17 +690,23 @@ std::size_t split_worst(FitMesh& mesh, const FitSamples& samples, const FitLimit
     if (done >= count || !p.is_alive() || p.error != -error) {
       continue;
     }
-    std::size_t longest = 0;
-    for (std::size_t k = 1; k < 3; ++k) {
-      const auto length = [&](std::size_t e) {
-        return (mesh.positions[p.nodes[(e + 1) % 3]] - mesh.positions[p.nodes[e]]).norm();
-      };
-      longest = length(k) > length(longest) ? k : longest;
-    }
     FitLimits anything = limits;
     anything.shape.min_angle = limits.shape.min_angle / 2;  // a half's angles may be, for the while
-    Trial trial = tried(mesh, samples, anything, split(mesh, p.nodes[longest], p.nodes[(longest + 1) % 3]),
-                        placing_steps);
+    Trial trial;
+    trial.error = std::numeric_limits<double>::infinity();
+    const auto consider = [&](Edit edit) {
+      const int steps = edit.others.empty() ? placing_steps : spreading_steps;
+      Trial other = tried(mesh, samples, anything, std::move(edit), steps);
+      if (other.error < trial.error) {
+        trial = std::move(other);
+      }
+    };
+    for (std::size_t k = 0; k < 3; ++k) {
+      consider(split(mesh, p.nodes[k], p.nodes[(k + 1) % 3]));
+    }
+    if (trial.error > limits.error && std::isfinite(trial.error)) {
+      consider(widened(mesh, trial.edit));
+    }
     if (std::isfinite(trial.error)) {
       apply(mesh, std::move(trial));
       ++done;

@@ -25,8 +25,12 @@ struct Edit {
   Index node = no_index;
   int rank = 0;              ///< of the node, as FitMesh::rank()
   std::vector<Vec3> starts;  ///< places to look from: the first that keeps the shape counts
-  std::vector<std::pair<Index, Vec3>> normals;  ///< of the node: slots and where to start
+  std::vector<std::pair<Index, Vec3>> normals = {};  ///< of the node: slots and where to start
+  std::vector<Index> others = {};               ///< nodes that move with it
 };
+
+/// The same edit with the nodes around it free as well: more can be made good, at some five times the cost.
+Edit widened(const FitMesh& mesh, Edit edit);
 
 /// Merging the ends of an edge, splitting it, turning it; moving a node. Nothing: the topology, a boundary or a crease
 /// does not allow it.

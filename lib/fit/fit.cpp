@@ -22,8 +22,11 @@ constexpr double default_width = 1e-4;  // of the diagonal: of certified interva
 constexpr double margin = 0.97;         // of the tolerance: what the samples may say, for they miss a little
 constexpr double start_error = 0.5;     // of the tolerance: flat error of the mesh that the search starts from
 constexpr double surplus = 1.5;         // of triangles at the start of a search for a count
-constexpr double longest_edge = 2;      // of the mean: no region without nodes of its own
-constexpr int mean_power = 2, largest_power = 8;  // of residuals: the mean counts, or the largest
+constexpr double longest_edge = 3;      // of the mean: no region without nodes of its own
+constexpr int mean_power = 2, largest_power = 4;  // of residuals: the mean counts, or the largest
+constexpr int settling_steps = 6;
+constexpr double eased_angle = 0.5;     // of the smallest angle, while edges collapse; mended afterwards
+constexpr int mending_passes = 2;
 constexpr double smoothing = 0.1;       // of the stiffness against sliding
 constexpr int default_rounds = 8;
 constexpr int certificates = 12;
@@ -38,7 +41,7 @@ public:
     limits_.shape.min_angle = options.min_angle;
     width_ = options.width.value_or(default_width * target.diagonal());
     if (options.tolerance) {
-      width_ = std::min(width_, *options.tolerance / 10);
+      width_ = std::min(width_, *options.tolerance / 100);
     }
   }
 
@@ -88,7 +91,9 @@ private:
   void improve(FitMesh& mesh, const FitSamples& samples) {
     limits_.shape.longest = longest_edge * mesh.mean_edge();
     flip_edges(mesh, samples, limits_);
-    mend_shapes(mesh, samples, limits_, most());
+    for (int pass = 0; pass < mending_passes; ++pass) {
+      mend_shapes(mesh, samples, limits_, most());
+    }
   }
 
   /// Certifies, keeps what is better, and notes it.
@@ -143,8 +148,10 @@ private:
     const int rounds = options_.max_iterations.value_or(default_rounds);
     for (int round = 0; round < rounds; ++round) {
       const std::size_t before = mesh.alive;
+      limits_.shape.min_angle = eased_angle * options_.min_angle;
       collapse_edges(mesh, samples, limits_, 4, options_.progress);
-      settle(mesh, samples, largest_power, 3);
+      limits_.shape.min_angle = options_.min_angle;
+      settle(mesh, samples, largest_power, settling_steps);
       improve(mesh, samples);
       if (static_cast<double>(mesh.alive) > worth_it * static_cast<double>(before)) {
         break;
@@ -161,9 +168,6 @@ private:
       if (distance.upper() <= tolerance) {
         result_.stopped = "the tolerance holds";
         return;
-      }
-      if (i > 1) {
-        limits_.error *= std::clamp(tolerance / distance.upper(), 0.9, 0.99);
       }
       for (const FarPlace& place : distance.beyond_of_target) {
         samples.add({place.point});
