@@ -8,7 +8,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <unordered_set>
 
 namespace tunica {
 namespace {
@@ -289,81 +288,6 @@ NodeMoves move_by_barycentre(const Target& target, TriangleMesh& mesh, double of
   }
   mesh.vertices = moved;
   return moves;
-}
-
-std::size_t flip_upright_triangles(const Target& target, TriangleMesh& mesh) {
-  constexpr double wanted = 0.5;
-  constexpr int passes = 5;
-  const auto sides = vertex_normals(mesh);
-  std::vector<Vec3> normals = sides;
-  for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
-    if (const auto foot = target.closest_facing(mesh.vertices[v], sides[v], target.diagonal())) {
-      normals[v] = foot->normal;
-    }
-  }
-  const auto state = [&](const std::array<Index, 3>& v) { return facet_state(v, mesh.vertices, normals); };
-  const auto key = [](Index a, Index b) { return (std::uint64_t{std::min(a, b)} << 32) | std::max(a, b); };
-  std::unordered_set<std::uint64_t> edges;
-  for (const auto& v : mesh.triangles) {
-    for (std::size_t i = 0; i < 3; ++i) {
-      edges.insert(key(v[i], v[(i + 1) % 3]));
-    }
-  }
-  std::size_t flips = 0;
-  for (int pass = 0; pass < passes; ++pass) {
-    const auto across = neighbours(mesh, incidence(mesh));
-    std::vector<std::uint8_t> touched(mesh.triangles.size(), 0);
-    std::size_t before = flips;
-    for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-      const FacetState here = state(mesh.triangles[t]);
-      if (here.agreement >= wanted || touched[t] != 0) {
-        continue;
-      }
-      double best = here.agreement + 0.05;
-      std::optional<std::size_t> edge;
-      std::array<std::array<Index, 3>, 2> pair;
-      for (std::size_t i = 0; i < 3; ++i) {
-        const Index other = across[t][i];
-        if (other == no_neighbour || touched[other] != 0) {
-          continue;
-        }
-        const Index a = mesh.triangles[t][i], b = mesh.triangles[t][(i + 1) % 3], c = mesh.triangles[t][(i + 2) % 3];
-        const auto& o = mesh.triangles[other];
-        const Index d = o[0] != a && o[0] != b ? o[0] : (o[1] != a && o[1] != b ? o[1] : o[2]);
-        if (d == c || edges.contains(key(c, d))) {
-          continue;
-        }
-        const std::array<std::array<Index, 3>, 2> turned{{{a, d, c}, {d, b, c}}};
-        const FacetState first = state(turned[0]), second = state(turned[1]);
-        const double agreement = std::min(first.agreement, second.agreement);
-        if (agreement > best && std::min(first.height, second.height) > 1e-3) {
-          best = agreement;
-          edge = i;
-          pair = turned;
-        }
-      }
-      if (edge) {
-        const Index other = across[t][*edge];
-        edges.erase(key(mesh.triangles[t][*edge], mesh.triangles[t][(*edge + 1) % 3]));
-        edges.insert(key(pair[0][1], pair[0][2]));
-        mesh.triangles[t] = pair[0];
-        mesh.triangles[other] = pair[1];
-        // Their neighbours' entries are out of date until the next pass.
-        touched[t] = touched[other] = 1;
-        for (const Index stale : across[t]) {
-          touched[stale == no_neighbour ? t : stale] = 1;
-        }
-        for (const Index stale : across[other]) {
-          touched[stale == no_neighbour ? t : stale] = 1;
-        }
-        ++flips;
-      }
-    }
-    if (flips == before) {
-      break;
-    }
-  }
-  return flips;
 }
 
 }  // namespace tunica

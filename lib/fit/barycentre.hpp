@@ -35,9 +35,4 @@ std::vector<std::optional<std::size_t>> match_boundaries(const Target& target, c
 /// settles there, within one or two moves.
 NodeMoves move_by_barycentre(const Target& target, TriangleMesh& mesh, double off_target);
 
-/// Turns edges of the pair of triangles around them where a triangle stands nearly upright on the target (its normal
-/// agrees by less than 0.5 with the target's at one of its corners) and the turned pair agrees better. Such slivers
-/// come from decimation; no nodal normal suits them. @return how many edges were turned
-std::size_t flip_upright_triangles(const Target& target, TriangleMesh& mesh);
-
 }  // namespace tunica

@@ -26,13 +26,13 @@ constexpr double longest_edge = 3;      // of the mean: no region without nodes 
 constexpr int mean_power = 2, largest_power = 4;  // of residuals: the mean counts, or the largest
 constexpr int settling_steps = 6;
 constexpr double eased_angle = 0.5;     // of the smallest angle, while edges collapse; mended afterwards
-constexpr int mending_passes = 2;
+constexpr int mending_passes = 3;
 constexpr double smoothing = 0.1;       // of the stiffness against sliding
 constexpr int default_rounds = 8;
 constexpr int certificates = 12;
 constexpr double worth_it = 0.985;      // a round that leaves more than this brings nothing
 constexpr std::size_t fewest_sampled = 8;  // shells: as few want no fewer points of the target
-constexpr double exchanged = 1.0 / 40;  // of the shells, in a round
+constexpr std::array<double, 3> exchanged{1.0 / 40, 1.0 / 150, 1.0 / 15};  // of the shells, in a round
 
 class Fitting {
 public:
@@ -208,18 +208,21 @@ private:
     double error = reduced(mesh);
     const int rounds = options_.max_iterations.value_or(default_rounds);
     result_.stopped = "the limit of rounds was reached";
-    for (int round = 1; round < rounds; ++round) {
+    int fruitless = 0;
+    for (int round = 1; round < rounds && fruitless < static_cast<int>(exchanged.size()); ++round) {
       FitMesh other = mesh;
       limits_.error = error / 2;
-      split_worst(other, samples, limits_,
-                  std::max<std::size_t>(1, static_cast<std::size_t>(exchanged * static_cast<double>(shells))));
+      const double many = exchanged[static_cast<std::size_t>(fruitless)] * static_cast<double>(shells);
+      split_worst(other, samples, limits_, std::max<std::size_t>(1, static_cast<std::size_t>(many)));
       const double now = reduced(other);
-      if (other.alive > shells || now > worth_it * error) {
-        result_.stopped = "further rounds bring too little";
-        break;
+      fruitless = other.alive <= shells && now < worth_it * error ? 0 : fruitless + 1;
+      if (other.alive <= shells && now < error) {
+        mesh = std::move(other);
+        error = now;
       }
-      mesh = std::move(other);
-      error = now;
+    }
+    if (fruitless == static_cast<int>(exchanged.size())) {
+      result_.stopped = "further rounds bring too little";
     }
     certified(mesh.shell());
   }
@@ -227,7 +230,9 @@ private:
   void split_everywhere() {
     FitMesh mesh = started(coarse_);
     FitSamples samples = samples_for(static_cast<double>(mesh.alive));
-    settle(mesh, samples, mean_power, 3);
+    limits_.error = settle(mesh, samples, mean_power, 3);
+    improve(mesh, samples);
+    settle(mesh, samples, mean_power, 2);
     certified(mesh.shell());
     result_.stopped = "the limit of iterations was reached";
     for (int level = 1; level < options_.max_iterations.value_or(max_index); ++level) {

@@ -1,10 +1,11 @@
 #include "fit/relax.hpp"
 
 #include "core/error.hpp"
+#include "fit/edits.hpp"
 #include "fit/fit.hpp"
-#include "fit/mend.hpp"
-#include "fit/normals.hpp"
+#include "fit/start.hpp"
 #include "shell/curved_surface.hpp"
+#include "shell/normals.hpp"
 #include "shell/refine.hpp"
 #include "surface/checks.hpp"
 
@@ -25,6 +26,7 @@ constexpr double default_off_target = 1e-3;  // of the diagonal
 constexpr double worth_it = 0.99;            // an iteration that brings less than 1 % brings nothing
 constexpr std::size_t triangles_judged = 5000;
 constexpr int patience = 3;  // iterations that bring nothing
+constexpr double least_angle = 10, least_agreement = 0.4;  // degrees, cosine: what curved shells can stand on
 
 class Relaxation {
 public:
@@ -60,8 +62,6 @@ public:
       }
       fruitless = upper < worth_it * level_best ? 0 : fruitless + 1;
       level_best = std::min(level_best, upper);
-      futile_ = upper < worth_it * best_upper_ ? 0 : futile_ + 1;
-      best_upper_ = std::min(best_upper_, upper);
       if (options_.refine) {
         // Far from the tolerance another move of the same nodes is not worth its time.
         const bool far = !options_.tolerance || upper > 2 * *options_.tolerance;
@@ -92,10 +92,7 @@ private:
     const double off_target = std::min(default_off_target * target_.diagonal(),
                                        options_.tolerance.value_or(std::numeric_limits<double>::infinity()) / 4);
     iteration.moves = move_by_barycentre(target_, mesh, off_target);
-    result_.flips += flip_upright_triangles(target_, mesh);
-    const Mending mending = mend(target_, mesh, off_target, mend_limits());
-    result_.flips += mending.turned;
-    result_.merged += mending.merged;
+    mesh = mended(mesh, off_target);
     current_.vertices = std::move(mesh.vertices);
     current_.triangles = std::move(mesh.triangles);
     const auto folded = take_normals_from(target_, current_);
@@ -125,12 +122,19 @@ private:
     return distance.both.upper;
   }
 
-  /// Where refinement brings nothing, mending may undo it: it steps back.
-  [[nodiscard]] MendLimits mend_limits() const {
-    if (result_.iterations.empty()) {
-      return {};
-    }
-    return futile_ < 2 ? MendLimits{10, 0.4, 1} : futile_ < 4 ? MendLimits{5, 0.3, 1} : MendLimits{2, 0.25, 1};
+  /// Thin triangles, and nodes whose facets fold, are mended by edits that do not stray farther from the target.
+  [[nodiscard]] TriangleMesh mended(const TriangleMesh& moved, double off_target) const {
+    FitMesh mesh(shells_on(target_, moved, current_.patch));
+    const FitSamples samples(target_, mesh.alive, true);
+    samples.attach(mesh);
+    samples.measure(mesh);
+    FitLimits limits;
+    limits.shape.min_angle = least_angle;
+    limits.shape.agreement = least_agreement;
+    limits.shape.size_ratio = std::numeric_limits<double>::infinity();
+    limits.error = off_target;
+    mend_shapes(mesh, samples, limits, mesh.alive);
+    return flat_facets(mesh.shell());
   }
 
   /// A tenth of the distance is narrow enough to compare iterates; to decide on the tolerance it gets narrower.
@@ -172,8 +176,6 @@ private:
   double width_;
   ShellMesh current_;
   std::vector<double> errors_;  // of each current shell, mm
-  double best_upper_ = std::numeric_limits<double>::infinity();
-  int futile_ = 0;  // iterations in a row that did not better the best
   RelaxResult result_;
 };
 

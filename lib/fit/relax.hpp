@@ -40,8 +40,6 @@ struct RelaxResult {
   std::vector<RelaxIteration> iterations;
   std::optional<bool> reached;  ///< the tolerance; none without one
   std::string stopped;          ///< why it ended there, in words
-  std::size_t flips = 0;        ///< edges turned for triangles that stand upright, fold or are thin
-  std::size_t merged = 0;       ///< pairs of nodes, for the same
 };
 
 /// Whether most of a mesh's area faces the other way than the target.
@@ -51,7 +49,7 @@ bool faces_other_way(const TriangleMesh& mesh, const Target& target);
 TriangleMesh turned_around(TriangleMesh mesh);
 
 /// Moves a coarse mesh onto a target as curved shells by the paper's rule. Per iteration: nodes move to barycentres,
-/// edges turn where a triangle stands upright on the target, folds and thin triangles are mended (see mend.hpp), nodal
+/// folds and thin triangles are mended (mend_shapes()), nodal
 /// normals come from the target and are fitted to it, the two-sided distance of the curved surface is measured. It ends
 /// when the tolerance certainly holds; when three iterations in a row brought less than 1 % (then it refines, if it
 /// may); or at the limits: 20 iterations, 60 where it refines. The best iterate is the result.

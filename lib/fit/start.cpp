@@ -1,6 +1,6 @@
 #include "fit/start.hpp"
 
-#include "fit/normals.hpp"
+#include "shell/normals.hpp"
 #include "surface/checks.hpp"
 #include "surface/decimate.hpp"
 #include "surface/hausdorff.hpp"

@@ -1,4 +1,4 @@
-#include "fit/normals.hpp"
+#include "shell/normals.hpp"
 
 #include "core/threads.hpp"
 #include "shell/curved_surface.hpp"
