@@ -28,7 +28,8 @@ constexpr int settling_steps = 6;
 constexpr double eased_angle = 0.5;     // of the smallest angle, while edges collapse; mended afterwards
 constexpr int mending_passes = 3;
 constexpr double smoothing = 0.1;       // of the stiffness against sliding
-constexpr int default_rounds = 8;
+constexpr int default_rounds = 12;       // of exchanges
+constexpr double fewer_by = 0.92;        // of the shells: the next count to be tried
 constexpr int certificates = 12;
 constexpr double worth_it = 0.985;      // a round that leaves more than this brings nothing
 constexpr std::size_t fewest_sampled = 8;  // shells: as few want no fewer points of the target
@@ -39,6 +40,7 @@ public:
   Fitting(const TriangleMesh& coarse, const Target& target, const FitOptions& options)
       : coarse_(without_unused(coarse)), target_(target), options_(options), like_target_(same_topology(coarse_, target)) {
     limits_.shape.min_angle = options.min_angle;
+    rounds_ = options.max_iterations.value_or(default_rounds);
     width_ = options.width.value_or(default_width * target.diagonal());
     if (options.tolerance) {
       width_ = std::min(width_, *options.tolerance / 100);
@@ -143,10 +145,10 @@ private:
     make_certain(mesh, samples, tolerance);
   }
 
-  /// Collapses and settles in turn as long as that leaves fewer shells.
+  /// Collapses and settles in turn as long as that leaves fewer shells; then as many fewer as exchanges make good.
   void fewer(FitMesh& mesh, const FitSamples& samples) {
-    const int rounds = options_.max_iterations.value_or(default_rounds);
-    for (int round = 0; round < rounds; ++round) {
+    const double limit = limits_.error;
+    for (int round = 0; round < 3; ++round) {
       const std::size_t before = mesh.alive;
       limits_.shape.min_angle = eased_angle * options_.min_angle;
       collapse_edges(mesh, samples, limits_, 4, options_.progress);
@@ -157,6 +159,16 @@ private:
         break;
       }
     }
+    while (rounds_ > 0) {
+      FitMesh other = mesh;
+      const auto shells = static_cast<std::size_t>(fewer_by * static_cast<double>(mesh.alive));
+      reduce(other, samples, shells);
+      if (exchange(other, samples, shells, limit) > limit || other.alive >= mesh.alive) {
+        break;
+      }
+      mesh = std::move(other);
+    }
+    limits_.error = limit;
   }
 
   /// What the samples miss is found by a certificate, added to them, and mended; where that does not do, split.
@@ -189,41 +201,48 @@ private:
     }
   }
 
-  /// Shells move from where they are hardly needed to where the error is largest.
-  void to_count(std::size_t shells) {
-    FitMesh mesh = started(like_target_ ? decimation(target_, static_cast<std::size_t>(surplus * static_cast<double>(shells)))
-                                        : coarse_);
-    const FitSamples samples = samples_for(static_cast<double>(shells));
-    settle(mesh, samples, mean_power, 3);
-    const auto reduced = [&](FitMesh& state) {
-      limits_.shape.longest = longest_edge * state.mean_edge() *
-                              std::sqrt(static_cast<double>(state.alive) / static_cast<double>(shells));
-      limits_.error = std::numeric_limits<double>::infinity();
-      collapse_edges(state, samples, limits_, shells, options_.progress);
-      limits_.error = settle(state, samples, largest_power, 4);
-      flip_edges(state, samples, limits_);
-      mend_shapes(state, samples, limits_, shells);
-      return limits_.error = settle(state, samples, largest_power, 1);
-    };
-    double error = reduced(mesh);
-    const int rounds = options_.max_iterations.value_or(default_rounds);
-    result_.stopped = "the limit of rounds was reached";
-    int fruitless = 0;
-    for (int round = 1; round < rounds && fruitless < static_cast<int>(exchanged.size()); ++round) {
+  /// Collapses edges until so many shells are left, whatever the error, and settles. @return the largest error, mm
+  double reduce(FitMesh& mesh, const FitSamples& samples, std::size_t shells) {
+    limits_.shape.longest = longest_edge * mesh.mean_edge() *
+                            std::sqrt(static_cast<double>(mesh.alive) / static_cast<double>(shells));
+    limits_.error = std::numeric_limits<double>::infinity();
+    collapse_edges(mesh, samples, limits_, shells, options_.progress);
+    limits_.error = settle(mesh, samples, largest_power, 4);
+    flip_edges(mesh, samples, limits_);
+    mend_shapes(mesh, samples, limits_, shells);
+    return settle(mesh, samples, largest_power, 1);
+  }
+
+  /// Moves shells from where they are hardly needed to where the error is largest, as long as that brings them closer,
+  /// they are not within `enough` (mm), and rounds are left.
+  /// @return the largest error, mm
+  double exchange(FitMesh& mesh, const FitSamples& samples, std::size_t shells, double enough) {
+    double error = samples.measure(mesh);
+    std::size_t fruitless = 0;
+    while (error > enough && rounds_ > 0 && fruitless < exchanged.size()) {
+      --rounds_;
       FitMesh other = mesh;
       limits_.error = error / 2;
-      const double many = exchanged[static_cast<std::size_t>(fruitless)] * static_cast<double>(shells);
+      const double many = exchanged[fruitless] * static_cast<double>(shells);
       split_worst(other, samples, limits_, std::max<std::size_t>(1, static_cast<std::size_t>(many)));
-      const double now = reduced(other);
+      const double now = reduce(other, samples, shells);
       fruitless = other.alive <= shells && now < worth_it * error ? 0 : fruitless + 1;
       if (other.alive <= shells && now < error) {
         mesh = std::move(other);
         error = now;
       }
     }
-    if (fruitless == static_cast<int>(exchanged.size())) {
-      result_.stopped = "further rounds bring too little";
-    }
+    result_.stopped = rounds_ > 0 ? "further rounds bring too little" : "the limit of rounds was reached";
+    return error;
+  }
+
+  void to_count(std::size_t shells) {
+    FitMesh mesh = started(like_target_ ? decimation(target_, static_cast<std::size_t>(surplus * static_cast<double>(shells)))
+                                        : coarse_);
+    const FitSamples samples = samples_for(static_cast<double>(shells));
+    settle(mesh, samples, mean_power, 3);
+    reduce(mesh, samples, shells);
+    exchange(mesh, samples, shells, 0);
     certified(mesh.shell());
   }
 
@@ -251,6 +270,7 @@ private:
   bool like_target_;  // COARSE has the target's topology: its boundaries are the target's
   double width_;
   FitLimits limits_;
+  int rounds_;  // of exchanges that are left
   RelaxResult result_;
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
