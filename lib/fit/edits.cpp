@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cmath>
 #include <queue>
+#include <unordered_map>
 
 namespace tunica {
 namespace {
@@ -243,6 +244,9 @@ Trial tried(const FitMesh& mesh, const FitSamples& samples, const FitLimits& lim
   if (keeps_shape()) {
     trial.error = largest_error(piece);
   }
+  for (FitPatch& p : piece.patches) {
+    p.residuals = {};  // measured anew before they are needed again
+  }
   return trial;
 }
 
@@ -276,7 +280,6 @@ void apply(FitMesh& mesh, Trial&& trial) {
     FitPatch &to = mesh.patches[t], &from = trial.piece.patches[i];
     to.attached = std::move(from.attached);
     to.guesses = std::move(from.guesses);
-    to.residuals = std::move(from.residuals);
     to.error = from.error;
     changed.push_back(t);
   }
@@ -471,9 +474,7 @@ struct Candidate {
   double error;
   Index u, v;
   unsigned version;  // of its surroundings when it was tried; 0: never
-  bool operator<(const Candidate& o) const {
-    return error != o.error ? error > o.error : u != o.u ? u > o.u : v > o.v;
-  }
+  bool operator<(const Candidate& o) const { return error != o.error ? error > o.error : u != o.u ? u > o.u : v > o.v; }
 };
 
 /// Edges in the order of their errors; tried when their turn comes, tried again when what surrounds them has changed.
@@ -498,12 +499,9 @@ public:
       if (mesh_.around[best.u].empty() || mesh_.around[best.v].empty()) {
         continue;
       }
-      Trial trial = attempt(best);
-      if (!(trial.error <= limits_.error)) {
-        continue;
-      }
-      const Index kept = trial.edit.node;
-      apply(mesh_, std::move(trial));
+      auto trial = trials_.extract(key(best.u, best.v));
+      const Index kept = trial.mapped().edit.node;
+      apply(mesh_, std::move(trial.mapped()));
       const auto ring = mesh_.ring(kept);
       ++version_[kept];
       for (const Index w : ring) {
@@ -518,6 +516,7 @@ public:
   }
 
 private:
+  static std::uint64_t key(Index u, Index v) { return (std::uint64_t{u} << 32) | v; }
   [[nodiscard]] unsigned now(Index u, Index v) const { return version_[u] + version_[v]; }
   [[nodiscard]] bool is_known(const Candidate& c) const { return c.version == now(c.u, c.v); }
 
@@ -551,15 +550,16 @@ private:
         some.push_back(c);
       }
     }
+    std::vector<Trial> trials(some.size());
     parallel_for_blocks(some.size(), 1, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
-        some[i].error = attempt(some[i]).error;
+        trials[i] = attempt(some[i]);
       }
     });
-    for (Candidate& c : some) {
-      if (std::isfinite(c.error) && c.error <= limits_.error) {
-        c.version = now(c.u, c.v);
-        queue_.push(c);
+    for (std::size_t i = 0; i < some.size(); ++i) {
+      if (const double error = trials[i].error; std::isfinite(error) && error <= limits_.error) {
+        queue_.push({error, some[i].u, some[i].v, now(some[i].u, some[i].v)});
+        trials_.insert_or_assign(key(some[i].u, some[i].v), std::move(trials[i]));
       }
     }
   }
@@ -569,6 +569,7 @@ private:
   const FitLimits& limits_;
   std::vector<unsigned> version_;
   std::priority_queue<Candidate> queue_;
+  std::unordered_map<std::uint64_t, Trial> trials_;  // of edges, the last ones
 };
 
 }  // namespace
@@ -659,7 +660,8 @@ void mend_shapes(FitMesh& mesh, const FitSamples& samples, const FitLimits& limi
       Trial trial = tried(mesh, samples, limits, std::move(edit), wide ? spreading_steps : placing_steps);
       const double gain = trial.shortfall_before - trial.shortfall;
       if (trial.error <= std::max(limits.error, trial.error_before) &&
-          gain > std::max((1 - worth_it) * trial.shortfall_before, best ? best->shortfall_before - best->shortfall : 0.0)) {
+          gain > std::max((1 - worth_it) * trial.shortfall_before,
+                          best ? best->shortfall_before - best->shortfall : 0.0)) {
         best = std::move(trial);
       }
     };

@@ -23,10 +23,10 @@ struct Edit {
   std::vector<Index> removed;
   std::vector<Added> added;
   Index node = no_index;
-  int rank = 0;              ///< of the node, as FitMesh::rank()
-  std::vector<Vec3> starts;  ///< places to look from: the first that keeps the shape counts
+  int rank = 0;                                      ///< of the node, as FitMesh::rank()
+  std::vector<Vec3> starts;                          ///< places to look from: the first that keeps the shape counts
   std::vector<std::pair<Index, Vec3>> normals = {};  ///< of the node: slots and where to start
-  std::vector<Index> others = {};               ///< nodes that move with it
+  std::vector<Index> others = {};                    ///< nodes that move with it
 };
 
 /// The same edit with the nodes around it free as well: more can be made good, at some five times the cost.
@@ -42,12 +42,12 @@ Edit move(const FitMesh& mesh, Index node, const Vec3& start);
 /// An edit tried beside the mesh: the node at its best place.
 struct Trial {
   Edit edit;
-  FitPiece piece;           ///< the added patches
+  FitPiece piece;                   ///< the added patches
   std::vector<Index> nodes, slots;  ///< of the piece: their numbers in the mesh
-  double error = 0;         ///< mm, largest of the added patches; infinite: they would lose their shape
-  double error_before = 0;  ///< of the removed ones
-  double shortfall = 0;     ///< of the added patches' shapes: angles, lengths, sizes against neighbours, and edges that
-                            ///< join two features, between which no node can bend
+  double error = 0;                 ///< mm, largest of the added patches; infinite: they would lose their shape
+  double error_before = 0;          ///< of the removed ones
+  double shortfall = 0;  ///< of the added patches' shapes: angles, lengths, sizes against neighbours, and edges that
+                         ///< join two features, between which no node can bend
   double shortfall_before = 0;
 };
 

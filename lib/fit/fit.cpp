@@ -20,25 +20,28 @@ namespace {
 
 constexpr double default_width = 1e-4;  // of the diagonal: of certified intervals
 constexpr double margin = 0.97;         // of the tolerance: what the samples may say, for they miss a little
-constexpr double start_error = 0.5;     // of the tolerance: flat error of the mesh that the search starts from
+constexpr double start_error = 1;       // of the tolerance: flat error of the mesh that the search starts from
 constexpr double surplus = 1.5;         // of triangles at the start of a search for a count
 constexpr double longest_edge = 3;      // of the mean: no region without nodes of its own
 constexpr int mean_power = 2, largest_power = 4;  // of residuals: the mean counts, or the largest
 constexpr int settling_steps = 6;
-constexpr double eased_angle = 0.5;     // of the smallest angle, while edges collapse; mended afterwards
+constexpr double eased_angle = 0.5;  // of the smallest angle, while edges collapse; mended afterwards
 constexpr int mending_passes = 3;
-constexpr double smoothing = 0.1;       // of the stiffness against sliding
-constexpr int default_rounds = 12;       // of exchanges
-constexpr double fewer_by = 0.92;        // of the shells: the next count to be tried
+constexpr double smoothing = 0.1;   // of the stiffness against sliding
+constexpr int default_rounds = 12;  // of exchanges
+constexpr double fewer_by = 0.92;   // of the shells: the next count to be tried
 constexpr int certificates = 12;
-constexpr double worth_it = 0.985;      // a round that leaves more than this brings nothing
+constexpr double worth_it = 0.985;         // a round that leaves more than this brings nothing
 constexpr std::size_t fewest_sampled = 8;  // shells: as few want no fewer points of the target
 constexpr std::array<double, 3> exchanged{1.0 / 40, 1.0 / 150, 1.0 / 15};  // of the shells, in a round
 
 class Fitting {
 public:
   Fitting(const TriangleMesh& coarse, const Target& target, const FitOptions& options)
-      : coarse_(without_unused(coarse)), target_(target), options_(options), like_target_(same_topology(coarse_, target)) {
+      : coarse_(without_unused(coarse)),
+        target_(target),
+        options_(options),
+        like_target_(same_topology(coarse_, target)) {
     limits_.shape.min_angle = options.min_angle;
     rounds_ = options.max_iterations.value_or(default_rounds);
     width_ = options.width.value_or(default_width * target.diagonal());
@@ -203,8 +206,8 @@ private:
 
   /// Collapses edges until so many shells are left, whatever the error, and settles. @return the largest error, mm
   double reduce(FitMesh& mesh, const FitSamples& samples, std::size_t shells) {
-    limits_.shape.longest = longest_edge * mesh.mean_edge() *
-                            std::sqrt(static_cast<double>(mesh.alive) / static_cast<double>(shells));
+    limits_.shape.longest =
+        longest_edge * mesh.mean_edge() * std::sqrt(static_cast<double>(mesh.alive) / static_cast<double>(shells));
     limits_.error = std::numeric_limits<double>::infinity();
     collapse_edges(mesh, samples, limits_, shells, options_.progress);
     limits_.error = settle(mesh, samples, largest_power, 4);
@@ -237,8 +240,8 @@ private:
   }
 
   void to_count(std::size_t shells) {
-    FitMesh mesh = started(like_target_ ? decimation(target_, static_cast<std::size_t>(surplus * static_cast<double>(shells)))
-                                        : coarse_);
+    FitMesh mesh = started(
+        like_target_ ? decimation(target_, static_cast<std::size_t>(surplus * static_cast<double>(shells))) : coarse_);
     const FitSamples samples = samples_for(static_cast<double>(shells));
     settle(mesh, samples, mean_power, 3);
     reduce(mesh, samples, shells);

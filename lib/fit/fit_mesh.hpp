@@ -45,12 +45,12 @@ struct FitPatch {
 /// Shells whose nodes may move together, a whole mesh or a few around an edit: all that least squares needs.
 struct FitPiece {
   Patch kind = Patch::watertight;
-  std::vector<Vec3> positions;         ///< #V
-  std::vector<std::uint8_t> free;      ///< #V: the node may move and its normals turn
-  std::vector<Vec3> normals;           ///< #S unit
-  std::vector<Index> node_of_slot;     ///< #S
-  std::vector<FitPatch> patches;       ///< #T
-  std::vector<Index> points;           ///< samples of the target to attach anew at each measurement; none: they stay
+  std::vector<Vec3> positions;      ///< #V
+  std::vector<std::uint8_t> free;   ///< #V: the node may move and its normals turn
+  std::vector<Vec3> normals;        ///< #S unit
+  std::vector<Index> node_of_slot;  ///< #S
+  std::vector<FitPatch> patches;    ///< #T
+  std::vector<Index> points;        ///< samples of the target to attach anew at each measurement; none: they stay
 
   [[nodiscard]] std::array<Vec3, 3> corners(const FitPatch& p) const {
     return {positions[p.nodes[0]], positions[p.nodes[1]], positions[p.nodes[2]]};
@@ -68,8 +68,8 @@ struct FitPiece {
 
 /// What facets keep as far as the target allows.
 struct ShapeLimits {
-  double min_angle = 20;  ///< degrees
-  double agreement = 0.3;  ///< N·n of a corner's normal and the facet's: the slope there is below 73 degrees
+  double min_angle = 20;    ///< degrees
+  double agreement = 0.3;   ///< N·n of a corner's normal and the facet's: the slope there is below 73 degrees
   double size_ratio = 2.5;  ///< of the longest edges of neighbours
   double longest = std::numeric_limits<double>::infinity();  ///< mm, of an edge
 };

@@ -17,16 +17,16 @@
 namespace tunica {
 namespace {
 
-constexpr double largest_tilt = 0.3;      // rad, per step: the model is linear in it
-constexpr double largest_move = 0.3;      // of the mean edge at the node, likewise
-constexpr double least_weight = 0.1;      // residuals below this part of the largest count alike
-constexpr double normal_damping = 1e-4;   // of the diagonal
-constexpr double sliding_damping = 0.3;   // of the diagonal, where errors are as large as edges
-constexpr double least_damping = 1e-6;    // of the diagonal: regular whatever the residuals see
-constexpr double shortening = 0.35;       // of a step that did not help
-constexpr int trials = 5;                 // the last without the nodes that still have no better place
-constexpr double may_grow = 1.05;         // the sum around a node: what its neighbours' steps gain or cost it
-constexpr double keeps_facing = 0.3;      // cosine between a facet's normals before and after
+constexpr double largest_tilt = 0.3;       // rad, per step: the model is linear in it
+constexpr double largest_move = 0.3;       // of the mean edge at the node, likewise
+constexpr double least_weight = 0.1;       // residuals below this part of the largest count alike
+constexpr double normal_damping = 1e-4;    // of the diagonal
+constexpr double sliding_damping = 0.3;    // of the diagonal, where errors are as large as edges
+constexpr double least_damping = 1e-6;     // of the diagonal: regular whatever the residuals see
+constexpr double shortening = 0.35;        // of a step that did not help
+constexpr int trials = 5;                  // the last without the nodes that still have no better place
+constexpr double may_grow = 1.05;          // the sum around a node: what its neighbours' steps gain or cost it
+constexpr double keeps_facing = 0.3;       // cosine between a facet's normals before and after
 constexpr Eigen::Index few_unknowns = 80;  // solved as a dense system
 constexpr std::size_t patches_per_block = 16;
 constexpr int most_columns = 27;

@@ -5,10 +5,10 @@
 namespace tunica {
 
 struct SquaresOptions {
-  ShapeLimits shape;            ///< facets that keep them go on keeping them, others get no worse
-  int power = 2;                ///< even; of the residuals in the sum that is lessened: large ones bring out the largest
-  double smoothing = 0;         ///< pull of nodes towards the middle of their neighbours, within the surface
-  bool positions = true;        ///< else only the normals turn
+  ShapeLimits shape;      ///< facets that keep them go on keeping them, others get no worse
+  int power = 2;          ///< even; of the residuals in the sum that is lessened: large ones bring out the largest
+  double smoothing = 0;   ///< pull of nodes towards the middle of their neighbours, within the surface
+  bool positions = true;  ///< else only the normals turn
   double doubted = std::numeric_limits<double>::infinity();  ///< see FitSamples::measure()
 };
 
@@ -17,8 +17,8 @@ struct SquaresOptions {
 /// around it would grow or a facet would lose its shape. One node, a ring or a whole mesh: the same step.
 /// @param piece  measured; its residuals and errors are kept up to date
 /// @return the part of the sum that is left, at most 1
-/// Source: Gauss-Newton with Levenberg's damping; iteratively reweighted for powers above 2. Cost: three measurements of
-/// the piece, more where steps are shortened. The result does not depend on the number of threads.
+/// Source: Gauss-Newton with Levenberg's damping; iteratively reweighted for powers above 2. Cost: three measurements
+/// of the piece, more where steps are shortened. The result does not depend on the number of threads.
 double least_squares_step(FitPiece& piece, const FitSamples& samples, const SquaresOptions& options);
 
 }  // namespace tunica

@@ -25,7 +25,7 @@ constexpr double default_width = 1e-4;       // of the diagonal
 constexpr double default_off_target = 1e-3;  // of the diagonal
 constexpr double worth_it = 0.99;            // an iteration that brings less than 1 % brings nothing
 constexpr std::size_t triangles_judged = 5000;
-constexpr int patience = 3;  // iterations that bring nothing
+constexpr int patience = 3;                                // iterations that bring nothing
 constexpr double least_angle = 10, least_agreement = 0.4;  // degrees, cosine: what curved shells can stand on
 
 class Relaxation {

@@ -14,12 +14,12 @@
 namespace tunica {
 namespace {
 
-constexpr double crease_angle = 40;          // degrees
-constexpr double crease_share = 0.6;         // of the facets' angle is there already close to the edge
-constexpr double close_by = 0.08;            // of the height of the triangle
-constexpr std::size_t fewest_edges = 3;      // of a crease
-constexpr std::size_t sampled = 20'000;      // vertices, and facets: for the error of flat facets
-constexpr std::size_t first_rung = 4000;     // triangles of the first decimation, from which the count is judged
+constexpr double crease_angle = 40;       // degrees
+constexpr double crease_share = 0.6;      // of the facets' angle is there already close to the edge
+constexpr double close_by = 0.08;         // of the height of the triangle
+constexpr std::size_t fewest_edges = 3;   // of a crease
+constexpr std::size_t sampled = 20'000;   // vertices, and facets: for the error of flat facets
+constexpr std::size_t first_rung = 4000;  // triangles of the first decimation, from which the count is judged
 
 /// Largest sampled distance between flat facets and target, both ways, mm.
 double sampled_error(const TriangleMesh& mesh, const Target& target) {
@@ -67,8 +67,8 @@ EdgeFlags sharp_edges(const TriangleMesh& mesh, const Target& target, const std:
         continue;
       }
       const auto& v = mesh.triangles[other];
-      const auto l = static_cast<std::size_t>(
-          std::find(v.begin(), v.end(), mesh.triangles[t][(k + 1) % 3]) - v.begin());
+      const auto l =
+          static_cast<std::size_t>(std::find(v.begin(), v.end(), mesh.triangles[t][(k + 1) % 3]) - v.begin());
       sharp[t][k] = sharp[other][l] = turn(normal_near(t, k), normal_near(other, l)) > crease_share * whole;
     }
   }
