@@ -34,7 +34,9 @@ std::vector<Report> read_good_reports(cli::Tool& tool, const std::vector<std::fi
 
 int main(int argc, char** argv) {
   cli::Tool tool("chart", "Draws speed against accuracy, or any two numbers, from the tools' own reports as SVG.",
-                 "tunica-chart relax-*.json -o chart.svg --series result.shells --csv chart.csv");
+                 "tunica-chart relax.json -o chart.svg\n"
+                 "  tunica-chart relax.json -o rounds.svg --x result.iterations.seconds --y "
+                 "result.iterations.hausdorff_percent.upper --lines --csv rounds.csv");
   std::vector<std::filesystem::path> paths;
   std::filesystem::path out;
   std::filesystem::path csv;

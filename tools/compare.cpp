@@ -1,5 +1,6 @@
 #include "cli/tool.hpp"
 #include "io/mesh_file.hpp"
+#include "io/mesh_pair.hpp"
 #include "io/picture.hpp"
 #include "shell/boundary_distance.hpp"
 #include "shell/curved_surface.hpp"
@@ -238,6 +239,7 @@ void run(cli::Tool& tool, const Arguments& given) {
     MeshFile file_a = read_mesh(given.a, unit_mm, require_unit);
     MeshFile file_b = read_mesh(given.b, unit_mm, require_unit);
     const std::string space = common_space(file_a, given.a, file_b, given.b);
+    require_same_scale(file_a, given.a, file_b, given.b, unit_mm);
     a = surface_of(std::move(file_a), given);
     a.space = space;
     target = std::move(file_b.mesh);
@@ -304,7 +306,7 @@ int main(int argc, char** argv) {
       "Two-sided Hausdorff distance of two surfaces, flat or curved, as an interval that certainly holds the "
       "true value.",
       "tunica-compare coarse.ply surface.ply --max 1%\n"
-      "  tunica-compare shell.ply surface.ply --shell --picture map.png --report compare.json");
+      "  tunica-compare shell.ply surface.ply --shell --picture compare.png --report compare.json");
   Arguments given;
   declare(tool, given);
   tool.stages({"read", "compare"});

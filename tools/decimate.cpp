@@ -252,8 +252,8 @@ int main(int argc, char** argv) {
                  "Quadric edge collapse: fewer triangles for the same surface. Boundaries and topology are kept, no "
                  "triangle is flipped, those without area go, and the two-sided distance to the input is certified.",
                  "tunica-decimate surface.ply coarse.ply --triangles 800\n"
-                 "  tunica-decimate surface.ply coarse.ply --max-error 0.5% --report decimate.json\n"
-                 "  tunica-decimate surface.ply coarse.ply --triangles 800 --min-angle 20");
+                 "  tunica-decimate surface.ply within.ply --max-error 0.5% --report decimate.json\n"
+                 "  tunica-decimate surface.ply shaped.ply --triangles 800 --min-angle 20");
   Arguments given;
   declare(tool, given);
   tool.stages({"read", "decimate", "measure", "write"});

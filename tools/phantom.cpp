@@ -34,7 +34,7 @@ tunica::Vec3 parse_spacing(const std::string& text) {
 int main(int argc, char** argv) {
   using namespace tunica;
   cli::Tool tool("phantom", "Makes a segmented volume whose true surface is known.",
-                 "tunica-phantom aneurysm aneurysm.nii.gz --size 128 --spacing 0.5 --truth truth.ply");
+                 "tunica-phantom aneurysm aneurysm.nii.gz --size 64 --spacing 1.5 --truth truth.ply");
   std::string shape;
   std::string spacing = "1";
   std::filesystem::path out;

@@ -4,6 +4,7 @@
 #include "cli/usage.hpp"
 #include "core/quantity.hpp"
 #include "io/mesh_file.hpp"
+#include "io/mesh_pair.hpp"
 #include "io/picture.hpp"
 #include "shell/boundary_distance.hpp"
 #include "shell/curved_surface.hpp"
@@ -298,6 +299,8 @@ void run(cli::Tool& tool, const Arguments& given) {
     Surface start = read_surface(tool, tool.input(given.coarse), unit_mm);
     tool.input(given.target);
     Surface surface = given.coarse == given.target ? start : read_surface(tool, given.target, unit_mm);
+    require_same_scale(start.file, given.coarse, surface.file, given.target, unit_mm);
+    require_near(start.file, given.coarse, surface.file, given.target);
     ply = ply_options(tool, common_space(start.file, given.coarse, surface.file, given.target));
     coarse = std::move(start.file.mesh);
     target.emplace(std::move(surface.file.mesh));
@@ -315,9 +318,10 @@ void run(cli::Tool& tool, const Arguments& given) {
   const double percent = 100 / diagonal;
 
   const auto keep_partial = [&](const ShellMesh& shell) {
-    PlyOptions always = ply;
-    always.overwrite = true;
-    write_ply(fs::path(given.out.string() + ".part"), shell, always);
+    PlyOptions partial = ply;
+    partial.partial = true;
+    partial.overwrite = true;
+    write_ply(given.out, shell, partial);
   };
   ShellMesh best;
   std::optional<double> tolerance;  // mm
@@ -479,9 +483,9 @@ int main(int argc, char** argv) {
       "relax",
       "Moves a coarse mesh onto its target as curved shells, and certifies the distance of the curved surface "
       "to the target, both ways.",
-      "tunica-relax coarse.ply surface.ply shell.ply --tolerance 1% --refine --picture map.png\n"
-      "tunica-relax coarse.obj surface.obj shell.ply --mesh-unit mm --max-iterations 5\n"
-      "tunica-relax surface.ply surface.ply shell.ply --method fit --tolerance 0.3%");
+      "tunica-relax coarse.ply surface.ply shell.ply --tolerance 1% --refine --picture map.png --report relax.json\n"
+      "tunica-relax coarse.ply surface.ply paper.ply --method barycentre --max-iterations 5\n"
+      "tunica-relax surface.ply surface.ply quick.ply --tolerance 1% --effort 0");
   Arguments given;
   declare(tool, given);
   tool.stages({"read", "relax", "measure", "write"});

@@ -7,6 +7,7 @@
 #include "io/scene.hpp"
 #include "io/scene_file.hpp"
 #include "mechanics/curved_displacement.hpp"
+#include "mechanics/doubts.hpp"
 #include "mechanics/solve.hpp"
 
 #include <fmt/format.h>
@@ -269,13 +270,14 @@ Scene scene_of_flags(const Arguments& a) {
   return scene;
 }
 
-// Mechanics knows bodies, not files: says which file a refused or unsolved model came from.
+// Mechanics knows bodies, and where some of them were said: says which file a refused or unsolved model came from.
 template <typename Work>
 auto naming(const fs::path& file, const Work& work) {
   try {
     return work();
   } catch (const InputError& error) {
-    throw InputError(fmt::format("{}: {}", file.string(), error.what()));
+    const std::string what = error.what();
+    throw InputError(what.starts_with(file.string() + ":") ? what : fmt::format("{}: {}", file.string(), what));
   } catch (const RequirementError& error) {
     throw RequirementError(fmt::format("{}: {}", file.string(), error.what()));
   }
@@ -432,8 +434,6 @@ void report_summary(Json& result, const Summary& summary, bool converged, std::o
   }
 }
 
-fs::path partial(fs::path out) { return out += ".part"; }
-
 // The scene, from wherever the command line says; what it was read from is registered.
 Scene read_scene_of_run(cli::Tool& tool, const Arguments& a, const std::optional<RunJournal>& before,
                         std::vector<fs::path>& inputs) {
@@ -570,13 +570,16 @@ void simulate(cli::Tool& tool, const Arguments& a) {
   prepare_result(tool.result(), model);
   const fs::path& subject = inputs.front();
   naming(subject, [&] { check_model(model, scene.run); });
+  for (const std::string& doubt : doubts(model, scene.run)) {
+    tool.warn(doubt);
+  }
   if (a.check) {
-    fmt::print("{}", scene_text(scene));
+    tool.print(scene_text(scene));
     return;
   }
   const RunIdentity identity = identity_of_run(tool, scene, inputs, drawing);
   if (!journal) {
-    journal.emplace(RunJournal::create(partial(out), identity));
+    journal.emplace(RunJournal::create(part_of(out), identity));
   } else if (const std::string differs = difference(journal->identity(), identity); !differs.empty()) {
     throw InputError(fmt::format("{}: is another run: {}", a.resume.string(), differs));
   }
@@ -683,9 +686,8 @@ int main(int argc, char** argv) {
   cli::Tool tool("simulate", "Pressure load on thin curved shells, static or dynamic.",
                  "tunica-simulate shell.ply result.hdf --young 1MPa --poisson 0.45 --thickness 1.5mm --pressure 1kPa "
                  "--fix boundary --static\n"
-                 "  tunica-simulate shell.ply result.hdf --young 1MPa --poisson 0.45 --thickness 1.5mm --density "
-                 "1100kg/m3 --pressure 100mmHg --fix 'below z=-10mm' --duration 2s --step 40ms --ramp 1s\n"
-                 "  tunica-simulate --scene scene.toml result.hdf");
+                 "  tunica-simulate shell.ply motion.hdf --young 1MPa --poisson 0.45 --thickness 1.5mm --density "
+                 "1100kg/m3 --pressure 1kPa --fix boundary --duration 100ms --step 10ms --ramp 50ms");
   Arguments arguments;
   declare(tool, arguments);
   tool.stages({"read", "setup", "solve", "write"});

@@ -223,7 +223,10 @@ A stated requirement was not met: tolerance, count, convergence, equilibrium.
 .B 5
 An output or the report could not be written, or exists and
 .B \-\-force
-was not given.
+was not given, or another run is writing it.
+.TP
+.B 6
+Out of memory, or of the limit that is set on it.
 .TP
 .BR 129 ", " 130 ", " 143
 Stopped by SIGHUP, SIGINT or SIGTERM.

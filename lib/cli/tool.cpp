@@ -4,7 +4,7 @@
 #include "cli/usage.hpp"
 #include "core/threads.hpp"
 #include "core/version.hpp"
-#include "io/output_file.hpp"
+#include "core/words.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -14,7 +14,7 @@
 
 #include <algorithm>
 #include <csignal>
-#include <cstdio>
+#include <cstring>
 #include <fstream>
 #include <memory>
 #include <new>
@@ -24,6 +24,8 @@
 
 namespace tunica::cli {
 namespace {
+
+constexpr const char* report_flag = "--report";
 
 extern "C" void on_signal(int signal) {
   request_stop(signal);
@@ -67,15 +69,13 @@ std::string shell_quoted(const std::string& word) {
 }
 
 // The report of a run whose command line could not be parsed: then no option has been stored yet.
-std::filesystem::path report_argument(int argc, char** argv) {
-  constexpr std::string_view flag = "--report";
-  for (int i = 1; i < argc; ++i) {
-    const std::string_view word = argv[i];
-    if (word == flag && i + 1 < argc) {
-      return argv[i + 1];
+std::filesystem::path report_argument(const std::vector<std::string>& words) {
+  for (std::size_t i = 1; i < words.size(); ++i) {
+    if (words[i - 1] == report_flag) {
+      return words[i];
     }
-    if (word.starts_with(flag) && word.substr(flag.size()).starts_with('=')) {
-      return word.substr(flag.size() + 1);
+    if (words[i].starts_with(report_flag + std::string("="))) {
+      return words[i].substr(std::strlen(report_flag) + 1);
     }
   }
   return {};
@@ -111,6 +111,22 @@ std::filesystem::path resolved(const std::filesystem::path& path) {
   return error ? whole.lexically_normal() : canonical;
 }
 
+// Whether a file is NAME.part, or one whose name begins so: NAME.part.states.
+bool is_kept_under(const std::filesystem::path& file, const std::filesystem::path& part) {
+  const std::string& name = file.native();
+  const std::string& start = part.native();
+  return name.starts_with(start) && (name.size() == start.size() || name[start.size()] == '.');
+}
+
+// Every output of the run is held open, and an atlas has many labels.
+void allow_many_files() {
+  rlimit limit{};
+  if (::getrlimit(RLIMIT_NOFILE, &limit) == 0) {
+    limit.rlim_cur = limit.rlim_max;
+    (void)::setrlimit(RLIMIT_NOFILE, &limit);
+  }
+}
+
 // --force is meant for an older report: a slip of the pen must not turn a mesh or a patient's volume into JSON.
 void require_no_other_file(const std::filesystem::path& report) {
   std::ifstream file(report, std::ios::binary);
@@ -127,7 +143,7 @@ Tool::Tool(std::string verb, std::string summary, std::string example)
   app_.footer("Example:\n  " + std::regex_replace(example, std::regex("\n *"), "\n  "));
   app_.set_help_flag("--help", "print this help and stop");
   app_.set_version_flag("--version", fmt::format("tunica-{} {}", verb_, version), "print name and version and stop");
-  app_.add_option("--report", report_, "write a JSON record of the run to FILE, also when the run fails")
+  app_.add_option(report_flag, report_, "write a JSON record of the run to FILE, also when the run fails")
       ->type_name("FILE");
   app_.add_option("--threads", threads_,
                   "at most N threads (default: TUNICA_THREADS, else SLURM_CPUS_PER_TASK, else all cores)")
@@ -198,86 +214,137 @@ void Tool::parse_common() {
   }
 }
 
+std::optional<int> Tool::parse(int argc, char** argv) {
+  try {
+    // For the build alone, so not among the options: the manual page and the completion that are installed.
+    if (argc == 3 && std::string_view(argv[1]) == "--documentation") {
+      const std::string_view kind = argv[2];
+      if (kind == "man" || kind == "bash") {
+        print(kind == "man" ? man_page(app_) : bash_completion(app_));
+        return 0;
+      }
+    }
+    app_.parse(argc, argv);
+    parse_common();
+    return std::nullopt;
+  } catch (const CLI::Success&) {
+    try {
+      print(app_.get_help_ptr()->count() > 0 ? app_.help() : app_.version() + "\n");
+      return 0;
+    } catch (const OutputError& error) {
+      return finish(error.code(), error.what());
+    }
+  } catch (const CLI::ParseError& error) {
+    report_ = report_argument(words_);
+    force_ = std::ranges::find(words_, "--force") != words_.end();
+    return finish(ExitCode::usage, fmt::format("{} (see tunica-{} --help)", usage_message(app_, error), verb_));
+  } catch (const UsageError& error) {
+    return finish(error.code(), fmt::format("{} (see tunica-{} --help)", error.what(), verb_));
+  } catch (const OutputError& error) {
+    return finish(error.code(), error.what());
+  }
+}
+
 int Tool::run(int argc, char** argv, const std::function<void()>& body) {
   start_ = std::chrono::steady_clock::now();
   start_on_disk_ = std::filesystem::file_time_type::clock::now() - std::chrono::milliseconds(20);  // the disk's tick
+  occupy_standard_descriptors();
+  allow_many_files();
+  words_.assign(argv, argv + argc);
   for (int i = 0; i < argc; ++i) {
     command_ += (i > 0 ? " " : "") + shell_quoted(i > 0 ? argv[i] : "tunica-" + verb_);
   }
   std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);  // writing past a limit on file sizes is then an error like a full disk
   tidy_options(app_);
-  // For the build alone, so not among the options: the manual page and the completion that are installed.
-  if (argc == 3 && std::string_view(argv[1]) == "--documentation") {
-    const std::string_view kind = argv[2];
-    if (kind == "man" || kind == "bash") {
-      fmt::print("{}", kind == "man" ? man_page(app_) : bash_completion(app_));
-      return std::fflush(stdout) == 0 ? 0 : static_cast<int>(ExitCode::output);
-    }
-  }
-  try {
-    app_.parse(argc, argv);
-    parse_common();
-  } catch (const CLI::Success& success) {
-    return app_.exit(success);
-  } catch (const CLI::ParseError& error) {
-    report_ = report_argument(argc, argv);
-    return finish(ExitCode::usage, fmt::format("{} (see tunica-{} --help)", usage_message(app_, error), verb_));
-  } catch (const UsageError& error) {
-    return finish(error.code(), fmt::format("{} (see tunica-{} --help)", error.what(), verb_));
+  if (const auto code = parse(argc, argv)) {
+    return *code;
   }
   std::signal(SIGINT, on_signal);
   std::signal(SIGTERM, on_signal);
   if (std::signal(SIGHUP, on_signal) == SIG_IGN) {
     std::signal(SIGHUP, SIG_IGN);  // as nohup has it
   }
-  std::signal(SIGXFSZ, SIG_IGN);  // writing past a limit on file sizes is then an error like a full disk
+  return perform(body);
+}
+
+int Tool::perform(const std::function<void()>& body) {
   try {
-    if (!report_.empty()) {
-      const std::filesystem::path report = std::exchange(report_, {});
-      require_writable(report, force_);
-      require_no_other_file(report);
-      report_ = report;
-    }
+    register_report();
     body();
     return finish(ExitCode::ok, {});
   } catch (const UsageError& error) {
     return finish(error.code(), fmt::format("{} (see tunica-{} --help)", error.what(), verb_));
+  } catch (const MemoryError& error) {
+    return finish(error.code(), out_of_memory(error.what()));
   } catch (const Error& error) {
     return finish(error.code(), error.what());
   } catch (const Interrupted& interrupted) {
     finish(ExitCode::ok, fmt::format("stopped by signal {}", interrupted.signal()));
     return 128 + interrupted.signal();
   } catch (const std::bad_alloc&) {
-    return finish(ExitCode::internal, "out of memory");
+    return finish(ExitCode::memory, out_of_memory("out of memory: give it more, or a smaller input"));
   } catch (const std::exception& error) {
-    return finish(ExitCode::internal, error.what());
+    // TBB has no type for it.
+    return std::string_view(error.what()).find("pthread_create") != std::string_view::npos
+               ? finish(ExitCode::memory,
+                        out_of_memory("no thread can be started: give it more memory, or --threads 1"))
+               : finish(ExitCode::internal, error.what());
   }
 }
 
+// With the file and the stage at hand, and what limits it.
+std::string Tool::out_of_memory(const std::string& why) const {
+  rlimit limit{};
+  const bool limited = ::getrlimit(RLIMIT_AS, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY;
+  return fmt::format("{}{} ({}{}at most {:.0f} MiB were in use)", at_hand_.empty() ? "" : at_hand_ + ": ", why,
+                     running_.empty() ? "" : "stage " + running_ + ", ",
+                     limited ? fmt::format("limit {} MiB by ulimit -v, ", limit.rlim_cur >> 20U) : "",
+                     peak_mebibytes());
+}
+
+void Tool::register_report() {
+  if (report_.empty()) {
+    return;
+  }
+  // A report that is refused is not to be written by finish() either.
+  const std::filesystem::path report = std::exchange(report_, {});
+  require_writable(report, force_);
+  require_no_other_file(report);
+  report_lock_ = PartLock::take(part_of(report));
+  require_writable(report, force_);
+  report_ = report;
+  // However this run ends, an older report must not speak for it. Where the command line names that file once more, it
+  // may be an input, which is yet to be refused.
+  for (std::size_t i = 1; i < words_.size(); ++i) {
+    if (words_[i - 1] != report_flag && resolved(words_[i]) == resolved(report)) {
+      return;
+    }
+  }
+  std::error_code ignored;
+  std::filesystem::remove(report, ignored);
+}
+
 int Tool::finish(ExitCode code, const std::string& error) {
-  if (bar_open_) {
-    std::fputc('\n', stderr);
-    bar_open_ = false;
-  }
+  locks_.clear();
   const std::string message = one_line(error);
-  if (!message.empty()) {
-    fmt::print(stderr, "tunica-{}: {}\n", verb_, message);
-  }
+  say_line(message.empty() ? "" : fmt::format("tunica-{}: {}\n", verb_, message));
   if (!report_.empty()) {
     try {
       write_report(message.empty(), message);
     } catch (const std::exception& failure) {
-      fmt::print(stderr, "tunica-{}: {}\n", verb_, one_line(failure.what()));
-      return static_cast<int>(code == ExitCode::ok ? ExitCode::output : code);
+      say_line(fmt::format("tunica-{}: {}\n", verb_, one_line(failure.what())));
+      code = code == ExitCode::ok ? ExitCode::output : code;
     }
   }
+  report_lock_.reset();
   return static_cast<int>(code);
 }
 
 void Tool::write_report(bool ok, const std::string& error) {
   Json outputs = Json::array();
   for (const std::filesystem::path& path : outputs_) {
-    for (const std::string& name : {path.string(), path.string() + ".part"}) {
+    for (const std::string& name : {path.string(), part_of(path).string()}) {
       std::error_code missing;  // an older file that --force would have replaced is not an output of a run that failed
       const auto written = std::filesystem::last_write_time(name, missing);
       if (!missing && (ok || written >= start_on_disk_)) {
@@ -292,6 +359,7 @@ void Tool::write_report(bool ok, const std::string& error) {
       {"version", version},
       {"ok", ok},
       {"error", error.empty() ? Json() : Json(error)},
+      {"warnings", warnings_},
       {"command", command_},
       {"inputs", inputs_},
       {"outputs", outputs},
@@ -307,22 +375,27 @@ void Tool::write_report(bool ok, const std::string& error) {
 
 void Tool::claim(const std::filesystem::path& path, bool written) {
   const std::filesystem::path place = resolved(path);
-  if (!report_.empty() && place == resolved(report_)) {
+  const std::filesystem::path part = resolved(path.parent_path() / ".") / part_of(path.filename());
+  if (!report_.empty() && (place == resolved(report_) || is_kept_under(place, part_of(resolved(report_))) ||
+                           (written && is_kept_under(resolved(report_), part)))) {
     report_.clear();
     throw UsageError(fmt::format("{}: --report names a file of the run itself, name another", path.string()));
   }
-  for (const auto& [other, other_written] : claimed_) {
-    if (other == place && (written || other_written)) {
-      throw UsageError(written && other_written
+  for (const Claim& other : claimed_) {
+    const bool same = other.place == place || (other.written && is_kept_under(place, other.part)) ||
+                      (written && is_kept_under(other.place, part));
+    if (same && (written || other.written)) {
+      throw UsageError(written && other.written
                            ? fmt::format("{}: two outputs have the same name", path.string())
                            : fmt::format("{}: is an input and an output, name another output", path.string()));
     }
   }
-  claimed_.emplace_back(place, written);
+  claimed_.push_back({place, part, written});
 }
 
 const std::filesystem::path& Tool::input(const std::filesystem::path& path) {
   claim(path, false);
+  at_hand_ = path.string();
   Json hash;
   if (!report_.empty()) {
     try {
@@ -342,12 +415,17 @@ const std::filesystem::path& Tool::output(const std::filesystem::path& path, con
   }
   require_writable(path, force_);
   claim(path, true);
+  at_hand_ = at_hand_.empty() ? name : at_hand_;
+  locks_.push_back(PartLock::take(part_of(path)));
+  require_writable(path, force_);  // another run may have finished it before the lock was ours
   outputs_.push_back(path);
   return path;
 }
 
 Tool::Stage::Stage(Tool& tool, std::string name)
-    : tool_(tool), name_(std::move(name)), start_(std::chrono::steady_clock::now()) {}
+    : tool_(tool), name_(std::move(name)), start_(std::chrono::steady_clock::now()) {
+  tool_.running_ = name_;
+}
 
 Tool::Stage::~Stage() {
   Json& entry = tool_.seconds_[name_];
@@ -367,44 +445,55 @@ Progress Tool::progress(const std::string& doing) {
   struct Shown {
     std::chrono::steady_clock::time_point last = std::chrono::steady_clock::now();
     std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now();
+    double most = 0;
   };
   const bool terminal = ::isatty(STDERR_FILENO) == 1;
   return [this, doing, terminal, shown = std::make_shared<Shown>()](double fraction) {
+    // What turns out to be more work than it looked waits until it has caught up.
+    shown->most = std::max(shown->most, std::min(fraction, 1.0));
     const auto now = std::chrono::steady_clock::now();
     const auto pause = terminal ? std::chrono::milliseconds(100) : std::chrono::milliseconds(10'000);
     if (now - shown->last < pause) {
       return;
     }
     shown->last = now;
-    const double percent = 100 * std::min(1.0, std::max(0.0, fraction));
+    const double percent = 100 * shown->most;
     if (terminal) {
       constexpr int width = 30;
       const auto filled = static_cast<std::size_t>(percent / 100 * width);
-      fmt::print(stderr, "\r{:<10} [{:<{}}] {:5.1f} %  {:.1f} s ", doing, std::string(filled, '#'), width, percent,
-                 seconds_since(shown->start));
+      say(fmt::format("\r{:<10} [{:<{}}] {:5.1f} %  {:.1f} s ", doing, std::string(filled, '#'), width, percent,
+                      seconds_since(shown->start)));
       bar_open_ = true;
     } else {
-      fmt::print(stderr, "tunica-{}: {} {:.1f} %\n", verb_, doing, percent);
+      say_line(fmt::format("tunica-{}: {} {:.1f} %\n", verb_, doing, percent));
     }
   };
 }
 
+void Tool::say_line(const std::string& text) const { say((std::exchange(bar_open_, false) ? "\n" : "") + text); }
+
 void Tool::note(const std::string& text) const {
   if (!quiet_) {
-    fmt::print(stderr, "{}{}\n", bar_open_ ? "\n" : "", text);
+    say_line(text + "\n");
   }
 }
 
 void Tool::detail(const std::string& text) const {
   if (verbose_) {
-    fmt::print(stderr, "{}{}\n", bar_open_ ? "\n" : "", text);
+    say_line(text + "\n");
   }
 }
 
 void Tool::warn(const std::string& text) const {
+  warnings_.push_back(one_line(text));
   if (!quiet_) {
-    fmt::print(stderr, "{}tunica-{}: warning: {}\n", bar_open_ ? "\n" : "", verb_, one_line(text));
+    say_line(fmt::format("tunica-{}: warning: {}\n", verb_, one_line(text)));
   }
+}
+
+void Tool::print(const std::string& text) const {
+  say_line("");
+  tunica::print(text);
 }
 
 }  // namespace tunica::cli

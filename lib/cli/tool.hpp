@@ -4,6 +4,7 @@
 #include "core/json.hpp"
 #include "core/progress.hpp"
 #include "core/quantity.hpp"
+#include "io/output_file.hpp"
 
 #include <CLI/CLI.hpp>
 
@@ -11,6 +12,7 @@
 #include <filesystem>
 #include <functional>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -56,11 +58,13 @@ public:
   /// Parses, runs `body`, writes the report, prints one line on an error. @return the exit code for main().
   int run(int argc, char** argv, const std::function<void()>& body);
 
-  /// Registers an input, with its hash, for the report and returns it. Errors: UsageError when it is also an output.
+  /// Registers an input, with its hash, for the report and returns it. Errors: UsageError when it is also an output, or
+  /// one of the names under which an output is kept until it is whole (NAME.part, NAME.part.states, ...).
   const std::filesystem::path& input(const std::filesystem::path& path);
 
   /// Registers an output for the report; OutputError when it exists and --force was not given, or cannot be written;
   /// UsageError when it is also an input, another output or the report, or ends with none of `endings`, where given.
+  /// From here on to the end of the run no other one can write it: the PartLock is held.
   const std::filesystem::path& output(const std::filesystem::path& path, const std::vector<std::string>& endings = {});
   /// Names in the report a file whose name follows from an output's, once it is there.
   void wrote(const std::filesystem::path& path) { outputs_.push_back(path); }
@@ -86,10 +90,14 @@ public:
   /// A callback that draws a bar on a terminal, prints a line now and then elsewhere, and is silent with --quiet.
   [[nodiscard]] Progress progress(const std::string& doing);
 
-  /// A line on stderr: always but with --quiet (`note`), only with --verbose (`detail`), a warning.
+  /// A line on stderr: always but with --quiet (`note`), only with --verbose (`detail`), a warning; the last stands in
+  /// the report too, also with --quiet.
   void note(const std::string& text) const;
   void detail(const std::string& text) const;
   void warn(const std::string& text) const;
+
+  /// What was asked for on standard output. Errors: OutputError when it is lost.
+  void print(const std::string& text) const;
 
   /// The `result` object of the report. A value that is undefined is set to null (`Json()`).
   [[nodiscard]] Json& result() { return result_; }
@@ -102,22 +110,38 @@ public:
   [[nodiscard]] const std::string& command() const { return command_; }
 
 private:
+  std::optional<int> parse(int argc, char** argv);
+  int perform(const std::function<void()>& body);
   int finish(ExitCode code, const std::string& error);
+  void register_report();
   void write_report(bool ok, const std::string& error);
   void parse_common();
   void claim(const std::filesystem::path& path, bool written);
+  [[nodiscard]] std::string out_of_memory(const std::string& why) const;
+  void say_line(const std::string& text) const;
 
   std::string verb_;
   CLI::App app_;
+  std::vector<std::string> words_;  ///< of the command line
   std::string command_;
   std::filesystem::path report_;
   std::optional<std::string> threads_;
   bool force_ = false;
   bool quiet_ = false;
   bool verbose_ = false;
-  bool bar_open_ = false;
-  std::vector<std::pair<std::filesystem::path, bool>> claimed_;  ///< resolved files of the run; written or read
+  mutable bool bar_open_ = false;
+  struct Claim {
+    std::filesystem::path place;  ///< resolved
+    std::filesystem::path part;   ///< under which it is kept until it is whole
+    bool written = false;         ///< or read
+  };
+  std::vector<Claim> claimed_;                    ///< files of the run
+  std::vector<std::shared_ptr<PartLock>> locks_;  ///< of the outputs
+  std::shared_ptr<PartLock> report_lock_;
+  std::string at_hand_;  ///< the input registered last
+  std::string running_;  ///< the stage begun last
   Json inputs_ = Json::array();
+  mutable Json warnings_ = Json::array();  ///< warn() says, it does not change the tool
   std::vector<std::filesystem::path> outputs_;
   Json seconds_ = Json::object();
   Json result_ = Json::object();

@@ -15,6 +15,7 @@ enum class ExitCode : int {
   input = 3,
   requirement = 4,
   output = 5,
+  memory = 6,
 };
 
 class Error : public std::runtime_error {
@@ -48,6 +49,13 @@ public:
 class OutputError : public Error {
 public:
   explicit OutputError(const std::string& message) : Error(ExitCode::output, message) {}
+};
+
+/// There is not enough memory for the work; the message says for which, and what takes less. std::bad_alloc is the same
+/// where nothing more is known.
+class MemoryError : public Error {
+public:
+  explicit MemoryError(const std::string& message) : Error(ExitCode::memory, message) {}
 };
 
 /// SIGHUP, SIGINT or SIGTERM arrived; thrown by check_interrupt() at a place where the state is consistent.

@@ -9,6 +9,7 @@
 #include <cerrno>
 #include <cstring>
 #include <functional>
+#include <new>
 #include <numeric>
 
 namespace tunica::hdf5 {
@@ -70,6 +71,9 @@ Writer::Writer(const std::filesystem::path& path) : name_(path.string()) {
 void Writer::check(int result, const std::string& doing) const {
   if (result < 0) {
     library_failed = true;
+    if (errno == ENOMEM) {
+      throw std::bad_alloc();
+    }
     const std::string why = errno != 0 ? fmt::format(": {}", std::strerror(errno)) : std::string();
     throw OutputError(fmt::format("{}: cannot be {}{}", name_, doing, why));
   }

@@ -33,7 +33,7 @@ private:
   Id id_ = -1;
 };
 
-/// Writes one file. Every failure is an OutputError that names the file.
+/// Writes one file. Every failure is an OutputError that names the file, but for lack of memory: std::bad_alloc.
 class Writer {
 public:
   /// Creates `path` without locking it.
@@ -60,7 +60,7 @@ public:
   /// Closes the file and everything that is open in it; what is left of other handles is void.
   void close();
 
-  /// Throws OutputError when `result` is negative.
+  /// Throws when `result` is negative.
   void check(int result, const std::string& doing) const;
   Handle own(Id id, const std::string& doing) const;
 

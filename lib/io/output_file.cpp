@@ -6,6 +6,7 @@
 #include <openssl/evp.h>
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <array>
@@ -14,6 +15,7 @@
 #include <cstring>
 #include <fstream>
 #include <memory>
+#include <mutex>
 #include <vector>
 
 namespace tunica {
@@ -90,13 +92,102 @@ void require_writable(const fs::path& path, bool overwrite) {
   }
 }
 
-OutputFile::OutputFile(fs::path path, bool overwrite) : path_(std::move(path)), partial_(path_) {
-  partial_ += ".part";
-  require_writable(path_, overwrite);
-  const File file(std::fopen(partial_.c_str(), "wb"));
-  if (!file) {
-    throw OutputError(fmt::format("{}: cannot be created: {}", partial_.string(), reason()));
+int open_own_file(const fs::path& path, int flags) {
+  const auto refuse = [&](const char* what) {
+    throw OutputError(fmt::format("{}: is {}, and is to be written: remove it", path.string(), what));
+  };
+  const auto require_regular = [&](const struct stat& file) {
+    if (S_ISLNK(file.st_mode)) {
+      refuse("a symbolic link");
+    }
+    if (!S_ISREG(file.st_mode)) {
+      refuse(S_ISDIR(file.st_mode) ? "a folder" : "a device or a pipe");
+    }
+    if (file.st_nlink > 1) {
+      refuse("one of several names of a file");
+    }
+  };
+  struct stat file {};
+  if (::lstat(path.c_str(), &file) == 0) {  // to open a device may be enough to set it going
+    require_regular(file);
   }
+  const int descriptor = ::open(path.c_str(), flags | O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC, 0666);
+  if (descriptor < 0) {
+    if (errno == ENOENT && (flags & O_CREAT) == 0) {
+      return -1;
+    }
+    throw OutputError(fmt::format("{}: cannot be created: {}", path.string(), reason()));
+  }
+  try {
+    if (::fstat(descriptor, &file) != 0) {
+      throw OutputError(fmt::format("{}: cannot be read: {}", path.string(), reason()));
+    }
+    require_regular(file);
+  } catch (const OutputError&) {
+    ::close(descriptor);
+    throw;
+  }
+  return descriptor;
+}
+
+std::shared_ptr<PartLock> PartLock::take(const fs::path& part) {
+  static std::mutex one_at_a_time;
+  static std::vector<std::weak_ptr<PartLock>> held;
+  const std::lock_guard guard(one_at_a_time);
+  std::erase_if(held, [](const std::weak_ptr<PartLock>& lock) { return lock.expired(); });
+  for (const std::weak_ptr<PartLock>& other : held) {
+    if (auto lock = other.lock(); lock && lock->is_at(part)) {
+      return lock;
+    }
+  }
+  while (true) {
+    const std::shared_ptr<PartLock> lock(new PartLock(part, open_own_file(part, O_CREAT)));
+    // Of the open file, not of the process: another thing that opens and closes the file here does not end it, and
+    // HDF5, which asks for another kind of lock when it reads, is not kept from looking at a run under way.
+    struct flock whole {};
+    whole.l_type = F_WRLCK;
+    whole.l_whence = SEEK_SET;
+    if (::fcntl(lock->descriptor_, F_OFD_SETLK, &whole) != 0 && (errno == EAGAIN || errno == EACCES)) {
+      lock->foreign_ = true;
+      throw OutputError(
+          fmt::format("{}: another run is writing it: wait for it, stop it, or name another output", part.string()));
+    }
+    // Whoever held it may have renamed or removed it meanwhile.
+    if (lock->is_at(part)) {
+      held.push_back(lock);
+      return lock;
+    }
+  }
+}
+
+PartLock::~PartLock() {
+  struct stat file {};
+  if (!foreign_ && ::fstat(descriptor_, &file) == 0 && file.st_size == 0 && is_at(part_)) {
+    ::unlink(part_.c_str());
+  }
+  ::close(descriptor_);
+}
+
+bool PartLock::is_at(const fs::path& path) const {
+  struct stat mine {};
+  struct stat there {};
+  return ::fstat(descriptor_, &mine) == 0 && ::lstat(path.c_str(), &there) == 0 && mine.st_dev == there.st_dev &&
+         mine.st_ino == there.st_ino;
+}
+
+void PartLock::empty() const {
+  if (::ftruncate(descriptor_, 0) != 0) {
+    throw OutputError(fmt::format("{}: cannot be written: {}", part_.string(), reason()));
+  }
+}
+
+fs::path part_of(fs::path path) { return path += ".part"; }
+
+OutputFile::OutputFile(fs::path path, bool overwrite) : path_(std::move(path)), partial_(part_of(path_)) {
+  require_writable(path_, overwrite);
+  lock_ = PartLock::take(partial_);
+  require_writable(path_, overwrite);  // another run may have finished it before the lock was ours
+  lock_->empty();
 }
 
 OutputFile::~OutputFile() {

@@ -1,17 +1,50 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <string_view>
+#include <utility>
 
 namespace tunica {
 
+/// The right to write the file NAME.part: a lock on the file itself, which other programs that ask for it respect. It
+/// ends with the last holder of the pointer, or of the process, however that ends. A file that is then still empty is
+/// removed.
+class PartLock {
+public:
+  /// Creates the file where it is not there; keeps its bytes where it is. Whoever asks in the process that holds it
+  /// gets the same lock. Errors: OutputError when another process holds it, or when the file cannot be opened for
+  /// writing or is anything but a regular file with this one name: links are not followed, and a pipe is not waited
+  /// for.
+  static std::shared_ptr<PartLock> take(const std::filesystem::path& part);
+
+  ~PartLock();
+  PartLock(const PartLock&) = delete;
+  PartLock& operator=(const PartLock&) = delete;
+
+  /// Drops the bytes of an earlier run. Errors: OutputError.
+  void empty() const;
+
+private:
+  PartLock(std::filesystem::path part, int descriptor) : part_(std::move(part)), descriptor_(descriptor) {}
+  [[nodiscard]] bool is_at(const std::filesystem::path& path) const;
+
+  std::filesystem::path part_;
+  int descriptor_;
+  bool foreign_ = false;  ///< another process holds it
+};
+
+/// Opens a file for writing that must be no link, pipe or device. @param flags  of open(2), beside those for that.
+/// @return the descriptor. Errors: OutputError; with O_CREAT missing, a missing file is -1.
+int open_own_file(const std::filesystem::path& path, int flags);
+
 /// An output that is whole or not there: everything goes to `NAME.part`, which commit() flushes to the disk and
 /// renames to NAME (or to the file behind it, when NAME is a symbolic link). Without commit() the destructor removes
-/// the .part file, unless keep_partial() was called.
+/// the .part file, unless keep_partial() was called. It holds the PartLock.
 class OutputFile {
 public:
-  /// Errors: OutputError when NAME exists and `overwrite` is false, or when NAME.part cannot be created.
+  /// Errors: OutputError when NAME exists and `overwrite` is false, or as PartLock::take().
   OutputFile(std::filesystem::path path, bool overwrite);
   ~OutputFile();
   OutputFile(const OutputFile&) = delete;
@@ -29,9 +62,13 @@ public:
 private:
   std::filesystem::path path_;
   std::filesystem::path partial_;
+  std::shared_ptr<PartLock> lock_;
   bool done_ = false;
   bool keep_ = false;
 };
+
+/// NAME.part, in which NAME is written.
+std::filesystem::path part_of(std::filesystem::path path);
 
 /// Throws OutputError when `path` exists and `overwrite` is false, or is a folder, a device or a pipe (renaming onto
 /// /dev/null would replace it), or when its folder cannot be written to. Tools call

@@ -549,20 +549,33 @@ void draw(const std::filesystem::path& path, const TriangleMesh& surface, const 
   write_file(path, canvas.png(), options.overwrite);
 }
 
+// OpenCV reports an error to the terminal before it throws.
+void draw_quietly(const std::filesystem::path& path, const TriangleMesh& surface, const std::vector<double>& values_mm,
+                  const PictureOptions& options) {
+  require_writable(path, options.overwrite);
+  cv::redirectError([](int, const char*, const char*, const char*, int, void*) { return 0; });
+  try {
+    draw(path, surface, values_mm, options);
+  } catch (const cv::Exception& error) {
+    if (error.code == cv::Error::StsNoMem) {
+      throw std::bad_alloc();
+    }
+    throw InternalError(fmt::format("{}: cannot be drawn: {}", path.string(), error.err));
+  }
+}
+
 }  // namespace
 
 void write_error_map_picture(const std::filesystem::path& path, const TriangleMesh& surface,
                              const std::vector<double>& values_mm, const PictureOptions& options) {
   TUNICA_ASSERT(values_mm.size() == surface.vertices.size());
   TUNICA_ASSERT(!options.diagonal || *options.diagonal > 0);
-  require_writable(path, options.overwrite);
-  draw(path, surface, values_mm, options);
+  draw_quietly(path, surface, values_mm, options);
 }
 
 void write_surface_picture(const std::filesystem::path& path, const TriangleMesh& surface,
                            const PictureOptions& options) {
-  require_writable(path, options.overwrite);
-  draw(path, surface, {}, options);
+  draw_quietly(path, surface, {}, options);
 }
 
 }  // namespace tunica

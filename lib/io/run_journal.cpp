@@ -8,7 +8,6 @@
 #include <zlib.h>
 
 #include <fcntl.h>
-#include <sys/file.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -250,10 +249,11 @@ std::string difference(const RunIdentity& before, const RunIdentity& now) {
 }
 
 struct RunJournal::Implementation {
-  Implementation(const fs::path& part, int flags) : states_path(part), checkpoint_path(part) {
+  Implementation(const fs::path& the_part, int flags)
+      : part(the_part), states_path(part), checkpoint_path(part), lock(PartLock::take(part)) {
     states_path += ".states";
     checkpoint_path += ".checkpoint";
-    descriptor = ::open(states_path.c_str(), flags | O_CLOEXEC, 0666);
+    descriptor = open_own_file(states_path, flags);
   }
   ~Implementation() {
     if (descriptor >= 0) {
@@ -262,13 +262,6 @@ struct RunJournal::Implementation {
   }
   Implementation(const Implementation&) = delete;
   Implementation& operator=(const Implementation&) = delete;
-
-  void lock() const {
-    if (::flock(descriptor, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
-      throw OutputError(
-          fmt::format("{}: another tunica-simulate is writing it: wait for it or stop it", states_path.string()));
-    }
-  }
 
   void write(std::string_view bytes) {
     while (!bytes.empty()) {
@@ -309,14 +302,14 @@ struct RunJournal::Implementation {
   std::size_t read(std::string& into) {
     std::size_t got = 0;
     while (got < into.size()) {
-      const ssize_t part = ::read(descriptor, into.data() + got, into.size() - got);
-      if (part < 0 && errno == EINTR) {
+      const ssize_t more = ::read(descriptor, into.data() + got, into.size() - got);
+      if (more < 0 && errno == EINTR) {
         continue;
       }
-      if (part <= 0) {
+      if (more <= 0) {
         break;
       }
-      got += static_cast<std::size_t>(part);
+      got += static_cast<std::size_t>(more);
     }
     size += got;
     return got;
@@ -371,7 +364,9 @@ struct RunJournal::Implementation {
       unpack(kept_size);
       checkpoint_members(unpack, checkpoint.emplace());
       unpack.require_end();
-      if (of_identity != identity_checksum) {
+      // Every step leaves its seconds, so the size of the file bounds how many there can be.
+      const Summary& summary = checkpoint->summary;
+      if (of_identity != identity_checksum || summary.steps != summary.seconds_per_step.size()) {
         throw Damaged();
       }
     } catch (const Damaged&) {
@@ -415,8 +410,10 @@ struct RunJournal::Implementation {
     write_file(checkpoint_path, std::string(checkpoint_magic) + head.bytes() + pack.bytes(), true);
   }
 
+  fs::path part;
   fs::path states_path;
   fs::path checkpoint_path;
+  std::shared_ptr<PartLock> lock;  ///< on `part`, for all three
   int descriptor = -1;
   RunIdentity identity;
   std::uint32_t identity_checksum = 0;
@@ -435,53 +432,54 @@ RunJournal::RunJournal(std::unique_ptr<Implementation> implementation) : impleme
 RunJournal::RunJournal(RunJournal&&) noexcept = default;
 
 RunJournal::~RunJournal() {
-  if (implementation_ && implementation_->created && implementation_->states == 0) {
-    remove();
+  if (implementation_ && implementation_->created) {
+    std::error_code missing;
+    const auto bytes = fs::file_size(implementation_->part, missing);
+    if (missing || bytes == 0) {
+      remove();
+    }
   }
 }
 
 RunJournal RunJournal::create(const fs::path& part, RunIdentity identity) {
-  auto journal = std::make_unique<Implementation>(part, O_RDWR | O_CREAT);
-  if (journal->descriptor < 0) {
-    throw OutputError(fmt::format("{}: cannot be created: {}", journal->states_path.string(), std::strerror(errno)));
-  }
-  journal->lock();
+  auto journal = std::make_unique<Implementation>(part, O_CREAT);
   // From what goes on to what it goes on with: whenever this is cut short, no old checkpoint meets new states.
-  for (const fs::path& old : {journal->checkpoint_path, part}) {
-    std::error_code ignored;
-    fs::remove(old, ignored);
-  }
+  std::error_code ignored;
+  fs::remove(journal->checkpoint_path, ignored);
+  journal->lock->empty();
   if (::ftruncate(journal->descriptor, 0) != 0) {
     throw OutputError(fmt::format("{}: cannot be written: {}", journal->states_path.string(), std::strerror(errno)));
   }
   Packer pack;
   identity_members(pack, identity);
   journal->identity_checksum = checksum(pack.bytes());
-  journal->write(std::string(states_magic) + record_of(pack.bytes()));
-  journal->header_size = journal->size;
-  journal->created = true;
-  journal->identity = std::move(identity);
-  return RunJournal(std::move(journal));
+  RunJournal created(std::move(journal));  // from here on it removes what it does not get to
+  Implementation& begun = *created.implementation_;
+  begun.created = true;
+  begun.write(std::string(states_magic) + record_of(pack.bytes()));
+  begun.header_size = begun.size;
+  begun.identity = std::move(identity);
+  return created;
 }
 
 RunJournal RunJournal::open(const fs::path& part) {
-  if (!fs::exists(part)) {
-    fs::path whole = part;
-    whole.replace_extension();
+  fs::path whole = part;
+  whole.replace_extension();
+  fs::path states = part;
+  states += ".states";
+  // NAME.part is written anew, and is not there where the disk was too full even for that.
+  if (!fs::exists(part) && (fs::exists(whole) || !fs::exists(states))) {
     throw InputError(fs::exists(whole) ? fmt::format("{}: no such file: {} is complete, there is nothing to resume",
                                                      part.string(), whole.string())
                                        : fmt::format("{}: no such file: there is nothing to resume", part.string()));
   }
-  auto journal = std::make_unique<Implementation>(part, O_RDWR);
+  auto journal = std::make_unique<Implementation>(part, 0);
   if (journal->descriptor < 0) {
     throw InputError(
-        errno == ENOENT
-            ? fmt::format("{}: cannot be resumed: {} is not beside it, which a run leaves when it is interrupted, and "
-                          "not when it has failed",
-                          part.string(), journal->states_path.filename().string())
-            : fmt::format("{}: cannot be opened: {}", journal->states_path.string(), std::strerror(errno)));
+        fmt::format("{}: cannot be resumed: {} is not beside it, which a run leaves when it is interrupted, and "
+                    "not when it has failed",
+                    part.string(), journal->states_path.filename().string()));
   }
-  journal->lock();
   journal->read_identity();
   journal->read_checkpoint();
   journal->require_whole_states();  // before anybody replaces NAME.part

@@ -32,10 +32,11 @@ std::string difference(const RunIdentity& before, const RunIdentity& now);
 /// * NAME.part.checkpoint: the last checkpoint and how much of NAME.part.states belongs to it; written whole, flushed
 ///   to the disk and renamed, so it is the last one or the one before.
 /// A resumed run writes NAME.part anew from the states, up to the checkpoint, and goes on from there.
+/// Whoever holds the PartLock of NAME.part, as a journal does, writes all three.
 /// Cost: 96 bytes per node and state; checkpoints are spaced so that they take at most a twentieth of the time.
 class RunJournal {
 public:
-  /// Starts the journal of a new run; what an earlier run left under this name, NAME.part included, is removed.
+  /// Starts the journal of a new run; what an earlier run left under this name is removed, NAME.part emptied.
   /// Errors: OutputError, also when another process is at work on it.
   static RunJournal create(const std::filesystem::path& part, RunIdentity identity);
 
@@ -47,7 +48,8 @@ public:
   RunJournal& operator=(RunJournal&&) = delete;
   RunJournal(const RunJournal&) = delete;
   RunJournal& operator=(const RunJournal&) = delete;
-  /// Removes the files of a new run that never got to a state.
+  /// Removes the files of a new run that leaves no NAME.part, or an empty one: it has no result to go on from, as when
+  /// the disk is full.
   ~RunJournal();
 
   [[nodiscard]] const RunIdentity& identity() const;

@@ -289,11 +289,27 @@ void make_flat(ShellMesh& mesh) {
   }
 }
 
-MeshFile read_body_mesh(const SceneShell& shell) {
+// Where a body, fix or load was said; on the command line all is of one mesh.
+std::string said_at(const Place& place, const SceneShell& shell) {
+  return place.flag ? shell.mesh.string() : place.text;
+}
+
+struct BodyMesh {
+  MeshFile file;
+  bool curved = false;
+  ShellMesh shell;
+};
+
+BodyMesh read_body_mesh(const SceneShell& shell) {
   const auto read = [&] {
-    MeshFile file = read_mesh(shell.mesh, shell.unit_mm, true);
+    BodyMesh mesh{read_mesh(shell.mesh, shell.unit_mm, true), false, {}};
+    const MeshFile& file = mesh.file;
     require_no_other_unit(file, shell.unit_mm, shell.mesh);
-    return file;
+    mesh.curved = shell.rest == Rest::curved && !(file.normals.empty() && file.corner_normals.empty());
+    mesh.shell = mesh.curved
+                     ? shell_of(file, shell.mesh)
+                     : ShellMesh{file.mesh.vertices, file.mesh.triangles, {}, {}, file.patch.value_or(Patch::comas)};
+    return mesh;
   };
   if (shell.places.item.flag) {
     return read();
@@ -331,13 +347,12 @@ std::vector<double> thickness_of(const SceneShell& shell, const MeshFile& file) 
 }
 
 ShellBody load_body(const SceneShell& shell, std::vector<std::string>& notes) {
-  const MeshFile file = read_body_mesh(shell);
+  BodyMesh read = read_body_mesh(shell);
   ShellBody body;
   body.name = shell.name;
-  body.curved = shell.rest == Rest::curved && !(file.normals.empty() && file.corner_normals.empty());
-  body.mesh = body.curved
-                  ? shell_of(file, shell.mesh)
-                  : ShellMesh{file.mesh.vertices, file.mesh.triangles, {}, {}, file.patch.value_or(Patch::comas)};
+  body.said_at = said_at(shell.places.item, shell);
+  body.curved = read.curved;
+  body.mesh = std::move(read.shell);
   for (Vec3& vertex : body.mesh.vertices) {
     vertex *= shell.scale;
   }
@@ -350,7 +365,7 @@ ShellBody load_body(const SceneShell& shell, std::vector<std::string>& notes) {
                       shell.mesh.string()));
     }
   }
-  body.thickness = thickness_of(shell, file);
+  body.thickness = thickness_of(shell, read.file);
   body.material = shell.material;
   body.membrane = shell.membrane;
   body.bending = shell.bending;
@@ -358,8 +373,21 @@ ShellBody load_body(const SceneShell& shell, std::vector<std::string>& notes) {
   return body;
 }
 
-Load resolve_load(const SceneLoad& load, std::size_t body_number, const Body& body) {
-  Load result{body_number, load.kind, load.ramp};
+// Where the run looks for the factor of the loads, there must be some.
+void require_load(const Scene& scene) {
+  const bool buckles = std::holds_alternative<BucklingRun>(scene.run.kind);
+  if (!buckles && !std::holds_alternative<ArcLengthRun>(scene.run.kind)) {
+    return;
+  }
+  const auto prescribes = [](const SceneFix& fix) { return fix.displacement && !fix.displacement->isZero(0); };
+  require(
+      !scene.loads.empty() || std::any_of(scene.fixes.begin(), scene.fixes.end(), prescribes),
+      scene.run_places.of(buckles ? "kind" : "control"),
+      fmt::format("{} needs a load or a prescribed displacement: add a [[load]]", buckles ? "buckling" : "arc length"));
+}
+
+Load resolve_load(const SceneLoad& load, const SceneShell& shell, std::size_t body_number, const Body& body) {
+  Load result{body_number, load.kind, load.ramp, said_at(load.places.item, shell)};
   if (load.where) {
     const std::vector<Index> nodes = nodes_of(body, *load.where, load.places);
     if (auto* force = std::get_if<ForceLoad>(&result.kind)) {
@@ -468,6 +496,7 @@ void check_scene(const Scene& scene) {
 }
 
 LoadedScene load_scene(const Scene& scene) {
+  require_load(scene);
   LoadedScene loaded;
   loaded.notes = scene.notes;
   Model& model = loaded.model;
@@ -484,12 +513,13 @@ LoadedScene load_scene(const Scene& scene) {
       model.rigid_motions.push_back({b});
     } else {
       model.fixes.push_back({b, nodes_of(bodies[b], fix.where, fix.places), fix.translation, fix.rotation,
-                             fix.displacement.value_or(Vec3::Zero()), fix.ramp});
+                             fix.displacement.value_or(Vec3::Zero()), fix.ramp,
+                             said_at(fix.places.item, scene.shells[b])});
     }
   }
   for (const SceneLoad& load : scene.loads) {
     const std::size_t b = body_index(scene, load.body, load.places);
-    model.loads.push_back(resolve_load(load, b, bodies[b]));
+    model.loads.push_back(resolve_load(load, scene.shells[b], b, bodies[b]));
   }
   for (const SceneProbe& probe : scene.probes) {
     const std::size_t b = body_index(scene, probe.body, probe.places);

@@ -45,7 +45,7 @@ VolumeFile read_volume(const std::filesystem::path& path, const VolumeOptions& o
 /// for the voxels; the slab's affine, slope and intercept are those of the whole volume.
 using SlabVisitor = std::function<void(const VolumeFile& file, const Volume& slab, std::size_t first_slice)>;
 
-/// How much is read at a time: as many slices as both allow, one at least (and up to 16 of a slice stack).
+/// How much is read at a time: as many slices as both allow, one at least.
 struct SlabSize {
   std::size_t bytes = std::size_t{64} << 20;
   std::optional<std::size_t> slices;
@@ -59,8 +59,8 @@ struct SlabSize {
 VolumeFile read_volume_slabs(const std::filesystem::path& path, const VolumeOptions& options, const SlabSize& size,
                              const SlabVisitor& visit);
 
-/// What read_volume() returns, but for the voxels, which are not read. Errors: as read_volume(), but for those about
-/// the voxels themselves and the end of the file.
+/// What read_volume() returns, but for the voxels, which are not read: its data is empty, of their type. Errors: as
+/// read_volume(), but for those about the voxels themselves and the end of the file.
 VolumeFile read_volume_header(const std::filesystem::path& path, const VolumeOptions& options = {});
 
 /// Writes NIfTI-1, gzip-compressed when the name ends in ".gz". World transform as sform (float32), and as qform too

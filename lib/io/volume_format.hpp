@@ -93,6 +93,12 @@ void read_text_voxels(VolumeFile& file, ByteStream& stream, VoxelType type, cons
 /// `count` voxels of 0.
 Volume::Data make_voxels(VoxelType type, std::size_t count);
 
+/// Sets the name of the voxels' type, and the volume's data to no voxels of it.
+inline void set_type(VolumeFile& file, VoxelType type) {
+  file.datatype = name_of(type);
+  file.volume.data = make_voxels(type, 0);
+}
+
 /// Index of the frame (layer) to read of `count`: the only one, or the one chosen.
 /// @param what  "frame" or "layer"; @param hint  added to the message that asks for the choice
 /// Errors: InputError: none chosen of several, or the choice does not exist.

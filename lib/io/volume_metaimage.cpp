@@ -249,7 +249,7 @@ VolumeFile read_metaimage(const fs::path& path, const VolumeOptions& options, co
   VolumeFile file;
   file.format = "MetaImage";
   const VoxelType type = voxel_type(path, require(path, header, "ElementType"));
-  file.datatype = name_of(type);
+  set_type(file, type);
   const std::string_view dimensions_text = require(path, header, "NDims");
   const std::size_t dimensions = dimensions_text == "3" ? 3 : dimensions_text == "4" ? 4 : 0;
   if (dimensions == 0) {

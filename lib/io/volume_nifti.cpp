@@ -367,7 +367,7 @@ VolumeFile read_nifti(const fs::path& path, const VolumeOptions& options, const 
   const auto sizes = sizes_of(path, header);
   set_dims(file, path, std::span<const std::uint64_t, 3>(sizes.data(), 3));
   const VoxelType type = voxel_type(path, header.datatype);
-  file.datatype = name_of(type);
+  set_type(file, type);
   set_transform(file, path, header, options.prefer_qform);
   if (header.slope != 0 && std::isfinite(header.slope)) {
     if (!std::isfinite(header.intercept)) {

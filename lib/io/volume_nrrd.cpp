@@ -561,7 +561,7 @@ VolumeFile read_nrrd(const fs::path& path, const VolumeOptions& options, const S
   VolumeFile file;
   file.format = "NRRD";
   const VoxelType type = voxel_type(path, require(path, header, "type"));
-  file.datatype = name_of(type);
+  set_type(file, type);
 
   std::vector<AxisInfo> axes = parse_axes(path, header);
   const bool has_directions = find(header, "spacedirections") != nullptr;

@@ -1,35 +1,15 @@
 #include "core/error.hpp"
 #include "core/progress.hpp"
-#include "io/slice_header.hpp"
+#include "io/slice_file.hpp"
 #include "io/volume_format.hpp"
-
-#include <opencv2/core.hpp>
-#include <opencv2/core/utils/logger.hpp>
-#include <opencv2/imgcodecs.hpp>
 
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cstring>
-#include <iostream>
 
 namespace tunica::volume_format {
 namespace fs = std::filesystem;
 namespace {
-
-VoxelType voxel_type(const SliceHeader& header) {
-  using Kind = SliceHeader::Kind;
-  switch (header.bits) {
-    case 8:
-      return header.kind == Kind::integer ? VoxelType::int8 : VoxelType::uint8;
-    case 16:
-      return header.kind == Kind::integer ? VoxelType::int16 : VoxelType::uint16;
-    case 32:
-      return header.kind == Kind::real ? VoxelType::float32 : VoxelType::int32;
-    default:
-      return VoxelType::float64;
-  }
-}
 
 // "slice10" after "slice9": runs of digits compare as numbers.
 bool natural_less(const std::string& a, const std::string& b) {
@@ -124,97 +104,90 @@ std::vector<fs::path> slices_in(const fs::path& folder, std::vector<std::string>
   return slices;
 }
 
-std::string content_head(const fs::path& path) {
-  ByteStream stream(path, 0, Coding::plain);
-  std::string head(16, '\0');
-  head.resize(stream.read(head.data(), head.size()));
-  return head;
-}
-
-std::vector<SliceHeader> headers_of(const fs::path& path, bool& png) {
-  const std::string head = content_head(path);
-  if (head.empty()) {
-    throw InputError(fmt::format("{}: is empty", path.string()));
-  }
-  if (looks_like_tiff(head)) {
-    return read_tiff_headers(path);
-  }
-  png = looks_like_png(head);
-  if (png) {
-    return {read_png_header(path)};
-  }
-  throw InputError(fmt::format("{}: is neither TIFF nor PNG, whatever its name says", path.string()));
-}
-
-[[noreturn]] void throw_undecodable(const fs::path& path, std::size_t page) {
-  throw InputError(fmt::format("{}: the pixels of page {} cannot be decoded: the file is corrupt; get it again",
-                               path.string(), page));
-}
-
-// While it lives OpenCV says nothing: its messages would come as a second line of error.
-class Silence {
-public:
-  Silence()
-      : level_(cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT)),
-        stream_(std::cerr.rdbuf(nullptr)) {
-    cv::redirectError([](int, const char*, const char*, const char*, int, void*) { return 0; });
-  }
-  ~Silence() {
-    cv::redirectError(nullptr);
-    std::cerr.rdbuf(stream_);
-    cv::utils::logging::setLogLevel(level_);
-  }
-  Silence(const Silence&) = delete;
-  Silence& operator=(const Silence&) = delete;
-
-private:
-  cv::utils::logging::LogLevel level_;
-  std::streambuf* stream_;
+struct Stack {
+  std::string format;
+  SliceHeader common;
+  std::size_t count = 0;  // slices
 };
 
-std::vector<cv::Mat> decode(const fs::path& path, bool png, std::size_t first, std::size_t count) {
-  const Silence silence;
-  std::vector<cv::Mat> pages;
-  try {
-    if (png) {
-      pages.push_back(cv::imdecode(read_png_pixels(path), cv::IMREAD_UNCHANGED));
-    } else {
-      cv::imreadmulti(path.string(), pages, static_cast<int>(first), static_cast<int>(count), cv::IMREAD_UNCHANGED);
+// Looks at the header of every slice.
+Stack stack_of(const std::vector<fs::path>& paths, bool one_page_each) {
+  Stack stack;
+  std::optional<SliceHeader> common;
+  for (const fs::path& path : paths) {
+    const std::unique_ptr<SliceFile> slices = open_slices(path);
+    stack.format = stack.format.empty() ? slices->format() : stack.format;
+    std::size_t page = 0;
+    for (auto header = slices->next(); header; header = slices->next(), ++page, ++stack.count) {
+      common = common.value_or(*header);
+      if (*header != *common) {
+        throw InputError(
+            fmt::format("{}: page {} has {} x {} pixels of type {}, the first slice {} x {} of type {}: all "
+                        "slices of a stack must be alike",
+                        path.string(), page, header->width, header->height, name_of(header->type), common->width,
+                        common->height, name_of(common->type)));
+      }
     }
-  } catch (const cv::Exception&) {
-    throw_undecodable(path, first + pages.size());
+    if (one_page_each && page > 1) {
+      throw InputError(fmt::format("{}: has {} pages: name this file itself, or keep one page per file in the folder",
+                                   path.string(), page));
+    }
   }
-  return pages;
+  stack.common = *common;
+  return stack;
 }
 
-// Copies decoded pages to where they belong; `to` advances by their bytes.
-void store(const fs::path& path, std::size_t first, const std::vector<cv::Mat>& pages, std::size_t wanted,
-           const SliceHeader& header, char*& to) {
-  if (pages.size() < wanted) {
-    throw_undecodable(path, first + pages.size());
-  }
-  for (std::size_t i = 0; i < wanted; ++i) {
-    const cv::Mat& page = pages[i];
-    const bool real = page.depth() == CV_32F || page.depth() == CV_64F;
-    if (page.empty() || page.channels() != 1 || page.cols != static_cast<int>(header.width) ||
-        page.rows != static_cast<int>(header.height) || page.elemSize() * 8 != header.bits ||
-        real != (header.kind == SliceHeader::Kind::real)) {
-      throw_undecodable(path, first + i);
+// Decodes all pages: into the file's volume, or with a sink into that.
+void read_pages(VolumeFile& file, const std::vector<fs::path>& paths, const SliceHeader& common, const SlabSink* sink) {
+  const std::size_t count = file.volume.dims[2];
+  const std::size_t at_once = sink == nullptr ? count : sink->slices(file.volume.dims, common.type);
+  Volume slab = file.volume;
+  std::size_t first = 0;   // slice of the slab
+  std::size_t filled = 0;  // slices of the slab
+  const auto require_unchanged = [](bool unchanged, const fs::path& path) {
+    if (!unchanged) {
+      throw InputError(fmt::format("{}: was changed while it was read: run this again", path.string()));
     }
-    const std::size_t row_bytes = header.width * (header.bits / 8);
-    for (int row = 0; row < page.rows; ++row, to += row_bytes) {
-      std::memcpy(to, page.ptr(row), row_bytes);
+  };
+  for (const fs::path& path : paths) {
+    const std::unique_ptr<SliceFile> slices = open_slices(path);
+    for (auto header = slices->next(); header; header = slices->next()) {
+      require_unchanged(first < count && *header == common, path);
+      if (filled == 0) {
+        slab.dims[2] = std::min(at_once, count - first);
+        slab.data = make_voxels(common.type, slab.voxels());
+      }
+      char* const bytes = std::visit([](auto& values) { return reinterpret_cast<char*>(values.data()); }, slab.data);
+      slices->decode(bytes + filled * common.row_bytes() * common.height);
+      if (++filled < slab.dims[2]) {
+        continue;
+      }
+      if (sink != nullptr) {
+        sink->visit(file, slab, first);
+      } else {
+        file.volume.data = std::move(slab.data);
+      }
+      first += filled;
+      filled = 0;
     }
   }
+  require_unchanged(first == count, paths.back());
 }
-
-struct Slice {
-  fs::path path;
-  bool png;
-  std::size_t pages;
-};
 
 }  // namespace
+
+std::unique_ptr<SliceFile> open_slices(const fs::path& path) {
+  std::string head(16, '\0');
+  head.resize(ByteStream(path, 0, Coding::plain).read(head.data(), head.size()));
+  if (looks_like_tiff(head)) {
+    return open_tiff(path);
+  }
+  if (looks_like_png(head)) {
+    return open_png(path);
+  }
+  throw InputError(fmt::format("{}: {}", path.string(),
+                               head.empty() ? "is empty" : "is neither TIFF nor PNG, whatever its name says"));
+}
 
 VolumeFile read_slices(const fs::path& path, const VolumeOptions& options, const SlabSink* sink) {
   VolumeFile file;
@@ -233,75 +206,24 @@ VolumeFile read_slices(const fs::path& path, const VolumeOptions& options, const
   choose(path, "layer", 1, options.layer);
   choose(path, "frame", 1, options.frame);
 
-  std::vector<Slice> slices;
-  std::optional<SliceHeader> common;
-  std::size_t count = 0;
-  for (const fs::path& slice : paths) {
-    bool png = false;
-    const std::vector<SliceHeader> headers = headers_of(slice, png);
-    if (folder && headers.size() > 1) {
-      throw InputError(fmt::format("{}: has {} pages: name this file itself, or keep one page per file in the folder",
-                                   slice.string(), headers.size()));
-    }
-    for (std::size_t page = 0; page < headers.size(); ++page) {
-      const SliceHeader& header = headers[page];
-      common = common.value_or(header);
-      if (header != *common) {
-        throw InputError(
-            fmt::format("{}: page {} has {} x {} pixels of type {}, the first slice {} x {} of type {}: all "
-                        "slices of a stack must be alike",
-                        slice.string(), page, header.width, header.height, name_of(voxel_type(header)), common->width,
-                        common->height, name_of(voxel_type(*common))));
-      }
-    }
-    slices.push_back({slice, png, headers.size()});
-    count += headers.size();
-  }
-  if (count == 1) {
+  const Stack stack = stack_of(paths, folder);
+  const SliceHeader& common = stack.common;
+  if (stack.count == 1) {
     file.warnings.push_back(
         fmt::format("{}: is a single slice, a volume one voxel thick: name a multi-page TIFF or the "
                     "folder of the slices",
                     path.string()));
   }
-  file.format = slices.front().png ? "PNG stack" : "TIFF stack";
-  const VoxelType type = voxel_type(*common);
-  file.datatype = name_of(type);
-  set_dims(file, path, std::array<std::uint64_t, 3>{common->width, common->height, count});
+  file.format = stack.format + " stack";
+  set_type(file, common.type);
+  set_dims(file, path, std::array<std::uint64_t, 3>{common.width, common.height, stack.count});
   file.transform = "--spacing";
   Eigen::Matrix<double, 3, 4> affine = Eigen::Matrix<double, 3, 4>::Zero();
   affine.leftCols<3>() = options.spacing->asDiagonal();
   set_affine(file, path, affine);
 
-  if (sink != nullptr && !sink->visit) {
-    return file;
-  }
-  constexpr std::size_t pages_at_once = 16;
-  const auto bytes_of = [](Volume& volume) {
-    return std::visit([](auto& values) { return reinterpret_cast<char*>(values.data()); }, volume.data);
-  };
-  char* to = nullptr;
-  if (sink == nullptr) {
-    file.volume.data = make_voxels(type, file.volume.voxels());
-    to = bytes_of(file.volume);
-  }
-  std::size_t done = 0;
-  for (const Slice& slice : slices) {
-    for (std::size_t first = 0; first < slice.pages; first += pages_at_once) {
-      check_interrupt();
-      const std::size_t now = std::min(pages_at_once, slice.pages - first);
-      const std::vector<cv::Mat> pages = decode(slice.path, slice.png, first, now);
-      if (sink == nullptr) {
-        store(slice.path, first, pages, now, *common, to);
-        continue;
-      }
-      Volume slab = file.volume;
-      slab.dims[2] = now;
-      slab.data = make_voxels(type, slab.voxels());
-      char* slab_bytes = bytes_of(slab);
-      store(slice.path, first, pages, now, *common, slab_bytes);
-      sink->visit(file, slab, done);
-      done += now;
-    }
+  if (sink == nullptr || sink->visit) {
+    read_pages(file, paths, common, sink);
   }
   return file;
 }

@@ -1,4 +1,5 @@
 #include "core/error.hpp"
+#include "mechanics/doubts.hpp"
 #include "mechanics/run.hpp"
 #include "mechanics/supports.hpp"
 #include "shell/curved_surface.hpp"
@@ -18,7 +19,7 @@ constexpr double largest_imbalance = 1e-3;
 std::string place(const Vec3& p) { return fmt::format("({:.6g}, {:.6g}, {:.6g}) mm", p.x(), p.y(), p.z()); }
 
 [[noreturn]] void refuse(const ShellBody& body, const std::string& what) {
-  throw InputError(fmt::format("{}: {}", body.name, what));
+  throw InputError(fmt::format("{}{}: {}", body.said_at.empty() ? "" : body.said_at + ": ", body.name, what));
 }
 
 void check_body(const ShellBody& body) {
@@ -53,6 +54,7 @@ void check_body(const ShellBody& body) {
     high = high.cwiseMax(x);
   }
   const double size = (high - low).maxCoeff();
+  const double diagonal = (high - low).norm();
   for (std::size_t i = 0; i < body.thickness.size(); ++i) {
     if (!(body.thickness[i] > 0) || !std::isfinite(body.thickness[i])) {
       refuse(body, fmt::format("the thickness at node {} is {:.6g} mm: it must be positive", i, body.thickness[i]));
@@ -62,6 +64,11 @@ void check_body(const ShellBody& body) {
              fmt::format("the thickness at node {} is {:.6g} mm, less than {:.0e} of the shell's size: its bending "
                          "stiffness would be lost in round-off",
                          i, body.thickness[i], least_thinness));
+    }
+    if (body.thickness[i] > diagonal) {
+      refuse(body, fmt::format("the thickness at node {} is {:.6g} mm, more than the {:.6g} mm that the whole body "
+                               "measures: it is no shell; is its unit right?",
+                               i, body.thickness[i], diagonal));
     }
   }
 }
@@ -74,6 +81,7 @@ void check_triangles(const ShellBody& body) {
   edges.reserve(3 * mesh.triangles.size());
   const auto key = [](Index a, Index b) { return (std::uint64_t{a} << 32) | b; };
   std::set<std::array<Index, 3>> seen;
+  std::string inconsistent;  // said only when no third triangle meets there
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     const auto& v = mesh.triangles[t];
     for (const Index i : v) {
@@ -100,18 +108,22 @@ void check_triangles(const ShellBody& body) {
                                  from, to, place(mesh.vertices[from]), t));
       }
       const auto [other, is_new] = half_edges.emplace(key(from, to), t);
-      if (!is_new) {
-        refuse(body, fmt::format("elements {} and {} at {} have inconsistent orientation: the normals of one point "
-                                 "inward; orient the mesh",
-                                 other->second, t, place(mesh.vertices[from])));
+      if (!is_new && inconsistent.empty()) {
+        inconsistent = fmt::format(
+            "elements {} and {} at {} have inconsistent orientation: the normals of one point "
+            "inward; orient the mesh",
+            other->second, t, place(mesh.vertices[from]));
       }
     }
+  }
+  if (!inconsistent.empty()) {
+    refuse(body, inconsistent);
   }
   if (body.curved && mesh.corner_normals.empty() && mesh.normals.size() != mesh.vertices.size()) {
     refuse(body, fmt::format("{} normals for {} nodes", mesh.normals.size(), mesh.vertices.size()));
   }
   if (body.curved && body.rest == Rest::curved) {
-    require_fit(mesh, body.name);
+    require_fit(mesh, body.said_at.empty() ? body.name : body.said_at + ": " + body.name);
   }
 }
 
@@ -181,30 +193,24 @@ void check_load_factors(const StaticRun& run) {
   }
 }
 
-bool prescribes(const Fix& fix) {
-  for (int c = 0; c < 3; ++c) {
-    if (fix.translation[static_cast<std::size_t>(c)] && fix.displacement[c] != 0) {
-      return true;
-    }
+void require_load(const Model& model, const char* kind) {
+  if (!is_loaded(model)) {
+    const std::string zero = model.loads.empty() ? "" : model.loads.front().said_at;
+    throw InputError(fmt::format("{}{} needs a load or a prescribed displacement{}", zero.empty() ? "" : zero + ": ",
+                                 kind, model.loads.empty() ? "" : ", and this is zero"));
   }
-  return false;
-}
-
-bool is_loaded(const Model& model) {
-  return !model.loads.empty() || std::any_of(model.fixes.begin(), model.fixes.end(), prescribes);
 }
 
 /// Whether a state of rest is looked for, so that nothing may move freely.
 bool finds_rest(const Model& model, const RunSettings& settings) {
   return std::holds_alternative<StaticRun>(settings.kind) || std::holds_alternative<BucklingRun>(settings.kind) ||
          std::holds_alternative<ArcLengthRun>(settings.kind) ||
-         (std::holds_alternative<FrequencyRun>(settings.kind) && is_loaded(model));
+         (std::holds_alternative<FrequencyRun>(settings.kind) &&
+          (!model.loads.empty() || std::any_of(model.fixes.begin(), model.fixes.end(), prescribes)));
 }
 
 void check_path(const Model& model, const ArcLengthRun& run) {
-  if (!is_loaded(model)) {
-    throw InputError("arc length needs a load or a prescribed displacement");
-  }
+  require_load(model, "arc length");
   const auto ramped = [](const auto& item) { return !item.ramp.points.empty(); };
   if (std::any_of(model.loads.begin(), model.loads.end(), ramped) ||
       std::any_of(model.fixes.begin(), model.fixes.end(), ramped)) {
@@ -233,9 +239,7 @@ void check_run(const Model& model, const RunSettings& settings) {
     require_densities(model, "a run for frequencies");
     check_load_factors(frequencies->preload);
   } else if (std::holds_alternative<BucklingRun>(settings.kind)) {
-    if (!is_loaded(model)) {
-      throw InputError("buckling needs a load or a prescribed displacement");
-    }
+    require_load(model, "buckling");
   } else if (const auto* path = std::get_if<ArcLengthRun>(&settings.kind)) {
     check_path(model, *path);
   } else {

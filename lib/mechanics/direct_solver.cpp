@@ -451,7 +451,7 @@ DirectSolver::DirectSolver(const BlockMatrix& pattern, const FreeMask& free)
   try {
     implementation_->analyse(pattern, free);
   } catch (const std::bad_alloc&) {
-    throw RequirementError("the direct solver needs more memory than there is: use the cg solver or fewer shells");
+    throw MemoryError("the direct solver needs more memory than there is: use the cg solver or fewer shells");
   }
 }
 

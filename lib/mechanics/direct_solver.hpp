@@ -16,7 +16,7 @@ using FreeMask = std::vector<bool>;
 /// Source: Duff, Reid 1983, "The multifrontal solution of indefinite sparse symmetric linear equations".
 class DirectSolver {
 public:
-  /// Errors: RequirementError when the factor does not fit into the memory.
+  /// Errors: MemoryError when the factor does not fit into the memory.
   DirectSolver(const BlockMatrix& pattern, const FreeMask& free);
   ~DirectSolver();
   DirectSolver(DirectSolver&&) noexcept;

@@ -48,6 +48,7 @@ struct ShellBody {
   Membrane membrane = Membrane::adapt;
   Bending bending = Bending::dkt_comas;
   Rest rest = Rest::curved;
+  std::string said_at{};  ///< where the user said it, for messages; may be empty, here and below
 };
 
 /// A piecewise linear table over time (dynamic) or load factor (static); constant beyond its ends. Empty: 1.
@@ -65,6 +66,7 @@ struct Fix {
   std::array<bool, 3> rotation{true, true, true};
   Vec3 displacement = Vec3::Zero();  ///< mm; of the held translations; follows the load factor (static) or `ramp`
   Ramp ramp;
+  std::string said_at{};
 };
 
 /// Holds the six rigid motions of every connected piece of a body without adding stress.
@@ -101,6 +103,7 @@ struct Load {
   std::size_t body = 0;
   std::variant<PressureLoad, ForceLoad, MomentLoad, EdgeLoad, AreaLoad, GravityLoad> kind;
   Ramp ramp;
+  std::string said_at{};
 };
 
 struct Probe {

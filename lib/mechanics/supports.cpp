@@ -93,9 +93,11 @@ void make_supports(ShellSystem& system, const Model& model) {
           const double value = fix.displacement[static_cast<Eigen::Index>(c)];
           const auto [place, is_new] = values.emplace(freedom, std::pair(value, f));
           if (!is_new && place->second.first != value) {
-            throw InputError(
-                fmt::format("{}: two fixes prescribe different displacements {} mm and {} mm along {} of node {}",
-                            model.shells[fix.body].name, place->second.first, value, "xyz"[c], node));
+            const Fix& other = model.fixes[place->second.second];
+            throw InputError(fmt::format(
+                "{}{}: two fixes prescribe different displacements {} mm{} and {} mm along {} of node {}: keep one",
+                fix.said_at.empty() ? "" : fix.said_at + ": ", model.shells[fix.body].name, place->second.first,
+                other.said_at.empty() ? "" : " (" + other.said_at + ")", value, "xyz"[c], node));
           }
           system.held[freedom] = true;
         }

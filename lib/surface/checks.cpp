@@ -126,6 +126,7 @@ private:
     const auto local = [&](Index t) {
       auto i = static_cast<Index>(std::lower_bound(triangles.begin(), triangles.end(), t) - triangles.begin());
       while (fan_[i] != i) {
+        fan_[i] = fan_[fan_[i]];
         i = fan_[i];
       }
       return i;

@@ -34,6 +34,9 @@ constexpr double even_rim_weight = 5;
 /// Down to this many times the triangles wanted, edges collapse in sweeps, unless shape counts (rough surfaces then
 /// come out worse by a quarter).
 constexpr std::size_t sweep_factor = 8;
+/// An edge waits while more triangles stand around its ends: to look at all of them for each of as many edges would
+/// take the square of their number. Other edges there lessen them first; ordinary vertices have six.
+constexpr Index most_around = 256;
 /// How strongly a new vertex is held near the middle of its edge where the quadric is flat. Where few planes have met
 /// it must be weak: on a fine mesh even what looks flat is curved, and the held vertices are the first to be off.
 constexpr double pull = 1e-5;
@@ -120,25 +123,30 @@ bool EdgeCollapse::connect(const TriangleMesh& mesh) {
       half_[corner++].from = number_[v];
     }
   }
-  // The edges known so far at their lower end, each as the higher end and the edge before it in the same list.
+  // The edges known so far at their end with fewer triangles, each as the far end and the edge before it in the same
+  // list.
   struct Known {
-    Index higher, before;
+    Index far, before;
   };
+  for (const Half& half : half_) {
+    ++vertex_[half.from].triangles;
+  }
   std::vector<Known> known;
   known.reserve(half_.size() / 2 + 1);
   half_of_.reserve(half_.size() / 2 + 1);
   std::vector<Index> last(vertex_.size(), none);
   for (HalfEdge h = 0; h < half_.size(); ++h) {
-    const Index lower = std::min(from(h), to(h));
-    const Index higher = std::max(from(h), to(h));
-    Index edge = last[lower];
-    while (edge != none && known[edge].higher != higher) {
+    const auto [near, far] = std::minmax({from(h), to(h)}, [&](Index u, Index v) {
+      return std::pair(vertex_[u].triangles, u) < std::pair(vertex_[v].triangles, v);
+    });
+    Index edge = last[near];
+    while (edge != none && known[edge].far != far) {
       edge = known[edge].before;
     }
     if (edge == none) {
       half_[h].edge = static_cast<Index>(known.size());
-      known.push_back({higher, last[lower]});
-      last[lower] = half_[h].edge;
+      known.push_back({far, last[near]});
+      last[near] = half_[h].edge;
       half_of_.push_back(h);
       continue;
     }
@@ -504,39 +512,6 @@ EdgeCollapse::Target EdgeCollapse::best_on_curve(HalfEdge h, const Quadric& q) c
   return best;
 }
 
-/// The costs of edges in their best places, `forbidden` for those that cannot collapse: inner ones several at once.
-void EdgeCollapse::costs_of(const std::vector<Index>& edges, std::vector<double>& costs) const {
-  costs.assign(edges.size(), forbidden);
-  std::array<HalfEdge, lane_count> together{};
-  std::array<std::size_t, lane_count> place{};
-  std::size_t waiting = 0;
-  const auto flush = [&] {
-    for (std::size_t k = waiting; k < lane_count; ++k) {
-      together[k] = together[0];
-    }
-    const Lanes found = inner_costs(together);
-    for (std::size_t k = 0; k < waiting; ++k) {
-      costs[place[k]] = found[k];
-    }
-    waiting = 0;
-  };
-  for (std::size_t i = 0; i < edges.size(); ++i) {
-    const HalfEdge h = half_of_[edges[i]];
-    if (vertex_[from(h)].curve == none && vertex_[to(h)].curve == none) {
-      together[waiting] = h;
-      place[waiting++] = i;
-      if (waiting == lane_count) {
-        flush();
-      }
-    } else if (const auto found = target(h, Placement::best)) {
-      costs[i] = found->cost();
-    }
-  }
-  if (waiting > 0) {
-    flush();
-  }
-}
-
 void EdgeCollapse::evaluate(Index edge, Placement placement) {
   placement_[edge] = placement;
   if (const auto found = target(half_of_[edge], placement)) {
@@ -552,6 +527,9 @@ void EdgeCollapse::evaluate(Index edge, Placement placement) {
 bool EdgeCollapse::keeps_topology(HalfEdge h) {
   const Index u = from(h);
   const Index v = to(h);
+  if (vertex_[u].triangles + vertex_[v].triangles > most_around) {
+    return false;
+  }
   const std::size_t expected = half_[h].twin == none ? 1 : 2;
   ++stamp_;
   neighbours_of(u, [&](Index w) { vertex_[w].mark = stamp_; });
@@ -561,14 +539,7 @@ bool EdgeCollapse::keeps_topology(HalfEdge h) {
     return false;
   }
   const auto keeps_enough = [&](Index apex) {
-    const std::size_t needed = vertex_[apex].curve == none ? 4 : 2;  // triangles: one more neighbour at a boundary
-    std::size_t triangles = 0;
-    HalfEdge spoke = vertex_[apex].outgoing;
-    do {
-      ++triangles;
-      spoke = half_[previous(spoke)].twin;
-    } while (triangles < needed && spoke != none && spoke != vertex_[apex].outgoing);
-    return triangles >= needed;
+    return vertex_[apex].triangles >= (vertex_[apex].curve == none ? 4 : 2);  // one more neighbour at a boundary
   };
   return keeps_enough(from(previous(h))) && (half_[h].twin == none || keeps_enough(from(previous(half_[h].twin))));
 }
@@ -642,11 +613,8 @@ void EdgeCollapse::unlink(HalfEdge spoke, HalfEdge rim) {
 /// Stores a half-edge that leaves the vertex: of a boundary vertex the one that lies on the boundary.
 void EdgeCollapse::set_outgoing(Index vertex, HalfEdge any) {
   HalfEdge h = any;
-  while (half_[h].twin != none) {
+  while (vertex_[vertex].curve != none && half_[h].twin != none) {
     h = next(half_[h].twin);
-    if (h == any) {
-      break;
-    }
   }
   vertex_[vertex].outgoing = h;
 }
@@ -663,11 +631,15 @@ void EdgeCollapse::collapse(HalfEdge h, const Target& chosen) {
   half_of_[half_[h].edge] = none;
   unlink(previous(h), next(h));
   triangles_ -= 1;
+  vertex_[a].triangles -= 1;
+  vertex_[u].triangles += vertex_[v].triangles - 2;
   Index b = none;
   if (o != none) {
     b = from(previous(o));
     unlink(next(o), previous(o));
     triangles_ -= 1;
+    vertex_[b].triangles -= 1;
+    vertex_[u].triangles -= 2;
   }
   vertex_[u].position = chosen.position;
   vertex_[u].quadric += vertex_[v].quadric;
@@ -687,9 +659,15 @@ void EdgeCollapse::collapse(HalfEdge h, const Target& chosen) {
     return from(half) == vertex ? half : next(half);
   };
   set_outgoing(u, leaving(u, half_[previous(h)].edge));
-  set_outgoing(a, leaving(a, half_[previous(h)].edge));
+  // Many triangles may stand around the corners opposite the edge: they are walked only where none is at hand.
+  const auto keep_outgoing = [&](Index apex, HalfEdge dead, HalfEdge spoke) {
+    if (vertex_[apex].outgoing / 3 == dead / 3 || vertex_[apex].curve == none) {
+      set_outgoing(apex, leaving(apex, half_[spoke].edge));
+    }
+  };
+  keep_outgoing(a, h, previous(h));
   if (b != none) {
-    set_outgoing(b, leaving(b, half_[next(o)].edge));
+    keep_outgoing(b, o, next(o));
   }
   history_.push_back({given_[u], given_[v], static_cast<Index>(triangles_), centre_ + scale_ * chosen.position});
 }

@@ -75,6 +75,7 @@ private:
     HalfEdge outgoing = none;    // a half-edge from it; at a boundary the one without a twin
     Index curve = none;          // boundary curve
     Index mark = 0;              // stamp of the last link check
+    Index triangles = 0;         // around it
   };
   struct Half {
     Index from = 0;

@@ -66,6 +66,39 @@ void EdgeCollapse::evaluate_touched() {
   }
 }
 
+/// The costs of edges in their best places, `forbidden` for those that cannot collapse: inner ones several at once.
+void EdgeCollapse::costs_of(const std::vector<Index>& edges, std::vector<double>& costs) const {
+  costs.assign(edges.size(), forbidden);
+  std::array<HalfEdge, lane_count> together{};
+  std::array<std::size_t, lane_count> place{};
+  std::size_t waiting = 0;
+  const auto flush = [&] {
+    for (std::size_t k = waiting; k < lane_count; ++k) {
+      together[k] = together[0];
+    }
+    const Lanes found = inner_costs(together);
+    for (std::size_t k = 0; k < waiting; ++k) {
+      costs[place[k]] = found[k];
+    }
+    waiting = 0;
+  };
+  for (std::size_t i = 0; i < edges.size(); ++i) {
+    const HalfEdge h = half_of_[edges[i]];
+    if (vertex_[from(h)].curve == none && vertex_[to(h)].curve == none) {
+      together[waiting] = h;
+      place[waiting++] = i;
+      if (waiting == lane_count) {
+        flush();
+      }
+    } else if (const auto found = target(h, Placement::best)) {
+      costs[i] = found->cost();
+    }
+  }
+  if (waiting > 0) {
+    flush();
+  }
+}
+
 double EdgeCollapse::cost_quantile(double fraction) const {
   std::vector<double> costs;
   const std::size_t stride = 1 + half_of_.size() / most_looked_at;

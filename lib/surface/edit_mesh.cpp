@@ -39,6 +39,10 @@ EditMesh::EditMesh(const TriangleMesh& mesh)
 }
 
 std::array<Index, 2> EditMesh::on_edge(Index u, Index v) const {
+  if (around[v].size() < around[u].size()) {
+    const auto [to_u, from_u] = on_edge(v, u);
+    return {from_u, to_u};
+  }
   std::array<Index, 2> found{none, none};
   for (const Index t : around[u]) {
     const auto& c = triangles[t];
@@ -113,7 +117,7 @@ Index EditMesh::add_triangle(const std::array<Index, 3>& corners) {
 
 void EditMesh::remove_triangle(Index t) {
   for (const Index v : triangles[t]) {
-    around[v].erase(std::find(around[v].begin(), around[v].end(), t));
+    around[v].erase(std::lower_bound(around[v].begin(), around[v].end(), t));
   }
   triangles[t] = {none, none, none};
   free_triangles.push_back(t);

@@ -34,11 +34,14 @@ std::vector<std::array<Index, 3>> neighbours(std::span<const std::array<Index, 3
       for (std::size_t k = 0; k < 3; ++k) {
         const Index u = triangles[t][k];
         const Index v = triangles[t][(k + 1) % 3];
+        // At the end with fewer triangles: over all edges those are few, even where one vertex has all triangles.
+        const bool fewer_at_u = around.of(u).size() <= around.of(v).size();
+        const Index far = fewer_at_u ? v : u;
         Index other = no_neighbour;
         std::size_t shared = 0;
-        for (const Index candidate : around.of(u)) {
+        for (const Index candidate : around.of(fewer_at_u ? u : v)) {
           const auto& corners = triangles[candidate];
-          if (candidate != t && (corners[0] == v || corners[1] == v || corners[2] == v)) {
+          if (candidate != t && (corners[0] == far || corners[1] == far || corners[2] == far)) {
             other = candidate;
             ++shared;
           }
@@ -85,28 +88,35 @@ std::vector<std::vector<Index>> loops_of(std::vector<DirectedEdge> edges) {
 }  // namespace
 
 std::vector<std::vector<Index>> boundary_loops(const TriangleMesh& mesh) {
-  // The edges known so far in a list at their lower end, each with the number of its triangles.
+  // The edges known so far in a list at their end with fewer triangles, each with the number of its triangles.
   struct Edge {
-    Index higher, before, triangles;
+    Index far, before, triangles;
   };
   constexpr Index none = 0xffffffff;
   std::vector<Edge> edges;
   edges.reserve(3 * mesh.triangles.size() / 2 + 1);
   std::vector<Index> last(mesh.vertices.size(), none);
+  std::vector<Index> valence(mesh.vertices.size(), 0);
+  for (const auto& c : mesh.triangles) {
+    for (const Index v : c) {
+      ++valence[v];
+    }
+  }
   std::vector<Index> edge_of;
   edge_of.reserve(3 * mesh.triangles.size());
   for (const auto& c : mesh.triangles) {
     for (std::size_t k = 0; k < 3; ++k) {
-      const Index lower = std::min(c[k], c[(k + 1) % 3]);
-      const Index higher = std::max(c[k], c[(k + 1) % 3]);
-      Index edge = last[lower];
-      while (edge != none && edges[edge].higher != higher) {
+      const auto [near, far] = std::minmax({c[k], c[(k + 1) % 3]}, [&](Index u, Index v) {
+        return std::pair(valence[u], u) < std::pair(valence[v], v);
+      });
+      Index edge = last[near];
+      while (edge != none && edges[edge].far != far) {
         edge = edges[edge].before;
       }
       if (edge == none) {
         edge = static_cast<Index>(edges.size());
-        edges.push_back({higher, last[lower], 0});
-        last[lower] = edge;
+        edges.push_back({far, last[near], 0});
+        last[near] = edge;
       }
       ++edges[edge].triangles;
       edge_of.push_back(edge);

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -69,6 +70,94 @@ TEST_F(OutputFileTest, ADeviceOrAPipeIsNotReplaced) {
   ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
   EXPECT_THROW(write_file(pipe, "bytes", true), OutputError);
   EXPECT_TRUE(fs::is_fifo(pipe));
+}
+
+// What another program holds: a lock of another open file.
+class ForeignLock {
+public:
+  explicit ForeignLock(const fs::path& path) : descriptor_(::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600)) {
+    struct flock whole {};
+    whole.l_type = F_WRLCK;
+    EXPECT_EQ(::fcntl(descriptor_, F_OFD_SETLK, &whole), 0);
+  }
+  ~ForeignLock() { ::close(descriptor_); }
+  ForeignLock(const ForeignLock&) = delete;
+  ForeignLock& operator=(const ForeignLock&) = delete;
+
+private:
+  int descriptor_;
+};
+
+TEST_F(OutputFileTest, TwoRunsNeverWriteOneFile) {
+  std::ofstream(in("a.part")) << "half of the other run's";
+  {
+    const ForeignLock other(in("a.part"));
+    EXPECT_THROW(write_file(in("a"), "mine", true), OutputError);
+    EXPECT_EQ(read_file(in("a.part")), "half of the other run's");
+    EXPECT_FALSE(fs::exists(in("a")));
+  }
+  write_file(in("a"), "mine", true);
+  EXPECT_EQ(read_file(in("a")), "mine");
+}
+
+TEST_F(OutputFileTest, AnEmptyPartOfAnotherRunStays) {
+  const ForeignLock other(in("a.part"));
+  EXPECT_THROW(PartLock::take(in("a.part")), OutputError);
+  EXPECT_TRUE(fs::exists(in("a.part")));
+}
+
+TEST_F(OutputFileTest, TheLockKeepsOthersOutUntilItsLastHolderIsGone) {
+  const auto locked = [&] {
+    const int descriptor = ::open(in("a.part").c_str(), O_RDWR | O_CLOEXEC);
+    struct flock whole {};
+    whole.l_type = F_WRLCK;
+    const bool refused = ::fcntl(descriptor, F_OFD_SETLK, &whole) != 0;
+    ::close(descriptor);
+    return refused;
+  };
+  auto lock = PartLock::take(in("a.part"));
+  EXPECT_TRUE(locked());
+  EXPECT_EQ(PartLock::take(in("a.part")), lock);
+  {
+    OutputFile file(in("a"), false);
+    std::ofstream(file.partial_path()) << "best so far";
+    file.keep_partial();
+  }
+  EXPECT_TRUE(locked());
+  lock.reset();
+  EXPECT_FALSE(locked());
+  EXPECT_EQ(read_file(in("a.part")), "best so far");
+  lock = PartLock::take(in("a.part"));
+  write_file(in("a"), "done", false);
+  EXPECT_NE(PartLock::take(in("a.part")), lock) << "what was renamed is locked no more";
+}
+
+TEST_F(OutputFileTest, ALockAloneLeavesNothing) {
+  { const auto lock = PartLock::take(in("a.part")); }
+  EXPECT_TRUE(fs::is_empty(folder_));
+  std::ofstream(in("a.part")) << "of an earlier run";
+  { const auto lock = PartLock::take(in("a.part")); }
+  EXPECT_EQ(read_file(in("a.part")), "of an earlier run");
+}
+
+TEST_F(OutputFileTest, APartThatIsNoFileOfItsOwnIsRefused) {
+  const auto refused = [&](const char* name) {
+    EXPECT_THROW(write_file(in(name), "bytes", true), OutputError) << name;
+    EXPECT_FALSE(fs::exists(in(name))) << name;
+  };
+  write_file(in("precious"), "kept", false);
+  fs::create_symlink(in("precious"), in("link.part"));
+  refused("link");
+  fs::create_symlink(in("nowhere"), in("dangling.part"));
+  refused("dangling");
+  fs::create_hard_link(in("precious"), in("twin.part"));
+  refused("twin");
+  fs::create_directory(in("folder.part"));
+  refused("folder");
+  ASSERT_EQ(::mkfifo(in("pipe.part").c_str(), 0600), 0);
+  refused("pipe");  // and is not waited for
+  EXPECT_EQ(read_file(in("precious")), "kept");
+  EXPECT_FALSE(fs::exists(in("nowhere")));
 }
 
 TEST_F(OutputFileTest, ReadingRefusesWhatIsNotAFile) {

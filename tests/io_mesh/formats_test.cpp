@@ -235,6 +235,21 @@ TEST(Glb, RefusesToMultiplyASmallFile) {
               HasSubstr("more memory than its size justifies"));
 }
 
+TEST(Glb, HasAsManyNodesAsItLikes) {
+  const TemporaryFolder folder;
+  constexpr int count = 400'000;
+  std::string nodes = "{\"mesh\":0}";
+  std::string children = "2";
+  for (int n = 3; n < count; ++n) {
+    nodes += ",{\"mesh\":0}";
+    children += "," + std::to_string(n);
+  }
+  std::string json = with(test::tetrahedron_glb_json, "\"children\":[0]", "\"children\":[0," + children + "]");
+  json = with(json, "\"name\":\"parent\"}", "\"name\":\"parent\"}," + nodes);
+  EXPECT_EQ(read_mesh(folder.file("a.glb", test::glb(json, test::tetrahedron_glb_data()))).mesh.triangles.size(),
+            4U * (count - 1));
+}
+
 TEST(MeshFile, AsksForTheUnitOfFormatsThatCarryNone) {
   const TemporaryFolder folder;
   const auto asks = [&](const std::string& name, const std::string& bytes) {

@@ -14,6 +14,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -228,18 +229,56 @@ inline std::string metaimage_header(std::string_view type = "MET_UCHAR", std::st
          std::string(more) + "ElementType = " + std::string(type) + "\nElementDataFile = " + std::string(data) + "\n";
 }
 
+/// As LZW of TIFF: literal codes of nine bits, the table cleared before ten are needed.
+inline std::string lzw_coded(const std::string& bytes) {
+  std::string bits;
+  const auto put_code = [&](unsigned code) {
+    for (int bit = 8; bit >= 0; --bit) {
+      bits += (code >> bit & 1) != 0 ? '1' : '0';
+    }
+  };
+  for (std::size_t i = 0; i < bytes.size(); ++i) {
+    if (i % 200 == 0) {
+      put_code(256);
+    }
+    put_code(static_cast<unsigned char>(bytes[i]));
+  }
+  put_code(257);
+  bits.resize((bits.size() + 7) / 8 * 8, '0');
+  std::string out;
+  for (std::size_t i = 0; i < bits.size(); i += 8) {
+    out += static_cast<char>(std::stoi(bits.substr(i, 8), nullptr, 2));
+  }
+  return out;
+}
+
+/// As PackBits: literal runs.
+inline std::string pack_bits_coded(const std::string& bytes) {
+  std::string out;
+  for (std::size_t i = 0; i < bytes.size(); i += 128) {
+    const std::string run = bytes.substr(i, 128);
+    out += static_cast<char>(run.size() - 1);
+    out += run;
+  }
+  return out;
+}
+
 struct TiffOptions {
   Endian endian = Endian::little;
   bool big_tiff = false;
   int format = 1;       // 1 unsigned, 2 signed, 3 float
-  int compression = 1;  // 1 none, 8 deflate
+  int compression = 1;  // 1 none, 5 LZW, 8 deflate, 32773 PackBits
   int photometric = 1;
   int samples = 1;
   int orientation = 1;
+  std::uint32_t rows = 0;  // of a strip or tile; 0: one strip
+  std::uint32_t tile = 0;  // columns of a tile; 0: strips
   std::string description;
+  /// Called with the stored bytes of every strip or tile, to damage them.
+  std::function<void(std::size_t page, std::size_t part, std::string& stored)> damage;
 };
 
-/// A TIFF of pages of width x height pixels, one strip each.
+/// A TIFF of pages of width x height pixels.
 template <class T>
 std::string tiff_file(std::uint32_t width, std::uint32_t height, const std::vector<std::vector<T>>& pages,
                       const TiffOptions& options = {}) {
@@ -253,52 +292,94 @@ std::string tiff_file(std::uint32_t width, std::uint32_t height, const std::vect
   const auto word = [&](std::uint64_t value) {
     return big ? encoded<std::uint64_t>(value, e) : encoded(static_cast<std::uint32_t>(value), e);
   };
+  const auto parts_of = [&](const std::vector<T>& page) {
+    std::vector<std::vector<T>> parts;
+    if (options.rows == 0) {
+      return std::vector<std::vector<T>>{page};
+    }
+    const std::uint32_t columns = options.tile > 0 ? options.tile : width;
+    for (std::uint32_t y = 0; y < height; y += options.rows) {
+      for (std::uint32_t x = 0; x < width; x += columns) {
+        auto& part = parts.emplace_back();
+        for (std::uint32_t i = 0; i < options.rows * columns; ++i) {
+          const std::uint32_t row = y + i / columns;
+          const std::uint32_t column = x + i % columns;
+          if (row < height && column < width) {
+            part.push_back(page[row * width + column]);
+          } else if (options.tile > 0) {
+            part.push_back(0);
+          }
+        }
+      }
+    }
+    return parts;
+  };
   std::size_t link = file.size();
   file += word(0);
-  for (const auto& page : pages) {
-    std::string pixels = encoded(page, e);
-    if (options.compression == 8) {
-      pixels = deflated(pixels, 15);
+  for (std::size_t page = 0; page < pages.size(); ++page) {
+    std::vector<std::uint32_t> offsets, sizes;
+    for (const auto& part : parts_of(pages[page])) {
+      std::string stored = encoded(part, e);
+      stored = options.compression == 8       ? deflated(stored, 15)
+               : options.compression == 5     ? lzw_coded(stored)
+               : options.compression == 32773 ? pack_bits_coded(stored)
+                                              : stored;
+      if (options.damage) {
+        options.damage(page, offsets.size(), stored);
+      }
+      offsets.push_back(static_cast<std::uint32_t>(file.size()));
+      sizes.push_back(static_cast<std::uint32_t>(stored.size()));
+      file += stored;
+      file += std::string(file.size() % 2, '\0');
     }
-    const std::size_t strip = file.size();
-    file += pixels;
-    file += std::string(file.size() % 2, '\0');
-    const std::size_t text = file.size();
-    file += options.description + std::string(options.description.size() % 2, '\0');
-    const std::string here = word(file.size());
-    file.replace(link, here.size(), here);
     struct Entry {
       int tag;
       int type;
-      std::uint64_t count;
-      std::uint64_t value;
+      std::string values;
     };
-    std::vector<Entry> entries{{256, 4, 1, width},
-                               {257, 4, 1, height},
-                               {258, 3, 1, 8 * sizeof(T)},
-                               {259, 3, 1, static_cast<std::uint64_t>(options.compression)},
-                               {262, 3, 1, static_cast<std::uint64_t>(options.photometric)},
-                               {273, 4, 1, strip},
-                               {274, 3, 1, static_cast<std::uint64_t>(options.orientation)},
-                               {277, 3, 1, static_cast<std::uint64_t>(options.samples)},
-                               {278, 4, 1, height},
-                               {279, 4, 1, pixels.size()},
-                               {339, 3, 1, static_cast<std::uint64_t>(options.format)}};
-    if (!options.description.empty()) {
-      entries.insert(entries.begin() + 5, {270, 2, options.description.size(), text});
+    const auto small = [&](int tag, std::size_t value) {
+      return Entry{tag, 3, encoded(static_cast<std::uint16_t>(value), e)};
+    };
+    const auto large = [&](int tag, const std::vector<std::uint32_t>& values) {
+      return Entry{tag, 4, encoded(values, e)};
+    };
+    const bool tiled = options.tile > 0;
+    std::vector<Entry> entries{large(256, {width}),
+                               large(257, {height}),
+                               small(258, 8 * sizeof(T)),
+                               small(259, static_cast<std::size_t>(options.compression)),
+                               small(262, static_cast<std::size_t>(options.photometric)),
+                               {270, 2, options.description},
+                               small(274, static_cast<std::size_t>(options.orientation)),
+                               small(277, static_cast<std::size_t>(options.samples)),
+                               large(tiled ? 322 : 278, {tiled              ? options.tile
+                                                         : options.rows > 0 ? options.rows
+                                                                            : height}),
+                               small(339, static_cast<std::size_t>(options.format))};
+    if (tiled) {
+      entries.push_back(large(323, {options.rows}));
     }
-    file += big ? encoded<std::uint64_t>(entries.size(), e) : encoded(static_cast<std::uint16_t>(entries.size()), e);
-    for (const Entry& entry : entries) {
-      file += encoded(static_cast<std::uint16_t>(entry.tag), e) + encoded(static_cast<std::uint16_t>(entry.type), e) +
-              word(entry.count);
-      std::string value = entry.type == 3 ? encoded(static_cast<std::uint16_t>(entry.value), e)
-                                          : encoded(static_cast<std::uint32_t>(entry.value), e);
-      if (entry.type == 2 && big) {
-        value = encoded<std::uint64_t>(entry.value, e);
+    entries.push_back(large(tiled ? 324 : 273, offsets));
+    entries.push_back(large(tiled ? 325 : 279, sizes));
+    std::erase_if(entries, [](const Entry& entry) { return entry.values.empty(); });
+    std::sort(entries.begin(), entries.end(), [](const Entry& l, const Entry& r) { return l.tag < r.tag; });
+    std::string table =
+        big ? encoded<std::uint64_t>(entries.size(), e) : encoded(static_cast<std::uint16_t>(entries.size()), e);
+    for (Entry& entry : entries) {
+      const std::size_t each = entry.type == 2 ? 1 : entry.type == 3 ? 2 : 4;
+      table += encoded(static_cast<std::uint16_t>(entry.tag), e) + encoded(static_cast<std::uint16_t>(entry.type), e) +
+               word(entry.values.size() / each);
+      if (entry.values.size() > word(0).size()) {
+        const std::string here = word(file.size());
+        file += entry.values + std::string(entry.values.size() % 2, '\0');
+        entry.values = here;
       }
-      value.resize(big ? 8 : 4, '\0');
-      file += value;
+      entry.values.resize(word(0).size(), '\0');
+      table += entry.values;
     }
+    const std::string here = word(file.size());
+    file.replace(link, here.size(), here);
+    file += table;
     link = file.size();
     file += word(0);
   }

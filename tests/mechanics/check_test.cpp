@@ -2,6 +2,7 @@
 
 #include "benchmarks.hpp"
 #include "core/error.hpp"
+#include "mechanics/doubts.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -42,6 +43,23 @@ TEST(CheckModel, NamesAFlippedElement) {
   Model model = plate();
   std::swap(model.shells[0].mesh.triangles[7][0], model.shells[0].mesh.triangles[7][1]);
   expect_refused(model, "inconsistent orientation");
+}
+
+TEST(CheckModel, NamesAnEdgeOfThreeElementsAsThatWhateverTheirOrder) {
+  Model model = plate();
+  ShellMesh& mesh = model.shells[0].mesh;
+  const auto runs = [](const std::array<Index, 3>& t, Index from, Index to) {
+    return (t[0] == from && t[1] == to) || (t[1] == from && t[2] == to) || (t[2] == from && t[0] == to);
+  };
+  const auto inner = std::find_if(mesh.triangles.begin(), mesh.triangles.end(), [&](const auto& t) {
+    return std::any_of(mesh.triangles.begin(), mesh.triangles.end(),
+                       [&](const auto& s) { return runs(s, t[1], t[0]); });
+  });
+  ASSERT_NE(inner, mesh.triangles.end());
+  mesh.vertices.emplace_back(0.5, 0.5, 1.0);
+  mesh.triangles.insert(mesh.triangles.begin(),
+                        {(*inner)[0], (*inner)[1], static_cast<Index>(mesh.vertices.size() - 1)});
+  expect_refused(model, "non-manifold");
 }
 
 TEST(CheckModel, NamesADoubleElement) {
@@ -118,12 +136,126 @@ TEST(CheckModel, RigidMotionsAreHeldOnlyUnderBalancedLoads) {
   expect_refused(model, "net force or moment");
 }
 
-TEST(CheckModel, NamesFixesThatContradictEachOther) {
+TEST(CheckModel, NamesFixesThatContradictEachOtherAndWhereTheyWereSaid) {
   Model model = plate();
+  model.fixes[0].said_at = "scene:7:1";
   Fix fix = model.fixes[0];
   fix.displacement = Vec3(0, 0, 1);
+  fix.said_at = "scene:9:1";
   model.fixes.push_back(fix);
-  expect_refused(model, "different displacements");
+  expect_refused(model, "scene:9:1: shell: two fixes prescribe different displacements 0 mm (scene:7:1) and 1 mm");
+}
+
+TEST(CheckModel, NamesWhereABodyWasSaid) {
+  Model model = plate();
+  model.fixes.clear();
+  model.shells[0].said_at = "scene:3:1";
+  expect_refused(model, "scene:3:1: shell: the piece with node 0");
+}
+
+TEST(CheckModel, BucklingAndPathsNeedALoadThatIsNotZero) {
+  Model model = plate();
+  model.loads[0] = {0, PressureLoad{0, true}, {}, "scene:8:1"};
+  RunSettings settings = linear_run();
+  settings.kind = BucklingRun{};
+  expect_refused(model, "scene:8:1: buckling needs a load", settings);
+  settings.kind = ArcLengthRun{};
+  expect_refused(model, "scene:8:1: arc length needs a load", settings);
+}
+
+TEST(CheckModel, RefusesAWallThickerThanTheWholeBody) {
+  Model model = plate();
+  model.shells[0].thickness = {100};  // 1 m for 1 cm, say
+  expect_refused(model, "is its unit right?");
+}
+
+std::vector<std::string> doubts_of(const Model& model, const RunSettings& settings = linear_run()) {
+  EXPECT_NO_THROW(check_model(model, settings));
+  return doubts(model, settings);
+}
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+TEST(Doubts, OfAGoodModelThereAreNone) {
+  EXPECT_THAT(doubts_of(plate()), IsEmpty());
+  Model ball;
+  ball.shells.push_back(flat_body(make_sphere(10, 2), 1000, 0.3, 1));
+  ball.rigid_motions.push_back({0});
+  ball.loads.push_back({0, PressureLoad{1e-4, true}, {}});
+  EXPECT_THAT(doubts_of(ball), IsEmpty());
+}
+
+TEST(Doubts, AWallThickerThanATenthOfTheBody) {
+  Model model = plate();
+  model.shells[0].thickness = {0.15};
+  EXPECT_THAT(doubts_of(model), ElementsAre(HasSubstr("more than a tenth")));
+}
+
+TEST(Doubts, AWallThickerThanTheRadiusOfCurvatureOfMostOfTheBodyButNotOfACrease) {
+  // A quarter of a tube of radius 0.5, 20 long: its diagonal is no measure of how thick a wall may be.
+  const auto tube = [](double thickness, double radius) {
+    Model model;
+    const Grid grid = make_grid(8, 20, [&](double u, double v) {
+      const double angle = u * 2;
+      return Vec3(radius * std::cos(angle), radius * std::sin(angle), 20 * v);
+    });
+    model.shells.push_back(flat_body(grid.mesh, 1000, 0.3, thickness));
+    hold(
+        model, [](const Vec3& p) { return p.z() < 1e-9; }, "xyz", "xyz");
+    model.loads.push_back({0, PressureLoad{1e-6, true}, {}});
+    return model;
+  };
+  EXPECT_THAT(doubts_of(tube(0.7, 0.5)), ElementsAre(HasSubstr("radius of curvature")));
+  EXPECT_THAT(doubts_of(tube(0.3, 0.5)), IsEmpty());
+  // Two flat walls that meet in an edge: there the radius is small, elsewhere there is none.
+  Model angle;
+  const Grid grid = make_grid(
+      20, 10, [](double u, double v) { return Vec3(10 * std::abs(u - 0.5), 10 * std::max(0.0, u - 0.5), 10 * v); });
+  angle.shells.push_back(flat_body(grid.mesh, 1000, 0.3, 1));
+  hold(
+      angle, [](const Vec3& p) { return p.z() < 1e-9; }, "xyz", "xyz");
+  angle.loads.push_back({0, PressureLoad{1e-6, true}, {}});
+  EXPECT_THAT(doubts_of(angle), IsEmpty());
+}
+
+TEST(Doubts, TheCurvatureOfSphereAndCylinderIsTheirOwn) {
+  const ShellMesh sphere = make_sphere(10, 3);
+  for (const double curvature : largest_curvatures(sphere, true)) {
+    EXPECT_NEAR(curvature, 0.1, 0.002);
+  }
+  for (const double curvature : largest_curvatures(sphere, false)) {
+    EXPECT_NEAR(curvature, 0.1, 0.02);
+  }
+}
+
+TEST(Doubts, BodiesThatCannotMoveAndLoadsThatMoveNothing) {
+  Model model = plate();
+  model.loads.push_back({0, ForceLoad{{0}, Vec3(0, 0, 1)}, {}, "scene:9:1"});
+  EXPECT_THAT(doubts_of(model),
+              ElementsAre("scene:9:1: shell: this force acts on held nodes only, so it moves nothing"));
+  std::get<ForceLoad>(model.loads.back().kind).nodes = {0, 15};  // one of them is free
+  EXPECT_THAT(doubts_of(model), IsEmpty());
+  model = plate();
+  hold(
+      model, [](const Vec3&) { return true; }, "xyz", "");
+  EXPECT_THAT(doubts_of(model), ElementsAre(HasSubstr("all its nodes are held")));
+  model.fixes.back().displacement = Vec3(0, 0, 0.1);
+  model.fixes.erase(model.fixes.begin());
+  EXPECT_THAT(doubts_of(model), IsEmpty());
+}
+
+TEST(Doubts, LoadsThatAreZeroAndNoneAtAll) {
+  Model model = plate();
+  model.loads[0].ramp.points = {{0, 0}, {2, 0}, {3, 1}};  // over the load factor, which ends at 1
+  EXPECT_THAT(doubts_of(model), ElementsAre(HasSubstr("ramp of this load is zero")));
+  model.loads[0].ramp.points = {{0, 0}, {1, 1}};
+  EXPECT_THAT(doubts_of(model), IsEmpty());
+  model.loads.clear();
+  EXPECT_THAT(doubts_of(model), ElementsAre(HasSubstr("nothing loads the model")));
+  model.loads.push_back({0, PressureLoad{0, true}, {}});
+  EXPECT_THAT(doubts_of(model), ElementsAre(HasSubstr("this load is zero"), HasSubstr("nothing loads the model")));
 }
 
 }  // namespace

@@ -2,14 +2,19 @@
 """Makefile.pipeline: its rules with tools that do nothing but write their files, and the whole chain with the real ones."""
 
 import csv
+import fcntl
+import hashlib
 import json
 import os
 import pathlib
+import random
 import shutil
+import signal
 import stat
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 
 SOURCE = pathlib.Path(__file__).resolve().parents[2]
@@ -27,21 +32,26 @@ class Pipeline(unittest.TestCase):
         self.out = self.folder / "out"
         self.bin = TOOLS
 
-    def make(self, *flags, environment=None, **variables):
-        words = [f"{name}={value}" for name, value in variables.items()]
+    def start(self, *flags, environment=None, **variables):
+        words = [f"{name}={value}" for name, value in {"BIN": self.bin, "OUT": self.out, **variables}.items()]
         settings = {name: value for name, value in os.environ.items() if name not in ("MAKEFLAGS", "MAKELEVEL", "MFLAGS")}
         settings.update(environment or {})
-        return subprocess.run(
-            ["make", "-f", SOURCE / "Makefile.pipeline", f"BIN={self.bin}", f"OUT={self.out}", *flags, *words],
-            cwd=self.folder, env=settings, capture_output=True, text=True, timeout=500)
+        return subprocess.Popen(["make", "-f", SOURCE / "Makefile.pipeline", *flags, *words], cwd=self.folder,
+                                env=settings, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                                errors="surrogateescape", start_new_session=True)
+
+    def make(self, *flags, **rest):
+        run = self.start(*flags, **rest)
+        stdout, stderr = run.communicate(timeout=500)
+        return subprocess.CompletedProcess(run.args, run.returncode, stdout, stderr)
 
     def summary(self):
         with open(self.out / "summary.tsv", newline="") as file:
             return {row["case"]: row for row in csv.DictReader(file, delimiter="\t", quoting=csv.QUOTE_NONE)}
 
 
-class Rules(Pipeline):
-    """What is run when, with stub tools."""
+class WithStubs(Pipeline):
+    """Tools that do nothing, and two volumes."""
 
     def setUp(self):
         super().setUp()
@@ -67,6 +77,17 @@ class Rules(Pipeline):
         newest = max(p.stat().st_mtime_ns for p in self.folder.rglob("*"))
         os.utime(path, ns=(newest + 1_000_000, newest + 1_000_000))
 
+    def refusal(self, *flags, **variables):
+        done = self.make(*flags, **variables)
+        self.assertNotEqual(done.returncode, 0)
+        self.assertFalse(self.out.exists(), "refused before any work")
+        self.assertNotIn("Traceback", done.stderr)
+        return done.stderr
+
+
+class Rules(WithStubs):
+    """What is run when."""
+
     def test_case_leaves_the_files_of_the_contract(self):
         done = self.make(VOLUMES="a.nii.gz", LABEL=3, **LOAD)
         self.assertEqual(done.returncode, 0, done.stderr)
@@ -87,7 +108,7 @@ class Rules(Pipeline):
         self.assertIn("--label 3 --smooth none --open-border --frame 2 --threads 3", extract)
         self.assertIn("--triangles 123", decimate)
         self.assertIn("--tolerance 0.5% --refine --method barycentre", relax)
-        self.assertIn("--fix below z=-10mm --pressure=1kPa --young 1MPa --poisson 0.45 --thickness 1.5mm "
+        self.assertIn("--fix below z=-10mm --pressure 1kPa --young 1MPa --poisson 0.45 --thickness 1.5mm "
                       "--density 1100kg/m3 --static", simulate)
 
     def test_defaults(self):
@@ -191,12 +212,6 @@ class Rules(Pipeline):
         self.assertNotEqual(done.returncode, 0)
         self.assertEqual(self.summary()["a/1"]["exit"], "137")
 
-    def refusal(self, *flags, **variables):
-        done = self.make(*flags, **variables)
-        self.assertNotEqual(done.returncode, 0)
-        self.assertFalse(self.out.exists(), "refused before any work")
-        return done.stderr
-
     def test_nothing_physical_is_assumed_for_a_users_volume(self):
         for name in LOAD:
             rest = {key: value for key, value in LOAD.items() if key != name}
@@ -212,17 +227,325 @@ class Rules(Pipeline):
         (self.folder / "other").mkdir()
         (self.folder / "other" / "a.nii").write_text("another")
         self.assertIn("same stem", self.refusal(VOLUMES="a.nii.gz other/a.nii", LABEL=1, **LOAD))
-        self.assertIn("without spaces", self.refusal(VOLUMES="a.nii.gz", LABEL=1, OUT=f"{self.out} 2", **LOAD))
-        self.assertIn("names with the sign '", self.refusal(VOLUMES="a'.nii", LABEL=1, **LOAD))
+        self.assertIn("VOLUMES is empty", self.refusal(VOLUMES="", LABEL=1, **LOAD))
+        self.assertIn("OUT: has no name", self.refusal(VOLUMES="a.nii.gz", LABEL=1, **{**LOAD, "OUT": ""}))
+        self.assertIn("folder", self.refusal(VOLUMES="a.nii.gz", LABELS="../1", **LOAD))
+        (self.bin / "tunica-relax").unlink()
+        self.assertIn("no tunica-relax", self.refusal(VOLUMES="a.nii.gz", LABEL=1, **LOAD))
 
-    def test_a_glob_that_matches_a_name_with_a_space_is_refused(self):
-        (self.folder / "a b.nii.gz").write_text("a volume")
-        self.assertIn("has a space in its name", self.refusal(VOLUMES="a*.nii.gz", LABEL=1, **LOAD))
+    def test_dry_run_names_what_would_be_done_and_writes_nothing(self):
+        arguments = dict(VOLUMES="a.nii.gz", LABEL=1, **LOAD)
+        planned = self.make("-n", **arguments)
+        self.assertEqual(planned.returncode, 0, planned.stderr)
+        self.assertFalse(self.out.exists())
+        for stage in STAGES:
+            self.assertIn(f"tunica-{stage} ", planned.stdout)
+        self.make(**arguments)
+        self.calls()
+        before = {path: path.stat().st_mtime_ns for path in self.out.rglob("*")}
+        planned = self.make("-n", SHELLS=9, **arguments)
+        self.assertNotIn("tunica-extract", planned.stdout)
+        for stage in STAGES[1:]:
+            self.assertIn(f"tunica-{stage} ", planned.stdout)
+        self.assertNotIn("tunica-", self.make("-n", **arguments).stdout)
+        self.assertEqual({path: path.stat().st_mtime_ns for path in self.out.rglob("*")}, before)
+        self.assertEqual(self.calls(), [])
 
-    def test_names_with_spaces_are_explained(self):
-        (self.folder / "my scan.nii").write_text("a volume")
-        done = self.make(VOLUMES="my scan.nii", LABEL=1, **LOAD)
-        self.assertIn("no such volume: my (a name with spaces cannot stand in VOLUMES", done.stderr)
+
+class Inputs(WithStubs):
+    """What a stage read, by its own report, is what it depends on."""
+
+    def setUp(self):
+        super().setUp()
+        self.read = [self.folder / "a.nii.gz", self.folder / "data.raw"]
+        self.read[1].write_text("voxels")
+
+    def run_again(self, volumes="a.nii.gz"):
+        inputs = [{"path": str(path), "sha256": hashlib.sha256(path.read_bytes()).hexdigest()} for path in self.read]
+        text = ", ".join(json.dumps(entry) for entry in inputs)
+        done = self.make(VOLUMES=volumes, LABEL=1, environment={"STUB_INPUTS": text}, **LOAD)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return self.verbs()
+
+    def test_changed_data_beside_a_header(self):
+        self.assertEqual(self.run_again(), sorted(STAGES))
+        self.assertEqual(self.run_again(), [])
+        self.read[1].write_text("other voxels")
+        self.assertEqual(self.run_again(), sorted(STAGES))
+        self.assertEqual(self.run_again(), [])
+
+    def test_an_older_file_moved_into_place(self):
+        other = self.folder / "other.raw"
+        other.write_text("VOXELS")
+        os.utime(other, (1, 1))
+        self.run_again()
+        other.rename(self.read[1])
+        self.assertEqual(self.run_again(), sorted(STAGES))
+        os.chmod(self.read[1], 0o600)
+        self.assertEqual(self.run_again(), [], "the same content")
+
+    def test_slices_of_a_folder(self):
+        slices = self.folder / "slices"
+        slices.mkdir()
+        self.read = [slices / f"{number}.png" for number in range(3)]
+        for path in self.read:
+            path.write_text("a slice")
+        self.assertEqual(self.run_again("slices/"), sorted(STAGES))
+        self.assertEqual(self.run_again("slices"), [])
+        self.read[1].write_text("another slice")
+        self.assertEqual(self.run_again("slices"), sorted(STAGES), "a changed slice")
+        self.read.append(slices / "3.png")
+        self.read[3].write_text("a slice")
+        self.assertEqual(self.run_again("slices"), sorted(STAGES), "one more")
+        self.read.pop().unlink()
+        self.assertEqual(self.run_again("slices"), sorted(STAGES), "one less")
+        self.assertEqual(self.run_again("slices"), [])
+
+    def test_another_volume_of_the_same_relative_name(self):
+        self.run_again()
+        for name in ("here", "there"):
+            (self.folder / name).mkdir()
+            (self.folder / name / "a.nii.gz").write_text(name)
+        self.run_again("here/a.nii.gz")
+        os.utime(self.folder / "there" / "a.nii.gz", (1, 1))
+        self.assertEqual(self.run_again("there/a.nii.gz"), sorted(STAGES))
+
+    def test_a_result_without_its_report_is_none(self):
+        self.run_again()
+        (self.out / "a" / "1" / "relax.json").unlink()
+        self.assertEqual(self.run_again(), sorted(STAGES[2:]))
+
+
+class Names(WithStubs):
+    """Any name a file may have works, or is refused by name, and none is ever run."""
+
+    def setUp(self):
+        super().setUp()
+        self.scans = self.folder / "scans"
+        self.scans.mkdir()
+
+    def run_on(self, *names, volumes="scans/*", flags=("-k", "-j2"), **variables):
+        for name in names:
+            (self.scans / name).write_text("a volume")
+        done = self.make(*flags, VOLUMES=volumes, LABEL=1, **LOAD, **variables)
+        self.assertNotIn("Traceback", done.stderr)
+        return done
+
+    def test_every_sign(self):
+        signs = "".join(chr(code) for code in range(0x20, 0x7f) if chr(code) != "/")
+        names = [signs, signs[::-1], "`touch pwned`", "$(touch pwned)", "$(shell touch pwned)", "x'\"; touch pwned; '",
+                 "a b  c", "--help", "-rf", "${HOME}", "#", "=", "%", "a:b", "~", ".b", "(1)", "a\u00a0b",
+                 "gro\u00dfe Gef\u00e4\u00dfe \u5fc3", "l" * 240]
+        done = self.run_on(*(name + ".nii.gz" for name in names), volumes="scans/* scans/.b.nii.gz")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        for name in names:
+            self.assertTrue((self.out / name / "1" / "result.hdf").is_file(), name)
+        self.assertFalse(list(self.folder.rglob("pwned*")))
+        with open(self.out / "summary.tsv", encoding="utf-8") as file:
+            self.assertEqual(len(file.read().split("\n")), len(names) + 2)
+        self.calls()
+        again = self.run_on(volumes="scans/* scans/.b.nii.gz")
+        self.assertEqual((again.returncode, self.calls()), (0, []), again.stderr)
+
+    def test_a_name_that_begins_like_a_flag_is_no_flag(self):
+        (self.folder / "-rf.nii.gz").write_text("a volume")
+        self.assertEqual(self.make(VOLUMES="-rf.nii.gz", LABEL=1, **LOAD).returncode, 0)
+        self.assertTrue(self.calls()[0].startswith("extract ./-rf.nii.gz "))
+        self.assertEqual(self.make(VOLUMES="*rf.nii.gz", LABEL=1, **{**LOAD, "OUT": "-out"}).returncode, 0)
+        self.assertTrue(all(" ./-out/" in line for line in self.calls()))
+
+    def test_names_with_blanks_in_a_list(self):
+        for name in ("my scan.nii", "a  b.nii", "c.nii"):
+            (self.folder / name).write_text("a volume")
+        for volumes in ("my scan.nii a  b.nii c.nii", "c.nii a  b.nii my sc*.nii", "'"):
+            expected = {"'"} if volumes == "'" else {"my scan", "a  b", "c"}
+            self.make("-k", VOLUMES=volumes, LABEL=1, **LOAD)
+            self.assertEqual({path.name for path in self.out.iterdir() if path.is_dir()}, expected)
+            shutil.rmtree(self.out)
+
+    def test_whole_name_in_the_list_is_never_expanded(self):
+        for name in ("a$(shell touch pwned)b.nii", "$(PRESSURE).nii", "$$.nii", "`touch pwned`.nii", "a#b.nii",
+                     "[x].nii"):
+            (self.folder / name).write_text("a volume")
+            done = self.make(VOLUMES=name, LABEL=1, **LOAD)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertTrue((self.out / name[:-4] / "1" / "result.hdf").is_file(), name)
+            environment = {"VOLUMES": name, "SHELLS": "7"}
+            self.assertEqual(self.make(LABEL=1, environment=environment, **LOAD).returncode, 0, name)
+        self.assertFalse(list(self.folder.rglob("pwned*")))
+
+    def test_bytes_that_are_no_text(self):
+        name = os.fsdecode(b"\xff\xfe.nii.gz")
+        done = self.run_on(name)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertTrue((self.out / name[:-7] / "1" / "result.hdf").is_file())
+
+    def test_control_signs_are_refused_by_name_and_the_others_go_on(self):
+        for flags in ((), ("-k", "-j2")):
+            done = self.run_on("a\nb.nii.gz", "tab\t.nii.gz", "good.nii.gz", flags=flags)
+            self.assertNotEqual(done.returncode, 0)
+            rows = self.summary()
+            self.assertEqual(rows["good/1"]["message"], "done")
+            refused = [row for row in rows.values() if row["message"] != "done"]
+            self.assertEqual([(row["stage"], row["exit"]) for row in refused], [("none", "2")] * 2)
+            self.assertIn(r"scans/a\nb.nii.gz: has a control character", refused[0]["message"])
+            self.assertIn(r"pipeline: scans/tab\t.nii.gz: has a control character", done.stderr)
+            shutil.rmtree(self.out)
+
+    def test_names_of_the_pipelines_own_files_are_refused(self):
+        done = self.run_on("summary.tsv.nii.gz", ".lock.nii.gz", "good.nii.gz", "bin.nii.gz", "cases.nii.gz",
+                           volumes="scans/* scans/.lock.nii.gz")
+        self.assertNotEqual(done.returncode, 0)
+        rows = self.summary()
+        self.assertEqual([rows[f"{name}/1"]["message"] for name in ("good", "bin", "cases")], ["done"] * 3)
+        self.assertIn("cannot be called 'summary.tsv'", rows["summary.tsv/1"]["message"])
+        self.assertIn("cannot be called '.lock'", rows[".lock/1"]["message"])
+
+    def test_names_that_are_alike_to_make_stay_apart(self):
+        done = self.run_on("a b.nii.gz", "a+b.nii.gz", "a_b.nii.gz", "a_b_2.nii.gz")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        for name in ("a b", "a+b", "a_b", "a_b_2"):
+            self.assertTrue((self.out / name / "1" / "result.hdf").is_file(), name)
+        self.assertEqual(len(self.calls()), 16)
+
+    def test_a_folder_that_cannot_be_made_is_one_failed_case(self):
+        self.out.mkdir()
+        (self.out / "a").write_text("in the way")
+        done = self.make(VOLUMES="a.nii.gz b.seg.nrrd", LABEL=1, **LOAD)
+        self.assertNotEqual(done.returncode, 0)
+        rows = self.summary()
+        self.assertEqual((rows["a/1"]["exit"], rows["b/1"]["message"]), ("2", "done"))
+        self.assertIn("cannot be written", rows["a/1"]["message"])
+
+    def test_settings_are_single_words(self):
+        done = self.make(VOLUMES="a.nii.gz", LABEL=1, FIX="below z=-1mm; touch pwned",
+                         **{**LOAD, "PRESSURE": "$(touch pwned)"})
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("--fix below z=-1mm; touch pwned --pressure $(touch pwned) ", self.calls()[3])
+        self.assertFalse(list(self.folder.rglob("pwned*")))
+
+
+class Runs(WithStubs):
+    """Runs that are killed, run into each other, or cannot write; the summary is that of the run."""
+
+    ARGUMENTS = dict(VOLUMES="a.nii.gz b.seg.nrrd", LABELS="1 2", **LOAD)
+
+    def wait_for(self, count):
+        """Until so many commands have begun."""
+        while len((self.bin / "calls").read_text().splitlines() if (self.bin / "calls").exists() else []) < count:
+            time.sleep(0.01)
+
+    def tree(self, run):
+        """The processes of a run, the first first."""
+        listed = subprocess.run(["ps", "-o", "pid=", "-s", str(run.pid)], capture_output=True, text=True, check=True)
+        return sorted(int(word) for word in listed.stdout.split())
+
+    def test_a_run_that_waits_says_for_what(self):
+        self.out.mkdir()
+        with open(self.out / ".lock", "w") as file:
+            fcntl.flock(file, fcntl.LOCK_EX)
+            run = self.start(**self.ARGUMENTS)
+            self.assertIn("another run", run.stderr.readline())
+            self.assertEqual(list(self.out.iterdir()), [self.out / ".lock"])
+        run.communicate()
+        self.assertEqual(run.returncode, 0)
+
+    def test_the_next_run_waits_for_what_a_kill_left(self):
+        slow = {"STUB_SECONDS": "0.3"}
+        for victims in (1, 2, 3):  # the top make, the program, the make of the cases
+            run = self.start("-j2", "-k", environment=slow, SHELLS=victims, **self.ARGUMENTS)
+            self.wait_for(3)
+            for process in self.tree(run)[:victims]:
+                os.kill(process, signal.SIGKILL)
+            done = self.make("-j2", "-k", environment=slow, SHELLS=victims, **self.ARGUMENTS)
+            run.communicate()
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertEqual([row["message"] for row in self.summary().values()], ["done"] * 4)
+            self.assertNotIn("collision", self.calls())
+            self.assertFalse((self.out / ".run").exists())
+
+    def test_runs_on_one_folder_come_one_after_the_other(self):
+        slow = {"STUB_SECONDS": "0.2"}
+        runs = [self.start("-j2", "-k", environment=slow, SHELLS=count, **self.ARGUMENTS) for count in (5, 6, 7)]
+        for run in runs:
+            stdout, stderr = run.communicate(timeout=100)
+            self.assertEqual(run.returncode, 0, stderr)
+            self.assertEqual(stdout.count(" done\n"), 4, stdout)
+        self.assertNotIn("collision", self.calls())
+
+    def test_random_kills_leave_nothing_wrong(self):
+        choice = random.Random(1)
+        for attempt in range(6):
+            run = self.start("-j2", "-k", environment={"STUB_SECONDS": "0.05"}, SHELLS=attempt, **self.ARGUMENTS)
+            time.sleep(choice.uniform(0.2, 1.5))
+            victims = self.tree(run)
+            for process in choice.sample(victims, min(len(victims), choice.randint(1, 4))):
+                try:
+                    os.kill(process, signal.SIGKILL)
+                except ProcessLookupError:
+                    pass
+            self.make("-j2", "-k", SHELLS=attempt, **self.ARGUMENTS)
+            run.communicate()
+            for busy in self.out.rglob("*.busy"):  # of a stub that was killed
+                busy.rmdir()
+            done = self.make("-j2", "-k", SHELLS=attempt, **self.ARGUMENTS)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.calls()
+            self.assertEqual(self.make("-j2", SHELLS=attempt, **self.ARGUMENTS).returncode, 0)
+            self.assertEqual(self.calls(), [])
+
+    def test_a_stopped_run_says_so_and_leaves_nothing_at_work(self):
+        run = self.start("-j2", environment={"STUB_SECONDS": "1000"}, **self.ARGUMENTS)
+        self.wait_for(2)
+        os.kill(run.pid, signal.SIGTERM)
+        stdout, stderr = run.communicate(timeout=100)
+        self.assertNotEqual(run.returncode, 0)
+        with open(self.out / ".lock") as file:
+            fcntl.flock(file, fcntl.LOCK_EX)  # the last process of the run has ended
+        self.assertNotIn("Traceback", stderr)
+        self.assertNotIn("done", stdout)
+        self.assertEqual({row["message"] for row in self.summary().values()}, {"stopped while it ran", "not run"})
+
+    def test_what_an_earlier_run_did_is_not_told(self):
+        self.make("-k", environment={"STUB_FAIL": "relax/b/1"}, **self.ARGUMENTS)
+        self.assertEqual(self.summary()["b/1"]["stage"], "relax")
+        self.make(SHELLS=9, environment={"STUB_FAIL": "decimate/a/1"}, **self.ARGUMENTS)
+        rows = self.summary()
+        self.assertEqual((rows["a/1"]["stage"], rows["a/1"]["exit"]), ("decimate", "4"))
+        for name in ("a/2", "b/1", "b/2"):
+            self.assertEqual((rows[name]["stage"], rows[name]["message"], rows[name]["shells"]), ("none", "not run", ""))
+
+    def test_folder_of_results_that_is_a_file(self):
+        self.out.write_text("in the way")
+        done = self.make(**self.ARGUMENTS)
+        self.assertNotEqual(done.returncode, 0)
+        self.assertNotIn("Traceback", done.stderr)
+        self.assertIn(f"pipeline: {self.out}: File exists", done.stderr)
+
+    def test_summary_that_cannot_be_written(self):
+        (self.out / "summary.tsv").mkdir(parents=True)
+        done = self.make(**self.ARGUMENTS)
+        self.assertNotEqual(done.returncode, 0)
+        self.assertNotIn("Traceback", done.stderr)
+        self.assertIn("summary.tsv cannot be written", done.stdout)
+        self.assertEqual(done.stdout.count("  done\n"), 4)
+
+    @unittest.skipIf(os.geteuid() == 0, "the superuser may write anywhere")
+    def test_nothing_writable(self):
+        self.out.mkdir(mode=0o500)
+        done = self.make(**self.ARGUMENTS)
+        self.assertNotEqual(done.returncode, 0)
+        self.assertNotIn("Traceback", done.stderr)
+        self.assertIn("Permission denied", done.stderr)
+
+    def test_nobody_reads_the_table(self):
+        full = open("/dev/full", "w")
+        self.addCleanup(full.close)
+        words = [f"{name}={value}" for name, value in {"BIN": self.bin, "OUT": self.out, **self.ARGUMENTS}.items()]
+        done = subprocess.run([SOURCE / "tools" / "pipeline.py"], cwd=self.folder, stdout=full, stderr=subprocess.PIPE,
+                              env={**os.environ, **dict(word.split("=", 1) for word in words), "KIND": "static"}, text=True)
+        self.assertNotIn("Traceback", done.stderr)
+        self.assertEqual([row["message"] for row in self.summary().values()], ["done"] * 4)
 
 
 @unittest.skipUnless(all((TOOLS / f"tunica-{verb}").exists() for verb in STAGES + ["phantom", "chart"]),

@@ -54,6 +54,30 @@ inline TriangleMesh sphere(int level, double radius = 1) {
   return mesh;
 }
 
+/// A cone of n triangles around one vertex, the first or the last, open at its rim or closed by a second one below.
+inline TriangleMesh fan(std::size_t n, bool closed, bool tip_first) {
+  TriangleMesh mesh;
+  const Index first = tip_first ? 1 : 0;
+  const Index tip = tip_first ? 0 : static_cast<Index>(n);
+  const Index bottom = static_cast<Index>(n + 1);
+  mesh.vertices.resize(closed ? n + 2 : n + 1);
+  mesh.vertices[tip] = {0, 0, 1};
+  if (closed) {
+    mesh.vertices[bottom] = {0, 0, -1};
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    const double angle = 2 * std::numbers::pi * static_cast<double>(i) / static_cast<double>(n);
+    const Index from = static_cast<Index>(first + i);
+    const Index to = static_cast<Index>(first + (i + 1) % n);
+    mesh.vertices[from] = {std::cos(angle), std::sin(angle), 0};
+    mesh.triangles.push_back({from, to, tip});
+    if (closed) {
+      mesh.triangles.push_back({to, from, bottom});
+    }
+  }
+  return mesh;
+}
+
 /// An n by m grid in the plane z = height over [0, width] x [0, depth].
 inline TriangleMesh plane(std::size_t n, std::size_t m, double width = 1, double depth = 1, double height = 0) {
   TriangleMesh mesh;

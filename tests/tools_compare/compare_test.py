@@ -120,6 +120,39 @@ class Compare(WholeTool):
         meshes.write_ply(self.path("wild.ply"), vertices, triangles, flat, ["surface=comas"])
         self.run_tool("wild.ply", "sphere.ply", "--shell", code=3, says="wild.ply")
 
+    def test_a_wrong_unit_is_told_at_once(self):
+        vertices, triangles = meshes.sphere(3, 10.0)
+        for factor, says in ((1000, "the numbers of other.ply are probably um, not mm, or those of sphere.ply m, not mm"),
+                             (0.001, "the numbers of other.ply are probably m, not mm, or those of sphere.ply um"),
+                             (10, "the numbers of sphere.ply are probably cm, not mm"),
+                             (0.1, "the numbers of other.ply are probably cm, not mm")):
+            meshes.write_ply(self.path("other.ply"), [[factor * x for x in v] for v in vertices], triangles)
+            report = self.run_tool("other.ply", "sphere.ply", code=3, says=says)
+            self.assertTrue(report["error"].startswith("other.ply: is "), report["error"])
+            self.assertIsNone(report["seconds"]["compare"])
+        # What the file states or the user said is what is doubted.
+        meshes.write_obj(self.path("other.obj"), [[0.1 * x for x in v] for v in vertices], triangles)
+        self.run_tool("other.obj", "sphere.ply", "--mesh-unit", "m", code=3, says="probably cm, not m")
+        self.run_tool("other.obj", "sphere.ply", "--mesh-unit", "cm")
+
+    def test_sizes_that_no_unit_explains_are_compared(self):
+        vertices, triangles = meshes.sphere(3, 10.0)
+        for scale in ((3, 3, 3), (10, 1, 1), (30, 30, 30)):
+            meshes.write_ply(self.path("other.ply"), [[s * x for s, x in zip(scale, v)] for v in vertices], triangles)
+            result = self.run_tool("other.ply", "sphere.ply")["result"]
+            self.assertTrue(interval_holds(result["hausdorff_mm"], 10 * max(scale) - 10, slack=1.5))
+
+    def test_surfaces_far_apart_are_compared(self):
+        vertices, triangles = meshes.sphere(2, 10.0)
+        away = [(x + 30000, y, z) for x, y, z in vertices]
+        meshes.write_ply(self.path("away.ply"), away, triangles, self.normals, ["SPACE=LPS", "surface=comas"])
+        for flags in ([], ["--shell"]):
+            report = self.run_tool("away.ply", "sphere.ply", *flags)
+            self.assertTrue(interval_holds(report["result"]["hausdorff_mm"], 30000, slack=1.5))
+            width = report["result"]["hausdorff_percent"]["upper"] - report["result"]["hausdorff_percent"]["lower"]
+            self.assertLessEqual(width, 0.01)
+            self.assertLess(report["peak_mib"], 500)
+
     def test_output_exists(self):
         with open(self.path("map.ply"), "w") as file:
             file.write("mine")

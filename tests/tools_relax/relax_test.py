@@ -323,6 +323,18 @@ class Contract(Case):
         write_ply(flat, np.zeros((3, 3)), [[0, 1, 2]])
         self.relax(self.coarse, flat, self.out, expect=3)
 
+    def test_a_wrong_unit_or_place_is_told_before_any_work(self):
+        vertices, triangles = cylinder(8, 3, radius=10.3)
+        wrong = self.path("wrong.ply")
+        for moved, says in ((1000 * vertices, "about 1000 times as large"), (vertices / 1000, "about 1000 times as small"),
+                            (10 * vertices, "probably cm, not mm"), (vertices + [40_000, 0, 0], "away from")):
+            write_ply(wrong, moved, triangles)
+            record, error = self.relax(wrong, self.target, self.out, expect=3)
+            self.assertIn("wrong.ply: ", error)
+            self.assertIn(says, error)
+            self.assertIsNone(record["seconds"]["relax"])
+            self.assertFalse(os.path.exists(self.out))
+
     def test_the_space_is_kept_and_two_spaces_are_refused(self):
         write_ply(self.target, *cylinder(64, 40), space="RAS")
         _, error = self.relax(self.coarse, self.target, self.out, expect=3)

@@ -214,6 +214,26 @@ class Flags(SimulateTest):
             self.assertIn("full.hdf", self.done.stderr)
             self.assertFalse(os.path.exists(self.path("full.hdf")))
 
+    def test_what_can_hardly_be_meant_is_told_on_stderr_and_in_the_report(self):
+        def told(says, *arguments, many=1):
+            report = self.run_tool(*arguments, "out.hdf", "--force")
+            self.assertEqual(len(report["warnings"]), many, report["warnings"])
+            self.assertIn(says, report["warnings"][0])
+            self.assertIn("warning: " + report["warnings"][0], self.done.stderr)
+            quiet = self.run_tool(*arguments, "out.hdf", "--force", "--quiet")
+            self.assertEqual((quiet["warnings"], self.done.stderr), (report["warnings"], ""))
+
+        def thick(words, thickness):
+            return [thickness if word == "0.5mm" else word for word in words]
+
+        self.assertEqual(self.run_tool("ball.ply", "out.hdf", *HELD)["warnings"], [])
+        told("ball.ply: shell: its thickness, 5 mm, is more than a tenth", "ball.ply", *thick(HELD, "5mm"))
+        told("all its nodes are held", "ball.ply", *PRESSED, "--static", "--fix", "below x=1m")
+        nothing = [word if word != "100Pa" else "0Pa" for word in HELD]
+        told("this load is zero", "ball.ply", *nothing, many=2)
+        self.run_tool("ball.ply", "out.hdf", *thick(HELD, "1m"), "--force", expect=3)
+        self.assertIn("ball.ply: shell: the thickness at node 0 is 1000 mm, more than", self.done.stderr)
+
     def test_check_prints_a_scene_that_gives_the_same_run(self):
         self.run_tool("ball.ply", *HELD, "--check")
         text = self.done.stdout

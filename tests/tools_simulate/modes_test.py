@@ -71,7 +71,7 @@ class Modes(SimulateTest):
         pulled = (fix("all = true", "z", "") + fix("below = {axis = \"x\", at = \"0mm\"}", "xyz", "") +
                   load("edge", "[\"1N/mm\", \"0N/mm\", \"0N/mm\"]", "above = {axis = \"x\", at = \"10mm\"}"))
         for scene, code, says in (
-            (run("buckling") + plate + supported, 3, "buckling needs a load"),
+            (run("buckling") + plate + supported, 3, "scene.toml:2:8: buckling needs a load"),
             (run("frequencies", "count = 9000") + plate + supported, 3, "count = 9000, but the model has only"),
             (run("frequencies") + shell("plate.ply", 0.05, 1000, 0.3) + supported, 3, "no density"),
             (run("frequencies", "solver = \"cg\"") + plate + supported, 3, "direct solver"),

@@ -1,11 +1,14 @@
 """Runs that are killed at any moment and go on: the same end as without, or a clear refusal."""
 import os
 import random
+import resource
 import shutil
 import signal
+import struct
 import subprocess
 import time
 import unittest
+import zlib
 
 import h5py
 import numpy as np
@@ -278,6 +281,21 @@ nearest = ["0mm", "0mm", "10mm"]
         self.run_tool("ball.ply", "whole.hdf", *DYNAMIC)
         self.assert_same("whole.hdf", "out.hdf")
 
+    def test_a_forged_count_of_steps_is_no_run(self):
+        """Its checksum holds, yet no file of this size can have seen so many steps."""
+        self.interrupted()
+        with open(self.path(LEFT[2]), "r+b") as file:
+            checkpoint = file.read()
+            head = checkpoint.index(b"\n") + 1  # then the checksum, of all that follows
+            steps = head + 4 + 4 + 8 + 8 + 8  # identity, states, their bytes, degrees of freedom
+            count = struct.unpack_from("<Q", checkpoint, steps)[0]
+            self.assertTrue(0 < count < 150, count)
+            content = checkpoint[head + 4:steps] + struct.pack("<Q", 3 * 10**16) + checkpoint[steps + 8:]
+            file.seek(head)
+            file.write(struct.pack("<I", zlib.crc32(content)) + content)
+        self.run_tool("--resume", "out.hdf.part", expect=3)
+        self.assertIn(f"{LEFT[2]}: is damaged", self.done.stderr)
+
     def test_before_the_first_checkpoint_it_begins_again(self):
         self.interrupted()
         os.remove(self.path(LEFT[2]))
@@ -296,9 +314,27 @@ nearest = ["0mm", "0mm", "10mm"]
         while not os.path.exists(self.path(LEFT[2])) and time.monotonic() < limit:
             time.sleep(0.01)
         self.run_tool("--resume", "out.hdf.part", expect=5)
-        self.assertIn("another tunica-simulate", self.done.stderr)
+        self.assertIn("another run is writing it", self.done.stderr)
         self.run_tool("ball.ply", "out.hdf", *long, expect=5)
         self.assertIsNone(running.poll())
+
+    def test_a_full_disk_leaves_what_can_be_resumed_or_nothing(self):
+        """A limit on the size of files stands for the disk: writing past it fails in the same way."""
+        self.run_tool("ball.ply", "whole.hdf", *DYNAMIC)
+        seen = set()
+        for kibibytes in (8, 64, 128, 192, 256, 512):
+            done = subprocess.run([SIMULATE, "ball.ply", "out.hdf", *DYNAMIC, "--quiet"], cwd=self.folder, text=True,
+                                  capture_output=True, check=False, preexec_fn=lambda most=kibibytes << 10:
+                                  resource.setrlimit(resource.RLIMIT_FSIZE, (most, most)))
+            self.assertEqual(done.returncode, 5, done.stderr)
+            kept = os.path.exists(self.path(LEFT[0]))
+            seen.add(kept)
+            self.assertEqual(os.path.exists(self.path(LEFT[1])), kept, kibibytes)
+            if kept:
+                self.run_tool("--resume", "out.hdf.part")
+                self.assert_same("whole.hdf", "out.hdf")
+                os.remove(self.path("out.hdf"))
+        self.assertEqual(seen, {False, True})
 
     def test_a_failed_run_leaves_nothing_to_go_on_with(self):
         self.run_tool("ball.ply", "out.hdf", *MATERIAL, "--pressure", "10MPa", "--fix", "rigid-motions", "--static",

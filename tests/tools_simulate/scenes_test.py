@@ -51,6 +51,43 @@ class Scenes(SimulateTest):
         self.assertLess(max(errors[2:]), 0.01)
         self.assertLess(errors[2], errors[0] / 2)
 
+    def test_what_a_scene_says_wrong_is_told_with_its_place(self):
+        write_ply(self.path("plate.ply"), *grid(4, 4, 10, 10))
+        body = shell("plate.ply", 0.1, 1, 0.3)
+        held = fix("below = {axis = \"x\", at = \"0mm\"}")
+        pulled = load("force", "[\"0N\", \"0N\", \"1mN\"]", "nodes = [0]")
+        path = STATIC + "control = \"arc-length\"\n"
+
+        def place(text, item, number=1):
+            lines = text.splitlines()
+            return [i + 1 for i, line in enumerate(lines) if line == item][number - 1]
+
+        moved = fix("nodes = [0]", more="displacement = [\"0mm\", \"0mm\", \"1mm\"]")
+        free, twice, lifted = STATIC + body + pulled, STATIC + body + held + moved, STATIC + body + held + pulled
+        for scene, where, says in (
+                (free, f"{place(free, '[[shell]]')}:1: ", "can move freely"),
+                (twice, f"{place(twice, '[[fix]]', 2)}:1: ", f"scene.toml:{place(twice, '[[fix]]')}:1) and 1 mm along z"),
+                (path + body + held, "3:11: ", "arc length needs a load")):
+            self.simulate(scene, expect=3)
+            self.assertTrue(self.done.stderr.startswith(f"tunica-simulate: scene.toml:{where}"), self.done.stderr)
+            self.assertIn(says, self.done.stderr)
+        self.write("scene.toml", lifted)
+        report = self.run_tool("--scene", "scene.toml", "out.hdf")
+        self.assertEqual(report["warnings"], [f"scene.toml:{place(lifted, '[[load]]')}:1: s: this force acts on held "
+                                              "nodes only, so it moves nothing"])
+        ramped = STATIC + body + held + load("area", "[\"0Pa\", \"0Pa\", \"1Pa\"]", more="ramp = [[0, 0], [1, 0]]")
+        self.write("scene.toml", ramped)
+        report = self.run_tool("--scene", "scene.toml", "out.hdf", "--force")
+        self.assertIn("ramp of this load is zero", report["warnings"][0])
+
+    def test_normals_that_are_no_numbers_are_told_with_file_and_node(self):
+        vertices, triangles, normals = sphere(0, 10)
+        normals[7] = [math.nan, 0, 1]
+        write_ply(self.path("ball.ply"), vertices, triangles, normals)
+        self.simulate(STATIC + shell("ball.ply", 0.1, 1, 0.3) + fix("all = true"), expect=3)
+        self.assertIn("scene.toml:5:8: ", self.done.stderr)
+        self.assertIn("ball.ply: the normal of vertex 7 has components that are no numbers", self.done.stderr)
+
     def test_simply_supported_plate(self):
         """w D / (q a^4) = 0.00406235: a fix that leaves the rotations free."""
         a, t, young, q = 100, 1, 2e5, 1e-3

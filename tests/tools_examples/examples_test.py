@@ -1,0 +1,43 @@
+#!/usr/bin/python3
+"""The worked examples of every tool's --help run as printed: one after the other, from phantom to chart, in one folder."""
+
+import os
+import resource
+import subprocess
+import tempfile
+import unittest
+from pathlib import Path
+
+TOOLS = Path(os.environ["TUNICA_BIN"])
+CHAIN = ["phantom", "extract", "decimate", "relax", "compare", "simulate", "chart"]
+LONGEST_SECONDS = 20  # of one processor, whatever else the machine does
+
+
+def examples_of(verb):
+    """The command lines under "Example:"."""
+    text = subprocess.run([TOOLS / f"tunica-{verb}", "--help"], capture_output=True, text=True, check=True).stdout
+    lines = text.split("\nExample:\n")[1].splitlines()
+    return [line.strip() for line in lines if line.strip()]
+
+
+class Examples(unittest.TestCase):
+    def test_all_in_the_order_of_the_chain(self):
+        self.assertEqual(sorted(path.name for path in TOOLS.glob("tunica-*")), sorted(f"tunica-{verb}" for verb in CHAIN))
+        environment = {**os.environ, "PATH": f"{TOOLS}:{os.environ['PATH']}"}
+        with tempfile.TemporaryDirectory(prefix="tunica-test-") as folder:
+            for verb in CHAIN:
+                examples = examples_of(verb)
+                self.assertGreater(len(examples), 0, verb)
+                for example in examples:
+                    with self.subTest(example=example):
+                        self.assertTrue(example.startswith(f"tunica-{verb} "))
+                        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+                        run = subprocess.run(["sh", "-c", example], cwd=folder, env=environment, capture_output=True,
+                                             text=True)
+                        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+                        self.assertEqual(run.returncode, 0, run.stderr)
+                        self.assertLess(after.ru_utime - before.ru_utime, LONGEST_SECONDS)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,399 @@
+#!/usr/bin/env python3
+"""Runs the cases of Makefile.pipeline: finds them, plans what is out of date, lets make do it, and tells how it went.
+
+make and the shell cannot hold any name a file may have, so they see none. For every case there is a folder in OUT/.run,
+called by a harmless name, with
+  out              a link to the case's own folder, OUT/<volume stem>/<label>
+  STAGE.command    the command of the stage, its words quoted for the shell
+  STAGE.flags      what its result depends on besides the files make sees; as old as can be when that has not changed
+  STAGE.exit       the exit code of the stage in this run; empty while it runs
+  done             there when every stage is up to date
+and cases.mk, run in OUT/.run, knows the rest. Settings are environment variables, set by Makefile.pipeline.
+
+OUT/.lock is held, by a descriptor that every process of the run inherits, from the planning until the last of them has
+ended: runs on one OUT come one after the other, also after a kill that left some of their processes.
+"""
+
+import argparse
+import errno
+import fcntl
+import glob
+import hashlib
+import os
+import re
+import shlex
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+
+import summary
+
+ENDINGS = (".seg.nrrd", ".nii.gz", ".nii", ".nrrd", ".nhdr", ".mha", ".mhd", ".tiff", ".tif", ".png")
+PRODUCTS = {"extract": ["surface.ply"], "decimate": ["coarse.ply"], "relax": ["shell.ply", "map.png"],
+            "simulate": ["result.hdf"]}
+OF_THE_RUN = (".lock", ".run", "summary.tsv", "chart.svg")
+BLANKS = re.compile(r"\s+", re.ASCII)
+CONTROL = re.compile(r"[\x00-\x1f\x7f]")
+
+
+class Refused(Exception):
+    """What is asked for cannot be meant; the text says why and what to do."""
+
+
+class Case:
+    """One label of one volume."""
+
+    def __init__(self, out, volume, stem, label):
+        self.volume = volume
+        self.label = label
+        self.name = f"{stem}/{label}"
+        self.folder = os.path.join(out, stem, label)
+        self.plan = None  # its folder in OUT/.run
+        self.refused = unfit(volume, stem)  # why it is not run, or None
+
+
+def setting(name):
+    """A setting in one line; blank when it is not given. Texts with blanks in them may be names only where VOLUMES and
+    OUT are read."""
+    return BLANKS.sub(" ", os.environ.get(name, "")).strip()
+
+
+def switched_on(name):
+    return setting(name) not in ("", "0", "no", "off", "false")
+
+
+def shown(name):
+    """A name in one line."""
+    return CONTROL.sub(lambda sign: repr(sign.group())[1:-1], name)
+
+
+# ------------------------------------------------------------------------------------------------------- which cases
+
+def matching(text):
+    """The files a word of VOLUMES means: itself where there is such a file, else what it matches."""
+    path = os.path.expanduser(text)
+    return [path] if os.path.lexists(path) else sorted(glob.glob(path))
+
+
+def find_volumes(text):
+    """The volumes of a list of names and globs. Neighbouring words are one name with blanks where only that exists."""
+    words = list(re.finditer(r"\S+", text, re.ASCII))
+    if os.path.lexists(text):
+        return [text]
+    found = []
+    first = 0
+    while first < len(words):
+        for last in range(first, len(words)):
+            volumes = matching(text[words[first].start():words[last].end()])
+            if volumes:
+                break
+        else:
+            word, last = words[first].group(), first
+            if glob.has_magic(word):
+                raise Refused(f"VOLUMES: nothing matches {word}")
+            volumes = [word]  # the tool says what is wrong with it
+        found += volumes
+        first = last + 1
+    return found
+
+
+def stem_of(volume):
+    """The name of a volume's folder of results."""
+    name = os.path.basename(os.path.abspath(volume))
+    for ending in ENDINGS:
+        if name.endswith(ending) and name != ending:
+            return name[:-len(ending)]
+    return name
+
+
+def unfit(volume, stem):
+    """Why no case can be made of a volume, or None."""
+    if CONTROL.search(volume):
+        return f"{shown(volume)}: has a control character in its name: rename the file or link to it"
+    if stem in ("", *OF_THE_RUN):
+        return f"{volume}: its results cannot be called '{stem}' in OUT: rename the file or link to it"
+    return None
+
+
+def find_cases(out):
+    labels = ["iso" + setting("ISOVALUE")] if setting("ISOVALUE") else setting("LABELS").split()
+    for label in labels:
+        if "/" in label or label in (".", ".."):
+            raise Refused(f"LABELS: '{label}' cannot be the name of a folder: give the label's value")
+    volumes = {os.path.abspath(path): path for path in reversed(find_volumes(os.environ.get("VOLUMES", "")))}
+    if not volumes:
+        raise Refused("VOLUMES is empty: name segmented volumes, or leave it out to see a shipped sample")
+    by_stem = {}
+    for volume in reversed(volumes.values()):
+        other = by_stem.setdefault(stem_of(volume), volume)
+        if other is not volume:
+            raise Refused(f"{shown(other)} and {shown(volume)} have the same stem and would share a folder: rename one")
+    return [Case(out, volume, stem, label) for stem, volume in by_stem.items() for label in dict.fromkeys(labels)]
+
+
+# ------------------------------------------------------------------------------------------------------ what they run
+
+def flag(name, value):
+    """The words of a flag: a value that looks like a flag itself stays with its name."""
+    return [f"{name}={value}"] if value.startswith("-") else [name, value]
+
+
+def flag_if(name, setting_name):
+    return flag(name, setting(setting_name)) if setting(setting_name) else []
+
+
+def path_word(path):
+    """A path that no tool takes for a flag."""
+    return os.path.join(".", path) if path.startswith("-") else path
+
+
+def stage_flags(label):
+    """Per stage what changes its result, as text for the shell."""
+    extract = flag_if("--isovalue", "ISOVALUE") or flag("--label", label)
+    extract += flag_if("--smooth", "SMOOTH")
+    for name, word in (("LARGEST", "--largest"), ("FILL", "--fill-cavities"), ("OPEN", "--open-border")):
+        extract += [word] if switched_on(name) else []
+    relax = flag("--tolerance", setting("TOLERANCE")) + ["--refine"] if setting("TOLERANCE") else []
+    relax += flag_if("--method", "METHOD")
+    simulate = flag_if("--fix", "FIX")
+    for name in ("pressure", "young", "poisson", "thickness", "density"):
+        simulate += flag_if("--" + name, name.upper())
+    if setting("KIND") == "static":
+        simulate += ["--static", *flag_if("--load-steps", "LOAD_STEPS")]
+    else:
+        simulate += flag_if("--duration", "DURATION") + flag_if("--step", "STEP")
+    words = {"extract": extract, "decimate": flag_if("--triangles", "SHELLS"), "relax": relax, "simulate": simulate}
+    return {stage: " ".join([shlex.join(words[stage]), setting(stage.upper())]).strip() for stage in words}
+
+
+def stage_commands(case, binaries, flags):
+    """Per stage its command, as text for the shell."""
+    surface, coarse, shell, picture, result, facts = (
+        os.path.join(case.folder, name)
+        for name in ("surface.ply", "coarse.ply", "shell.ply", "map.png", "result.hdf", "extract.json"))
+    words = {"extract": [path_word(case.volume), surface], "decimate": [surface, coarse],
+             "relax": [coarse, surface, shell, "--picture", picture], "simulate": [shell, result]}
+    # Whether there is a boundary to hold is known once the surface is.
+    is_closed = f"grep -q '\"closed\": *true' {shlex.quote(facts)}"
+    chosen_fix = "" if setting("FIX") else f' --fix "$(if {is_closed}; then echo rigid-motions; else echo boundary; fi)"'
+    commands = {}
+    for stage, stage_words in words.items():
+        tool = os.path.join(binaries, f"tunica-{stage}")
+        report = ["--force", "--report", os.path.join(case.folder, f"{stage}.json")]
+        fix = chosen_fix if stage == "simulate" else ""
+        commands[stage] = f"{shlex.join([tool, *stage_words, *report])}{fix} {flags[stage]}"
+    return commands
+
+
+# ------------------------------------------------------------------------------------------------ what is up to date
+
+def read_text(path):
+    try:
+        with open(path, "rb") as file:
+            return os.fsdecode(file.read())
+    except OSError:
+        return None
+
+
+def write_text(path, text):
+    with open(path, "wb") as file:
+        file.write(os.fsencode(text))
+
+
+def sha256(path):
+    digest = hashlib.sha256()
+    with open(path, "rb") as file:
+        for block in iter(lambda: file.read(1 << 20), b""):
+            digest.update(block)
+    return digest.hexdigest()
+
+
+def changed_since(entry, start_ns):
+    """Whether an input named in a report is another one than at that time. A file that was moved here keeps its age, so
+    where only its entry is younger its content decides."""
+    try:
+        info = os.stat(entry["path"])
+        if info.st_mtime_ns >= start_ns:
+            return True
+        return info.st_ctime_ns >= start_ns and sha256(entry["path"]) != entry["sha256"]
+    except IsADirectoryError:
+        return False  # the report names its files, too
+    except (OSError, KeyError, TypeError, ValueError):
+        return True
+
+
+def is_up_to_date(case, stage, remembered):
+    """Whether a stage left its files and a good report, had these flags, and read nothing that has changed since: the
+    report names all of that, data beside a header and slices of a folder too."""
+    try:
+        start_ns = os.stat(os.path.join(case.folder, f".{stage}.flags")).st_mtime_ns
+    except OSError:
+        return False
+    if not all(os.path.isfile(os.path.join(case.folder, name)) for name in PRODUCTS[stage]):
+        return False
+    report = summary.read_report(os.path.join(case.folder, f"{stage}.json"))
+    if read_text(os.path.join(case.folder, f".{stage}.flags")) != remembered or report.get("ok") is not True:
+        return False
+    inputs = report.get("inputs") or []
+    return isinstance(inputs, list) and not any(changed_since(entry, start_ns) for entry in inputs)
+
+
+def plan_case(case, binaries, dry):
+    """Writes the case's folder for cases.mk. Errors: OSError when a folder cannot be made."""
+    if not dry:
+        os.makedirs(case.folder, exist_ok=True)
+    os.makedirs(os.path.dirname(case.plan), exist_ok=True)
+    os.mkdir(case.plan)
+    os.symlink(os.path.abspath(case.folder), os.path.join(case.plan, "out"))
+    flags = stage_flags(case.label)
+    commands = stage_commands(case, binaries, flags)
+    for stage in summary.STAGES:
+        # The volume itself, which may be a folder of slices, stands here: a report names the files.
+        remembered = flags[stage] if stage != "extract" else f"{os.path.abspath(case.volume)} {flags[stage]}"
+        path = os.path.join(case.plan, f"{stage}.flags")
+        write_text(path, remembered)
+        write_text(os.path.join(case.plan, f"{stage}.command"), commands[stage])
+        if is_up_to_date(case, stage, remembered) and not (stage == "extract" and volume_changed(case)):
+            os.utime(path, (0, 0))
+
+
+def volume_changed(case):
+    """Whether the volume is younger than its extraction: a file, or a folder that slices came to or went from."""
+    start_ns = os.stat(os.path.join(case.folder, ".extract.flags")).st_mtime_ns
+    try:
+        return os.stat(case.volume).st_mtime_ns >= start_ns
+    except OSError:
+        return True
+
+
+def plan_cases(cases, run, binaries, dry):
+    """Plans all cases that are not refused, and says which are; one whose folder cannot be made is refused, too."""
+    os.symlink(os.path.abspath(binaries), os.path.join(run, "bin"))
+    used = set()
+    for case in cases:
+        if case.refused:
+            continue
+        # The name make uses is the case's own where that is harmless; shortened, since a number may follow.
+        harmless = "/".join(re.sub(r"[^A-Za-z0-9._-]|^[.-]", "_", part)[:200] for part in case.name.split("/"))
+        name, count = harmless, 1
+        while name in used or name.split("/")[0] in ("bin", "cases"):
+            count += 1
+            name = harmless.replace("/", f"_{count}/")
+        used.add(name)
+        case.plan = os.path.join(run, name)
+        try:
+            plan_case(case, binaries, dry)
+        except OSError as error:
+            shutil.rmtree(case.plan, ignore_errors=True)
+            case.refused = f"{case.folder}: cannot be written: {error.strerror}"
+    for case in cases:
+        if case.refused:
+            say(case.refused)
+    planned = [os.path.relpath(case.plan, run) for case in cases if not case.refused]
+    write_text(os.path.join(run, "cases"), "\n".join(planned))
+
+
+# ------------------------------------------------------------------------------------------------------------- the run
+
+def lock(out):
+    """Waits until no other run is at work in OUT, and lets none begin before this process and its children end."""
+    descriptor = os.open(os.path.join(out, ".lock"), os.O_RDWR | os.O_CREAT, 0o666)
+    os.set_inheritable(descriptor, True)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        say(f"another run, or what is left of one that was killed, is at work in {out}: waiting until it has ended "
+            f"('fuser {os.path.join(out, '.lock')}' names its processes)")
+        fcntl.flock(descriptor, fcntl.LOCK_EX)
+    except OSError as error:
+        if error.errno not in (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP):
+            raise
+        say(f"{out}: its file system knows no locks: no other run may work there at the same time")
+
+
+def say(text):
+    try:
+        print(f"pipeline: {text}", file=sys.stderr, flush=True)
+    except OSError:
+        pass  # words that cannot be said do not end a run
+
+
+def run_make(make, run):
+    """Lets make do what is planned, in a process group of its own: a signal that stops this process is passed on to all
+    of the group, as a terminal does, since make's own jobs would leave their commands at work. The summary comes after.
+    @return make's exit code, and the signal that stopped this process, if any"""
+    rules = os.path.join(os.path.dirname(os.path.abspath(__file__)), "cases.mk")
+    environment = dict(os.environ, TUNICA_FROM=os.getcwd())
+    child = subprocess.Popen([*shlex.split(make), "--no-print-directory", "-f", rules], cwd=run, env=environment,
+                             close_fds=False, stdin=subprocess.DEVNULL, preexec_fn=os.setpgrp)
+    stopped = []
+
+    def pass_on(number, _):
+        stopped.append(number)
+        try:
+            os.killpg(child.pid, number)
+        except ProcessLookupError:
+            pass  # all have ended
+
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, pass_on)
+    return child.wait(), stopped[0] if stopped else None
+
+
+def check_tools(binaries):
+    for stage in summary.STAGES:
+        if not os.access(os.path.join(binaries, f"tunica-{stage}"), os.X_OK):
+            raise Refused(f"{binaries}: has no tunica-{stage} that can be run: build it, or correct BIN")
+
+
+def dry_run(cases, binaries, make):
+    with tempfile.TemporaryDirectory(prefix="tunica-") as run:
+        plan_cases(cases, run, binaries, dry=True)
+        return run_make(make, run)[0]
+
+
+def real_run(cases, out, binaries, make):
+    check_tools(binaries)
+    os.makedirs(out, exist_ok=True)
+    lock(out)
+    run = os.path.join(out, ".run")
+    shutil.rmtree(run, ignore_errors=True)  # left by a run that was killed
+    os.mkdir(run)
+    plan_cases(cases, run, binaries, dry=False)
+    code, stopped = run_make(make, run)
+    failed = summary.tell(out, cases, os.path.join(binaries, "tunica-chart"))
+    shutil.rmtree(run, ignore_errors=True)
+    return 128 + stopped if stopped else code or failed
+
+
+def main():
+    arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    arguments.add_argument("--make", default="make", help="how make is called")
+    arguments.add_argument("--dry-run", action="store_true", help="write nothing")
+    options = arguments.parse_args()
+    out = path_word(os.environ.get("OUT", ""))
+    if not out.strip() or CONTROL.search(out):
+        raise Refused("OUT: has no name for the folder of the results that fits in one line")
+    binaries = path_word(os.environ.get("BIN", "").rstrip("/"))
+    cases = find_cases(out)
+    if options.dry_run:
+        return dry_run(cases, binaries, options.make)
+    return real_run(cases, out, binaries, options.make)
+
+
+if __name__ == "__main__":
+    for stream in (sys.stdout, sys.stderr):
+        if stream is not None:
+            stream.reconfigure(encoding="utf-8", errors="surrogateescape")
+    try:
+        sys.exit(main())
+    except Refused as refusal:
+        say(refusal)
+    except OSError as failure:
+        say(f"{failure.filename or 'OUT'}: {failure.strerror}")
+    except KeyboardInterrupt:
+        sys.exit(130)
+    sys.exit(2)
