@@ -34,9 +34,7 @@ Vec3 polar(const std::array<Vec3, 10>& p, const Vec3& a, const Vec3& b, const Ve
 /// The part of a patch over a triangle of its parameters, which is a cubic Bezier triangle itself. A corner that is a
 /// corner of the patch keeps its place to the bit.
 CubicPatch part_of(const CubicPatch& patch, const Domain& d) {
-  const auto at = [&](std::size_t i, std::size_t j, std::size_t k) {
-    return polar(patch.control, d[i], d[j], d[k]);
-  };
+  const auto at = [&](std::size_t i, std::size_t j, std::size_t k) { return polar(patch.control, d[i], d[j], d[k]); };
   return {{at(0, 0, 0), at(1, 1, 1), at(2, 2, 2), at(0, 0, 1), at(0, 1, 1), at(1, 1, 2), at(1, 2, 2), at(2, 2, 0),
            at(2, 0, 0), at(0, 1, 2)}};
 }
@@ -145,10 +143,14 @@ public:
       }
     }
     switch (shared) {
-      case 0: return meet(piece(one), piece(other));
-      case 1: return meet(piece(one, mine[0]), piece(other, theirs[0]));
-      case 2: return meet(beside_edge(one, 3 - mine[0] - mine[1]), beside_edge(other, 3 - theirs[0] - theirs[1]));
-      default: return false;
+      case 0:
+        return meet(piece(one), piece(other));
+      case 1:
+        return meet(piece(one, mine[0]), piece(other, theirs[0]));
+      case 2:
+        return meet(beside_edge(one, 3 - mine[0] - mine[1]), beside_edge(other, 3 - theirs[0] - theirs[1]));
+      default:
+        return false;
     }
   }
 

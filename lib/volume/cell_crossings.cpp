@@ -78,8 +78,8 @@ std::vector<std::array<Index, 2>> CellCrossings::find(const std::vector<Vec3>& p
     check_interrupt();
     std::array<std::size_t, rows.size()> first;
     for (std::size_t r = 0; r < rows.size(); ++r) {
-      first[r] = static_cast<std::size_t>(
-          std::lower_bound(cell_.begin(), cell_.end(), cell_[begin] + rows[r] - 1) - cell_.begin());
+      first[r] = static_cast<std::size_t>(std::lower_bound(cell_.begin(), cell_.end(), cell_[begin] + rows[r] - 1) -
+                                          cell_.begin());
     }
     for (std::size_t i = begin; i < end; ++i) {
       for (std::size_t r = 0; r < rows.size(); ++r) {

@@ -125,14 +125,14 @@ public:
     // Holding vertices back changes the volume, and offsetting for the volume may spoil a triangle: until neither. In
     // the end moves are only taken back, and the surface as it was has no fault.
     const CellCrossings crossings(mesh_.triangles, start_);
-    bool sound = false;
-    for (int round = 0; !sound; ++round) {
-      if (round < most_corrections) {
-        correct_volume();
-      }
-      const std::size_t held = hold_back_spoilt() + hold_back_crossing(crossings);
+    std::size_t held = 1;
+    for (int round = 0; round < most_corrections && held > 0; ++round) {
+      correct_volume();
+      held = hold_back_spoilt() + hold_back_crossing(crossings);
       result.held_back += held;
-      sound = held == 0 && !hold_back_volume();
+    }
+    while (held > 0 || hold_back_volume()) {
+      held = hold_back_spoilt() + hold_back_crossing(crossings);
     }
     for (std::size_t v = 0; v < start_.size(); ++v) {
       result.largest_move = std::max(result.largest_move, (now_[v] - start_[v]).cwiseAbs().maxCoeff());

