@@ -8,7 +8,7 @@
 #include "io/picture.hpp"
 #include "shell/boundary_distance.hpp"
 #include "shell/curved_surface.hpp"
-#include "shell/fit_cross.hpp"
+#include "shell/shell_crossings.hpp"
 #include "surface/checks.hpp"
 #include "surface/degenerate.hpp"
 #include "surface/hausdorff.hpp"
@@ -415,7 +415,13 @@ void run(cli::Tool& tool, const Arguments& given) {
                                         "creases do not allow more"
                                       : "folds, rims or creases do not allow more, or the error would be larger"));
     }
-    result["self_intersections"] = crossing_shells(relaxed.shell).size();
+    const std::size_t crossings = crossing_patches(relaxed.shell).size();
+    result["self_intersections"] = crossings;
+    if (crossings > 0) {
+      tool.warn(fmt::format(
+          "{} pair(s) of curved shells cross: more shells, or a target that does not cross itself, will part them",
+          crossings));
+    }
     result["reached"] = relaxed.reached ? Json(*relaxed.reached) : Json();
     result["stopped"] = relaxed.stopped;
     result["edges_turned"] = relaxed.flips;

@@ -14,9 +14,9 @@ ROOMS = {
     "cli": {"core", "volume", "surface", "shell", "mechanics", "io", "cli"},
 }
 
-# Marching cubes returns a mesh, and smoothing measures its volume: the volume room sees these two headers of the
-# surface room and nothing else of it, so it links it.
-SHARED_NOUNS = {"volume": {"surface/triangle_mesh.hpp", "surface/measure.hpp"}}
+# Marching cubes returns a mesh, and smoothing measures its volume and leaves no triangles that cross: the volume room
+# sees these three headers of the surface room and nothing else of it, so it links it.
+SHARED_NOUNS = {"volume": {"surface/triangle_mesh.hpp", "surface/measure.hpp", "surface/self_intersections.hpp"}}
 
 # Header pattern, what it belongs to, and which files may include it.
 OWNERS = [
