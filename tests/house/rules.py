@@ -9,9 +9,10 @@ ROOMS = {
     "volume": {"core", "volume"},
     "surface": {"core", "surface"},
     "shell": {"core", "surface", "shell"},
+    "fit": {"core", "surface", "shell", "fit"},
     "mechanics": {"core", "surface", "shell", "mechanics"},
-    "io": {"core", "volume", "surface", "shell", "mechanics", "io"},
-    "cli": {"core", "volume", "surface", "shell", "mechanics", "io", "cli"},
+    "io": {"core", "volume", "surface", "shell", "fit", "mechanics", "io"},
+    "cli": {"core", "volume", "surface", "shell", "fit", "mechanics", "io", "cli"},
 }
 
 # Marching cubes returns a mesh, and smoothing measures its volume and leaves no triangles that cross: the volume room
@@ -56,7 +57,7 @@ def _product(path):
 
 
 def order_of_rooms(path, text):
-    """core < volume; core < surface < shell < mechanics; all < io < cli < tools."""
+    """core < volume; core < surface < shell < fit; shell < mechanics; all < io < cli < tools."""
     room = _room(path)
     found = []
     if path.endswith(CODE) and _product(path):
