@@ -2,7 +2,7 @@
 """The fit against its bars: shells, certified distance, shape and seconds per target, as a table.
 
     TUNICA_BIN=build/release/bin tests/bench/fit_bench.py [--targets SCRIPT] [--data FOLDER] [--only WORD,WORD]
-        [--out docs/tables/shells.md]
+        [--flat] [--out docs/tables/shells.md]
     TUNICA_BIN=build/release/bin tests/bench/fit_bench.py --scaling docs/charts/fit-scaling.svg
 
 Targets: shapes.py beside this file; SCRIPT, which writes aneurysm_tube.ply, liver_like.ply and bumpy.ply into its working
@@ -38,7 +38,6 @@ class Case:
     angle: float = ANGLE
     threads: int = 1
     unit: tuple = ()
-    has_flat: bool = True
 
     def asked(self):
         return [f"{self.shells:,} shells" if self.is_count else f"{self.percent:g} %"]
@@ -69,7 +68,7 @@ def scripted(folder, script):
         subprocess.run([sys.executable, script.resolve()], cwd=folder, check=True, stdout=subprocess.DEVNULL)
     yield Case("open tube with a bulge", folder / "aneurysm_tube.ply", 0.1, 130)
     yield Case("smooth liver", folder / "liver_like.ply", 0.1, 330, seconds=10)
-    yield Case("bumpy ball, a million facets, two threads", folder / "bumpy.ply", 0.1, 1500, threads=2, has_flat=False)
+    yield Case("bumpy ball, a million facets, two threads", folder / "bumpy.ply", 0.1, 1500, threads=2)
     yield Case("open tube with a bulge", folder / "aneurysm_tube.ply", None, 772, is_count=True, seconds=1)
 
 
@@ -111,14 +110,14 @@ def told(value, bar, text):
     return f"{text.format(value)} (≤ {text.format(bar)})" if value <= bar else f"**{text.format(value)}** (≤ {text.format(bar)})"
 
 
-def row(case, folder):
+def row(case, folder, with_flat):
     report, seconds = run("relax", case.target, case.target, folder / "shell.ply", *case.options(), threads=case.threads)
     result = report.get("result", {})
     if not report["ok"]:
-        return f"| {case.name} | {case.asked()[0]} | **{report['error']}** | | | | | | |"
-    flat = flat_count(case, folder) if case.has_flat and not case.is_count else None
+        return f"| {case.name} | {case.asked()[0]} | **{report['error']}** |"
+    flat = flat_count(case, folder) if with_flat and not case.is_count else None
     return "| " + " | ".join([
-        case.name, *case.asked(), told(result["shells"], case.shells, "{:,}"), f"{flat:,}" if flat else "",
+        case.name, *case.asked(), told(result["shells"], case.shells, "{:,}"), *([f"{flat or 0:,}"] if with_flat else []),
         told(result["hausdorff_percent"]["upper"], case.percent, "{:.3g}"), f"{result['min_angle_deg']:.1f}°",
         f"{result['size_ratio']:.1f}", str(result["self_intersections"]), told(seconds, case.seconds, "{:.2g}")]) + " |"
 
@@ -187,9 +186,11 @@ def table(folder, given):
         print(line, flush=True)
         return line
 
-    lines = [say("| target | asked | shells | well-shaped flat triangles | certified, % of the diagonal | smallest angle |"
-                 " size ratio | crossings | processor time, s |"), say("|---|---|---|---|---|---|---|---|---|")]
-    lines += [say(row(case, folder)) for case in cases(folder, given, wanted) if wanted(case.name)]
+    flat = ["well-shaped flat triangles"] if given.flat else []
+    head = ["target", "asked", "shells", *flat, "certified, % of the diagonal", "smallest angle", "size ratio", "crossings",
+            "processor time, s"]
+    lines = [say("| " + " | ".join(head) + " |"), say("|---" * len(head) + "|")]
+    lines += [say(row(case, folder, given.flat)) for case in cases(folder, given, wanted) if wanted(case.name)]
     target = folder / "aneurysm_tube.ply"
     if target.exists() and wanted("levels"):
         lines += ["", "The open tube by `--refine` without a tolerance: every shell split in four and refitted.", "",
@@ -204,6 +205,7 @@ def main():
     parser.add_argument("--targets", type=Path)
     parser.add_argument("--data", type=Path)
     parser.add_argument("--only", default="", help="words of the targets' names, or levels")
+    parser.add_argument("--flat", action="store_true", help="also the flat triangles of 20 degrees that hold a tolerance")
     parser.add_argument("--out", type=Path)
     parser.add_argument("--folder", type=Path, help="keeps targets here")
     given = parser.parse_args()
