@@ -114,7 +114,7 @@ def row(case, folder, with_flat):
     report, seconds = run("relax", case.target, case.target, folder / "shell.ply", *case.options(), threads=case.threads)
     result = report.get("result", {})
     if not report["ok"]:
-        return f"| {case.name} | {case.asked()[0]} | **{report['error']}** |"
+        return f"| {case.name} | {case.asked()[0]} | **{report['error'].split(': ', 1)[-1]}** |"
     flat = flat_count(case, folder) if with_flat and not case.is_count else None
     return "| " + " | ".join([
         case.name, *case.asked(), told(result["shells"], case.shells, "{:,}"), *([f"{flat or 0:,}"] if with_flat else []),
