@@ -7,6 +7,7 @@
 #include "shell/boundary_distance.hpp"
 #include "shell/curved_hausdorff.hpp"
 #include "shell/refine.hpp"
+#include "shell/shell_crossings.hpp"
 #include "surface/checks.hpp"
 
 #include <fmt/core.h>
@@ -113,14 +114,15 @@ private:
         distance.boundary = between->both;
       }
     }
+    crossings_ = crossing_patches(shell);
     const bool holds = options_.tolerance && distance.upper() <= *options_.tolerance;
-    const bool held = result_.reached.value_or(false);
-    const bool is_better = result_.shell.triangles.empty() || (holds && !held) ||
-                           (holds == held && (holds ? shell.triangles.size() < result_.shell.triangles.size()
-                                                    : distance.upper() < result_.distance.upper()));
+    const auto rank = std::array{holds ? 1.0 : 0.0, crossings_.empty() ? 1.0 : 0.0,
+                                 holds ? -static_cast<double>(shell.triangles.size()) : -distance.upper()};
+    const bool is_better = result_.shell.triangles.empty() || rank > rank_;
     if (is_better) {
       result_.shell = shell;
       result_.distance = distance;
+      rank_ = rank;
       if (options_.tolerance) {
         result_.reached = holds;
       }
@@ -182,7 +184,9 @@ private:
       const ShellDistance distance = certified(mesh.shell(&patch_of));
       if (distance.upper() <= tolerance) {
         result_.stopped = "the tolerance holds";
-        return;
+        if (crossings_.empty()) {
+          return;
+        }
       }
       for (const FarPlace& place : distance.beyond_of_target) {
         samples.add({place.point});
@@ -194,8 +198,16 @@ private:
           error = std::max(error, place.distance);
         }
       }
+      for (const auto& pair : crossings_) {
+        for (const Index patch : pair) {
+          double& error = mesh.patches[patch_of[patch]].error;
+          error = std::max(error, 2 * limits_.error);  // finer ones follow the target between its walls
+        }
+      }
       if (mesh.alive >= most()) {
-        result_.stopped = "the limit of shells was reached";
+        if (!result_.reached.value_or(false)) {
+          result_.stopped = "the limit of shells was reached";
+        }
         return;
       }
       split_worst(mesh, samples, limits_, (most() - mesh.alive) / 2);
@@ -275,6 +287,8 @@ private:
   FitLimits limits_;
   int rounds_;  // of exchanges that are left
   RelaxResult result_;
+  std::array<double, 3> rank_{};                 // of the result: see certified()
+  std::vector<std::array<Index, 2>> crossings_;  // of the shells that were certified last
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
 
