@@ -35,8 +35,8 @@ struct Drawing {
   }
 };
 
-/// An independent look: both patches drawn, every triangle of one against every other. Triangles that have the node in
-/// common must meet beside it.
+/// An independent look: both patches drawn, every triangle of one against every other but for those two that
+/// have a common node.
 bool drawings_cross(const ShellMesh& shell, Index one, Index other, int level) {
   const Drawing a(shell, one, level), b(shell, other, level);
   for (std::size_t i = 0; i < a.triangles.size(); ++i) {
@@ -44,17 +44,9 @@ bool drawings_cross(const ShellMesh& shell, Index one, Index other, int level) {
       if ((a.lower[i].array() > b.upper[j].array()).any() || (b.lower[j].array() > a.upper[i].array()).any()) {
         continue;
       }
-      auto c = a.triangles[i], d = b.triangles[j];
-      const auto node = std::find_first_of(c.begin(), c.end(), d.begin(), d.end());
-      if (node == c.end()) {
-        if (triangles_cross(c, d)) {
-          return true;
-        }
-        continue;
-      }
-      std::rotate(d.begin(), std::find(d.begin(), d.end(), *node), d.end());
-      std::rotate(c.begin(), node, c.end());
-      if (triangles_cross_beside_corner(c, d)) {
+      const auto &c = a.triangles[i], &d = b.triangles[j];
+      const bool at_node = std::find_first_of(c.begin(), c.end(), d.begin(), d.end()) != c.end();
+      if (!at_node && triangles_cross(c, d)) {
         return true;
       }
     }
