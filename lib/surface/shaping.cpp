@@ -453,8 +453,8 @@ private:
         return;
       }
       weights_.angle *= 1.6;
-      weights_.most_error *= 1.6;
       weights_.error *= round < 12 ? 1.15 : 1;
+      weights_.most_error = most_large_errors * weights_.error;
       state_.set_weights(weights_);
       dirty_.assign(mesh().positions.size(), 0);
       if (round % 6 == 3 && mesh().alive + 2 * bad.size() > options_.triangles) {
