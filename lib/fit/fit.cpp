@@ -83,7 +83,7 @@ private:
       SquaresOptions squares;
       squares.shape = limits_.shape;
       squares.power = power;
-      squares.smoothing = smoothing;
+      squares.smoothing = power == mean_power ? smoothing : 0;
       const double left = least_squares_step(mesh, samples, squares);
       samples.attach(mesh);
       error = samples.measure(mesh);
@@ -303,7 +303,6 @@ ShellMesh refit(const ShellMesh& shell, const Target& target, double min_angle) 
   const FitSamples samples(target, mesh.alive, true);
   SquaresOptions squares;
   squares.shape.min_angle = min_angle;
-  squares.smoothing = smoothing;
   for (int step = 0; step < 2; ++step) {
     samples.attach(mesh);
     samples.measure(mesh);

@@ -1,8 +1,6 @@
 #include "shell/boundary_distance.hpp"
 
 #include "shell/families.hpp"
-#include "shell/fit_parts.hpp"
-#include "shell/fit_start.hpp"
 #include "shell/shell_distance.hpp"
 
 #include <gtest/gtest.h>
