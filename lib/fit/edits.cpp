@@ -708,6 +708,12 @@ std::size_t split_worst(FitMesh& mesh, const FitSamples& samples, const FitLimit
     for (std::size_t k = 0; k < 3; ++k) {
       consider(split(mesh, p.nodes[k], p.nodes[(k + 1) % 3]));
     }
+    if (!std::isfinite(trial.error)) {  // where nothing keeps its shape the error alone counts
+      anything.may_miss = std::numeric_limits<double>::infinity();
+      consider(split(mesh, p.nodes[0], p.nodes[1]));
+      consider(split(mesh, p.nodes[1], p.nodes[2]));
+      consider(split(mesh, p.nodes[2], p.nodes[0]));
+    }
     if (trial.error > limits.error && std::isfinite(trial.error)) {
       consider(widened(mesh, trial.edit));
     }

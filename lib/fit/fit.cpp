@@ -179,14 +179,18 @@ private:
   /// What the samples miss is found by a certificate, added to them, and mended; where that does not do, split.
   void make_certain(FitMesh& mesh, FitSamples& samples, double tolerance) {
     result_.stopped = "further splits bring too little";
+    std::size_t crossed = std::numeric_limits<std::size_t>::max();
     for (int i = 0; i < certificates; ++i) {
       std::vector<Index> patch_of;
       const ShellDistance distance = certified(mesh.shell(&patch_of));
       if (distance.upper() <= tolerance) {
         result_.stopped = "the tolerance holds";
-        if (crossings_.empty()) {
+        if (crossings_.empty() || crossings_.size() >= crossed) {
           return;
         }
+        crossed = crossings_.size();
+      } else {
+        crossings_.clear();  // first things first
       }
       for (const FarPlace& place : distance.beyond_of_target) {
         samples.add({place.point});

@@ -85,6 +85,7 @@ TEST(Relax, RefinesNoFurtherThanAllowed) {
 TEST(Relax, WithoutAToleranceEveryIterationSplitsAllShellsAsInThePaper) {
   const Target target(testing::cylinder(64, 20, 1, 3));
   RelaxOptions options = quick(target);
+  options.surface = Patch::comas;
   options.refine = true;
   options.max_iterations = 2;
   const RelaxResult result = relax_by_barycentre(testing::cylinder(6, 1, 1, 3), target, options);
