@@ -226,6 +226,15 @@ TEST(Start, CreasesAreCurvesOfTheTargetAndCurvatureIsNone) {
   }
 }
 
+TEST(Start, TopologyIsComponentsLoopsAndHandles) {
+  const Target target(testing::sphere(3));
+  EXPECT_TRUE(same_topology(testing::sphere(1), target));
+  EXPECT_FALSE(same_topology(shapes::torus(24, 12), target));
+  EXPECT_FALSE(same_topology(testing::cylinder(12, 4, 1, 2), target));
+  EXPECT_FALSE(
+      same_topology(shapes::together(testing::sphere(1), shapes::moved(testing::sphere(1), {5, 0, 0})), target));
+}
+
 TEST(Start, DecimationsComeNearTheErrorAskedFor) {
   TriangleMesh mesh = testing::sphere(6, 50);
   const Target target(mesh);
