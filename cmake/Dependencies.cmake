@@ -4,6 +4,7 @@ set(CGAL_DATA_DIR unused)
 find_package(CGAL 5.5 REQUIRED)
 find_package(Eigen3 3.4 REQUIRED NO_MODULE)  # CGAL puts its own, older find module first
 find_package(HDF5 1.10 REQUIRED COMPONENTS C)
+find_package(assimp 5.2 REQUIRED)
 find_package(TBB REQUIRED)
 find_package(fmt REQUIRED)
 find_package(CLI11 REQUIRED)

@@ -21,6 +21,7 @@ constexpr int placing_steps = 3;          // of least squares, then largest erro
 constexpr int largest_power = 6;          // of the residuals, where the largest counts
 constexpr int spreading_steps = 4;        // with the nodes around free: of least squares and smoothing
 constexpr double spreading = 1;           // of the stiffness: smoothing, there
+constexpr double split_may_miss = 0.1;    // of shapes: as much as keeps a corner's normal fit for a shell
 constexpr std::size_t tried_at_once = 8;  // collapses, whatever the number of threads
 constexpr double worth_it = 0.97;         // of an error or a shortfall
 
@@ -214,7 +215,7 @@ Trial tried(const FitMesh& mesh, const FitSamples& samples, const FitLimits& lim
   builder.build();
   const auto keeps_shape = [&] {
     trial.shortfall = builder.shortfall();
-    return trial.shortfall <= trial.shortfall_before + 1e-6;
+    return trial.shortfall <= trial.shortfall_before + limits.may_miss;
   };
   bool sound = keeps_shape();
   for (std::size_t i = 1; i < trial.edit.starts.size() && !sound; ++i) {
@@ -692,8 +693,9 @@ std::size_t split_worst(FitMesh& mesh, const FitSamples& samples, const FitLimit
     if (done >= count || !p.is_alive() || p.error != -error) {
       continue;
     }
-    FitLimits anything = limits;
-    anything.shape.min_angle = limits.shape.min_angle / 2;  // a half's angles may be, for the while
+    FitLimits anything = limits;  // an error outweighs shapes, which are mended afterwards
+    anything.shape.min_angle = limits.shape.min_angle / 2;
+    anything.may_miss = split_may_miss;
     Trial trial;
     trial.error = std::numeric_limits<double>::infinity();
     const auto consider = [&](Edit edit) {
@@ -705,6 +707,12 @@ std::size_t split_worst(FitMesh& mesh, const FitSamples& samples, const FitLimit
     };
     for (std::size_t k = 0; k < 3; ++k) {
       consider(split(mesh, p.nodes[k], p.nodes[(k + 1) % 3]));
+    }
+    if (!std::isfinite(trial.error)) {  // where nothing keeps its shape the error alone counts
+      anything.may_miss = std::numeric_limits<double>::infinity();
+      consider(split(mesh, p.nodes[0], p.nodes[1]));
+      consider(split(mesh, p.nodes[1], p.nodes[2]));
+      consider(split(mesh, p.nodes[2], p.nodes[0]));
     }
     if (trial.error > limits.error && std::isfinite(trial.error)) {
       consider(widened(mesh, trial.edit));

@@ -10,7 +10,8 @@ namespace tunica {
 /// What shells must keep while they are edited.
 struct FitLimits {
   ShapeLimits shape;
-  double error = 0;  ///< mm, of a patch
+  double error = 0;        ///< mm, of a patch
+  double may_miss = 1e-6;  ///< by which the shapes' shortfall may grow
 };
 
 /// Some patches in place of others, and at most one node that looks for its place. Nodes and slots are the mesh's; new

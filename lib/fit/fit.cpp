@@ -7,6 +7,7 @@
 #include "shell/boundary_distance.hpp"
 #include "shell/curved_hausdorff.hpp"
 #include "shell/refine.hpp"
+#include "shell/shell_crossings.hpp"
 #include "surface/checks.hpp"
 
 #include <fmt/core.h>
@@ -82,7 +83,7 @@ private:
       SquaresOptions squares;
       squares.shape = limits_.shape;
       squares.power = power;
-      squares.smoothing = smoothing;
+      squares.smoothing = power == mean_power ? smoothing : 0;
       const double left = least_squares_step(mesh, samples, squares);
       samples.attach(mesh);
       error = samples.measure(mesh);
@@ -113,14 +114,15 @@ private:
         distance.boundary = between->both;
       }
     }
+    crossings_ = crossing_patches(shell);
     const bool holds = options_.tolerance && distance.upper() <= *options_.tolerance;
-    const bool held = result_.reached.value_or(false);
-    const bool is_better = result_.shell.triangles.empty() || (holds && !held) ||
-                           (holds == held && (holds ? shell.triangles.size() < result_.shell.triangles.size()
-                                                    : distance.upper() < result_.distance.upper()));
+    const auto rank = std::array{holds ? 1.0 : 0.0, crossings_.empty() ? 1.0 : 0.0,
+                                 holds ? -static_cast<double>(shell.triangles.size()) : -distance.upper()};
+    const bool is_better = result_.shell.triangles.empty() || rank > rank_;
     if (is_better) {
       result_.shell = shell;
       result_.distance = distance;
+      rank_ = rank;
       if (options_.tolerance) {
         result_.reached = holds;
       }
@@ -177,12 +179,18 @@ private:
   /// What the samples miss is found by a certificate, added to them, and mended; where that does not do, split.
   void make_certain(FitMesh& mesh, FitSamples& samples, double tolerance) {
     result_.stopped = "further splits bring too little";
+    std::size_t crossed = std::numeric_limits<std::size_t>::max();
     for (int i = 0; i < certificates; ++i) {
       std::vector<Index> patch_of;
       const ShellDistance distance = certified(mesh.shell(&patch_of));
       if (distance.upper() <= tolerance) {
         result_.stopped = "the tolerance holds";
-        return;
+        if (crossings_.empty() || crossings_.size() >= crossed) {
+          return;
+        }
+        crossed = crossings_.size();
+      } else {
+        crossings_.clear();  // first things first
       }
       for (const FarPlace& place : distance.beyond_of_target) {
         samples.add({place.point});
@@ -194,8 +202,16 @@ private:
           error = std::max(error, place.distance);
         }
       }
+      for (const auto& pair : crossings_) {
+        for (const Index patch : pair) {
+          double& error = mesh.patches[patch_of[patch]].error;
+          error = std::max(error, 2 * limits_.error);  // finer ones follow the target between its walls
+        }
+      }
       if (mesh.alive >= most()) {
-        result_.stopped = "the limit of shells was reached";
+        if (!result_.reached.value_or(false)) {
+          result_.stopped = "the limit of shells was reached";
+        }
         return;
       }
       split_worst(mesh, samples, limits_, (most() - mesh.alive) / 2);
@@ -275,6 +291,8 @@ private:
   FitLimits limits_;
   int rounds_;  // of exchanges that are left
   RelaxResult result_;
+  std::array<double, 3> rank_{};                 // of the result: see certified()
+  std::vector<std::array<Index, 2>> crossings_;  // of the shells that were certified last
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
 
@@ -289,7 +307,6 @@ ShellMesh refit(const ShellMesh& shell, const Target& target, double min_angle) 
   const FitSamples samples(target, mesh.alive, true);
   SquaresOptions squares;
   squares.shape.min_angle = min_angle;
-  squares.smoothing = smoothing;
   for (int step = 0; step < 2; ++step) {
     samples.attach(mesh);
     samples.measure(mesh);

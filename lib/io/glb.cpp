@@ -1,17 +1,23 @@
-// GLB (binary glTF 2.0): the triangles of the scene shown. Materials, images, skins, animations, morphs and references
-// to other files are passed over. Source: Khronos, glTF 2.0 specification.
+// GLB (binary glTF 2.0) through assimp.
+//
+// assimp trusts what it reads, so it never sees the file itself: the scene is checked here, and what was checked (the
+// node tree, the triangles, their positions and indices) is written anew as a small GLB in memory. Materials, images,
+// skins, animations, morphs and references to other files do not reach it.
+// Source: Khronos, glTF 2.0 specification.
 #include "core/error.hpp"
 #include "core/json.hpp"
 #include "io/mesh_formats.hpp"
 
+#include <assimp/postprocess.h>
+#include <assimp/scene.h>
 #include <fmt/format.h>
 
-#include <Eigen/Geometry>
 #include <Eigen/LU>
 
+#include <assimp/Importer.hpp>
 #include <cmath>
 #include <cstring>
-#include <numeric>
+#include <map>
 
 namespace tunica {
 namespace {
@@ -29,6 +35,13 @@ std::uint32_t word_at(std::string_view bytes, std::size_t at) {
   std::uint32_t value = 0;
   std::memcpy(&value, bytes.data() + at, sizeof value);
   return value;
+}
+
+void append_word(std::string& bytes, std::size_t value) {
+  const auto word = static_cast<std::uint32_t>(value);
+  std::array<char, sizeof word> raw;
+  std::memcpy(raw.data(), &word, sizeof word);
+  bytes.append(raw.data(), raw.size());
 }
 
 struct Chunks {
@@ -70,26 +83,70 @@ Chunks split_chunks(std::string_view bytes, const std::string& name) {
   return chunks;
 }
 
-class SceneReader {
+/// The JSON with nothing in lists and objects that lie `deepest` within each other: each of a million `[` would take a
+/// hundred bytes. A callback of the parser could drop them, too, but has it look at all elements of a list after each.
+std::string shallow(std::string_view json, int deepest) {
+  std::string kept;
+  int depth = 0;
+  bool in_string = false;
+  for (std::size_t i = 0; i < json.size();) {
+    const std::size_t length = in_string && json[i] == '\\' ? 2 : 1;
+    const bool opens = !in_string && (json[i] == '[' || json[i] == '{');
+    const bool closes = !in_string && (json[i] == ']' || json[i] == '}');
+    depth += opens ? 1 : 0;
+    if (depth < deepest || (depth == deepest && (opens || closes))) {
+      kept.append(json.substr(i, length));
+    }
+    depth -= closes ? 1 : 0;
+    in_string = in_string != (json[i] == '"');
+    i += length;
+  }
+  return kept;
+}
+
+/// Checks a scene and writes it anew, reduced to triangles.
+class SceneFilter {
 public:
-  SceneReader(const Chunks& chunks, std::size_t file_bytes, const std::string& name)
+  SceneFilter(const Chunks& chunks, std::size_t file_bytes, const std::string& name)
       : binary_(chunks.binary), budget_(file_bytes), name_(name) {
-    const auto keep = [](int depth, SortedJson::parse_event_t, const SortedJson&) { return depth <= max_nesting; };
-    in_ = SortedJson::parse(chunks.json, keep, false);  // a hundred bytes of memory for each of a million `[` otherwise
+    in_ = SortedJson::parse(shallow(chunks.json, max_nesting), nullptr, false);
     if (!in_.is_object()) {
       fail("its JSON is broken");
     }
   }
 
-  TriangleMesh read() {
+  /// A GLB of what was checked.
+  std::string filtered() {
     require_no_extensions();
+    out_ = SortedJson{{"asset", {{"version", "2.0"}}}, {"scene", 0}};
+    SortedJson roots = SortedJson::array();
     for (const std::size_t root : root_nodes()) {
-      add_node(root, Eigen::Matrix4d::Identity(), 0);
+      roots.push_back(add_node(root, 0));
     }
-    if (mesh_.triangles.empty()) {
+    if (out_["meshes"].empty()) {
       fail("has no triangles");
     }
-    return std::move(mesh_);
+    out_["scenes"] = SortedJson::array({{{"nodes", roots}}});
+    // assimp wants the last item of an interleaved view to be as long as the others: zeros follow the data.
+    const std::size_t padded = (binary_.size() + max_stride + 3) / 4 * 4;
+    out_["buffers"] = SortedJson::array({{{"byteLength", padded}}});
+    std::string json = out_.dump();
+    json.resize((json.size() + 3) / 4 * 4, ' ');
+    std::string bytes = "glTF";
+    append_word(bytes, 2);
+    const std::size_t length = 12 + 8 + json.size() + 8 + padded;
+    if (length > 0xffffffff) {
+      fail("is too large for a GLB file");
+    }
+    append_word(bytes, length);
+    append_word(bytes, json.size());
+    append_word(bytes, json_chunk);
+    bytes += json;
+    append_word(bytes, padded);
+    append_word(bytes, binary_chunk);
+    bytes += binary_;
+    bytes.append(padded - binary_.size(), '\0');
+    return bytes;
   }
 
 private:
@@ -182,53 +239,58 @@ private:
     return roots;
   }
 
-  void add_node(std::size_t index, const Eigen::Matrix4d& parent, std::size_t depth) {
+  std::size_t add_node(std::size_t index, std::size_t depth) {
     const SortedJson& node = item("nodes", index);
     if (visited_[index] || depth > max_depth) {
       fail(fmt::format("its nodes are no tree (node {})", index));
     }
     visited_[index] = true;
-    const Eigen::Matrix4d placement = parent * placement_of(node);
+    SortedJson copy = SortedJson::object();
+    for (const auto& [key, length] : {std::pair{"matrix", 16}, {"translation", 3}, {"rotation", 4}, {"scale", 3}}) {
+      const auto found = node.find(key);
+      if (found != node.end()) {
+        copy[key] = checked_numbers(*found, key, static_cast<std::size_t>(length));
+      }
+    }
     if (node.contains("mesh")) {
-      add_mesh(required(node, "mesh"), placement);
+      const std::optional<std::size_t> mesh = add_mesh(required(node, "mesh"));
+      if (mesh) {
+        copy["mesh"] = *mesh;
+      }
     }
+    SortedJson children = SortedJson::array();
     for (const SortedJson& child : member(node, "children", SortedJson::value_t::array)) {
-      add_node(number_of(child), placement, depth + 1);
+      children.push_back(add_node(number_of(child), depth + 1));
     }
+    if (!children.empty()) {
+      copy["children"] = children;
+    }
+    out_["nodes"].push_back(copy);
+    return out_["nodes"].size() - 1;
   }
 
-  [[nodiscard]] Eigen::Matrix4d placement_of(const SortedJson& node) const {
-    if (node.contains("matrix")) {
-      return Eigen::Matrix4d(numbers<16>(node, "matrix", {}).data());  // by columns
-    }
-    const auto move = numbers<3>(node, "translation", {0, 0, 0});
-    const auto turn = numbers<4>(node, "rotation", {0, 0, 0, 1});
-    const auto scale = numbers<3>(node, "scale", {1, 1, 1});
-    const Eigen::Quaterniond rotation(turn[3], turn[0], turn[1], turn[2]);
-    Eigen::Affine3d placement = Eigen::Translation3d(move[0], move[1], move[2]) * rotation.normalized();
-    placement.scale(Vec3(scale[0], scale[1], scale[2]));
-    return placement.matrix();
-  }
-
-  template <std::size_t length>
-  [[nodiscard]] std::array<double, length> numbers(const SortedJson& node, const char* key,
-                                                   std::array<double, length> values) const {
-    const auto list = node.find(key);
-    if (list == node.end()) {
-      return values;
-    }
-    bool good = list->is_array() && list->size() == length;
-    for (std::size_t i = 0; i < length && good; ++i) {
-      good = (*list)[i].is_number() && std::abs((*list)[i].template get<double>()) <= 1e12;
-      values[i] = good ? (*list)[i].template get<double>() : 0;
-    }
-    if (!good) {
+  SortedJson checked_numbers(const SortedJson& list, const char* key, std::size_t length) const {
+    if (!list.is_array() || list.size() != length) {
       fail(fmt::format("\"{}\" of a node needs {} numbers", key, length));
     }
-    return values;
+    for (const SortedJson& value : list) {
+      if (!value.is_number() || !(std::abs(value.get<double>()) <= 1e12)) {
+        fail(fmt::format("\"{}\" of a node needs {} numbers", key, length));
+      }
+    }
+    return list;
   }
 
-  void add_mesh(std::size_t index, const Eigen::Matrix4d& placement) {
+  /// The number of the mesh in the output; none when it has no triangles (points, lines). Written once, paid for by
+  /// every node that shows it.
+  std::optional<std::size_t> add_mesh(std::size_t index) {
+    const auto known = meshes_.find(index);
+    if (known != meshes_.end()) {
+      spend(known->second.cost);
+      return known->second.number;
+    }
+    const std::size_t before = budget_;
+    SortedJson primitives = SortedJson::array();
     for (const SortedJson& primitive : member(item("meshes", index), "primitives", SortedJson::value_t::array)) {
       if (!primitive.is_object()) {
         fail("a primitive in its JSON is no object");
@@ -238,58 +300,46 @@ private:
       if (mode == 5 || mode == 6) {
         fail("triangle strips and fans are not understood: export plain triangles");
       }
-      if (mode == 4) {  // else points or lines
-        add_triangles(primitive, placement);
+      if (mode == 4) {
+        primitives.push_back(checked_primitive(primitive));
       }
     }
+    std::optional<std::size_t> number;
+    if (!primitives.empty()) {
+      out_["meshes"].push_back({{"primitives", primitives}});
+      number = out_["meshes"].size() - 1;
+    }
+    meshes_[index] = {number, before - budget_};
+    return number;
   }
 
-  void add_triangles(const SortedJson& primitive, const Eigen::Matrix4d& placement) {
+  SortedJson checked_primitive(const SortedJson& primitive) {
     const SortedJson& attributes = member(primitive, "attributes", SortedJson::value_t::object);
     const SortedJson& positions = item("accessors", required(attributes, "POSITION"));
     if (whole(positions, "componentType", 0) != 5126 || type_of(positions) != "VEC3") {
       fail("its positions are no vectors of floats");
     }
-    const Items points = items_of(positions, 12);
-    const std::size_t first = mesh_.vertices.size();
-    if (first + points.count > max_index) {
-      fail("has more vertices than are understood");
-    }
-    for (std::size_t i = 0; i < points.count; ++i) {
-      std::array<float, 3> p;
-      std::memcpy(p.data(), points.at(i), sizeof p);
-      mesh_.vertices.emplace_back((placement * Eigen::Vector4d(p[0], p[1], p[2], 1)).head<3>());
-    }
-    std::vector<Index> corners(points.count);
-    std::iota(corners.begin(), corners.end(), Index{0});
+    const std::size_t vertices = required(positions, "count");
+    spend(vertices);
+    const std::size_t position_accessor = add_accessor(positions, vertices, 12);
+    std::size_t corners = vertices;
+    SortedJson copy = {{"attributes", {{"POSITION", position_accessor}}}, {"mode", 4}};
     if (primitive.contains("indices")) {
-      corners = corners_of(item("accessors", required(primitive, "indices")), points.count);
-    }
-    if (corners.empty() || corners.size() % 3 != 0) {
-      fail(fmt::format("{} corners are no number of triangles", corners.size()));
-    }
-    const bool mirrored = placement.topLeftCorner<3, 3>().determinant() < 0;
-    for (std::size_t c = 0; c < corners.size(); c += 3) {
-      const auto corner = [&](std::size_t k) { return static_cast<Index>(first + corners[c + k]); };
-      mesh_.triangles.push_back({corner(0), corner(mirrored ? 2 : 1), corner(mirrored ? 1 : 2)});
-    }
-  }
-
-  std::vector<Index> corners_of(const SortedJson& indices, std::size_t vertices) {
-    const std::size_t component = whole(indices, "componentType", 0);
-    const std::size_t size = component == 5121 ? 1 : component == 5123 ? 2 : component == 5125 ? 4 : 0;
-    if (size == 0 || type_of(indices) != "SCALAR") {
-      fail("its indices are no unsigned whole numbers");
-    }
-    const Items items = items_of(indices, size);
-    std::vector<Index> corners(items.count, 0);
-    for (std::size_t i = 0; i < items.count; ++i) {
-      std::memcpy(&corners[i], items.at(i), size);
-      if (corners[i] >= vertices) {
-        fail(fmt::format("corner {} names vertex {}, but there are only {} (counted from 0)", i, corners[i], vertices));
+      const SortedJson& indices = item("accessors", required(primitive, "indices"));
+      const std::size_t component = whole(indices, "componentType", 0);
+      const std::size_t size = component == 5121 ? 1 : component == 5123 ? 2 : component == 5125 ? 4 : 0;
+      if (size == 0 || type_of(indices) != "SCALAR") {
+        fail("its indices are no unsigned whole numbers");
       }
+      corners = required(indices, "count");
+      spend(corners);
+      copy["indices"] = add_accessor(indices, corners, size);
+      check_indices(out_["accessors"].back(), corners, size, vertices);
     }
-    return corners;
+    if (corners == 0 || corners % 3 != 0) {
+      fail(fmt::format("{} corners are no number of triangles", corners));
+    }
+    return copy;
   }
 
   [[nodiscard]] static std::string type_of(const SortedJson& accessor) {
@@ -305,20 +355,11 @@ private:
     budget_ -= amount;
   }
 
-  struct Items {
-    const char* first = nullptr;
-    std::size_t count = 0;
-    std::size_t stride = 0;
-    [[nodiscard]] const char* at(std::size_t i) const { return first + i * stride; }
-  };
-
-  /// What an accessor names, when every byte of it is there.
-  Items items_of(const SortedJson& accessor, std::size_t item_bytes) {
+  /// Copies an accessor and its view when every byte it names is there.
+  std::size_t add_accessor(const SortedJson& accessor, std::size_t count, std::size_t item_bytes) {
     if (accessor.contains("sparse") || !accessor.contains("bufferView")) {
       fail("sparse accessors are not understood");
     }
-    const std::size_t count = required(accessor, "count");
-    spend(count);
     const SortedJson& view = item("bufferViews", required(accessor, "bufferView"));
     if (whole(view, "buffer", 0) != 0 || item("buffers", 0).contains("uri")) {
       fail("refers to another file: embed the buffers");
@@ -333,23 +374,109 @@ private:
       fail(fmt::format("is truncated or broken: an accessor of {} items reaches beyond its {} bytes of data", count,
                        binary_.size()));
     }
-    return {binary_.data() + view_offset + offset, count, stride};
+    SortedJson view_copy = {{"buffer", 0}, {"byteOffset", view_offset + offset}, {"byteLength", count * stride}};
+    if (stride != item_bytes) {
+      view_copy["byteStride"] = stride;
+    }
+    out_["bufferViews"].push_back(view_copy);
+    out_["accessors"].push_back({{"bufferView", out_["bufferViews"].size() - 1},
+                                 {"componentType", accessor["componentType"]},
+                                 {"count", count},
+                                 {"type", accessor["type"]}});
+    return out_["accessors"].size() - 1;
+  }
+
+  /// assimp drops triangles with a wrong index without a word.
+  void check_indices(const SortedJson& accessor, std::size_t count, std::size_t size, std::size_t vertices) const {
+    const SortedJson& view = out_["bufferViews"][accessor["bufferView"].get<std::size_t>()];
+    const std::size_t stride = view.value("byteStride", size);
+    const char* at = binary_.data() + view["byteOffset"].get<std::size_t>();
+    for (std::size_t i = 0; i < count; ++i) {
+      std::uint32_t value = 0;
+      std::memcpy(&value, at + i * stride, size);
+      if (value >= vertices) {
+        fail(fmt::format("corner {} names vertex {}, but there are only {} (counted from 0)", i, value, vertices));
+      }
+    }
   }
 
   SortedJson in_;
-  TriangleMesh mesh_;
+  SortedJson out_;
   std::string_view binary_;
   std::size_t budget_;  ///< vertices and corners that may still be read
   std::vector<bool> visited_;
+  struct Written {
+    std::optional<std::size_t> number;
+    std::size_t cost;
+  };
+  std::map<std::size_t, Written> meshes_;  ///< by their number in the file
   const std::string& name_;
 };
+
+Eigen::Matrix4d matrix_of(const aiMatrix4x4& m) {
+  Eigen::Matrix4d result;
+  result << m.a1, m.a2, m.a3, m.a4, m.b1, m.b2, m.b3, m.b4, m.c1, m.c2, m.c3, m.c4, m.d1, m.d2, m.d3, m.d4;
+  return result;
+}
+
+void append_mesh(const aiMesh& mesh, const Eigen::Matrix4d& placement, TriangleMesh& result, const std::string& name) {
+  const auto first = result.vertices.size();
+  if (first + mesh.mNumVertices > max_index) {
+    throw InputError(fmt::format("{}: has more vertices than are understood", name));
+  }
+  for (unsigned v = 0; v < mesh.mNumVertices; ++v) {
+    const aiVector3D& p = mesh.mVertices[v];
+    result.vertices.emplace_back((placement * Eigen::Vector4d(p.x, p.y, p.z, 1)).head<3>());
+  }
+  const bool mirrored = placement.topLeftCorner<3, 3>().determinant() < 0;
+  for (unsigned f = 0; f < mesh.mNumFaces; ++f) {
+    const aiFace& face = mesh.mFaces[f];
+    if (face.mNumIndices != 3) {
+      throw InputError(fmt::format("{}: face {} has {} corners, 3 are expected", name, f, face.mNumIndices));
+    }
+    std::array<Index, 3> triangle;
+    for (unsigned corner = 0; corner < 3; ++corner) {
+      if (face.mIndices[corner] >= mesh.mNumVertices) {
+        throw InputError(fmt::format("{}: face {} names vertex {}, but there are only {}", name, f,
+                                     face.mIndices[corner], mesh.mNumVertices));
+      }
+      triangle[corner] = static_cast<Index>(first + face.mIndices[corner]);
+    }
+    if (mirrored) {
+      std::swap(triangle[1], triangle[2]);
+    }
+    result.triangles.push_back(triangle);
+  }
+}
+
+void append_node(const aiScene& scene, const aiNode& node, const Eigen::Matrix4d& parent, TriangleMesh& result,
+                 const std::string& name) {
+  const Eigen::Matrix4d placement = parent * matrix_of(node.mTransformation);
+  for (unsigned m = 0; m < node.mNumMeshes; ++m) {
+    append_mesh(*scene.mMeshes[node.mMeshes[m]], placement, result, name);
+  }
+  for (unsigned c = 0; c < node.mNumChildren; ++c) {
+    append_node(scene, *node.mChildren[c], placement, result, name);
+  }
+}
 
 }  // namespace
 
 MeshFile read_glb(std::string_view bytes, const std::string& name) {
+  const std::string checked = SceneFilter(split_chunks(bytes, name), bytes.size(), name).filtered();
   MeshFile file;
   file.units.emplace("m");
-  file.mesh = SceneReader(split_chunks(bytes, name), bytes.size(), name).read();
+  Assimp::Importer importer;
+  const aiScene* scene = nullptr;
+  try {
+    scene = importer.ReadFileFromMemory(checked.data(), checked.size(), 0, "glb");
+  } catch (const std::exception& error) {
+    throw InputError(fmt::format("{}: cannot be read as GLB: {}", name, error.what()));
+  }
+  if (scene == nullptr || scene->mRootNode == nullptr) {
+    throw InputError(fmt::format("{}: cannot be read as GLB: {}", name, importer.GetErrorString()));
+  }
+  append_node(*scene, *scene->mRootNode, Eigen::Matrix4d::Identity(), file.mesh, name);
   weld_exactly(file.mesh);
   return file;
 }

@@ -23,7 +23,7 @@ constexpr std::size_t hopeless_count = 4;  // times the triangles that the error
 /// A well-shaped mesh whose error is below this share of the one allowed says that fewer triangles can do, whatever
 /// became of a mesh with fewer: errors of single counts scatter by a tenth.
 constexpr double much_below = 0.8;
-constexpr int most_attempts = 18;
+constexpr int most_attempts = 14, attempts_below = 7;
 constexpr double more_collapses = 0.1;
 /// Where more than this share of the triangles stays there is no levelling: finding the places that it should mend
 /// would take longer than all collapses.
@@ -248,10 +248,11 @@ private:
     std::size_t holds = mesh_.triangles.size() + 1;
     std::size_t looked_below = holds;
     std::size_t fewest_within = mesh_.triangles.size();
-    for (int step = 0; step < most_attempts; ++step) {
+    int attempts = most_attempts;
+    for (int step = 0; step < attempts; ++step) {
       count = std::clamp(count, fails + 1, std::max(fails + 1, holds - 1));
       found = attempt(std::min(count, mesh_.triangles.size()));
-      advance(options_.progress, 0.1 + 0.9 * (step + 1) / most_attempts);
+      advance(options_.progress, 0.1 + 0.9 * (step + 1) / attempts);
       if (found.error_kept && found.angle_held) {
         holds = std::min(count, found.mesh.triangles.size());
         best = found;
@@ -270,6 +271,7 @@ private:
       const bool done = static_cast<double>(holds) < 1.04 * static_cast<double>(fails);
       if (done && best && best->error->upper < much_below * *options_.max_error && holds < looked_below) {
         looked_below = holds;
+        attempts = step + 1 + attempts_below;
         fails = 0;
         count = grown(holds, *best->error);
       } else if (done || fails >= mesh_.triangles.size()) {

@@ -35,7 +35,8 @@ constexpr double even_rim_weight = 5;
 /// come out worse by a quarter).
 constexpr std::size_t sweep_factor = 8;
 /// An edge waits while more triangles stand around its ends: to look at all of them for each of as many edges would
-/// take the square of their number. Other edges there lessen them first; ordinary vertices have six.
+/// take the square of their number. Ordinary vertices have six, poles of globes dozens; where there are more, edges
+/// around them lessen them first, so that this sets the time alone.
 constexpr Index most_around = 256;
 /// How strongly a new vertex is held near the middle of its edge where the quadric is flat. Where few planes have met
 /// it must be weak: on a fine mesh even what looks flat is curved, and the held vertices are the first to be off.

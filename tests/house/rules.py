@@ -22,6 +22,7 @@ SHARED_NOUNS = {"volume": {"surface/triangle_mesh.hpp", "surface/measure.hpp", "
 # Header pattern, what it belongs to, and which files may include it.
 OWNERS = [
     (r"CGAL/", "CGAL", r"lib/surface/[^/]*\.cpp"),
+    (r"assimp/", "assimp", r"lib/io/[^/]*\.cpp"),
     (r"opencv2/", "OpenCV", r"lib/io/[^/]*\.cpp"),
     (r"(hdf5\.h|hdf5_hl\.h|H5\w*\.h|hdf5/)", "HDF5", r"lib/io/[^/]*\.cpp"),
     (r"toml", "toml++", r"lib/io/[^/]*\.cpp"),

@@ -132,8 +132,9 @@ class Compare(WholeTool):
             self.assertIsNone(report["seconds"]["compare"])
         # What the file states or the user said is what is doubted.
         meshes.write_obj(self.path("other.obj"), [[0.1 * x for x in v] for v in vertices], triangles)
-        self.run_tool("other.obj", "sphere.ply", "--mesh-unit", "m", code=3, says="probably cm, not m")
-        self.run_tool("other.obj", "sphere.ply", "--mesh-unit", "cm")
+        meshes.write_ply(self.path("stated.ply"), vertices, triangles, comments=["units mm"])
+        self.run_tool("other.obj", "stated.ply", "--mesh-unit", "m", code=3, says="probably cm, not m")
+        self.run_tool("other.obj", "stated.ply", "--mesh-unit", "cm")
 
     def test_sizes_that_no_unit_explains_are_compared(self):
         vertices, triangles = meshes.sphere(3, 10.0)

@@ -1,4 +1,4 @@
-#include "shell/barycentre.hpp"
+#include "fit/barycentre.hpp"
 
 #include "shell/families.hpp"
 #include "surface/measure.hpp"
@@ -164,28 +164,6 @@ TEST(Barycentre, NoTriangleFlipsOrCollapsesOnTheWay) {
     const Vec3 n = (mesh.vertices[b] - mesh.vertices[a]).cross(mesh.vertices[c] - mesh.vertices[a]);
     EXPECT_GT(n.z(), 0) << t;
   }
-}
-
-TEST(Barycentre, ATriangleStandingUprightIsTurnedAway) {
-  // Schwarz's lantern: on a cylinder a band of triangles so flat that their normals turn along the axis.
-  const TriangleMesh fine = testing::cylinder(96, 60, 1, 1);
-  const Target target(fine);
-  TriangleMesh mesh = testing::cylinder(6, 24, 1, 1);
-  const auto worst = [&] {
-    double least = 1;
-    for (const auto& [a, b, c] : mesh.triangles) {
-      const Vec3 &p = mesh.vertices[a], &q = mesh.vertices[b], &r = mesh.vertices[c];
-      const Vec3 n = (q - p).cross(r - p).normalized();
-      for (const Vec3& x : {p, q, r}) {
-        least = std::min(least, n.dot(Vec3(x.x(), x.y(), 0)));
-      }
-    }
-    return least;
-  };
-  const double before = worst();
-  EXPECT_LT(before, 0.4);
-  EXPECT_GT(flip_upright_triangles(target, mesh), 0u);
-  EXPECT_GE(worst(), before);
 }
 
 }  // namespace
