@@ -119,7 +119,7 @@ def row(case, folder, with_flat):
     return "| " + " | ".join([
         case.name, *case.asked(), told(result["shells"], case.shells, "{:,}"), *([f"{flat or 0:,}"] if with_flat else []),
         told(result["hausdorff_percent"]["upper"], case.percent, "{:.3g}"), f"{result['min_angle_deg']:.1f}°",
-        f"{result['size_ratio']:.1f}", str(result["self_intersections"]), told(seconds, case.seconds, "{:.2g}")]) + " |"
+        f"{result['size_ratio']:.1f}", str(result["self_intersections"]), told(seconds, case.seconds, "{:.3g}")]) + " |"
 
 
 def levels(target, folder):
@@ -128,7 +128,7 @@ def levels(target, folder):
     report, _ = run("relax", folder / "coarse.ply", target, folder / "levels.ply", "--refine", "--max-shells", 12800)
     for level, bar in zip(report["result"]["iterations"], (None, 1, 4)):
         yield (f"| {level['shells']:,} | {level['hausdorff_percent']['upper']:.2g} | "
-               f"{told(level['seconds'], bar, '{:.2g}')} |")
+               f"{told(level['seconds'], bar, '{:.3g}')} |")
 
 
 def scaling(folder, chart):
