@@ -26,7 +26,8 @@ ORGAN_WALL = 1.5
 SHAPED = f"{COUNT}, from 20°"  # the coarse mesh has these angles already
 WAYS = {"1 %": (25, 25), "0.3 %": (12, 12), str(COUNT): (3, 6), SHAPED: (3, 6)}
 RULE = """The rule: where nodes resolve the bending, the error of the answer is about one to three times the mean distance
-over the thickness of the wall, which the report of `tunica-relax` (`mean_distance_mm`) tells before anything is simulated.
+over the thickness of the wall, which the report of `tunica-relax` (`mean_distance_mm`) tells before anything is simulated;
+below a mean of 1 % what is left is the elements' own error, about 1 % with 800.
 Where shells are longer than a held rim's bending reaches, sqrt(radius x thickness), displacements are off by far more."""
 
 
