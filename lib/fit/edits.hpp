@@ -9,7 +9,7 @@ namespace tunica {
 
 /// What shells must keep while they are edited.
 struct FitLimits {
-  ShapeLimits shape;
+  FacetLimits shape;
   double error = 0;        ///< mm, of a patch
   double may_miss = 1e-6;  ///< by which the shapes' shortfall may grow
 };
@@ -52,9 +52,12 @@ struct Trial {
   double shortfall_before = 0;
 };
 
-/// @param steps  of least squares, at most; an error that stays far above `limits.error` ends them
+/// Places the node by some steps of least squares; an error that stays far above `limits.error` ends them.
 /// Cost: some 0.1 ms per step.
-Trial tried(const FitMesh& mesh, const FitSamples& samples, const FitLimits& limits, Edit edit, int steps);
+Trial tried(const FitMesh& mesh, const FitSamples& samples, const FitLimits& limits, Edit edit);
+
+/// What the shapes of some patches lack, as Trial::shortfall has it.
+double shortfall_of(const FitMesh& mesh, const std::vector<Index>& patches, const FacetLimits& limits);
 
 /// Does what was tried; the mesh around it must be the same still.
 void apply(FitMesh& mesh, Trial&& trial);

@@ -28,12 +28,12 @@ constexpr int mean_power = 2, largest_power = 4;  // of residuals: the mean coun
 constexpr int settling_steps = 6;
 constexpr double eased_angle = 0.5;  // of the smallest angle, while edges collapse; mended afterwards
 constexpr int mending_passes = 3;
-constexpr double smoothing = 0.1;   // of the stiffness against sliding
-constexpr int default_rounds = 12;  // of exchanges
-constexpr double fewer_by = 0.92;   // of the shells: the next count to be tried
-constexpr int certificates = 12;
-constexpr double worth_it = 0.985;         // a round that leaves more than this brings nothing
-constexpr std::size_t fewest_sampled = 8;  // shells: as few want no fewer points of the target
+constexpr double smoothing = 0.1;               // of the stiffness against sliding
+constexpr int default_rounds = 12;              // of exchanges
+constexpr double fewer_by = 0.92;               // of the shells: the next count to be tried
+constexpr int certificates = 12, patience = 4;  // of these in a row that are no better
+constexpr double worth_it = 0.985;              // a round that leaves more than this brings nothing
+constexpr std::size_t fewest_sampled = 8;       // shells: as few want no fewer points of the target
 constexpr std::array<double, 3> exchanged{1.0 / 40, 1.0 / 150, 1.0 / 15};  // of the shells, in a round
 
 class Fitting {
@@ -140,12 +140,23 @@ private:
   void to_tolerance(double tolerance) {
     limits_.error = margin * tolerance;
     const bool keep_coarse = options_.refine || !like_target_;
-    FitMesh mesh = started(keep_coarse ? coarse_ : decimation_within(target_, start_error * tolerance));
+    TriangleMesh start = keep_coarse ? coarse_ : decimation_within(target_, start_error * tolerance);
+    if (const double enough = surplus * static_cast<double>(most());
+        !keep_coarse && static_cast<double>(start.triangles.size()) > enough) {
+      start = decimation(target_, static_cast<std::size_t>(enough));
+    }
+    FitMesh mesh = started(start);
     FitSamples samples = samples_for(static_cast<double>(mesh.alive) / (keep_coarse ? 1 : 3));
     settle(mesh, samples, mean_power, 4);
     improve(mesh, samples);
-    if (!options_.refine) {
+    if (options_.refine) {
+      settle(mesh, samples, mean_power, 2);
+    } else {
       fewer(mesh, samples);
+      if (mesh.alive > most()) {
+        reduce(mesh, samples, most());
+        limits_.error = margin * tolerance;
+      }
     }
     make_certain(mesh, samples, tolerance);
   }
@@ -180,7 +191,9 @@ private:
   void make_certain(FitMesh& mesh, FitSamples& samples, double tolerance) {
     result_.stopped = "further splits bring too little";
     std::size_t crossed = std::numeric_limits<std::size_t>::max();
-    for (int i = 0; i < certificates; ++i) {
+    double closest = std::numeric_limits<double>::infinity();
+    int fruitless = 0;  // certificates in a row
+    for (int i = 0; i < certificates && fruitless < patience; ++i) {
       std::vector<Index> patch_of;
       const ShellDistance distance = certified(mesh.shell(&patch_of));
       if (distance.upper() <= tolerance) {
@@ -191,6 +204,8 @@ private:
         crossed = crossings_.size();
       } else {
         crossings_.clear();  // first things first
+        fruitless = distance.upper() < worth_it * closest ? 0 : fruitless + 1;
+        closest = std::min(closest, distance.upper());
       }
       for (const FarPlace& place : distance.beyond_of_target) {
         samples.add({place.point});
@@ -214,7 +229,7 @@ private:
         }
         return;
       }
-      split_worst(mesh, samples, limits_, (most() - mesh.alive) / 2);
+      split_worst(mesh, samples, limits_, std::min((most() - mesh.alive) / 2, mesh.alive / 4 + fewest_sampled));
       settle(mesh, samples, largest_power, 2);
       improve(mesh, samples);
     }
@@ -226,6 +241,11 @@ private:
         longest_edge * mesh.mean_edge() * std::sqrt(static_cast<double>(mesh.alive) / static_cast<double>(shells));
     limits_.error = std::numeric_limits<double>::infinity();
     collapse_edges(mesh, samples, limits_, shells, options_.progress);
+    if (mesh.alive > shells) {  // a count outweighs shapes
+      FitLimits any = limits_;
+      any.may_miss = std::numeric_limits<double>::infinity();
+      collapse_edges(mesh, samples, any, shells, options_.progress);
+    }
     limits_.error = settle(mesh, samples, largest_power, 4);
     flip_edges(mesh, samples, limits_);
     mend_shapes(mesh, samples, limits_, shells);
@@ -260,8 +280,12 @@ private:
         like_target_ ? decimation(target_, static_cast<std::size_t>(surplus * static_cast<double>(shells))) : coarse_);
     const FitSamples samples = samples_for(static_cast<double>(shells));
     settle(mesh, samples, mean_power, 3);
-    reduce(mesh, samples, shells);
-    exchange(mesh, samples, shells, 0);
+    if (mesh.alive > shells) {
+      reduce(mesh, samples, shells);
+      exchange(mesh, samples, shells, 0);
+    } else {
+      result_.stopped = "the surface has no more triangles than shells are allowed";
+    }
     certified(mesh.shell());
   }
 
@@ -271,15 +295,18 @@ private:
     limits_.error = settle(mesh, samples, mean_power, 3);
     improve(mesh, samples);
     settle(mesh, samples, mean_power, 2);
-    certified(mesh.shell());
+    ShellMesh shell = mesh.shell();
+    certified(shell);
     result_.stopped = "the limit of iterations was reached";
-    for (int level = 1; level < options_.max_iterations.value_or(max_index); ++level) {
-      if (4 * result_.shell.triangles.size() > most()) {
+    for (int level = 1; level < options_.max_iterations.value_or(std::numeric_limits<int>::max()); ++level) {
+      if (4 * shell.triangles.size() > most()) {
         result_.stopped = "the limit of shells was reached";
         break;
       }
       tunica::advance(options_.progress, 0);
-      certified(refit(result_.shell, target_, options_.min_angle));
+      shell = refit(shell, target_, options_.min_angle);
+      result_.shell = {};  // the last level is what is asked for
+      certified(shell);
     }
   }
 

@@ -32,7 +32,7 @@ double FitPiece::longest_edge(const FitPatch& p) const {
   return std::sqrt(std::max({(c[1] - c[0]).squaredNorm(), (c[2] - c[1]).squaredNorm(), (c[0] - c[2]).squaredNorm()}));
 }
 
-double shape_shortfall(const FitPiece& piece, const FitPatch& patch, const ShapeLimits& limits) {
+double shape_shortfall(const FitPiece& piece, const FitPatch& patch, const FacetLimits& limits) {
   const auto c = piece.corners(patch);
   const double angle = 1 - smallest_angle_degrees(c[0], c[1], c[2]) / limits.min_angle;
   const double agreement = 1 - normal_agreement(c, piece.corner_normals(patch)) / limits.agreement;

@@ -67,7 +67,7 @@ struct FitPiece {
 };
 
 /// What facets keep as far as the target allows.
-struct ShapeLimits {
+struct FacetLimits {
   double min_angle = 20;    ///< degrees
   double agreement = 0.3;   ///< N·n of a corner's normal and the facet's: the slope there is below 73 degrees
   double size_ratio = 2.5;  ///< of the longest edges of neighbours
@@ -76,7 +76,7 @@ struct ShapeLimits {
 
 /// Sum of squares of the parts by which a patch's facet misses its smallest angle, its agreement, its longest edge; 0
 /// when it keeps them.
-double shape_shortfall(const FitPiece& piece, const FitPatch& patch, const ShapeLimits& limits);
+double shape_shortfall(const FitPiece& piece, const FitPatch& patch, const FacetLimits& limits);
 
 /// A shell mesh under edit. Patches that are gone have no nodes; their places are used again.
 struct FitMesh : FitPiece {

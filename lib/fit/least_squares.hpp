@@ -5,7 +5,7 @@
 namespace tunica {
 
 struct SquaresOptions {
-  ShapeLimits shape;      ///< facets that keep them go on keeping them, others get no worse
+  FacetLimits shape;      ///< facets that keep them go on keeping them, others get no worse
   int power = 2;          ///< even; of the residuals in the sum that is lessened: large ones bring out the largest
   double smoothing = 0;   ///< pull of nodes towards the middle of their neighbours, within the surface
   bool positions = true;  ///< else only the normals turn

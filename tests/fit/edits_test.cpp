@@ -135,7 +135,7 @@ TEST(Edits, EveryKindKeepsAClosedOrientedManifold) {
       continue;
     }
     Trial trial = tried(ball.mesh, ball.samples, limits,
-                        v % 8 < 4 ? *std::move(edits[kind]) : widened(ball.mesh, *std::move(edits[kind])), 2);
+                        v % 8 < 4 ? *std::move(edits[kind]) : widened(ball.mesh, *std::move(edits[kind])));
     if (std::isfinite(trial.error)) {
       apply(ball.mesh, std::move(trial));
     }
