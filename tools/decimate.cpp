@@ -116,8 +116,8 @@ void warn_of_changes(const cli::Tool& tool, const fs::path& in, const DecimateRe
   }
 }
 
-// Which requirement was not met, in words; none when all were.
-std::optional<std::string> what_failed(const Arguments& given, const DecimateResult& result) {
+// Which requirement was not met, in words; none when all were. @param angle  degrees, the smallest of the mesh
+std::optional<std::string> what_failed(const Arguments& given, const DecimateResult& result, double angle) {
   const std::size_t count = result.mesh.triangles.size();
   if (!result.error_kept && result.long_spikes > 0) {
     return fmt::format(
@@ -129,7 +129,7 @@ std::optional<std::string> what_failed(const Arguments& given, const DecimateRes
     return fmt::format(
         "no mesh was found that keeps both --max-error and --min-angle ({:.3g} mm at {:.3g} degrees); "
         "allow more error or smaller angles",
-        result.error->upper, result.smallest_angle);
+        result.error->upper, angle);
   }
   if (!result.error_kept) {
     return fmt::format("the error asked for by --max-error is below what double precision can certify ({:.3g} mm)",
@@ -138,7 +138,7 @@ std::optional<std::string> what_failed(const Arguments& given, const DecimateRes
   if (!result.angle_held) {
     return fmt::format(
         "the smallest angle that could be reached{} is {:.3g} degrees; lower --min-angle or allow more {}",
-        given.max_error ? " within the error" : "", result.smallest_angle, given.max_error ? "error" : "triangles");
+        given.max_error ? " within the error" : "", angle, given.max_error ? "error" : "triangles");
   }
   if (!result.count_reached && given.max_error) {
     return fmt::format("{} triangles are the fewest found that keep --max-error; raise one of the two", count);
@@ -186,7 +186,8 @@ void run(cli::Tool& tool, const Arguments& given) {
       throw InputError(fmt::format("{}: {}", given.in.string(), error.what()));
     }
   }
-  const auto failure = what_failed(given, coarse);
+  const double angle = min_angle_degrees(coarse.mesh);
+  const auto failure = what_failed(given, coarse, angle);
 
   {
     const auto stage = tool.stage("measure");
@@ -203,13 +204,18 @@ void run(cli::Tool& tool, const Arguments& given) {
     const MeshFacts facts = examine(coarse.mesh);
     const std::size_t degenerate = count_degenerate(coarse.mesh);
     warn_of_changes(tool, given.in, coarse, degenerate);
+    if (min_angle && angle < *min_angle) {
+      tool.warn(fmt::format("the smallest angle is {:.3g} degrees, below --min-angle: {}", angle,
+                            coarse.angle_held ? "there IN's own corners are sharper" : "no better mesh was found"));
+    }
     tool.result() = {
         {"triangles_in", in.mesh.triangles.size()},
         {"triangles", coarse.mesh.triangles.size()},
         {"hausdorff_percent",
          {{"lower", 100 * distance.lower / diagonal_mm}, {"upper", 100 * distance.upper / diagonal_mm}}},
         {"hausdorff_mm", {{"lower", distance.lower}, {"upper", distance.upper}}},
-        {"min_angle_deg", min_angle_degrees(coarse.mesh)},
+        {"min_angle_deg", angle},
+        {"min_angle_held", min_angle ? Json(coarse.angle_held) : Json()},
         {"mean_quality", mean_quality(coarse.mesh)},
         {"manifold", facts.manifold && facts.oriented},
         {"euler", facts.euler},
@@ -226,9 +232,10 @@ void run(cli::Tool& tool, const Arguments& given) {
                                   {"split_vertices", repairs->split_vertices},
                                   {"cut_edges", repairs->cut_edges}};
     }
-    tool.note(fmt::format("{} of {} triangles, at most {:.4g} % ({:.4g} mm) from the input",
-                          coarse.mesh.triangles.size(), in.mesh.triangles.size(), 100 * distance.upper / diagonal_mm,
-                          distance.upper));
+    tool.note(
+        fmt::format("{} of {} triangles, at most {:.4g} % ({:.4g} mm) from the input, no angle below {:.3g} degrees",
+                    coarse.mesh.triangles.size(), in.mesh.triangles.size(), 100 * distance.upper / diagonal_mm,
+                    distance.upper, std::floor(1000 * angle) / 1000));
   }
 
   const auto stage = tool.stage("write");

@@ -1,14 +1,15 @@
 // tunica-relax COARSE TARGET OUT.ply: a coarse mesh becomes curved shells on its target, with a certified distance.
-#include "shell/relax.hpp"
 #include "cli/tool.hpp"
 #include "cli/usage.hpp"
 #include "core/quantity.hpp"
+#include "fit/fit.hpp"
 #include "io/mesh_file.hpp"
 #include "io/mesh_pair.hpp"
 #include "io/picture.hpp"
 #include "shell/boundary_distance.hpp"
 #include "shell/curved_surface.hpp"
-#include "shell/fit_cross.hpp"
+#include "shell/shell_crossings.hpp"
+#include "shell/shell_quality.hpp"
 #include "surface/checks.hpp"
 #include "surface/degenerate.hpp"
 #include "surface/hausdorff.hpp"
@@ -29,11 +30,9 @@ constexpr double interval_width = 1e-4;  // of the diagonal: what the report cer
 constexpr double rounding = 1e-9;        // of the diagonal: by which a certified interval may be wider than asked
 constexpr double curved_deviation =
     0.8e-5;  // of the diagonal; the contract of --curved, 1e-5, may be taken of either surface
-constexpr double most_for_spikes = 0.9;  // of the tolerance
-constexpr double usual_angle = 20;       // degrees
-constexpr double rounded_up = 0.9975;    // of it: what prints as less
-constexpr double most_effort = 100;
-constexpr double largest_kink = 90;                 // degrees
+constexpr double most_for_spikes = 0.9;             // of the tolerance
+constexpr double usual_angle = 20;                  // degrees
+constexpr double rounded_up = 0.9975;               // of it: what prints as less
 constexpr double least_angle = 1, most_angle = 30;  // degrees
 constexpr std::size_t map_triangles = 200'000;
 
@@ -46,7 +45,7 @@ struct Arguments {
   std::optional<std::string> mesh_unit;
   bool refine = false;
   std::optional<std::size_t> shells, max_shells;
-  std::optional<std::string> kink, min_angle, effort;
+  std::optional<std::string> min_angle;
   std::optional<int> max_iterations;
 };
 
@@ -63,36 +62,27 @@ void declare(cli::Tool& tool, Arguments& given) {
          "fit (least error: positions, normals and connectivity are chosen together; the default) or barycentre (the "
          "paper's rule: keeps COARSE's triangles)")
       ->check(CLI::IsMember({"barycentre", "fit"}));
-  app.add_option(
-         "--surface", given.surface,
-         "the patch: comas (the paper's 9-term cubic) or watertight (cubics that meet exactly); neither given: "
-         "comas, but where fit to a --tolerance finds long shells, as along cylinders, the one that takes fewer")
+  app.add_option("--surface", given.surface,
+                 "the patch: watertight (the default: cubics that meet exactly) or comas (the paper's 9-term cubic)")
       ->check(CLI::IsMember({"comas", "watertight"}));
   app.add_flag("--refine", given.refine,
-               "keep COARSE's triangles and split them where the distance is above the tolerance (without one: four "
-               "times as many); without --refine, fit looks for the fewest shells, whatever COARSE has");
+               "keep COARSE's triangles and split them where the distance is above the tolerance; without a "
+               "tolerance split every shell in four and refit, once or as --max-shells or --max-iterations say; "
+               "without --refine, fit looks for the fewest shells, whatever COARSE has");
   app.add_option("--shells", given.shells,
                  "fit: at most N shells instead of as many as COARSE has (with --tolerance: as few as it takes)")
       ->check(cli::whole_number(1))
       ->type_name("N");
   app.add_option("--max-shells", given.max_shells, "at most N shells")->check(cli::whole_number(1))->type_name("N");
   app.add_option(
-         "--kink", given.kink,
-         "fit to a --tolerance, comas: degrees by which the normals of shells that meet at a node may part where "
-         "that saves shells (default 75; 0: several normals only at creases and where facets turn too far for one)")
+         "--min-angle", given.min_angle,
+         "fit: degrees that the angles of the shells keep where the target's boundaries and creases allow it (default "
+         "20, from 1 to 30)")
       ->type_name("DEG");
   app.add_option(
-         "--min-angle", given.min_angle,
-         "fit: degrees that the angles of the shells keep where folds, rims and creases allow it (default 20; to "
-         "a --tolerance less where that saves shells: 10 or 5 along cylinders, and any where flat ones are as few)")
-      ->type_name("DEG");
-  app.add_option("--effort", given.effort,
-                 "fit to a --tolerance: how long fewer shells are looked for, times the usual (default 1; 0: a fifth "
-                 "of the time, or less, for a fifth to nine tenths more shells; at most 100)")
-      ->type_name("X");
-  app.add_option("--max-iterations", given.max_iterations,
-                 "at most N iterations (barycentre: 20, with --refine 60; fit: 8 rounds, or 1 to many shells on a "
-                 "smooth target; to a tolerance as many, and no limit of exchanges)")
+         "--max-iterations", given.max_iterations,
+         "at most N iterations (barycentre: 20, with --refine 60), rounds of the search (fit: 12) or levels (fit with "
+         "--refine and no tolerance: 2, the first is COARSE's own)")
       ->check(cli::whole_number(1, 100000))
       ->type_name("N");
   app.add_option("--map", given.map, "error map: the curved surface with its distance to the target, PLY")
@@ -115,17 +105,12 @@ void refuse_contradictions(const Arguments& given) {
   if (given.max_shells && !given.refine && !(fit && given.tolerance)) {
     throw UsageError("--max-shells limits --refine, or a fit to a --tolerance; else the number of shells is given");
   }
-  if (given.kink && (!fit || !given.tolerance || given.refine || given.surface == "watertight")) {
-    throw UsageError("--kink belongs to --method fit with --tolerance, without --refine, and comas patches");
-  }
-  if (given.effort && (!fit || !given.tolerance || given.refine)) {
-    throw UsageError("--effort belongs to --method fit with --tolerance, without --refine");
-  }
   if (given.min_angle && !fit) {
     throw UsageError("--min-angle belongs to --method fit");
   }
-  if (given.refine && !given.tolerance && !given.max_shells && !given.max_iterations) {
-    throw UsageError("--refine needs to know where to end: --tolerance, --max-shells or --max-iterations");
+  if (given.refine && !fit && !given.tolerance && !given.max_shells && !given.max_iterations) {
+    throw UsageError(
+        "--method barycentre --refine needs to know where to end: --tolerance, --max-shells or --max-iterations");
   }
 }
 
@@ -268,213 +253,258 @@ void write_maps(cli::Tool& tool, const Arguments& given, const ShellMesh& shell,
   }
 }
 
-void run(cli::Tool& tool, const Arguments& given) {
-  refuse_contradictions(given);
-  const auto largest_part = degrees("--kink", given.kink, 0, largest_kink);
-  const auto min_angle = degrees("--min-angle", given.min_angle, least_angle, most_angle);
-  std::optional<double> effort;
-  if (given.effort) {
-    effort = parse_number(*given.effort);
-    if (!effort || !(*effort >= 0 && *effort <= most_effort)) {
-      throw UsageError(fmt::format("--effort: '{}' is not a number from 0 to {:.0f}", *given.effort, most_effort));
-    }
+/// One run: read, relax, measure, write.
+class Run {
+public:
+  Run(cli::Tool& tool, const Arguments& given) : tool_(tool), given_(given), fits_(given.method == "fit") {}
+
+  void operator()() {
+    refuse_contradictions(given_);
+    min_angle_ = degrees("--min-angle", given_.min_angle, least_angle, most_angle);
+    name_outputs();
+    read();
+    relax();
+    measure();
+    write();
   }
-  tool.output(given.out, {".ply"});
-  for (const auto& [path, ending] : {std::pair(given.map, ".ply"), {given.picture, ".png"}, {given.curved, ".ply"}}) {
-    if (path) {
-      tool.output(*path, {ending});
+
+private:
+  void name_outputs() {
+    tool_.output(given_.out, {".ply"});
+    for (const auto& [path, ending] :
+         {std::pair(given_.map, ".ply"), {given_.picture, ".png"}, {given_.curved, ".ply"}}) {
+      if (path) {
+        tool_.output(*path, {ending});
+      }
     }
   }
 
-  std::optional<double> unit_mm;
-  if (given.mesh_unit) {
-    unit_mm = parse_length_unit(*given.mesh_unit);
-  }
-  TriangleMesh coarse;
-  std::optional<Target> target, with_spikes;
-  double moved = 0;  // of the target, mm: by taking its spikes
-  PlyOptions ply;
-  {
-    const auto stage = tool.stage("read");
-    Surface start = read_surface(tool, tool.input(given.coarse), unit_mm);
-    tool.input(given.target);
-    Surface surface = given.coarse == given.target ? start : read_surface(tool, given.target, unit_mm);
-    require_same_scale(start.file, given.coarse, surface.file, given.target, unit_mm);
-    require_near(start.file, given.coarse, surface.file, given.target);
-    ply = ply_options(tool, common_space(start.file, given.coarse, surface.file, given.target));
-    coarse = std::move(start.file.mesh);
-    target.emplace(std::move(surface.file.mesh));
+  void read() {
+    const auto stage = tool_.stage("read");
+    std::optional<double> unit_mm;
+    if (given_.mesh_unit) {
+      unit_mm = parse_length_unit(*given_.mesh_unit);
+    }
+    Surface start = read_surface(tool_, tool_.input(given_.coarse), unit_mm);
+    tool_.input(given_.target);
+    Surface surface = given_.coarse == given_.target ? start : read_surface(tool_, given_.target, unit_mm);
+    require_same_scale(start.file, given_.coarse, surface.file, given_.target, unit_mm);
+    require_near(start.file, given_.coarse, surface.file, given_.target);
+    ply_ = ply_options(tool_, common_space(start.file, given_.coarse, surface.file, given_.target));
+    coarse_ = std::move(start.file.mesh);
+    target_.emplace(std::move(surface.file.mesh));
     if (surface.with_spikes) {
-      with_spikes.emplace(*std::move(surface.with_spikes));
-      moved = surface.moved;
+      with_spikes_.emplace(*std::move(surface.with_spikes));
+      moved_ = surface.moved;
     }
     if (start.facts.boundary_loops != surface.facts.boundary_loops) {
-      surface.facts.boundary_loops -= target->point_loops();  // decimation closes them
+      surface.facts.boundary_loops -= target_->point_loops();  // decimation closes them
     }
-    warn_of_mismatch(tool, start.facts, surface.facts);
-  }
-  const Target& whole = with_spikes ? *with_spikes : *target;  // what distances are to
-  const double diagonal = whole.diagonal();
-  const double percent = 100 / diagonal;
-
-  const auto keep_partial = [&](const ShellMesh& shell) {
-    PlyOptions partial = ply;
-    partial.partial = true;
-    partial.overwrite = true;
-    write_ply(given.out, shell, partial);
-  };
-  ShellMesh best;
-  std::optional<double> tolerance;  // mm
-  RelaxOptions options;
-  options.method = given.method == "fit" ? RelaxMethod::fit : RelaxMethod::barycentre;
-  options.surface = given.surface == "watertight" ? Patch::watertight : Patch::comas;
-  options.either_surface = !given.surface && !given.kink;
-  options.refine = given.refine;
-  options.shells = given.shells;
-  options.max_shells = given.max_shells;
-  options.max_iterations = given.max_iterations;
-  options.kink = largest_part.value_or(options.kink);
-  options.effort = effort.value_or(options.effort);
-  options.min_angle = min_angle;
-  options.width = interval_width * diagonal;
-  options.progress = tool.progress("relax");
-  if (given.tolerance) {
-    tolerance = given.tolerance->millimetres(diagonal);
-    options.tolerance = moved < most_for_spikes * *tolerance ? *tolerance - moved : *tolerance;
-  }
-  options.on_iteration = [&](const RelaxIteration& iteration, const ShellMesh& so_far) {
-    best = so_far;
-    tool.detail(
-        fmt::format("{} shells: {:.4f} to {:.4f} %; nodes by the rule {}, to the closest point {}, on the boundary {}, "
-                    "held back {}; {:.2f} s",
-                    iteration.shells, percent * iteration.hausdorff.lower, percent * iteration.hausdorff.upper,
-                    iteration.moves.by_rule, iteration.moves.to_closest_point, iteration.moves.on_boundary,
-                    iteration.moves.shortened, iteration.seconds));
-  };
-  RelaxResult relaxed;
-  try {
-    const auto stage = tool.stage("relax");
-    relaxed = relax(coarse, *target, options);
-  } catch (const Interrupted&) {
-    if (!best.triangles.empty()) {
-      keep_partial(best);
-      tool.warn(
-          fmt::format("the best mesh so far, {} shells, is in {}.part", best.triangles.size(), given.out.string()));
+    warn_of_mismatch(tool_, start.facts, surface.facts);
+    if (faces_other_way(coarse_, *target_)) {
+      coarse_ = turned_around(std::move(coarse_));
+      tool_.warn("COARSE faces the other way than TARGET; its triangles were turned around");
     }
-    throw;
-  } catch (const InputError& error) {
-    throw InputError(given.coarse.string() + ": " + error.what());
-  }
-  if (relaxed.turned_around) {
-    tool.warn("COARSE faces the other way than TARGET; its triangles were turned around");
+    if (fits_ && given_.tolerance && !given_.refine && given_.coarse != given_.target) {
+      tool_.note(
+          "COARSE's triangles are not kept: the fewest shells for the tolerance are looked for (--refine keeps them)");
+    }
   }
 
-  ShellDistance distance;
-  {
-    const auto stage = tool.stage("measure");
+  /// What distances are to: the target with its spikes.
+  [[nodiscard]] const Target& whole() const { return with_spikes_ ? *with_spikes_ : *target_; }
+  [[nodiscard]] double percent() const { return 100 / whole().diagonal(); }
+
+  [[nodiscard]] FitOptions options() {
+    FitOptions out;
+    out.surface = given_.surface == "comas" ? Patch::comas : Patch::watertight;
+    out.refine = given_.refine;
+    out.shells = given_.shells;
+    out.max_shells = given_.max_shells;
+    out.max_iterations = given_.max_iterations;
+    if (given_.refine && !given_.tolerance && !given_.max_shells && !given_.max_iterations) {
+      out.max_iterations = 2;
+    }
+    out.min_angle = min_angle_.value_or(usual_angle);
+    out.width = interval_width * whole().diagonal();
+    out.progress = tool_.progress("relax");
+    if (given_.tolerance) {
+      tolerance_ = given_.tolerance->millimetres(whole().diagonal());
+      out.tolerance = moved_ < most_for_spikes * *tolerance_ ? *tolerance_ - moved_ : *tolerance_;
+    }
+    out.on_iteration = [this](const RelaxIteration& iteration, const ShellMesh& so_far) {
+      best_ = so_far;
+      tool_.detail(fmt::format(
+          "{} shells: {:.4f} to {:.4f} %; nodes by the rule {}, to the closest point {}, on the boundary {}, held back "
+          "{}; {:.2f} s",
+          iteration.shells, percent() * iteration.hausdorff.lower, percent() * iteration.hausdorff.upper,
+          iteration.moves.by_rule, iteration.moves.to_closest_point, iteration.moves.on_boundary,
+          iteration.moves.shortened, iteration.seconds));
+    };
+    return out;
+  }
+
+  void relax() {
+    const FitOptions how = options();
+    const auto stage = tool_.stage("relax");
+    try {
+      relaxed_ = fits_ ? fit(coarse_, *target_, how) : relax_by_barycentre(coarse_, *target_, how);
+    } catch (const Interrupted&) {
+      if (!best_.triangles.empty()) {
+        keep_partial(best_);
+        tool_.warn(
+            fmt::format("the best mesh so far, {} shells, is in {}.part", best_.triangles.size(), given_.out.string()));
+      }
+      throw;
+    } catch (const InputError& error) {
+      throw InputError(given_.coarse.string() + ": " + error.what());
+    }
+  }
+
+  void measure() {
+    const auto stage = tool_.stage("measure");
     ShellDistanceOptions measuring;
-    measuring.width = interval_width * diagonal;
-    if (tolerance) {
-      measuring.width = std::min(measuring.width, *tolerance / 20);
+    measuring.width = interval_width * whole().diagonal();
+    if (tolerance_) {
+      measuring.width = std::min(measuring.width, *tolerance_ / 20);
     }
-    const ShellDistance flat = flat_distance(relaxed.shell, whole, measuring);
-    measuring.progress = tool.progress("measure");
-    distance = certified_distance(relaxed, whole, moved, measuring);
-    const double farthest = relaxed.distance.boundary ? distance.upper() : distance.both.upper;
-    if (moved > 0 && relaxed.reached && farthest > *tolerance) {
-      relaxed.reached = false;
-      relaxed.stopped = "no shells reach the target's spikes without area";
+    const ShellDistance flat = flat_distance(relaxed_.shell, whole(), measuring);
+    measuring.progress = tool_.progress("measure");
+    distance_ = certified_distance(relaxed_, whole(), moved_, measuring);
+    const double farthest = relaxed_.distance.boundary ? distance_.upper() : distance_.both.upper;
+    if (moved_ > 0 && relaxed_.reached && farthest > *tolerance_) {
+      relaxed_.reached = false;
+      relaxed_.stopped = "no shells reach the target's spikes without area";
     }
-
-    Json& result = tool.result();
-    result["shells"] = relaxed.shell.triangles.size();
-    result["hausdorff_mm"] = interval(distance.both, 1);
-    result["hausdorff_percent"] = interval(distance.both, percent);
-    result["one_sided_percent"] = {{"shell_to_target", interval(distance.shell_to_target, percent)},
-                                   {"target_to_shell", interval(distance.target_to_shell, percent)}};
-    result["boundary_percent"] = distance.boundary ? interval(*distance.boundary, percent) : Json();
-    result["mean_percent"] = distance.mean * percent;
-    result["rms_percent"] = distance.rms * percent;
-    result["flat_hausdorff_percent"] = interval(flat.both, percent);
+    Json& result = tool_.result();
+    result["shells"] = relaxed_.shell.triangles.size();
+    result["hausdorff_mm"] = interval(distance_.both, 1);
+    result["hausdorff_percent"] = interval(distance_.both, percent());
+    result["one_sided_percent"] = {{"shell_to_target", interval(distance_.shell_to_target, percent())},
+                                   {"target_to_shell", interval(distance_.target_to_shell, percent())}};
+    result["boundary_percent"] = distance_.boundary ? interval(*distance_.boundary, percent()) : Json();
+    result["mean_percent"] = distance_.mean * percent();
+    result["rms_percent"] = distance_.rms * percent();
+    result["flat_hausdorff_percent"] = interval(flat.both, percent());
     result["iterations"] = Json::array();
-    for (const RelaxIteration& iteration : relaxed.iterations) {
+    for (const RelaxIteration& iteration : relaxed_.iterations) {
       result["iterations"].push_back({{"shells", iteration.shells},
-                                      {"hausdorff_percent", interval(iteration.hausdorff, percent)},
+                                      {"hausdorff_percent", interval(iteration.hausdorff, percent())},
                                       {"seconds", iteration.seconds}});
     }
-    const double angle = min_angle_degrees(flat_facets(relaxed.shell));
-    result["min_angle_deg"] = angle;
-    if (options.min_angle && angle < *options.min_angle) {
-      tool.warn(fmt::format(
-          "the smallest angle is {:.3g} degrees: folds, rims or creases do not allow {:.3g} everywhere, or the error "
-          "would be larger",
-          angle, *options.min_angle));
-    } else if (options.method == RelaxMethod::fit && !options.min_angle && angle < rounded_up * usual_angle) {
-      tool.warn(fmt::format("the smallest angle is {:.3g} degrees, below the usual {:.0f}: {}", angle, usual_angle,
-                            tolerance ? "so it takes fewer shells (--min-angle says otherwise), or folds, rims or "
-                                        "creases do not allow more"
-                                      : "folds, rims or creases do not allow more, or the error would be larger"));
-    }
-    result["self_intersections"] = crossing_shells(relaxed.shell).size();
-    result["reached"] = relaxed.reached ? Json(*relaxed.reached) : Json();
-    result["stopped"] = relaxed.stopped;
-    result["edges_turned"] = relaxed.flips;
-    result["diagonal_mm"] = diagonal;
+    result["reached"] = relaxed_.reached ? Json(*relaxed_.reached) : Json();
+    result["stopped"] = relaxed_.stopped;
+    result["diagonal_mm"] = whole().diagonal();
+    measure_shapes();
+    tool_.note(fmt::format("{} shells, two-sided distance {:.4f} to {:.4f} % of the diagonal: {}",
+                           relaxed_.shell.triangles.size(), percent() * distance_.both.lower,
+                           percent() * distance_.both.upper, relaxed_.stopped));
   }
-  tool.note(fmt::format("{} shells, two-sided distance {:.4f} to {:.4f} % of the diagonal: {}",
-                        relaxed.shell.triangles.size(), percent * distance.both.lower, percent * distance.both.upper,
-                        relaxed.stopped));
 
-  const auto stage = tool.stage("write");
-  const auto most = given.shells ? given.shells : given.max_shells;
-  if (most && relaxed.shell.triangles.size() > *most) {
-    keep_partial(relaxed.shell);
-    throw RequirementError(
-        fmt::format("{}: {} shells are the fewest found that keep its pieces, holes and handles without folds, {} are "
-                    "allowed; the best mesh is in {}.part",
-                    given.target.string(), relaxed.shell.triangles.size(), *most, given.out.string()));
-  }
-  if (tolerance && !*relaxed.reached) {
-    keep_partial(relaxed.shell);
-    throw RequirementError(fmt::format(
-        "{}: the tolerance of {:.4g} % is not reached: {:.4g} %{} with {} shells ({}); the best mesh is {}.part. {}",
-        given.out.string(), percent * *tolerance, percent * distance.both.upper,
-        distance.boundary && options.method == RelaxMethod::fit
-            ? fmt::format(", {:.4g} % of the boundaries", percent * distance.boundary->upper)
-            : "",
-        relaxed.shell.triangles.size(), relaxed.stopped, given.out.string(),
-        options.method == RelaxMethod::fit ? "Allow more shells or iterations, or a wider tolerance"
-        : given.refine                     ? "Allow more shells or iterations"
-                                           : "Add --refine, or take a coarse mesh with more triangles"));
-  }
-  if (const std::size_t without_area = count_without_area(relaxed.shell); without_area > 0) {
-    keep_partial(relaxed.shell);
-    throw RequirementError(
-        fmt::format("{}: {} shell(s) have no area, as the surface has none there; the best mesh is "
-                    "{}.part. Make the surface anew, or take such parts away first",
-                    given.out.string(), without_area, given.out.string()));
-  }
-  require_fit(relaxed.shell, given.out.string());
-  std::vector<fs::path> written;
-  try {
-    write_ply(given.out, relaxed.shell, ply);
-    written.push_back(given.out);
-    if (given.curved) {
-      write_ply(*given.curved, tessellate(relaxed.shell, curved_deviation * diagonal).mesh, ply);
-      written.push_back(*given.curved);
+  void measure_shapes() {
+    Json& result = tool_.result();
+    const double angle = min_angle_degrees(flat_facets(relaxed_.shell));
+    result["min_angle_deg"] = angle;
+    if (const double wanted = min_angle_.value_or(usual_angle); fits_ && angle < rounded_up * wanted) {
+      tool_.warn(fmt::format(
+          "the smallest angle is {:.3g} degrees, below {:.3g}: boundaries or creases do not allow more, or the error "
+          "would be larger",
+          angle, wanted));
     }
-    if (given.map || given.picture) {
-      write_maps(tool, given, relaxed.shell, whole, distance, ply, written);
+    const std::size_t crossings = crossing_patches(relaxed_.shell).size();
+    result["self_intersections"] = crossings;
+    if (crossings > 0) {
+      tool_.warn(fmt::format(
+          "{} pair(s) of curved shells cross: more shells, or a target that does not cross itself, will part them",
+          crossings));
     }
-  } catch (...) {
-    // Of a run that failed nothing looks finished.
-    for (const fs::path& path : written) {
-      std::error_code ignored;
-      fs::remove(path, ignored);
-    }
-    throw;
+    const ShellQuality quality = shell_quality(relaxed_.shell, whole());
+    result["mean_distance_mm"] = quality.mean_distance;
+    result["normal_error_deg"] = {{"mean", quality.mean_normal_error}, {"max", quality.max_normal_error}};
+    result["gap_mm"] = quality.gap;
+    result["size_ratio"] = quality.size_ratio;
   }
-}
+
+  void keep_partial(const ShellMesh& shell) const {
+    PlyOptions partial = ply_;
+    partial.partial = true;
+    partial.overwrite = true;
+    write_ply(given_.out, shell, partial);
+  }
+
+  /// Keeps the mesh as the best there is, and fails.
+  [[noreturn]] void fail(const std::string& message) const {
+    keep_partial(relaxed_.shell);
+    throw RequirementError(message);
+  }
+
+  void require_what_was_asked() const {
+    const std::string out = given_.out.string();
+    const auto most = given_.shells ? given_.shells : given_.max_shells;
+    if (most && relaxed_.shell.triangles.size() > *most) {
+      fail(
+          fmt::format("{}: {} shells are the fewest found that keep its pieces, holes and handles without folds, {} "
+                      "are allowed; the best mesh is in {}.part",
+                      given_.target.string(), relaxed_.shell.triangles.size(), *most, out));
+    }
+    if (tolerance_ && !*relaxed_.reached) {
+      fail(fmt::format(
+          "{}: the tolerance of {:.4g} % is not reached: {:.4g} %{} with {} shells ({}); the best mesh is {}.part. {}",
+          out, percent() * *tolerance_, percent() * distance_.both.upper,
+          distance_.boundary && fits_
+              ? fmt::format(", {:.4g} % of the boundaries", percent() * distance_.boundary->upper)
+              : "",
+          relaxed_.shell.triangles.size(), relaxed_.stopped, out,
+          fits_           ? "Allow more shells or iterations, or a wider tolerance"
+          : given_.refine ? "Allow more shells or iterations"
+                          : "Add --refine, or take a coarse mesh with more triangles"));
+    }
+    if (const std::size_t without_area = count_without_area(relaxed_.shell); without_area > 0) {
+      fail(
+          fmt::format("{}: {} shell(s) have no area, as the surface has none there; the best mesh is {}.part. Make "
+                      "the surface anew, or take such parts away first",
+                      out, without_area, out));
+    }
+    require_fit(relaxed_.shell, out);
+  }
+
+  void write() {
+    const auto stage = tool_.stage("write");
+    require_what_was_asked();
+    std::vector<fs::path> written;
+    try {
+      write_ply(given_.out, relaxed_.shell, ply_);
+      written.push_back(given_.out);
+      if (given_.curved) {
+        write_ply(*given_.curved, tessellate(relaxed_.shell, curved_deviation * whole().diagonal()).mesh, ply_);
+        written.push_back(*given_.curved);
+      }
+      if (given_.map || given_.picture) {
+        write_maps(tool_, given_, relaxed_.shell, whole(), distance_, ply_, written);
+      }
+    } catch (...) {
+      // Of a run that failed nothing looks finished.
+      for (const fs::path& path : written) {
+        std::error_code ignored;
+        fs::remove(path, ignored);
+      }
+      throw;
+    }
+  }
+
+  cli::Tool& tool_;
+  const Arguments& given_;
+  bool fits_;
+  std::optional<double> min_angle_;  // degrees
+  TriangleMesh coarse_;
+  std::optional<Target> target_, with_spikes_;
+  double moved_ = 0;  // of the target, mm: by taking its spikes
+  PlyOptions ply_;
+  std::optional<double> tolerance_;  // mm
+  ShellMesh best_;
+  RelaxResult relaxed_;
+  ShellDistance distance_;
+};
 
 }  // namespace
 
@@ -485,9 +515,9 @@ int main(int argc, char** argv) {
       "to the target, both ways.",
       "tunica-relax coarse.ply surface.ply shell.ply --tolerance 1% --refine --picture map.png --report relax.json\n"
       "tunica-relax coarse.ply surface.ply paper.ply --method barycentre --max-iterations 5\n"
-      "tunica-relax coarse.ply surface.ply quick.ply --shells 200");
+      "tunica-relax surface.ply surface.ply fewest.ply --tolerance 1%");
   Arguments given;
   declare(tool, given);
   tool.stages({"read", "relax", "measure", "write"});
-  return tool.run(argc, argv, [&] { run(tool, given); });
+  return tool.run(argc, argv, [&] { Run(tool, given)(); });
 }

@@ -28,18 +28,4 @@ std::optional<Vec3> compatible_normal(const Vec3& wanted, std::span<const Vec3> 
 /// @return the nodes whose facets fold so sharply that no normal is compatible; they keep their facets' mean
 std::vector<Index> take_normals_from(const Target& target, ShellMesh& shell);
 
-struct NormalFit {
-  int sweeps = 0;
-  double largest_before = 0;  ///< largest sampled distance, either way, mm
-  double largest_after = 0;
-};
-
-/// Turns the nodal normals, and only these, so that the curved surface comes closer to the target: node by node a
-/// Gauss-Newton step on the fourth, then the eighth powers of the distances of samples of both surfaces, for the
-/// largest distance is what counts; nodes with large distances also try the normals of the facets around. A turn is
-/// taken only when the distances around the node get less. Normals stay compatible with their facets. Limits: positions
-/// stay; where a facet spans a crease of the target the patch cannot follow it. Cost: per sweep about 100 closest-point
-/// queries per node. The result does not depend on the number of threads.
-NormalFit fit_normals(const Target& target, ShellMesh& shell);
-
 }  // namespace tunica

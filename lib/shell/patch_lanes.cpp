@@ -12,6 +12,15 @@ constexpr double arrival = 1e-6;    // in a patch's parameters: a step to the fo
 Lanes dot(const LaneVec3& a, const LaneVec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 Lanes dot(const LaneVec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
+/// Of places side by side, as in PatchAxes.
+double dot(const Lanes& a, const Lanes& b) { return stdx::reduce(a * b); }
+
+Vec2 inside(Vec2 b) {
+  b = b.cwiseMax(0);
+  const double sum = b[0] + b[1];
+  return sum > 1 ? Vec2(b / sum) : b;
+}
+
 LaneVec3 minus(const LaneVec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
 
 /// Into the triangle.
@@ -92,6 +101,58 @@ std::array<Lanes, 3> PatchAxes::second_derivatives(const Vec2& b) const {
   const double x = b[0], y = b[1];
   return {2.0 * (c_[3] + (3 * x) * c_[6] + y * c_[7]), c_[4] + 2.0 * (x * c_[7] + y * c_[8]),
           2.0 * (c_[5] + (3 * y) * c_[9] + x * c_[8])};
+}
+
+PatchFoot foot_on_patch(const PatchAxes& patch, const Vec3& q, Vec2 start, int most) {
+  const Lanes wanted = lanes_of([&](std::size_t k) { return k < 3 ? q[static_cast<Eigen::Index>(k)] : 0.0; });
+  Vec2 at = start;
+  Lanes point = patch.point(at);
+  Lanes r = wanted - point;
+  double least = dot(r, r);
+  for (int i = 0; i < most; ++i) {
+    const auto d = patch.tangents(at);
+    double a = dot(d[0], d[0]), b = dot(d[0], d[1]), e = dot(d[1], d[1]);
+    const double f = dot(d[0], r), g = dot(d[1], r);
+    if (i >= steps) {
+      // What is left after these is the curvature's doing.
+      const auto h = patch.second_derivatives(at);
+      const double a2 = a - dot(h[0], r), b2 = b - dot(h[1], r), e2 = e - dot(h[2], r);
+      if (a2 > 0 && a2 * e2 - b2 * b2 > 1e-3 * (a * e - b * b)) {
+        a = a2;
+        b = b2;
+        e = e2;
+      }
+    }
+    const double det = a * e - b * b;
+    if (!(det > 1e-14 * a * e)) {
+      break;
+    }
+    Vec2 next = at + Vec2((e * f - b * g) / det, (a * g - b * f) / det);
+    if (next[0] < 0 || next[1] < 0 || next[0] + next[1] > 1) {
+      // Along the border that is crossed the step is taken anew.
+      next = inside(next);
+      const Vec2 along = next[0] <= 0 ? Vec2(0, 1) : next[1] <= 0 ? Vec2(1, 0) : Vec2(-1, 1);
+      const auto dn = patch.tangents(next);
+      const Lanes tangent = along[0] * dn[0] + along[1] * dn[1];
+      next =
+          inside(next + along * (dot(tangent, wanted - patch.point(next)) / std::max(dot(tangent, tangent), 1e-300)));
+    }
+    const Lanes p = patch.point(next);
+    const Lanes rest = wanted - p;
+    const double squared = dot(rest, rest);
+    if (squared >= least) {
+      break;
+    }
+    const bool arrived = (next - at).squaredNorm() < arrival * arrival;
+    at = next;
+    point = p;
+    r = rest;
+    least = squared;
+    if (arrived) {
+      break;
+    }
+  }
+  return {at, Vec3(point[0], point[1], point[2]), least};
 }
 
 LaneFeet feet_on_patch(const PatchPowers& patch, const LaneVec3& q) {

@@ -41,6 +41,17 @@ private:
   std::array<Lanes, 10> c_;  // of the powers as in PatchPowers
 };
 
+/// A point of a patch near a given one.
+struct PatchFoot {
+  Vec2 at;
+  Vec3 point;
+  double squared_distance;
+};
+
+/// The point of a patch closest to q, nearly: from a start by at most so many Gauss-Newton steps, Newton's from the
+/// third on.
+PatchFoot foot_on_patch(const PatchAxes& patch, const Vec3& q, Vec2 start, int most);
+
 /// Nearly the points of a patch closest to q: foot_on_patch() for several.
 struct LaneFeet {
   Lanes x, y;

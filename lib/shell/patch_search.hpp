@@ -1,7 +1,7 @@
 #pragma once
 
 #include "shell/curved_surface.hpp"
-#include "shell/fit_samples.hpp"
+#include "shell/patch_lanes.hpp"
 #include "surface/closest_point.hpp"
 #include "surface/incidence.hpp"
 #include "surface/measure.hpp"

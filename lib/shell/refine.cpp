@@ -59,7 +59,29 @@ std::size_t longest(const ShellMesh& shell, const Edges& edges, std::size_t t) {
   return best;
 }
 
+std::size_t place_of(const Edges& edges, std::size_t t, Index edge) {
+  const auto& own = edges.of_triangle[t];
+  return static_cast<std::size_t>(std::find(own.begin(), own.end(), edge) - own.begin());
+}
+
+/// Whether the normals at an end of an edge differ from one side to the other.
+bool is_crease(const ShellMesh& shell, const Edges& edges, Index edge) {
+  const auto& [s, t] = edges.triangles[edge];
+  if (t == none || shell.corner_normals.empty()) {
+    return false;
+  }
+  const auto normal_at = [&](Index triangle, Index node) {
+    const auto& v = shell.triangles[triangle];
+    return shell.corner_normals[triangle][static_cast<std::size_t>(std::find(v.begin(), v.end(), node) - v.begin())];
+  };
+  const auto differs = [&](Index node) { return normal_at(s, node) != normal_at(t, node); };
+  return differs(edges.ends[edge][0]) || differs(edges.ends[edge][1]);
+}
+
 using Triangles = std::vector<std::array<Index, 3>>;
+
+/// Where an edge runs, among the places of a patch.
+constexpr std::array<std::array<double, 2>, 3> halfway{{{0.5, 0}, {0.5, 0.5}, {0, 0.5}}};
 
 /// The way to cut a triangle whose worst piece has the better shape.
 const Triangles& better(const std::vector<Vec3>& p, const Triangles& one, const Triangles& other) {
@@ -107,26 +129,33 @@ ShellMesh split_shells(const ShellMesh& shell, const std::vector<Split>& wanted)
   const auto patches = curved_patches(shell);
   ShellMesh out{shell.vertices, {}, shell.normals, {}, shell.patch};
   std::vector<Index> middle(edges.ends.size(), none);
-  const std::array<Vec2, 3> halfway{Vec2(0.5, 0), Vec2(0.5, 0.5), Vec2(0, 0.5)};
+  std::vector<std::array<Vec3, 2>> normal_of(edges.ends.size());  // on either side
   for (std::size_t e = 0; e < edges.ends.size(); ++e) {
     if (cut[e] == 0) {
       continue;
     }
-    Vec3 point = Vec3::Zero(), normal = Vec3::Zero();
+    Vec3 point = Vec3::Zero();
     double sides = 0;
-    for (const Index t : edges.triangles[e]) {
+    for (std::size_t side = 0; side < 2; ++side) {
+      const Index t = edges.triangles[e][side];
       if (t != none) {
-        const CubicPatch& patch = patches[t];
-        const auto k = static_cast<std::size_t>(std::find(edges.of_triangle[t].begin(), edges.of_triangle[t].end(), e) -
-                                                edges.of_triangle[t].begin());
-        point += patch.point(halfway[k]);
-        normal += patch.normal(halfway[k]);
+        const std::size_t k = place_of(edges, t, static_cast<Index>(e));
+        const Vec2 at(halfway[k][0], halfway[k][1]);
+        point += patches[t].point(at);
+        normal_of[e][side] = patches[t].normal(at);
         sides += 1;
       }
     }
+    if (sides == 1) {
+      normal_of[e][1] = normal_of[e][0];
+    }
+    const Vec3 mean = (normal_of[e][0] + normal_of[e][1]).stableNormalized();
+    if (!is_crease(shell, edges, static_cast<Index>(e))) {
+      normal_of[e] = {mean, mean};
+    }
     middle[e] = static_cast<Index>(out.vertices.size());
     out.vertices.emplace_back(point / sides);
-    out.normals.push_back(normal.stableNormalized());
+    out.normals.push_back(mean);
   }
 
   for (std::size_t t = 0; t < shell.triangles.size(); ++t) {
@@ -150,6 +179,19 @@ ShellMesh split_shells(const ShellMesh& shell, const std::vector<Split>& wanted)
                       {{a, ab, ca}, {ab, b, bc}, {ab, c, ca}, {ab, bc, c}});
     }
     out.triangles.insert(out.triangles.end(), pieces.begin(), pieces.end());
+    for (std::size_t i = 0; i < pieces.size() && !shell.corner_normals.empty(); ++i) {
+      auto& normals = out.corner_normals.emplace_back();
+      for (std::size_t corner = 0; corner < 3; ++corner) {
+        for (std::size_t j = 0; j < 3; ++j) {
+          const Index e = edges.of_triangle[t][j];
+          if (pieces[i][corner] == v[j]) {
+            normals[corner] = shell.corner_normals[t][j];
+          } else if (pieces[i][corner] == middle[e]) {
+            normals[corner] = normal_of[e][edges.triangles[e][0] == t ? 0 : 1];
+          }
+        }
+      }
+    }
   }
   return out;
 }

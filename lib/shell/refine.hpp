@@ -14,7 +14,7 @@ enum class Split : std::uint8_t {
 /// Splits shells so that the mesh stays conforming: an edge is cut for both its triangles, and a triangle with a cut
 /// edge has its longest edge cut too, so that angles do not get smaller from split to split. Of the ways to join the
 /// cuts the one with the better worst triangle is taken. New nodes lie on the curved patches (the mean of two
-/// neighbours' edge curves), with their normals.
+/// neighbours' edge curves), with their normals: one for each side along creases.
 /// @param wanted  #F; neighbours may get split as well
 /// Source: Rivara, "Algorithms for refining triangular grids", IJNME 20, 1984. Cost: linear.
 ShellMesh split_shells(const ShellMesh& shell, const std::vector<Split>& wanted);

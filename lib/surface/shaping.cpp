@@ -16,8 +16,10 @@ namespace {
 
 constexpr int rounds = 8;
 constexpr int mending_rounds = 24;
-constexpr double large_error = 0.85;    // quantile of the triangles' errors that counts as large
-constexpr double safe_angle = 1.04;     // of the angle asked for: what is worked towards
+constexpr double large_error = 0.85;  // quantile of the triangles' errors that counts as large
+constexpr double safe_angle = 1.04;   // of the angle asked for: what is worked towards
+/// Of these, what a change may leave: as much as an edge of twice the length sags, which shape may ask for.
+constexpr double most_large_errors = 4;
 constexpr double least_gain = 1e-4;     // smaller ones are not worth another look at the neighbours
 constexpr double good_quality = 0.875;  // mean radius ratio that is worked towards
 constexpr double least_quality = 0.86;  // below it there are further rounds
@@ -78,13 +80,11 @@ public:
     state_.measure_all();
     pin_sharp_corners(mesh);
     weights_.error = 1e-3 * diagonal(target);
-    weights_.most_error = 0.01 * diagonal(target);
     weights_.angle_wanted = safe_angle * options.min_angle;
   }
 
   TriangleMesh run() {
     state_.set_weights(weights_);
-    for_each_triangle([&](Index t) { weights_.most_error = std::max(weights_.most_error, 1.5 * state_.error(t)); });
     for (int round = 0; round < rounds; ++round) {
       improve();
       if (round + 2 < rounds) {
@@ -155,13 +155,14 @@ private:
     }
   }
 
-  // What counts as a large error, and how much shape weighs, follow from the state.
+  // What counts as a large error, what no change may leave, and how much shape weighs, follow from the state.
   void adapt() {
     std::vector<double> errors;
     for_each_triangle([&](Index t) { errors.push_back(state_.error(t)); });
     const auto at = errors.begin() + static_cast<std::ptrdiff_t>(large_error * static_cast<double>(errors.size() - 1));
     std::nth_element(errors.begin(), at, errors.end());
     weights_.error = std::max(*at, 1e-9 * weights_.error);
+    weights_.most_error = most_large_errors * weights_.error;
     weights_.quality *= std::clamp(std::exp(40 * (good_quality - mean_quality(mesh().mesh()))), 0.5, 2.0);
     state_.set_weights(weights_);
     dirty_.assign(mesh().positions.size(), 1);
@@ -291,11 +292,28 @@ private:
     return found;
   }
 
+  // The longest edge, which gives the better shapes; an edge of the rim, where the error may be the rim's own.
   double split_worst(Index t, double limit) {
-    const auto [u, v] = edge_by_length(t, true);
-    state_.make_split(u, v, trial_);
-    const double cost = state_.evaluate(trial_, limit);
-    return cost < limit ? cost : std::numeric_limits<double>::infinity();
+    const auto c = mesh().triangles[t];
+    double best = std::numeric_limits<double>::infinity();
+    const auto try_edge = [&](Index u, Index v) {
+      PatchTrial trial;
+      state_.make_split(u, v, trial);
+      const double cost = state_.evaluate(trial, std::min(limit, best));
+      if (cost < std::min(limit, best)) {
+        best = cost;
+        trial_ = std::move(trial);
+      }
+    };
+    const auto longest = edge_by_length(t, true);
+    try_edge(longest[0], longest[1]);
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Index u = c[k], v = c[(k + 1) % 3];
+      if (mesh().on_edge(u, v)[1] == EditMesh::none && std::minmax(u, v) != std::minmax(longest[0], longest[1])) {
+        try_edge(u, v);
+      }
+    }
+    return best;
   }
 
   // Uses up the triangles that are allowed where the error is largest.
@@ -436,6 +454,7 @@ private:
       }
       weights_.angle *= 1.6;
       weights_.error *= round < 12 ? 1.15 : 1;
+      weights_.most_error = most_large_errors * weights_.error;
       state_.set_weights(weights_);
       dirty_.assign(mesh().positions.size(), 0);
       if (round % 6 == 3 && mesh().alive + 2 * bad.size() > options_.triangles) {

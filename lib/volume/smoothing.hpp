@@ -36,7 +36,7 @@ struct StaircaseOptions {
 struct StaircaseResult {
   double largest_move = 0;    ///< in voxels, along any axis of the image; below 0.5
   double volume_change = 0;   ///< largest of any component of 100 voxels or more, as a fraction of its volume
-  std::size_t held_back = 0;  ///< vertices that stayed nearer to where they were, so that no triangle turned over
+  std::size_t held_back = 0;  ///< vertices that stayed nearer to where they were: no triangle turned over or crossed
 };
 
 /// Smooths away the staircase of a marching-cubes surface: a surface with the same triangles, whose vertices stay
@@ -48,7 +48,7 @@ struct StaircaseResult {
 /// way round: corners move by less than half a voxel, and points within a triangle move by means of the corners'
 /// moves. Each component of 100 voxels or more keeps its volume to 0.1 %, by an offset along the normals that respects
 /// the same limits; where that does not reach, its moves are taken back. Triangles stay as they are, and none is turned
-/// over or flattened. All of this is asserted on the result.
+/// over or flattened; nor do any two touch or cross that did not before. All of this is asserted on the result.
 /// The result is the same to the bit whatever the number of threads.
 /// @param mesh  the marching-cubes surface of a selection, in world mm; changed in place
 /// @param grid  the selection (its dims and affine are used)

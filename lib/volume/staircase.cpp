@@ -2,6 +2,7 @@
 // 1998. B. O'Donoghue, E. Candes: Adaptive restart for accelerated gradient schemes. Found. Comput. Math. 15 (2015).
 #include "core/error.hpp"
 #include "core/threads.hpp"
+#include "volume/cell_crossings.hpp"
 #include "volume/local_quadrics.hpp"
 #include "volume/smoothing.hpp"
 #include "volume/vertex_neighbours.hpp"
@@ -84,6 +85,7 @@ public:
   Smoother(const TriangleMesh& mesh, const Mask& grid, bool open_border)
       : mesh_(mesh),
         to_world_(grid.affine().leftCols<3>()),
+        origin_(grid.affine().col(3)),
         start_(mesh.vertices.size()),
         boundary_(mesh.vertices.size(), false),
         low_(mesh.vertices.size()),
@@ -91,7 +93,7 @@ public:
     const Mat3 to_voxel = to_world_.inverse();
     mirrored_ = to_world_.determinant() < 0;
     for (std::size_t v = 0; v < start_.size(); ++v) {
-      start_[v] = to_voxel * (mesh.vertices[v] - grid.affine().col(3));
+      start_[v] = to_voxel * (mesh.vertices[v] - origin_);
       low_[v] = start_[v].array() - reach;
       high_[v] = start_[v].array() + reach;
       for (int axis = 0; open_border && axis < 3; ++axis) {
@@ -120,19 +122,18 @@ public:
     relax(neighbours, inner, most_last_iterations, {});
     advance(progress, 0.9);
     StaircaseResult result;
-    // Holding vertices back changes the volume, and offsetting for the volume may spoil a triangle: until neither.
-    for (int round = 0; round < 8; ++round) {
+    // Holding vertices back changes the volume, and offsetting for the volume may spoil a triangle: until neither. In
+    // the end moves are only taken back, and the surface as it was has no fault.
+    const CellCrossings crossings(mesh_.triangles, start_);
+    std::size_t held = 1;
+    for (int round = 0; round < most_corrections && held > 0; ++round) {
       correct_volume();
-      const std::size_t held = hold_back_spoilt();
+      held = hold_back_spoilt() + hold_back_crossing(crossings);
       result.held_back += held;
-      if (held == 0) {
-        break;
-      }
     }
-    do {
-      while (hold_back_spoilt() > 0) {
-      }
-    } while (hold_back_volume());
+    while (held > 0 || hold_back_volume()) {
+      held = hold_back_spoilt() + hold_back_crossing(crossings);
+    }
     for (std::size_t v = 0; v < start_.size(); ++v) {
       result.largest_move = std::max(result.largest_move, (now_[v] - start_[v]).cwiseAbs().maxCoeff());
     }
@@ -143,17 +144,21 @@ public:
     return result;
   }
 
-  void store(TriangleMesh& mesh, const Vec3& origin) const {
+  /// The vertices where they are now, in world mm.
+  [[nodiscard]] std::vector<Vec3> places() const {
+    std::vector<Vec3> result = mesh_.vertices;
     for_all(now_.size(), [&](std::size_t v) {
       if (now_[v] != start_[v]) {
-        mesh.vertices[v] = to_world_ * now_[v] + origin;
+        result[v] = to_world_ * now_[v] + origin_;
       }
     });
+    return result;
   }
 
 private:
   static constexpr int most_iterations = 60;
   static constexpr int most_last_iterations = 3;
+  static constexpr int most_corrections = 8;
 
   [[nodiscard]] Vec3 confine(std::size_t v, const Vec3& p) const { return p.cwiseMax(low_[v]).cwiseMin(high_[v]); }
 
@@ -350,9 +355,26 @@ private:
         spoilt[t[0]] = spoilt[t[1]] = spoilt[t[2]] = true;
       }
     }
+    return hold_back(spoilt);
+  }
+
+  /// The same where triangles met.
+  std::size_t hold_back_crossing(const CellCrossings& crossings) {
+    std::vector<bool> crossing(now_.size(), false);
+    for (const auto& pair : crossings.find(places())) {
+      for (const Index t : pair) {
+        for (const Index v : mesh_.triangles[t]) {
+          crossing[v] = now_[v] != start_[v];
+        }
+      }
+    }
+    return hold_back(crossing);
+  }
+
+  std::size_t hold_back(const std::vector<bool>& vertices) {
     std::size_t count = 0;
     for (std::size_t v = 0; v < now_.size(); ++v) {
-      if (spoilt[v]) {
+      if (vertices[v]) {
         const Vec3 half = 0.5 * (now_[v] - start_[v]);
         now_[v] = half.norm() > 1e-3 ? Vec3(start_[v] + half) : start_[v];
         low_[v] = high_[v] = now_[v];
@@ -411,6 +433,7 @@ private:
 
   const TriangleMesh& mesh_;
   Mat3 to_world_;
+  Vec3 origin_;
   bool mirrored_ = false;
   std::vector<Vec3> start_;     ///< voxel coordinates of the input
   std::vector<Vec3> now_;       ///< and of the surface as it is
@@ -426,7 +449,7 @@ private:
 StaircaseResult smooth_staircase(TriangleMesh& mesh, const Mask& grid, const StaircaseOptions& options) {
   Smoother smoother(mesh, grid, options.open_border);
   const StaircaseResult result = smoother.run(options.progress);
-  smoother.store(mesh, grid.affine().col(3));
+  mesh.vertices = smoother.places();
   return result;
 }
 

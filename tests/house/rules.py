@@ -9,14 +9,15 @@ ROOMS = {
     "volume": {"core", "volume"},
     "surface": {"core", "surface"},
     "shell": {"core", "surface", "shell"},
+    "fit": {"core", "surface", "shell", "fit"},
     "mechanics": {"core", "surface", "shell", "mechanics"},
-    "io": {"core", "volume", "surface", "shell", "mechanics", "io"},
-    "cli": {"core", "volume", "surface", "shell", "mechanics", "io", "cli"},
+    "io": {"core", "volume", "surface", "shell", "fit", "mechanics", "io"},
+    "cli": {"core", "volume", "surface", "shell", "fit", "mechanics", "io", "cli"},
 }
 
-# Marching cubes returns a mesh, and smoothing measures its volume: the volume room sees these two headers of the
-# surface room and nothing else of it, so it links it.
-SHARED_NOUNS = {"volume": {"surface/triangle_mesh.hpp", "surface/measure.hpp"}}
+# Marching cubes returns a mesh, and smoothing measures its volume and leaves no triangles that cross: the volume room
+# sees these three headers of the surface room and nothing else of it, so it links it.
+SHARED_NOUNS = {"volume": {"surface/triangle_mesh.hpp", "surface/measure.hpp", "surface/self_intersections.hpp"}}
 
 # Header pattern, what it belongs to, and which files may include it.
 OWNERS = [
@@ -57,7 +58,7 @@ def _product(path):
 
 
 def order_of_rooms(path, text):
-    """core < volume; core < surface < shell < mechanics; all < io < cli < tools."""
+    """core < volume; core < surface < shell < fit; shell < mechanics; all < io < cli < tools."""
     room = _room(path)
     found = []
     if path.endswith(CODE) and _product(path):

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "shell/shell_mesh.hpp"
+#include "shell/target.hpp"
 
 #include <cmath>
 #include <map>
@@ -57,6 +58,15 @@ inline ShellMesh sphere_shell(int times, double radius = 1) {
   ShellMesh shell{mesh.vertices, mesh.triangles, mesh.vertices, {}, Patch::comas};
   for (Vec3& n : shell.normals) {
     n.normalize();
+  }
+  return shell;
+}
+
+/// Shells that are flat facets: the normals at their corners are the facets'.
+inline ShellMesh flat_shells(const TriangleMesh& mesh, Patch patch) {
+  ShellMesh shell{mesh.vertices, mesh.triangles, vertex_normals(mesh), {}, patch};
+  for (const Vec3& n : facet_normals(mesh)) {
+    shell.corner_normals.push_back({n, n, n});
   }
   return shell;
 }

@@ -1,14 +1,22 @@
 #include "shell/patch_lanes.hpp"
 
-#include "shell/fit_samples.hpp"
-#include "shell/normal_equations.hpp"
-
 #include <gtest/gtest.h>
+#include <Eigen/LU>
 
 #include <random>
 
 namespace tunica {
 namespace {
+
+/// The parameters of the point of the facet closest to q, brought inside.
+Vec2 foot_on_facet(const CubicPatch& patch, const Vec3& q) {
+  const auto& c = patch.control;
+  Eigen::Matrix<double, 3, 2> edges;
+  edges << c[1] - c[0], c[2] - c[0];
+  Vec2 at = (edges.transpose() * edges).inverse() * (edges.transpose() * (q - c[0]));
+  at = at.cwiseMax(0);
+  return at.sum() > 1 ? Vec2(at / at.sum()) : at;
+}
 
 CubicPatch some_patch() {
   return comas_patch({Vec3(0, 0, 0), Vec3(2, 0, 0.1), Vec3(0.4, 1.5, -0.2)},
@@ -56,44 +64,13 @@ TEST(PatchLanes, FeetAreThoseOfOnePointAtATime) {
     }
     const LaneFeet feet = feet_on_patch(powers, lane_points([&](std::size_t k) { return q[k]; }));
     for (std::size_t k = 0; k < lane_count; ++k) {
-      const PatchFoot expected = foot_on_patch(patch, q[k]);
+      const PatchFoot expected = foot_on_patch(PatchAxes(patch), q[k], foot_on_facet(patch, q[k]), 2);
       const Vec2 at(feet.x[k], feet.y[k]);
       EXPECT_LT((at - expected.at).norm(), 1e-9);
       EXPECT_NEAR(feet.squared_distance[k], expected.squared_distance, 1e-12);
       EXPECT_LT((lane(feet.point, k) - patch.point(at)).norm(), 1e-13);
     }
   }
-}
-
-TEST(NormalEquations, AreTheSumsOverTheResiduals) {
-  std::mt19937 random(5);
-  std::uniform_real_distribution<double> value(-1, 1);
-  const auto any = [&] { return value(random); };
-  const Eigen::Matrix<double, 30, 5> jacobian = Eigen::Matrix<double, 30, 5>::NullaryExpr(any);
-  std::vector<Residual> residuals;
-  for (int i = 0; i < 7; ++i) {  // not a multiple of the lanes
-    residuals.push_back({Vec2(0.1 * i, 0.2), Vec3(any(), any(), any()).normalized(), any()});
-  }
-  Eigen::Matrix<double, 5, 5> h = Eigen::Matrix<double, 5, 5>::Identity(), expected_h = h;
-  Eigen::Matrix<double, 5, 1> g = Eigen::Matrix<double, 5, 1>::Ones(), expected_g = g;
-  add_normal_equations<5>(
-      jacobian, residuals, [](const Lanes& d) { return Lanes(1.0 + d * d); }, h, g);
-  for (const Residual& r : residuals) {
-    // How the patch's point follows, by control points that move.
-    Eigen::Matrix<double, 5, 1> row;
-    for (Eigen::Index c = 0; c < 5; ++c) {
-      CubicPatch moved;
-      for (std::size_t i = 0; i < 10; ++i) {
-        moved.control[i] = jacobian.block<3, 1>(3 * static_cast<Eigen::Index>(i), c);
-      }
-      row[c] = moved.point(r.at).dot(r.direction);
-    }
-    const double weight = 1 + r.distance * r.distance;
-    expected_h += weight * row * row.transpose();
-    expected_g -= weight * r.distance * row;
-  }
-  EXPECT_LT((h - expected_h).norm(), 1e-12);
-  EXPECT_LT((g - expected_g).norm(), 1e-12);
 }
 
 }  // namespace

@@ -45,6 +45,32 @@ TEST(SelfIntersections, TrianglesThatShareAVertexAreNoPair) {
   EXPECT_EQ(count_self_intersections(mesh), 0U);
 }
 
+TEST(SelfIntersections, TrianglesWithACornerInCommonMayMeetElsewhere) {
+  using Triangle = std::array<Vec3, 3>;
+  const Triangle flat{Vec3(0, 0, 0), Vec3(2, 0, 0), Vec3(0, 2, 0)};
+  const auto both_ways = [&](const Triangle& other) {
+    const bool meet = triangles_cross_beside_corner(flat, other);
+    EXPECT_EQ(triangles_cross_beside_corner(other, flat), meet);
+    EXPECT_TRUE(triangles_cross(flat, other));  // at the corner, at least
+    return meet;
+  };
+  EXPECT_TRUE(both_ways({Vec3(0, 0, 0), Vec3(1, 0.4, 1), Vec3(1, 0.4, -1)}));       // through it
+  EXPECT_TRUE(both_ways({Vec3(0, 0, 0), Vec3(9, 3, 1), Vec3(9, 3, -1)}));           // through it and out
+  EXPECT_FALSE(both_ways({Vec3(0, 0, 0), Vec3(1, -1e-9, 1), Vec3(1, -1e-9, -1)}));  // beside it
+  EXPECT_FALSE(both_ways({Vec3(0, 0, 0), Vec3(1, 0.4, 1e-300), Vec3(1, 0.4, 1)}));  // above it, by nearly nothing
+  EXPECT_TRUE(both_ways({Vec3(0, 0, 0), Vec3(1, 0.4, 0), Vec3(1, 0.4, 1)}));        // along it
+  EXPECT_TRUE(both_ways({Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(1, -1, 0)}));           // along its edge
+  EXPECT_TRUE(both_ways({Vec3(0, 0, 0), Vec3(5, 4, 0), Vec3(4, 5, 0)}));            // over it, in its plane
+  EXPECT_FALSE(both_ways({Vec3(0, 0, 0), Vec3(-1, 0.5, 0), Vec3(0.5, -1, 0)}));     // in its plane, elsewhere
+  EXPECT_FALSE(triangles_cross_beside_corner(flat, {Vec3(0, 0, 0), Vec3(0, 0, 0), Vec3(1, 0.5, 0)}));  // no area
+}
+
+TEST(SelfIntersections, BoxesThatOverlap) {
+  const std::vector<Vec3> lower{{0, 0, 0}, {1, 1, 1}, {3, 0, 0}, {1.5, 1.5, 1.5}};
+  const std::vector<Vec3> upper{{1, 1, 1}, {2, 2, 2}, {4, 1, 1}, {1.6, 1.6, 1.6}};
+  EXPECT_EQ(overlapping_boxes(lower, upper), (std::vector<std::array<Index, 2>>{{0, 1}, {1, 3}}));
+}
+
 TEST(SelfIntersections, PatchesAreCountedOnce) {
   // Two flat patches of four triangles each cross in several triangles.
   const TriangleMesh one = shapes::split({{{-1, -1, 0}, {1, -1, 0}, {0, 1, 0}}, {{{0, 1, 2}}}});

@@ -76,6 +76,10 @@ class Decimate(WholeTool):
             self.assertLessEqual(result["hausdorff_mm"]["upper"], 0.2)
             # The tips are as sharp as they were, but for chords that are 0.2 mm beside their sides; nothing else is.
             self.assertGreater(result["min_angle_deg"], 10)
+            # That IN's own corners are the reason is said, with the angle.
+            self.assertIs(result["min_angle_held"], True)
+            said = self.warnings("in.ply", "again.ply", "--min-angle", 20, "--max-error", "0.2mm")
+            self.assertIn(f"the smallest angle is {result['min_angle_deg']:.3g} degrees", "\n".join(said))
             self.assertLess(result["min_angle_deg"], math.degrees(2 * math.atan(0.7 / 5)))
             _, rows, faces = meshes.read_ply(self.path("out.ply"))
             sharp = set()
@@ -93,7 +97,10 @@ class Decimate(WholeTool):
         triangles = [t for i in range(0, 20, 2) for t in ((i, i + 2, i + 3), (i, i + 3, i + 1))]
         meshes.write_ply(self.path("in.ply"), strip, triangles)
         report = self.run_tool("in.ply", "out.ply", "--triangles", 2, "--min-angle", 20, code=4, says="smallest angle")
-        self.assertLess(report["result"]["min_angle_deg"], 20)
+        angle = report["result"]["min_angle_deg"]
+        self.assertLess(angle, 20)
+        self.assertIn(f"{angle:.3g} degrees", report["error"])
+        self.assertIs(report["result"]["min_angle_held"], False)
         self.assertTrue(self.exists("out.ply.part"))
         self.assertFalse(self.exists("out.ply"))
 

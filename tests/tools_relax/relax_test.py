@@ -98,8 +98,6 @@ class Case(unittest.TestCase):
     def relax(self, *arguments, expect=0):
         """Runs the tool, with the class's method when none is named; @return its report and stderr."""
         arguments = [*arguments, *([] if "--method" in arguments else self.method)]
-        if "--tolerance" in arguments and not {"--refine", "barycentre", "--effort"} & set(map(str, arguments)):
-            arguments += ["--effort", "0.1"]  # that shells are the fewest is not what these tests are about
         report = self.path("report.json")
         if os.path.exists(report):
             os.remove(report)
@@ -174,7 +172,7 @@ class Contract(Case):
         with open(self.path("map.png"), "rb") as file:
             self.assertEqual(file.read(8), b"\x89PNG\r\n\x1a\n")
         vertices, _, comments = read_ply(self.out)
-        for comment in ("surface=comas", "units mm", "SPACE=LPS"):
+        for comment in ("surface=watertight", "units mm", "SPACE=LPS"):
             self.assertIn(comment, comments)
         normals = columns(vertices, ("nx", "ny", "nz"))
         self.assertLess(np.abs(np.linalg.norm(normals, axis=1) - 1).max(), 1e-12)
@@ -271,22 +269,10 @@ class Contract(Case):
 
     def test_wrong_usage_is_2(self):
         for extra in (["--tolerance", "0.5"], ["--tolerance", "-1mm"], ["--method", "nonsense"],
-                      ["--surface", "smooth"], ["--refine"], ["--max-shells", "10"],
+                      ["--surface", "smooth"], ["--max-shells", "10"], ["--kink", "20"], ["--effort", "1"],
                       ["--max-iterations", "0"], ["--mesh-unit", "parsec"], ["--unknown"]):
             self.relax(self.coarse, self.target, self.out, *extra, expect=2)
-        for extra in (["--tolerance", "1%", "--kink", "-1"], ["--tolerance", "1%", "--kink", "91"],
-                      ["--tolerance", "1%", "--kink", "nan"], ["--tolerance", "1%", "--kink", "wide"],
-                      ["--kink", "20"], ["--tolerance", "1%", "--kink", "20", "--refine"],
-                      ["--tolerance", "1%", "--kink", "20", "--surface", "watertight"],
-                      ["--tolerance", "1%", "--kink", "20", "--method", "barycentre"],
-                      ["--effort", "1"], ["--tolerance", "1%", "--effort", "-1"], ["--tolerance", "1%", "--effort", "nan"],
-                      ["--tolerance", "1%", "--effort", "101"], ["--tolerance", "1%", "--effort", "much"],
-                      ["--tolerance", "1%", "--effort", "1", "--refine"],
-                      ["--tolerance", "1%", "--effort", "1", "--method", "barycentre"],
-                      ["--min-angle", "0.5"], ["--min-angle", "31"], ["--min-angle", "nan"], ["--min-angle", "wide"],
-                      ["--min-angle", "20", "--method", "barycentre"]):
-            self.relax(self.coarse, self.target, self.out, *extra, expect=2)
-        for extra in (["--shells", "0"], ["--shells", "100", "--max-shells", "100", "--refine"]):
+        for extra in (["--min-angle", "0.5"], ["--min-angle", "31"], ["--min-angle", "nan"], ["--min-angle", "wide"], ["--min-angle", "20", "--method", "barycentre"]):
             self.relax(self.coarse, self.target, self.out, *extra, expect=2)
         barycentre = ["--method", "barycentre"]
         for extra in (["--refine"], ["--max-shells", "10"], ["--shells", "100"]):
@@ -446,7 +432,7 @@ class Fit(Case):
     def test_fewer_shells_than_the_topology_needs_are_4(self):
         _, error = self.relax(self.target, self.target, self.out, "--shells", 3, expect=4)
         self.assertIn("pieces, holes and handles", error)
-        self.assertEqual(len(read_ply(self.out + ".part")[1]), 6)
+        self.assertLess(len(read_ply(self.out + ".part")[1]), 40)
 
     def test_triangles_without_area_are_3(self):
         line, points = self.path("line.ply"), np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [4.0, 0, 0]])
@@ -489,12 +475,12 @@ class Fit(Case):
         write_ply(wedge, [[0, 0, 0], [40, 0, 0], [40, 4, 0], [20, 6, 0]], [[0, 1, 2], [0, 2, 3]])
         record, said = self.relax(wedge, wedge, self.out, "--tolerance", "0.5%")
         self.assertLess(record["result"]["min_angle_deg"], 20)
-        self.assertIn("below the usual 20", said)
+        self.assertIn("below 20", said)
 
     def test_more_shells_than_the_target_has_triangles_are_the_target(self):
         record, _ = self.relax(self.target, self.target, self.out, "--shells", 100000)
         self.assertEqual(record["result"]["shells"], 5120)
-        self.assertLess(record["result"]["hausdorff_percent"]["upper"], 0.01)  # the width of the interval
+        self.assertLess(record["result"]["hausdorff_percent"]["upper"], 0.1)
 
     def test_pieces_sheets_and_crumbs_are_kept(self):
         ball, faces = sphere(3)
@@ -526,38 +512,31 @@ class Fit(Case):
             os.remove(self.out + ".part")
 
 
-    def test_normals_part_by_no_more_than_asked_and_save_shells(self):
+    def test_a_smooth_surface_has_one_normal_per_node_and_no_gaps(self):
         vertices, triangles = sphere(3)
         vertices *= 1 + 0.12 * np.sin(vertices[:, :1] / 6) * np.cos(vertices[:, 1:2] / 8)
         wavy = self.path("wavy.ply")
         write_ply(wavy, vertices, triangles)
-        shells = {}
-        for kink in (0, 40):
-            out = self.path(f"{kink}.ply")
-            record, _ = self.relax(wavy, wavy, out, "--tolerance", "1%", "--kink", kink)
-            self.assertTrue(record["result"]["reached"])
-            self.assertEqual(record["result"]["self_intersections"], 0)
-            shells[kink] = record["result"]["shells"]
-            _, faces, _ = read_ply(out)
-            normals = read_corner_normals(out)
-            largest = 0
-            for node in range(faces.max() + 1):
-                here = normals[faces == node]
-                largest = max(largest, np.degrees(np.arccos(np.clip(here @ here.T, -1, 1))).max())
-            self.assertLess(largest, kink + 1e-4)
-        self.assertLess(shells[40], shells[0])
+        for surface, widest in (("watertight", 1e-9), ("comas", 5)):
+            record, _ = self.relax(wavy, wavy, self.out, "--tolerance", "1%", "--surface", surface, "--force")
+            result = record["result"]
+            self.assertTrue(result["reached"])
+            self.assertEqual(result["self_intersections"], 0)
+            with open(self.out, "rb") as file:
+                self.assertNotIn(b"corner_normals", file.read(4096))
+            self.assertLessEqual(result["gap_mm"], widest)
+            self.assertGreaterEqual(result["size_ratio"], 1)
+            self.assertLess(result["mean_distance_mm"], result["hausdorff_mm"]["upper"])
+            self.assertLess(result["normal_error_deg"]["mean"], result["normal_error_deg"]["max"])
 
-    def test_effort_finds_fewer_shells(self):
-        vertices, triangles = sphere(3)
-        vertices *= 1 + 0.12 * np.sin(vertices[:, :1] / 6) * np.cos(vertices[:, 1:2] / 8)
-        wavy = self.path("wavy.ply")
-        write_ply(wavy, vertices, triangles)
-        shells = {}
-        for effort in (0, 1):
-            record, _ = self.relax(wavy, wavy, self.out, "--tolerance", "1%", "--effort", effort, "--force")
-            self.assertTrue(record["result"]["reached"])
-            shells[effort] = record["result"]["shells"]
-        self.assertLess(shells[1], shells[0])
+    def test_refining_without_a_tolerance_splits_every_shell_in_four(self):
+        coarse = self.path("coarse.ply")
+        write_ply(coarse, *cylinder(12, 6, radius=10.1))
+        record, _ = self.relax(coarse, self.target, self.out, "--refine")
+        self.assertEqual([i["shells"] for i in record["result"]["iterations"]], [144, 576])
+        self.assertEqual(record["result"]["shells"], 576)
+        record, _ = self.relax(coarse, self.target, self.out, "--refine", "--max-shells", 2400, "--force")
+        self.assertEqual(record["result"]["shells"], 2304)
 
     def test_angles_are_kept_that_are_asked_for(self):
         vertices, triangles = cylinder(60, 24, radius=1, length=4)
@@ -580,9 +559,9 @@ class Fit(Case):
         self.assertIn("the smallest angle is", err)
 
     def test_a_limit_of_shells_that_only_a_search_for_the_fewest_keeps_is_kept(self):
-        record, _ = self.relax(self.target, self.target, self.out, "--tolerance", "0.3%", "--kink", 0)
+        record, _ = self.relax(self.target, self.target, self.out, "--tolerance", "0.3%")
         fewest = record["result"]["shells"]
-        record, _ = self.relax(self.target, self.target, self.out, "--tolerance", "0.3%", "--kink", 0, "--max-shells",
+        record, _ = self.relax(self.target, self.target, self.out, "--tolerance", "0.3%", "--max-shells",
                                fewest, "--force")
         self.assertTrue(record["result"]["reached"])
         self.assertLessEqual(record["result"]["shells"], fewest)
@@ -636,7 +615,7 @@ class Organs(Case):
                         "20", "--report", report], check=True, capture_output=True, timeout=300)
         with open(report) as file:
             triangles = json.load(file)["result"]["triangles"]
-        record, _ = self.relax(target, target, self.path("shell.ply"), *unit, "--tolerance", "1%", "--effort", 1)
+        record, _ = self.relax(target, target, self.path("shell.ply"), *unit, "--tolerance", "1%")
         result = record["result"]
         self.assertLessEqual(result["hausdorff_percent"]["upper"], 1)
         self.assertLessEqual(result["boundary_percent"]["upper"], 1)

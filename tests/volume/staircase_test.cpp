@@ -2,6 +2,8 @@
 #include "mesh_check.hpp"
 #include "surface/closest_point.hpp"
 #include "surface/measure.hpp"
+#include "surface/self_intersections.hpp"
+#include "volume/cell_crossings.hpp"
 #include "volume/components.hpp"
 #include "volume/marching_cubes.hpp"
 #include "volume/phantom.hpp"
@@ -12,6 +14,7 @@
 
 #include <Eigen/LU>
 
+#include <algorithm>
 #include <cmath>
 #include <ostream>
 
@@ -233,6 +236,74 @@ TEST(Staircase, NoiseStaysAManifoldWithoutTurnedTriangles) {
       ASSERT_GT(normal(before).dot(normal(after)), 0);
     }
   }
+}
+
+/// Pairs of triangles without a common edge that meet elsewhere than in a common corner: all against all.
+std::vector<std::array<Index, 2>> crossings(const TriangleMesh& mesh) {
+  auto found = find_self_intersections(mesh);
+  std::vector<std::vector<Index>> around(mesh.vertices.size());
+  for (Index t = 0; t < mesh.triangles.size(); ++t) {
+    for (const Index v : mesh.triangles[t]) {
+      around[v].push_back(t);
+    }
+  }
+  for (Index v = 0; v < around.size(); ++v) {
+    const auto from_v = [&](Index t) {
+      auto c = mesh.triangles[t];
+      std::rotate(c.begin(), std::find(c.begin(), c.end(), v), c.end());
+      return c;
+    };
+    for (const Index one : around[v]) {
+      for (const Index other : around[v]) {
+        const auto c = from_v(one), d = from_v(other);
+        const bool share_edge = c[1] == d[1] || c[1] == d[2] || c[2] == d[1] || c[2] == d[2];
+        if (one < other && !share_edge &&
+            triangles_cross_beside_corner({mesh.vertices[v], mesh.vertices[c[1]], mesh.vertices[c[2]]},
+                                          {mesh.vertices[v], mesh.vertices[d[1]], mesh.vertices[d[2]]})) {
+          found.push_back({one, other});
+        }
+      }
+    }
+  }
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+TEST(Staircase, NoTrianglesCross) {
+  // Noise, and folds one voxel thick that are one voxel apart and inclined to the grid.
+  Random random(5);
+  for (const double density : {0.15, 0.85}) {
+    const Mask mask =
+        select(make_volume<std::uint8_t>({24, 20, 18}, [&](auto...) { return random.uniform() < density; }), label_one);
+    TriangleMesh mesh = marching_cubes(mask);
+    ASSERT_TRUE(crossings(mesh).empty());
+    smooth_staircase(mesh, mask);
+    EXPECT_TRUE(crossings(mesh).empty());
+  }
+  const Volume folds = make_volume<std::uint8_t>({40, 40, 30}, [](auto i, auto j, auto k) {
+    return i > 1 && j > 1 && k > 1 && i < 37 && j < 37 && k < 27 && (5 * i + 2 * j + 4 * k) / 6 % 3 == 0;
+  });
+  const Mask mask = select(folds, label_one);
+  TriangleMesh mesh = marching_cubes(mask);
+  ASSERT_TRUE(crossings(mesh).empty());
+  smooth_staircase(mesh, mask);
+  EXPECT_TRUE(crossings(mesh).empty());
+}
+
+TEST(Staircase, CrossingsAreFoundFromCellToCell) {
+  // Vertices thrown by nearly half a voxel: many triangles meet, all of them near their cells.
+  Random random(8);
+  const Mask mask =
+      select(make_volume<std::uint8_t>({14, 12, 10}, [&](auto...) { return random.uniform() < 0.4; }), label_one);
+  TriangleMesh mesh = marching_cubes(mask);
+  const CellCrossings cells(mesh.triangles, mesh.vertices);
+  EXPECT_TRUE(cells.find(mesh.vertices).empty());
+  for (Vec3& p : mesh.vertices) {
+    p += 0.98 * Vec3(random.uniform() - 0.5, random.uniform() - 0.5, random.uniform() - 0.5);
+  }
+  const auto found = cells.find(mesh.vertices);
+  EXPECT_GT(found.size(), 100U);
+  EXPECT_EQ(found, crossings(mesh));
 }
 
 TEST(Staircase, SameToTheBitWhateverTheNumberOfThreads) {

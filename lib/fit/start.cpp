@@ -1,0 +1,207 @@
+#include "fit/start.hpp"
+
+#include "shell/normals.hpp"
+#include "surface/checks.hpp"
+#include "surface/decimate.hpp"
+#include "surface/hausdorff.hpp"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace tunica {
+namespace {
+
+constexpr double crease_angle = 40;       // degrees
+constexpr double crease_share = 0.6;      // of the facets' angle is there already close to the edge
+constexpr double close_by = 0.08;         // of the height of the triangle
+constexpr std::size_t fewest_edges = 3;   // of a crease
+constexpr std::size_t sampled = 20'000;   // vertices, and facets: for the error of flat facets
+constexpr std::size_t first_rung = 4000;  // triangles of the first decimation, from which the count is judged
+
+/// Largest sampled distance between flat facets and target, both ways, mm.
+double sampled_error(const TriangleMesh& mesh, const Target& target) {
+  const auto largest = [](const TriangleMesh& points, const ClosestPoint& surface) {
+    const auto distances = vertex_distances(points, surface);
+    return *std::max_element(distances.begin(), distances.end());
+  };
+  TriangleMesh some;
+  const auto& vertices = target.mesh().vertices;
+  for (std::size_t v = 0; v < vertices.size(); v += std::max<std::size_t>(1, vertices.size() / sampled)) {
+    some.vertices.push_back(vertices[v]);
+  }
+  const double to_mesh = largest(some, ClosestPoint(mesh));
+  some.vertices.clear();
+  for (std::size_t t = 0; t < mesh.triangles.size(); t += std::max<std::size_t>(1, mesh.triangles.size() / sampled)) {
+    const auto& [a, b, c] = mesh.triangles[t];
+    const Vec3 &p = mesh.vertices[a], &q = mesh.vertices[b], &r = mesh.vertices[c];
+    some.vertices.insert(some.vertices.end(), {(p + q + r) / 3, (p + q) / 2, (q + r) / 2, (r + p) / 2});
+  }
+  return std::max(to_mesh, largest(some, target.tree()));
+}
+
+using EdgeFlags = std::vector<std::array<bool, 3>>;
+
+/// Edges of the mesh across which facets turn, and the target already close by.
+EdgeFlags sharp_edges(const TriangleMesh& mesh, const Target& target, const std::vector<Vec3>& facets,
+                      const std::vector<std::array<Index, 3>>& across) {
+  EdgeFlags sharp(mesh.triangles.size(), {false, false, false});
+  const auto normal_near = [&](std::size_t t, std::size_t k) {
+    const auto& v = mesh.triangles[t];
+    const Vec3 middle = (mesh.vertices[v[k]] + mesh.vertices[v[(k + 1) % 3]]) / 2;
+    const auto foot = target.closest_facing(middle + close_by * (mesh.vertices[v[(k + 2) % 3]] - middle), facets[t],
+                                            target.diagonal());
+    return foot ? foot->facet_normal : facets[t];
+  };
+  const auto turn = [](const Vec3& a, const Vec3& b) { return std::acos(std::clamp(a.dot(b), -1.0, 1.0)); };
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Index other = across[t][k];
+      if (other == no_neighbour || other < t) {
+        continue;
+      }
+      const double whole = turn(facets[t], facets[other]);
+      if (whole < crease_angle * std::numbers::pi / 180) {
+        continue;
+      }
+      const auto& v = mesh.triangles[other];
+      const auto l =
+          static_cast<std::size_t>(std::find(v.begin(), v.end(), mesh.triangles[t][(k + 1) % 3]) - v.begin());
+      sharp[t][k] = sharp[other][l] = turn(normal_near(t, k), normal_near(other, l)) > crease_share * whole;
+    }
+  }
+  return sharp;
+}
+
+/// Leaves connected curves of some edges only.
+void drop_short_curves(const TriangleMesh& mesh, EdgeFlags& sharp) {
+  std::vector<Index> parent(mesh.vertices.size());
+  for (std::size_t v = 0; v < parent.size(); ++v) {
+    parent[v] = static_cast<Index>(v);
+  }
+  const auto root = [&](Index v) {
+    while (parent[v] != v) {
+      v = parent[v] = parent[parent[v]];
+    }
+    return v;
+  };
+  const auto for_each = [&](const auto& action) {
+    for (std::size_t t = 0; t < sharp.size(); ++t) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        if (sharp[t][k]) {
+          action(mesh.triangles[t][k], mesh.triangles[t][(k + 1) % 3], sharp[t][k]);
+        }
+      }
+    }
+  };
+  for_each([&](Index u, Index v, bool) { parent[root(u)] = root(v); });
+  std::vector<std::size_t> sides(mesh.vertices.size(), 0);  // every edge has two
+  for_each([&](Index u, Index, bool) { ++sides[root(u)]; });
+  for_each([&](Index u, Index, bool& is_sharp) { is_sharp = sides[root(u)] >= 2 * fewest_edges; });
+}
+
+/// The triangles around a node, by the side of the creases that they are on.
+std::vector<std::vector<Index>> sides_around(const TriangleMesh& mesh, const EdgeFlags& sharp,
+                                             const std::vector<std::array<Index, 3>>& across, Index node,
+                                             std::span<const Index> around) {
+  std::vector<Index> open(around.begin(), around.end());
+  std::vector<std::vector<Index>> sides;
+  while (!open.empty()) {
+    std::vector<Index> side{open.back()};
+    open.pop_back();
+    for (std::size_t i = 0; i < side.size(); ++i) {
+      const Index t = side[i];
+      for (std::size_t k = 0; k < 3; ++k) {
+        const bool at_node = mesh.triangles[t][k] == node || mesh.triangles[t][(k + 1) % 3] == node;
+        const auto found = at_node && !sharp[t][k] ? std::find(open.begin(), open.end(), across[t][k]) : open.end();
+        if (found != open.end()) {
+          side.push_back(*found);
+          open.erase(found);
+        }
+      }
+    }
+    sides.push_back(std::move(side));
+  }
+  return sides;
+}
+
+/// Mean of the facets' normals at a node, by their angles there.
+Vec3 mean_normal(const TriangleMesh& mesh, const std::vector<Vec3>& facets, Index node,
+                 const std::vector<Index>& triangles) {
+  Vec3 sum = Vec3::Zero();
+  for (const Index t : triangles) {
+    const auto& v = mesh.triangles[t];
+    const auto c = static_cast<std::size_t>(std::find(v.begin(), v.end(), node) - v.begin());
+    const Vec3 a = mesh.vertices[v[(c + 1) % 3]] - mesh.vertices[node];
+    const Vec3 b = mesh.vertices[v[(c + 2) % 3]] - mesh.vertices[node];
+    sum += std::atan2(a.cross(b).norm(), a.dot(b)) * facets[t];
+  }
+  return sum.norm() > 1e-6 ? Vec3(sum.normalized()) : facets[triangles[0]];
+}
+
+}  // namespace
+
+bool same_topology(const TriangleMesh& mesh, const Target& target) {
+  if (mesh.triangles == target.mesh().triangles) {
+    return true;
+  }
+  const MeshFacts x = examine(mesh), y = examine(target.mesh());
+  const auto agree = [&](std::size_t closed) {
+    return x.boundary_loops + closed == y.boundary_loops && x.euler == y.euler + static_cast<long>(closed);
+  };
+  return x.components == y.components && (agree(0) || agree(target.point_loops()));
+}
+
+TriangleMesh decimation(const Target& target, std::size_t triangles) {
+  DecimateOptions options;
+  options.triangles = std::max<std::size_t>(triangles, 4);
+  options.levelled = false;
+  return decimate(target.mesh(), options).mesh;
+}
+
+TriangleMesh decimation_within(const Target& target, double error) {
+  TriangleMesh mesh = decimation(target, std::min(first_rung, target.mesh().triangles.size()));
+  for (int rung = 0; rung < 2; ++rung) {
+    const double wanted = static_cast<double>(mesh.triangles.size()) * sampled_error(mesh, target) / error;
+    if (wanted >= static_cast<double>(target.mesh().triangles.size())) {
+      return target.mesh();
+    }
+    mesh = decimation(target, static_cast<std::size_t>(wanted));
+  }
+  return mesh;
+}
+
+ShellMesh shells_on(const Target& target, const TriangleMesh& mesh, Patch patch) {
+  ShellMesh shell;
+  shell.vertices = mesh.vertices;
+  shell.triangles = mesh.triangles;
+  shell.patch = patch;
+  take_normals_from(target, shell);
+  const auto facets = facet_normals(mesh);
+  const Incidence around = incidence(mesh);
+  const auto across = neighbours(mesh, around);
+  EdgeFlags sharp = sharp_edges(mesh, target, facets, across);
+  drop_short_curves(mesh, sharp);
+  const auto is_creased = [](const auto& edges) { return edges[0] || edges[1] || edges[2]; };
+  if (std::none_of(sharp.begin(), sharp.end(), is_creased)) {
+    return shell;
+  }
+  shell.corner_normals.resize(mesh.triangles.size());
+  for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
+    const auto node = static_cast<Index>(v);
+    const auto sides = sides_around(mesh, sharp, across, node, around.of(node));
+    for (const auto& side : sides) {
+      const Vec3 normal = sides.size() == 1 ? shell.normals[v] : mean_normal(mesh, facets, node, side);
+      for (const Index t : side) {
+        const auto& corners = mesh.triangles[t];
+        const auto k = static_cast<std::size_t>(std::find(corners.begin(), corners.end(), node) - corners.begin());
+        shell.corner_normals[t][k] = normal;
+      }
+    }
+  }
+  return shell;
+}
+
+}  // namespace tunica

@@ -1,0 +1,24 @@
+#pragma once
+
+#include "shell/shell_mesh.hpp"
+#include "shell/target.hpp"
+
+namespace tunica {
+
+/// Whether components, boundary loops and handles are as many; loops of the target that are a point may be closed.
+bool same_topology(const TriangleMesh& mesh, const Target& target);
+
+/// A quadric decimation of the target with so many triangles.
+TriangleMesh decimation(const Target& target, std::size_t triangles);
+
+/// One whose flat facets are about `error` (mm, sampled) from the target: flat errors go with 1 / triangles.
+TriangleMesh decimation_within(const Target& target, double error);
+
+/// A mesh on the target as shells: the target's normals at its nodes, one for each side along its creases.
+///
+/// A crease is a curve of the target, of three edges of the mesh or more, across which the target's normal turns by
+/// more than `crease_angle` within a fraction of a triangle: what turns as far over the whole triangle is curved.
+/// @param patch  of the shells
+ShellMesh shells_on(const Target& target, const TriangleMesh& mesh, Patch patch);
+
+}  // namespace tunica
