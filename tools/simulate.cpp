@@ -61,7 +61,7 @@ void declare(cli::Tool& tool, Arguments& a) {
       ->allow_extra_args(false)  // the next word is a file
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
   app.add_flag("--static", a.is_static, "solve for the state of rest");
-  app.add_option("--load-steps", a.load_steps, "static: steps in which the load grows (default 10)")->type_name("N");
+  app.add_option("--load-steps", a.load_steps, "static: steps in which the load grows, each written (default: all at once)")->type_name("N");
   tool.quantity("--duration", a.duration, dimension::time, "dynamic: time simulated, e.g. 2s");
   tool.quantity("--step", a.step, dimension::time, "dynamic: time step, e.g. 40ms");
   tool.quantity("--ramp", a.ramp, dimension::time,
@@ -193,7 +193,7 @@ void set_kind(const Arguments& a, Scene& scene, Ramp& load_ramp) {
         throw UsageError(fmt::format("--static and {} contradict each other: give one", flag));
       }
     }
-    scene.run.kind = StaticRun{false, equal_load_factors(count(a.load_steps, "--load-steps", 1e6).value_or(10))};
+    scene.run.kind = StaticRun{false, equal_load_factors(count(a.load_steps, "--load-steps", 1e6).value_or(1))};
     return;
   }
   if (!a.duration && !a.step) {
@@ -354,6 +354,8 @@ void prepare_result(Json& result, const Model& model) {
             {"step_parts", 0},
             {"converged", false},
             {"max_displacement_mm", nullptr},
+            {"max_node_displacement_mm", nullptr},
+            {"wall", nullptr},
             {"volume_before_mm3", nullptr},
             {"volume_after_mm3", nullptr},
             {"strain_energy_mj", nullptr},
@@ -369,6 +371,8 @@ void prepare_result(Json& result, const Model& model) {
             {"buckling_factors", Json::array()},
             {"limit_load_factors", Json::array()},
             {"branch_load_factors", Json::array()},
+            {"snaps", Json::array()},
+            {"energy", nullptr},
             {"short_waves_stiffened_from", nullptr}};
   for (const Probe& probe : model.probes) {
     result["probes"][probe.name] = {{"time_s", Json::array()},
@@ -379,12 +383,18 @@ void prepare_result(Json& result, const Model& model) {
 }
 
 // What is known of a run that may still fail.
-void report_state(Json& result, const Model& model, const State& state, bool dynamic) {
+void report_state(Json& result, const Model& model, const State& state, const ElementFields& fields, bool dynamic) {
   double most = 0;
   for (const Vec3& u : state.displacement) {
     most = std::max(most, u.norm());
   }
-  result["max_displacement_mm"] = most;
+  result["max_displacement_mm"] = fields.largest_displacement;
+  result["max_node_displacement_mm"] = most;
+  result["wall"] = {{"stress_p99_mpa", fields.wall.stress_p99},
+                    {"stress_max_mpa", fields.wall.stress_max},
+                    {"stress_max_at_mm", triple(fields.wall.stress_max_at)},
+                    {"strain_p99_percent", 1e2 * fields.wall.strain_p99},
+                    {"strain_max_percent", 1e2 * fields.wall.strain_max}};
   if (result["volume_before_mm3"].is_null()) {
     result["volume_before_mm3"] = or_null(state.volume);
   }
@@ -406,7 +416,6 @@ void report_summary(Json& result, const Summary& summary, bool converged, std::o
   result["steps"] = summary.steps;
   result["step_parts"] = summary.parts;
   result["converged"] = converged;
-  result["max_displacement_mm"] = summary.max_displacement;
   result["volume_before_mm3"] = or_null(summary.volume_before);
   result["volume_after_mm3"] = or_null(summary.volume_after);
   result["strain_energy_mj"] = summary.strain_energy;
@@ -418,6 +427,16 @@ void report_summary(Json& result, const Summary& summary, bool converged, std::o
   result["limit_load_factors"] = summary.limit_factors;
   result["branch_load_factors"] = summary.branch_factors;
   result["cg_iterations"] = summary.cg_iterations;
+  for (const Snap& snap : summary.snaps) {
+    result["snaps"].push_back({{"load_factor", snap.load_factor}, {"distance_mm", snap.distance}});
+  }
+  if (const auto& energy = summary.energy) {
+    result["energy"] = {{"work_mj", energy->work},
+                        {"damped_mj", energy->damped},
+                        {"lost_mj", energy->lost},
+                        {"gained_percent", 1e2 * energy->gained},
+                        {"gaining_step", energy->gaining_step > 0 ? Json(energy->gaining_step) : Json()}};
+  }
   const std::vector<double>& seconds = summary.seconds_per_step;
   if (!seconds.empty()) {
     result["ms_per_step"] = {{"median", 1e3 * median(seconds)},
@@ -513,7 +532,8 @@ RunIdentity identity_of_run(const cli::Tool& tool, const Scene& scene, const std
 
 // Modes have shapes, but no size: nothing of a deformed state is claimed.
 void report_modes(Json& result, const Summary& summary) {
-  for (const char* key : {"max_displacement_mm", "volume_after_mm3", "strain_energy_mj"}) {
+  for (const char* key :
+       {"max_displacement_mm", "max_node_displacement_mm", "wall", "volume_after_mm3", "strain_energy_mj"}) {
     result[key] = nullptr;
   }
   result["frequencies_hz"] = summary.frequencies;
@@ -530,6 +550,47 @@ std::string modes_note(const Summary& summary, std::size_t asked) {
   }
   return fmt::format("{}{}{}", text, vibrates ? " Hz" : "",
                      values.size() < asked ? fmt::format(", of {} asked for: there are no more", asked) : "");
+}
+
+// What a user should know of a run that has ended well.
+void warn_of_run(cli::Tool& tool, const fs::path& subject, const RunSettings& run, const Summary& summary,
+                 std::size_t unresolved) {
+  for (const Snap& snap : summary.snaps) {
+    tool.warn(
+        fmt::format("{}: at load factor {:.6g} the path of equilibria breaks off (limit load): the shell snaps, by up "
+                    "to {:.3g} mm, to the next state of rest, from which the load goes on; arc length shows the path, "
+                    "a dynamic run the motion",
+                    subject.string(), snap.load_factor, snap.distance));
+  }
+  if (summary.energy && summary.energy->gaining_step > 0) {
+    tool.warn(
+        fmt::format("{}: time integration gains energy, {:.3g} % of the largest so far, more than 10 % from step {} "
+                    "({:.6g} s) on: the steps are too coarse for the motion: take shorter ones, or a smaller "
+                    "spectral_radius",
+                    subject.string(), 1e2 * summary.energy->gained, summary.energy->gaining_step,
+                    summary.energy->gaining_time));
+  }
+  if (summary.stiffened_from) {
+    tool.warn(
+        fmt::format("{}: the mesh is coarse for so thin a curved shell (h^2 > 3 R t): from {} {:.4g} on, where it "
+                    "would have buckled in waves as short as its elements, these were made stiff; whether the shell "
+                    "itself buckles this mesh does not resolve: refine it",
+                    subject.string(), std::holds_alternative<DynamicRun>(run.kind) ? "second" : "load factor",
+                    *summary.stiffened_from));
+  }
+  constexpr double notable_residual = 1e-3;
+  if (run.newton_max == 1 && summary.residual > notable_residual) {
+    tool.warn(
+        fmt::format("{}: one linearisation per step left {:.2g} of the forces unbalanced in the last one: take "
+                    "smaller steps, or leave newton_max at its default",
+                    subject.string(), summary.residual));
+  }
+  if (unresolved > 0) {
+    tool.warn(
+        fmt::format("{}: {} shells bend by more than 30 degrees within themselves: the mesh is too coarse for "
+                    "this load, refine it there",
+                    subject.string(), unresolved));
+  }
 }
 
 void simulate(cli::Tool& tool, const Arguments& a) {
@@ -583,7 +644,9 @@ void simulate(cli::Tool& tool, const Arguments& a) {
   const RunIdentity& origin = journal->identity();
 
   stage.emplace(tool, "write");
-  ResultFile file(out, model, {series, origin.command, origin.scene, origin.inputs, drawing.level(), tool.force()});
+  const char* const time_units = dynamic != nullptr ? "s" : frequencies != nullptr ? "Hz" : "1";
+  ResultFile file(out, model,
+                  {series, time_units, origin.command, origin.scene, origin.inputs, drawing.level(), tool.force()});
   std::optional<ResultExport> exported;
   if (drawing.pvd || drawing.xmf) {
     exported.emplace(out, model, exports);
@@ -592,8 +655,8 @@ void simulate(cli::Tool& tool, const Arguments& a) {
   constexpr double most_bending = std::numbers::pi / 6;
   std::size_t unresolved = 0;
   const auto record = [&](const State& state) {
-    report_state(tool.result(), model, state, dynamic != nullptr);
     const ElementFields of_state = fields(state);
+    report_state(tool.result(), model, state, of_state, dynamic != nullptr);
     file.append(state, of_state);
     if (const auto written = exported ? exported->append(state, of_state) : std::nullopt) {
       tool.wrote(*written);
@@ -651,28 +714,9 @@ void simulate(cli::Tool& tool, const Arguments& a) {
     return;
   }
   tool.note(fmt::format("{} nodes in {} steps, {}: largest displacement {:.4g} mm", model.node_count(), summary.steps,
-                        converged ? "converged" : "not asked to converge", summary.max_displacement));
-  if (summary.stiffened_from) {
-    tool.warn(
-        fmt::format("{}: the mesh is coarse for so thin a curved shell (h^2 > 3 R t): from {} {:.4g} on, where it "
-                    "would have buckled in waves as short as its elements, these were made stiff; whether the shell "
-                    "itself buckles this mesh does not resolve: refine it",
-                    subject.string(), std::holds_alternative<DynamicRun>(scene.run.kind) ? "second" : "load factor",
-                    *summary.stiffened_from));
-  }
-  constexpr double notable_residual = 1e-3;
-  if (scene.run.newton_max == 1 && summary.residual > notable_residual) {
-    tool.warn(
-        fmt::format("{}: one linearisation per step left {:.2g} of the forces unbalanced in the last one: take "
-                    "smaller steps, or leave newton_max at its default",
-                    subject.string(), summary.residual));
-  }
-  if (unresolved > 0) {
-    tool.warn(
-        fmt::format("{}: {} shells bend by more than 30 degrees within themselves: the mesh is too coarse for "
-                    "this load, refine it there",
-                    subject.string(), unresolved));
-  }
+                        converged ? "converged" : "not asked to converge",
+                        tool.result()["max_displacement_mm"].get<double>()));
+  warn_of_run(tool, subject, scene.run, summary, unresolved);
 }
 
 }  // namespace
