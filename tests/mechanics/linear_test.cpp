@@ -263,7 +263,7 @@ TEST_P(FreeEndedCylinder, IsRightOrRefusedHoweverThin) {
   body.curved = true;
   body.rest = Rest::curved;
   for (const Vec3& p : grid.mesh.vertices) {
-    body.mesh.normals.push_back(-Vec3(p.x(), 0, p.z()).normalized());
+    body.mesh.normals.push_back(Vec3(p.x(), 0, p.z()).normalized());
   }
   model.shells.push_back(body);
   hold(
