@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 namespace tunica {
 namespace {
@@ -92,11 +93,26 @@ ShellMesh moved_mesh(const ShellMesh& mesh, std::size_t first, const State& stat
   return moved;
 }
 
+/// A mesh without normals with those of its facets; nothing where it has its own.
+std::optional<ShellMesh> faceted(const ShellMesh& mesh) {
+  if (!mesh.normals.empty() || !mesh.corner_normals.empty()) {
+    return std::nullopt;
+  }
+  ShellMesh result = mesh;
+  for (const auto& [i, j, k] : mesh.triangles) {
+    const Vec3& origin = mesh.vertices[i];
+    const Vec3 normal = (mesh.vertices[j] - origin).cross(mesh.vertices[k] - origin).normalized();
+    result.corner_normals.push_back({normal, normal, normal});
+  }
+  return result;
+}
+
 /// The patches of a body in the reference and in a state.
 class MovedPatches {
 public:
   MovedPatches(const Model& model, std::size_t body, const State& state)
-      : mesh_(model.shells[body].mesh),
+      : faceted_(faceted(model.shells[body].mesh)),
+        mesh_(faceted_ ? *faceted_ : model.shells[body].mesh),
         displacement_(state.displacement.data() + model.first_node(body)),
         before_(curved_patches(mesh_)),
         after_(curved_patches(moved_mesh(mesh_, model.first_node(body), state, collapsed_))) {}
@@ -111,6 +127,7 @@ public:
   }
 
 private:
+  std::optional<ShellMesh> faceted_;
   const ShellMesh& mesh_;
   const Vec3* displacement_;
   std::vector<std::uint8_t> collapsed_;
