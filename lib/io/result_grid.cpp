@@ -68,7 +68,7 @@ std::span<const GridField> ResultGrid::fixed_layout() { return fixed_fields; }
 std::span<const GridField> ResultGrid::layout() { return state_fields; }
 
 ResultGrid::Body ResultGrid::make_body(const ShellMesh& mesh, int level) {
-  Body body{tessellate_uniformly(mesh, level), {}, {}, {}, mesh.vertices.size()};
+  Body body{tessellate_uniformly(mesh, level), {}, {}, mesh.vertices.size()};
   // Where a vertex is, as the weights of the nodes it depends on: the same from both sides of an edge.
   using Key = std::array<std::pair<Index, int>, 2>;
   std::map<Key, Index> of_edges;
@@ -97,9 +97,6 @@ ResultGrid::Body ResultGrid::make_body(const ShellMesh& mesh, int level) {
     body.point.push_back(point);
   }
   body.points = shared.size();
-  for (const double count : shared) {
-    body.shared.push_back(count > 0 ? 1 : 0);
-  }
   for (const Index point : body.point) {
     body.weight.push_back(1 / shared[point]);
   }
@@ -141,14 +138,12 @@ ResultGrid::ResultGrid(const Model& model, int level) : model_(model) {
     const std::size_t first = points();
     TUNICA_ASSERT(first + body.points <= max_index);
     std::vector<Vec3> means(body.points, Vec3::Zero());
-    for (std::size_t i = 0; i < shell.mesh.vertices.size(); ++i) {
-      means[i] = body.shared[i] ? Vec3::Zero() : shell.mesh.vertices[i];
-    }
     std::vector<Vec3> normal(body.points, Vec3::Zero());
     for (std::size_t v = 0; v < body.point.size(); ++v) {
       means[body.point[v]] += body.weight[v] * surface.mesh.vertices[v];
       normal[body.point[v]] += patches[surface.vertex_shell[v]].normal(surface.barycentric[v]);
     }
+    std::copy(shell.mesh.vertices.begin(), shell.mesh.vertices.end(), means.begin());  // to the bit
     for (std::size_t i = 0; i < means.size(); ++i) {
       coordinates_.insert(coordinates_.end(), means[i].data(), means[i].data() + 3);
       add(normals, normal[i].stableNormalized());

@@ -46,7 +46,6 @@ private:
     Tessellation surface;        ///< patch by patch
     std::vector<Index> point;    ///< #vertices of it: of the body
     std::vector<double> weight;  ///< #vertices of it: one over how many share the point
-    std::vector<char> shared;    ///< #points: a patch has it; a node without triangles stays alone
     std::size_t points = 0;
   };
   [[nodiscard]] static Body make_body(const ShellMesh& mesh, int level);
