@@ -162,12 +162,11 @@ constexpr std::array about_fields{
     About{"principal_strain_top", "1", "largest and smallest strain at the face the normal points to"},
     About{"principal_strain_bottom", "1", "largest and smallest strain at the other face"}};
 
-constexpr std::array about_steps{
-    About{"PartOffsets", "1", "first part of each state"},
-    About{"PointOffsets", "1", "first point of each state"},
-    About{"CellOffsets", "1", "first triangle of each state"},
-    About{"ConnectivityIdOffsets", "1", "first entry of Connectivity of each state"},
-    About{"NumberOfParts", "1", "parts of each state"}};
+constexpr std::array about_steps{About{"PartOffsets", "1", "first part of each state"},
+                                 About{"PointOffsets", "1", "first point of each state"},
+                                 About{"CellOffsets", "1", "first triangle of each state"},
+                                 About{"ConnectivityIdOffsets", "1", "first entry of Connectivity of each state"},
+                                 About{"NumberOfParts", "1", "parts of each state"}};
 
 struct ProbeSeries {
   std::size_t node = 0;

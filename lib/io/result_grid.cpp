@@ -79,8 +79,8 @@ ResultGrid::Body ResultGrid::make_body(const ShellMesh& mesh, int level) {
     const auto second = static_cast<int>(std::lround(level * b.x()));
     const auto third = static_cast<int>(std::lround(level * b.y()));
     std::vector<std::pair<Index, int>> weights;
-    for (const auto& [node, weight] : {std::pair{corners[0], level - second - third}, std::pair{corners[1], second},
-                                       std::pair{corners[2], third}}) {
+    for (const auto& [node, weight] :
+         {std::pair{corners[0], level - second - third}, std::pair{corners[1], second}, std::pair{corners[2], third}}) {
       if (weight > 0) {
         weights.emplace_back(node, weight);
       }
@@ -151,10 +151,9 @@ ResultGrid::ResultGrid(const Model& model, int level) : model_(model) {
     add_means(
         body,
         [&](std::size_t v) {
-          return shell.thickness.size() == 1
-                     ? shell.thickness.front()
-                     : between(shell.mesh.triangles[surface.vertex_shell[v]], surface.barycentric[v],
-                               shell.thickness.data());
+          return shell.thickness.size() == 1 ? shell.thickness.front()
+                                             : between(shell.mesh.triangles[surface.vertex_shell[v]],
+                                                       surface.barycentric[v], shell.thickness.data());
         },
         thicknesses);
     for (const auto& triangle : surface.mesh.triangles) {

@@ -16,9 +16,9 @@ struct GridField {
   bool of_cells;
 };
 
-/// The curved surfaces of all bodies as one grid of linear triangles: each patch cut into level^2; the patches of a body
-/// share their points at nodes and edges, where each point is the mean of theirs (comas patches do not quite meet). The
-/// nodes of a body come first, in their order. The model must outlive it.
+/// The curved surfaces of all bodies as one grid of linear triangles: each patch cut into level^2; the patches of a
+/// body share their points at nodes and edges, where each point is the mean of theirs (comas patches do not quite
+/// meet). The nodes of a body come first, in their order. The model must outlive it.
 class ResultGrid {
 public:
   /// @param level  pieces per edge; 0: as drawing_level() says

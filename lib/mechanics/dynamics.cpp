@@ -310,8 +310,8 @@ private:
     for (std::size_t i = 0; i < system_.held.size(); ++i) {
       if (system_.held[i]) {
         const auto k = static_cast<Eigen::Index>(i);
-        acting_[k] = forces_.internal[k] + mass_[k] * (motion.rates.acceleration[k] +
-                                                       run_.damping.mass * motion.rates.velocity[k]);
+        acting_[k] = forces_.internal[k] +
+                     mass_[k] * (motion.rates.acceleration[k] + run_.damping.mass * motion.rates.velocity[k]);
       }
     }
   }
@@ -481,11 +481,11 @@ private:
   BlockMatrix matrix_;
   VectorX mass_;
   Forces forces_;
-  std::vector<ElementState> deformation_;   ///< at the start of the step
-  std::vector<ElementState> before_;        ///< at the start of the step before, where damping asks for it
-  VectorX change_;   ///< displacements and rotations of the last step
-  VectorX acting_;   ///< at the start of the step
-  double work_ = 0;  ///< mJ, since energies were last balanced
+  std::vector<ElementState> deformation_;  ///< at the start of the step
+  std::vector<ElementState> before_;       ///< at the start of the step before, where damping asks for it
+  VectorX change_;                         ///< displacements and rotations of the last step
+  VectorX acting_;                         ///< at the start of the step
+  double work_ = 0;                        ///< mJ, since energies were last balanced
   double damped_ = 0;
   std::vector<ElementState> viscous_zero_;  ///< the deformation at which damping by beta K vanishes
   double length_before_ = 0;                ///< s

@@ -112,10 +112,10 @@ private:
 
   static void require_digits(double error) {
     if (error > largest_round_off) {
-      throw RequirementError(
-          fmt::format("round-off leaves an error of {:.2g} % in the linear solution, more than {:g} %: the shell is too "
-                      "thin for double precision on this mesh: take fewer elements, or a thicker wall",
-                      100 * error, 100 * largest_round_off));
+      throw RequirementError(fmt::format(
+          "round-off leaves an error of {:.2g} % in the linear solution, more than {:g} %: the shell is too "
+          "thin for double precision on this mesh: take fewer elements, or a thicker wall",
+          100 * error, 100 * largest_round_off));
     }
   }
 

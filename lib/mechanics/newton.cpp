@@ -134,8 +134,8 @@ private:
 
   /// At the floor of round-off a residual says nothing about the error any more; the increments still do.
   [[nodiscard]] bool at_rest() const {
-    return result_.residual <= settings_.converge || (result_.residual * now_.scale <= now_.floor &&
-                                                      last_size_ <= largest_round_off * result_.reached);
+    return result_.residual <= settings_.converge ||
+           (result_.residual * now_.scale <= now_.floor && last_size_ <= largest_round_off * result_.reached);
   }
 
   /// By the tangent; prescribed displacements move in the first. @return false where there is no solution.
@@ -229,9 +229,9 @@ private:
   bool moving_;  ///< prescribed displacements are still to be moved
   bool tangent_is_current_ = false;
   VectorX increment_;
-  VectorX whole_;           ///< the sum of all increments
-  double work_ = 0;         ///< of the unbalanced forces along the increment
-  double last_size_ = 0;    ///< of the last increment
+  VectorX whole_;         ///< the sum of all increments
+  double work_ = 0;       ///< of the unbalanced forces along the increment
+  double last_size_ = 0;  ///< of the last increment
   double largest_solution_ = 0;
   double previous_residual_ = 0;
 };

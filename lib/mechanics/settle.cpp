@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::size_t most_iterations = 200;
 constexpr double first_viscosity = 1e-3;  // of the stiffness against moving one node alone
-constexpr double least_viscosity = 1e-9;   // less is none
+constexpr double least_viscosity = 1e-9;  // less is none
 constexpr double largest_viscosity = 1e6;
 /// Of the work of the unbalanced forces along a step that they may do against it at its end.
 constexpr double largest_push_back = 0.5;

@@ -537,8 +537,7 @@ void linear_forces(const ShellSystem& system, const VectorX& displacement, Vecto
         for (int k = 0; k < 3; ++k) {
           const auto corner = static_cast<std::size_t>(k);
           LaneVector6 moved;
-          set_lanes(
-              moved, [&](std::size_t l) { return displacement.segment<6>(at(group[l]->nodes[corner])); });
+          set_lanes(moved, [&](std::size_t l) { return displacement.segment<6>(at(group[l]->nodes[corner])); });
           motion.segment<6>(6 * k) = moved;
         }
         const LaneVector18 force = linear_force(elements, motion);

@@ -35,8 +35,8 @@ struct State {
   bool linear = false;  ///< of the linear theory: rotations are not finite ones
 };
 
-/// What the wall bears, over all bodies: of von Mises stress and largest principal strain, each the larger of both faces
-/// after averaging at the nodes within a body. p99 is passed on 1 % of the area.
+/// What the wall bears, over all bodies: of von Mises stress and largest principal strain, each the larger of both
+/// faces after averaging at the nodes within a body. p99 is passed on 1 % of the area.
 struct Wall {
   double stress_p99 = 0;  ///< MPa
   double stress_max = 0;
@@ -103,9 +103,9 @@ struct Summary {
   /// would have buckled in them (shell_element.hpp).
   std::optional<double> stiffened_from;
   std::optional<EnergyBalance> energy;  ///< of a dynamic run
-  std::vector<Snap> snaps;             ///< under load control, in order
-  std::vector<double> limit_factors;   ///< load factors at which a path by arc length turns, in its order
-  std::vector<double> branch_factors;  ///< and near which other paths leave it
+  std::vector<Snap> snaps;              ///< under load control, in order
+  std::vector<double> limit_factors;    ///< load factors at which a path by arc length turns, in its order
+  std::vector<double> branch_factors;   ///< and near which other paths leave it
 };
 
 /// Everything a run needs to go on after a step as if nothing had happened: the numbers as they stand in memory, so
@@ -149,8 +149,8 @@ void check_model(const Model& model, const RunSettings& settings);
 Summary solve(const Model& model, const RunSettings& settings, const std::function<void(const State&)>& on_state,
               const Progress& progress = {}, const Resumption& resumption = {});
 
-/// Forces, moments and stresses of every triangle in one state, and what is largest. For many states of one model: the elements are made
-/// ready once. The model must outlive it.
+/// Forces, moments and stresses of every triangle in one state, and what is largest. For many states of one model: the
+/// elements are made ready once. The model must outlive it.
 class ElementFieldEvaluator {
 public:
   explicit ElementFieldEvaluator(const Model& model);

@@ -44,8 +44,8 @@ using Clock = std::chrono::steady_clock;
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
-/// Smallest increment that is tried before the load counts as one without equilibrium near: this part of the whole load,
-/// and of a load step.
+/// Smallest increment that is tried before the load counts as one without equilibrium near: this part of the whole
+/// load, and of a load step.
 constexpr double smallest_of_load = 1.0 / 4096;
 constexpr double smallest_of_step = 1.0 / 16;
 /// Where a path breaks off, the shell is let go this many smallest increments beyond, so that it does not come back.
@@ -201,8 +201,8 @@ Failure why(const NewtonResult& result, const SettleResult& let_go, bool prescri
 }
 
 /// What load control does: the load grows to one load factor after the other, each in one step, which is cut only where
-/// Newton's method fails. Where the path of equilibria breaks off, the shell goes on from the state of rest that it then
-/// finds.
+/// Newton's method fails. Where the path of equilibria breaks off, the shell goes on from the state of rest that it
+/// then finds.
 class LoadControl {
 public:
   LoadControl(ShellSystem& system, const Model& model, const RunSettings& settings, const StaticRun& run,
@@ -373,7 +373,7 @@ private:
   Configuration configuration_;
   Summary summary_;
   double factor_ = 0;
-  double shown_ = 0;                                             ///< load factor of the last state handed over
+  double shown_ = 0;                                            ///< load factor of the last state handed over
   double increment_ = std::numeric_limits<double>::infinity();  ///< of the load factor, to be tried next
 };
 

@@ -226,11 +226,13 @@ TEST(Energy, OfPrescribedMotionIsWorkToo) {
 }
 
 TEST(Energy, GainedByTimeIntegrationIsNamedWithItsStep) {
-  // Steps too coarse for a large motion: every one converges, and the strip comes to hold more energy than it was given.
+  // Steps too coarse for a large motion: every one converges, and the strip comes to hold more energy than it was
+  // given.
   const Cantilever strip(0.5);
   const Balanced wild = balance(strip.model, strip.settings(Integrator::generalised_alpha, 0.8, 12, 8));
   const double given = wild.stored[5];  // after the pulse
-  const auto first = std::find_if(wild.stored.begin() + 5, wild.stored.end(), [&](double e) { return e > 1.1 * given; });
+  const auto first =
+      std::find_if(wild.stored.begin() + 5, wild.stored.end(), [&](double e) { return e > 1.1 * given; });
   ASSERT_NE(first, wild.stored.end());
   EXPECT_GT(wild.energy.gained, 0.1);
   ASSERT_GT(wild.energy.gaining_step, 5U);

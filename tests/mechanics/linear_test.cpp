@@ -256,8 +256,8 @@ INSTANTIATE_TEST_SUITE_P(Linear, FreeEndedCylinder, testing::Values(1e4, 1e5, 1e
 TEST_P(FreeEndedCylinder, IsRightOrRefusedHoweverThin) {
   constexpr std::size_t n = 96;
   const double thickness = 1 / GetParam();
-  const Grid grid = make_grid(
-      n, n, [](double u, double v) { return Vec3(std::sin(pi / 2 * u), v, std::cos(pi / 2 * u)); });
+  const Grid grid =
+      make_grid(n, n, [](double u, double v) { return Vec3(std::sin(pi / 2 * u), v, std::cos(pi / 2 * u)); });
   Model model;
   ShellBody body = flat_body(grid.mesh, 1, 0.3, thickness);
   body.curved = true;

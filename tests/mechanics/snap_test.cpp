@@ -1,5 +1,5 @@
-// Load control where the path of equilibria breaks off: the next state of rest, whatever the steps. Figures of Sze, Liu,
-// Lo 2004, "Popular benchmark problems for geometric nonlinear analysis of shells", tables 5 to 8.
+// Load control where the path of equilibria breaks off: the next state of rest, whatever the steps. Figures of Sze,
+// Liu, Lo 2004, "Popular benchmark problems for geometric nonlinear analysis of shells", tables 5 to 8.
 
 #include "benchmarks.hpp"
 
@@ -42,9 +42,7 @@ Model quarter_cylinder(std::size_t around, std::size_t along, double radius, dou
   return model;
 }
 
-void add_force(Model& model, Index node, double z) {
-  model.loads.push_back({0, ForceLoad{{node}, Vec3(0, 0, z)}, {}});
-}
+void add_force(Model& model, Index node, double z) { model.loads.push_back({0, ForceLoad{{node}, Vec3(0, 0, z)}, {}}); }
 
 struct Outcome {
   Summary summary;

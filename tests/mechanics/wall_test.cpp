@@ -1,7 +1,7 @@
 // What a run says about the wall: largest displacement of the curved surface, stresses and strains at the nodes.
 
-#include "benchmarks.hpp"
 #include "mechanics/wall.hpp"
+#include "benchmarks.hpp"
 
 #include <gtest/gtest.h>
 
@@ -12,8 +12,8 @@ using namespace benchmarks;
 
 Model square(std::size_t n) {
   Model model;
-  model.shells.push_back(flat_body(make_grid(n, n, [](double u, double v) { return Vec3(3 * u, 2 * v, 0); }).mesh, 1,
-                                   0, 1));
+  model.shells.push_back(
+      flat_body(make_grid(n, n, [](double u, double v) { return Vec3(3 * u, 2 * v, 0); }).mesh, 1, 0, 1));
   return model;
 }
 
@@ -64,7 +64,8 @@ TEST(Wall, TheLargestDisplacementMayLieBetweenTheNodes) {
     for (const Vec3& u : state.displacement) {
       EXPECT_EQ(u.norm(), 0);
     }
-    EXPECT_NEAR(fields.largest_displacement, moment * length * length / (8 * bending), 0.01 * fields.largest_displacement);
+    EXPECT_NEAR(fields.largest_displacement, moment * length * length / (8 * bending),
+                0.01 * fields.largest_displacement);
   }
 }
 
