@@ -118,8 +118,15 @@ public:
     result_.converged = !moving_ && (now_.scale == 0 || result_.residual <= settings_.converge);
     while (!result_.converged && result_.valid && result_.iterations < settings_.newton_max) {
       check_interrupt();
-      result_.valid = find_increment() && advance();
-      result_.converged = result_.valid && at_rest();
+      const bool at_floor = result_.iterations > 0 && is_at_floor();
+      result_.valid = find_increment();
+      // What is left of the increments there is noise: told, but not added.
+      result_.converged =
+          result_.valid && at_floor && increment_size(system_, increment_) <= largest_round_off * result_.reached;
+      if (result_.valid && !result_.converged) {
+        result_.valid = advance();
+        result_.converged = result_.valid && at_rest();
+      }
     }
     return result_;
   }
@@ -132,10 +139,12 @@ private:
     return balance.scale > 0 ? norm / balance.scale : (norm > 0 ? 1.0 : 0.0);
   }
 
+  [[nodiscard]] bool is_at_floor() const { return result_.residual * now_.scale <= now_.floor; }
+
   /// At the floor of round-off a residual says nothing about the error any more; the increments still do.
   [[nodiscard]] bool at_rest() const {
     return result_.residual <= settings_.converge ||
-           (result_.residual * now_.scale <= now_.floor && last_size_ <= largest_round_off * result_.reached);
+           (is_at_floor() && last_size_ <= largest_round_off * result_.reached);
   }
 
   /// By the tangent; prescribed displacements move in the first. @return false where there is no solution.
