@@ -4,6 +4,7 @@
 #include "io/result_export.hpp"
 #include "io/result_file.hpp"
 #include "io/run_journal.hpp"
+#include "io/run_report.hpp"
 #include "io/scene.hpp"
 #include "io/scene_file.hpp"
 #include "mechanics/curved_displacement.hpp"
@@ -62,7 +63,9 @@ void declare(cli::Tool& tool, Arguments& a) {
       ->allow_extra_args(false)  // the next word is a file
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
   app.add_flag("--static", a.is_static, "solve for the state of rest");
-  app.add_option("--load-steps", a.load_steps, "static: steps in which the load grows (default 10)")->type_name("N");
+  app.add_option("--load-steps", a.load_steps,
+                 "static: steps in which the load grows, each written (default: all at once)")
+      ->type_name("N");
   tool.quantity("--duration", a.duration, dimension::time, "dynamic: time simulated, e.g. 2s");
   tool.quantity("--step", a.step, dimension::time, "dynamic: time step, e.g. 40ms");
   tool.quantity("--ramp", a.ramp, dimension::time,
@@ -194,7 +197,7 @@ void set_kind(const Arguments& a, Scene& scene, Ramp& load_ramp) {
         throw UsageError(fmt::format("--static and {} contradict each other: give one", flag));
       }
     }
-    scene.run.kind = StaticRun{false, equal_load_factors(count(a.load_steps, "--load-steps", 1e6).value_or(10))};
+    scene.run.kind = StaticRun{false, equal_load_factors(count(a.load_steps, "--load-steps", 1e6).value_or(1))};
     return;
   }
   if (!a.duration && !a.step) {
@@ -332,108 +335,6 @@ fs::path output_path(const CLI::App& app, const Arguments& a) {
   return out;
 }
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
-Json triple(const Vec3& v) { return Json::array({v.x(), v.y(), v.z()}); }
-
-Json or_null(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
-
-// The keys of the contract, undefined until the run fills them.
-void prepare_result(Json& result, const Model& model) {
-  std::size_t shells = 0;
-  for (const ShellBody& body : model.shells) {
-    shells += body.mesh.triangles.size();
-  }
-  result = {{"shells", shells},
-            {"tetrahedra", 0},
-            {"nodes", model.node_count()},
-            {"dof", nullptr},
-            {"steps", 0},
-            {"step_parts", 0},
-            {"converged", false},
-            {"max_displacement_mm", nullptr},
-            {"volume_before_mm3", nullptr},
-            {"volume_after_mm3", nullptr},
-            {"strain_energy_mj", nullptr},
-            {"residual", nullptr},
-            {"algebraic_error_percent", nullptr},
-            {"algebraic_error_is_lower_bound", false},
-            {"newton_iterations", 0},
-            {"cg_iterations", 0},
-            {"ms_per_step", {{"median", nullptr}, {"max", nullptr}}},
-            {"real_time_factor", nullptr},
-            {"probes", Json::object()},
-            {"frequencies_hz", Json::array()},
-            {"buckling_factors", Json::array()},
-            {"limit_load_factors", Json::array()},
-            {"branch_load_factors", Json::array()},
-            {"short_waves_stiffened_from", nullptr}};
-  for (const Probe& probe : model.probes) {
-    result["probes"][probe.name] = {{"time_s", Json::array()},
-                                    {"load_factor", Json::array()},
-                                    {"displacement_mm", Json::array()},
-                                    {"rotation_rad", Json::array()}};
-  }
-}
-
-// What is known of a run that may still fail.
-void report_state(Json& result, const Model& model, const State& state, bool dynamic) {
-  double most = 0;
-  for (const Vec3& u : state.displacement) {
-    most = std::max(most, u.norm());
-  }
-  result["max_displacement_mm"] = most;
-  if (result["volume_before_mm3"].is_null()) {
-    result["volume_before_mm3"] = or_null(state.volume);
-  }
-  result["volume_after_mm3"] = or_null(state.volume);
-  result["strain_energy_mj"] = state.strain_energy;
-  result["residual"] = state.residual;
-  for (const Probe& probe : model.probes) {
-    const std::size_t node = model.first_node(probe.body) + probe.node;
-    Json& record = result["probes"][probe.name];
-    record["time_s"].push_back(dynamic ? Json(state.time) : Json());
-    record["load_factor"].push_back(state.load_factor);
-    record["displacement_mm"].push_back(triple(state.displacement[node]));
-    record["rotation_rad"].push_back(triple(state.rotation[node]));
-  }
-}
-
-void report_summary(Json& result, const Summary& summary, bool converged, std::optional<double> duration) {
-  result["dof"] = summary.dof;
-  result["steps"] = summary.steps;
-  result["step_parts"] = summary.parts;
-  result["converged"] = converged;
-  result["max_displacement_mm"] = summary.max_displacement;
-  result["volume_before_mm3"] = or_null(summary.volume_before);
-  result["volume_after_mm3"] = or_null(summary.volume_after);
-  result["strain_energy_mj"] = summary.strain_energy;
-  result["residual"] = summary.residual;
-  result["algebraic_error_percent"] = summary.algebraic_error ? Json(1e2 * *summary.algebraic_error) : Json();
-  result["algebraic_error_is_lower_bound"] = summary.algebraic_error_is_bound;
-  result["newton_iterations"] = summary.newton_iterations;
-  result["short_waves_stiffened_from"] = or_null(summary.stiffened_from);
-  result["limit_load_factors"] = summary.limit_factors;
-  result["branch_load_factors"] = summary.branch_factors;
-  result["cg_iterations"] = summary.cg_iterations;
-  const std::vector<double>& seconds = summary.seconds_per_step;
-  if (!seconds.empty()) {
-    result["ms_per_step"] = {{"median", 1e3 * median(seconds)},
-                             {"max", 1e3 * *std::max_element(seconds.begin(), seconds.end())}};
-    double wall = 0;
-    for (const double s : seconds) {
-      wall += s;
-    }
-    if (duration && wall > 0) {
-      result["real_time_factor"] = *duration / wall;
-    }
-  }
-}
-
 // The scene, from wherever the command line says; what it was read from is registered.
 Scene read_scene_of_run(cli::Tool& tool, const Arguments& a, const std::optional<RunJournal>& before,
                         std::vector<fs::path>& inputs) {
@@ -511,27 +412,6 @@ RunIdentity identity_of_run(const cli::Tool& tool, const Scene& scene, const std
   return identity;
 }
 
-// Modes have shapes, but no size: nothing of a deformed state is claimed.
-void report_modes(Json& result, const Summary& summary) {
-  for (const char* key : {"max_displacement_mm", "volume_after_mm3", "strain_energy_mj"}) {
-    result[key] = nullptr;
-  }
-  result["frequencies_hz"] = summary.frequencies;
-  result["buckling_factors"] = summary.buckling_factors;
-}
-
-std::string modes_note(const Summary& summary, std::size_t asked) {
-  const bool vibrates = !summary.frequencies.empty();
-  const std::vector<double>& values = vibrates ? summary.frequencies : summary.buckling_factors;
-  std::string text =
-      fmt::format("{} {}: {:.6g}", values.size(), vibrates ? "frequencies" : "buckling factors", values.front());
-  if (values.size() > 1) {
-    text += fmt::format(" to {:.6g}", values.back());
-  }
-  return fmt::format("{}{}{}", text, vibrates ? " Hz" : "",
-                     values.size() < asked ? fmt::format(", of {} asked for: there are no more", asked) : "");
-}
-
 void simulate(cli::Tool& tool, const Arguments& a) {
   const fs::path out = output_path(tool.arguments(), a);
   std::optional<cli::Tool::Stage> stage(std::in_place, tool, "read");
@@ -586,7 +466,9 @@ void simulate(cli::Tool& tool, const Arguments& a) {
   const RunIdentity& origin = journal->identity();
 
   stage.emplace(tool, "write");
-  ResultFile file(out, model, {series, origin.command, origin.scene, origin.inputs, drawing.level(), tool.force()});
+  const char* const time_units = dynamic != nullptr ? "s" : frequencies != nullptr ? "Hz" : "1";
+  ResultFile file(out, model,
+                  {series, time_units, origin.command, origin.scene, origin.inputs, drawing.level(), tool.force()});
   std::optional<ResultExport> exported;
   if (drawing.pvd || drawing.xmf) {
     exported.emplace(out, model, exports);
@@ -595,8 +477,8 @@ void simulate(cli::Tool& tool, const Arguments& a) {
   constexpr double most_bending = std::numbers::pi / 6;
   std::size_t unresolved = 0;
   const auto record = [&](const State& state) {
-    report_state(tool.result(), model, state, dynamic != nullptr);
     const ElementFields of_state = fields(state);
+    report_state(tool.result(), model, state, of_state, dynamic != nullptr);
     file.append(state, of_state);
     if (const auto written = exported ? exported->append(state, of_state) : std::nullopt) {
       tool.wrote(*written);
@@ -654,27 +536,10 @@ void simulate(cli::Tool& tool, const Arguments& a) {
     return;
   }
   tool.note(fmt::format("{} nodes in {} steps, {}: largest displacement {:.4g} mm", model.node_count(), summary.steps,
-                        converged ? "converged" : "not asked to converge", summary.max_displacement));
-  if (summary.stiffened_from) {
-    tool.warn(
-        fmt::format("{}: the mesh is coarse for so thin a curved shell (h^2 > 3 R t): from {} {:.4g} on, where it "
-                    "would have buckled in waves as short as its elements, these were made stiff; whether the shell "
-                    "itself buckles this mesh does not resolve: refine it",
-                    subject.string(), std::holds_alternative<DynamicRun>(scene.run.kind) ? "second" : "load factor",
-                    *summary.stiffened_from));
-  }
-  constexpr double notable_residual = 1e-3;
-  if (scene.run.newton_max == 1 && summary.residual > notable_residual) {
-    tool.warn(
-        fmt::format("{}: one linearisation per step left {:.2g} of the forces unbalanced in the last one: take "
-                    "smaller steps, or leave newton_max at its default",
-                    subject.string(), summary.residual));
-  }
-  if (unresolved > 0) {
-    tool.warn(
-        fmt::format("{}: {} shells bend by more than 30 degrees within themselves: the mesh is too coarse for "
-                    "this load, refine it there",
-                    subject.string(), unresolved));
+                        converged ? "converged" : "not asked to converge",
+                        tool.result()["max_displacement_mm"].get<double>()));
+  for (const std::string& text : run_warnings(scene.run, summary, unresolved)) {
+    tool.warn(fmt::format("{}: {}", subject.string(), text));
   }
 }
 

@@ -106,6 +106,12 @@ void Writer::ascii_attribute(Id object, const char* name, const std::string& tex
   attribute(object, name, type.get(), {}, text.data());
 }
 
+void Writer::describe(const std::string& path, const std::string& units, const std::string& description) const {
+  const Handle dataset = own(H5Dopen2(root(), path.c_str(), H5P_DEFAULT), "written");
+  ascii_attribute(dataset.get(), "units", units);
+  ascii_attribute(dataset.get(), "description", description);
+}
+
 Handle Writer::dataset(Id parent, const std::string& name, Id type, const std::vector<Size>& shape, const void* values,
                        bool rewritten) const {
   errno = 0;

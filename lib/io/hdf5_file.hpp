@@ -53,6 +53,9 @@ public:
   void text(Id parent, const std::string& name, const std::string& text) const;
   void texts(Id parent, const std::string& name, const std::vector<std::string>& texts) const;
 
+  /// What a data set holds: attributes `units` and `description`.
+  void describe(const std::string& path, const std::string& units, const std::string& description) const;
+
   void rewrite(const Handle& dataset, Id type, const void* values) const;
 
   /// Hands everything to the operating system: it survives the end of this process.

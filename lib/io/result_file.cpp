@@ -6,6 +6,7 @@
 #include "io/output_file.hpp"
 #include "io/result_grid.hpp"
 
+#include <fmt/format.h>
 #include <hdf5.h>
 
 #include <algorithm>
@@ -104,6 +105,69 @@ private:
   std::optional<Series> offsets_;
 };
 
+// What a data set is, by its path; every one has a line.
+struct About {
+  const char* path;
+  const char* units;
+  const char* description;
+};
+
+constexpr std::array about{
+    About{"VTKHDF/NumberOfPoints", "1", "points of the drawn surface"},
+    About{"VTKHDF/NumberOfCells", "1", "triangles of the drawn surface"},
+    About{"VTKHDF/NumberOfConnectivityIds", "1", "three times the triangles"},
+    About{"VTKHDF/Points", "mm", "reference surface; the nodes of a body come first, in file order"},
+    About{"VTKHDF/Connectivity", "1", "points of each triangle, from 0"},
+    About{"VTKHDF/Offsets", "1", "where each triangle begins in Connectivity"},
+    About{"VTKHDF/Types", "1", "VTK cell type, 5: triangle"},
+    About{"VTKHDF/PointData/normal", "1", "unit normal of the reference surface"},
+    About{"VTKHDF/PointData/thickness", "mm", "thickness of the wall in the reference"},
+    About{"VTKHDF/PointData/displacement", "mm", "deformed curved surface minus reference"},
+    About{"VTKHDF/PointData/rotation", "rad", "rotation vectors, linear between the nodes"},
+    About{"VTKHDF/PointData/von_mises", "MPa",
+          "von Mises stress, averaged at the nodes within a body, the larger of both faces, linear between the nodes"},
+    About{"VTKHDF/CellData/body", "1", "number of the body, from 0"},
+    About{"tunica/scene", "1", "the resolved scene, TOML in SI units"},
+    About{"tunica/command", "1", "the command of the run"},
+    About{"tunica/version", "1", "version of tunica"},
+    About{"tunica/inputs/path", "1", "files that were read"},
+    About{"tunica/inputs/sha256", "1", "and their SHA-256"},
+    About{"tunica/converged", "1", "1: every step converged and the file is complete"},
+    About{"tunica/nodes/position", "mm", "nodes of all bodies one after the other, in file order; reference"},
+    About{"tunica/nodes/displacement", "mm", "by state and node, world axes"},
+    About{"tunica/nodes/rotation", "rad", "rotation vectors by state and node, world axes"},
+    About{"tunica/elements/nodes", "1", "the three nodes of each shell, rows of tunica/nodes, from 0"},
+    About{"tunica/elements/body", "1", "the body of each shell, from 0"},
+    About{"tunica/history/load_factor", "1", "factor of the loads; dynamic: of the first load's ramp"},
+    About{"tunica/history/volume", "mm3", "enclosed by the closed bodies' curved surfaces; NaN where one is open"},
+    About{"tunica/history/strain_energy", "mJ", "elastic energy"},
+    About{"tunica/history/kinetic_energy", "mJ", "kinetic energy"},
+    About{"tunica/history/residual", "1", "unbalanced forces over those that balance"},
+    About{"tunica/history/newton_iterations", "1", "linear systems of the step"},
+    About{"tunica/history/cg_iterations", "1", "iterations of conjugate gradients in the step"},
+    About{"tunica/history/max_displacement", "mm", "largest of the curved surfaces"},
+    About{"tunica/history/stress_p99", "MPa", "von Mises stress, averaged at the nodes, passed on 1 % of the area"},
+    About{"tunica/history/stress_max", "MPa", "largest von Mises stress, averaged at the nodes"},
+    About{"tunica/history/stress_max_at", "mm", "the node where it is, reference"},
+    About{"tunica/history/strain_p99", "%", "largest principal strain of either face, passed on 1 % of the area"},
+    About{"tunica/history/strain_max", "%", "largest principal strain of either face, averaged at the nodes"}};
+
+// Of the elements' fields, in CellData and in tunica/elements.
+constexpr std::array about_fields{
+    About{"pressure", "MPa", "pressure on the shell"},
+    About{"von_mises_top", "MPa", "von Mises stress at the face the normal points to, constant in each shell"},
+    About{"von_mises_bottom", "MPa", "von Mises stress at the other face, constant in each shell"},
+    About{"membrane_force", "N/mm", "xx, yy, xy in the shell's own frame, x along its first edge"},
+    About{"bending_moment", "N", "moment per length: xx, yy, xy in the same frame"},
+    About{"principal_strain_top", "1", "largest and smallest strain at the face the normal points to"},
+    About{"principal_strain_bottom", "1", "largest and smallest strain at the other face"}};
+
+constexpr std::array about_steps{About{"PartOffsets", "1", "first part of each state"},
+                                 About{"PointOffsets", "1", "first point of each state"},
+                                 About{"CellOffsets", "1", "first triangle of each state"},
+                                 About{"ConnectivityIdOffsets", "1", "first entry of Connectivity of each state"},
+                                 About{"NumberOfParts", "1", "parts of each state"}};
+
 struct ProbeSeries {
   std::size_t node = 0;
   Series displacement;
@@ -123,6 +187,7 @@ struct ResultFile::Implementation {
     write_grid();
     make_fields();
     make_history();
+    describe_all(options.time_units);
     writer.flush();
   }
 
@@ -199,6 +264,7 @@ struct ResultFile::Implementation {
     fixed.emplace_back(writer, cell_data.get(), cell_offsets.get(), "body", H5T_NATIVE_INT32,
                        std::vector<Size>{grid.cells()}, grid.body_of_cell().data(), series);
     const Handle element_group = writer.group(tunica_group.get(), "elements");
+    write_elements(element_group.get());
     for (const GridField& field : ResultGrid::layout()) {
       fields.emplace_back(writer, (field.of_cells ? cell_data : point_data).get(),
                           (field.of_cells ? cell_offsets : point_offsets).get(), field.name,
@@ -213,20 +279,44 @@ struct ResultFile::Implementation {
     }
   }
 
+  void write_elements(hid_t group) {
+    std::vector<std::int64_t> nodes;
+    std::vector<std::int32_t> bodies;
+    for (std::size_t b = 0; b < model.shells.size(); ++b) {
+      for (const auto& triangle : model.shells[b].mesh.triangles) {
+        for (const Index node : triangle) {
+          nodes.push_back(static_cast<std::int64_t>(model.first_node(b) + node));
+        }
+        bodies.push_back(static_cast<std::int32_t>(b));
+      }
+    }
+    (void)writer.dataset(group, "nodes", H5T_NATIVE_INT64, {grid.elements(), 3}, nodes.data());
+    (void)writer.dataset(group, "body", H5T_NATIVE_INT32, {grid.elements()}, bodies.data());
+  }
+
   void make_history() {
     const Size nodes = model.node_count();
     const Handle group = writer.group(tunica_group.get(), "nodes");
+    std::vector<double> positions;
+    for (const ShellBody& body : model.shells) {
+      const std::vector<double> of_body = flattened(body.mesh.vertices);
+      positions.insert(positions.end(), of_body.begin(), of_body.end());
+    }
+    (void)writer.dataset(group.get(), "position", H5T_NATIVE_DOUBLE, {nodes, 3}, positions.data());
     node_displacement =
         Series(writer, group.get(), "displacement", H5T_NATIVE_DOUBLE, {nodes, 3}, nodes_chunk_rows, true);
     node_rotation = Series(writer, group.get(), "rotation", H5T_NATIVE_DOUBLE, {nodes, 3}, nodes_chunk_rows, true);
 
     const Handle history = writer.group(tunica_group.get(), "history");
-    for (const char* name : {"time", "load_factor", "volume", "strain_energy", "kinetic_energy", "residual"}) {
+    for (const char* name : {"time", "load_factor", "volume", "strain_energy", "kinetic_energy", "residual",
+                             "max_displacement", "stress_p99", "stress_max", "strain_p99", "strain_max"}) {
       numbers.emplace_back(writer, history.get(), name, H5T_NATIVE_DOUBLE, std::vector<Size>{}, history_chunk, false);
     }
     for (const char* name : {"newton_iterations", "cg_iterations"}) {
       counts.emplace_back(writer, history.get(), name, H5T_NATIVE_INT64, std::vector<Size>{}, history_chunk, false);
     }
+
+    stress_max_at = Series(writer, history.get(), "stress_max_at", H5T_NATIVE_DOUBLE, {3}, history_chunk, false);
 
     const Handle all_probes = writer.group(tunica_group.get(), "probes");
     for (const Probe& probe : model.probes) {
@@ -237,14 +327,58 @@ struct ResultFile::Implementation {
     }
   }
 
+  void describe_all(const std::string& time_units) {
+    const auto under = [&](const std::string& group, const About& one) {
+      writer.describe(group + one.path, one.units, one.description);
+    };
+    for (const About& one : about) {
+      under("", one);
+    }
+    for (const About& one : about_fields) {
+      under("VTKHDF/CellData/", one);
+      under("tunica/elements/", one);
+    }
+    writer.describe("tunica/history/time", time_units,
+                    "dynamic: time; static: load factor; arc length: number of the step; modes: frequency or factor");
+    for (const Probe& probe : model.probes) {
+      const std::string group = "tunica/probes/" + probe.name;
+      writer.describe(group + "/displacement", "mm", "of the probe's node, by state");
+      writer.describe(group + "/rotation", "rad", "rotation vector of the probe's node, by state");
+    }
+    if (!series) {
+      return;
+    }
+    for (const About& one : about_steps) {
+      under("VTKHDF/Steps/", one);
+    }
+    writer.describe("VTKHDF/Steps/Values", time_units, "time of each state, as tunica/history/time");
+    for (const auto& list : {ResultGrid::layout(), ResultGrid::fixed_layout()}) {
+      for (const GridField& field : list) {
+        writer.describe(fmt::format("VTKHDF/Steps/{}DataOffsets/{}", field.of_cells ? "Cell" : "Point", field.name),
+                        "1", "first row of each state");
+      }
+    }
+    writer.describe("VTKHDF/Steps/CellDataOffsets/body", "1", "first row of each state");
+  }
+
   void append(const State& state, const ElementFields& of_elements) {
     TUNICA_ASSERT(state.displacement.size() == model.node_count() && state.rotation.size() == model.node_count());
     put_fields(state, of_elements);
     node_displacement.append(writer, 1, flattened(state.displacement).data());
     node_rotation.append(writer, 1, flattened(state.rotation).data());
-    const std::array<double, 6> history{
-        state.time,          state.load_factor,    state.volume.value_or(std::numeric_limits<double>::quiet_NaN()),
-        state.strain_energy, state.kinetic_energy, state.residual};
+    const Wall& wall = of_elements.wall;
+    const std::array<double, 11> history{state.time,
+                                         state.load_factor,
+                                         state.volume.value_or(std::numeric_limits<double>::quiet_NaN()),
+                                         state.strain_energy,
+                                         state.kinetic_energy,
+                                         state.residual,
+                                         of_elements.largest_displacement,
+                                         wall.stress_p99,
+                                         wall.stress_max,
+                                         1e2 * wall.strain_p99,
+                                         1e2 * wall.strain_max};
+    stress_max_at.append(writer, 1, wall.stress_max_at.data());
     for (std::size_t i = 0; i < numbers.size(); ++i) {
       numbers[i].append(writer, 1, &history[i]);
     }
@@ -312,6 +446,7 @@ struct ResultFile::Implementation {
   Series node_displacement;
   Series node_rotation;
   std::vector<Series> numbers;
+  Series stress_max_at;
   std::vector<Series> counts;
   std::vector<ProbeSeries> probes;
 };

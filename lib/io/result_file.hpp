@@ -15,6 +15,7 @@ struct ResultOptions {
   /// False: /VTKHDF holds one loaded state, the last one appended (Version {1,0}), which every ParaView from 5.10 on
   /// shows deformed. True: every state, with times (Version {2,0}, Steps).
   bool series = false;
+  std::string time_units = "1";  ///< of the states' `time`
   std::string command;
   std::string scene;                                        ///< resolved, SI
   std::vector<std::pair<std::string, std::string>> inputs;  ///< path, sha256

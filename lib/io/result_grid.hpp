@@ -16,8 +16,9 @@ struct GridField {
   bool of_cells;
 };
 
-/// The curved surfaces of all bodies as one grid of linear triangles: each patch cut into level^2, patches share no
-/// points. The model must outlive it.
+/// The curved surfaces of all bodies as one grid of linear triangles: each patch cut into level^2; the patches of a
+/// body share their points at nodes and edges, where each point is the mean of theirs (comas patches do not quite
+/// meet). The nodes of a body come first, in their order. The model must outlive it.
 class ResultGrid {
 public:
   /// @param level  pieces per edge; 0: as drawing_level() says
@@ -41,8 +42,19 @@ public:
   [[nodiscard]] std::vector<std::vector<float>> values(const State& state, const ElementFields& fields) const;
 
 private:
+  struct Body {
+    Tessellation surface;        ///< patch by patch
+    std::vector<Index> point;    ///< #vertices of it: of the body
+    std::vector<double> weight;  ///< #vertices of it: one over how many share the point
+    std::size_t points = 0;
+  };
+  [[nodiscard]] static Body make_body(const ShellMesh& mesh, int level);
+  /// Adds the means at the points of a body of what `of_vertex` gives for the vertices of its tessellation.
+  template <typename OfVertex>
+  static void add_means(const Body& body, const OfVertex& of_vertex, std::vector<float>& values);
+
   const Model& model_;
-  std::vector<Tessellation> bodies_;
+  std::vector<Body> bodies_;
   std::size_t elements_ = 0;
   std::vector<double> coordinates_;
   std::vector<std::int32_t> connectivity_;

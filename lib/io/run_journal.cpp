@@ -56,9 +56,12 @@ private:
   void put(const std::vector<double>& values) { list(values.data(), values.size()); }
   void put(const std::vector<Vec3>& values) { list(values.data(), values.size()); }
   void put(const std::vector<Eigen::Quaterniond>& values) { list(values.data(), values.size()); }
-  void put(const std::optional<double>& value) {
+  void put(const std::vector<Snap>& values) { list(values.data(), values.size()); }
+  void put(const EnergyBalance& value) { raw(&value, sizeof value); }
+  template <typename Value>
+  void put(const std::optional<Value>& value) {
     (*this)(value.has_value());
-    (*this)(value.value_or(0));
+    (*this)(value.value_or(Value{}));
   }
   template <typename First, typename Second>
   void put(const std::pair<First, Second>& pair) {
@@ -125,12 +128,15 @@ private:
   void get(std::vector<double>& values) { list(values); }
   void get(std::vector<Vec3>& values) { list(values); }
   void get(std::vector<Eigen::Quaterniond>& values) { list(values); }
-  void get(std::optional<double>& value) {
+  void get(std::vector<Snap>& values) { list(values); }
+  void get(EnergyBalance& value) { raw(&value, sizeof value); }
+  template <typename Value>
+  void get(std::optional<Value>& value) {
     bool there = false;
-    double number = 0;
+    Value content{};
     (*this)(there);
-    (*this)(number);
-    value = there ? std::optional(number) : std::nullopt;
+    (*this)(content);
+    value = there ? std::optional(content) : std::nullopt;
   }
   void get(std::vector<std::pair<std::string, std::string>>& pairs) {
     pairs.resize(count(2 * sizeof(std::uint64_t)));
@@ -176,10 +182,11 @@ template <typename Archive, typename AnyCheckpoint>
 void checkpoint_members(Archive& archive, AnyCheckpoint& checkpoint) {
   auto& [summary, position, displacement, rotation, memory] = checkpoint;
   auto& [dof, steps, parts, converged, residual, newton_iterations, cg_iterations, error, error_is_bound, volume_before,
-         volume_after, strain, largest, seconds_per_step, frequencies, factors, stiffened, limits, branches] = summary;
+         volume_after, strain, largest, seconds_per_step, frequencies, factors, stiffened, energy, snaps, limits,
+         branches] = summary;
   each(archive, dof, steps, parts, converged, residual, newton_iterations, cg_iterations, error, error_is_bound,
-       volume_before, volume_after, strain, largest, seconds_per_step, frequencies, factors, stiffened, limits,
-       branches);
+       volume_before, volume_after, strain, largest, seconds_per_step, frequencies, factors, stiffened, energy, snaps,
+       limits, branches);
   each(archive, position, displacement, rotation, memory);
 }
 

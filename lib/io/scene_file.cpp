@@ -316,9 +316,7 @@ void read_static(const Table& run, StaticRun& settings) {
     run.place("load_factors").fail("load_steps and load_factors contradict each other: give one");
   }
   if (!run.has("load_factors")) {
-    const std::size_t default_steps = settings.linear ? 1 : 10;
-    settings.load_factors =
-        equal_load_factors(run.has("load_steps") ? run.count("load_steps", most_load_steps) : default_steps);
+    settings.load_factors = equal_load_factors(run.has("load_steps") ? run.count("load_steps", most_load_steps) : 1);
     return;
   }
   for (const toml::node& node : run.array("load_factors", "[0.1, 0.2, 1.0]")) {

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 namespace tunica {
 namespace {
@@ -92,30 +93,129 @@ ShellMesh moved_mesh(const ShellMesh& mesh, std::size_t first, const State& stat
   return moved;
 }
 
+/// A mesh without normals with those of its facets; nothing where it has its own.
+std::optional<ShellMesh> faceted(const ShellMesh& mesh) {
+  if (!mesh.normals.empty() || !mesh.corner_normals.empty()) {
+    return std::nullopt;
+  }
+  ShellMesh result = mesh;
+  for (const auto& [i, j, k] : mesh.triangles) {
+    const Vec3& origin = mesh.vertices[i];
+    const Vec3 normal = (mesh.vertices[j] - origin).cross(mesh.vertices[k] - origin).normalized();
+    result.corner_normals.push_back({normal, normal, normal});
+  }
+  return result;
+}
+
+/// The patches of a body in the reference and in a state.
+class MovedPatches {
+public:
+  MovedPatches(const Model& model, std::size_t body, const State& state)
+      : faceted_(faceted(model.shells[body].mesh)),
+        mesh_(faceted_ ? *faceted_ : model.shells[body].mesh),
+        displacement_(state.displacement.data() + model.first_node(body)),
+        before_(curved_patches(mesh_)),
+        after_(curved_patches(moved_mesh(mesh_, model.first_node(body), state, collapsed_))) {}
+
+  [[nodiscard]] Vec3 displacement(std::size_t triangle, const Vec2& b) const {
+    if (collapsed_[triangle] == 0) {
+      return after_[triangle].point(b) - before_[triangle].point(b);
+    }
+    const auto& nodes = mesh_.triangles[triangle];
+    return (1 - b.x() - b.y()) * displacement_[nodes[0]] + b.x() * displacement_[nodes[1]] +
+           b.y() * displacement_[nodes[2]];
+  }
+
+private:
+  std::optional<ShellMesh> faceted_;
+  const ShellMesh& mesh_;
+  const Vec3* displacement_;
+  std::vector<std::uint8_t> collapsed_;
+  std::vector<CubicPatch> before_;
+  std::vector<CubicPatch> after_;
+};
+
+/// A place in a patch, and how far it moves.
+struct Sample {
+  double length = 0;
+  std::size_t triangle = 0;
+  Vec2 b = Vec2::Zero();
+};
+
+/// The largest of a regular grid over a patch.
+Sample best_of_grid(const MovedPatches& patches, std::size_t triangle) {
+  constexpr int pieces = 3;
+  Sample best{-1, triangle};
+  for (int i = 0; i <= pieces; ++i) {
+    for (int j = 0; i + j <= pieces; ++j) {
+      const Vec2 b = Vec2(i, j) / pieces;
+      const double length = patches.displacement(triangle, b).norm();
+      if (length > best.length) {
+        best = {length, triangle, b};
+      }
+    }
+  }
+  return best;
+}
+
+/// Uphill within the patch, in ever smaller steps.
+double climb(const MovedPatches& patches, Sample at) {
+  constexpr double first_step = 1.0 / 6;
+  constexpr double last_step = 1e-4;
+  const std::array<Vec2, 6> ways{Vec2(1, 0), Vec2(-1, 0), Vec2(0, 1), Vec2(0, -1), Vec2(1, -1), Vec2(-1, 1)};
+  for (double step = first_step; step > last_step;) {
+    Sample best = at;
+    for (const Vec2& way : ways) {
+      const Vec2 b = at.b + step * way;
+      if (b.minCoeff() < 0 || b.sum() > 1) {
+        continue;
+      }
+      const double length = patches.displacement(at.triangle, b).norm();
+      if (length > best.length) {
+        best = {length, at.triangle, b};
+      }
+    }
+    if (best.length == at.length) {
+      step /= 2;
+    }
+    at = best;
+  }
+  return at.length;
+}
+
 }  // namespace
 
 std::vector<Vec3> curved_displacement(const Model& model, std::size_t body, const State& state,
                                       const Tessellation& surface) {
-  const ShellMesh& mesh = model.shells[body].mesh;
-  const std::size_t first = model.first_node(body);
-  std::vector<std::uint8_t> collapsed;
-  const auto before = curved_patches(mesh);
-  const auto after = curved_patches(moved_mesh(mesh, first, state, collapsed));
+  const MovedPatches patches(model, body, state);
   std::vector<Vec3> result(surface.mesh.vertices.size());
   parallel_for_blocks(result.size(), vertices_per_block, [&](std::size_t begin, std::size_t end) {
     for (std::size_t v = begin; v < end; ++v) {
-      const Index triangle = surface.vertex_shell[v];
-      const Vec2& b = surface.barycentric[v];
-      if (collapsed[triangle] == 0) {
-        result[v] = after[triangle].point(b) - before[triangle].point(b);
-      } else {
-        const auto& nodes = mesh.triangles[triangle];
-        result[v] = (1 - b.x() - b.y()) * state.displacement[first + nodes[0]] +
-                    b.x() * state.displacement[first + nodes[1]] + b.y() * state.displacement[first + nodes[2]];
-      }
+      result[v] = patches.displacement(surface.vertex_shell[v], surface.barycentric[v]);
     }
   });
   return result;
+}
+
+double largest_displacement(const Model& model, const State& state) {
+  constexpr std::size_t climbed = 16;  // patches around the largest may hold it
+  double largest = 0;
+  for (std::size_t body = 0; body < model.shells.size(); ++body) {
+    const MovedPatches patches(model, body, state);
+    std::vector<Sample> samples(model.shells[body].mesh.triangles.size());
+    parallel_for_blocks(samples.size(), 256, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t t = begin; t < end; ++t) {
+        samples[t] = best_of_grid(patches, t);
+      }
+    });
+    const auto kept = samples.begin() + static_cast<std::ptrdiff_t>(std::min(climbed, samples.size()));
+    std::partial_sort(samples.begin(), kept, samples.end(),
+                      [](const Sample& a, const Sample& b) { return a.length > b.length; });
+    for (auto sample = samples.begin(); sample != kept; ++sample) {
+      largest = std::max(largest, climb(patches, *sample));
+    }
+  }
+  return largest;
 }
 
 std::size_t count_unresolved(const Model& model, const State& state, double angle) {

@@ -14,6 +14,10 @@ namespace tunica {
 std::vector<Vec3> curved_displacement(const Model& model, std::size_t body, const State& state,
                                       const Tessellation& surface);
 
+/// The largest displacement of the curved surfaces of all bodies, mm: as curved_displacement(), at nine points of every
+/// patch and the nodes, and from the best of them on as far up as their patches go.
+double largest_displacement(const Model& model, const State& state);
+
 /// Shells with a corner that bends by more than `angle` (rad) relative to the facet: strains within a shell are small
 /// no more, and a finer mesh will move differently. Zero for a linear run, whose rotations are small by assumption.
 std::size_t count_unresolved(const Model& model, const State& state, double angle);

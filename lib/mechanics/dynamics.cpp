@@ -36,6 +36,10 @@ bool is_solved(const RunSettings& settings, const NewtonResult& result) {
                                   : result.converged && result.stable;
 }
 
+/// A gain of energy by time integration that passes this part of the largest energy is told. What trapezia leave of the
+/// work of loads that follow a coarse step stays below.
+constexpr double tolerated_gain = 0.1;
+
 struct Motion {
   Configuration configuration;
   Rates rates;
@@ -80,12 +84,13 @@ public:
     bool precise = true;  ///< false: no part is short enough for the tolerance
   };
 
-  /// The accelerations with which a second-order scheme begins: those of the loads of time 0.
+  /// The forces that act at time 0, and the accelerations with which a second-order scheme begins.
   void start(Motion& motion) {
+    evaluate(system_, model_, motion.configuration, load_factors(model_, false, 0), {}, forces_, nullptr);
+    keep_acting(motion);
     if (!scheme_.second_order()) {
       return;
     }
-    evaluate(system_, model_, motion.configuration, load_factors(model_, false, 0), {}, forces_, nullptr);
     for (Eigen::Index i = 0; i < mass_.size(); ++i) {
       const bool moves = !system_.held[static_cast<std::size_t>(i)] && mass_[i] > 0;
       motion.rates.acceleration[i] = moves ? (forces_.external[i] - forces_.internal[i]) / mass_[i] : 0;
@@ -97,7 +102,7 @@ public:
   StepResult advance(double time, double length, Motion& motion) {
     if (tolerance_ == 0) {
       const StepResult result = step(time, length, true, motion);
-      keep_deformation(length);
+      accept(length, motion);
       return result;
     }
     StepResult total;
@@ -118,7 +123,7 @@ public:
       const double wanted = h * std::clamp(0.9 * std::pow(error, -1 / scheme_.local_order()), 0.2, 2.0);
       if (solved && error <= 1) {
         motion = std::move(attempt);
-        keep_deformation(h);
+        accept(h, motion);
         done = h == left ? length : done + h;
         part_ = std::min(h < part_ && wanted >= h ? std::max(wanted, part_) : wanted, run_.step);
         ++total.parts;
@@ -146,6 +151,7 @@ public:
     std::map<std::string, std::vector<double>, std::less<>> result{{"velocity", values(motion.rates.velocity)},
                                                                    {"acceleration", values(motion.rates.acceleration)},
                                                                    {"auxiliary", values(motion.rates.auxiliary)},
+                                                                   {"acting", values(acting_)},
                                                                    {"part", {part_}},
                                                                    {"at_rest", {at_rest_ ? 1.0 : 0.0}}};
     if (!before_.empty()) {
@@ -161,13 +167,15 @@ public:
   void recall(const std::map<std::string, std::vector<double>, std::less<>>& memory, Motion& motion) {
     for (auto [name, vector] :
          {std::pair{"velocity", &motion.rates.velocity}, std::pair{"acceleration", &motion.rates.acceleration},
-          std::pair{"auxiliary", &motion.rates.auxiliary}}) {
+          std::pair{"auxiliary", &motion.rates.auxiliary}, std::pair{"acting", &acting_}}) {
       const std::vector<double>& values = memory.at(name);
-      TUNICA_ASSERT(values.size() == static_cast<std::size_t>(vector->size()));
+      TUNICA_ASSERT(values.size() == static_cast<std::size_t>(mass_.size()));
+      vector->resize(mass_.size());
       std::copy(values.begin(), values.end(), vector->begin());
     }
     deformation_.clear();
     before_.clear();
+    work_ = damped_ = 0;
     part_ = memory.at("part").at(0);
     at_rest_ = memory.at("at_rest").at(0) != 0;
     if (const auto found = memory.find("deformation_before"); found != memory.end()) {
@@ -185,6 +193,24 @@ public:
   [[nodiscard]] double kinetic_energy(const VectorX& velocity) const {
     return 0.5 * velocity.dot(mass_.cwiseProduct(velocity));
   }
+
+  /// Closes the balance of energy after a step.
+  void balance_energy(std::size_t step, double time, const Motion& motion, EnergyBalance& energy) {
+    const double stored = forces_.energy + kinetic_energy(motion.rates.velocity);
+    energy.work += std::exchange(work_, 0);
+    energy.damped += std::exchange(damped_, 0);
+    energy.lost = energy.work - energy.damped - stored;
+    energy.most_lost = std::max(energy.most_lost, energy.lost);
+    energy.largest = std::max({energy.largest, stored, std::abs(energy.work)});
+    if (energy.largest > 0) {
+      energy.gained = std::max(energy.gained, (energy.most_lost - energy.lost) / energy.largest);
+    }
+    if (energy.gained > tolerated_gain && energy.gaining_step == 0) {
+      energy.gaining_step = step;
+      energy.gaining_time = time;
+    }
+  }
+
   [[nodiscard]] std::size_t freedom_count() const { return solver_.freedom_count(); }
   void tell_direct_error(bool tell) { solver_.tell_direct_error(tell); }
   [[nodiscard]] double tolerance() const { return tolerance_; }
@@ -232,8 +258,8 @@ private:
     if (may_follow && settings_.newton_max > 1 && !settings_.cg_fixed_count && !acceptable(result.newton)) {
       follow(s, result, motion.configuration);
     }
-    find_change(s.start, motion.configuration, s.change);
-    scheme_.end_rates(length, system_.held, s.rates_before, s.change, motion.rates);
+    find_change(s.start, motion.configuration, change_);
+    scheme_.end_rates(length, system_.held, s.rates_before, change_, motion.rates);
     for (const Piece& piece : system_.pieces) {
       if (held_by_rigid_motions(model_, piece.body)) {
         stop_rigid_motion(piece, length, motion);
@@ -262,12 +288,32 @@ private:
   }
 
   /// The step is done: its end is where the next one starts.
-  void keep_deformation(double length) {
+  void accept(double length, const Motion& motion) {
+    const VectorX acted = std::move(acting_);
+    keep_acting(motion);
+    work_ += 0.5 * (acted + acting_).dot(change_);
+    damped_ += run_.damping.mass * length * 2 * kinetic_energy(change_ / length);
+    for (std::size_t e = 0; run_.damping.stiffness > 0 && e < system_.elements.size(); ++e) {
+      damped_ += run_.damping.stiffness / length * 2 *
+                 strain_energy(system_.elements[e], forces_.deformation[e] - deformation_[e]);
+    }
     if (run_.damping.stiffness > 0 && scheme_.second_order()) {
       before_.swap(deformation_);
       length_before_ = length;
     }
     deformation_ = forces_.deformation;
+  }
+
+  /// Loads, and on held freedoms what moves them.
+  void keep_acting(const Motion& motion) {
+    acting_ = forces_.external;
+    for (std::size_t i = 0; i < system_.held.size(); ++i) {
+      if (system_.held[i]) {
+        const auto k = static_cast<Eigen::Index>(i);
+        acting_[k] = forces_.internal[k] +
+                     mass_[k] * (motion.rates.acceleration[k] + run_.damping.mass * motion.rates.velocity[k]);
+      }
+    }
   }
 
   static bool acceptable(const NewtonResult& result) { return result.converged && result.valid && result.stable; }
@@ -435,8 +481,12 @@ private:
   BlockMatrix matrix_;
   VectorX mass_;
   Forces forces_;
-  std::vector<ElementState> deformation_;   ///< at the start of the step
-  std::vector<ElementState> before_;        ///< at the start of the step before, where damping asks for it
+  std::vector<ElementState> deformation_;  ///< at the start of the step
+  std::vector<ElementState> before_;       ///< at the start of the step before, where damping asks for it
+  VectorX change_;                         ///< displacements and rotations of the last step
+  VectorX acting_;                         ///< at the start of the step
+  double work_ = 0;                        ///< mJ, since energies were last balanced
+  double damped_ = 0;
   std::vector<ElementState> viscous_zero_;  ///< the deformation at which damping by beta K vanishes
   double length_before_ = 0;                ///< s
   double tolerance_ = 0;                    ///< mm, of error control; 0: none
@@ -448,129 +498,176 @@ double first_load_factor(const Model& model, double time) {
   return model.loads.empty() ? 0 : model.loads.front().ramp.at(time);
 }
 
+/// The steps of a run, what they hand over, and why one fails.
+class TimeLoop {
+public:
+  TimeLoop(ShellSystem& system, const Model& model, const RunSettings& settings, const DynamicRun& run,
+           const StateCallback& on_state)
+      : system_(system),
+        model_(model),
+        settings_(settings),
+        run_(run),
+        on_state_(on_state),
+        stepper_(system, model, settings, run),
+        motion_{reference_configuration(system), Rates::zero(at(system.node_count()))} {}
+
+  Summary follow(const Progress& progress, const Resumption& resumption) {
+    if (resumption.from) {
+      resume(*resumption.from);
+    } else {
+      begin();
+    }
+    // The last step may be shorter: the run ends at its duration.
+    const auto steps = static_cast<std::size_t>(std::max(1.0, std::ceil(run_.duration / run_.step - 1e-9)));
+    for (std::size_t s = summary_.steps; s < steps; ++s) {
+      const bool last = s + 1 == steps;
+      // Not of the first step, which is the longest without.
+      stepper_.tell_direct_error(s == 1 || last);
+      take_step(last ? run_.duration : static_cast<double>(s + 1) * run_.step, last);
+      resumption.offer([&] {
+        return Checkpoint{summary_, time_, motion_.configuration.displacement, motion_.configuration.rotation,
+                          stepper_.memory(motion_)};
+      });
+      advance(progress, static_cast<double>(s + 1) / static_cast<double>(steps));
+    }
+    return summary_;
+  }
+
+private:
+  void begin() {
+    summary_.dof = stepper_.freedom_count();
+    summary_.energy.emplace();
+    stepper_.start(motion_);
+    State state = make_state(system_, model_, motion_.configuration, 0);
+    state.converged = true;
+    hand_over(state);
+    summary_.volume_before = state.volume;
+    summary_.volume_after = state.volume;
+  }
+
+  void resume(const Checkpoint& from) {
+    summary_ = from.summary;
+    if (summary_.stiffened_from) {
+      stiffen_short_waves(system_);
+    }
+    time_ = from.position;
+    motion_.configuration = {from.displacement, from.rotation};
+    stepper_.recall(from.memory, motion_);
+    shown_ = summary_.steps / settings_.every * settings_.every;
+  }
+
+  void take_step(double end, bool last) {
+    const auto start = Clock::now();
+    const Motion before = motion_;
+    const TimeStepper::StepResult step = advance_stiffening(end);
+    const NewtonResult& result = step.newton;
+    if (!step.precise) {
+      throw RequirementError(fmt::format(
+          "the step from {:.6g} s to {:.6g} s adds more than the tolerance of {:.3g} mm to the error however "
+          "short its parts are: allow a larger one (adaptive), or put the load on by a ramp",
+          time_, end, stepper_.tolerance()));
+    }
+    if (!is_solved(settings_, result)) {
+      fail(step, before, end);
+    }
+    time_ = end;
+    stepper_.balance_energy(summary_.steps + 1, end, motion_, *summary_.energy);
+    const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
+    const bool wanted = (summary_.steps + 1) % settings_.every == 0 || last;
+    State state = wanted ? make_state(system_, model_, motion_.configuration, time_) : State();
+    state.residual = result.residual;
+    state.newton_iterations = result.iterations;
+    state.cg_iterations = result.cg_iterations;
+    set_algebraic_error(result.algebraic_error, state);
+    state.converged = settings_.newton_max == 1 ? result.linear_converged : result.converged;
+    if (wanted) {
+      hand_over(state);
+      shown_ = summary_.steps + 1;
+    }
+    summary_.parts += step.parts;
+    record_step(state, seconds, summary_);
+  }
+
+  /// A step that fails is taken again with its short waves made stiff, where the mesh is coarse for the thickness.
+  TimeStepper::StepResult advance_stiffening(double end) {
+    if (summary_.stiffened_from || !soft_waves_) {
+      return stepper_.advance(time_, end - time_, motion_);
+    }
+    const Motion before = motion_;
+    const auto memory = stepper_.memory(motion_);
+    const TimeStepper::StepResult step = stepper_.advance(time_, end - time_, motion_);
+    if (step.precise && is_solved(settings_, step.newton)) {
+      return step;
+    }
+    stiffen_short_waves(system_);
+    summary_.stiffened_from = time_;
+    motion_ = before;
+    stepper_.recall(memory, motion_);
+    return stepper_.advance(time_, end - time_, motion_);
+  }
+
+  [[noreturn]] void fail(const TimeStepper::StepResult& step, const Motion& before, double end) {
+    if (summary_.steps > shown_) {  // the last good state, also where it is none of every `every` steps
+      motion_ = before;
+      State state = make_state(system_, model_, motion_.configuration, time_);
+      state.converged = true;
+      hand_over(state);
+    }
+    const NewtonResult& result = step.newton;
+    const std::vector<double> wanted = load_factors(model_, false, end);
+    std::vector<double> carried =
+        time_ > 0 ? load_factors(model_, false, time_) : std::vector<double>(wanted.size(), 0.0);
+    for (std::size_t l = 0; l < carried.size(); ++l) {
+      carried[l] += step.reached * (wanted[l] - carried[l]);
+    }
+    if (step.reached < 1 && carried != wanted) {
+      throw RequirementError(fmt::format(
+          "no equilibrium in the step from {:.6g} s to {:.6g} s: the limit load is reached at "
+          "{:.3g} of its change of load ({}); beyond it {}; the last good state is at {:.6g} s",
+          time_, end, step.reached, describe_loads(model_, carried, wanted),
+          step.ran_away ? "the shell yields without bound" : "no state was found that the shell could rest in", time_));
+    }
+    throw RequirementError(
+        fmt::format("the step from {:.6g} s to {:.6g} s {} (relative residual {:.3g} after {} "
+                    "iterations): take a smaller step, a ramp or damping; the last good state is at {:.6g} s",
+                    time_, end,
+                    !result.valid                        ? "made elements collapse or fold"
+                    : result.converged && !result.stable ? "leads to a state that is not stable"
+                                                         : "did not converge",
+                    result.residual, result.iterations, time_));
+  }
+
+  void hand_over(State& state) {
+    state.load_factor = first_load_factor(model_, state.time);
+    state.kinetic_energy = stepper_.kinetic_energy(motion_.rates.velocity);
+    state.velocity.resize(system_.node_count());
+    state.angular_velocity.resize(system_.node_count());
+    for (std::size_t i = 0; i < system_.node_count(); ++i) {
+      state.velocity[i] = motion_.rates.velocity.segment<3>(at(i));
+      state.angular_velocity[i] = motion_.rates.velocity.segment<3>(at(i) + 3);
+    }
+    on_state_(state);
+  }
+
+  ShellSystem& system_;
+  const Model& model_;
+  const RunSettings& settings_;
+  const DynamicRun& run_;
+  const StateCallback& on_state_;
+  TimeStepper stepper_;
+  Motion motion_;
+  Summary summary_;
+  const bool soft_waves_ = has_soft_waves(system_);
+  double time_ = 0;
+  std::size_t shown_ = 0;  ///< steps done at the last state handed over
+};
+
 }  // namespace
 
 Summary run_dynamic(ShellSystem& system, const Model& model, const RunSettings& settings, const DynamicRun& run,
                     const StateCallback& on_state, const Progress& progress, const Resumption& resumption) {
   release_rigid_motion_supports(system, model);
-  Summary summary;
-  TimeStepper integrator(system, model, settings, run);
-  Motion motion{reference_configuration(system), Rates::zero(at(system.node_count()))};
-  const auto hand_over = [&](State& state) {
-    state.load_factor = first_load_factor(model, state.time);
-    state.kinetic_energy = integrator.kinetic_energy(motion.rates.velocity);
-    state.velocity.resize(system.node_count());
-    state.angular_velocity.resize(system.node_count());
-    for (std::size_t i = 0; i < system.node_count(); ++i) {
-      state.velocity[i] = motion.rates.velocity.segment<3>(at(i));
-      state.angular_velocity[i] = motion.rates.velocity.segment<3>(at(i) + 3);
-    }
-    on_state(state);
-  };
-  State state;
-  double time = 0;
-  if (resumption.from) {
-    summary = resumption.from->summary;
-    if (summary.stiffened_from) {
-      stiffen_short_waves(system);
-    }
-    time = resumption.from->position;
-    motion.configuration = {resumption.from->displacement, resumption.from->rotation};
-    integrator.recall(resumption.from->memory, motion);
-  } else {
-    summary.dof = integrator.freedom_count();
-    integrator.start(motion);
-    state = make_state(system, model, motion.configuration, 0);
-    state.converged = true;
-    hand_over(state);
-    summary.volume_before = state.volume;
-    summary.volume_after = state.volume;
-  }
-
-  // The last step may be shorter: the run ends at its duration.
-  const auto steps = static_cast<std::size_t>(std::max(1.0, std::ceil(run.duration / run.step - 1e-9)));
-  const bool soft_waves = has_soft_waves(system);
-  std::size_t shown = summary.steps / settings.every * settings.every;  // steps done at the last state handed over
-  for (std::size_t s = summary.steps; s < steps; ++s) {
-    const auto start = Clock::now();
-    const bool last = s + 1 == steps;
-    const double end = last ? run.duration : static_cast<double>(s + 1) * run.step;
-    // Not of the first step, which is the longest without.
-    integrator.tell_direct_error(s == 1 || last);
-    TimeStepper::StepResult step;
-    const Motion before = motion;
-    if (!summary.stiffened_from && soft_waves) {
-      const auto memory = integrator.memory(motion);
-      step = integrator.advance(time, end - time, motion);
-      if (!step.precise || !is_solved(settings, step.newton)) {
-        stiffen_short_waves(system);
-        summary.stiffened_from = time;
-        motion = before;
-        integrator.recall(memory, motion);
-        step = integrator.advance(time, end - time, motion);
-      }
-    } else {
-      step = integrator.advance(time, end - time, motion);
-    }
-    const auto& [result, reached, ran_away, parts, precise] = step;
-    const bool one_linearisation = settings.newton_max == 1;
-    if (!precise) {
-      throw RequirementError(fmt::format(
-          "the step from {:.6g} s to {:.6g} s adds more than the tolerance of {:.3g} mm to the error however "
-          "short its parts are: allow a larger one (adaptive), or put the load on by a ramp",
-          time, end, integrator.tolerance()));
-    }
-    if (!is_solved(settings, result)) {
-      if (s > shown) {  // the last good state, also where it is none of every `every` steps
-        motion = before;
-        state = make_state(system, model, motion.configuration, time);
-        state.converged = true;
-        hand_over(state);
-      }
-      const std::vector<double> wanted_factors = load_factors(model, false, end);
-      std::vector<double> carried =
-          time > 0 ? load_factors(model, false, time) : std::vector<double>(wanted_factors.size(), 0.0);
-      for (std::size_t l = 0; l < carried.size(); ++l) {
-        carried[l] += reached * (wanted_factors[l] - carried[l]);
-      }
-      throw RequirementError(
-          reached < 1 && carried != wanted_factors
-              ? fmt::format(
-                    "no equilibrium in the step from {:.6g} s to {:.6g} s: the limit load is reached at "
-                    "{:.3g} of its change of load ({}); beyond it {}; the last good state is at {:.6g} s",
-                    time, end, reached, describe_loads(model, carried, wanted_factors),
-                    ran_away ? "the shell yields without bound" : "no state was found that the shell could rest in",
-                    time)
-              : fmt::format("the step from {:.6g} s to {:.6g} s {} (relative residual {:.3g} after {} "
-                            "iterations): take a smaller step, a ramp or damping; the last good state is at {:.6g} s",
-                            time, end,
-                            !result.valid                        ? "made elements collapse or fold"
-                            : result.converged && !result.stable ? "leads to a state that is not stable"
-                                                                 : "did not converge",
-                            result.residual, result.iterations, time));
-    }
-    time = end;
-    const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
-    const bool wanted = (s + 1) % settings.every == 0 || last;
-    state = wanted ? make_state(system, model, motion.configuration, time) : State();
-    state.residual = result.residual;
-    state.newton_iterations = result.iterations;
-    state.cg_iterations = result.cg_iterations;
-    set_algebraic_error(result.algebraic_error, state);
-    state.converged = one_linearisation ? result.linear_converged : result.converged;
-    if (wanted) {
-      hand_over(state);
-      shown = s + 1;
-    }
-    summary.parts += parts;
-    record_step(state, seconds, summary);
-    resumption.offer([&] {
-      return Checkpoint{summary, time, motion.configuration.displacement, motion.configuration.rotation,
-                        integrator.memory(motion)};
-    });
-    advance(progress, static_cast<double>(s + 1) / static_cast<double>(steps));
-  }
-  return summary;
+  return TimeLoop(system, model, settings, run, on_state).follow(progress, resumption);
 }
 
 }  // namespace tunica

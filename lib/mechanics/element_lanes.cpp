@@ -359,6 +359,33 @@ LaneState linear_deformation(const ElementLanes& element, const LaneVector18& mo
   return state;
 }
 
+LaneVector18 linear_force(const ElementLanes& element, const LaneVector18& motion) {
+  LaneVector18 less = motion;  // a common displacement strains nothing, not even by round-off
+  for (int k = 0; k < 3; ++k) {
+    less.segment<3>(6 * k) -= motion.head<3>();
+  }
+  const LaneState stress = element_force(element, linear_deformation(element, less));
+  const Reference reference = find_reference(element);
+  LaneVector18 local = reference.derivatives.strain.transpose().lazyProduct(stress.head<3>());
+  LaneVec3 total = LaneVec3::Zero();
+  for (int k = 0; k < 3; ++k) {
+    if (element.skewed) {
+      local += 0.5 * stress[12 + k] *
+               (reference.derivatives.slopes.row(2 * k) + reference.derivatives.slopes.row(2 * k + 1)).transpose();
+    }
+    const LaneVec3 moment = stress.segment<3>(3 + 3 * k);
+    local.segment<3>(6 * k + 3) += moment;
+    total += moment;
+  }
+  LaneVector18 force;
+  for (int k = 0; k < 3; ++k) {
+    local.segment<3>(6 * k) -= reference.g[static_cast<std::size_t>(k)].transpose() * total;
+    force.segment<3>(6 * k) = element.axes.transpose() * local.segment<3>(6 * k);
+    force.segment<3>(6 * k + 3) = element.axes.transpose() * local.segment<3>(6 * k + 3);
+  }
+  return force;
+}
+
 LaneMatrix18 linear_stiffness(const ElementLanes& element) {
   const Reference reference = find_reference(element);
   LaneMatrix18 stiffness = LaneMatrix18::Zero();

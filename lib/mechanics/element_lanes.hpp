@@ -75,6 +75,10 @@ void unit_pressure(const ElementLanes& element, const MotionLanes& motion, LaneV
 /// linear_deformation() of each.
 LaneState linear_deformation(const ElementLanes& element, const LaneVector18& motion);
 
+/// What linear_stiffness() times the motion (as above) stands for, by way of strains and stresses: those of bending are
+/// right to round-off, where the entries of the stiffness are too coarse for them on very thin shells.
+LaneVector18 linear_force(const ElementLanes& element, const LaneVector18& motion);
+
 /// linear_stiffness() of each.
 LaneMatrix18 linear_stiffness(const ElementLanes& element);
 

@@ -89,124 +89,168 @@ double increment_size(const ShellSystem& system, const VectorX& increment) {
   return std::sqrt(sum / (static_cast<double>(increment.size()) / 6));
 }
 
-NewtonResult newton(const ShellSystem& system, const RunSettings& settings, TangentSolver& solver,
-                    const BalanceFunction& balance, const VectorX& held_increment, BlockMatrix& matrix,
-                    Configuration& configuration, bool likely_at_rest) {
-  NewtonResult result;
-  bool moving = held_increment.squaredNorm() > 0;
-  Balance now = balance(configuration, likely_at_rest ? nullptr : &matrix);
-  bool tangent_is_current = !likely_at_rest;
-  double largest_solution = 0;
-  double previous_residual = 0;
-  VectorX increment;
-  VectorX whole = VectorX::Zero(held_increment.size());
-  const auto residual_of = [&](const Balance& b) {
-    VectorX free = b.unbalanced;
-    mask(solver.free(), free);
-    const double norm = force_norm(system, free);
-    return b.scale > 0 ? norm / b.scale : (norm > 0 ? 1.0 : 0.0);
-  };
-  const auto reached = [&](const Balance& b, double residual) {
-    return residual <= settings.converge || residual * b.scale <= b.floor;
-  };
-  if (!now.valid) {
-    return result;
-  }
-  result.valid = true;
-  result.stable = true;
-  result.linear_converged = true;
-  result.residual = residual_of(now);
-  if (!moving && (now.scale == 0 || result.residual <= settings.converge)) {
-    result.converged = true;
-    return result;
-  }
-  for (result.iterations = 0; result.iterations < settings.newton_max;) {
-    check_interrupt();
-    if (!tangent_is_current) {
-      now = balance(configuration, &matrix);
+namespace {
+
+/// One call of newton().
+class NewtonIteration {
+public:
+  NewtonIteration(const ShellSystem& system, const RunSettings& settings, TangentSolver& solver,
+                  const BalanceFunction& balance, const VectorX& held_increment, BlockMatrix& matrix,
+                  Configuration& configuration)
+      : system_(system),
+        settings_(settings),
+        solver_(solver),
+        balance_(balance),
+        held_increment_(held_increment),
+        matrix_(matrix),
+        configuration_(configuration),
+        moving_(held_increment.squaredNorm() > 0),
+        whole_(VectorX::Zero(held_increment.size())) {}
+
+  NewtonResult run(bool likely_at_rest) {
+    now_ = balance_(configuration_, likely_at_rest ? nullptr : &matrix_);
+    tangent_is_current_ = !likely_at_rest;
+    if (!now_.valid) {
+      return result_;
     }
-    VectorX right = now.unbalanced;
-    if (moving) {
+    result_.valid = result_.stable = result_.linear_converged = true;
+    result_.residual = residual_of(now_);
+    result_.converged = !moving_ && (now_.scale == 0 || result_.residual <= settings_.converge);
+    while (!result_.converged && result_.valid && result_.iterations < settings_.newton_max) {
+      check_interrupt();
+      const bool at_floor = result_.iterations > 0 && is_at_floor();
+      result_.valid = find_increment();
+      // What is left of the increments there is noise: told, but not added.
+      result_.converged =
+          result_.valid && at_floor && increment_size(system_, increment_) <= largest_round_off * result_.reached;
+      if (result_.valid && !result_.converged) {
+        result_.valid = advance();
+        result_.converged = result_.valid && at_rest();
+      }
+    }
+    return result_;
+  }
+
+private:
+  [[nodiscard]] double residual_of(const Balance& balance) const {
+    VectorX free = balance.unbalanced;
+    mask(solver_.free(), free);
+    const double norm = force_norm(system_, free);
+    return balance.scale > 0 ? norm / balance.scale : (norm > 0 ? 1.0 : 0.0);
+  }
+
+  [[nodiscard]] bool is_at_floor() const { return result_.residual * now_.scale <= now_.floor; }
+
+  /// At the floor of round-off a residual says nothing about the error any more; the increments still do.
+  [[nodiscard]] bool at_rest() const {
+    return result_.residual <= settings_.converge ||
+           (is_at_floor() && last_size_ <= largest_round_off * result_.reached);
+  }
+
+  /// By the tangent; prescribed displacements move in the first. @return false where there is no solution.
+  bool find_increment() {
+    if (!tangent_is_current_) {
+      now_ = balance_(configuration_, &matrix_);
+    }
+    VectorX right = now_.unbalanced;
+    if (moving_) {
       VectorX product;
-      multiply(matrix, held_increment, product);
+      multiply(matrix_, held_increment_, product);
       right -= product;
     }
-    mask(solver.free(), right);
-    const TangentSolver::Result solved = solver.solve(matrix, right, increment);
-    result.cg_iterations += solved.cg_iterations;
-    result.stable = solved.positive_definite;
-    result.linear_converged = solved.converged;
-    result.algebraic_error = solved.error;
+    mask(solver_.free(), right);
+    const TangentSolver::Result solved = solver_.solve(matrix_, right, increment_);
+    result_.cg_iterations += solved.cg_iterations;
+    result_.stable = solved.positive_definite;
+    result_.linear_converged = solved.converged;
+    result_.algebraic_error = solved.error;
     if (solved.error) {
-      largest_solution = std::max(largest_solution, solved.error->solution);
-      result.algebraic_error->solution = largest_solution;
+      largest_solution_ = std::max(largest_solution_, solved.error->solution);
+      result_.algebraic_error->solution = largest_solution_;
     }
-    ++result.iterations;
+    ++result_.iterations;
     if (!solved.solved) {
-      result.valid = false;
-      return result;
+      return false;
     }
-    const double work = right.dot(increment);
-    if (moving) {
-      increment += held_increment;
-    } else if (const double turn = largest_rotation(increment); turn > largest_turn) {
-      increment *= largest_turn / turn;
+    work_ = right.dot(increment_);
+    if (moving_) {
+      increment_ += held_increment_;
+    } else if (const double turn = largest_rotation(increment_); turn > largest_turn) {
+      increment_ *= largest_turn / turn;
     }
-    if (result.iterations == 1) {
-      result.predicted = increment_size(system, increment);
+    if (result_.iterations == 1) {
+      result_.predicted = increment_size(system_, increment_);
     }
+    return true;
+  }
 
+  /// Along the increment, as far as the line search says. @return false where the state there cannot be used.
+  bool advance() {
     // Where another iteration will follow, judged by quadratic convergence, its tangent is made with the forces.
     const double expected =
-        result.iterations > 1 ? std::pow(result.residual, 3) / (previous_residual * previous_residual) : 1;
-    const bool more = result.iterations < settings.newton_max && expected > settings.converge;
-    previous_residual = result.residual;
-    const Configuration before = configuration;
+        result_.iterations > 1 ? std::pow(result_.residual, 3) / (previous_residual_ * previous_residual_) : 1;
+    const bool more = result_.iterations < settings_.newton_max && expected > settings_.converge;
+    previous_residual_ = result_.residual;
+    const Configuration before = configuration_;
     double length = 1;
-    Balance next;
     for (int trial = 0;; ++trial) {
-      configuration = before;
-      advance_configuration(configuration, length * increment);
-      tangent_is_current = more && trial == 0;
-      next = balance(configuration, tangent_is_current ? &matrix : nullptr);
-      if (moving || trial == 6) {
+      configuration_ = before;
+      advance_configuration(configuration_, length * increment_);
+      tangent_is_current_ = more && trial == 0;
+      now_ = balance_(configuration_, tangent_is_current_ ? &matrix_ : nullptr);
+      if (moving_ || trial == 6) {
         break;
       }
-      if (!next.valid) {
+      if (!now_.valid) {
         length /= 2;
         continue;
       }
-      if (result.iterations <= free_iterations) {
+      if (result_.iterations <= free_iterations) {
         break;
       }
-      VectorX free = next.unbalanced;
-      mask(solver.free(), free);
-      const double left = free.dot(increment);
-      if (std::abs(left) <= 0.8 * std::abs(work) || work <= 0) {
+      VectorX free = now_.unbalanced;
+      mask(solver_.free(), free);
+      const double left = free.dot(increment_);
+      if (std::abs(left) <= 0.8 * std::abs(work_) || work_ <= 0) {
         break;
       }
-      const double secant = length * work / (work - left);
-      length = std::clamp(secant, 0.2 * length, 0.7 * length);
+      length = std::clamp(length * work_ / (work_ - left), 0.2 * length, 0.7 * length);
     }
-    whole += length * increment;
-    result.reached = increment_size(system, whole);
-    result.valid = next.valid;
-    if (!next.valid) {
-      return result;
+    moving_ = false;
+    whole_ += length * increment_;
+    last_size_ = length * increment_size(system_, increment_);
+    result_.reached = increment_size(system_, whole_);
+    if (now_.valid) {
+      result_.residual = residual_of(now_);
     }
-    moving = false;
-    now = next;
-    result.residual = residual_of(next);
-    if (!std::isfinite(result.residual)) {
-      result.valid = false;
-      return result;
-    }
-    if (reached(next, result.residual)) {
-      result.converged = true;
-      return result;
-    }
+    return now_.valid && std::isfinite(result_.residual);
   }
-  return result;
+
+  const ShellSystem& system_;
+  const RunSettings& settings_;
+  TangentSolver& solver_;
+  const BalanceFunction& balance_;
+  const VectorX& held_increment_;
+  BlockMatrix& matrix_;
+  Configuration& configuration_;
+  NewtonResult result_;
+  Balance now_;
+  bool moving_;  ///< prescribed displacements are still to be moved
+  bool tangent_is_current_ = false;
+  VectorX increment_;
+  VectorX whole_;         ///< the sum of all increments
+  double work_ = 0;       ///< of the unbalanced forces along the increment
+  double last_size_ = 0;  ///< of the last increment
+  double largest_solution_ = 0;
+  double previous_residual_ = 0;
+};
+
+}  // namespace
+
+NewtonResult newton(const ShellSystem& system, const RunSettings& settings, TangentSolver& solver,
+                    const BalanceFunction& balance, const VectorX& held_increment, BlockMatrix& matrix,
+                    Configuration& configuration, bool likely_at_rest) {
+  return NewtonIteration(system, settings, solver, balance, held_increment, matrix, configuration).run(likely_at_rest);
 }
 
 }  // namespace tunica

@@ -7,6 +7,9 @@
 
 namespace tunica {
 
+/// Round-off may leave this part of a solution open, well below what any mesh does; more and there is no answer.
+inline constexpr double largest_round_off = 1e-3;
+
 /// Which freedoms no support holds.
 FreeMask free_freedoms(const ShellSystem& system);
 
@@ -52,7 +55,8 @@ struct Balance {
 using BalanceFunction = std::function<Balance(const Configuration&, BlockMatrix* tangent)>;
 
 struct NewtonResult {
-  bool converged = false;         ///< residual below the tolerance, or at the floor of round-off
+  /// Residual below the tolerance, or at the floor of round-off with increments below largest_round_off of the change.
+  bool converged = false;
   bool linear_converged = false;  ///< the last linear system was solved to its own tolerance
   bool stable = false;            ///< the last tangent was positive definite
   bool valid = false;             ///< the configuration can be used: finite, no element collapsed

@@ -10,7 +10,10 @@ namespace {
 
 constexpr std::size_t most_iterations = 200;
 constexpr double first_viscosity = 1e-3;  // of the stiffness against moving one node alone
+constexpr double least_viscosity = 1e-9;  // less is none
 constexpr double largest_viscosity = 1e6;
+/// Of the work of the unbalanced forces along a step that they may do against it at its end.
+constexpr double largest_push_back = 0.5;
 constexpr double largest_turn = 0.3;  // rad per iteration
 
 Eigen::Index at(std::size_t node) { return 6 * static_cast<Eigen::Index>(node); }
@@ -67,72 +70,109 @@ void limit(const ShellSystem& system, VectorX& increment) {
 
 }  // namespace
 
-SettleResult settle(const ShellSystem& system, const RunSettings& settings, TangentSolver& solver,
-                    const BalanceFunction& balance, BlockMatrix& matrix, Configuration& configuration) {
-  SettleResult result;
-  const VectorX diagonal = viscous_diagonal(system);
-  const double bound = size_of(system);
-  double viscosity = first_viscosity;
-  bool positive_without = false;
-  Balance now = balance(configuration, &matrix);
-  const auto norm_of = [&](const Balance& b) {
-    VectorX free = b.unbalanced;
-    mask(solver.free(), free);
-    return force_norm(system, free);
-  };
-  double norm = now.valid ? norm_of(now) : 0;
-  for (; now.valid && result.iterations < most_iterations; ++result.iterations) {
-    check_interrupt();
-    result.residual = now.scale > 0 ? norm / now.scale : 0;
-    const bool at_rest = result.residual <= settings.converge || norm <= now.floor;
-    if (at_rest && positive_without) {
-      result.settled = true;
-      return result;
-    }
-    if (at_rest || viscosity < 1e-9) {
-      viscosity = 0;
-    }
-    VectorX right = now.unbalanced;
-    mask(solver.free(), right);
-    BlockMatrix shifted = matrix;
-    add_diagonal(viscosity, diagonal, shifted);
-    VectorX increment;
-    const TangentSolver::Result solved = solver.solve(shifted, right, increment);
-    result.cg_iterations += solved.cg_iterations;
-    if (!solved.solved || !solved.positive_definite) {
-      positive_without = false;
-      result.lost_stability = true;
-      viscosity = std::max(4 * viscosity, 1e-9);
-      if (viscosity > largest_viscosity) {
-        return result;
+namespace {
+
+/// One call of settle().
+class Descent {
+public:
+  Descent(const ShellSystem& system, const RunSettings& settings, TangentSolver& solver, const BalanceFunction& balance,
+          BlockMatrix& matrix, Configuration& configuration)
+      : system_(system),
+        settings_(settings),
+        solver_(solver),
+        balance_(balance),
+        matrix_(matrix),
+        configuration_(configuration),
+        diagonal_(viscous_diagonal(system)),
+        now_(balance(configuration, &matrix)),
+        norm_(now_.valid ? norm_of(now_) : 0) {}
+
+  SettleResult run() {
+    const double bound = size_of(system_);
+    for (; now_.valid && result_.iterations < most_iterations; ++result_.iterations) {
+      check_interrupt();
+      result_.residual = now_.scale > 0 ? norm_ / now_.scale : 0;
+      const bool at_rest = result_.residual <= settings_.converge || norm_ <= now_.floor;
+      if (at_rest && positive_without_) {
+        result_.settled = true;
+        return result_;
       }
-      continue;
+      if (at_rest || viscosity_ < least_viscosity) {
+        viscosity_ = 0;
+      }
+      if (!step()) {
+        viscosity_ = std::max(4 * viscosity_, least_viscosity);
+        if (viscosity_ > largest_viscosity) {
+          return result_;
+        }
+      } else if (largest_displacement(configuration_) > bound) {
+        result_.ran_away = true;
+        return result_;
+      }
     }
-    positive_without = viscosity == 0;
-    limit(system, increment);
-    Configuration next = configuration;
+    return result_;
+  }
+
+private:
+  [[nodiscard]] double norm_of(const Balance& balance) const {
+    VectorX free = balance.unbalanced;
+    mask(solver_.free(), free);
+    return force_norm(system_, free);
+  }
+
+  /// An implicit step. @return false where it would not lead downhill, or too far: it takes more viscosity.
+  bool step() {
+    VectorX right = now_.unbalanced;
+    mask(solver_.free(), right);
+    BlockMatrix shifted = matrix_;
+    add_diagonal(viscosity_, diagonal_, shifted);
+    VectorX increment;
+    const TangentSolver::Result solved = solver_.solve(shifted, right, increment);
+    result_.cg_iterations += solved.cg_iterations;
+    if (!solved.solved || !solved.positive_definite) {
+      positive_without_ = false;
+      result_.lost_stability = true;
+      return false;
+    }
+    positive_without_ = viscosity_ == 0;
+    limit(system_, increment);
+    Configuration next = configuration_;
     advance_configuration(next, increment);
     BlockMatrix next_matrix = std::move(shifted);
-    const Balance then = balance(next, &next_matrix);
-    if (!then.valid) {
-      viscosity = std::max(10 * viscosity, first_viscosity);
-      if (viscosity > largest_viscosity) {
-        return result;
-      }
-      continue;
+    const Balance then = balance_(next, &next_matrix);
+    // Beyond the bottom of a valley the forces push back.
+    if (!then.valid || then.unbalanced.dot(increment) < -largest_push_back * right.dot(increment)) {
+      return false;
     }
-    configuration = std::move(next);
-    matrix = std::move(next_matrix);
+    configuration_ = std::move(next);
+    matrix_ = std::move(next_matrix);
     const double then_norm = norm_of(then);
-    viscosity *= std::clamp(then_norm / norm, 0.1, 2.0);
-    now = then;
-    norm = then_norm;
-    if (largest_displacement(configuration) > bound) {
-      result.ran_away = true;
-      return result;
-    }
+    // As little as leads on: a shell that leaves its path moves slowly at first, whatever the residual.
+    viscosity_ *= std::clamp(then_norm / norm_, 0.1, 0.5);
+    now_ = then;
+    norm_ = then_norm;
+    return true;
   }
-  return result;
+
+  const ShellSystem& system_;
+  const RunSettings& settings_;
+  TangentSolver& solver_;
+  const BalanceFunction& balance_;
+  BlockMatrix& matrix_;
+  Configuration& configuration_;
+  const VectorX diagonal_;
+  Balance now_;
+  double norm_;
+  double viscosity_ = first_viscosity;
+  bool positive_without_ = false;
+  SettleResult result_;
+};
+
+}  // namespace
+
+SettleResult settle(const ShellSystem& system, const RunSettings& settings, TangentSolver& solver,
+                    const BalanceFunction& balance, BlockMatrix& matrix, Configuration& configuration) {
+  return Descent(system, settings, solver, balance, matrix, configuration).run();
 }
 
 VectorX weakest_direction(const ShellSystem& system, TangentSolver& solver, const BalanceFunction& balance,

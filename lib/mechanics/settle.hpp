@@ -16,10 +16,10 @@ struct SettleResult {
 
 /// Lets a configuration, which is changed, creep downhill until it rests: a stable equilibrium of the same load, near
 /// or far, or none. For states that Newton's method cannot reach because the path to them loses its stability. How:
-/// pseudo-transient continuation, implicit Euler steps of a gradient flow with a viscosity that falls with the residual
-/// and rises where the tangent is not positive definite; it never stops at an unstable equilibrium. Source: Kelley,
-/// Keyes 1998, "Convergence analysis of pseudo-transient continuation". Cost: one or two factorisations per iteration;
-/// from ten to a few hundred iterations.
+/// pseudo-transient continuation, implicit Euler steps of a gradient flow with a viscosity that falls while they lead
+/// downhill, and rises where the tangent is not positive definite; it never stops at an unstable equilibrium. Source:
+/// Kelley, Keyes 1998, "Convergence analysis of pseudo-transient continuation". Cost: one or two factorisations per
+/// iteration; from ten to a few hundred iterations.
 SettleResult settle(const ShellSystem& system, const RunSettings& settings, TangentSolver& solver,
                     const BalanceFunction& balance, BlockMatrix& matrix, Configuration& configuration);
 

@@ -525,6 +525,33 @@ void linear_stiffness(const ShellSystem& system, BlockMatrix& matrix) {
   }
 }
 
+void linear_forces(const ShellSystem& system, const VectorX& displacement, VectorX& forces) {
+  forces.setZero(at(system.node_count()));
+  for (const std::vector<Batch>& colour : system.colours) {
+    parallel_for_blocks(colour.size(), grain, [&](std::size_t begin, std::size_t end) {
+      ElementLanes elements;
+      LaneVector18 motion;
+      for (std::size_t b = begin; b < end; ++b) {
+        const ElementGroup group = members(system, colour[b]);
+        gather(group, elements);
+        for (int k = 0; k < 3; ++k) {
+          const auto corner = static_cast<std::size_t>(k);
+          LaneVector6 moved;
+          set_lanes(moved, [&](std::size_t l) { return displacement.segment<6>(at(group[l]->nodes[corner])); });
+          motion.segment<6>(6 * k) = moved;
+        }
+        const LaneVector18 force = linear_force(elements, motion);
+        for (std::size_t l = 0; l < colour[b].count; ++l) {
+          const Vector18 one = lane(force, l);
+          for (int k = 0; k < 3; ++k) {
+            forces.segment<6>(at(group[l]->nodes[static_cast<std::size_t>(k)])) += one.segment<6>(6 * k);
+          }
+        }
+      }
+    });
+  }
+}
+
 double force_norm(const ShellSystem& system, const VectorX& force) {
   double sum = 0;
   for (std::size_t i = 0; i < system.node_count(); ++i) {

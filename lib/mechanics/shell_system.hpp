@@ -113,6 +113,11 @@ void evaluate(const ShellSystem& system, const Model& model, const Configuration
 /// Stiffness of the linear theory at the reference, without any load.
 void linear_stiffness(const ShellSystem& system, BlockMatrix& matrix);
 
+/// That stiffness times displacements and rotation vectors (6 per node), summed over the elements' stresses: its error
+/// is round-off of strains, not of stiffnesses, whose entries are larger by (h / t)^2 and more than what a thin shell
+/// bends with.
+void linear_forces(const ShellSystem& system, const VectorX& displacement, VectorX& forces);
+
 /// Root of the sum of squares of forces and moments / length.
 double force_norm(const ShellSystem& system, const VectorX& force);
 

@@ -1,8 +1,10 @@
 #include "mechanics/solve.hpp"
 
 #include "core/error.hpp"
+#include "mechanics/curved_displacement.hpp"
 #include "mechanics/rotation.hpp"
 #include "mechanics/run.hpp"
+#include "mechanics/wall.hpp"
 
 #include <fmt/format.h>
 
@@ -100,6 +102,48 @@ Summary solve(const Model& model, const RunSettings& settings, const std::functi
                     : run_static(system, model, settings, run, on_state, progress, resumption);
 }
 
+namespace {
+
+/// From the fields of the elements what of them is large.
+void find_wall(const Model& model, ElementFields& fields) {
+  constexpr double above = 0.01;
+  constexpr double equal_stress = 1e-6;
+  const auto larger = [&](std::vector<double> top, const std::vector<double>& bottom) {
+    top = averaged_at_nodes(model, top);
+    const std::vector<double> other = averaged_at_nodes(model, bottom);
+    std::transform(top.begin(), top.end(), other.begin(), top.begin(),
+                   [](double a, double b) { return std::max(a, b); });
+    return top;
+  };
+  const auto first = [](const std::vector<Vec2>& pairs) {
+    std::vector<double> values;
+    for (const Vec2& pair : pairs) {
+      values.push_back(pair[0]);
+    }
+    return values;
+  };
+  Wall& wall = fields.wall;
+  fields.von_mises = larger(fields.von_mises_top, fields.von_mises_bottom);
+  wall.stress_max = *std::max_element(fields.von_mises.begin(), fields.von_mises.end());
+  // The first of equal ones, so that on a symmetric body it is not round-off that chooses.
+  const auto highest = std::ranges::find_if(
+      fields.von_mises, [&](double stress) { return stress >= (1 - equal_stress) * wall.stress_max; });
+  auto node = static_cast<std::size_t>(highest - fields.von_mises.begin());
+  wall.stress_p99 = area_quantile(model, fields.von_mises, above);
+  for (const ShellBody& body : model.shells) {
+    if (node < body.mesh.vertices.size()) {
+      wall.stress_max_at = body.mesh.vertices[node];
+      break;
+    }
+    node -= body.mesh.vertices.size();
+  }
+  const std::vector<double> strain = larger(first(fields.principal_strain_top), first(fields.principal_strain_bottom));
+  wall.strain_max = *std::max_element(strain.begin(), strain.end());
+  wall.strain_p99 = area_quantile(model, strain, above);
+}
+
+}  // namespace
+
 struct ElementFieldEvaluator::Implementation {
   const Model& model;
   ShellSystem system;
@@ -164,6 +208,8 @@ ElementFields ElementFieldEvaluator::operator()(const State& state) const {
     fields.principal_strain_bottom.push_back(principal(strain - t / 2 * curvature));
     fields.pressure.push_back(pressure[element.body]);
   }
+  find_wall(model, fields);
+  fields.largest_displacement = largest_displacement(model, state);
   return fields;
 }
 

@@ -35,6 +35,16 @@ struct State {
   bool linear = false;  ///< of the linear theory: rotations are not finite ones
 };
 
+/// What the wall bears, over all bodies: of von Mises stress and largest principal strain, each the larger of both
+/// faces after averaging at the nodes within a body. p99 is passed on 1 % of the area.
+struct Wall {
+  double stress_p99 = 0;  ///< MPa
+  double stress_max = 0;
+  Vec3 stress_max_at = Vec3::Zero();  ///< mm, the node, in the reference
+  double strain_p99 = 0;              ///< engineering strain of the co-rotated frame
+  double strain_max = 0;
+};
+
 /// Per-element results of one state (#elements of all bodies in order; components in the element's own frame whose
 /// x axis is the projection of the first edge).
 struct ElementFields {
@@ -45,7 +55,28 @@ struct ElementFields {
   /// At the faces, largest first; engineering strains of the co-rotated frame.
   std::vector<Vec2> principal_strain_top;
   std::vector<Vec2> principal_strain_bottom;
-  std::vector<double> pressure;  ///< MPa, of this state
+  std::vector<double> pressure;   ///< MPa, of this state
+  std::vector<double> von_mises;  ///< MPa, #nodes: the larger of both faces' averages at the nodes
+  Wall wall;
+  double largest_displacement = 0;  ///< mm, of the curved surfaces, also between the nodes
+};
+
+/// Where a static path broke off and the shell moved by itself to the next state of rest.
+struct Snap {
+  double load_factor = 0;
+  double distance = 0;  ///< mm, the farthest that a node moved
+};
+
+/// Of a dynamic run: work = stored + damped + lost. All from the beginning, mJ unless said.
+struct EnergyBalance {
+  double work = 0;               ///< by loads and prescribed displacements, by trapezia over each step
+  double damped = 0;             ///< by physical damping
+  double lost = 0;               ///< to time integration; below zero: gained from it
+  double most_lost = 0;          ///< so far
+  double largest = 0;            ///< energy so far, stored or brought in
+  double gained = 0;             ///< the most that time integration has given back or added, relative to `largest`
+  std::size_t gaining_step = 0;  ///< in which that passed a tenth; 0: in none
+  double gaining_time = 0;       ///< s, the end of that step
 };
 
 struct Summary {
@@ -64,15 +95,17 @@ struct Summary {
   std::optional<double> volume_before;    ///< mm^3; none when a body is open
   std::optional<double> volume_after;
   double strain_energy = 0;              ///< mJ
-  double max_displacement = 0;           ///< mm, of the last state
+  double max_displacement = 0;           ///< mm, of the nodes in the last state
   std::vector<double> seconds_per_step;  ///< wall
   std::vector<double> frequencies;       ///< Hz, increasing
   std::vector<double> buckling_factors;  ///< increasing
   /// Load factor (static) or time (s) from which waves as short as the elements were made stiff, because the shell
   /// would have buckled in them (shell_element.hpp).
   std::optional<double> stiffened_from;
-  std::vector<double> limit_factors;   ///< load factors at which a path by arc length turns, in its order
-  std::vector<double> branch_factors;  ///< and near which other paths leave it
+  std::optional<EnergyBalance> energy;  ///< of a dynamic run
+  std::vector<Snap> snaps;              ///< under load control, in order
+  std::vector<double> limit_factors;    ///< load factors at which a path by arc length turns, in its order
+  std::vector<double> branch_factors;   ///< and near which other paths leave it
 };
 
 /// Everything a run needs to go on after a step as if nothing had happened: the numbers as they stand in memory, so
@@ -116,8 +149,8 @@ void check_model(const Model& model, const RunSettings& settings);
 Summary solve(const Model& model, const RunSettings& settings, const std::function<void(const State&)>& on_state,
               const Progress& progress = {}, const Resumption& resumption = {});
 
-/// Forces, moments and stresses of every triangle in one state. For many states of one model: the elements are made
-/// ready once. The model must outlive it.
+/// Forces, moments and stresses of every triangle in one state, and what is largest. For many states of one model: the
+/// elements are made ready once. The model must outlive it.
 class ElementFieldEvaluator {
 public:
   explicit ElementFieldEvaluator(const Model& model);

@@ -44,13 +44,17 @@ using Clock = std::chrono::steady_clock;
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
-/// Smallest part of a load step that is tried before the load counts as one without equilibrium.
-constexpr double smallest_part = 1.0 / 1024;
+/// Smallest increment that is tried before the load counts as one without equilibrium near: this part of the whole
+/// load, and of a load step.
+constexpr double smallest_of_load = 1.0 / 4096;
+constexpr double smallest_of_step = 1.0 / 16;
+/// Where a path breaks off, the shell is let go this many smallest increments beyond, so that it does not come back.
+constexpr double beyond_the_limit = 4;
 /// A step whose change is more than this times its linear prediction has left the path: up to a limit point a quadratic
 /// fold gives at most 2.
 constexpr double largest_departure = 3;
-/// A shell that gives way by less than this part of its thickness (root mean square) has branched off its path, not
-/// jumped.
+/// A shell that gives way by less than this part of its thickness (root mean square) has branched off its path; more is
+/// a snap.
 constexpr double largest_branch = 0.25;
 /// Part of the thickness by which a shell is pushed off a path that it may leave.
 constexpr double nudge = 0.01;
@@ -167,6 +171,14 @@ double distance(const Configuration& a, const Configuration& b) {
   return std::sqrt(sum / static_cast<double>(a.displacement.size()));
 }
 
+double largest_distance(const Configuration& a, const Configuration& b) {
+  double largest = 0;
+  for (std::size_t i = 0; i < a.displacement.size(); ++i) {
+    largest = std::max(largest, (a.displacement[i] - b.displacement[i]).norm());
+  }
+  return largest;
+}
+
 struct Failure {
   std::string found;
   std::string reason;
@@ -179,11 +191,6 @@ Failure why(const NewtonResult& result, const SettleResult& let_go, bool prescri
   if (let_go.ran_away) {
     return {none, limit + ": beyond it there is no equilibrium, the shell yields without bound"};
   }
-  if (let_go.settled) {
-    return {none, limit +
-                      ": beyond it the shell jumps to a distant shape (snap-through or buckling), which a dynamic run "
-                      "may follow"};
-  }
   if (!result.stable || let_go.lost_stability) {
     return {none,
             limit + ": the stiffness is no longer positive, and no state was found in which the shell could rest"};
@@ -193,197 +200,188 @@ Failure why(const NewtonResult& result, const SettleResult& let_go, bool prescri
                                                       : "elements collapse or fold"};
 }
 
+/// What load control does: the load grows to one load factor after the other, each in one step, which is cut only where
+/// Newton's method fails. Where the path of equilibria breaks off, the shell goes on from the state of rest that it
+/// then finds.
+class LoadControl {
+public:
+  LoadControl(ShellSystem& system, const Model& model, const RunSettings& settings, const StaticRun& run,
+              const StateCallback& on_state)
+      : system_(system),
+        model_(model),
+        settings_(settings),
+        run_(run),
+        on_state_(on_state),
+        step_(system, model, settings),
+        thickness_(least_thickness(model)),
+        configuration_(reference_configuration(system)) {}
+
+  Summary follow(const Progress& progress, const Resumption& resumption) {
+    if (resumption.from) {
+      resume(*resumption.from);
+    } else {
+      begin();
+    }
+    const std::size_t steps = run_.load_factors.size();
+    for (std::size_t s = summary_.steps; s < steps; ++s) {
+      const auto start = Clock::now();
+      step_.tell_direct_error(s == 0 || s + 1 == steps);
+      const NewtonResult result = reach(run_.load_factors[s]);
+      const State state = state_of(result);
+      record_step(state, seconds_since(start), summary_);
+      if ((s + 1) % settings_.every == 0 || s + 1 == steps) {
+        show(state);
+      }
+      resumption.offer([&] {
+        return Checkpoint{summary_,
+                          factor_,
+                          configuration_.displacement,
+                          configuration_.rotation,
+                          {{"shown", {shown_}}, {"increment", {increment_}}}};
+      });
+      advance(progress, static_cast<double>(s + 1) / static_cast<double>(steps));
+    }
+    return summary_;
+  }
+
+private:
+  void begin() {
+    summary_.dof = step_.freedom_count();
+    State state = make_state(system_, model_, configuration_, 0);
+    state.converged = true;
+    on_state_(state);
+    summary_.volume_before = state.volume;
+    summary_.volume_after = state.volume;
+  }
+
+  void resume(const Checkpoint& from) {
+    summary_ = from.summary;
+    if (summary_.stiffened_from) {
+      stiffen_short_waves(system_);
+    }
+    configuration_ = {from.displacement, from.rotation};
+    factor_ = from.position;
+    shown_ = from.memory.at("shown").at(0);
+    increment_ = from.memory.at("increment").at(0);
+  }
+
+  /// Equilibrium at a load factor. Errors: RequirementError: there is none.
+  /// @return of the last increment, with the iterations of all
+  NewtonResult reach(double target) {
+    const double step = target - factor_;
+    const double smallest = std::min(smallest_of_load * run_.load_factors.back(), smallest_of_step * step);
+    NewtonResult result;
+    std::size_t iterations = 0;
+    std::size_t cg_iterations = 0;
+    while (factor_ != target) {
+      const double before = factor_;
+      const double next = increment_ >= target - factor_ - 1e-12 * step ? target : factor_ + increment_;
+      Configuration attempt = configuration_;
+      result = step_.run(next, factor_, attempt);
+      iterations += result.iterations;
+      cg_iterations += result.cg_iterations;
+      if (may_stand(result)) {
+        configuration_ = std::move(attempt);
+        factor_ = next;
+        increment_ *= 2;
+        continue;
+      }
+      increment_ = (next - before) / 2;
+      if (increment_ >= smallest) {
+        continue;
+      }
+      if (!summary_.stiffened_from && has_soft_waves(system_)) {
+        stiffen_short_waves(system_);
+        summary_.stiffened_from = factor_;
+        increment_ = step;
+        continue;
+      }
+      const SettleResult settled = leave_path(std::min(target, factor_ + beyond_the_limit * smallest), result);
+      iterations += settled.iterations;
+      cg_iterations += settled.cg_iterations;
+      result.residual = settled.residual;
+      result.converged = true;
+      increment_ = beyond_the_limit * smallest;
+    }
+    result.iterations = iterations;
+    result.cg_iterations = cg_iterations;
+    return result;
+  }
+
+  [[nodiscard]] bool may_stand(const NewtonResult& result) const {
+    // With a fixed count of iterations, or one linearisation, nobody asks for a tolerance.
+    if (settings_.cg_fixed_count) {
+      return result.valid;
+    }
+    const bool one_linearisation = settings_.newton_max == 1 && result.residual <= largest_unchecked_residual;
+    const bool left_the_path = result.predicted > 0 && result.reached > largest_departure * result.predicted;
+    return (result.converged || (result.valid && one_linearisation)) && result.stable && !left_the_path;
+  }
+
+  /// From where the path breaks off to the next state of rest, at a load factor beyond. Errors: RequirementError: none.
+  SettleResult leave_path(double beyond, const NewtonResult& failed) {
+    Configuration attempt = configuration_;
+    const SettleResult settled = step_.let_go(beyond, factor_, thickness_, attempt);
+    if (!settled.settled) {
+      fail(failed, settled);
+    }
+    if (distance(attempt, configuration_) > largest_branch * thickness_) {
+      summary_.snaps.push_back({factor_, largest_distance(attempt, configuration_)});
+    }
+    configuration_ = std::move(attempt);
+    factor_ = beyond;
+    return settled;
+  }
+
+  [[noreturn]] void fail(const NewtonResult& failed, const SettleResult& let_go) {
+    if (factor_ != shown_) {  // the last good state, also between two load steps
+      NewtonResult good;
+      good.converged = true;
+      show(state_of(good));
+    }
+    const double last = run_.load_factors.back();
+    const auto [found, reason] = why(failed, let_go, !system_.prescribed.empty());
+    throw RequirementError(
+        fmt::format("{} beyond load factor {:.6g} of {:.6g} ({}): {}; the last good state is at {:.6g}", found, factor_,
+                    last, describe_loads(model_, load_factors(model_, true, factor_), load_factors(model_, true, last)),
+                    reason, factor_));
+  }
+
+  [[nodiscard]] State state_of(const NewtonResult& result) const {
+    State state = make_state(system_, model_, configuration_, factor_);
+    state.load_factor = factor_;
+    state.residual = result.residual;
+    state.newton_iterations = result.iterations;
+    state.cg_iterations = result.cg_iterations;
+    set_algebraic_error(result.algebraic_error, state);
+    state.converged = result.converged;
+    return state;
+  }
+
+  void show(const State& state) {
+    on_state_(state);
+    shown_ = factor_;
+  }
+
+  ShellSystem& system_;
+  const Model& model_;
+  const RunSettings& settings_;
+  const StaticRun& run_;
+  const StateCallback& on_state_;
+  LoadStep step_;
+  const double thickness_;
+  Configuration configuration_;
+  Summary summary_;
+  double factor_ = 0;
+  double shown_ = 0;                                            ///< load factor of the last state handed over
+  double increment_ = std::numeric_limits<double>::infinity();  ///< of the load factor, to be tried next
+};
+
 }  // namespace
 
 Summary run_static(ShellSystem& system, const Model& model, const RunSettings& settings, const StaticRun& run,
                    const StateCallback& on_state, const Progress& progress, const Resumption& resumption) {
-  Summary summary;
-  LoadStep step(system, model, settings);
-  Configuration configuration = reference_configuration(system);
-  State state;
-  double factor = 0;
-  double shown = 0;
-  double part = 1;
-  if (resumption.from) {
-    summary = resumption.from->summary;
-    if (summary.stiffened_from) {
-      stiffen_short_waves(system);
-    }
-    configuration = {resumption.from->displacement, resumption.from->rotation};
-    factor = resumption.from->position;
-    shown = resumption.from->memory.at("shown").at(0);
-    part = resumption.from->memory.at("part").at(0);
-  } else {
-    summary.dof = step.freedom_count();
-    state = make_state(system, model, configuration, 0);
-    state.converged = true;
-    on_state(state);
-    summary.volume_before = state.volume;
-    summary.volume_after = state.volume;
-  }
-
-  const double thickness = least_thickness(model);
-  for (std::size_t s = summary.steps; s < run.load_factors.size(); ++s) {
-    const auto start = Clock::now();
-    const double target = run.load_factors[s];
-    const double whole = target - factor;
-    step.tell_direct_error(s == 0 || s + 1 == run.load_factors.size());
-    std::size_t newton_iterations = 0;
-    std::size_t cg_iterations = 0;
-    NewtonResult result;
-    while (factor != target) {
-      const bool last = part * whole >= target - factor - 1e-12 * whole;
-      const double next = last ? target : factor + part * whole;
-      Configuration attempt = configuration;
-      result = step.run(next, factor, attempt);
-      newton_iterations += result.iterations;
-      cg_iterations += result.cg_iterations;
-      // With a fixed count of iterations, or one linearisation, nobody asks for a tolerance.
-      const bool one_linearisation = settings.newton_max == 1 && result.residual <= largest_unchecked_residual;
-      const bool accepted = result.converged || (result.valid && (settings.cg_fixed_count || one_linearisation));
-      const bool left_the_path = result.predicted > 0 && result.reached > largest_departure * result.predicted;
-      if (accepted && (settings.cg_fixed_count || (result.stable && !left_the_path))) {
-        configuration = std::move(attempt);
-        factor = next;
-        part = std::min(1.0, 2 * part);
-        continue;
-      }
-      part /= 2;
-      if (part >= smallest_part) {
-        continue;
-      }
-      if (!summary.stiffened_from && has_soft_waves(system)) {
-        stiffen_short_waves(system);
-        summary.stiffened_from = factor;
-        part = 1;
-        continue;
-      }
-      const double beyond = std::min(target, factor + 4 * smallest_part * whole);
-      attempt = configuration;
-      const SettleResult let_go = step.let_go(beyond, factor, thickness, attempt);
-      newton_iterations += let_go.iterations;
-      cg_iterations += let_go.cg_iterations;
-      if (!let_go.settled || distance(attempt, configuration) > largest_branch * thickness) {
-        if (factor != shown) {  // the last good state, also between two load steps
-          state = make_state(system, model, configuration, factor);
-          state.load_factor = factor;
-          state.converged = true;
-          on_state(state);
-        }
-        const auto [found, reason] = why(result, let_go, !system.prescribed.empty());
-        throw RequirementError(
-            fmt::format("{} beyond load factor {:.6g} of {:.6g} ({}): {}; the last good state is at "
-                        "{:.6g}",
-                        found, factor, run.load_factors.back(),
-                        describe_loads(model, load_factors(model, true, factor),
-                                       load_factors(model, true, run.load_factors.back())),
-                        reason, factor));
-      }
-      configuration = std::move(attempt);
-      factor = beyond;
-      part = 4 * smallest_part;
-      result.residual = let_go.residual;
-      result.converged = true;
-    }
-    state = make_state(system, model, configuration, factor);
-    state.load_factor = factor;
-    state.residual = result.residual;
-    state.newton_iterations = newton_iterations;
-    state.cg_iterations = cg_iterations;
-    set_algebraic_error(result.algebraic_error, state);
-    state.converged = result.converged;
-    record_step(state, seconds_since(start), summary);
-    const bool is_last = s + 1 == run.load_factors.size();
-    if ((s + 1) % settings.every == 0 || is_last) {
-      on_state(state);
-      shown = factor;
-    }
-    resumption.offer([&] {
-      return Checkpoint{
-          summary, factor, configuration.displacement, configuration.rotation, {{"shown", {shown}}, {"part", {part}}}};
-    });
-    advance(progress, static_cast<double>(s + 1) / static_cast<double>(run.load_factors.size()));
-  }
-  return summary;
-}
-
-Summary run_linear(ShellSystem& system, const Model& model, const RunSettings& settings, const StaticRun& run,
-                   const StateCallback& on_state, const Progress& progress, const Resumption& resumption) {
-  Summary summary;
-  TangentSolver solver(system, settings);
-  solver.tell_direct_error(true);
-  const Configuration reference = reference_configuration(system);
-  State state;
-  if (resumption.from) {
-    summary = resumption.from->summary;
-  } else {
-    summary.dof = solver.freedom_count();
-    state = make_state(system, model, reference, 0);
-    state.converged = true;
-    state.linear = true;
-    on_state(state);
-    summary.volume_before = state.volume;
-    summary.volume_after = state.volume;
-  }
-
-  BlockMatrix matrix = system.pattern;
-  linear_stiffness(system, matrix);
-  Forces forces;
-  const std::size_t first = summary.steps;
-  for (std::size_t s = first; s < run.load_factors.size(); ++s) {
-    const auto start = Clock::now();
-    const double factor = run.load_factors[s];
-    evaluate(system, model, reference, load_factors(model, true, factor), {}, forces, nullptr);
-    const VectorX held = prescribed_positions(system, model, factor);
-    VectorX product;
-    multiply(matrix, held, product);
-    VectorX right = forces.external - product;
-    mask(solver.free(), right);
-    VectorX solution;
-    const TangentSolver::Result solved = solver.solve(matrix, right, solution, s > first);
-    if (!solved.solved || !solved.positive_definite) {
-      throw RequirementError(
-          "the linear stiffness is not positive definite: the model is not held, or its elements are "
-          "too distorted for double precision");
-    }
-    VectorX displacement = solution + held;
-    take_out_linear_rigid_motion(system, model, displacement);
-    multiply(matrix, displacement, product);
-
-    Configuration configuration = reference;
-    for (std::size_t i = 0; i < system.node_count(); ++i) {
-      configuration.displacement[i] = displacement.segment<3>(6 * static_cast<Eigen::Index>(i));
-      configuration.rotation[i] = exponential(displacement.segment<3>(6 * static_cast<Eigen::Index>(i) + 3));
-    }
-    VectorX unbalanced = forces.external - product;
-    mask(solver.free(), unbalanced);
-    const double scale = std::max(force_norm(system, forces.external), force_norm(system, product));
-    state = make_state(system, model, configuration, factor);
-    for (std::size_t i = 0; i < system.node_count(); ++i) {
-      state.rotation[i] = displacement.segment<3>(6 * static_cast<Eigen::Index>(i) + 3);
-    }
-    state.linear = true;
-    state.load_factor = factor;
-    state.strain_energy = 0.5 * displacement.dot(product);
-    state.residual = scale > 0 ? force_norm(system, unbalanced) / scale : 0;
-    state.newton_iterations = 1;
-    state.cg_iterations = solved.cg_iterations;
-    set_algebraic_error(solved.error, state);
-    state.converged = solved.converged;
-    if (!solved.converged && !settings.cg_fixed_count) {
-      throw RequirementError(
-          fmt::format("conjugate gradients stopped at a relative residual of {:.3g} after {} "
-                      "iterations: use the direct solver or allow more iterations",
-                      solved.residual, solved.cg_iterations));
-    }
-    record_step(state, seconds_since(start), summary);
-    if ((s + 1) % settings.every == 0 || s + 1 == run.load_factors.size()) {
-      on_state(state);
-    }
-    resumption.offer([&] { return Checkpoint{summary, factor, {}, {}, {}}; });  // no step needs the one before
-    advance(progress, static_cast<double>(s + 1) / static_cast<double>(run.load_factors.size()));
-  }
-  return summary;
+  return LoadControl(system, model, settings, run, on_state).follow(progress, resumption);
 }
 
 }  // namespace tunica

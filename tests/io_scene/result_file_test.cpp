@@ -69,6 +69,9 @@ nearest = ["10mm", "10mm", "0mm"]
     result.bending_moment.assign(count, Vec3::Constant(2 * value));
     result.von_mises_top.assign(count, value);
     result.von_mises_bottom.assign(count, value);
+    result.von_mises.assign(model_.node_count(), value);
+    result.wall = {value, 3 * value, Vec3::Constant(value), value / 100, value / 50};
+    result.largest_displacement = value;
     result.principal_strain_top.assign(count, Vec2(value, -value));
     result.principal_strain_bottom.assign(count, Vec2(value, -value));
     for (std::size_t i = 0; i < count; ++i) {
@@ -229,7 +232,7 @@ TEST_F(ResultTest, aSeriesGrowsAndASingleStateIsReplaced) {
     file.commit(true);
     const double points = values(out(), "/VTKHDF/NumberOfPoints").at(0);
     const double cells = values(out(), "/VTKHDF/NumberOfCells").at(0);
-    EXPECT_EQ(points, 40 * 15);  // 8 + 32 shells, 4 pieces per edge
+    EXPECT_EQ(points, 31 + 3 * (12 + 56) + 3 * 40);  // 8 + 32 shells, 4 pieces per edge; shared nodes and edges
     EXPECT_EQ(cells, 40 * 16);
     const double states = series ? 2 : 1;
     const std::vector<double> u = values(out(), "/VTKHDF/PointData/displacement");

@@ -248,5 +248,40 @@ TEST(Linear, ThinTwistedBeam) {
   }
 }
 
+/// A cylinder with free ends between two opposite forces bends without extension: each moves by
+/// (pi / 8 - 1 / pi) P R^3 / (D L). Timoshenko, Woinowsky-Krieger 1959, article 121.
+class FreeEndedCylinder : public testing::TestWithParam<double> {};
+INSTANTIATE_TEST_SUITE_P(Linear, FreeEndedCylinder, testing::Values(1e4, 1e5, 1e6, 1e7));
+
+TEST_P(FreeEndedCylinder, IsRightOrRefusedHoweverThin) {
+  constexpr std::size_t n = 96;
+  const double thickness = 1 / GetParam();
+  const Grid grid =
+      make_grid(n, n, [](double u, double v) { return Vec3(std::sin(pi / 2 * u), v, std::cos(pi / 2 * u)); });
+  Model model;
+  ShellBody body = flat_body(grid.mesh, 1, 0.3, thickness);
+  body.curved = true;
+  body.rest = Rest::curved;
+  for (const Vec3& p : grid.mesh.vertices) {
+    body.mesh.normals.push_back(Vec3(p.x(), 0, p.z()).normalized());
+  }
+  model.shells.push_back(body);
+  hold(
+      model, [](const Vec3& p) { return std::abs(p.x()) < 1e-9; }, "x", "yz");
+  hold(
+      model, [](const Vec3& p) { return std::abs(p.z()) < 1e-9; }, "z", "xy");
+  hold(
+      model, [](const Vec3& p) { return std::abs(p.y()) < 1e-9; }, "y", "xz");
+  const double bending = std::pow(thickness, 3) / (12 * (1 - 0.09));
+  model.loads.push_back({0, ForceLoad{{grid.node(0, 0)}, Vec3(0, 0, -bending / 4)}, {}});
+  const double exact = (pi / 8 - 1 / pi) / 2;
+  try {
+    EXPECT_NEAR(-last_state(model, linear_run()).displacement[grid.node(0, 0)].z(), exact, 0.02 * exact);
+  } catch (const RequirementError& error) {
+    EXPECT_NE(std::string(error.what()).find("double precision"), std::string::npos) << error.what();
+    EXPECT_GT(GetParam(), 1e5) << error.what();
+  }
+}
+
 }  // namespace
 }  // namespace tunica

@@ -41,6 +41,19 @@ class Paths(SimulateTest):
             np.testing.assert_allclose(file["tunica/history/load_factor"][:], factor)
             np.testing.assert_array_equal(file["VTKHDF/Steps/Values"][:], np.arange(len(factor)))
 
+    def test_roof_that_snaps_says_so(self):
+        """Dead load beyond the limit: the next state of rest, told in a warning and in the result."""
+        self.write("scene.toml", self.roof("", self.FORCE))
+        report = self.run_tool("--scene", "scene.toml", "out.hdf")
+        result = report["result"]
+        self.assertEqual(result["steps"], 1)
+        self.assertEqual(len(result["snaps"]), 1)
+        self.assertAlmostEqual(result["snaps"][0]["load_factor"], .7421, delta=0.005)
+        self.assertGreater(result["snaps"][0]["distance_mm"], 10)
+        self.assertRegex(self.done.stderr, r"warning: .*: at load factor 0\.74.* the shell snaps")
+        w = -result["probes"]["centre"]["displacement_mm"][-1][2]
+        self.assertAlmostEqual(w, np.interp(1, [.3871, 1.0835], [24.049, 29.374]), delta=0.6)
+
     def test_path_that_does_not_get_there(self):
         self.write("scene.toml", self.roof(self.UNTIL + "max_steps = 5", self.FORCE))
         report = self.run_tool("--scene", "scene.toml", "out.hdf", expect=4)
