@@ -15,7 +15,7 @@
 namespace tunica {
 namespace {
 
-constexpr double joins_features = 0.1;  // shortfall of an edge between two features: as an angle of two thirds
+constexpr double joins_features = 1;  // shortfall of an edge between two features: outweighs an angle
 constexpr double fit_agreement = 1.05 * least_normal_agreement;  // of a corner: less makes no shell
 constexpr double hopeless = 8;                                   // times the limit after the first step
 constexpr int placing_steps = 3;                                 // of least squares, then largest errors, twice

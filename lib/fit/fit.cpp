@@ -9,6 +9,7 @@
 #include "shell/refine.hpp"
 #include "shell/shell_crossings.hpp"
 #include "surface/checks.hpp"
+#include "surface/measure.hpp"
 
 #include <fmt/core.h>
 
@@ -23,10 +24,11 @@ constexpr double default_width = 1e-4;  // of the diagonal: of certified interva
 constexpr double margin = 0.97;         // of the tolerance: what the samples may say, for they miss a little
 constexpr double start_error = 1;       // of the tolerance: flat error of the mesh that the search starts from
 constexpr double surplus = 1.5;         // of triangles at the start of a search for a count
-constexpr double longest_edge = 3;      // of the mean: no region without nodes of its own
+constexpr double longest_edge = 2;      // of the mean: no region without nodes of its own
+constexpr double fewest_across = 4;     // of the longest edges: along a square of the surface's area, likewise
 constexpr int mean_power = 2, largest_power = 4;  // of residuals: the mean counts, or the largest
 constexpr int settling_steps = 6;
-constexpr double eased_angle = 0.5;  // of the smallest angle, while edges collapse; mended afterwards
+constexpr double angle_margin = 1.01;  // of the smallest angle: what steps may give away
 constexpr int mending_passes = 3;
 constexpr double smoothing = 0.1;               // of the stiffness against sliding
 constexpr int default_rounds = 12;              // of exchanges
@@ -43,7 +45,8 @@ public:
         target_(target),
         options_(options),
         like_target_(same_topology(coarse_, target)) {
-    limits_.shape.min_angle = options.min_angle;
+    limits_.shape.min_angle = angle_margin * options.min_angle;
+    most_ = options.max_shells.value_or(options.tolerance ? options.shells.value_or(max_index) : max_index);
     rounds_ = options.max_iterations.value_or(default_rounds);
     width_ = options.width.value_or(default_width * target.diagonal());
     if (options.tolerance) {
@@ -63,10 +66,6 @@ public:
   }
 
 private:
-  [[nodiscard]] std::size_t most() const {
-    return options_.max_shells.value_or(options_.tolerance ? options_.shells.value_or(max_index) : max_index);
-  }
-
   [[nodiscard]] FitMesh started(const TriangleMesh& mesh) const {
     return FitMesh(shells_on(target_, mesh, options_.surface));
   }
@@ -94,12 +93,32 @@ private:
     return error;
   }
 
+  /// As they should be with so many shells; while the fewest are looked for, whatever their mean is.
+  void limit_lengths(const FitMesh& mesh, std::size_t shells) {
+    const double mean = mesh.mean_edge() * std::sqrt(static_cast<double>(mesh.alive) / static_cast<double>(shells));
+    limits_.shape.longest = std::sqrt(mesh.area()) / fewest_across;
+    if (!options_.tolerance || options_.refine) {
+      limits_.shape.longest = std::min(limits_.shape.longest, longest_edge * mean);
+    }
+  }
+
   void improve(FitMesh& mesh, const FitSamples& samples) {
-    limits_.shape.longest = longest_edge * mesh.mean_edge();
+    limit_lengths(mesh, mesh.alive);
     flip_edges(mesh, samples, limits_);
     for (int pass = 0; pass < mending_passes; ++pass) {
-      mend_shapes(mesh, samples, limits_, most());
+      mend_shapes(mesh, samples, limits_, most_);
     }
+  }
+
+  [[nodiscard]] std::vector<Index> thin_triangles(const ShellMesh& shell) const {
+    std::vector<Index> thin;
+    for (Index t = 0; t < shell.triangles.size(); ++t) {
+      const auto& [a, b, c] = shell.triangles[t];
+      if (smallest_angle_degrees(shell.vertices[a], shell.vertices[b], shell.vertices[c]) < options_.min_angle) {
+        thin.push_back(t);
+      }
+    }
+    return thin;
   }
 
   /// Certifies, keeps what is better, and notes it.
@@ -115,9 +134,11 @@ private:
       }
     }
     crossings_ = crossing_patches(shell);
+    thin_ = thin_triangles(shell);
     const bool holds = options_.tolerance && distance.upper() <= *options_.tolerance;
     const auto rank = std::array{holds ? 1.0 : 0.0, crossings_.empty() ? 1.0 : 0.0,
-                                 holds ? -static_cast<double>(shell.triangles.size()) : -distance.upper()};
+                                 holds ? -static_cast<double>(thin_.size()) : -distance.upper(),
+                                 -static_cast<double>(shell.triangles.size())};
     const bool is_better = result_.shell.triangles.empty() || rank > rank_;
     if (is_better) {
       result_.shell = shell;
@@ -140,25 +161,26 @@ private:
   void to_tolerance(double tolerance) {
     limits_.error = margin * tolerance;
     const bool keep_coarse = options_.refine || !like_target_;
-    TriangleMesh start = keep_coarse ? coarse_ : decimation_within(target_, start_error * tolerance);
-    if (const double enough = surplus * static_cast<double>(most());
-        !keep_coarse && static_cast<double>(start.triangles.size()) > enough) {
-      start = decimation(target_, static_cast<std::size_t>(enough));
-    }
-    FitMesh mesh = started(start);
+    FitMesh mesh = started(keep_coarse ? coarse_ : decimation_within(target_, start_error * tolerance));
     FitSamples samples = samples_for(static_cast<double>(mesh.alive) / (keep_coarse ? 1 : 3));
     settle(mesh, samples, mean_power, 4);
     improve(mesh, samples);
     if (options_.refine) {
       settle(mesh, samples, mean_power, 2);
-    } else {
-      fewer(mesh, samples);
-      if (mesh.alive > most()) {
-        reduce(mesh, samples, most());
-        limits_.error = margin * tolerance;
-      }
+      make_certain(mesh, samples, tolerance);
+      return;
     }
+    const std::size_t allowed = most_;
+    most_ = max_index;  // the fewest may be few enough, though more are on the way
+    fewer(mesh, samples);
     make_certain(mesh, samples, tolerance);
+    if (result_.shell.triangles.size() > allowed) {
+      most_ = allowed;
+      result_.shell = {};
+      reduce(mesh, samples, allowed);
+      certified(mesh.shell());
+      result_.stopped = "the limit of shells was reached";
+    }
   }
 
   /// Collapses and settles in turn as long as that leaves fewer shells; then as many fewer as exchanges make good.
@@ -166,9 +188,7 @@ private:
     const double limit = limits_.error;
     for (int round = 0; round < 3; ++round) {
       const std::size_t before = mesh.alive;
-      limits_.shape.min_angle = eased_angle * options_.min_angle;
       collapse_edges(mesh, samples, limits_, 4, options_.progress);
-      limits_.shape.min_angle = options_.min_angle;
       settle(mesh, samples, largest_power, settling_steps);
       improve(mesh, samples);
       if (static_cast<double>(mesh.alive) > worth_it * static_cast<double>(before)) {
@@ -190,7 +210,7 @@ private:
   /// What the samples miss is found by a certificate, added to them, and mended; where that does not do, split.
   void make_certain(FitMesh& mesh, FitSamples& samples, double tolerance) {
     result_.stopped = "further splits bring too little";
-    std::size_t crossed = std::numeric_limits<std::size_t>::max();
+    std::size_t fewest_faults = std::numeric_limits<std::size_t>::max();
     double closest = std::numeric_limits<double>::infinity();
     int fruitless = 0;  // certificates in a row
     for (int i = 0; i < certificates && fruitless < patience; ++i) {
@@ -198,12 +218,14 @@ private:
       const ShellDistance distance = certified(mesh.shell(&patch_of));
       if (distance.upper() <= tolerance) {
         result_.stopped = "the tolerance holds";
-        if (crossings_.empty() || crossings_.size() >= crossed) {
+        const std::size_t faults = crossings_.size() + thin_.size();
+        if (faults == 0 || faults >= fewest_faults) {
           return;
         }
-        crossed = crossings_.size();
+        fewest_faults = faults;
       } else {
         crossings_.clear();  // first things first
+        thin_.clear();
         fruitless = distance.upper() < worth_it * closest ? 0 : fruitless + 1;
         closest = std::min(closest, distance.upper());
       }
@@ -211,25 +233,36 @@ private:
         samples.add({place.point});
       }
       settle(mesh, samples, largest_power, 2);
-      if (i > 0) {
-        for (const FarPlace& place : distance.beyond_of_shell) {
-          double& error = mesh.patches[patch_of[place.patch]].error;
-          error = std::max(error, place.distance);
+      // The certificate says where: samples alone see errors, too, where the target itself is rough. Of boundaries as
+      // curves it says nothing; and where it was said in vain all is tried.
+      std::vector<double> far(mesh.patches.size(), 0);
+      for (const auto* places : {&distance.beyond_of_shell, &distance.beyond_of_target}) {
+        for (const FarPlace& place : *places) {
+          far[patch_of[place.patch]] = std::max(far[patch_of[place.patch]], place.distance);
         }
       }
+      for (std::size_t t = 0; t < mesh.patches.size(); ++t) {
+        double& error = mesh.patches[t].error;
+        const bool is_known = mesh.patches[t].boundary == 0 && fruitless < 2;
+        error = std::max(is_known ? std::min(error, limits_.error) : error, far[t]);
+      }
+      // Finer ones follow the target between its walls, and leave room for better shapes.
+      const auto wants_splits = [&](Index patch) {
+        double& error = mesh.patches[patch_of[patch]].error;
+        error = std::max(error, 2 * limits_.error);
+      };
       for (const auto& pair : crossings_) {
-        for (const Index patch : pair) {
-          double& error = mesh.patches[patch_of[patch]].error;
-          error = std::max(error, 2 * limits_.error);  // finer ones follow the target between its walls
-        }
+        wants_splits(pair[0]);
+        wants_splits(pair[1]);
       }
-      if (mesh.alive >= most()) {
+      std::for_each(thin_.begin(), thin_.end(), wants_splits);
+      if (mesh.alive >= most_) {
         if (!result_.reached.value_or(false)) {
           result_.stopped = "the limit of shells was reached";
         }
         return;
       }
-      split_worst(mesh, samples, limits_, std::min((most() - mesh.alive) / 2, mesh.alive / 4 + fewest_sampled));
+      split_worst(mesh, samples, limits_, std::min((most_ - mesh.alive) / 2, mesh.alive / 4 + fewest_sampled));
       settle(mesh, samples, largest_power, 2);
       improve(mesh, samples);
     }
@@ -237,8 +270,7 @@ private:
 
   /// Collapses edges until so many shells are left, whatever the error, and settles. @return the largest error, mm
   double reduce(FitMesh& mesh, const FitSamples& samples, std::size_t shells) {
-    limits_.shape.longest =
-        longest_edge * mesh.mean_edge() * std::sqrt(static_cast<double>(mesh.alive) / static_cast<double>(shells));
+    limit_lengths(mesh, shells);
     limits_.error = std::numeric_limits<double>::infinity();
     collapse_edges(mesh, samples, limits_, shells, options_.progress);
     if (mesh.alive > shells) {  // a count outweighs shapes
@@ -299,7 +331,7 @@ private:
     certified(shell);
     result_.stopped = "the limit of iterations was reached";
     for (int level = 1; level < options_.max_iterations.value_or(std::numeric_limits<int>::max()); ++level) {
-      if (4 * shell.triangles.size() > most()) {
+      if (4 * shell.triangles.size() > most_) {
         result_.stopped = "the limit of shells was reached";
         break;
       }
@@ -316,10 +348,12 @@ private:
   bool like_target_;  // COARSE has the target's topology: its boundaries are the target's
   double width_;
   FitLimits limits_;
-  int rounds_;  // of exchanges that are left
+  std::size_t most_;  // shells
+  int rounds_;        // of exchanges that are left
   RelaxResult result_;
-  std::array<double, 3> rank_{};                 // of the result: see certified()
+  std::array<double, 4> rank_{};                 // of the result: see certified()
   std::vector<std::array<Index, 2>> crossings_;  // of the shells that were certified last
+  std::vector<Index> thin_;                      // likewise
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
 

@@ -129,7 +129,7 @@ std::vector<std::array<Index, 2>> FitMesh::edges() const {
   return out;
 }
 
-double FitMesh::mean_edge() const {
+double FitMesh::area() const {
   double area = 0;
   for (const FitPatch& p : patches) {
     if (p.is_alive()) {
@@ -137,7 +137,11 @@ double FitMesh::mean_edge() const {
       area += triangle_area(c[0], c[1], c[2]);
     }
   }
-  return std::sqrt(4 / std::sqrt(3.0) * area / static_cast<double>(std::max<std::size_t>(alive, 1)));
+  return area;
+}
+
+double FitMesh::mean_edge() const {
+  return std::sqrt(4 / std::sqrt(3.0) * area() / static_cast<double>(std::max<std::size_t>(alive, 1)));
 }
 
 Index FitMesh::add_patch(const std::array<Index, 3>& nodes, const std::array<Index, 3>& slots) {

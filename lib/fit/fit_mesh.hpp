@@ -97,6 +97,8 @@ struct FitMesh : FitPiece {
   [[nodiscard]] std::vector<Index> ring(Index node) const;
   /// Edges (u < v) in a deterministic order.
   [[nodiscard]] std::vector<std::array<Index, 2>> edges() const;
+  /// Of the facets, mm².
+  [[nodiscard]] double area() const;
   /// Mean edge of equilateral triangles of the mesh's area and count, mm.
   [[nodiscard]] double mean_edge() const;
 

@@ -334,7 +334,7 @@ private:
         if (!p.is_alive() || (moved[p.nodes[0]] | moved[p.nodes[1]] | moved[p.nodes[2]]) == 0) {
           continue;
         }
-        broken[t] = shape_shortfall(piece_, p, options_.shape) > shortfall_[t] + 1e-4 ||
+        broken[t] = shape_shortfall(piece_, p, options_.shape) > shortfall_[t] + 1e-6 ||
                     piece_.facing(p).dot(facing_[t]) < keeps_facing;
         if (broken[t] == 0) {
           samples_.measure(piece_, p, options_.doubted);

@@ -19,6 +19,7 @@
 namespace tunica {
 namespace {
 
+constexpr int mending_passes = 10;  // while facets fold
 constexpr int default_iterations = 20;
 constexpr int default_iterations_refining = 60;
 constexpr double default_width = 1e-4;       // of the diagonal
@@ -92,10 +93,13 @@ private:
     const double off_target = std::min(default_off_target * target_.diagonal(),
                                        options_.tolerance.value_or(std::numeric_limits<double>::infinity()) / 4);
     iteration.moves = move_by_barycentre(target_, mesh, off_target);
-    mesh = mended(mesh, off_target);
-    current_.vertices = std::move(mesh.vertices);
-    current_.triangles = std::move(mesh.triangles);
-    const auto folded = take_normals_from(target_, current_);
+    std::vector<Index> folded;
+    for (int pass = 0; pass == 0 || (pass < mending_passes && !folded.empty()); ++pass) {
+      mesh = mended(mesh, pass == 0 ? off_target : std::numeric_limits<double>::infinity());
+      current_.vertices = mesh.vertices;
+      current_.triangles = mesh.triangles;
+      folded = take_normals_from(target_, current_);
+    }
     if (!folded.empty() && !result_.iterations.empty()) {
       return {};
     }
@@ -122,9 +126,11 @@ private:
     return distance.both.upper;
   }
 
-  /// Thin triangles, and nodes whose facets fold, are mended by edits that do not stray farther from the target.
-  [[nodiscard]] TriangleMesh mended(const TriangleMesh& moved, double off_target) const {
-    FitMesh mesh(shells_on(target_, moved, current_.patch));
+  /// Thin triangles, and nodes whose facets fold, are mended by edits that stray no farther from the target, mm.
+  [[nodiscard]] TriangleMesh mended(const TriangleMesh& moved, double stray) const {
+    ShellMesh shell{moved.vertices, moved.triangles, {}, {}, current_.patch};
+    take_normals_from(target_, shell);
+    FitMesh mesh(shell);
     const FitSamples samples(target_, mesh.alive, true);
     samples.attach(mesh);
     samples.measure(mesh);
@@ -132,7 +138,7 @@ private:
     limits.shape.min_angle = least_angle;
     limits.shape.agreement = least_agreement;
     limits.shape.size_ratio = std::numeric_limits<double>::infinity();
-    limits.error = off_target;
+    limits.error = stray;
     mend_shapes(mesh, samples, limits, mesh.alive);
     return flat_facets(mesh.shell());
   }

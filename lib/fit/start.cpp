@@ -1,6 +1,7 @@
 #include "fit/start.hpp"
 
 #include "shell/normals.hpp"
+#include "surface/boundary_curves.hpp"
 #include "surface/checks.hpp"
 #include "surface/decimate.hpp"
 #include "surface/hausdorff.hpp"
@@ -10,14 +11,15 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
 namespace tunica {
 namespace {
 
-constexpr double crease_angle = 40;       // degrees
-constexpr double crease_share = 0.6;      // of the facets' angle is there already close to the edge
-constexpr double close_by = 0.08;         // of the height of the triangle
-constexpr std::size_t fewest_edges = 3;   // of a crease
+constexpr double crease_angle = 60;       // degrees
+constexpr double crease_length = 0.15;    // of the diagonal: less is texture, such as that of voxels
+constexpr double crease_share = 0.6;      // of the angle: coarser facets turn by less
+constexpr double close_by = 0.2;          // of an edge's length: a chord leaves a curved crease
 constexpr std::size_t sampled = 20'000;   // vertices, and facets: for the error of flat facets
 constexpr std::size_t first_rung = 4000;  // triangles of the first decimation, from which the count is judged
 
@@ -44,62 +46,69 @@ double sampled_error(const TriangleMesh& mesh, const Target& target) {
 
 using EdgeFlags = std::vector<std::array<bool, 3>>;
 
-/// Edges of the mesh across which facets turn, and the target already close by.
-EdgeFlags sharp_edges(const TriangleMesh& mesh, const Target& target, const std::vector<Vec3>& facets,
-                      const std::vector<std::array<Index, 3>>& across) {
-  EdgeFlags sharp(mesh.triangles.size(), {false, false, false});
-  const auto normal_near = [&](std::size_t t, std::size_t k) {
-    const auto& v = mesh.triangles[t];
-    const Vec3 middle = (mesh.vertices[v[k]] + mesh.vertices[v[(k + 1) % 3]]) / 2;
-    const auto foot = target.closest_facing(middle + close_by * (mesh.vertices[v[(k + 2) % 3]] - middle), facets[t],
-                                            target.diagonal());
-    return foot ? foot->facet_normal : facets[t];
-  };
-  const auto turn = [](const Vec3& a, const Vec3& b) { return std::acos(std::clamp(a.dot(b), -1.0, 1.0)); };
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      const Index other = across[t][k];
-      if (other == no_neighbour || other < t) {
-        continue;
-      }
-      const double whole = turn(facets[t], facets[other]);
-      if (whole < crease_angle * std::numbers::pi / 180) {
-        continue;
-      }
-      const auto& v = mesh.triangles[other];
-      const auto l =
-          static_cast<std::size_t>(std::find(v.begin(), v.end(), mesh.triangles[t][(k + 1) % 3]) - v.begin());
-      sharp[t][k] = sharp[other][l] = turn(normal_near(t, k), normal_near(other, l)) > crease_share * whole;
-    }
-  }
-  return sharp;
+double turn_degrees(const Vec3& a, const Vec3& b) {
+  return std::acos(std::clamp(a.dot(b), -1.0, 1.0)) * 180 / std::numbers::pi;
 }
 
-/// Leaves connected curves of some edges only.
-void drop_short_curves(const TriangleMesh& mesh, EdgeFlags& sharp) {
+/// The target's creases: connected edges that turn by `crease_angle`, long together; what is short is texture.
+std::optional<ClosestPoint> crease_curves(const Target& target) {
+  const TriangleMesh& mesh = target.mesh();
+  const auto across = neighbours(mesh, incidence(mesh));
   std::vector<Index> parent(mesh.vertices.size());
-  for (std::size_t v = 0; v < parent.size(); ++v) {
-    parent[v] = static_cast<Index>(v);
-  }
+  std::iota(parent.begin(), parent.end(), Index{0});
   const auto root = [&](Index v) {
     while (parent[v] != v) {
       v = parent[v] = parent[parent[v]];
     }
     return v;
   };
-  const auto for_each = [&](const auto& action) {
-    for (std::size_t t = 0; t < sharp.size(); ++t) {
-      for (std::size_t k = 0; k < 3; ++k) {
-        if (sharp[t][k]) {
-          action(mesh.triangles[t][k], mesh.triangles[t][(k + 1) % 3], sharp[t][k]);
-        }
+  std::vector<std::array<Index, 2>> edges;
+  for (Index t = 0; t < mesh.triangles.size(); ++t) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Index other = across[t][k];
+      if (other != no_neighbour && t < other &&
+          turn_degrees(target.facet_normals()[t], target.facet_normals()[other]) > crease_angle) {
+        edges.push_back({mesh.triangles[t][k], mesh.triangles[t][(k + 1) % 3]});
+        parent[root(edges.back()[0])] = root(edges.back()[1]);
       }
     }
-  };
-  for_each([&](Index u, Index v, bool) { parent[root(u)] = root(v); });
-  std::vector<std::size_t> sides(mesh.vertices.size(), 0);  // every edge has two
-  for_each([&](Index u, Index, bool) { ++sides[root(u)]; });
-  for_each([&](Index u, Index, bool& is_sharp) { is_sharp = sides[root(u)] >= 2 * fewest_edges; });
+  }
+  std::vector<double> length(mesh.vertices.size(), 0);
+  for (const auto& [u, v] : edges) {
+    length[root(u)] += (mesh.vertices[u] - mesh.vertices[v]).norm();
+  }
+  std::vector<std::array<Vec3, 2>> segments;
+  for (const auto& [u, v] : edges) {
+    if (length[root(u)] >= crease_length * target.diagonal()) {
+      segments.push_back({mesh.vertices[u], mesh.vertices[v]});
+    }
+  }
+  if (segments.empty()) {
+    return {};
+  }
+  return ClosestPoint(segments_as_triangles(segments));
+}
+
+/// Edges of the mesh across which facets turn, and that follow a crease of the target.
+EdgeFlags sharp_edges(const TriangleMesh& mesh, const ClosestPoint& creases, const std::vector<Vec3>& facets,
+                      const std::vector<std::array<Index, 3>>& across) {
+  EdgeFlags sharp(mesh.triangles.size(), {false, false, false});
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Index other = across[t][k];
+      if (other == no_neighbour || other < t || turn_degrees(facets[t], facets[other]) < crease_share * crease_angle) {
+        continue;
+      }
+      const Index u = mesh.triangles[t][k], v = mesh.triangles[t][(k + 1) % 3];
+      const Vec3 &a = mesh.vertices[u], &b = mesh.vertices[v];
+      const double near = close_by * (b - a).norm();
+      const auto is_near = [&](const Vec3& p) { return (creases.closest(p).point - p).norm() < near; };
+      const auto& w = mesh.triangles[other];
+      const auto l = static_cast<std::size_t>(std::find(w.begin(), w.end(), v) - w.begin());
+      sharp[t][k] = sharp[other][l] = is_near(a) && is_near(b) && is_near((a + b) / 2);
+    }
+  }
+  return sharp;
 }
 
 /// The triangles around a node, by the side of the creases that they are on.
@@ -179,15 +188,14 @@ ShellMesh shells_on(const Target& target, const TriangleMesh& mesh, Patch patch)
   shell.triangles = mesh.triangles;
   shell.patch = patch;
   take_normals_from(target, shell);
+  const auto creases = crease_curves(target);
+  if (!creases) {
+    return shell;
+  }
   const auto facets = facet_normals(mesh);
   const Incidence around = incidence(mesh);
   const auto across = neighbours(mesh, around);
-  EdgeFlags sharp = sharp_edges(mesh, target, facets, across);
-  drop_short_curves(mesh, sharp);
-  const auto is_creased = [](const auto& edges) { return edges[0] || edges[1] || edges[2]; };
-  if (std::none_of(sharp.begin(), sharp.end(), is_creased)) {
-    return shell;
-  }
+  const EdgeFlags sharp = sharp_edges(mesh, *creases, facets, across);
   shell.corner_normals.resize(mesh.triangles.size());
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
     const auto node = static_cast<Index>(v);

@@ -16,8 +16,8 @@ TriangleMesh decimation_within(const Target& target, double error);
 
 /// A mesh on the target as shells: the target's normals at its nodes, one for each side along its creases.
 ///
-/// A crease is a curve of the target, of three edges of the mesh or more, across which the target's normal turns by
-/// more than `crease_angle` within a fraction of a triangle: what turns as far over the whole triangle is curved.
+/// A crease is a curve of connected edges of the target that turn by more than 60 degrees, 15 % of the diagonal long
+/// or more.
 /// @param patch  of the shells
 ShellMesh shells_on(const Target& target, const TriangleMesh& mesh, Patch patch);
 
