@@ -14,8 +14,8 @@ namespace tunica {
 void require_same_scale(const MeshFile& a, const std::filesystem::path& path_a, const MeshFile& b,
                         const std::filesystem::path& path_b, std::optional<double> unit_mm);
 
-/// For meshes of which one is to become the other. Errors: InputError when ten diagonals of the larger one and more
-/// lie between their boxes. Cost: linear.
+/// For meshes of which one is to become the other. Errors: InputError when a diagonal of the larger one and more lies
+/// between their boxes. Cost: linear.
 void require_near(const MeshFile& a, const std::filesystem::path& path_a, const MeshFile& b,
                   const std::filesystem::path& path_b);
 

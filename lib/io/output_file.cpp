@@ -55,6 +55,8 @@ fs::path behind_links(fs::path path) {
   return path;
 }
 
+fs::path folder_of(const fs::path& path) { return path.has_parent_path() ? path.parent_path() : fs::path("."); }
+
 void flush_to_disk(const fs::path& path) {
   const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
   if (fd < 0) {
@@ -82,13 +84,23 @@ void require_writable(const fs::path& path, bool overwrite) {
   if (fs::exists(status) && !overwrite) {
     throw OutputError(fmt::format("{}: exists already, remove it or pass --force to overwrite it", path.string()));
   }
-  const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
-  if (!fs::is_directory(folder, error)) {
-    throw OutputError(fmt::format("{}: the folder {} does not exist", path.string(), folder.string()));
+  const fs::path folder = folder_of(path);
+  const fs::path target = folder_of(behind_links(path));
+  struct stat here {};
+  struct stat there {};
+  for (const auto& [place, facts] : {std::pair(folder, &here), std::pair(target, &there)}) {
+    if (!fs::is_directory(place, error) || ::stat(place.c_str(), facts) != 0) {
+      throw OutputError(fmt::format("{}: the folder {} does not exist", path.string(), place.string()));
+    }
+    if (::access(place.c_str(), W_OK) != 0) {
+      throw OutputError(
+          fmt::format("{}: the folder {} cannot be written to: {}", path.string(), place.string(), reason()));
+    }
   }
-  if (::access(folder.c_str(), W_OK) != 0) {
-    throw OutputError(
-        fmt::format("{}: the folder {} cannot be written to: {}", path.string(), folder.string(), reason()));
+  if (here.st_dev != there.st_dev) {
+    throw OutputError(fmt::format("{}: is a link to {} on another file system, to which nothing can be renamed: name "
+                                  "that file itself",
+                                  path.string(), behind_links(path).string()));
   }
 }
 
@@ -201,7 +213,9 @@ void OutputFile::commit() {
   TUNICA_ASSERT(!done_);
   flush_to_disk(partial_);
   if (std::rename(partial_.c_str(), behind_links(path_).c_str()) != 0) {
-    throw OutputError(fmt::format("{}: cannot be written: {}", path_.string(), reason()));
+    keep_ = true;  // it is whole: the work is not lost with its name
+    throw OutputError(fmt::format("{}: cannot be written: {}; the whole of it is in {}, rename that", path_.string(),
+                                  reason(), partial_.string()));
   }
   done_ = true;
 }

@@ -41,7 +41,7 @@ int open_own_file(const std::filesystem::path& path, int flags);
 
 /// An output that is whole or not there: everything goes to `NAME.part`, which commit() flushes to the disk and
 /// renames to NAME (or to the file behind it, when NAME is a symbolic link). Without commit() the destructor removes
-/// the .part file, unless keep_partial() was called. It holds the PartLock.
+/// the .part file, unless keep_partial() was called or the renaming failed. It holds the PartLock.
 class OutputFile {
 public:
   /// Errors: OutputError when NAME exists and `overwrite` is false, or as PartLock::take().
@@ -71,8 +71,9 @@ private:
 std::filesystem::path part_of(std::filesystem::path path);
 
 /// Throws OutputError when `path` exists and `overwrite` is false, or is a folder, a device or a pipe (renaming onto
-/// /dev/null would replace it), or when its folder cannot be written to. Tools call
-/// it before the work, so that an hour of computing does not end at a file that was there all the time.
+/// /dev/null would replace it), or when its folder, or the one a link leads to, cannot be written to or is of another
+/// file system. Tools call it before the work, so that an hour of computing does not end at a file that was there all
+/// the time.
 void require_writable(const std::filesystem::path& path, bool overwrite);
 
 /// Writes `bytes` as a whole file through an OutputFile. Errors: OutputError.

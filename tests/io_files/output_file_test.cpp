@@ -65,6 +65,33 @@ TEST_F(OutputFileTest, WhatCannotBeWrittenIsSaidBeforeTheWork) {
   EXPECT_THROW(OutputFile(in("no/file"), true), OutputError);
 }
 
+TEST_F(OutputFileTest, WhatALinkLeadsToIsLookedAtBeforeTheWork) {
+  fs::create_symlink("b", in("to_a_file"));
+  write_file(in("to_a_file"), "whole", false);
+  EXPECT_EQ(read_file(in("b")), "whole");
+  EXPECT_TRUE(fs::is_symlink(in("to_a_file")));
+  fs::create_symlink("no/folder", in("astray"));
+  EXPECT_THROW(require_writable(in("astray"), true), OutputError);
+  struct stat here {};
+  struct stat there {};
+  const fs::path other = "/dev/shm";
+  if (::stat(folder_.c_str(), &here) != 0 || ::stat(other.c_str(), &there) != 0 || here.st_dev == there.st_dev) {
+    GTEST_SKIP() << "no second file system at " << other;
+  }
+  fs::create_symlink(other / "tunica-test-never-written", in("abroad"));
+  EXPECT_THROW(require_writable(in("abroad"), true), OutputError);
+}
+
+TEST_F(OutputFileTest, WhatCannotBeRenamedIsKept) {
+  {
+    OutputFile file(in("a"), false);
+    std::ofstream(file.partial_path()) << "an hour of work";
+    fs::create_directory(in("a"));
+    EXPECT_THROW(file.commit(), OutputError);
+  }
+  EXPECT_EQ(read_file(in("a.part")), "an hour of work");
+}
+
 TEST_F(OutputFileTest, ADeviceOrAPipeIsNotReplaced) {
   const fs::path pipe = folder_ / "pipe";
   ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);

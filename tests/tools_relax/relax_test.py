@@ -312,8 +312,10 @@ class Contract(Case):
     def test_a_wrong_unit_or_place_is_told_before_any_work(self):
         vertices, triangles = cylinder(8, 3, radius=10.3)
         wrong = self.path("wrong.ply")
+        size = np.linalg.norm(np.ptp(vertices, axis=0))
         for moved, says in ((1000 * vertices, "about 1000 times as large"), (vertices / 1000, "about 1000 times as small"),
-                            (10 * vertices, "probably cm, not mm"), (vertices + [40_000, 0, 0], "away from")):
+                            (10 * vertices, "probably cm, not mm"), (vertices + [40_000, 0, 0], "away from"),
+                            (vertices + [2.5 * size, 0, 0], "away from")):
             write_ply(wrong, moved, triangles)
             record, error = self.relax(wrong, self.target, self.out, expect=3)
             self.assertIn("wrong.ply: ", error)
