@@ -16,8 +16,8 @@ namespace tunica {
 namespace {
 
 constexpr std::array<std::string_view, 4> units{"um", "mm", "cm", "m"};
-constexpr double slack = 1.25;       // a coarse mesh may be smaller than what it stands for
-constexpr double never_meant = 500;  // half of the ratio of neighbouring prefixes, whatever the shapes
+constexpr double slack = 1.25;        // a coarse mesh may be smaller than what it stands for
+constexpr double never_meant = 500;   // half of the ratio of neighbouring prefixes, whatever the shapes
 constexpr double diagonals_away = 1;  // as much as the whole thing: it lies somewhere else
 
 bool about(double value, double expected) { return value < slack * expected && value > expected / slack; }

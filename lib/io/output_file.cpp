@@ -98,9 +98,10 @@ void require_writable(const fs::path& path, bool overwrite) {
     }
   }
   if (here.st_dev != there.st_dev) {
-    throw OutputError(fmt::format("{}: is a link to {} on another file system, to which nothing can be renamed: name "
-                                  "that file itself",
-                                  path.string(), behind_links(path).string()));
+    throw OutputError(
+        fmt::format("{}: is a link to {} on another file system, to which nothing can be renamed: name "
+                    "that file itself",
+                    path.string(), behind_links(path).string()));
   }
 }
 
