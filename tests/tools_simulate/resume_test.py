@@ -82,7 +82,8 @@ class Resume(SimulateTest):
             if os.path.exists(self.path("out.hdf")):  # done, or killed when it was
                 self.assert_same("whole.hdf", "out.hdf")
                 os.remove(self.path("out.hdf"))
-            elif os.path.exists(self.path(LEFT[0])):  # else it was killed before it had begun to write
+            elif os.path.exists(self.path(LEFT[1])) and os.path.getsize(self.path(LEFT[1])) > 0:
+                # else it was killed before it had begun to write
                 command = ["--resume", "out.hdf.part"]
         result = self.run_tool(*command)["result"]
         for key in ("steps", "dof", "newton_iterations", "converged", "nodes"):
