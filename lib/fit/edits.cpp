@@ -3,6 +3,7 @@
 
 #include "core/threads.hpp"
 #include "fit/least_squares.hpp"
+#include "shell/normals.hpp"
 #include "surface/measure.hpp"
 
 #include <Eigen/Geometry>
@@ -16,12 +17,11 @@ namespace tunica {
 namespace {
 
 constexpr double joins_features = 1;  // shortfall of an edge between two features: outweighs an angle
-constexpr double fit_agreement = 1.05 * least_normal_agreement;  // of a corner: less makes no shell
-constexpr double hopeless = 8;                                   // times the limit after the first step
-constexpr int placing_steps = 3;                                 // of least squares, then largest errors, twice
-constexpr int largest_power = 6;                                 // of the residuals, where the largest counts
-constexpr int spreading_steps = 4;  // with the nodes around free: of least squares and smoothing
-constexpr double spreading = 1;     // of the stiffness: smoothing, there
+constexpr double hopeless = 8;        // times the limit after the first step
+constexpr int placing_steps = 3;      // of least squares, then largest errors, twice
+constexpr int largest_power = 6;      // of the residuals, where the largest counts
+constexpr int spreading_steps = 4;    // with the nodes around free: of least squares and smoothing
+constexpr double spreading = 1;       // of the stiffness: smoothing, there
 
 Vec2 middle_of_edge(std::size_t k) {
   const std::array<Vec2, 3> middles{Vec2(0.5, 0), Vec2(0.5, 0.5), Vec2(0, 0.5)};
@@ -201,20 +201,8 @@ Trial tried(const FitMesh& mesh, const FitSamples& samples, const FitLimits& lim
   FitPiece& piece = trial.piece;
   PieceBuilder builder(mesh, limits.shape, trial);
   builder.build();
-  const auto agreement = [](const FitPiece& of, const FitPatch& p) {
-    return normal_agreement(of.corners(p), of.corner_normals(p));
-  };
-  double least_agreement = fit_agreement;
-  for (const Index t : trial.edit.removed) {
-    least_agreement = std::min(least_agreement, agreement(mesh, mesh.patches[t]));
-  }
   const auto keeps_shape = [&] {
     trial.shortfall = builder.shortfall();
-    for (const FitPatch& p : piece.patches) {
-      if (agreement(piece, p) < least_agreement) {
-        return false;
-      }
-    }
     return trial.shortfall <= trial.shortfall_before + limits.may_miss;
   };
   bool sound = keeps_shape();
@@ -466,6 +454,20 @@ Edit move(const FitMesh& mesh, Index node, const Vec3& start) {
     const FitPatch& p = mesh.patches[t];
     edit.added.push_back({p.nodes, p.slots, t});
   }
+  return edit;
+}
+
+Edit flatten(const FitMesh& mesh, Index node, const Vec3& start) {
+  Edit edit = move(mesh, node, start);
+  std::vector<Vec3> fan;
+  for (const Index t : mesh.around[node]) {
+    const FitPatch& p = mesh.patches[t];
+    auto c = mesh.corners(p);
+    c[p.corner_of(node)] = start;
+    fan.emplace_back((c[1] - c[0]).cross(c[2] - c[0]).stableNormalized());
+  }
+  const FitPatch& first = mesh.patches[mesh.around[node][0]];
+  edit.normals.emplace_back(first.slots[first.corner_of(node)], most_compatible_normal(fan).normal);
   return edit;
 }
 

@@ -39,6 +39,8 @@ std::optional<Edit> collapse(const FitMesh& mesh, const FitSamples& samples, Ind
 std::optional<Edit> flip(const FitMesh& mesh, Index u, Index v);
 Edit split(const FitMesh& mesh, Index u, Index v);
 Edit move(const FitMesh& mesh, Index node, const Vec3& start);
+/// Moving a node inside a smooth part, its normal as it agrees best with the facets there.
+Edit flatten(const FitMesh& mesh, Index node, const Vec3& start);
 
 /// An edit tried beside the mesh: the node at its best place.
 struct Trial {
@@ -72,7 +74,8 @@ void flip_edges(FitMesh& mesh, const FitSamples& samples, const FitLimits& limit
 
 /// Flips, moves, collapses and splits where shapes fall short, within the error's limit (or what it is).
 /// @param most  shells
-void mend_shapes(FitMesh& mesh, const FitSamples& samples, const FitLimits& limits, std::size_t most);
+/// @param above  the shortfall from which patches are mended
+void mend_shapes(FitMesh& mesh, const FitSamples& samples, const FitLimits& limits, std::size_t most, double above = 0);
 
 /// Splits the longest edge of patches whose error is above the limit, the worst first, at most `count` of them.
 /// @return how many

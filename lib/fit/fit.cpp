@@ -66,10 +66,6 @@ public:
   }
 
 private:
-  [[nodiscard]] FitMesh started(const TriangleMesh& mesh) const {
-    return FitMesh(shells_on(target_, mesh, options_.surface));
-  }
-
   [[nodiscard]] FitSamples samples_for(double shells) const {
     return {target_, std::max(fewest_sampled, static_cast<std::size_t>(shells)), like_target_};
   }
@@ -100,6 +96,19 @@ private:
     if (!options_.tolerance || options_.refine) {
       limits_.shape.longest = std::min(limits_.shape.longest, longest_edge * mean);
     }
+  }
+
+  /// What is to be fitted. Folds of the decimation are mended where no error gets larger than the largest; what is left
+  /// of them gets creases.
+  FitMesh started(const TriangleMesh& coarse, const FitSamples& samples) {
+    FitMesh mesh(shells_on(target_, coarse, options_.surface));
+    limit_lengths(mesh, mesh.alive);
+    FitLimits limits = limits_;
+    limits.error = std::max(limits_.error, settle(mesh, samples, mean_power, 0));
+    for (int pass = 0; pass < mending_passes; ++pass) {
+      mend_shapes(mesh, samples, limits, most_, no_shell);
+    }
+    return FitMesh(creased_where_folded(mesh.shell()));
   }
 
   void improve(FitMesh& mesh, const FitSamples& samples) {
@@ -161,8 +170,9 @@ private:
   void to_tolerance(double tolerance) {
     limits_.error = margin * tolerance;
     const bool keep_coarse = options_.refine || !like_target_;
-    FitMesh mesh = started(keep_coarse ? coarse_ : decimation_within(target_, start_error * tolerance));
-    FitSamples samples = samples_for(static_cast<double>(mesh.alive) / (keep_coarse ? 1 : 3));
+    const TriangleMesh start = keep_coarse ? coarse_ : decimation_within(target_, start_error * tolerance);
+    FitSamples samples = samples_for(static_cast<double>(start.triangles.size()) / (keep_coarse ? 1 : 3));
+    FitMesh mesh = started(start, samples);
     settle(mesh, samples, mean_power, 4);
     improve(mesh, samples);
     if (options_.refine) {
@@ -177,7 +187,7 @@ private:
     if (result_.shell.triangles.size() > allowed) {
       most_ = allowed;
       result_.shell = {};
-      reduce(mesh, samples, allowed);
+      closest(mesh, samples, allowed, 0);
       certified(mesh.shell());
       result_.stopped = "the limit of shells was reached";
     }
@@ -198,8 +208,7 @@ private:
     while (rounds_ > 0) {
       FitMesh other = mesh;
       const auto shells = static_cast<std::size_t>(fewer_by * static_cast<double>(mesh.alive));
-      reduce(other, samples, shells);
-      if (exchange(other, samples, shells, limit) > limit || other.alive >= mesh.alive) {
+      if (closest(other, samples, shells, limit) > limit || other.alive >= mesh.alive) {
         break;
       }
       mesh = std::move(other);
@@ -275,7 +284,7 @@ private:
     collapse_edges(mesh, samples, limits_, shells, options_.progress);
     if (mesh.alive > shells) {  // a count outweighs shapes
       FitLimits any = limits_;
-      any.may_miss = std::numeric_limits<double>::infinity();
+      any.may_miss = no_shell / 2;
       collapse_edges(mesh, samples, any, shells, options_.progress);
     }
     limits_.error = settle(mesh, samples, largest_power, 4);
@@ -284,11 +293,11 @@ private:
     return settle(mesh, samples, largest_power, 1);
   }
 
-  /// Moves shells from where they are hardly needed to where the error is largest, as long as that brings them closer,
-  /// they are not within `enough` (mm), and rounds are left.
+  /// Reduces to so many shells; then moves some from where they are hardly needed to where the error is largest, as
+  /// long as that brings them closer, they are not within `enough` (mm), and rounds are left.
   /// @return the largest error, mm
-  double exchange(FitMesh& mesh, const FitSamples& samples, std::size_t shells, double enough) {
-    double error = samples.measure(mesh);
+  double closest(FitMesh& mesh, const FitSamples& samples, std::size_t shells, double enough) {
+    double error = reduce(mesh, samples, shells);
     std::size_t fruitless = 0;
     while (error > enough && rounds_ > 0 && fruitless < exchanged.size()) {
       --rounds_;
@@ -308,13 +317,13 @@ private:
   }
 
   void to_count(std::size_t shells) {
-    FitMesh mesh = started(
-        like_target_ ? decimation(target_, static_cast<std::size_t>(surplus * static_cast<double>(shells))) : coarse_);
     const FitSamples samples = samples_for(static_cast<double>(shells));
+    FitMesh mesh = started(
+        like_target_ ? decimation(target_, static_cast<std::size_t>(surplus * static_cast<double>(shells))) : coarse_,
+        samples);
     settle(mesh, samples, mean_power, 3);
     if (mesh.alive > shells) {
-      reduce(mesh, samples, shells);
-      exchange(mesh, samples, shells, 0);
+      closest(mesh, samples, shells, 0);
     } else {
       result_.stopped = "the surface has no more triangles than shells are allowed";
     }
@@ -322,8 +331,8 @@ private:
   }
 
   void split_everywhere() {
-    FitMesh mesh = started(coarse_);
-    FitSamples samples = samples_for(static_cast<double>(mesh.alive));
+    const FitSamples samples = samples_for(static_cast<double>(coarse_.triangles.size()));
+    FitMesh mesh = started(coarse_, samples);
     limits_.error = settle(mesh, samples, mean_power, 3);
     improve(mesh, samples);
     settle(mesh, samples, mean_power, 2);

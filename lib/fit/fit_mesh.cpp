@@ -8,7 +8,6 @@
 #include <cmath>
 
 namespace tunica {
-
 NormalsAcross FitPiece::normals_across(const FitPatch& p) const {
   NormalsAcross out;
   for (std::size_t k = 0; k < 3; ++k) {
@@ -35,10 +34,11 @@ double FitPiece::longest_edge(const FitPatch& p) const {
 double shape_shortfall(const FitPiece& piece, const FitPatch& patch, const FacetLimits& limits) {
   const auto c = piece.corners(patch);
   const double angle = 1 - smallest_angle_degrees(c[0], c[1], c[2]) / limits.min_angle;
-  const double agreement = 1 - normal_agreement(c, piece.corner_normals(patch)) / limits.agreement;
+  const double agreement = normal_agreement(c, piece.corner_normals(patch));
   const double length = piece.longest_edge(patch) / limits.longest - 1;
   const auto squared = [](double shortfall) { return shortfall > 0 ? shortfall * shortfall : 0; };
-  return squared(angle) + squared(agreement) + squared(length);
+  return squared(angle) + squared(1 - agreement / limits.agreement) + squared(length) +
+         (agreement < fit_agreement ? no_shell : 0);
 }
 
 FitMesh::FitMesh(const ShellMesh& shell) {

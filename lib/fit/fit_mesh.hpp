@@ -74,6 +74,12 @@ struct FacetLimits {
   double longest = std::numeric_limits<double>::infinity();  ///< mm, of an edge
 };
 
+/// N·n that corners need: a little above what makes a shell, so that round-off costs none.
+inline constexpr double fit_agreement = 1.05 * least_normal_agreement;
+
+/// Shortfall of a patch that is no shell, since a normal lies nearly in its facet: outweighs all other shapes.
+inline constexpr double no_shell = 1e9;
+
 /// Sum of squares of the parts by which a patch's facet misses its smallest angle, its agreement, its longest edge; 0
 /// when it keeps them.
 double shape_shortfall(const FitPiece& piece, const FitPatch& patch, const FacetLimits& limits);

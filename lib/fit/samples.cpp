@@ -15,7 +15,7 @@ constexpr std::size_t points_per_shell = 16;  // of the target: a cubic has ten 
 constexpr int grid_level = 5;                 // pieces per edge of a patch between its points: 21 of them, likewise
 constexpr int search_level = 3;   // pieces per edge of the flat surface on which points of the target find their patch
 constexpr double other_wall = 4;  // times as far: beyond that a closest point that faces away is one around a rim
-constexpr double beside = 0.7;    // cosine of 45 degrees: farther off the normal a distance counts along itself
+constexpr double beside = 0.99;   // cosine of 8 degrees: farther off the normal a distance counts along itself
 constexpr int points_per_edge = 4;              // of the boundary: pieces between them
 constexpr int edge_starts = 4, edge_steps = 4;  // of the search for the foot on a cubic edge: its extrema are at most 5
 constexpr std::size_t patches_per_block = 16;

@@ -164,6 +164,7 @@ namespace {
 std::vector<Edit> mendings(const FitMesh& mesh, const FitSamples& samples, Index t, bool may_split) {
   std::vector<Edit> out;
   const FitPatch& p = mesh.patches[t];
+  const bool is_folded = normal_agreement(mesh.corners(p), mesh.corner_normals(p)) < fit_agreement;
   for (std::size_t k = 0; k < 3; ++k) {
     if (auto edit = flip(mesh, p.nodes[k], p.nodes[(k + 1) % 3])) {
       out.push_back(*std::move(edit));
@@ -176,9 +177,15 @@ std::vector<Edit> mendings(const FitMesh& mesh, const FitSamples& samples, Index
       for (const Index w : ring) {
         sum += mesh.positions[w];
       }
-      const Vec3 middle = samples.foot(sum / static_cast<double>(ring.size()), mesh.facing(p)).point;
+      const Vec3 centre = sum / static_cast<double>(ring.size());
+      const Vec3 middle = samples.foot(centre, mesh.facing(p)).point;
       out.push_back(move(mesh, v, middle));
       out.push_back(move(mesh, v, (middle + mesh.positions[v]) / 2));
+      if (is_folded) {
+        for (const double rest : {1.0, 0.5, 0.25, 0.125, 0.0625}) {  // of the height
+          out.push_back(flatten(mesh, v, centre + rest * (mesh.positions[v] - centre)));
+        }
+      }
     }
   }
   std::size_t longest = 0;
@@ -201,27 +208,30 @@ std::vector<Edit> mendings(const FitMesh& mesh, const FitSamples& samples, Index
 
 }  // namespace
 
-void mend_shapes(FitMesh& mesh, const FitSamples& samples, const FitLimits& limits, std::size_t most) {
+void mend_shapes(FitMesh& mesh, const FitSamples& samples, const FitLimits& limits, std::size_t most, double above) {
   std::vector<std::pair<double, Index>> wanting;
   for (Index t = 0; t < mesh.patches.size(); ++t) {
     if (mesh.patches[t].is_alive()) {
-      if (const double shortfall = shortfall_of(mesh, {t}, limits.shape); shortfall > 0) {
+      if (const double shortfall = shortfall_of(mesh, {t}, limits.shape); shortfall > above) {
         wanting.emplace_back(-shortfall, t);
       }
     }
   }
   std::sort(wanting.begin(), wanting.end());
   for (const auto& [shortfall, t] : wanting) {
-    if (!mesh.patches[t].is_alive() || shortfall_of(mesh, {t}, limits.shape) <= 0) {
+    if (!mesh.patches[t].is_alive() || shortfall_of(mesh, {t}, limits.shape) <= above) {
       continue;
     }
     std::optional<Trial> best;
+    // Folds first, with the least error; then shapes.
+    const auto merit = [](const Trial& trial) {
+      const double gain = trial.shortfall_before - trial.shortfall, unfolded = std::round(gain / no_shell);
+      return std::pair(unfolded, unfolded > 0 ? -trial.error : gain);
+    };
     const auto consider = [&](Edit edit) {
       Trial trial = tried(mesh, samples, limits, std::move(edit));
-      const double gain = trial.shortfall_before - trial.shortfall;
       if (trial.error <= std::max(limits.error, trial.error_before) &&
-          gain > std::max((1 - worth_it) * trial.shortfall_before,
-                          best ? best->shortfall_before - best->shortfall : 0.0)) {
+          trial.shortfall < worth_it * trial.shortfall_before && (!best || merit(trial) > merit(*best))) {
         best = std::move(trial);
       }
     };
@@ -263,17 +273,18 @@ std::size_t split_worst(FitMesh& mesh, const FitSamples& samples, const FitLimit
         trial = std::move(other);
       }
     };
-    for (std::size_t k = 0; k < 3; ++k) {
-      consider(split(mesh, p.nodes[k], p.nodes[(k + 1) % 3]));
-    }
+    const std::array<Edit, 3> splits{split(mesh, p.nodes[0], p.nodes[1]), split(mesh, p.nodes[1], p.nodes[2]),
+                                     split(mesh, p.nodes[2], p.nodes[0])};
+    std::for_each(splits.begin(), splits.end(), consider);
     if (!std::isfinite(trial.error)) {  // where nothing keeps its shape the error alone counts
-      anything.may_miss = std::numeric_limits<double>::infinity();
-      consider(split(mesh, p.nodes[0], p.nodes[1]));
-      consider(split(mesh, p.nodes[1], p.nodes[2]));
-      consider(split(mesh, p.nodes[2], p.nodes[0]));
+      anything.may_miss = no_shell / 2;
+      std::for_each(splits.begin(), splits.end(), consider);
     }
-    if (trial.error > limits.error && std::isfinite(trial.error)) {
+    if (std::isfinite(trial.error) && trial.error > limits.error) {
       consider(widened(mesh, trial.edit));
+    }
+    for (std::size_t k = 0; k < 3 && !std::isfinite(trial.error); ++k) {
+      consider(widened(mesh, splits[k]));
     }
     if (std::isfinite(trial.error)) {
       apply(mesh, std::move(trial));

@@ -1,5 +1,6 @@
 #include "fit/start.hpp"
 
+#include "fit/fit_mesh.hpp"
 #include "shell/normals.hpp"
 #include "surface/boundary_curves.hpp"
 #include "surface/checks.hpp"
@@ -150,6 +151,19 @@ Vec3 mean_normal(const TriangleMesh& mesh, const std::vector<Vec3>& facets, Inde
   return sum.norm() > 1e-6 ? Vec3(sum.normalized()) : facets[triangles[0]];
 }
 
+void set_corner_normals(ShellMesh& shell, Index node, const std::vector<Index>& triangles, const Vec3& normal) {
+  if (shell.corner_normals.empty()) {
+    for (const auto& [a, b, c] : shell.triangles) {
+      shell.corner_normals.push_back({shell.normals[a], shell.normals[b], shell.normals[c]});
+    }
+  }
+  for (const Index t : triangles) {
+    const auto& corners = shell.triangles[t];
+    const auto k = static_cast<std::size_t>(std::find(corners.begin(), corners.end(), node) - corners.begin());
+    shell.corner_normals[t][k] = normal;
+  }
+}
+
 }  // namespace
 
 bool same_topology(const TriangleMesh& mesh, const Target& target) {
@@ -196,16 +210,55 @@ ShellMesh shells_on(const Target& target, const TriangleMesh& mesh, Patch patch)
   const Incidence around = incidence(mesh);
   const auto across = neighbours(mesh, around);
   const EdgeFlags sharp = sharp_edges(mesh, *creases, facets, across);
-  shell.corner_normals.resize(mesh.triangles.size());
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
     const auto node = static_cast<Index>(v);
     const auto sides = sides_around(mesh, sharp, across, node, around.of(node));
-    for (const auto& side : sides) {
-      const Vec3 normal = sides.size() == 1 ? shell.normals[v] : mean_normal(mesh, facets, node, side);
+    if (sides.size() > 1) {
+      for (const auto& side : sides) {
+        set_corner_normals(shell, node, side, mean_normal(mesh, facets, node, side));
+      }
+    }
+  }
+  return shell;
+}
+
+ShellMesh creased_where_folded(ShellMesh shell) {
+  const TriangleMesh mesh = flat_facets(shell);
+  const auto facets = facet_normals(mesh);
+  std::vector<Index> folded;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (shell.normal(t, static_cast<int>(k)).dot(facets[t]) < fit_agreement) {
+        folded.push_back(mesh.triangles[t][k]);
+      }
+    }
+  }
+  std::sort(folded.begin(), folded.end());
+  folded.erase(std::unique(folded.begin(), folded.end()), folded.end());
+  if (folded.empty()) {
+    return shell;
+  }
+  const Incidence around = incidence(mesh);
+  const auto across = neighbours(mesh, around);
+  EdgeFlags sharp(mesh.triangles.size());
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      sharp[t][k] = across[t][k] != no_neighbour && turn_degrees(facets[t], facets[across[t][k]]) > crease_angle;
+    }
+  }
+  for (const Index node : folded) {
+    for (const auto& side : sides_around(mesh, sharp, across, node, around.of(node))) {
+      std::vector<Vec3> fan;
       for (const Index t : side) {
-        const auto& corners = mesh.triangles[t];
-        const auto k = static_cast<std::size_t>(std::find(corners.begin(), corners.end(), node) - corners.begin());
-        shell.corner_normals[t][k] = normal;
+        fan.push_back(facets[t]);
+      }
+      const CompatibleNormal normal = most_compatible_normal(fan);
+      if (normal.agreement > fit_agreement) {
+        set_corner_normals(shell, node, side, normal.normal);
+        continue;
+      }
+      for (const Index t : side) {
+        set_corner_normals(shell, node, {t}, facets[t]);
       }
     }
   }

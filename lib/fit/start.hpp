@@ -21,4 +21,8 @@ TriangleMesh decimation_within(const Target& target, double error);
 /// @param patch  of the shells
 ShellMesh shells_on(const Target& target, const TriangleMesh& mesh, Patch patch);
 
+/// The same shells with a normal for each side of what folds, facet by facet if need be, at nodes where no one normal
+/// makes shells of all that meet there.
+ShellMesh creased_where_folded(ShellMesh shell);
+
 }  // namespace tunica

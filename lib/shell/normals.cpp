@@ -135,7 +135,7 @@ std::vector<Index> take_normals_from(const Target& target, ShellMesh& shell) {
         normal = compatible_normal(wanted, fan, least);
       }
       folded[v] = !normal;
-      shell.normals[v] = normal.value_or(side);
+      shell.normals[v] = normal.value_or(most_compatible_normal(fan).normal);
     }
   });
   std::vector<Index> out;

@@ -25,7 +25,7 @@ std::optional<Vec3> compatible_normal(const Vec3& wanted, std::span<const Vec3> 
 
 /// Gives every node the target's normal at its closest point on the side that the facets around it face, made
 /// compatible with these facets: N·n >= least_normal_agreement certainly, and 0.5 where that can be had.
-/// @return the nodes whose facets fold so sharply that no normal is compatible; they keep their facets' mean
+/// @return the nodes whose facets fold so sharply that no normal is compatible; they get the most compatible one
 std::vector<Index> take_normals_from(const Target& target, ShellMesh& shell);
 
 }  // namespace tunica

@@ -1,10 +1,14 @@
 // Least squares on one node and on all; edits keep topology, curves and shapes.
 #include "fit/edits.hpp"
 
+#include "core/error.hpp"
 #include "fit/least_squares.hpp"
 #include "fit/start.hpp"
+#include "shell/curved_surface.hpp"
 #include "shell/families.hpp"
+#include "shell/normals.hpp"
 #include "surface/checks.hpp"
+#include "surface/measure.hpp"
 #include "surface/shapes.hpp"
 
 #include <gtest/gtest.h>
@@ -223,6 +227,21 @@ TEST(Start, CreasesAreCurvesOfTheTargetAndCurvatureIsNone) {
     for (const Vec3& n : shell.corner_normals[t]) {
       EXPECT_LT((n - facets[t]).norm(), 1e-12);
     }
+  }
+}
+
+TEST(Start, NodesWithoutACompatibleNormalGetOneForEachSide) {
+  // Two squares, folded upon each other along a hinge: nothing agrees with both at its nodes.
+  ShellMesh shell;
+  shell.vertices = {{0, 0, 0}, {0, 1, 0}, {1, 1, 0.05}, {1, 0, 0.05}, {1, 1, -0.05}, {1, 0, -0.05}};
+  shell.triangles = {{0, 3, 1}, {3, 2, 1}, {0, 1, 5}, {1, 4, 5}};
+  take_normals_from(Target(flat_facets(shell)), shell);
+  EXPECT_THROW(require_fit(shell, "folded"), InputError);
+  const ShellMesh creased = creased_where_folded(shell);
+  EXPECT_NO_THROW(require_fit(creased, "creased"));
+  const auto facets = facet_normals(flat_facets(shell));
+  for (const auto& [triangle, corner] : {std::pair(0, 0), {0, 2}, {1, 2}, {2, 0}, {2, 1}, {3, 0}}) {
+    EXPECT_GT(creased.corner_normals[triangle][corner].dot(facets[triangle]), 0.9);
   }
 }
 

@@ -198,6 +198,32 @@ TEST(Fit, ACountIsKeptAndMoreShellsAreCloser) {
   }
 }
 
+/// A ball with fins thinner than the shells that are asked for: no normal agrees with both walls of a fin.
+TriangleMesh finned() {
+  TriangleMesh mesh = testing::sphere(4);
+  for (Vec3& p : mesh.vertices) {
+    p *= 40 * (1 + 0.8 * std::pow(std::abs(std::cos(2.5 * std::atan2(p.y(), p.x()))), 24) * (1 - p.z() * p.z()));
+  }
+  return mesh;
+}
+
+TEST(Fit, WhatFoldsBecomesShellsAllTheSame) {
+  TriangleMesh disc = testing::sphere(4, 40);
+  for (Vec3& p : disc.vertices) {
+    p.z() *= 0.02;
+  }
+  for (const TriangleMesh& mesh : {disc, finned()}) {
+    const Target target(mesh);
+    FitOptions options;
+    options.shells = 200;
+    options.min_angle = 5;
+    options.max_iterations = 1;
+    const RelaxResult result = fit(mesh, target, options);
+    EXPECT_NO_THROW(require_fit(result.shell, "fitted"));
+    EXPECT_LE(result.shell.triangles.size(), 200u);
+  }
+}
+
 TEST(Fit, RefiningKeepsCoarseAndSplitsWhereTheErrorIs) {
   const TriangleMesh mesh = wavy(5);
   const Target target(mesh);
