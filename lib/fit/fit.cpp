@@ -34,6 +34,7 @@ constexpr double smoothing = 0.1;               // of the stiffness against slid
 constexpr int default_rounds = 12;              // of exchanges
 constexpr double fewer_by = 0.92;               // of the shells: the next count to be tried
 constexpr int certificates = 12, patience = 4;  // of these in a row that are no better
+constexpr double out_of_reach = 8;              // tolerances: as far after `patience` certificates, it stays so
 constexpr double worth_it = 0.985;              // a round that leaves more than this brings nothing
 constexpr std::size_t fewest_sampled = 8;       // shells: as few want no fewer points of the target
 constexpr std::array<double, 3> exchanged{1.0 / 40, 1.0 / 150, 1.0 / 15};  // of the shells, in a round
@@ -102,6 +103,9 @@ private:
   /// of them gets creases.
   FitMesh started(const TriangleMesh& coarse, const FitSamples& samples) {
     FitMesh mesh(shells_on(target_, coarse, options_.surface));
+    if (!(mesh.area() > 1e-12 * target_.diagonal() * target_.diagonal())) {
+      throw InputError("all of its triangles are without area");
+    }
     limit_lengths(mesh, mesh.alive);
     FitLimits limits = limits_;
     limits.error = std::max(limits_.error, settle(mesh, samples, mean_power, 0));
@@ -183,10 +187,10 @@ private:
     const std::size_t allowed = most_;
     most_ = max_index;  // the fewest may be few enough, though more are on the way
     fewer(mesh, samples);
-    make_certain(mesh, samples, tolerance);
-    if (result_.shell.triangles.size() > allowed) {
-      most_ = allowed;
-      result_.shell = {};
+    most_ = allowed;
+    if (mesh.alive <= allowed) {
+      make_certain(mesh, samples, tolerance);
+    } else {
       closest(mesh, samples, allowed, 0);
       certified(mesh.shell());
       result_.stopped = "the limit of shells was reached";
@@ -235,6 +239,9 @@ private:
       } else {
         crossings_.clear();  // first things first
         thin_.clear();
+        if (i >= patience && distance.both.lower > out_of_reach * tolerance) {
+          return;
+        }
         fruitless = distance.upper() < worth_it * closest ? 0 : fruitless + 1;
         closest = std::min(closest, distance.upper());
       }

@@ -23,7 +23,8 @@ struct FitOptions : RelaxOptions {
 /// one normal, but where facets fold so sharply that no one normal makes shells of them); angles of `min_angle`,
 /// neighbours' sizes within 2.5, edges within a quarter of a square of the body's area (to a count and with `refine`:
 /// and within twice the mean), and a node inside whatever lies between boundaries and creases, where the target and the
-/// tolerance allow it. Deterministic, independent of the number of threads. Errors: Interrupted. Source: Hoppe et al.,
+/// tolerance allow it. Deterministic, independent of the number of threads. Errors: Interrupted; InputError: no
+/// triangle has an area. Source: Hoppe et al.,
 /// Mesh optimization, SIGGRAPH 1993, with cubic patches (Comas, Duriez, Cotin 2010, eq. 1-2) in place of facets. Cost:
 /// n log n for the target, then some 10 ms per shell of the result. Limits: a greedy search.
 RelaxResult fit(const TriangleMesh& coarse, const Target& target, const FitOptions& options);
