@@ -13,8 +13,8 @@ namespace tunica {
 namespace {
 
 constexpr std::size_t nodes_per_block = 64;
-constexpr double upright = 0.2;     // agreement of a facet with the target's normals below which it counts as flipped
-constexpr double collapsed = 0.05;  // height over longest edge
+constexpr double least_facing = 0.2;  // agreement of a facet with the target's normals below which it counts as flipped
+constexpr double collapsed = 0.05;    // height over longest edge
 constexpr int halvings = 6;
 
 /// Length along a closed polyline at its closest point to p, and the direction of the segment there.
@@ -139,7 +139,7 @@ FacetState facet_state(const std::array<Index, 3>& v, const std::vector<Vec3>& p
 }
 
 bool is_worse(const FacetState& now, const FacetState& before) {
-  return (now.agreement < upright && now.agreement < before.agreement) ||
+  return (now.agreement < least_facing && now.agreement < before.agreement) ||
          (now.height < collapsed && now.height < 0.5 * before.height);
 }
 

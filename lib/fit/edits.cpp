@@ -221,7 +221,7 @@ Trial tried(const FitMesh& mesh, const FitSamples& samples, const FitLimits& lim
   }
   SquaresOptions squares;
   squares.shape = limits.shape;
-  squares.doubted = limits.error;
+  squares.search_beyond = limits.error;
   const int steps = trial.edit.node == no_index ? 0 : wide ? spreading_steps : placing_steps;
   for (int step = 0; step < steps; ++step) {
     const bool spreads = wide && step < steps - 1;

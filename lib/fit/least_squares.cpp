@@ -337,7 +337,7 @@ private:
         broken[t] = shape_shortfall(piece_, p, options_.shape) > shortfall_[t] + 1e-6 ||
                     piece_.facing(p).dot(facing_[t]) < keeps_facing;
         if (broken[t] == 0) {
-          samples_.measure(piece_, p, options_.doubted);
+          samples_.measure(piece_, p, options_.search_beyond);
           costs[t] = cost_of(p);
         }
       }

@@ -211,12 +211,12 @@ void FitSamples::attach(FitPiece& piece) const {
   }
 }
 
-void FitSamples::measure(const FitPiece& piece, FitPatch& patch, double doubted) const {
+void FitSamples::measure(const FitPiece& piece, FitPatch& patch, double search_beyond) const {
   patch.residuals.clear();
   const CubicPatch surface = piece.surface(patch);
   const PatchPowers powers(surface);
   const Vec3 facing = piece.facing(patch);
-  from_patch(powers, facing, doubted, patch);
+  from_patch(powers, facing, search_beyond, patch);
   from_target(surface, powers, facing, patch);
   from_boundary(surface, facing, patch);
   patch.error = 0;
@@ -226,11 +226,11 @@ void FitSamples::measure(const FitPiece& piece, FitPatch& patch, double doubted)
 }
 
 double FitSamples::measure(FitPiece& piece) const {
-  const auto measure_above = [&](double least, double doubted) {
+  const auto measure_above = [&](double least, double search_beyond) {
     parallel_for_blocks(piece.patches.size(), patches_per_block, [&](std::size_t begin, std::size_t end) {
       for (std::size_t t = begin; t < end; ++t) {
         if (FitPatch& p = piece.patches[t]; p.is_alive() && p.error >= least) {
-          measure(piece, p, doubted);
+          measure(piece, p, search_beyond);
         }
       }
     });
@@ -245,7 +245,8 @@ double FitSamples::measure(FitPiece& piece) const {
   return measure_above(largest / 2, largest / 2);
 }
 
-void FitSamples::from_patch(const PatchPowers& powers, const Vec3& facing, double doubted, FitPatch& patch) const {
+void FitSamples::from_patch(const PatchPowers& powers, const Vec3& facing, double search_beyond,
+                            FitPatch& patch) const {
   if (patch.guesses.size() != grid_.size()) {
     const Index first = patch.guesses.empty() ? target_.tree().closest(powers.corner()).triangle : patch.guesses[0];
     patch.guesses.assign(grid_.size(), first);
@@ -258,7 +259,7 @@ void FitSamples::from_patch(const PatchPowers& powers, const Vec3& facing, doubl
     for (std::size_t k = 0; k < lane_count && i + k < grid_.size(); ++k) {
       const Vec3 p(points[0][k], points[1][k], points[2][k]);
       ClosestPoint::Hit hit = walk_.near_by(p, patch.guesses[i + k]);
-      if (hit.squared_distance > doubted * doubted) {
+      if (hit.squared_distance > search_beyond * search_beyond) {
         hit = target_.tree().closest(p, hit.triangle);
       }
       patch.guesses[i + k] = hit.triangle;

@@ -34,8 +34,8 @@ public:
   void attach(FitPiece& piece) const;
 
   /// Finds a patch's residuals and error.
-  /// @param doubted  mm: what seems farther off is looked for again among all of the target
-  void measure(const FitPiece& piece, FitPatch& patch, double doubted) const;
+  /// @param search_beyond  mm: what seems farther off is looked for again among all of the target
+  void measure(const FitPiece& piece, FitPatch& patch, double search_beyond) const;
   /// Of all patches. Parallel. @return mm, the largest error
   double measure(FitPiece& piece) const;
 
@@ -43,7 +43,7 @@ public:
   [[nodiscard]] Target::Foot foot(const Vec3& p, const Vec3& facing) const;
 
 private:
-  void from_patch(const PatchPowers& powers, const Vec3& facing, double doubted, FitPatch& patch) const;
+  void from_patch(const PatchPowers& powers, const Vec3& facing, double search_beyond, FitPatch& patch) const;
   void from_target(const CubicPatch& surface, const PatchPowers& powers, const Vec3& facing, FitPatch& patch) const;
   void from_boundary(const CubicPatch& surface, const Vec3& facing, FitPatch& patch) const;
   [[nodiscard]] Residual residual_of(const Vec2& at, const Vec3& p, const ClosestPoint::Hit& hit,

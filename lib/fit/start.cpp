@@ -1,5 +1,6 @@
 #include "fit/start.hpp"
 
+#include "core/disjoint_sets.hpp"
 #include "fit/fit_mesh.hpp"
 #include "shell/normals.hpp"
 #include "surface/boundary_curves.hpp"
@@ -12,7 +13,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <numeric>
 
 namespace tunica {
 namespace {
@@ -55,14 +55,7 @@ double turn_degrees(const Vec3& a, const Vec3& b) {
 std::optional<ClosestPoint> crease_curves(const Target& target) {
   const TriangleMesh& mesh = target.mesh();
   const auto across = neighbours(mesh, incidence(mesh));
-  std::vector<Index> parent(mesh.vertices.size());
-  std::iota(parent.begin(), parent.end(), Index{0});
-  const auto root = [&](Index v) {
-    while (parent[v] != v) {
-      v = parent[v] = parent[parent[v]];
-    }
-    return v;
-  };
+  DisjointSets curves(mesh.vertices.size());
   std::vector<std::array<Index, 2>> edges;
   for (Index t = 0; t < mesh.triangles.size(); ++t) {
     for (std::size_t k = 0; k < 3; ++k) {
@@ -70,17 +63,17 @@ std::optional<ClosestPoint> crease_curves(const Target& target) {
       if (other != no_neighbour && t < other &&
           turn_degrees(target.facet_normals()[t], target.facet_normals()[other]) > crease_angle) {
         edges.push_back({mesh.triangles[t][k], mesh.triangles[t][(k + 1) % 3]});
-        parent[root(edges.back()[0])] = root(edges.back()[1]);
+        curves.join(edges.back()[0], edges.back()[1]);
       }
     }
   }
   std::vector<double> length(mesh.vertices.size(), 0);
   for (const auto& [u, v] : edges) {
-    length[root(u)] += (mesh.vertices[u] - mesh.vertices[v]).norm();
+    length[curves.root(u)] += (mesh.vertices[u] - mesh.vertices[v]).norm();
   }
   std::vector<std::array<Vec3, 2>> segments;
   for (const auto& [u, v] : edges) {
-    if (length[root(u)] >= crease_length * target.diagonal()) {
+    if (length[curves.root(u)] >= crease_length * target.diagonal()) {
       segments.push_back({mesh.vertices[u], mesh.vertices[v]});
     }
   }

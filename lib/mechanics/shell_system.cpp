@@ -1,5 +1,6 @@
 #include "mechanics/shell_system.hpp"
 
+#include "core/disjoint_sets.hpp"
 #include "core/error.hpp"
 #include "core/threads.hpp"
 #include "mechanics/element_lanes.hpp"
@@ -79,18 +80,10 @@ void colour_elements(ShellSystem& system) {
 }
 
 void find_pieces(ShellSystem& system, const Model& model) {
-  std::vector<Index> parent(system.node_count());
-  std::iota(parent.begin(), parent.end(), Index{0});
-  const auto root = [&](Index i) {
-    while (parent[i] != i) {
-      parent[i] = parent[parent[i]];
-      i = parent[i];
-    }
-    return i;
-  };
+  DisjointSets joined(system.node_count());
   for (const ShellElement& e : system.elements) {
-    parent[root(e.nodes[1])] = root(e.nodes[0]);
-    parent[root(e.nodes[2])] = root(e.nodes[0]);
+    joined.join(e.nodes[0], e.nodes[1]);
+    joined.join(e.nodes[0], e.nodes[2]);
   }
   std::vector<std::size_t> piece_of(system.node_count(), SIZE_MAX);
   for (std::size_t body = 0; body < model.shells.size(); ++body) {
@@ -98,7 +91,7 @@ void find_pieces(ShellSystem& system, const Model& model) {
       if (system.used[i] == 0) {
         continue;
       }
-      std::size_t& piece = piece_of[root(static_cast<Index>(i))];
+      std::size_t& piece = piece_of[joined.root(static_cast<Index>(i))];
       if (piece == SIZE_MAX) {
         piece = system.pieces.size();
         system.pieces.push_back({body, {}});

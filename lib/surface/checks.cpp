@@ -1,5 +1,6 @@
 #include "surface/checks.hpp"
 
+#include "core/disjoint_sets.hpp"
 #include "surface/incidence.hpp"
 
 #include <fmt/format.h>
@@ -14,28 +15,6 @@ namespace tunica {
 namespace {
 
 std::string near(const Vec3& p) { return fmt::format("near ({:.6g}, {:.6g}, {:.6g})", p.x(), p.y(), p.z()); }
-
-class UnionFind {
-public:
-  explicit UnionFind(std::size_t size) : parent_(size) { std::iota(parent_.begin(), parent_.end(), Index{0}); }
-  Index find(Index i) {
-    while (parent_[i] != i) {
-      parent_[i] = parent_[parent_[i]];
-      i = parent_[i];
-    }
-    return i;
-  }
-  /// @return whether the two were apart before
-  bool join(Index i, Index j) {
-    i = find(i);
-    j = find(j);
-    parent_[std::max(i, j)] = std::min(i, j);
-    return i != j;
-  }
-
-private:
-  std::vector<Index> parent_;
-};
 
 bool has_repeated_corner(const std::array<Index, 3>& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; }
 
@@ -200,8 +179,8 @@ private:
   const TriangleMesh& mesh_;
   const Incidence around_;
   MeshFacts facts_;
-  UnionFind pieces_;
-  UnionFind rim_;
+  DisjointSets<> pieces_;
+  DisjointSets<> rim_;
   std::size_t joined_pieces_ = 0;
   std::size_t joined_rims_ = 0;
   std::size_t rim_vertices_ = 0;

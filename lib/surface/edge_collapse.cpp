@@ -332,7 +332,7 @@ double EdgeCollapse::squared_loss(HalfEdge h, const Vec3& position) const {
   return std::max(least[0], least[1]);
 }
 
-/// What its shapes make dearer is found out only when its turn comes.
+/// How far its shapes raise it is found out only when its turn comes.
 bool EdgeCollapse::collapse_cheapest() {
   const Index edge = heap_.top();
   const HalfEdge h = half_of_[edge];
@@ -545,7 +545,7 @@ bool EdgeCollapse::keeps_topology(HalfEdge h) {
   return keeps_enough(from(previous(h))) && (half_[h].twin == none || keeps_enough(from(previous(half_[h].twin))));
 }
 
-/// How many times dearer the triangles' shapes make a collapse; `forbidden` where it would fold or flatten any.
+/// By what factor the triangles' shapes raise the cost of a collapse; `forbidden` where it would fold or flatten any.
 double EdgeCollapse::shape_penalty(HalfEdge h, const Vec3& position) const {
   const double one = fan_penalty(from(h), to(h), position);
   return one == forbidden ? forbidden : std::max(one, fan_penalty(to(h), from(h), position));

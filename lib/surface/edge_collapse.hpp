@@ -55,7 +55,7 @@ private:
     double error;            // squared distances, as weighted
     double curve = 0;        // place on the boundary curve
     double length_cost = 0;  // what lets short edges go first
-    // What it counts for when shape makes the error dearer.
+    // What it counts for when shape raises the cost.
     [[nodiscard]] double cost(double factor = 1) const { return factor * error + length_cost; }
   };
   // A boundary loop of the given mesh, as a closed polyline; places on it are segment number + fraction.

@@ -341,7 +341,7 @@ LayerCounts count_missing(const PaddedGrid& grid, const Plane& a, const Plane& b
 }
 
 /// A loop around n crossed edges makes n - 2 triangles. Of the cells of one layer two have an edge in one of its slices
-/// in common, and four an upright edge.
+/// in common, and four an edge along z.
 LayerCounts count_layer(const PaddedGrid& grid, const Plane& a, const Plane& b, ActiveWords& active,
                         std::size_t slice) {
   LayerCounts sum;
@@ -351,11 +351,11 @@ LayerCounts count_layer(const PaddedGrid& grid, const Plane& a, const Plane& b, 
     const Word* const a0 = a.row(row) + w;
     sum.along_x += ones((a0[0] ^ shifted(a0)) & places);
     sum.along_y += ones((a0[0] ^ a.row(row + 1)[w]) & places);
-    sum.upright += ones((a0[0] ^ b.row(row)[w]) & places);
+    sum.along_z += ones((a0[0] ^ b.row(row)[w]) & places);
     cells += ones(places);
   }
   sum.in_slice = 2 * (sum.along_x + sum.along_y);
-  sum.in_layer = static_cast<std::ptrdiff_t>(4 * sum.upright) - static_cast<std::ptrdiff_t>(2 * cells);
+  sum.in_layer = static_cast<std::ptrdiff_t>(4 * sum.along_z) - static_cast<std::ptrdiff_t>(2 * cells);
   if (grid.is_open()) {
     const LayerCounts missing = count_missing(grid, a, b, found, slice);
     sum.in_slice -= missing.in_slice;
@@ -504,7 +504,7 @@ private:
     }
     TUNICA_ASSERT(x_end - x == static_cast<std::ptrdiff_t>(counts->along_x) &&
                   y_end - y == static_cast<std::ptrdiff_t>(counts->along_y) &&
-                  z_end - z == static_cast<std::ptrdiff_t>(counts->upright) &&
+                  z_end - z == static_cast<std::ptrdiff_t>(counts->along_z) &&
                   corner - corners == static_cast<std::ptrdiff_t>(3 * counts->triangles));
     if (!in_place) {
       std::copy_n(in_.triangles.begin(), counts->triangles, triangles_);
@@ -512,7 +512,7 @@ private:
     in_.samples.move_to(slice, places.front().row, places.back().row + 1);
     write_vertices(x, counts->along_x, slice, 0, 0);
     write_vertices(y, counts->along_y, slice, 1, counts->along_x);
-    write_vertices(z, counts->upright, slice, 2, counts->along_x + counts->along_y);
+    write_vertices(z, counts->along_z, slice, 2, counts->along_x + counts->along_y);
   }
 
   template <typename T>
@@ -546,8 +546,8 @@ private:
     const Index first_b = first_ + static_cast<Index>(counts.vertices());
     const Index y_a = first_ + static_cast<Index>(counts.along_x);
     const Index y_b = first_b + static_cast<Index>(counts_b.along_x);
-    const Index upright = y_a + static_cast<Index>(counts.along_y);
-    return RunningNumbers({first_, first_ + x_a, first_b, first_b + x_b, y_a, y_b, upright, upright + z});
+    const Index along_z = y_a + static_cast<Index>(counts.along_y);
+    return RunningNumbers({first_, first_ + x_a, first_b, first_b + x_b, y_a, y_b, along_z, along_z + z});
   }
 
   void write_vertices(const CrossedEdge* edges, std::size_t count, std::size_t slice, int axis, std::size_t offset) {

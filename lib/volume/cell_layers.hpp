@@ -15,17 +15,17 @@
 namespace tunica::cell_layers {
 
 /// What one slice of samples, and the layer of cells above it, contribute to the mesh. A slice's vertices are numbered
-/// in this order: those on edges along x, along y, and upright to the next slice.
+/// in this order: those on edges along x, along y, and along z to the next slice.
 struct LayerCounts {
   std::size_t along_x = 0;
   std::size_t along_y = 0;
-  std::size_t upright = 0;
+  std::size_t along_z = 0;
   std::size_t triangles = 0;
   /// What the triangles are counted by: how many cells of one layer have the slice's edges along x and y, taken
   /// together; and what else the layer adds.
   std::size_t in_slice = 0;
   std::ptrdiff_t in_layer = 0;
-  [[nodiscard]] std::size_t vertices() const { return along_x + along_y + upright; }
+  [[nodiscard]] std::size_t vertices() const { return along_x + along_y + along_z; }
 };
 
 /// The triangles of all layers, from the counts of all padded slices.

@@ -1,11 +1,11 @@
 #include "volume/components.hpp"
 
+#include "core/disjoint_sets.hpp"
 #include "core/progress.hpp"
 
 #include <algorithm>
 #include <bit>
 #include <functional>
-#include <numeric>
 
 namespace tunica {
 namespace {
@@ -34,8 +34,7 @@ public:
         first_.push_back(runs_.size());
       }
     }
-    parent_.resize(runs_.size());
-    std::iota(parent_.begin(), parent_.end(), std::size_t{0});
+    joined_ = DisjointSets<std::size_t>(runs_.size());
   }
 
   /// Joins runs of neighbouring rows that share a face, or with `edges` also those that share an edge only.
@@ -66,12 +65,7 @@ public:
   [[nodiscard]] const Run& operator[](std::size_t run) const { return runs_[run]; }
 
   /// The first run of a run's component.
-  std::size_t root(std::size_t run) {
-    while (parent_[run] != run) {
-      run = parent_[run] = parent_[parent_[run]];
-    }
-    return run;
-  }
+  std::size_t root(std::size_t run) { return joined_.root(run); }
 
   /// Calls visit(run, j, k) in order.
   template <typename Visit>
@@ -102,9 +96,7 @@ private:
     std::size_t b = first_[other];
     while (a < first_[row + 1] && b < first_[other + 1]) {
       if (runs_[a].begin < runs_[b].end + reach && runs_[b].begin < runs_[a].end + reach) {
-        const std::size_t root_a = root(a);
-        const std::size_t root_b = root(b);
-        parent_[std::max(root_a, root_b)] = std::min(root_a, root_b);
+        joined_.join(a, b);
       }
       ++(runs_[a].end < runs_[b].end ? a : b);
     }
@@ -113,7 +105,7 @@ private:
   const Mask& mask_;
   std::vector<Run> runs_;
   std::vector<std::size_t> first_;  ///< first run of each row, and one more
-  std::vector<std::size_t> parent_;
+  DisjointSets<std::size_t> joined_{0};
 };
 
 /// Voxels of each component, at its root.

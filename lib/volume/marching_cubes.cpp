@@ -179,7 +179,7 @@ void SlabMarchingCubes::add(const Volume& slab, std::size_t first_slice) {
         }
         const Values& at_hand = carried > 0 ? window : values;
         const Interpolated<typename Values::value_type> crossings(slab, at_hand, value_);
-        // Padded slices are one more; the upright edges of the last one at hand wait for the next slab.
+        // Padded slices are one more; the edges along z of the last one at hand wait for the next slab.
         writer_->write(first_slice == 0 ? 0 : first_slice, last ? writer_->slices() : next_slice_, &crossings,
                        first_slice - carried);
         if (!last) {

@@ -1,22 +1,15 @@
 #include "volume/outward.hpp"
 
+#include "core/disjoint_sets.hpp"
+
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 namespace tunica {
 namespace {
-
-Index root_of(std::vector<Index>& parent, Index vertex) {
-  while (parent[vertex] != vertex) {
-    parent[vertex] = parent[parent[vertex]];
-    vertex = parent[vertex];
-  }
-  return vertex;
-}
 
 // Beyond the image everything is outside, or, with an open border, as it is on the border.
 bool inside(const Mask& mask, bool open_border, const Vec3& index) {
@@ -59,8 +52,7 @@ bool faces_outward(const TriangleMesh& mesh, const Mask& mask, bool open_border)
   const double side = axes.determinant() < 0 ? -1 : 1;  // a mirroring affine turns normals round
   std::vector<Vec3> points(mesh.vertices.size());
   std::vector<Vec3> normals(mesh.vertices.size(), Vec3::Zero());
-  std::vector<Index> parent(mesh.vertices.size());
-  std::iota(parent.begin(), parent.end(), Index{0});
+  DisjointSets pieces(mesh.vertices.size());
   for (std::size_t vertex = 0; vertex < points.size(); ++vertex) {
     points[vertex] = to_index * (mesh.vertices[vertex] - mask.affine().col(3));
   }
@@ -69,15 +61,15 @@ bool faces_outward(const TriangleMesh& mesh, const Mask& mask, bool open_border)
     for (const Index corner : {a, b, c}) {
       normals[corner] += normal;
     }
-    parent[root_of(parent, a)] = root_of(parent, b);
-    parent[root_of(parent, b)] = root_of(parent, c);
+    pieces.join(a, b);
+    pieces.join(b, c);
   }
   std::vector<double> votes(points.size(), 0.0);
   for (Index vertex = 0; vertex < points.size(); ++vertex) {
-    votes[root_of(parent, vertex)] += normals[vertex].dot(outward_step(mask, open_border, points[vertex]));
+    votes[pieces.root(vertex)] += normals[vertex].dot(outward_step(mask, open_border, points[vertex]));
   }
   return std::all_of(mesh.triangles.begin(), mesh.triangles.end(),
-                     [&](const auto& triangle) { return votes[root_of(parent, triangle[0])] > 0; });
+                     [&](const auto& triangle) { return votes[pieces.root(triangle[0])] > 0; });
 }
 
 }  // namespace tunica

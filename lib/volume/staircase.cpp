@@ -1,5 +1,6 @@
 // S. F. F. Gibson: Constrained elastic surface nets: generating smooth surfaces from binary segmented data. MICCAI
 // 1998. B. O'Donoghue, E. Candes: Adaptive restart for accelerated gradient schemes. Found. Comput. Math. 15 (2015).
+#include "core/disjoint_sets.hpp"
 #include "core/error.hpp"
 #include "core/threads.hpp"
 #include "volume/cell_crossings.hpp"
@@ -13,7 +14,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -56,25 +56,15 @@ void for_all(std::size_t size, const Body& body) {
 
 /// Number of the connected component of each vertex, and how many there are.
 std::pair<std::vector<Index>, std::size_t> label_components(const TriangleMesh& mesh) {
-  std::vector<Index> parent(mesh.vertices.size());
-  std::iota(parent.begin(), parent.end(), Index{0});
-  const auto root = [&](Index v) {
-    while (parent[v] != v) {
-      v = parent[v] = parent[parent[v]];
-    }
-    return v;
-  };
-  for (const auto& t : mesh.triangles) {
-    for (int i = 1; i < 3; ++i) {
-      const Index a = root(t[0]);
-      const Index b = root(t[i]);
-      parent[std::max(a, b)] = std::min(a, b);
-    }
+  DisjointSets pieces(mesh.vertices.size());
+  for (const auto& [a, b, c] : mesh.triangles) {
+    pieces.join(a, b);
+    pieces.join(a, c);
   }
-  std::vector<Index> number(parent.size());
+  std::vector<Index> number(mesh.vertices.size());
   std::size_t count = 0;
-  for (Index v = 0; v < parent.size(); ++v) {
-    number[v] = root(v) == v ? static_cast<Index>(count++) : number[root(v)];
+  for (Index v = 0; v < number.size(); ++v) {
+    number[v] = pieces.root(v) == v ? static_cast<Index>(count++) : number[pieces.root(v)];
   }
   return {number, count};
 }

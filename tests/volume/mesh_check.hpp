@@ -1,5 +1,6 @@
 #pragma once
 
+#include "core/disjoint_sets.hpp"
 #include "surface/triangle_mesh.hpp"
 
 #include <Eigen/Geometry>
@@ -8,7 +9,6 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <numeric>
 #include <set>
 #include <string>
 #include <vector>
@@ -44,21 +44,14 @@ inline MeshCheck check_mesh(const TriangleMesh& mesh) {
   };
   std::map<std::pair<Index, Index>, Use> edges;
   std::vector<std::vector<std::pair<Index, Index>>> links(mesh.vertices.size());
-  std::vector<Index> parent(mesh.vertices.size());
-  std::iota(parent.begin(), parent.end(), Index{0});
-  const auto root = [&](Index v) {
-    while (parent[v] != v) {
-      v = parent[v] = parent[parent[v]];
-    }
-    return v;
-  };
+  DisjointSets pieces(mesh.vertices.size());
   for (const auto& t : mesh.triangles) {
     for (int i = 0; i < 3; ++i) {
       const Index a = t[i];
       const Index b = t[(i + 1) % 3];
       ++(a < b ? edges[{a, b}].forward : edges[{b, a}].backward);
       links[a].emplace_back(b, t[(i + 2) % 3]);
-      parent[root(a)] = root(b);
+      pieces.join(a, b);
     }
     const Vec3& p = mesh.vertices[t[0]];
     const Vec3& q = mesh.vertices[t[1]];
@@ -80,7 +73,7 @@ inline MeshCheck check_mesh(const TriangleMesh& mesh) {
       ++result.unused_vertices;
       continue;
     }
-    result.components += root(v) == v;
+    result.components += pieces.root(v) == v;
     // One fan: following the link's edges from a start without predecessor (or anywhere) visits all of them.
     std::map<Index, Index> next;
     std::set<Index> ends;
