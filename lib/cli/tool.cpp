@@ -26,6 +26,7 @@ namespace tunica::cli {
 namespace {
 
 constexpr const char* report_flag = "--report";
+constexpr const char* no_memory = "out of memory: give it more, or a smaller input";
 
 extern "C" void on_signal(int signal) {
   request_stop(signal);
@@ -257,8 +258,12 @@ int Tool::run(int argc, char** argv, const std::function<void()>& body) {
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);  // writing past a limit on file sizes is then an error like a full disk
   tidy_options(app_);
-  if (const auto code = parse(argc, argv)) {
-    return *code;
+  try {
+    if (const auto code = parse(argc, argv)) {
+      return *code;
+    }
+  } catch (const std::bad_alloc&) {
+    return finish(ExitCode::memory, out_of_memory(no_memory));
   }
   std::signal(SIGINT, on_signal);
   std::signal(SIGTERM, on_signal);
@@ -283,7 +288,7 @@ int Tool::perform(const std::function<void()>& body) {
     finish(ExitCode::ok, fmt::format("stopped by signal {}", interrupted.signal()));
     return 128 + interrupted.signal();
   } catch (const std::bad_alloc&) {
-    return finish(ExitCode::memory, out_of_memory("out of memory: give it more, or a smaller input"));
+    return finish(ExitCode::memory, out_of_memory(no_memory));
   } catch (const std::exception& error) {
     // TBB has no type for it.
     return std::string_view(error.what()).find("pthread_create") != std::string_view::npos

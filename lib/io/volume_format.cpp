@@ -477,6 +477,8 @@ std::size_t ByteStream::read_deflated(void* to, std::size_t size) {
       // A gzip file may be several streams one after the other.
       const bool more = stream.avail_in >= 2 && stream.next_in[0] == 0x1f && stream.next_in[1] == 0x8b;
       inflater_->ended = !more || inflateReset(&stream) != Z_OK;
+    } else if (code == Z_MEM_ERROR) {
+      throw std::bad_alloc();
     } else if (code != Z_OK && code != Z_BUF_ERROR) {
       throw InputError(fmt::format("{}: its compressed data is corrupt after {} bytes ({}); get the file again",
                                    path_.string(), position_ + got, stream.msg != nullptr ? stream.msg : "zlib error"));

@@ -8,6 +8,7 @@
 #include <zlib.h>
 
 #include <bit>
+#include <new>
 
 namespace tunica {
 namespace {
@@ -41,8 +42,12 @@ std::string compressed(std::string_view bytes) {
     const std::string_view block = bytes.substr(start, block_bytes);
     uLongf size = ::compressBound(block.size());
     std::string packed(size, '\0');
-    TUNICA_ASSERT(::compress2(reinterpret_cast<Bytef*>(packed.data()), &size,
-                              reinterpret_cast<const Bytef*>(block.data()), block.size(), fast) == Z_OK);
+    const int status = ::compress2(reinterpret_cast<Bytef*>(packed.data()), &size,
+                                   reinterpret_cast<const Bytef*>(block.data()), block.size(), fast);
+    if (status == Z_MEM_ERROR) {
+      throw std::bad_alloc();
+    }
+    TUNICA_ASSERT(status == Z_OK);
     head.push_back(size);
     blocks.append(packed, 0, size);
   }

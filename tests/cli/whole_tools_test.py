@@ -185,6 +185,22 @@ class WholeTools(unittest.TestCase):
                 self.assertIsNone(re.search("OpenCV|HDF5|terminate|BLAS", done.stderr), done.stderr)
             self.assertEqual(done.returncode, 0, verb)
 
+    def test_memory_that_does_not_do_to_start_is_said_as_well(self):
+        """The first mebibytes above what the system needs to load the program: done or exit code 6, nothing else."""
+        for verb, (arguments, _) in self.COMMANDS.items():
+            def run(kibibytes, words):
+                def limit():
+                    resource.setrlimit(resource.RLIMIT_AS, (kibibytes << 10, kibibytes << 10))
+                return subprocess.run([tool(verb), *words], cwd=self.folder, capture_output=True, text=True,
+                                      preexec_fn=limit, check=False)
+
+            loaded = next(k for k in range(4 << 10, 1 << 20, 1 << 9) if run(k, ["--version"]).returncode == 0)
+            # Half a mebibyte more, for libraries make objects before main().
+            for kibibytes in range(loaded + (1 << 9), loaded + (5 << 10), 1 << 8):
+                done = run(kibibytes, [*arguments, "--force"])
+                self.assertIn(done.returncode, (0, 6), (verb, kibibytes, done.stderr))
+                self.assertNotIn("terminate", done.stderr)
+
 
 if __name__ == "__main__":
     unittest.main()
