@@ -39,20 +39,89 @@ constexpr double worth_it = 0.985;              // a round that leaves more than
 constexpr std::size_t fewest_sampled = 8;       // shells: as few want no fewer points of the target
 constexpr std::array<double, 3> exchanged{1.0 / 40, 1.0 / 150, 1.0 / 15};  // of the shells, in a round
 
+/// Certifies shells, says what is wrong with them, and keeps the best.
+class Certifier {
+public:
+  Certifier(const Target& target, const FitOptions& options, bool like_target)
+      : target_(target),
+        options_(options),
+        like_target_(like_target),
+        width_(options.width.value_or(default_width * target.diagonal())) {
+    if (options.tolerance) {
+      width_ = std::min(width_, *options.tolerance / 100);
+    }
+  }
+
+  /// @param result gets an iteration, and the shell when it is better than the one there
+  ShellDistance certified(const ShellMesh& shell, RelaxResult& result) {
+    ShellDistanceOptions measuring;
+    measuring.width = width_;
+    measuring.limit = options_.tolerance;
+    measuring.list_beyond = options_.tolerance.has_value();
+    ShellDistance distance = curved_hausdorff(shell, target_, measuring);
+    if (like_target_) {
+      if (const auto between = boundary_distance(boundary_curves(shell), target_, width_, options_.tolerance)) {
+        distance.boundary = between->both;
+      }
+    }
+    crossings = crossing_patches(shell);
+    thin = thin_triangles(shell);
+    const bool holds = options_.tolerance && distance.upper() <= *options_.tolerance;
+    const auto rank = std::array{holds ? 1.0 : 0.0, crossings.empty() ? 1.0 : 0.0,
+                                 holds ? -static_cast<double>(thin.size()) : -distance.upper(),
+                                 -static_cast<double>(shell.triangles.size())};
+    if (result.shell.triangles.empty() || rank > rank_) {
+      result.shell = shell;
+      result.distance = distance;
+      rank_ = rank;
+      if (options_.tolerance) {
+        result.reached = holds;
+      }
+    }
+    const auto now = std::chrono::steady_clock::now();
+    result.iterations.push_back(
+        {shell.triangles.size(), distance.both, std::chrono::duration<double>(now - last_).count(), {}});
+    last_ = now;
+    if (options_.on_iteration) {
+      options_.on_iteration(result.iterations.back(), result.shell);
+    }
+    return distance;
+  }
+
+  std::vector<std::array<Index, 2>> crossings;  // of the shells that were certified last: pairs
+  std::vector<Index> thin;                      // likewise: below the smallest angle
+
+private:
+  [[nodiscard]] std::vector<Index> thin_triangles(const ShellMesh& shell) const {
+    std::vector<Index> out;
+    for (Index t = 0; t < shell.triangles.size(); ++t) {
+      const auto& [a, b, c] = shell.triangles[t];
+      if (smallest_angle_degrees(shell.vertices[a], shell.vertices[b], shell.vertices[c]) < options_.min_angle) {
+        out.push_back(t);
+      }
+    }
+    return out;
+  }
+
+  const Target& target_;
+  const FitOptions& options_;
+  bool like_target_;
+  double width_;
+  std::array<double, 4> rank_{};  // of the best
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
+
 class Fitting {
 public:
   Fitting(const TriangleMesh& coarse, const Target& target, const FitOptions& options)
       : coarse_(without_unused(coarse)),
         target_(target),
         options_(options),
-        like_target_(same_topology(coarse_, target)) {
+        like_target_(same_topology(coarse_, target)),
+        best_(target, options, like_target_) {
     limits_.shape.min_angle = angle_margin * options.min_angle;
     most_ = options.max_shells.value_or(options.tolerance ? options.shells.value_or(max_index) : max_index);
     rounds_ = options.max_iterations.value_or(default_rounds);
-    width_ = options.width.value_or(default_width * target.diagonal());
-    if (options.tolerance) {
-      width_ = std::min(width_, *options.tolerance / 100);
-    }
   }
 
   RelaxResult run() {
@@ -123,53 +192,8 @@ private:
     }
   }
 
-  [[nodiscard]] std::vector<Index> thin_triangles(const ShellMesh& shell) const {
-    std::vector<Index> thin;
-    for (Index t = 0; t < shell.triangles.size(); ++t) {
-      const auto& [a, b, c] = shell.triangles[t];
-      if (smallest_angle_degrees(shell.vertices[a], shell.vertices[b], shell.vertices[c]) < options_.min_angle) {
-        thin.push_back(t);
-      }
-    }
-    return thin;
-  }
-
-  /// Certifies, keeps what is better, and notes it.
-  ShellDistance certified(const ShellMesh& shell) {
-    ShellDistanceOptions measuring;
-    measuring.width = width_;
-    measuring.limit = options_.tolerance;
-    measuring.list_beyond = options_.tolerance.has_value();
-    ShellDistance distance = curved_hausdorff(shell, target_, measuring);
-    if (like_target_) {
-      if (const auto between = boundary_distance(boundary_curves(shell), target_, width_, options_.tolerance)) {
-        distance.boundary = between->both;
-      }
-    }
-    crossings_ = crossing_patches(shell);
-    thin_ = thin_triangles(shell);
-    const bool holds = options_.tolerance && distance.upper() <= *options_.tolerance;
-    const auto rank = std::array{holds ? 1.0 : 0.0, crossings_.empty() ? 1.0 : 0.0,
-                                 holds ? -static_cast<double>(thin_.size()) : -distance.upper(),
-                                 -static_cast<double>(shell.triangles.size())};
-    const bool is_better = result_.shell.triangles.empty() || rank > rank_;
-    if (is_better) {
-      result_.shell = shell;
-      result_.distance = distance;
-      rank_ = rank;
-      if (options_.tolerance) {
-        result_.reached = holds;
-      }
-    }
-    const auto now = std::chrono::steady_clock::now();
-    result_.iterations.push_back(
-        {shell.triangles.size(), distance.both, std::chrono::duration<double>(now - last_).count(), {}});
-    last_ = now;
-    if (options_.on_iteration) {
-      options_.on_iteration(result_.iterations.back(), result_.shell);
-    }
-    return distance;
-  }
+  /// Certifies, and keeps what is better.
+  ShellDistance certified(const ShellMesh& shell) { return best_.certified(shell, result_); }
 
   void to_tolerance(double tolerance) {
     limits_.error = margin * tolerance;
@@ -231,14 +255,14 @@ private:
       const ShellDistance distance = certified(mesh.shell(&patch_of));
       if (distance.upper() <= tolerance) {
         result_.stopped = "the tolerance holds";
-        const std::size_t faults = crossings_.size() + thin_.size();
+        const std::size_t faults = best_.crossings.size() + best_.thin.size();
         if (faults == 0 || faults >= fewest_faults) {
           return;
         }
         fewest_faults = faults;
       } else {
-        crossings_.clear();  // first things first
-        thin_.clear();
+        best_.crossings.clear();  // first things first
+        best_.thin.clear();
         if (i >= patience && distance.both.lower > out_of_reach * tolerance) {
           return;
         }
@@ -267,11 +291,11 @@ private:
         double& error = mesh.patches[patch_of[patch]].error;
         error = std::max(error, 2 * limits_.error);
       };
-      for (const auto& pair : crossings_) {
+      for (const auto& pair : best_.crossings) {
         wants_splits(pair[0]);
         wants_splits(pair[1]);
       }
-      std::for_each(thin_.begin(), thin_.end(), wants_splits);
+      std::for_each(best_.thin.begin(), best_.thin.end(), wants_splits);
       if (mesh.alive >= most_) {
         if (!result_.reached.value_or(false)) {
           result_.stopped = "the limit of shells was reached";
@@ -362,15 +386,11 @@ private:
   const Target& target_;
   const FitOptions& options_;
   bool like_target_;  // COARSE has the target's topology: its boundaries are the target's
-  double width_;
+  Certifier best_;
   FitLimits limits_;
   std::size_t most_;  // shells
   int rounds_;        // of exchanges that are left
   RelaxResult result_;
-  std::array<double, 4> rank_{};                 // of the result: see certified()
-  std::vector<std::array<Index, 2>> crossings_;  // of the shells that were certified last
-  std::vector<Index> thin_;                      // likewise
-  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
 
 }  // namespace

@@ -54,6 +54,82 @@ struct Equations {
   Eigen::VectorXd side;
 };
 
+/// The first of the three unknowns of each node, of the two of each slot; -1: it stays.
+struct Unknowns {
+  std::vector<Eigen::Index> node, slot;
+  Eigen::Index size = 0;
+};
+
+/// How the control points follow the unknowns, by differences.
+Jacobian jacobian(const FitPiece& piece, const FitPatch& p, const Unknowns& of, std::vector<Eigen::Index>& unknowns) {
+  struct Shape {
+    std::array<Vec3, 3> corners, normals;
+    NormalsAcross across;
+  };
+  const Shape shape{piece.corners(p), piece.corner_normals(p), piece.normals_across(p)};
+  const auto control = [&](const Shape& s) {
+    const CubicPatch patch = piece.kind == Patch::watertight ? watertight_patch(s.corners, s.normals, s.across)
+                                                             : comas_patch(s.corners, s.normals);
+    return Eigen::Matrix<double, 30, 1>(Eigen::Map<const Eigen::Matrix<double, 30, 1>>(patch.control[0].data()));
+  };
+  const Eigen::Matrix<double, 30, 1> base = control(shape);
+  const double step = 1e-6 * std::sqrt((shape.corners[1] - shape.corners[0]).squaredNorm() +
+                                       (shape.corners[2] - shape.corners[0]).squaredNorm());
+  constexpr double tilt = 1e-6;
+  Jacobian out(30, most_columns);
+  Shape changed = shape;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Eigen::Index first = of.node[p.nodes[k]];
+    for (Eigen::Index axis = 0; first >= 0 && axis < 3; ++axis) {
+      changed.corners[k][axis] += step;
+      out.col(static_cast<Eigen::Index>(unknowns.size())) = (control(changed) - base) / step;
+      unknowns.push_back(first + axis);
+      changed.corners[k] = shape.corners[k];
+    }
+  }
+  std::vector<Index> slots(p.slots.begin(), p.slots.end());
+  for (const auto& ends : p.across) {
+    for (const Index s : ends) {
+      if (piece.kind == Patch::watertight && std::find(slots.begin(), slots.end(), s) == slots.end()) {
+        slots.push_back(s);
+      }
+    }
+  }
+  for (const Index s : slots) {
+    const auto axes = tilt_axes(piece.normals[s]);
+    for (Eigen::Index axis = 0; of.slot[s] >= 0 && axis < 2; ++axis) {
+      const Vec3 tilted = piece.normals[s] + tilt * axes[static_cast<std::size_t>(axis)];
+      for (std::size_t k = 0; k < 3; ++k) {
+        changed.normals[k] = p.slots[k] == s ? tilted : shape.normals[k];
+        for (std::size_t end = 0; end < 2; ++end) {
+          changed.across[k][end] = p.across[k][end] == s ? tilted : shape.across[k][end];
+        }
+      }
+      out.col(static_cast<Eigen::Index>(unknowns.size())) = (control(changed) - base) / tilt;
+      unknowns.push_back(of.slot[s] + axis);
+    }
+  }
+  out.conservativeResize(30, static_cast<Eigen::Index>(unknowns.size()));
+  return out;
+}
+
+Eigen::VectorXd solve(const std::vector<Eigen::Triplet<double>>& entries, const Eigen::VectorXd& side) {
+  const Eigen::Index size = side.size();
+  if (size <= few_unknowns) {
+    Eigen::MatrixXd dense = Eigen::MatrixXd::Zero(size, size);
+    for (const auto& e : entries) {
+      dense(e.row(), e.col()) += e.value();
+    }
+    return dense.ldlt().solve(side);
+  }
+  Eigen::SparseMatrix<double> matrix(size, size);
+  matrix.setFromTriplets(entries.begin(), entries.end());
+  Eigen::ConjugateGradient<Eigen::SparseMatrix<double>, Eigen::Lower | Eigen::Upper> solver;
+  solver.setTolerance(1e-3);
+  solver.setMaxIterations(100);
+  return solver.compute(matrix).solve(side);
+}
+
 class Step {
 public:
   Step(FitPiece& piece, const FitSamples& samples, const SquaresOptions& options)
@@ -64,7 +140,7 @@ public:
       scale_ = std::max(scale_, p.error);
     }
     number_unknowns();
-    if (size_ == 0 || !(scale_ > 1e-12 * samples_.target().diagonal())) {
+    if (of_.size == 0 || !(scale_ > 1e-12 * samples_.target().diagonal())) {
       return 1;
     }
     assemble();
@@ -75,7 +151,6 @@ public:
 
 private:
   struct Node {
-    Eigen::Index position = -1;  // first of its three unknowns; none: it stays
     std::vector<Index> slots;
     double edge = 0;   // mm, mean
     double error = 0;  // mm, largest around
@@ -87,7 +162,8 @@ private:
 
   void number_unknowns() {
     nodes_.resize(piece_.positions.size());
-    tilt_.assign(piece_.normals.size(), -1);
+    of_.node.assign(piece_.positions.size(), -1);
+    of_.slot.assign(piece_.normals.size(), -1);
     for (const FitPatch& p : piece_.patches) {
       for (std::size_t k = 0; p.is_alive() && k < 3; ++k) {
         ++nodes_[p.nodes[k]].patches;
@@ -95,16 +171,16 @@ private:
     }
     for (std::size_t v = 0; v < nodes_.size(); ++v) {
       if (options_.positions && piece_.free[v] != 0 && nodes_[v].patches > 0) {
-        nodes_[v].position = size_;
-        size_ += 3;
+        of_.node[v] = of_.size;
+        of_.size += 3;
       }
     }
-    for (std::size_t s = 0; s < tilt_.size(); ++s) {
+    for (std::size_t s = 0; s < of_.slot.size(); ++s) {
       const Index v = piece_.node_of_slot[s];
       if (piece_.free[v] != 0 && nodes_[v].patches > 0) {
         nodes_[v].slots.push_back(static_cast<Index>(s));
-        tilt_[s] = size_;
-        size_ += 2;
+        of_.slot[s] = of_.size;
+        of_.size += 2;
       }
     }
   }
@@ -118,62 +194,9 @@ private:
     return cost;
   }
 
-  /// How the control points follow the unknowns, by differences.
-  Jacobian jacobian(const FitPatch& p, std::vector<Eigen::Index>& unknowns) const {
-    struct Shape {
-      std::array<Vec3, 3> corners, normals;
-      NormalsAcross across;
-    };
-    const Shape shape{piece_.corners(p), piece_.corner_normals(p), piece_.normals_across(p)};
-    const auto control = [&](const Shape& s) {
-      const CubicPatch patch = piece_.kind == Patch::watertight ? watertight_patch(s.corners, s.normals, s.across)
-                                                                : comas_patch(s.corners, s.normals);
-      return Eigen::Matrix<double, 30, 1>(Eigen::Map<const Eigen::Matrix<double, 30, 1>>(patch.control[0].data()));
-    };
-    const Eigen::Matrix<double, 30, 1> base = control(shape);
-    const double step = 1e-6 * std::sqrt((shape.corners[1] - shape.corners[0]).squaredNorm() +
-                                         (shape.corners[2] - shape.corners[0]).squaredNorm());
-    constexpr double tilt = 1e-6;
-    Jacobian out(30, most_columns);
-    Shape changed = shape;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const Eigen::Index first = nodes_[p.nodes[k]].position;
-      for (Eigen::Index axis = 0; first >= 0 && axis < 3; ++axis) {
-        changed.corners[k][axis] += step;
-        out.col(static_cast<Eigen::Index>(unknowns.size())) = (control(changed) - base) / step;
-        unknowns.push_back(first + axis);
-        changed.corners[k] = shape.corners[k];
-      }
-    }
-    std::vector<Index> slots(p.slots.begin(), p.slots.end());
-    for (const auto& ends : p.across) {
-      for (const Index s : ends) {
-        if (piece_.kind == Patch::watertight && std::find(slots.begin(), slots.end(), s) == slots.end()) {
-          slots.push_back(s);
-        }
-      }
-    }
-    for (const Index s : slots) {
-      const auto axes = tilt_axes(piece_.normals[s]);
-      for (Eigen::Index axis = 0; tilt_[s] >= 0 && axis < 2; ++axis) {
-        const Vec3 tilted = piece_.normals[s] + tilt * axes[static_cast<std::size_t>(axis)];
-        for (std::size_t k = 0; k < 3; ++k) {
-          changed.normals[k] = p.slots[k] == s ? tilted : shape.normals[k];
-          for (std::size_t end = 0; end < 2; ++end) {
-            changed.across[k][end] = p.across[k][end] == s ? tilted : shape.across[k][end];
-          }
-        }
-        out.col(static_cast<Eigen::Index>(unknowns.size())) = (control(changed) - base) / tilt;
-        unknowns.push_back(tilt_[s] + axis);
-      }
-    }
-    out.conservativeResize(30, static_cast<Eigen::Index>(unknowns.size()));
-    return out;
-  }
-
   Equations equations(const FitPatch& p) const {
     Equations out;
-    const Jacobian control = jacobian(p, out.unknowns);
+    const Jacobian control = jacobian(piece_, p, of_, out.unknowns);
     const auto n = static_cast<Eigen::Index>(out.unknowns.size());
     const auto count = static_cast<Eigen::Index>(p.residuals.size());
     Eigen::MatrixXd rows(n, count);
@@ -252,7 +275,7 @@ private:
   }
 
   [[nodiscard]] Eigen::VectorXd solved() const {
-    Eigen::VectorXd side = Eigen::VectorXd::Zero(size_), diagonal = Eigen::VectorXd::Zero(size_);
+    Eigen::VectorXd side = Eigen::VectorXd::Zero(of_.size), diagonal = Eigen::VectorXd::Zero(of_.size);
     std::vector<Eigen::Triplet<double>> entries;
     for (const Equations& e : equations_) {
       for (std::size_t a = 0; a < e.unknowns.size(); ++a) {
@@ -267,53 +290,41 @@ private:
     for (std::size_t v = 0; v < nodes_.size(); ++v) {
       const Node& node = nodes_[v];
       double stiffness = 0;
-      if (node.position >= 0) {
-        stiffness = diagonal.segment<3>(node.position).sum();
+      if (of_.node[v] >= 0) {
+        stiffness = diagonal.segment<3>(of_.node[v]).sum();
         const double slide = stiffness * std::min(1.0, std::pow(node.error / node.edge, 2));
         const double pulling = options_.smoothing * std::max(slide, 1e-3 * stiffness);
         const auto [within, way] = pull(v);
         const Mat3 damping =
             (least_damping * stiffness + sliding_damping * slide) * Mat3::Identity() + pulling * within;
-        side.segment<3>(node.position) += pulling * way;
+        side.segment<3>(of_.node[v]) += pulling * way;
         for (Eigen::Index i = 0; i < 3; ++i) {
           for (Eigen::Index j = 0; j < 3; ++j) {
-            entries.emplace_back(node.position + i, node.position + j, damping(i, j));
+            entries.emplace_back(of_.node[v] + i, of_.node[v] + j, damping(i, j));
           }
         }
       }
       for (const Index s : node.slots) {
-        const double damping = normal_damping * diagonal.segment<2>(tilt_[s]).sum() +
+        const double damping = normal_damping * diagonal.segment<2>(of_.slot[s]).sum() +
                                least_damping * stiffness * node.edge * node.edge + 1e-300;
-        entries.emplace_back(tilt_[s], tilt_[s], damping);
-        entries.emplace_back(tilt_[s] + 1, tilt_[s] + 1, damping);
+        entries.emplace_back(of_.slot[s], of_.slot[s], damping);
+        entries.emplace_back(of_.slot[s] + 1, of_.slot[s] + 1, damping);
       }
     }
-    if (size_ <= few_unknowns) {
-      Eigen::MatrixXd dense = Eigen::MatrixXd::Zero(size_, size_);
-      for (const auto& e : entries) {
-        dense(e.row(), e.col()) += e.value();
-      }
-      return dense.ldlt().solve(side);
-    }
-    Eigen::SparseMatrix<double> matrix(size_, size_);
-    matrix.setFromTriplets(entries.begin(), entries.end());
-    Eigen::ConjugateGradient<Eigen::SparseMatrix<double>, Eigen::Lower | Eigen::Upper> solver;
-    solver.setTolerance(1e-3);
-    solver.setMaxIterations(100);
-    return solver.compute(matrix).solve(side);
+    return solve(entries, side);
   }
 
   void put(std::size_t v, double length, const Eigen::VectorXd& x) {
     const Node& node = nodes_[v];
-    if (node.position >= 0) {
-      Vec3 move = length * x.segment<3>(node.position);
+    if (of_.node[v] >= 0) {
+      Vec3 move = length * x.segment<3>(of_.node[v]);
       if (const double far = move.norm(); far > largest_move * node.edge) {
         move *= largest_move * node.edge / far;
       }
       piece_.positions[v] = positions_[v] + move;
     }
     for (const Index s : node.slots) {
-      Vec2 tilt = length * x.segment<2>(tilt_[s]);
+      Vec2 tilt = length * x.segment<2>(of_.slot[s]);
       if (const double far = tilt.norm(); far > largest_tilt) {
         tilt *= largest_tilt / far;
       }
@@ -382,7 +393,7 @@ private:
       }
       bool any = false;
       for (std::size_t v = 0; v < nodes_.size(); ++v) {
-        bad[v] = length[v] > 0 && (nodes_[v].position >= 0 || !nodes_[v].slots.empty()) &&
+        bad[v] = length[v] > 0 && (of_.node[v] >= 0 || !nodes_[v].slots.empty()) &&
                  (bad[v] != 0 || around[v] > may_grow * nodes_[v].cost + 1e-6 * before);
         any = any || bad[v] != 0;
       }
@@ -405,9 +416,8 @@ private:
   const FitSamples& samples_;
   const SquaresOptions& options_;
   double scale_ = 0;
-  Eigen::Index size_ = 0;
+  Unknowns of_;
   std::vector<Node> nodes_;
-  std::vector<Eigen::Index> tilt_;  // first unknown of each slot; none: it stays
   std::vector<Equations> equations_;
   std::vector<double> costs_, shortfall_;
   std::vector<Vec3> facing_, positions_, normals_;
