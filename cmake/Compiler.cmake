@@ -24,13 +24,17 @@ if(TUNICA_X86_64_V3 AND CMAKE_SYSTEM_PROCESSOR STREQUAL "x86_64")
   endif()
 endif()
 
-# tunica_library(NAME LINKS lib... PRIVATE lib...): lib/NAME/*.cpp as the static library tunica_NAME. LINKS are the
+# Headers are included as tunica/ROOM/name.hpp, here as where they are installed.
+file(MAKE_DIRECTORY ${PROJECT_BINARY_DIR}/include)
+file(CREATE_LINK ${PROJECT_SOURCE_DIR}/lib ${PROJECT_BINARY_DIR}/include/tunica SYMBOLIC)
+
+# tunica_library(NAME LINKS lib... PRIVATE lib...): the .cpp files of lib/NAME and its rooms as the static library tunica_NAME. LINKS are the
 # rooms it may include: the link lines are the architecture.
 function(tunica_library name)
   cmake_parse_arguments(arg "" "" "LINKS;PRIVATE" ${ARGN})
-  file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*.cpp)
+  file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*.cpp)
   add_library(tunica_${name} STATIC ${sources})
-  target_include_directories(tunica_${name} PUBLIC ${PROJECT_SOURCE_DIR}/lib ${PROJECT_BINARY_DIR}/generated)
+  target_include_directories(tunica_${name} PUBLIC ${PROJECT_BINARY_DIR}/include ${PROJECT_BINARY_DIR}/include/generated)
   target_link_libraries(tunica_${name} PUBLIC ${arg_LINKS} PRIVATE tunica_flags ${arg_PRIVATE})
 endfunction()
 

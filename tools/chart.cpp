@@ -1,6 +1,6 @@
-#include "cli/tool.hpp"
-#include "io/output_file.hpp"
-#include "io/report_chart.hpp"
+#include "tunica/cli/tool.hpp"
+#include "tunica/io/file/output_file.hpp"
+#include "tunica/io/result/report_chart.hpp"
 
 namespace {
 

@@ -1,14 +1,14 @@
-#include "cli/tool.hpp"
-#include "io/mesh_file.hpp"
-#include "io/mesh_pair.hpp"
-#include "io/picture.hpp"
-#include "shell/boundary_distance.hpp"
-#include "shell/curved_surface.hpp"
-#include "shell/shell_distance.hpp"
-#include "shell/target.hpp"
-#include "surface/hausdorff.hpp"
-#include "surface/measure.hpp"
-#include "surface/subdivide.hpp"
+#include "tunica/cli/tool.hpp"
+#include "tunica/io/mesh/mesh_file.hpp"
+#include "tunica/io/mesh/mesh_pair.hpp"
+#include "tunica/draw/picture.hpp"
+#include "tunica/shell/distance/boundary_distance.hpp"
+#include "tunica/shell/patch/curved_surface.hpp"
+#include "tunica/shell/distance/shell_distance.hpp"
+#include "tunica/shell/distance/target.hpp"
+#include "tunica/surface/distance/hausdorff.hpp"
+#include "tunica/surface/mesh/measure.hpp"
+#include "tunica/surface/mesh/subdivide.hpp"
 
 #include <fmt/format.h>
 
@@ -192,8 +192,7 @@ void write_files(const cli::Tool& tool, const Arguments& given, const Surface& a
     look.quantity = "distance to " + given.b.filename().string();
     look.diagonal = diagonal_mm;
     look.lines = map.edges;
-    look.overwrite = tool.force();
-    write_error_map_picture(*given.picture, map.mesh, map.distances, look);
+    write_file(*given.picture, error_map_picture(map.mesh, map.distances, look), tool.force());
   }
 }
 

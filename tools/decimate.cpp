@@ -1,11 +1,11 @@
-#include "surface/decimate.hpp"
-#include "cli/tool.hpp"
-#include "io/mesh_file.hpp"
-#include "surface/checks.hpp"
-#include "surface/degenerate.hpp"
-#include "surface/hausdorff.hpp"
-#include "surface/measure.hpp"
-#include "surface/repair.hpp"
+#include "tunica/surface/decimation/decimate.hpp"
+#include "tunica/cli/tool.hpp"
+#include "tunica/io/mesh/mesh_file.hpp"
+#include "tunica/surface/mesh/checks.hpp"
+#include "tunica/surface/decimation/degenerate.hpp"
+#include "tunica/surface/distance/hausdorff.hpp"
+#include "tunica/surface/mesh/measure.hpp"
+#include "tunica/surface/repair/repair.hpp"
 
 #include <fmt/format.h>
 

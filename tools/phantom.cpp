@@ -1,9 +1,9 @@
 // tunica-phantom: a segmented volume whose true surface is known.
-#include "volume/phantom.hpp"
-#include "cli/tool.hpp"
-#include "io/mesh_file.hpp"
-#include "io/volume_file.hpp"
-#include "surface/measure.hpp"
+#include "tunica/volume/phantom/phantom.hpp"
+#include "tunica/cli/tool.hpp"
+#include "tunica/io/mesh/mesh_file.hpp"
+#include "tunica/io/volume/volume_file.hpp"
+#include "tunica/surface/mesh/measure.hpp"
 
 #include <fmt/format.h>
 

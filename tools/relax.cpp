@@ -1,19 +1,19 @@
 // tunica-relax COARSE TARGET OUT.ply: a coarse mesh becomes curved shells on its target, with a certified distance.
-#include "cli/tool.hpp"
-#include "cli/usage.hpp"
-#include "core/quantity.hpp"
-#include "fit/fit.hpp"
-#include "io/mesh_file.hpp"
-#include "io/mesh_pair.hpp"
-#include "io/picture.hpp"
-#include "shell/boundary_distance.hpp"
-#include "shell/curved_surface.hpp"
-#include "shell/shell_crossings.hpp"
-#include "shell/shell_quality.hpp"
-#include "surface/checks.hpp"
-#include "surface/degenerate.hpp"
-#include "surface/hausdorff.hpp"
-#include "surface/measure.hpp"
+#include "tunica/cli/tool.hpp"
+#include "tunica/cli/usage.hpp"
+#include "tunica/core/quantity.hpp"
+#include "tunica/fit/fit.hpp"
+#include "tunica/io/mesh/mesh_file.hpp"
+#include "tunica/io/mesh/mesh_pair.hpp"
+#include "tunica/draw/picture.hpp"
+#include "tunica/shell/distance/boundary_distance.hpp"
+#include "tunica/shell/patch/curved_surface.hpp"
+#include "tunica/shell/distance/shell_crossings.hpp"
+#include "tunica/shell/distance/shell_quality.hpp"
+#include "tunica/surface/mesh/checks.hpp"
+#include "tunica/surface/decimation/degenerate.hpp"
+#include "tunica/surface/distance/hausdorff.hpp"
+#include "tunica/surface/mesh/measure.hpp"
 
 #include <fmt/core.h>
 
@@ -237,7 +237,6 @@ void write_maps(cli::Tool& tool, const Arguments& given, const ShellMesh& shell,
                                   distance.both.upper, 100 * distance.both.upper / target.diagonal(), distance.mean);
     options.quantity = "distance to the target";
     options.diagonal = target.diagonal();
-    options.overwrite = tool.force();
     const auto on_edge = [](const Vec2& a, const Vec2& b) {
       return (a[0] == 0 && b[0] == 0) || (a[1] == 0 && b[1] == 0) || (a[0] + a[1] > 1 - 1e-9 && b[0] + b[1] > 1 - 1e-9);
     };
@@ -249,7 +248,7 @@ void write_maps(cli::Tool& tool, const Arguments& given, const ShellMesh& shell,
         }
       }
     }
-    write_error_map_picture(*given.picture, fine.mesh, distances, options);
+    write_file(*given.picture, error_map_picture(fine.mesh, distances, options), tool.force());
   }
 }
 

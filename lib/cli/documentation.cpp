@@ -1,6 +1,6 @@
-#include "cli/documentation.hpp"
+#include "tunica/cli/detail/documentation.hpp"
 
-#include "core/version.hpp"
+#include "tunica/core/version.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

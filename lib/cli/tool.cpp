@@ -1,10 +1,10 @@
-#include "cli/tool.hpp"
+#include "tunica/cli/tool.hpp"
 
-#include "cli/documentation.hpp"
-#include "cli/usage.hpp"
-#include "core/threads.hpp"
-#include "core/version.hpp"
-#include "core/words.hpp"
+#include "tunica/cli/detail/documentation.hpp"
+#include "tunica/cli/usage.hpp"
+#include "tunica/core/threads.hpp"
+#include "tunica/core/version.hpp"
+#include "tunica/core/words.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

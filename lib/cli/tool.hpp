@@ -1,10 +1,11 @@
+// cli: what every tool's command line shares.
 #pragma once
 
-#include "core/error.hpp"
-#include "core/json.hpp"
-#include "core/progress.hpp"
-#include "core/quantity.hpp"
-#include "io/output_file.hpp"
+#include "tunica/core/error.hpp"
+#include "tunica/core/json.hpp"
+#include "tunica/core/progress.hpp"
+#include "tunica/core/quantity.hpp"
+#include "tunica/io/file/output_file.hpp"
 
 #include <CLI/CLI.hpp>
 

@@ -1,6 +1,6 @@
-#include "cli/usage.hpp"
+#include "tunica/cli/usage.hpp"
 
-#include "core/quantity.hpp"
+#include "tunica/core/quantity.hpp"
 
 #include <fmt/format.h>
 

@@ -1,6 +1,7 @@
+// core: errors, quantities with units, progress, threads; what every room uses.
 #pragma once
 
-#include "core/types.hpp"
+#include "tunica/core/types.hpp"
 
 #include <algorithm>
 #include <numeric>

@@ -1,4 +1,4 @@
-#include "core/error.hpp"
+#include "tunica/core/error.hpp"
 
 #include <cstring>
 

@@ -1,6 +1,6 @@
-#include "core/fresh_memory.hpp"
+#include "tunica/core/fresh_memory.hpp"
 
-#include "core/threads.hpp"
+#include "tunica/core/threads.hpp"
 
 #include <sys/mman.h>
 

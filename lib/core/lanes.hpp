@@ -1,6 +1,6 @@
 #pragma once
 
-#include "core/lane_count.hpp"
+#include "tunica/core/lane_count.hpp"
 
 #include <Eigen/Core>
 

@@ -1,6 +1,6 @@
-#include "core/progress.hpp"
+#include "tunica/core/progress.hpp"
 
-#include "core/error.hpp"
+#include "tunica/core/error.hpp"
 
 #include <atomic>
 

@@ -1,6 +1,6 @@
-#include "core/quantity.hpp"
+#include "tunica/core/quantity.hpp"
 
-#include "core/error.hpp"
+#include "tunica/core/error.hpp"
 
 #include <fmt/format.h>
 

@@ -1,6 +1,6 @@
-#include "core/threads.hpp"
+#include "tunica/core/threads.hpp"
 
-#include "core/error.hpp"
+#include "tunica/core/error.hpp"
 
 #include <fmt/format.h>
 #include <tbb/global_control.h>

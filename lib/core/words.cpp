@@ -1,6 +1,6 @@
-#include "core/words.hpp"
+#include "tunica/core/words.hpp"
 
-#include "core/error.hpp"
+#include "tunica/core/error.hpp"
 
 #include <fcntl.h>
 #include <poll.h>

@@ -1,8 +1,8 @@
-#include "fit/barycentre.hpp"
+#include "tunica/fit/barycentre.hpp"
 
-#include "core/error.hpp"
-#include "core/threads.hpp"
-#include "surface/incidence.hpp"
+#include "tunica/core/error.hpp"
+#include "tunica/core/threads.hpp"
+#include "tunica/surface/mesh/incidence.hpp"
 
 #include <Eigen/Geometry>
 

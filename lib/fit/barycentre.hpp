@@ -1,6 +1,7 @@
+// fit: a coarse mesh and a target in, shells out: the fit, and the paper's barycentre rule.
 #pragma once
 
-#include "shell/target.hpp"
+#include "tunica/shell/distance/target.hpp"
 
 namespace tunica {
 

@@ -1,10 +1,10 @@
 // Every edit is a trial: patches in place of others, one node placed by least squares, all beside the mesh.
-#include "fit/edits.hpp"
+#include "tunica/fit/detail/edits.hpp"
 
-#include "core/threads.hpp"
-#include "fit/least_squares.hpp"
-#include "shell/normals.hpp"
-#include "surface/measure.hpp"
+#include "tunica/core/threads.hpp"
+#include "tunica/fit/detail/least_squares.hpp"
+#include "tunica/shell/distance/normals.hpp"
+#include "tunica/surface/mesh/measure.hpp"
 
 #include <Eigen/Geometry>
 

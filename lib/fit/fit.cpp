@@ -1,15 +1,15 @@
-#include "fit/fit.hpp"
+#include "tunica/fit/fit.hpp"
 
-#include "core/error.hpp"
-#include "fit/edits.hpp"
-#include "fit/least_squares.hpp"
-#include "fit/start.hpp"
-#include "shell/boundary_distance.hpp"
-#include "shell/curved_hausdorff.hpp"
-#include "shell/refine.hpp"
-#include "shell/shell_crossings.hpp"
-#include "surface/checks.hpp"
-#include "surface/measure.hpp"
+#include "tunica/core/error.hpp"
+#include "tunica/fit/detail/edits.hpp"
+#include "tunica/fit/detail/least_squares.hpp"
+#include "tunica/fit/detail/start.hpp"
+#include "tunica/shell/distance/boundary_distance.hpp"
+#include "tunica/shell/distance/curved_hausdorff.hpp"
+#include "tunica/shell/patch/refine.hpp"
+#include "tunica/shell/distance/shell_crossings.hpp"
+#include "tunica/surface/mesh/checks.hpp"
+#include "tunica/surface/mesh/measure.hpp"
 
 #include <fmt/core.h>
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "fit/relax.hpp"
+#include "tunica/fit/relax.hpp"
 
 namespace tunica {
 

@@ -1,6 +1,6 @@
-#include "fit/fit_mesh.hpp"
+#include "tunica/fit/detail/fit_mesh.hpp"
 
-#include "surface/measure.hpp"
+#include "tunica/surface/mesh/measure.hpp"
 
 #include <Eigen/Geometry>
 

@@ -1,10 +1,10 @@
 // Residuals follow the control points of their patch, these its nodes and normals: a sparse system of at most 27
 // unknowns per patch (three nodes, their normals, and across creases the neighbours' normals).
-#include "fit/least_squares.hpp"
+#include "tunica/fit/detail/least_squares.hpp"
 
-#include "core/progress.hpp"
-#include "core/threads.hpp"
-#include "surface/measure.hpp"
+#include "tunica/core/progress.hpp"
+#include "tunica/core/threads.hpp"
+#include "tunica/surface/mesh/measure.hpp"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>

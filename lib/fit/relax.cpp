@@ -1,13 +1,13 @@
-#include "fit/relax.hpp"
+#include "tunica/fit/relax.hpp"
 
-#include "core/error.hpp"
-#include "fit/edits.hpp"
-#include "fit/fit.hpp"
-#include "fit/start.hpp"
-#include "shell/curved_surface.hpp"
-#include "shell/normals.hpp"
-#include "shell/refine.hpp"
-#include "surface/checks.hpp"
+#include "tunica/core/error.hpp"
+#include "tunica/fit/detail/edits.hpp"
+#include "tunica/fit/fit.hpp"
+#include "tunica/fit/detail/start.hpp"
+#include "tunica/shell/patch/curved_surface.hpp"
+#include "tunica/shell/distance/normals.hpp"
+#include "tunica/shell/patch/refine.hpp"
+#include "tunica/surface/mesh/checks.hpp"
 
 #include <fmt/core.h>
 #include <Eigen/Geometry>

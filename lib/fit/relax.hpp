@@ -1,10 +1,10 @@
 #pragma once
 
-#include "core/progress.hpp"
-#include "fit/barycentre.hpp"
-#include "shell/shell_distance.hpp"
-#include "shell/shell_mesh.hpp"
-#include "shell/target.hpp"
+#include "tunica/core/progress.hpp"
+#include "tunica/fit/barycentre.hpp"
+#include "tunica/shell/distance/shell_distance.hpp"
+#include "tunica/shell/patch/shell_mesh.hpp"
+#include "tunica/shell/distance/target.hpp"
 
 #include <functional>
 #include <optional>

@@ -1,7 +1,7 @@
-#include "fit/samples.hpp"
+#include "tunica/fit/detail/samples.hpp"
 
-#include "core/threads.hpp"
-#include "surface/facet_distances.hpp"
+#include "tunica/core/threads.hpp"
+#include "tunica/surface/distance/facet_distances.hpp"
 
 #include <Eigen/Geometry>
 

@@ -1,7 +1,7 @@
 // The search: edges collapse in the order of their errors, flip, are mended and split.
-#include "core/threads.hpp"
-#include "fit/edits.hpp"
-#include "surface/measure.hpp"
+#include "tunica/core/threads.hpp"
+#include "tunica/fit/detail/edits.hpp"
+#include "tunica/surface/mesh/measure.hpp"
 
 #include <Eigen/Geometry>
 

@@ -1,12 +1,12 @@
-#include "fit/start.hpp"
+#include "tunica/fit/detail/start.hpp"
 
-#include "core/disjoint_sets.hpp"
-#include "fit/fit_mesh.hpp"
-#include "shell/normals.hpp"
-#include "surface/boundary_curves.hpp"
-#include "surface/checks.hpp"
-#include "surface/decimate.hpp"
-#include "surface/hausdorff.hpp"
+#include "tunica/core/disjoint_sets.hpp"
+#include "tunica/fit/detail/fit_mesh.hpp"
+#include "tunica/shell/distance/normals.hpp"
+#include "tunica/surface/distance/boundary_curves.hpp"
+#include "tunica/surface/mesh/checks.hpp"
+#include "tunica/surface/decimation/decimate.hpp"
+#include "tunica/surface/distance/hausdorff.hpp"
 
 #include <Eigen/Geometry>
 

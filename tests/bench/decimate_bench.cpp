@@ -8,13 +8,13 @@
 // Prints a line per mesh and count: two-sided certified distance in % of the diagonal, smallest angle, mean quality,
 // triangles facing away from both neighbours' side, median CPU milliseconds, and the ratios.
 #include "cgal_decimate.hpp"
-#include "core/error.hpp"
-#include "core/threads.hpp"
-#include "io/mesh_file.hpp"
-#include "surface/checks.hpp"
-#include "surface/decimate.hpp"
-#include "surface/hausdorff.hpp"
-#include "surface/measure.hpp"
+#include "tunica/core/error.hpp"
+#include "tunica/core/threads.hpp"
+#include "tunica/io/mesh/mesh_file.hpp"
+#include "tunica/surface/mesh/checks.hpp"
+#include "tunica/surface/decimation/decimate.hpp"
+#include "tunica/surface/distance/hausdorff.hpp"
+#include "tunica/surface/mesh/measure.hpp"
 #ifdef TUNICA_HAS_MESHOPTIMIZER
 #include "meshoptimizer_decimate.hpp"
 #endif

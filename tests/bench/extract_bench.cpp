@@ -3,9 +3,9 @@
 //
 //   bench_extract VOLUME < requests       a request: label|above|below VALUE THREADS
 //   each answer: wall ms, processor ms of all threads and of the calling one, vertices, triangles
-#include "core/threads.hpp"
-#include "io/volume_file.hpp"
-#include "volume/marching_cubes.hpp"
+#include "tunica/core/threads.hpp"
+#include "tunica/io/volume/volume_file.hpp"
+#include "tunica/volume/cubes/marching_cubes.hpp"
 
 #include <fmt/format.h>
 

@@ -3,11 +3,11 @@
 //
 //   build/release/tests/bench/bench_hausdorff coarse.ply fine.ply [--width 1e-4] [--rounds 3]
 #include "cgal_mesh.hpp"
-#include "core/error.hpp"
-#include "core/threads.hpp"
-#include "io/mesh_file.hpp"
-#include "surface/hausdorff.hpp"
-#include "surface/measure.hpp"
+#include "tunica/core/error.hpp"
+#include "tunica/core/threads.hpp"
+#include "tunica/io/mesh/mesh_file.hpp"
+#include "tunica/surface/distance/hausdorff.hpp"
+#include "tunica/surface/mesh/measure.hpp"
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/Polygon_mesh_processing/distance.h>

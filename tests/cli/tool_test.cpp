@@ -1,9 +1,9 @@
-#include "cli/tool.hpp"
-#include "cli/usage.hpp"
+#include "tunica/cli/tool.hpp"
+#include "tunica/cli/usage.hpp"
 
-#include "core/threads.hpp"
-#include "core/words.hpp"
-#include "io/output_file.hpp"
+#include "tunica/core/threads.hpp"
+#include "tunica/core/words.hpp"
+#include "tunica/io/file/output_file.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

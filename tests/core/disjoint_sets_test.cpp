@@ -1,4 +1,4 @@
-#include "core/disjoint_sets.hpp"
+#include "tunica/core/disjoint_sets.hpp"
 
 #include <gtest/gtest.h>
 

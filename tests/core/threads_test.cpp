@@ -1,4 +1,4 @@
-#include "core/threads.hpp"
+#include "tunica/core/threads.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,7 +1,7 @@
-#include "fit/barycentre.hpp"
+#include "tunica/fit/barycentre.hpp"
 
 #include "shell/families.hpp"
-#include "surface/measure.hpp"
+#include "tunica/surface/mesh/measure.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>

@@ -1,14 +1,14 @@
 // Least squares on one node and on all; edits keep topology, curves and shapes.
-#include "fit/edits.hpp"
+#include "tunica/fit/detail/edits.hpp"
 
-#include "core/error.hpp"
-#include "fit/least_squares.hpp"
-#include "fit/start.hpp"
-#include "shell/curved_surface.hpp"
+#include "tunica/core/error.hpp"
+#include "tunica/fit/detail/least_squares.hpp"
+#include "tunica/fit/detail/start.hpp"
+#include "tunica/shell/patch/curved_surface.hpp"
 #include "shell/families.hpp"
-#include "shell/normals.hpp"
-#include "surface/checks.hpp"
-#include "surface/measure.hpp"
+#include "tunica/shell/distance/normals.hpp"
+#include "tunica/surface/mesh/checks.hpp"
+#include "tunica/surface/mesh/measure.hpp"
 #include "surface/shapes.hpp"
 
 #include <gtest/gtest.h>

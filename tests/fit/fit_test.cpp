@@ -1,16 +1,16 @@
 // What the fit promises, on families of surfaces with known answers: certificates, topology, shape, one normal per
 // node, counts with room.
-#include "fit/fit.hpp"
+#include "tunica/fit/fit.hpp"
 
-#include "core/threads.hpp"
-#include "shell/curved_hausdorff.hpp"
-#include "shell/curved_surface.hpp"
+#include "tunica/core/threads.hpp"
+#include "tunica/shell/distance/curved_hausdorff.hpp"
+#include "tunica/shell/patch/curved_surface.hpp"
 #include "shell/families.hpp"
-#include "shell/shell_crossings.hpp"
-#include "shell/shell_quality.hpp"
-#include "surface/checks.hpp"
-#include "surface/decimate.hpp"
-#include "surface/measure.hpp"
+#include "tunica/shell/distance/shell_crossings.hpp"
+#include "tunica/shell/distance/shell_quality.hpp"
+#include "tunica/surface/mesh/checks.hpp"
+#include "tunica/surface/decimation/decimate.hpp"
+#include "tunica/surface/mesh/measure.hpp"
 #include "surface/shapes.hpp"
 
 #include <gtest/gtest.h>

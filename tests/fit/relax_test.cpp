@@ -1,10 +1,10 @@
-#include "fit/relax.hpp"
+#include "tunica/fit/relax.hpp"
 
-#include "core/error.hpp"
-#include "shell/curved_surface.hpp"
+#include "tunica/core/error.hpp"
+#include "tunica/shell/patch/curved_surface.hpp"
 #include "shell/families.hpp"
-#include "surface/checks.hpp"
-#include "surface/measure.hpp"
+#include "tunica/surface/mesh/checks.hpp"
+#include "tunica/surface/mesh/measure.hpp"
 
 #include <gtest/gtest.h>
 

@@ -72,6 +72,20 @@ class House(unittest.TestCase):
     def test_every_room_has_its_order(self):
         rooms = sorted(path.name for path in (SOURCE / "lib").iterdir() if path.is_dir())
         self.assertEqual(rooms, sorted(rules.ROOMS))
+        for room in rooms:
+            inner = {path.name for path in (SOURCE / "lib" / room).iterdir() if path.is_dir()} - {"detail"}
+            self.assertEqual(inner, set(rules.INNER_ROOMS.get(room, {})), room)
+            if inner:
+                loose = [path.name for path in (SOURCE / "lib" / room).glob("*.?pp")]
+                self.assertEqual(loose, [], f"files of {room} that are in none of its rooms")
+
+    def test_first_header_of_a_room_says_what_lives_there(self):
+        for room in rules.ROOMS:
+            for folder in rules.INNER_ROOMS.get(room, {"": None}):
+                name = f"{room}/{folder}".rstrip("/")
+                headers = sorted((SOURCE / "lib" / name).glob("*.hpp"))
+                first = headers[0].read_text(encoding="utf-8").split("\n")[0]
+                self.assertRegex(first, rf"^// {name}: \S.*\.$", headers[0])
 
     def test_clang_format(self):
         program = shutil.which("clang-format")
@@ -95,20 +109,37 @@ class EveryRuleCanFail(unittest.TestCase):
 
     def test_order_of_rooms(self):
         rule = rules.order_of_rooms
-        self.bad(rule, "lib/core/a.cpp", '#include "surface/measure.hpp"\n')
-        self.bad(rule, "lib/volume/a.hpp", '#include "surface/decimate.hpp"\n')
-        self.bad(rule, "lib/surface/a.cpp", '#include "volume/volume.hpp"\n')
-        self.bad(rule, "lib/surface/a.cpp", '#include "shell/shell_mesh.hpp"\n')
-        self.bad(rule, "lib/shell/a.cpp", '#  include "mechanics/model.hpp"\n')
-        self.bad(rule, "lib/mechanics/a.cpp", '#include "io/output_file.hpp"\n')
-        self.bad(rule, "lib/io/a.cpp", '#include "cli/tool.hpp"\n')
-        self.bad(rule, "lib/io/a.cpp", '#include "picture.hpp"\n')
+        for path, header in (
+                ("lib/core/a.cpp", "tunica/surface/mesh/measure.hpp"),
+                ("lib/volume/cubes/a.hpp", "tunica/surface/decimation/decimate.hpp"),
+                ("lib/surface/mesh/a.cpp", "tunica/volume/labels/volume.hpp"),
+                ("lib/shell/patch/a.cpp", "tunica/mechanics/model/model.hpp"),
+                ("lib/mechanics/runs/a.cpp", "tunica/io/file/output_file.hpp"),
+                ("lib/draw/a.cpp", "tunica/io/file/output_file.hpp"),
+                ("lib/io/mesh/a.cpp", "tunica/cli/tool.hpp"),
+                ("lib/io/mesh/a.cpp", "picture.hpp"),
+                ("lib/shell/patch/a.cpp", "shell/patch/shell_mesh.hpp"),
+                ("lib/surface/mesh/a.cpp", "tunica/surface/distance/hausdorff.hpp"),
+                ("lib/surface/mesh/detail/a.cpp", "tunica/surface/distance/hausdorff.hpp"),
+                ("lib/surface/repair/a.cpp", "tunica/surface/decimation/detail/edit_mesh.hpp"),
+                ("tools/relax.cpp", "tunica/fit/detail/edits.hpp")):
+            self.bad(rule, path, f'#include "{header}"\n')
+        for path, header in (
+                ("lib/volume/cubes/a.hpp", "tunica/surface/mesh/triangle_mesh.hpp"),
+                ("lib/shell/patch/a.cpp", "tunica/surface/mesh/measure.hpp"),
+                ("lib/surface/repair/a.cpp", "tunica/surface/decimation/degenerate.hpp"),
+                ("lib/fit/a.cpp", "tunica/fit/detail/edits.hpp"),
+                ("tools/relax.cpp", "tunica/cli/tool.hpp")):
+            self.good(rule, path, f'#include "{header}"\n')
         self.bad(rule, "lib/surface/CMakeLists.txt", "tunica_library(surface LINKS tunica_shell)\n")
         self.bad(rule, "lib/volume/CMakeLists.txt", "tunica_library(volume LINKS tunica_shell)\n")
-        self.good(rule, "lib/volume/a.hpp", '#include "surface/triangle_mesh.hpp"\n')
-        self.good(rule, "lib/shell/a.cpp", '#include "surface/measure.hpp"\n#include "core/types.hpp"\n')
-        self.good(rule, "tools/relax.cpp", '#include "cli/tool.hpp"\n')
         self.good(rule, "lib/shell/CMakeLists.txt", "tunica_library(shell LINKS tunica_surface)\n")
+
+    def test_detail_stays_inside(self):
+        text = '#include "tunica/fit/detail/edits.hpp"\n'
+        self.bad(rules.detail_stays_inside, "lib/fit/fit.hpp", text)
+        self.good(rules.detail_stays_inside, "lib/fit/fit.cpp", text)
+        self.good(rules.detail_stays_inside, "lib/fit/detail/start.hpp", text)
 
     def test_third_party_headers(self):
         rule = rules.third_party_headers
@@ -158,9 +189,13 @@ class EveryRuleCanFail(unittest.TestCase):
         self.good(rule, "lib/core/a.hpp", "/// all of them\nnamespace a {\n\nint f();\nint g();\n\n}\n")
         self.good(rule, "lib/core/a.hpp", "struct A {\n  int f();\n};\n")
 
-    def test_length(self):
-        self.bad(rules.length, "lib/core/a.cpp", "int a;\n" * 701)
-        self.good(rules.length, "lib/core/a.cpp", "int a;\n" * 700)
+    def test_lengths(self):
+        rule = rules.lengths
+        self.bad(rule, "lib/core/a.cpp", "int f() {\n" + "  g();\n" * 79 + "}\n")
+        self.bad(rule, "tools/a.cpp", "class A {\n  int f() {\n" + "  g();\n" * 79 + "}\n};\n")
+        self.bad(rule, "lib/core/a.hpp", "struct A : B {\n" + "  int a;\n" * 400 + "};\n")
+        self.good(rule, "lib/core/a.cpp", "namespace a {\nint f() {\n" + "  g();\n" * 78 + "}\n" + "int a;\n" * 400 + "}\n")
+        self.good(rule, "lib/core/a.hpp", "struct A {\n" + "  int a;\n" * 398 + "};\n")
 
     def test_blanks(self):
         for text in ("\tint a;\n", "int a; \n", "int a;", "int a;\n\n", "int a;\r\n"):

@@ -11,36 +11,50 @@ ROOMS = {
     "shell": {"core", "surface", "shell"},
     "fit": {"core", "surface", "shell", "fit"},
     "mechanics": {"core", "surface", "shell", "mechanics"},
-    "io": {"core", "volume", "surface", "shell", "fit", "mechanics", "io"},
-    "cli": {"core", "volume", "surface", "shell", "fit", "mechanics", "io", "cli"},
+    "draw": {"core", "surface", "draw"},
+    "io": {"core", "volume", "surface", "shell", "fit", "mechanics", "draw", "io"},
+    "cli": {"core", "volume", "surface", "shell", "fit", "mechanics", "draw", "io", "cli"},
+}
+
+# Rooms of the second level, and which of their own floor they may include.
+INNER_ROOMS = {
+    "volume": {"labels": set(), "cubes": {"labels"}, "smoothing": {"labels", "cubes"}, "phantom": {"labels", "cubes"}},
+    "surface": {"mesh": set(), "distance": {"mesh"}, "decimation": {"mesh", "distance"},
+                "repair": {"mesh", "decimation"}},
+    "shell": {"patch": set(), "distance": {"patch"}},
+    "mechanics": {"model": set(), "algebra": set(), "elements": {"model", "algebra"},
+                  "runs": {"model", "algebra", "elements"}},
+    "io": {"file": set(), "volume": {"file"}, "mesh": {"file"}, "scene": {"file", "mesh"}, "result": {"file"}},
 }
 
 # Marching cubes returns a mesh, and smoothing measures its volume and leaves no triangles that cross: the volume room
 # sees these three headers of the surface room and nothing else of it, so it links it.
-SHARED_NOUNS = {"volume": {"surface/triangle_mesh.hpp", "surface/measure.hpp", "surface/self_intersections.hpp"}}
+SHARED_NOUNS = {"volume": {"surface/mesh/triangle_mesh.hpp", "surface/mesh/measure.hpp",
+                           "surface/mesh/self_intersections.hpp"}}
 
 # Header pattern, what it belongs to, and which files may include it.
 OWNERS = [
-    (r"CGAL/", "CGAL", r"lib/surface/[^/]*\.cpp"),
-    (r"assimp/", "assimp", r"lib/io/[^/]*\.cpp"),
-    (r"opencv2/", "OpenCV", r"lib/io/[^/]*\.cpp"),
-    (r"(hdf5\.h|hdf5_hl\.h|H5\w*\.h|hdf5/)", "HDF5", r"lib/io/[^/]*\.cpp"),
-    (r"toml", "toml++", r"lib/io/[^/]*\.cpp"),
-    (r"tiffio\.h", "libtiff", r"lib/io/[^/]*\.cpp"),
-    (r"png\.h", "libpng", r"lib/io/[^/]*\.cpp"),
-    (r"zlib\.h", "zlib", r"lib/io/[^/]*\.cpp"),
-    (r"openssl/", "OpenSSL", r"lib/io/[^/]*\.cpp"),
-    (r"(suitesparse/|cholmod|SuiteSparse|umfpack|amd\.h|colamd\.h)", "CHOLMOD", r"lib/mechanics/[^/]*\.cpp"),
-    (r"Eigen/CholmodSupport", "CHOLMOD", r"lib/mechanics/[^/]*\.cpp"),
+    (r"CGAL/", "CGAL", r"lib/surface/.*\.cpp"),
+    (r"assimp/", "assimp", r"lib/io/.*\.cpp"),
+    (r"opencv2/", "OpenCV", r"lib/draw/.*\.cpp"),
+    (r"(hdf5\.h|hdf5_hl\.h|H5\w*\.h|hdf5/)", "HDF5", r"lib/io/.*\.cpp"),
+    (r"toml", "toml++", r"lib/io/.*\.cpp"),
+    (r"tiffio\.h", "libtiff", r"lib/io/.*\.cpp"),
+    (r"png\.h", "libpng", r"lib/(draw|io)/.*\.cpp"),
+    (r"zlib\.h", "zlib", r"lib/io/.*\.cpp"),
+    (r"openssl/", "OpenSSL", r"lib/io/.*\.cpp"),
+    (r"(suitesparse/|cholmod|SuiteSparse|umfpack|amd\.h|colamd\.h)", "CHOLMOD", r"lib/mechanics/.*\.cpp"),
+    (r"Eigen/CholmodSupport", "CHOLMOD", r"lib/mechanics/.*\.cpp"),
     (r"(tbb|oneapi)/", "TBB", r"lib/core/[^/]*\.cpp"),
     (r"omp\.h", "OpenMP (threads go through core/threads.hpp)", r"lib/core/[^/]*\.cpp"),
-    (r"CLI/", "CLI11", r"lib/cli/[^/]*"),
+    (r"CLI/", "CLI11", r"lib/cli/.*"),
     (r"nlohmann/", "nlohmann json", r"lib/core/json\.hpp"),
     (r"fmt/", "fmt", r".*\.cpp"),
-    (r"(iostream|fstream)$", "streams on files and the terminal", r"lib/(io|cli)/[^/]*\.cpp|tools/.*"),
+    (r"(iostream|fstream)$", "streams on files and the terminal", r"lib/(io|cli)/.*\.cpp|tools/.*"),
 ]
 
-LONGEST_FILE = 700
+LONGEST_FUNCTION = 80
+LONGEST_CLASS = 400
 CODE = (".hpp", ".cpp", ".h", ".in")
 
 
@@ -48,9 +62,11 @@ def _lines(text):
     return enumerate(text.split("\n"), start=1)
 
 
-def _room(path):
-    parts = PurePosixPath(path).parts
-    return parts[1] if len(parts) > 2 and parts[0] == "lib" else None
+def _rooms(path):
+    """@return first and second level of a file of lib/, none where it has none"""
+    parts = [part for part in PurePosixPath(path).parts[1:-1] if part != "detail"]
+    parts = parts if path.startswith("lib/") else []
+    return (parts + [None, None])[:2]
 
 
 def _product(path):
@@ -58,21 +74,27 @@ def _product(path):
 
 
 def order_of_rooms(path, text):
-    """core < volume; core < surface < shell < fit; shell < mechanics; all < io < cli < tools."""
-    room = _room(path)
+    """core < volume; core < surface < shell < fit; shell < mechanics; core < draw; all < io < cli < tools."""
+    room, inner = _rooms(path)
     found = []
     if path.endswith(CODE) and _product(path):
         for number, line in _lines(text):
             match = re.match(r'\s*#\s*include\s*"([^"]+)"', line)
             if not match:
                 continue
-            target = match.group(1).split("/")[0]
-            if "/" not in match.group(1) or target not in ROOMS:
-                found.append(f'{path}:{number}: include "{match.group(1)}" does not name a room of lib/')
-            elif match.group(1) in SHARED_NOUNS.get(room, ()):
+            header = match.group(1).removeprefix("tunica/")
+            target, target_inner = _rooms("lib/" + header)
+            allowed = INNER_ROOMS.get(room, {}).get(inner, set()) | {inner}
+            if header == match.group(1) or target not in ROOMS:
+                found.append(f'{path}:{number}: include "{match.group(1)}" does not name a room: "tunica/ROOM/..."')
+            elif "/detail/" in header and (target, target_inner) != (room, inner):
+                found.append(f"{path}:{number}: {header} is for its own room only")
+            elif header in SHARED_NOUNS.get(room, ()):
                 continue
             elif room is not None and target not in ROOMS.get(room, ROOMS):
                 found.append(f"{path}:{number}: {room} includes {target}, against the order of the rooms")
+            elif target == room and target_inner not in allowed:
+                found.append(f"{path}:{number}: {inner} includes {target_inner}, against the order of {room}")
     elif room is not None and path.endswith("CMakeLists.txt"):
         for number, line in _lines(text):
             for target in re.findall(r"\btunica_(\w+)", line):
@@ -80,6 +102,14 @@ def order_of_rooms(path, text):
                 if target in ROOMS and target not in ROOMS[room] and not shared:
                     found.append(f"{path}:{number}: {room} links {target}, against the order of the rooms")
     return found
+
+
+def detail_stays_inside(path, text):
+    """What a public header includes is public."""
+    if not (path.startswith("lib/") and path.endswith(".hpp")) or "/detail/" in path:
+        return []
+    return [f"{path}:{number}: a public header includes an internal one" for number, line in _lines(text)
+            if re.match(r'\s*#\s*include\s*".*/detail/', line)]
 
 
 def third_party_headers(path, text):
@@ -194,11 +224,34 @@ def docstrings(path, text):
     return found
 
 
-def length(path, text):
-    """A file that nobody reads whole is two files."""
-    count = text.count("\n")
-    readable = path.endswith(CODE + (".py", ".cmake", "CMakeLists.txt")) or "Makefile" in path
-    return [f"{path}:{count}: {count} lines, at most {LONGEST_FILE}"] if readable and count > LONGEST_FILE else []
+def lengths(path, text):
+    """A function of more than 80 lines is a recipe of several; a class of more than 400 are two."""
+    if not (path.endswith((".hpp", ".cpp")) and _product(path)):
+        return []
+    blank = re.sub(r"'(\\.|[^'\\\n])'", "' '", re.sub(r"//[^\n]*", lambda m: " " * len(m.group()), _blanked(text)))
+    found = []
+    opened = []  # (line, what stands before the brace)
+    head = ""
+    line = 1
+    for sign in blank:
+        line += sign == "\n"
+        if sign == "{":
+            opened.append((line, head))
+            head = ""
+        elif sign == "}" and opened:
+            begin, before = opened.pop()
+            head = ""
+            count = line - begin + 1
+            if re.search(r"\b(namespace|enum)\b[^)]*$", before):
+                continue
+            is_class = re.search(r"\b(class|struct|union)\b[^()]*$", before) is not None
+            if count > (LONGEST_CLASS if is_class else LONGEST_FUNCTION):
+                found.append(f"{path}:{begin}: {count} lines: {before.strip()[-60:]}")
+        elif sign == ";":
+            head = ""
+        else:
+            head += sign
+    return found
 
 
 def blanks(path, text):
@@ -226,5 +279,5 @@ def machine_paths(path, text):
     return found
 
 
-RULES = [order_of_rooms, third_party_headers, commented_out_code, open_ends, pragma_once, docstrings, length, blanks,
+RULES = [order_of_rooms, detail_stays_inside, third_party_headers, commented_out_code, open_ends, pragma_once, docstrings, lengths, blanks,
          machine_paths]

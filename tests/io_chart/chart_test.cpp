@@ -1,7 +1,7 @@
-#include "io/chart.hpp"
+#include "tunica/draw/chart.hpp"
 
-#include "io/report_chart.hpp"
-#include "io/ticks.hpp"
+#include "tunica/io/result/report_chart.hpp"
+#include "tunica/draw/detail/ticks.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,6 +1,6 @@
-#include "io/output_file.hpp"
+#include "tunica/io/file/output_file.hpp"
 
-#include "core/error.hpp"
+#include "tunica/core/error.hpp"
 
 #include <gtest/gtest.h>
 

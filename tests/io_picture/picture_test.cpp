@@ -1,8 +1,8 @@
-#include "io/picture.hpp"
+#include "tunica/draw/picture.hpp"
 
-#include "core/error.hpp"
-#include "core/threads.hpp"
-#include "io/output_file.hpp"
+#include "tunica/core/error.hpp"
+#include "tunica/core/threads.hpp"
+#include "tunica/io/file/output_file.hpp"
 #include "io_picture/shapes.hpp"
 #include "support/temporary_folder.hpp"
 
@@ -31,9 +31,8 @@ cv::Mat read_png(const fs::path& path) {
 
 class Picture : public testing::Test {
 protected:
-  cv::Mat picture(const TriangleMesh& mesh, const std::vector<double>& values, PictureOptions options = {}) {
-    options.overwrite = true;
-    write_error_map_picture(folder_ / "map.png", mesh, values, options);
+  cv::Mat picture(const TriangleMesh& mesh, const std::vector<double>& values, const PictureOptions& options = {}) {
+    write_file(folder_ / "map.png", error_map_picture(mesh, values, options), true);
     return read_png(folder_ / "map.png");
   }
 
@@ -118,23 +117,13 @@ TEST_F(Picture, faces_that_point_inward_look_the_same) {
 
 TEST_F(Picture, same_bytes_whatever_the_number_of_threads) {
   const TriangleMesh sphere = make_sphere(20, 5);
-  PictureOptions options{.title = "a", .diagonal = 60, .overwrite = true};
+  PictureOptions options{.title = "a", .diagonal = 60};
   set_thread_count(1);
-  write_error_map_picture(folder_ / "1.png", sphere, bump(sphere, {1, 1, 1}), options);
+  const std::string one = error_map_picture(sphere, bump(sphere, {1, 1, 1}), options);
   set_thread_count(4);
-  write_error_map_picture(folder_ / "4.png", sphere, bump(sphere, {1, 1, 1}), options);
+  const std::string four = error_map_picture(sphere, bump(sphere, {1, 1, 1}), options);
   set_thread_count(default_thread_count());
-  EXPECT_EQ(read_file(folder_ / "1.png"), read_file(folder_ / "4.png"));
-}
-
-TEST_F(Picture, existing_file_is_kept_unless_overwriting_is_allowed) {
-  const TriangleMesh box = make_box();
-  write_file(folder_ / "map.png", "mine", false);
-  EXPECT_THROW(write_error_map_picture(folder_ / "map.png", box, std::vector<double>(8, 1), {}), OutputError);
-  EXPECT_THROW(write_surface_picture(folder_ / "map.png", box, {}), OutputError);
-  EXPECT_EQ(read_file(folder_ / "map.png"), "mine");
-  EXPECT_THROW(write_surface_picture(folder_ / "no" / "map.png", box, {}), OutputError);
-  EXPECT_FALSE(fs::exists(folder_ / "map.png.part"));
+  EXPECT_EQ(one, four);
 }
 
 TEST_F(Picture, values_without_a_range_or_without_a_number_are_drawn) {
@@ -174,9 +163,9 @@ TEST_F(Picture, title_of_any_bytes_and_any_length_leaves_the_picture_whole) {
 
 TEST_F(Picture, lines_are_hidden_behind_the_surface) {
   const TriangleMesh box = make_box();
-  PictureOptions options{.overwrite = true};
+  PictureOptions options;
   const auto dark_pixels = [&] {
-    write_surface_picture(folder_ / "s.png", box, options);
+    write_file(folder_ / "s.png", surface_picture(box, options), true);
     const cv::Mat image = read_png(folder_ / "s.png");
     cv::Mat grey;
     cv::cvtColor(image, grey, cv::COLOR_BGR2GRAY);

@@ -1,6 +1,6 @@
-#include "io/rasteriser.hpp"
+#include "tunica/draw/detail/rasteriser.hpp"
 
-#include "core/threads.hpp"
+#include "tunica/core/threads.hpp"
 #include "io_picture/shapes.hpp"
 
 #include <gtest/gtest.h>

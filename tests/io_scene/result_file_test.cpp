@@ -1,9 +1,9 @@
 #include "scene_fixture.hpp"
 
-#include "core/error.hpp"
-#include "io/result_file.hpp"
-#include "io/result_grid.hpp"
-#include "mechanics/curved_displacement.hpp"
+#include "tunica/core/error.hpp"
+#include "tunica/io/result/result_file.hpp"
+#include "tunica/io/result/detail/result_grid.hpp"
+#include "tunica/mechanics/runs/curved_displacement.hpp"
 
 #include <gmock/gmock.h>
 #include <hdf5.h>

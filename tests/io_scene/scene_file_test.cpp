@@ -1,7 +1,7 @@
 #include "scene_fixture.hpp"
 
-#include "core/error.hpp"
-#include "io/toml_depth.hpp"
+#include "tunica/core/error.hpp"
+#include "tunica/io/scene/detail/toml_depth.hpp"
 
 #include <gmock/gmock.h>
 

@@ -1,7 +1,7 @@
 #pragma once
 
-#include "io/mesh_file.hpp"
-#include "io/scene_file.hpp"
+#include "tunica/io/mesh/mesh_file.hpp"
+#include "tunica/io/scene/scene_file.hpp"
 #include "support/temporary_folder.hpp"
 
 namespace tunica::test {

@@ -1,7 +1,7 @@
 #pragma once
 
-#include "core/error.hpp"
-#include "io/volume_file.hpp"
+#include "tunica/core/error.hpp"
+#include "tunica/io/volume/volume_file.hpp"
 #include "support/temporary_folder.hpp"
 
 #include <zlib.h>

@@ -1,8 +1,8 @@
 // The error that conjugate gradients tell, against the true one.
 
 #include "benchmarks.hpp"
-#include "mechanics/linear_solver.hpp"
-#include "mechanics/shell_system.hpp"
+#include "tunica/mechanics/algebra/linear_solver.hpp"
+#include "tunica/mechanics/runs/detail/shell_system.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,7 +1,7 @@
 #pragma once
 
-#include "core/error.hpp"
-#include "mechanics/solve.hpp"
+#include "tunica/core/error.hpp"
+#include "tunica/mechanics/runs/solve.hpp"
 
 #include <Eigen/Geometry>
 

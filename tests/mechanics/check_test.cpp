@@ -1,8 +1,8 @@
 // Models that cannot be solved are found and named before anything is solved.
 
 #include "benchmarks.hpp"
-#include "core/error.hpp"
-#include "mechanics/doubts.hpp"
+#include "tunica/core/error.hpp"
+#include "tunica/mechanics/runs/doubts.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,10 +1,10 @@
 // The co-rotational element: forces are the gradient of the energy, the tangent is the gradient of the forces.
 
-#include "mechanics/element_lanes.hpp"
-#include "mechanics/pressure.hpp"
-#include "mechanics/rotation.hpp"
-#include "mechanics/shell_element.hpp"
-#include "shell/curved_surface.hpp"
+#include "tunica/mechanics/elements/element_lanes.hpp"
+#include "tunica/mechanics/elements/pressure.hpp"
+#include "tunica/mechanics/elements/rotation.hpp"
+#include "tunica/mechanics/elements/shell_element.hpp"
+#include "tunica/shell/patch/curved_surface.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

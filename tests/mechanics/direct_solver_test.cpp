@@ -1,9 +1,9 @@
 // The factorisation against dense linear algebra: solutions, inertia, held freedoms, and the same bits on more threads.
 
-#include "mechanics/direct_solver.hpp"
+#include "tunica/mechanics/algebra/direct_solver.hpp"
 #include "benchmarks.hpp"
-#include "core/threads.hpp"
-#include "mechanics/shell_system.hpp"
+#include "tunica/core/threads.hpp"
+#include "tunica/mechanics/runs/detail/shell_system.hpp"
 
 #include <gtest/gtest.h>
 

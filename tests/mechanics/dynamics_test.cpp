@@ -1,7 +1,7 @@
 // Integrators: their order, what they damp, rigid rotation, error control, and going on from a checkpoint.
 
 #include "benchmarks.hpp"
-#include "core/error.hpp"
+#include "tunica/core/error.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,6 +1,6 @@
 // The plane elements: patch tests, invariance, units.
 
-#include "mechanics/element_stiffness.hpp"
+#include "tunica/mechanics/elements/element_stiffness.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>

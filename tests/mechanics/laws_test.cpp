@@ -1,8 +1,8 @@
 // Laws that hold for every mesh: zero modes, rigid motions, units, orientation, order of vertices, proportionality.
 
 #include "benchmarks.hpp"
-#include "mechanics/rotation.hpp"
-#include "mechanics/shell_system.hpp"
+#include "tunica/mechanics/elements/rotation.hpp"
+#include "tunica/mechanics/runs/detail/shell_system.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Eigenvalues>

@@ -1,8 +1,8 @@
 // Natural frequencies and buckling factors against closed forms.
 
 #include "benchmarks.hpp"
-#include "core/error.hpp"
-#include "mechanics/lanczos.hpp"
+#include "tunica/core/error.hpp"
+#include "tunica/mechanics/algebra/lanczos.hpp"
 
 #include <Eigen/Dense>
 

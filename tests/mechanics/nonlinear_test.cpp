@@ -1,7 +1,7 @@
 // Large displacements against Sze, Liu, Lo 2004 and exact solutions.
 
 #include "benchmarks.hpp"
-#include "core/error.hpp"
+#include "tunica/core/error.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,7 +1,7 @@
 // Paths by arc length, through limit points.
 
 #include "benchmarks.hpp"
-#include "core/error.hpp"
+#include "tunica/core/error.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

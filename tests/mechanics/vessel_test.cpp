@@ -2,7 +2,7 @@
 // run says what the wall can carry.
 
 #include "benchmarks.hpp"
-#include "core/error.hpp"
+#include "tunica/core/error.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

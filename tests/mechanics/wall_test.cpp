@@ -1,6 +1,6 @@
 // What a run says about the wall: largest displacement of the curved surface, stresses and strains at the nodes.
 
-#include "mechanics/wall.hpp"
+#include "tunica/mechanics/model/wall.hpp"
 #include "benchmarks.hpp"
 
 #include <gtest/gtest.h>

@@ -1,7 +1,7 @@
-#include "shell/boundary_distance.hpp"
+#include "tunica/shell/distance/boundary_distance.hpp"
 
 #include "shell/families.hpp"
-#include "shell/shell_distance.hpp"
+#include "tunica/shell/distance/shell_distance.hpp"
 
 #include <gtest/gtest.h>
 

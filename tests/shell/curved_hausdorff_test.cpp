@@ -1,9 +1,9 @@
-#include "shell/curved_hausdorff.hpp"
+#include "tunica/shell/distance/curved_hausdorff.hpp"
 
-#include "core/threads.hpp"
-#include "shell/curved_surface.hpp"
+#include "tunica/core/threads.hpp"
+#include "tunica/shell/patch/curved_surface.hpp"
 #include "shell/families.hpp"
-#include "surface/hausdorff.hpp"
+#include "tunica/surface/distance/hausdorff.hpp"
 
 #include <gtest/gtest.h>
 

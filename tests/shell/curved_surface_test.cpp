@@ -1,8 +1,8 @@
-#include "shell/curved_surface.hpp"
+#include "tunica/shell/patch/curved_surface.hpp"
 
-#include "core/error.hpp"
+#include "tunica/core/error.hpp"
 #include "shell/families.hpp"
-#include "shell/shape_function.hpp"
+#include "tunica/shell/patch/shape_function.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,7 +1,7 @@
 #pragma once
 
-#include "shell/shell_mesh.hpp"
-#include "shell/target.hpp"
+#include "tunica/shell/patch/shell_mesh.hpp"
+#include "tunica/shell/distance/target.hpp"
 
 #include <cmath>
 #include <map>

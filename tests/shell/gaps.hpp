@@ -1,7 +1,7 @@
 #pragma once
 
-#include "shell/curved_surface.hpp"
-#include "surface/incidence.hpp"
+#include "tunica/shell/patch/curved_surface.hpp"
+#include "tunica/surface/mesh/incidence.hpp"
 
 #include <algorithm>
 #include <utility>

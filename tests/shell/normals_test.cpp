@@ -1,9 +1,9 @@
-#include "shell/normals.hpp"
+#include "tunica/shell/distance/normals.hpp"
 
-#include "core/threads.hpp"
-#include "shell/curved_surface.hpp"
+#include "tunica/core/threads.hpp"
+#include "tunica/shell/patch/curved_surface.hpp"
 #include "shell/families.hpp"
-#include "shell/shell_distance.hpp"
+#include "tunica/shell/distance/shell_distance.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>

@@ -1,4 +1,4 @@
-#include "shell/patch_lanes.hpp"
+#include "tunica/shell/patch/patch_lanes.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/LU>

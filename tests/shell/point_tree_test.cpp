@@ -1,4 +1,4 @@
-#include "shell/point_tree.hpp"
+#include "tunica/shell/distance/point_tree.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,9 +1,9 @@
-#include "shell/refine.hpp"
+#include "tunica/shell/patch/refine.hpp"
 
-#include "shell/curved_surface.hpp"
+#include "tunica/shell/patch/curved_surface.hpp"
 #include "shell/families.hpp"
-#include "surface/checks.hpp"
-#include "surface/measure.hpp"
+#include "tunica/surface/mesh/checks.hpp"
+#include "tunica/surface/mesh/measure.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "shell/shape_function.hpp"
+#include "tunica/shell/patch/shape_function.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,8 +1,8 @@
-#include "shell/shell_crossings.hpp"
+#include "tunica/shell/distance/shell_crossings.hpp"
 
-#include "shell/curved_surface.hpp"
+#include "tunica/shell/patch/curved_surface.hpp"
 #include "shell/families.hpp"
-#include "surface/self_intersections.hpp"
+#include "tunica/surface/mesh/self_intersections.hpp"
 #include "surface/shapes.hpp"
 
 #include <gtest/gtest.h>

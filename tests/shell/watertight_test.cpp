@@ -1,10 +1,10 @@
-#include "shell/curved_surface.hpp"
+#include "tunica/shell/patch/curved_surface.hpp"
 
-#include "core/error.hpp"
+#include "tunica/core/error.hpp"
 #include "shell/families.hpp"
 #include "shell/gaps.hpp"
-#include "shell/target.hpp"
-#include "surface/measure.hpp"
+#include "tunica/shell/distance/target.hpp"
+#include "tunica/surface/mesh/measure.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>

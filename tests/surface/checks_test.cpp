@@ -1,7 +1,7 @@
-#include "surface/checks.hpp"
+#include "tunica/surface/mesh/checks.hpp"
 
-#include "surface/incidence.hpp"
-#include "surface/measure.hpp"
+#include "tunica/surface/mesh/incidence.hpp"
+#include "tunica/surface/mesh/measure.hpp"
 #include "surface/shapes.hpp"
 
 #include <gmock/gmock.h>

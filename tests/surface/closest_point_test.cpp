@@ -1,6 +1,6 @@
-#include "surface/closest_point.hpp"
+#include "tunica/surface/distance/closest_point.hpp"
 
-#include "core/threads.hpp"
+#include "tunica/core/threads.hpp"
 #include "surface/shapes.hpp"
 
 #include <gtest/gtest.h>

@@ -1,6 +1,6 @@
 // CGAL's Garland-Heckbert planes as the measure of decimation.
 #include "bench/cgal_decimate.hpp"
-#include "surface/checks.hpp"
+#include "tunica/surface/mesh/checks.hpp"
 #include "surface/decimated.hpp"
 #include "surface/shapes.hpp"
 

@@ -1,8 +1,8 @@
 #include "surface/decimated.hpp"
 
-#include "core/error.hpp"
-#include "surface/checks.hpp"
-#include "surface/incidence.hpp"
+#include "tunica/core/error.hpp"
+#include "tunica/surface/mesh/checks.hpp"
+#include "tunica/surface/mesh/incidence.hpp"
 #include "surface/shapes.hpp"
 
 #include <gmock/gmock.h>

@@ -1,8 +1,8 @@
 #pragma once
 
-#include "surface/decimate.hpp"
-#include "surface/hausdorff.hpp"
-#include "surface/measure.hpp"
+#include "tunica/surface/decimation/decimate.hpp"
+#include "tunica/surface/distance/hausdorff.hpp"
+#include "tunica/surface/mesh/measure.hpp"
 
 namespace tunica {
 

@@ -1,9 +1,9 @@
-#include "surface/degenerate.hpp"
+#include "tunica/surface/decimation/degenerate.hpp"
 
-#include "core/error.hpp"
-#include "surface/checks.hpp"
+#include "tunica/core/error.hpp"
+#include "tunica/surface/mesh/checks.hpp"
 #include "surface/decimated.hpp"
-#include "surface/incidence.hpp"
+#include "tunica/surface/mesh/incidence.hpp"
 #include "surface/shapes.hpp"
 
 #include <gtest/gtest.h>

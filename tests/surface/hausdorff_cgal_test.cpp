@@ -1,7 +1,7 @@
 // CGAL's bounded-error Hausdorff distance as an oracle: another implementation, on exact predicates.
 #include "bench/cgal_mesh.hpp"
-#include "surface/hausdorff.hpp"
-#include "surface/measure.hpp"
+#include "tunica/surface/distance/hausdorff.hpp"
+#include "tunica/surface/mesh/measure.hpp"
 #include "surface/shapes.hpp"
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>

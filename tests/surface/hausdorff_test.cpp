@@ -1,7 +1,7 @@
-#include "surface/hausdorff.hpp"
+#include "tunica/surface/distance/hausdorff.hpp"
 
-#include "core/threads.hpp"
-#include "surface/measure.hpp"
+#include "tunica/core/threads.hpp"
+#include "tunica/surface/mesh/measure.hpp"
 #include "surface/shapes.hpp"
 
 #include <gtest/gtest.h>

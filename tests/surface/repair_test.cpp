@@ -1,9 +1,9 @@
-#include "surface/repair.hpp"
+#include "tunica/surface/repair/repair.hpp"
 
-#include "core/error.hpp"
-#include "surface/checks.hpp"
-#include "surface/hausdorff.hpp"
-#include "surface/measure.hpp"
+#include "tunica/core/error.hpp"
+#include "tunica/surface/mesh/checks.hpp"
+#include "tunica/surface/distance/hausdorff.hpp"
+#include "tunica/surface/mesh/measure.hpp"
 #include "surface/shapes.hpp"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "surface/self_intersections.hpp"
+#include "tunica/surface/mesh/self_intersections.hpp"
 
 #include "surface/shapes.hpp"
 

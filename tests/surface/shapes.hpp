@@ -1,6 +1,6 @@
 #pragma once
 
-#include "surface/triangle_mesh.hpp"
+#include "tunica/surface/mesh/triangle_mesh.hpp"
 
 #include <Eigen/Geometry>
 

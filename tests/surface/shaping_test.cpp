@@ -1,11 +1,11 @@
-#include "surface/shaping.hpp"
+#include "tunica/surface/decimation/detail/shaping.hpp"
 
-#include "surface/boundary_curves.hpp"
-#include "surface/checks.hpp"
+#include "tunica/surface/distance/boundary_curves.hpp"
+#include "tunica/surface/mesh/checks.hpp"
 #include "surface/decimated.hpp"
-#include "surface/incidence.hpp"
-#include "surface/measure.hpp"
-#include "surface/shape_patch.hpp"
+#include "tunica/surface/mesh/incidence.hpp"
+#include "tunica/surface/mesh/measure.hpp"
+#include "tunica/surface/decimation/detail/shape_patch.hpp"
 #include "surface/shapes.hpp"
 
 #include <gtest/gtest.h>

@@ -1,10 +1,10 @@
-#include "surface/surface_walk.hpp"
+#include "tunica/surface/distance/surface_walk.hpp"
 
-#include "surface/closest_point.hpp"
-#include "surface/facet_distances.hpp"
-#include "surface/measure.hpp"
+#include "tunica/surface/distance/closest_point.hpp"
+#include "tunica/surface/distance/facet_distances.hpp"
+#include "tunica/surface/mesh/measure.hpp"
 #include "surface/shapes.hpp"
-#include "surface/subdivide.hpp"
+#include "tunica/surface/mesh/subdivide.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,7 +1,7 @@
-#include "volume/components.hpp"
+#include "tunica/volume/labels/components.hpp"
 
 #include "mesh_check.hpp"
-#include "volume/marching_cubes.hpp"
+#include "tunica/volume/cubes/marching_cubes.hpp"
 #include "volumes.hpp"
 
 #include <gtest/gtest.h>

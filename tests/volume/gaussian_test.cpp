@@ -1,7 +1,7 @@
-#include "core/error.hpp"
+#include "tunica/core/error.hpp"
 #include "mesh_check.hpp"
-#include "volume/marching_cubes.hpp"
-#include "volume/smoothing.hpp"
+#include "tunica/volume/cubes/marching_cubes.hpp"
+#include "tunica/volume/smoothing/smoothing.hpp"
 #include "volumes.hpp"
 
 #include <gtest/gtest.h>

@@ -1,7 +1,7 @@
-#include "volume/marching_cubes.hpp"
+#include "tunica/volume/cubes/marching_cubes.hpp"
 
-#include "core/error.hpp"
-#include "core/threads.hpp"
+#include "tunica/core/error.hpp"
+#include "tunica/core/threads.hpp"
 #include "mesh_check.hpp"
 #include "volumes.hpp"
 

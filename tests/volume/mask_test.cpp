@@ -1,4 +1,4 @@
-#include "volume/mask.hpp"
+#include "tunica/volume/labels/mask.hpp"
 
 #include "mesh_check.hpp"
 

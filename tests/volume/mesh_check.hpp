@@ -1,7 +1,7 @@
 #pragma once
 
-#include "core/disjoint_sets.hpp"
-#include "surface/triangle_mesh.hpp"
+#include "tunica/core/disjoint_sets.hpp"
+#include "tunica/surface/mesh/triangle_mesh.hpp"
 
 #include <Eigen/Geometry>
 

@@ -1,12 +1,12 @@
-#include "volume/phantom.hpp"
+#include "tunica/volume/phantom/phantom.hpp"
 
-#include "core/error.hpp"
-#include "core/threads.hpp"
-#include "surface/checks.hpp"
-#include "surface/closest_point.hpp"
-#include "surface/measure.hpp"
-#include "volume/components.hpp"
-#include "volume/marching_cubes.hpp"
+#include "tunica/core/error.hpp"
+#include "tunica/core/threads.hpp"
+#include "tunica/surface/mesh/checks.hpp"
+#include "tunica/surface/distance/closest_point.hpp"
+#include "tunica/surface/mesh/measure.hpp"
+#include "tunica/volume/labels/components.hpp"
+#include "tunica/volume/cubes/marching_cubes.hpp"
 #include "volumes.hpp"
 
 #include <gmock/gmock.h>

@@ -1,7 +1,7 @@
-#include "core/threads.hpp"
+#include "tunica/core/threads.hpp"
 #include "mesh_check.hpp"
-#include "volume/label_index.hpp"
-#include "volume/marching_cubes.hpp"
+#include "tunica/volume/cubes/label_index.hpp"
+#include "tunica/volume/cubes/marching_cubes.hpp"
 #include "volumes.hpp"
 
 #include <gtest/gtest.h>

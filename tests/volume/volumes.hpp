@@ -1,7 +1,7 @@
 #pragma once
 
-#include "volume/mask.hpp"
-#include "volume/volume.hpp"
+#include "tunica/volume/labels/mask.hpp"
+#include "tunica/volume/labels/volume.hpp"
 
 #include <utility>
 #include <vector>

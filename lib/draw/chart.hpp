@@ -1,0 +1,55 @@
+// draw: charts and pictures, as text and bytes; no file is touched.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace tunica {
+
+enum class Scale {
+  automatic,  ///< logarithmic when nothing is negative and the positive values span more than one decade
+  linear,
+  logarithmic,  ///< zeros stand in a lane of their own beside the axis; negative values are left out
+};
+
+struct ChartAxis {
+  std::string label;
+  Scale scale = Scale::automatic;
+  bool more_is_better = false;  ///< for the Pareto front
+};
+
+struct ChartMark {
+  double x = 0;
+  double y = 0;
+  std::string name;   ///< shown when the pointer rests on the mark: which run it is
+  std::string label;  ///< empty, or drawn beside the mark where there is room
+};
+
+struct ChartSeries {
+  std::string name;  ///< empty: not in the legend
+  std::vector<ChartMark> marks;
+  bool joined = false;  ///< a line joins the marks in their order
+};
+
+struct Chart {
+  std::string title;
+  ChartAxis x;
+  ChartAxis y;
+  std::string series_title;  ///< heading of the legend
+  std::vector<ChartSeries> series;
+};
+
+/// For each mark of each series whether it is on the Pareto front: no other mark is better in one coordinate and at
+/// least as good in the other. Cost: n log n.
+std::vector<std::vector<bool>> pareto_front(const Chart& chart);
+
+/// The scale that an automatic axis gets for these values.
+Scale resolved_scale(Scale wanted, const std::vector<double>& values);
+
+/// Draws a chart as SVG: round ticks, light grid, marks that differ in colour and shape (colour-blind-safe), the Pareto
+/// front as a dashed staircase, a legend at the right. Plain text in the reader's own sans-serif font; UTF-8.
+/// @param chart  finite values; a chart without marks gives empty axes
+/// Limits: beyond 40 series the legend ends with "and … more".
+std::string chart_svg(const Chart& chart);
+
+}  // namespace tunica

@@ -1,0 +1,24 @@
+#pragma once
+
+#include "tunica/fit/detail/samples.hpp"
+
+namespace tunica {
+
+struct SquaresOptions {
+  FacetLimits shape;      ///< facets that keep them go on keeping them, others get no worse
+  int power = 2;          ///< even; of the residuals in the sum that is lessened: large ones bring out the largest
+  double smoothing = 0;   ///< pull of nodes towards the middle of their neighbours, within the surface
+  bool positions = true;  ///< else only the normals turn
+  double search_beyond = std::numeric_limits<double>::infinity();  ///< see FitSamples::measure()
+};
+
+/// Moves the free nodes of a piece and turns their normals by one Gauss-Newton step on the residuals, weighted by
+/// (|residual| / largest)^(power - 2). Node by node the step is shortened, or left out, where the sum of the powers
+/// around it would grow or a facet would lose its shape. One node, a ring or a whole mesh: the same step.
+/// @param piece  measured; its residuals and errors are kept up to date
+/// @return the part of the sum that is left, at most 1
+/// Source: Gauss-Newton with Levenberg's damping; iteratively reweighted for powers above 2. Cost: three measurements
+/// of the piece, more where steps are shortened. The result does not depend on the number of threads.
+double least_squares_step(FitPiece& piece, const FitSamples& samples, const SquaresOptions& options);
+
+}  // namespace tunica

@@ -1,0 +1,22 @@
+#pragma once
+
+#include "tunica/io/mesh/mesh_file.hpp"
+
+#include <filesystem>
+#include <optional>
+
+namespace tunica {
+
+/// Two meshes of one thing, as they were read. Refuses, from their boxes alone, what only a wrong unit explains: sizes
+/// in the ratio of two units of length, along every axis to a quarter, or 500 times and more apart.
+/// @param unit_mm  what read_mesh() was told for files that state none
+/// Errors: InputError that names the file, the factor and the likely unit. Cost: linear.
+void require_same_scale(const MeshFile& a, const std::filesystem::path& path_a, const MeshFile& b,
+                        const std::filesystem::path& path_b, std::optional<double> unit_mm);
+
+/// For meshes of which one is to become the other. Errors: InputError when a diagonal of the larger one and more lies
+/// between their boxes. Cost: linear.
+void require_near(const MeshFile& a, const std::filesystem::path& path_a, const MeshFile& b,
+                  const std::filesystem::path& path_b);
+
+}  // namespace tunica

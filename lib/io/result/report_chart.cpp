@@ -1,0 +1,397 @@
+#include "tunica/io/result/report_chart.hpp"
+
+#include "tunica/core/error.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+
+namespace tunica {
+namespace {
+
+using Numbers = std::vector<std::optional<double>>;
+
+// A coordinate of the chart: its key or name, its label, and the values of each report.
+struct Coordinate {
+  std::string key;
+  std::string label;
+  std::vector<Numbers> values;
+};
+
+std::string middle_stage(const Report& report) {
+  static const std::map<std::string, std::string> stages{{"tunica-simulate", "solve"}};
+  const std::string tool = report.tool();
+  const auto stage = stages.find(tool);
+  return "seconds." + (stage != stages.end() ? stage->second : tool.substr(std::string("tunica-").size()));
+}
+
+bool all_of_tool(const std::vector<Report>& reports, const std::string& tool) {
+  return std::ranges::all_of(reports, [&](const Report& report) { return report.tool() == tool; });
+}
+
+Coordinate by_key(const std::vector<Report>& reports, const std::string& key) {
+  Coordinate coordinate{key, describe_key(key), {}};
+  for (const Report& report : reports) {
+    coordinate.values.push_back(numbers_at(report, key));
+  }
+  return coordinate;
+}
+
+Coordinate time_of(const std::vector<Report>& reports) {
+  const std::string step = "result.ms_per_step.median";
+  if (all_of_tool(reports, "tunica-simulate") &&
+      std::ranges::all_of(reports, [&](const Report& report) { return has_number(report, step); })) {
+    return by_key(reports, step);
+  }
+  if (all_of_tool(reports, reports.front().tool())) {
+    return by_key(reports, middle_stage(reports.front()));
+  }
+  Coordinate time{"seconds", "Time of the algorithm (s)", {}};
+  for (const Report& report : reports) {
+    time.values.push_back(numbers_at(report, middle_stage(report)));
+  }
+  return time;
+}
+
+Numbers volume_error(const Report& report) {
+  const auto mesh = numbers_at(report, "result.volume_mm3").front();
+  const auto voxels = numbers_at(report, "result.voxel_volume_mm3").front();
+  if (!mesh || !voxels || !(*voxels > 0)) {
+    return {std::nullopt};
+  }
+  return {100 * std::abs(*mesh - *voxels) / *voxels};
+}
+
+Coordinate natural_error(const std::vector<Report>& reports) {
+  if (all_of_tool(reports, "tunica-extract")) {
+    Coordinate error{"volume_error_percent", "Volume of the mesh against the voxels (%)", {}};
+    for (const Report& report : reports) {
+      error.values.push_back(volume_error(report));
+    }
+    return error;
+  }
+  for (const char* key : {"result.hausdorff_percent.upper", "result.algebraic_error_percent"}) {
+    if (std::ranges::all_of(reports, [&](const Report& report) { return has_number(report, key); })) {
+      return by_key(reports, key);
+    }
+  }
+  if (all_of_tool(reports, "tunica-simulate")) {
+    // What is left unbalanced is not the error of the model, but all that a single simulation knows.
+    return by_key(reports, "result.residual");
+  }
+  return by_key(reports, "result.hausdorff_percent.upper");
+}
+
+Coordinate error_to_reference(const std::vector<Report>& reports, const Report& reference) {
+  Coordinate error{"error_percent", {}, {}};
+  const Report* first = nullptr;
+  for (const Report& report : reports) {
+    const ReferenceError found = error_against(report, reference);
+    if (first != nullptr && found.quantity != error.label) {
+      throw InputError(fmt::format("{}: can be compared with the reference by '{}', but {} by '{}'; give --y a key",
+                                   report.path.string(), found.quantity, first->path.string(), error.label));
+    }
+    first = &report;
+    error.label = found.quantity;
+    error.values.push_back({found.percent});
+  }
+  return error;
+}
+
+Coordinate key_against_reference(const std::vector<Report>& reports, const std::string& key, const Report& reference) {
+  const Numbers truth = numbers_at(reference, key);
+  if (truth.empty() || !truth.back()) {
+    throw InputError(fmt::format("{}: the reference has no number under '{}'", reference.path.string(), key));
+  }
+  Coordinate error = by_key(reports, key);
+  const std::string label = error.label.substr(0, error.label.rfind(" ("));
+  error.key = key + " error_percent";
+  error.label = fmt::format("Error of {}{} (%)", std::tolower(label.front()) == 'h' ? "" : "the ",
+                            label.starts_with("Hausdorff")
+                                ? label
+                                : std::string(1, static_cast<char>(std::tolower(label.front()))) + label.substr(1));
+  for (Numbers& numbers : error.values) {
+    for (auto& number : numbers) {
+      if (number) {
+        const double percent = 100 * std::abs(*number - *truth.back()) / std::abs(*truth.back());
+        number = *number == *truth.back() ? std::optional(0.0)
+                 : std::isfinite(percent) ? std::optional(percent)
+                                          : std::nullopt;
+      }
+    }
+  }
+  return error;
+}
+
+std::string text_of(const Json& value) {
+  if (value.is_string()) {
+    return value.get<std::string>();
+  }
+  if (value.is_number_float()) {
+    return fmt::format("{:.6g}", value.get<double>());
+  }
+  return value.is_null() ? "none" : value.dump();
+}
+
+// The texts under a key, one per element of a list, or one.
+std::vector<std::string> texts_at(const Report& report, const std::string& key) {
+  if (key == "file") {
+    return {report.name};
+  }
+  std::vector<std::string> texts;
+  for (const Json& value : values_at(report, key).values) {
+    texts.push_back(text_of(value));
+  }
+  return texts;
+}
+
+// Orders the names of series: by value where all are numbers, else as they came.
+void sort_series(std::vector<ChartSeries>& series) {
+  const auto number = [](const ChartSeries& entry) -> std::optional<double> {
+    try {
+      std::size_t end = 0;
+      const double value = std::stod(entry.name, &end);
+      return end == entry.name.size() ? std::optional(value) : std::nullopt;
+    } catch (const std::exception&) {
+      return {};
+    }
+  };
+  if (std::ranges::all_of(series, [&](const ChartSeries& entry) { return number(entry).has_value(); })) {
+    std::ranges::stable_sort(series,
+                             [&](const ChartSeries& a, const ChartSeries& b) { return *number(a) < *number(b); });
+  }
+}
+
+bool more_is_better(const std::string& key) {
+  constexpr std::array<const char*, 3> names{"min_angle_deg", "mean_quality", "real_time_factor"};
+  return std::ranges::any_of(names, [&](const char* name) { return key.find(name) != std::string::npos; });
+}
+
+std::string csv_field(const std::string& text) {
+  if (text.find_first_of(",\"\r\n") == std::string::npos) {
+    return text;
+  }
+  std::string quoted = "\"";
+  for (const char c : text) {
+    quoted += c;
+    if (c == '"') {
+      quoted += c;
+    }
+  }
+  return quoted + "\"";
+}
+
+struct Row {
+  const Report* report = nullptr;
+  std::size_t index = 0;
+  std::string series;
+  ChartMark mark;
+};
+
+// Pairs of coordinates; a single value is repeated along a list. Pairs with a null are left out and counted.
+std::vector<Row> rows_of(const std::vector<Report>& reports, const Coordinate& x, const Coordinate& y,
+                         const ReportChartOptions& options, std::vector<std::string>& warnings) {
+  std::vector<Row> rows;
+  for (std::size_t r = 0; r < reports.size(); ++r) {
+    const Report& report = reports[r];
+    const std::size_t count = std::max(x.values[r].size(), y.values[r].size());
+    const auto series = options.series ? texts_at(report, *options.series) : std::vector<std::string>{""};
+    const auto labels = options.label ? texts_at(report, *options.label) : std::vector<std::string>{""};
+    const auto pick = [&](const auto& list, std::size_t i, const std::string& key) {
+      if (list.size() != 1 && list.size() != count) {
+        throw InputError(fmt::format("{}: '{}' has {} values, but '{}' and '{}' have {}: they do not pair up",
+                                     report.path.string(), key, list.size(), x.key, y.key, count));
+      }
+      return list[list.size() == 1 ? 0 : i];
+    };
+    std::size_t undefined = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      const auto px = pick(x.values[r], i, x.key);
+      const auto py = pick(y.values[r], i, y.key);
+      if (!px || !py) {
+        ++undefined;
+        continue;
+      }
+      rows.push_back({&report,
+                      i,
+                      pick(series, i, options.series.value_or("")),
+                      {*px, *py, report.name, pick(labels, i, options.label.value_or(""))}});
+    }
+    if (undefined > 0) {
+      warnings.push_back(fmt::format("{}: {} of {} values of '{}' against '{}' are undefined (null) and left out",
+                                     report.path.string(), undefined, count, y.key, x.key));
+    }
+  }
+  return rows;
+}
+
+void drop_negative(std::vector<Row>& rows, const ReportChartOptions& options, std::vector<std::string>& warnings) {
+  const std::size_t before = rows.size();
+  std::erase_if(rows, [&](const Row& row) {
+    return (options.x_scale == Scale::logarithmic && row.mark.x < 0) ||
+           (options.y_scale == Scale::logarithmic && row.mark.y < 0);
+  });
+  if (rows.size() < before) {
+    warnings.push_back(fmt::format("{} marks with negative values have no place on a logarithmic axis and are left out",
+                                   before - rows.size()));
+  }
+}
+
+std::string csv_of(const std::vector<std::pair<Row, bool>>& rows, const Coordinate& x, const Coordinate& y,
+                   const ReportChartOptions& options) {
+  std::string csv = fmt::format("report,tool,index,{},{},{},pareto_front\n",
+                                csv_field(options.series ? "series " + *options.series : "series"), csv_field(x.key),
+                                csv_field(y.key));
+  for (const auto& [row, front] : rows) {
+    csv += fmt::format("{},{},{},{},{},{},{}\n", csv_field(row.report->path.string()), csv_field(row.report->tool()),
+                       row.index, csv_field(row.series), row.mark.x, row.mark.y, front ? 1 : 0);
+  }
+  return csv;
+}
+
+}  // namespace
+
+ReportChart chart_of_reports(const std::vector<Report>& reports, const ReportChartOptions& options) {
+  TUNICA_ASSERT(!reports.empty());
+  const Coordinate x = options.x ? by_key(reports, *options.x) : time_of(reports);
+  const Coordinate y = options.y && options.reference ? key_against_reference(reports, *options.y, *options.reference)
+                       : options.y                    ? by_key(reports, *options.y)
+                       : options.reference            ? error_to_reference(reports, *options.reference)
+                                                      : natural_error(reports);
+  ReportChart made;
+  made.x_key = x.key;
+  made.y_key = y.key;
+  std::vector<Row> rows = rows_of(reports, x, y, options, made.warnings);
+  drop_negative(rows, options, made.warnings);
+  if (rows.empty()) {
+    throw InputError(fmt::format("{}: nothing to draw: no run has both '{}' and '{}'{}", reports.front().path.string(),
+                                 x.key, y.key, made.warnings.empty() ? "" : "; " + made.warnings.back()));
+  }
+
+  Chart& chart = made.chart;
+  chart.title = options.title;
+  chart.x = {options.x_label.value_or(x.label), options.x_scale, more_is_better(x.key)};
+  chart.y = {options.y_label.value_or(y.label), options.y_scale, !options.reference && more_is_better(y.key)};
+  // Marks of a list belong together: without --series each report is a line of its own.
+  const bool lists = std::ranges::any_of(rows, [](const Row& row) { return row.index > 0; });
+  const bool named = options.series.has_value();
+  chart.series_title = named ? (*options.series == "file" ? "File" : describe_key(*options.series)) : "";
+  std::map<std::string, std::size_t> place;
+  std::map<const Report*, std::size_t> line_of;
+  for (const Row& row : rows) {
+    const std::string name = named ? row.series : lists && reports.size() > 1 ? row.mark.name : "";
+    const auto [entry, added] = place.try_emplace(name, chart.series.size());
+    if (added) {
+      chart.series.push_back({name, {}, lists || options.joined});
+    }
+    chart.series[entry->second].marks.push_back(row.mark);
+  }
+  sort_series(chart.series);
+  if (options.joined) {
+    for (ChartSeries& series : chart.series) {
+      std::ranges::stable_sort(series.marks, [](const ChartMark& a, const ChartMark& b) { return a.x < b.x; });
+    }
+  }
+
+  made.marks = rows.size();
+  const auto front = pareto_front(chart);
+  for (const auto& flags : front) {
+    made.on_front += static_cast<std::size_t>(std::ranges::count(flags, true));
+  }
+  std::vector<std::pair<double, double>> on_front;
+  for (std::size_t s = 0; s < front.size(); ++s) {
+    for (std::size_t m = 0; m < front[s].size(); ++m) {
+      if (front[s][m]) {
+        on_front.emplace_back(chart.series[s].marks[m].x, chart.series[s].marks[m].y);
+      }
+    }
+  }
+  std::ranges::sort(on_front);
+  std::vector<std::pair<Row, bool>> flagged;
+  for (Row& row : rows) {
+    const bool best = std::ranges::binary_search(on_front, std::pair(row.mark.x, row.mark.y));
+    flagged.emplace_back(std::move(row), best);
+  }
+  made.csv = csv_of(flagged, x, y, options);
+  return made;
+}
+
+std::string describe_key(const std::string& key) {
+  static const std::map<std::string, std::string> units{
+      {"percent", "%"}, {"mm", "mm"}, {"mm2", "mm²"}, {"mm3", "mm³"}, {"deg", "°"}, {"mj", "mJ"},
+      {"hz", "Hz"},     {"s", "s"},   {"rad", "rad"}, {"mib", "MiB"}, {"ms", "ms"}};
+  std::vector<std::string> parts;
+  for (std::size_t start = 0; start <= key.size();) {
+    const std::size_t dot = std::min(key.find('.', start), key.size());
+    parts.push_back(key.substr(start, dot - start));
+    start = dot + 1;
+  }
+  std::string unit;
+  std::vector<std::string> words;
+  bool distance = false;
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    std::string part = parts[i];
+    if (i + 1 < parts.size() && (part == "result" || part == "iterations" || part == "probes")) {
+      continue;
+    }
+    if (part == "*" || (!part.empty() && part.find_first_not_of("0123456789-") == std::string::npos)) {
+      continue;
+    }
+    if (part == "seconds") {
+      unit = "s";
+      words.emplace_back(i + 1 < parts.size() && parts[i + 1] == "total" ? "total time" : "time");
+      if (i + 1 < parts.size()) {
+        if (parts[i + 1] != "total") {
+          words.back() += " to " + parts[i + 1];
+        }
+        ++i;
+      }
+      continue;
+    }
+    if (part == "ms_per_step") {
+      unit = "ms";
+      words.emplace_back("time per step");
+      continue;
+    }
+    const std::size_t underscore = part.rfind('_');
+    if (underscore != std::string::npos) {
+      const auto found = units.find(part.substr(underscore + 1));
+      if (found != units.end()) {
+        unit = found->second;
+        part.resize(underscore);
+      }
+    }
+    distance = distance || part.find("hausdorff") != std::string::npos || part.find("one_sided") != std::string::npos ||
+               part == "mean" || part == "rms";
+    part = part == "hausdorff"        ? "Hausdorff distance"
+           : part == "flat_hausdorff" ? "Hausdorff distance of the flat facets"
+           : part == "one_sided"      ? "one-sided distance"
+           : part == "mean"           ? "mean distance"
+           : part == "rms"            ? "root mean square distance"
+           : part == "upper"          ? "upper bound"
+           : part == "lower"          ? "lower bound"
+           : part == "dof"            ? "degrees of freedom"
+           : part == "peak"           ? "peak memory"
+           : part == "triangles_in"   ? "triangles before"
+                                      : part;
+    std::ranges::replace(part, '_', ' ');
+    words.push_back(part);
+  }
+  std::string label = fmt::format("{}", fmt::join(words, ", "));
+  if (label.empty()) {
+    return key;
+  }
+  if (label.front() >= 'a' && label.front() <= 'z') {
+    label.front() = static_cast<char>(label.front() - 'a' + 'A');
+  }
+  if (!unit.empty()) {
+    label += fmt::format(" ({})", unit == "%" && distance ? "% of the diagonal" : unit);
+  }
+  return label;
+}
+
+}  // namespace tunica

@@ -1,0 +1,46 @@
+#pragma once
+
+#include "tunica/mechanics/model/model.hpp"
+#include "tunica/mechanics/runs/solve.hpp"
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <vector>
+
+namespace tunica {
+
+struct ExportOptions {
+  bool pvd = false;      ///< STEM.pvd and one STEM_0000.vtu per state
+  bool xmf = false;      ///< STEM.xmf, which refers to the result file
+  bool series = false;   ///< as ResultOptions
+  int tessellation = 0;  ///< as ResultOptions
+  bool overwrite = false;
+};
+
+/// A result for readers that know no VTKHDF with time, beside the result file: OUT.hdf gives OUT.pvd, OUT_0000.vtu …,
+/// OUT.xmf. A .vtu is whole when append() returns. What refers to them comes with commit(); a run that does not get
+/// there leaves OUT.pvd.part (and OUT.xmf.part, which refers to OUT.hdf.part) with the states so far.
+/// Limits: .xmf (XDMF 2) shows what /VTKHDF holds: of a static run the last state.
+class ResultExport {
+public:
+  /// `model` must outlive this. Errors: OutputError, also when a .vtu is there already and `overwrite` is false.
+  ResultExport(const std::filesystem::path& result, const Model& model, const ExportOptions& options);
+  ~ResultExport();
+  ResultExport(const ResultExport&) = delete;
+  ResultExport& operator=(const ResultExport&) = delete;
+
+  /// @return the .vtu that now holds the state, if any. Errors: OutputError.
+  std::optional<std::filesystem::path> append(const State& state, const ElementFields& fields);
+  /// Just before the result file gets its name. Errors: OutputError.
+  void commit();
+
+private:
+  struct Implementation;
+  std::unique_ptr<Implementation> implementation_;
+};
+
+/// The files that an export names at its end: for checking them before the work.
+std::vector<std::filesystem::path> export_paths(const std::filesystem::path& result, const ExportOptions& options);
+
+}  // namespace tunica

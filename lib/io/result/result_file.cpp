@@ -1,0 +1,468 @@
+#include "tunica/io/result/result_file.hpp"
+
+#include "tunica/core/error.hpp"
+#include "tunica/core/version.hpp"
+#include "tunica/io/result/detail/hdf5_file.hpp"
+#include "tunica/io/file/output_file.hpp"
+#include "tunica/io/result/detail/result_grid.hpp"
+
+#include <fmt/format.h>
+#include <hdf5.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+namespace tunica {
+namespace {
+
+using hdf5::Handle;
+using hdf5::Series;
+using hdf5::Size;
+using hdf5::Writer;
+
+constexpr unsigned char vtk_triangle = 5;
+constexpr Size history_chunk = 256;
+constexpr Size nodes_chunk_rows = 1;
+
+using Floats = std::vector<float>;
+
+// Before anything of a state is written.
+void require_range(const std::vector<Floats>& fields) {
+  for (const Floats& values : fields) {
+    if (!std::all_of(values.begin(), values.end(), [](float v) { return std::isfinite(v); })) {
+      throw RequirementError(
+          "stresses or displacements pass 3e38, the range of single precision, in which results are kept: check the "
+          "units of loads and materials");
+    }
+  }
+}
+
+std::vector<double> flattened(const std::vector<Vec3>& vectors) {
+  std::vector<double> values;
+  values.reserve(3 * vectors.size());
+  for (const Vec3& v : vectors) {
+    values.insert(values.end(), v.data(), v.data() + 3);
+  }
+  return values;
+}
+
+// A field of the grid: in a series it grows and its offset is noted per state, else the one state is written again.
+class Field {
+public:
+  Field() = default;
+  Field(const Writer& writer, hid_t group, hid_t offsets, const std::string& name, Size rows, Size components,
+        bool series)
+      : rows_(rows) {
+    const std::vector<Size> row = components == 1 ? std::vector<Size>{} : std::vector<Size>{components};
+    if (series) {
+      values_ = Series(writer, group, name, H5T_NATIVE_FLOAT, row, rows, true);
+      offsets_ = Series(writer, offsets, name, H5T_NATIVE_INT64, {}, history_chunk, false);
+    } else {
+      std::vector<Size> shape{rows};
+      shape.insert(shape.end(), row.begin(), row.end());
+      only_ = writer.dataset(group, name, H5T_NATIVE_FLOAT, shape, nullptr, true);
+    }
+  }
+
+  void put(const Writer& writer, const Floats& values) {
+    if (!values_) {
+      writer.rewrite(only_, H5T_NATIVE_FLOAT, values.data());
+      return;
+    }
+    const auto offset = static_cast<std::int64_t>(values_->rows());
+    values_->append(writer, rows_, values.data());
+    offsets_->append(writer, 1, &offset);
+  }
+
+private:
+  Size rows_ = 0;
+  std::optional<Series> values_;
+  std::optional<Series> offsets_;
+  Handle only_;
+};
+
+// A field that no state changes: written once, the offset of every state is 0.
+class FixedField {
+public:
+  FixedField(const Writer& writer, hid_t group, hid_t offsets, const std::string& name, hid_t type,
+             const std::vector<Size>& shape, const void* values, bool series) {
+    (void)writer.dataset(group, name, type, shape, values);
+    if (series) {
+      offsets_ = Series(writer, offsets, name, H5T_NATIVE_INT64, {}, history_chunk, false);
+    }
+  }
+
+  void put(const Writer& writer) {
+    if (offsets_) {
+      constexpr std::int64_t zero = 0;
+      offsets_->append(writer, 1, &zero);
+    }
+  }
+
+private:
+  std::optional<Series> offsets_;
+};
+
+// What a data set is, by its path; every one has a line.
+struct About {
+  const char* path;
+  const char* units;
+  const char* description;
+};
+
+constexpr std::array about{
+    About{"VTKHDF/NumberOfPoints", "1", "points of the drawn surface"},
+    About{"VTKHDF/NumberOfCells", "1", "triangles of the drawn surface"},
+    About{"VTKHDF/NumberOfConnectivityIds", "1", "three times the triangles"},
+    About{"VTKHDF/Points", "mm", "reference surface; the nodes of a body come first, in file order"},
+    About{"VTKHDF/Connectivity", "1", "points of each triangle, from 0"},
+    About{"VTKHDF/Offsets", "1", "where each triangle begins in Connectivity"},
+    About{"VTKHDF/Types", "1", "VTK cell type, 5: triangle"},
+    About{"VTKHDF/PointData/normal", "1", "unit normal of the reference surface"},
+    About{"VTKHDF/PointData/thickness", "mm", "thickness of the wall in the reference"},
+    About{"VTKHDF/PointData/displacement", "mm", "deformed curved surface minus reference"},
+    About{"VTKHDF/PointData/rotation", "rad", "rotation vectors, linear between the nodes"},
+    About{"VTKHDF/PointData/von_mises", "MPa",
+          "von Mises stress, averaged at the nodes within a body, the larger of both faces, linear between the nodes"},
+    About{"VTKHDF/CellData/body", "1", "number of the body, from 0"},
+    About{"tunica/scene", "1", "the resolved scene, TOML in SI units"},
+    About{"tunica/command", "1", "the command of the run"},
+    About{"tunica/version", "1", "version of tunica"},
+    About{"tunica/inputs/path", "1", "files that were read"},
+    About{"tunica/inputs/sha256", "1", "and their SHA-256"},
+    About{"tunica/converged", "1", "1: every step converged and the file is complete"},
+    About{"tunica/nodes/position", "mm", "nodes of all bodies one after the other, in file order; reference"},
+    About{"tunica/nodes/displacement", "mm", "by state and node, world axes"},
+    About{"tunica/nodes/rotation", "rad", "rotation vectors by state and node, world axes"},
+    About{"tunica/elements/nodes", "1", "the three nodes of each shell, rows of tunica/nodes, from 0"},
+    About{"tunica/elements/body", "1", "the body of each shell, from 0"},
+    About{"tunica/history/load_factor", "1", "factor of the loads; dynamic: of the first load's ramp"},
+    About{"tunica/history/volume", "mm3", "enclosed by the closed bodies' curved surfaces; NaN where one is open"},
+    About{"tunica/history/strain_energy", "mJ", "elastic energy"},
+    About{"tunica/history/kinetic_energy", "mJ", "kinetic energy"},
+    About{"tunica/history/residual", "1", "unbalanced forces over those that balance"},
+    About{"tunica/history/newton_iterations", "1", "linear systems of the step"},
+    About{"tunica/history/cg_iterations", "1", "iterations of conjugate gradients in the step"},
+    About{"tunica/history/max_displacement", "mm", "largest of the curved surfaces"},
+    About{"tunica/history/stress_p99", "MPa", "von Mises stress, averaged at the nodes, passed on 1 % of the area"},
+    About{"tunica/history/stress_max", "MPa", "largest von Mises stress, averaged at the nodes"},
+    About{"tunica/history/stress_max_at", "mm", "the node where it is, reference"},
+    About{"tunica/history/strain_p99", "%", "largest principal strain of either face, passed on 1 % of the area"},
+    About{"tunica/history/strain_max", "%", "largest principal strain of either face, averaged at the nodes"}};
+
+// Of the elements' fields, in CellData and in tunica/elements.
+constexpr std::array about_fields{
+    About{"pressure", "MPa", "pressure on the shell"},
+    About{"von_mises_top", "MPa", "von Mises stress at the face the normal points to, constant in each shell"},
+    About{"von_mises_bottom", "MPa", "von Mises stress at the other face, constant in each shell"},
+    About{"membrane_force", "N/mm", "xx, yy, xy in the shell's own frame, x along its first edge"},
+    About{"bending_moment", "N", "moment per length: xx, yy, xy in the same frame"},
+    About{"principal_strain_top", "1", "largest and smallest strain at the face the normal points to"},
+    About{"principal_strain_bottom", "1", "largest and smallest strain at the other face"}};
+
+constexpr std::array about_steps{About{"PartOffsets", "1", "first part of each state"},
+                                 About{"PointOffsets", "1", "first point of each state"},
+                                 About{"CellOffsets", "1", "first triangle of each state"},
+                                 About{"ConnectivityIdOffsets", "1", "first entry of Connectivity of each state"},
+                                 About{"NumberOfParts", "1", "parts of each state"}};
+
+struct ProbeSeries {
+  std::size_t node = 0;
+  Series displacement;
+  Series rotation;
+};
+
+}  // namespace
+
+struct ResultFile::Implementation {
+  Implementation(const std::filesystem::path& path, const Model& the_model, const ResultOptions& options)
+      : model(the_model),
+        series(options.series),
+        output(path, options.overwrite),
+        grid(the_model, options.tessellation),
+        writer(output.partial_path()) {
+    write_about(options);
+    write_grid();
+    make_fields();
+    make_history();
+    describe_all(options.time_units);
+    writer.flush();
+  }
+
+  void write_about(const ResultOptions& options) {
+    tunica_group = writer.group(writer.root(), "tunica");
+    writer.text(tunica_group.get(), "scene", options.scene);
+    writer.text(tunica_group.get(), "command", options.command);
+    writer.text(tunica_group.get(), "version", version);
+    const Handle inputs = writer.group(tunica_group.get(), "inputs");
+    std::vector<std::string> paths;
+    std::vector<std::string> hashes;
+    for (const auto& [path, hash] : options.inputs) {
+      paths.push_back(path);
+      hashes.push_back(hash);
+    }
+    writer.texts(inputs.get(), "path", paths);
+    writer.texts(inputs.get(), "sha256", hashes);
+    constexpr unsigned char no = 0;
+    converged = writer.dataset(tunica_group.get(), "converged", H5T_NATIVE_UINT8, {}, &no, true);
+  }
+
+  void write_grid() {
+    vtk = writer.group(writer.root(), "VTKHDF");
+    const std::array<std::int64_t, 2> vtk_version{series ? 2 : 1, 0};
+    writer.attribute(vtk.get(), "Version", H5T_NATIVE_INT64, {2}, vtk_version.data());
+    writer.ascii_attribute(vtk.get(), "Type", "UnstructuredGrid");
+
+    const std::vector<std::int64_t> connectivity(grid.connectivity().begin(), grid.connectivity().end());
+    std::vector<std::int64_t> offsets(grid.cells() + 1);
+    for (std::size_t i = 0; i < offsets.size(); ++i) {
+      offsets[i] = static_cast<std::int64_t>(3 * i);
+    }
+    const std::vector<unsigned char> types(grid.cells(), vtk_triangle);
+    const auto count = [&](const char* name, std::size_t value) {
+      const auto number = static_cast<std::int64_t>(value);
+      (void)writer.dataset(vtk.get(), name, H5T_NATIVE_INT64, {1}, &number);
+    };
+    count("NumberOfPoints", grid.points());
+    count("NumberOfCells", grid.cells());
+    count("NumberOfConnectivityIds", connectivity.size());
+    (void)writer.dataset(vtk.get(), "Points", H5T_NATIVE_DOUBLE, {grid.points(), 3}, grid.coordinates().data());
+    (void)writer.dataset(vtk.get(), "Connectivity", H5T_NATIVE_INT64, {connectivity.size()}, connectivity.data());
+    (void)writer.dataset(vtk.get(), "Offsets", H5T_NATIVE_INT64, {offsets.size()}, offsets.data());
+    (void)writer.dataset(vtk.get(), "Types", H5T_NATIVE_UINT8, {types.size()}, types.data());
+  }
+
+  void make_fields() {
+    const Handle point_data = writer.group(vtk.get(), "PointData");
+    const Handle cell_data = writer.group(vtk.get(), "CellData");
+    Handle point_offsets;
+    Handle cell_offsets;
+    if (series) {
+      steps = writer.group(vtk.get(), "Steps");
+      point_offsets = writer.group(steps.get(), "PointDataOffsets");
+      cell_offsets = writer.group(steps.get(), "CellDataOffsets");
+      for (const char* name : {"PartOffsets", "PointOffsets", "CellOffsets", "ConnectivityIdOffsets"}) {
+        zeros.emplace_back(writer, steps.get(), name, H5T_NATIVE_INT64, std::vector<Size>{}, history_chunk, false);
+      }
+      parts = Series(writer, steps.get(), "NumberOfParts", H5T_NATIVE_INT64, {}, history_chunk, false);
+      values = Series(writer, steps.get(), "Values", H5T_NATIVE_DOUBLE, {}, history_chunk, false);
+      constexpr std::int64_t none = 0;
+      writer.attribute(steps.get(), "NSteps", H5T_NATIVE_INT64, {}, &none);
+      step_count = writer.own(H5Aopen(steps.get(), "NSteps", H5P_DEFAULT), "written");
+    }
+    const auto fixed_layout = ResultGrid::fixed_layout();
+    for (std::size_t i = 0; i < fixed_layout.size(); ++i) {
+      std::vector<Size> shape{grid.points()};
+      if (fixed_layout[i].components > 1) {
+        shape.push_back(fixed_layout[i].components);
+      }
+      fixed.emplace_back(writer, point_data.get(), point_offsets.get(), fixed_layout[i].name, H5T_NATIVE_FLOAT, shape,
+                         grid.fixed()[i].data(), series);
+    }
+    fixed.emplace_back(writer, cell_data.get(), cell_offsets.get(), "body", H5T_NATIVE_INT32,
+                       std::vector<Size>{grid.cells()}, grid.body_of_cell().data(), series);
+    const Handle element_group = writer.group(tunica_group.get(), "elements");
+    write_elements(element_group.get());
+    for (const GridField& field : ResultGrid::layout()) {
+      fields.emplace_back(writer, (field.of_cells ? cell_data : point_data).get(),
+                          (field.of_cells ? cell_offsets : point_offsets).get(), field.name,
+                          field.of_cells ? grid.cells() : grid.points(), field.components, series);
+      if (field.of_cells) {
+        std::vector<Size> row{grid.elements()};
+        if (field.components > 1) {
+          row.push_back(field.components);
+        }
+        elements.emplace_back(writer, element_group.get(), field.name, H5T_NATIVE_FLOAT, row, 1, true);
+      }
+    }
+  }
+
+  void write_elements(hid_t group) {
+    std::vector<std::int64_t> nodes;
+    std::vector<std::int32_t> bodies;
+    for (std::size_t b = 0; b < model.shells.size(); ++b) {
+      for (const auto& triangle : model.shells[b].mesh.triangles) {
+        for (const Index node : triangle) {
+          nodes.push_back(static_cast<std::int64_t>(model.first_node(b) + node));
+        }
+        bodies.push_back(static_cast<std::int32_t>(b));
+      }
+    }
+    (void)writer.dataset(group, "nodes", H5T_NATIVE_INT64, {grid.elements(), 3}, nodes.data());
+    (void)writer.dataset(group, "body", H5T_NATIVE_INT32, {grid.elements()}, bodies.data());
+  }
+
+  void make_history() {
+    const Size nodes = model.node_count();
+    const Handle group = writer.group(tunica_group.get(), "nodes");
+    std::vector<double> positions;
+    for (const ShellBody& body : model.shells) {
+      const std::vector<double> of_body = flattened(body.mesh.vertices);
+      positions.insert(positions.end(), of_body.begin(), of_body.end());
+    }
+    (void)writer.dataset(group.get(), "position", H5T_NATIVE_DOUBLE, {nodes, 3}, positions.data());
+    node_displacement =
+        Series(writer, group.get(), "displacement", H5T_NATIVE_DOUBLE, {nodes, 3}, nodes_chunk_rows, true);
+    node_rotation = Series(writer, group.get(), "rotation", H5T_NATIVE_DOUBLE, {nodes, 3}, nodes_chunk_rows, true);
+
+    const Handle history = writer.group(tunica_group.get(), "history");
+    for (const char* name : {"time", "load_factor", "volume", "strain_energy", "kinetic_energy", "residual",
+                             "max_displacement", "stress_p99", "stress_max", "strain_p99", "strain_max"}) {
+      numbers.emplace_back(writer, history.get(), name, H5T_NATIVE_DOUBLE, std::vector<Size>{}, history_chunk, false);
+    }
+    for (const char* name : {"newton_iterations", "cg_iterations"}) {
+      counts.emplace_back(writer, history.get(), name, H5T_NATIVE_INT64, std::vector<Size>{}, history_chunk, false);
+    }
+
+    stress_max_at = Series(writer, history.get(), "stress_max_at", H5T_NATIVE_DOUBLE, {3}, history_chunk, false);
+
+    const Handle all_probes = writer.group(tunica_group.get(), "probes");
+    for (const Probe& probe : model.probes) {
+      const Handle one = writer.group(all_probes.get(), probe.name);
+      probes.push_back({model.first_node(probe.body) + probe.node,
+                        Series(writer, one.get(), "displacement", H5T_NATIVE_DOUBLE, {3}, history_chunk, false),
+                        Series(writer, one.get(), "rotation", H5T_NATIVE_DOUBLE, {3}, history_chunk, false)});
+    }
+  }
+
+  void describe_all(const std::string& time_units) {
+    const auto under = [&](const std::string& group, const About& one) {
+      writer.describe(group + one.path, one.units, one.description);
+    };
+    for (const About& one : about) {
+      under("", one);
+    }
+    for (const About& one : about_fields) {
+      under("VTKHDF/CellData/", one);
+      under("tunica/elements/", one);
+    }
+    writer.describe("tunica/history/time", time_units,
+                    "dynamic: time; static: load factor; arc length: number of the step; modes: frequency or factor");
+    for (const Probe& probe : model.probes) {
+      const std::string group = "tunica/probes/" + probe.name;
+      writer.describe(group + "/displacement", "mm", "of the probe's node, by state");
+      writer.describe(group + "/rotation", "rad", "rotation vector of the probe's node, by state");
+    }
+    if (!series) {
+      return;
+    }
+    for (const About& one : about_steps) {
+      under("VTKHDF/Steps/", one);
+    }
+    writer.describe("VTKHDF/Steps/Values", time_units, "time of each state, as tunica/history/time");
+    for (const auto& list : {ResultGrid::layout(), ResultGrid::fixed_layout()}) {
+      for (const GridField& field : list) {
+        writer.describe(fmt::format("VTKHDF/Steps/{}DataOffsets/{}", field.of_cells ? "Cell" : "Point", field.name),
+                        "1", "first row of each state");
+      }
+    }
+    writer.describe("VTKHDF/Steps/CellDataOffsets/body", "1", "first row of each state");
+  }
+
+  void append(const State& state, const ElementFields& of_elements) {
+    TUNICA_ASSERT(state.displacement.size() == model.node_count() && state.rotation.size() == model.node_count());
+    put_fields(state, of_elements);
+    node_displacement.append(writer, 1, flattened(state.displacement).data());
+    node_rotation.append(writer, 1, flattened(state.rotation).data());
+    const Wall& wall = of_elements.wall;
+    const std::array<double, 11> history{state.time,
+                                         state.load_factor,
+                                         state.volume.value_or(std::numeric_limits<double>::quiet_NaN()),
+                                         state.strain_energy,
+                                         state.kinetic_energy,
+                                         state.residual,
+                                         of_elements.largest_displacement,
+                                         wall.stress_p99,
+                                         wall.stress_max,
+                                         1e2 * wall.strain_p99,
+                                         1e2 * wall.strain_max};
+    stress_max_at.append(writer, 1, wall.stress_max_at.data());
+    for (std::size_t i = 0; i < numbers.size(); ++i) {
+      numbers[i].append(writer, 1, &history[i]);
+    }
+    const std::array<std::int64_t, 2> iterations{static_cast<std::int64_t>(state.newton_iterations),
+                                                 static_cast<std::int64_t>(state.cg_iterations)};
+    for (std::size_t i = 0; i < counts.size(); ++i) {
+      counts[i].append(writer, 1, &iterations[i]);
+    }
+    for (ProbeSeries& probe : probes) {
+      probe.displacement.append(writer, 1, state.displacement[probe.node].data());
+      probe.rotation.append(writer, 1, state.rotation[probe.node].data());
+    }
+    writer.flush();
+    if (series) {
+      // Last, so that what NSteps counts is there.
+      const auto count = static_cast<std::int64_t>(values.rows());
+      writer.check(H5Awrite(step_count.get(), H5T_NATIVE_INT64, &count), "written");
+      writer.flush();
+    }
+    output.keep_partial();
+  }
+
+  void put_fields(const State& state, const ElementFields& of_elements) {
+    const std::vector<Floats> on_grid = grid.values(state, of_elements);
+    const std::vector<Floats> by_element = element_values(of_elements);
+    require_range(on_grid);
+    require_range(by_element);
+    for (std::size_t i = 0; i < fields.size(); ++i) {
+      fields[i].put(writer, on_grid[i]);
+    }
+    for (std::size_t i = 0; i < elements.size(); ++i) {
+      elements[i].append(writer, 1, by_element[i].data());
+    }
+    for (FixedField& field : fixed) {
+      field.put(writer);
+    }
+    if (series) {
+      constexpr std::int64_t zero = 0;
+      constexpr std::int64_t one = 1;
+      for (Series& offsets : zeros) {
+        offsets.append(writer, 1, &zero);
+      }
+      parts.append(writer, 1, &one);
+      values.append(writer, 1, &state.time);
+    }
+  }
+
+  // Handles close in reverse order, the file last.
+  const Model& model;
+  const bool series;
+  OutputFile output;
+  ResultGrid grid;
+  Writer writer;
+  Handle tunica_group;
+  Handle vtk;
+  Handle steps;
+  Handle step_count;
+  Handle converged;
+  std::vector<FixedField> fixed;
+  std::vector<Field> fields;
+  std::vector<Series> elements;
+  std::vector<Series> zeros;
+  Series parts;
+  Series values;
+  Series node_displacement;
+  Series node_rotation;
+  std::vector<Series> numbers;
+  Series stress_max_at;
+  std::vector<Series> counts;
+  std::vector<ProbeSeries> probes;
+};
+
+ResultFile::ResultFile(const std::filesystem::path& path, const Model& model, ResultOptions options)
+    : implementation_(std::make_unique<Implementation>(path, model, options)) {}
+
+ResultFile::~ResultFile() = default;
+
+void ResultFile::append(const State& state, const ElementFields& fields) { implementation_->append(state, fields); }
+
+void ResultFile::commit(bool converged) {
+  const unsigned char value = converged ? 1 : 0;
+  implementation_->writer.rewrite(implementation_->converged, H5T_NATIVE_UINT8, &value);
+  implementation_->writer.close();
+  implementation_->output.commit();
+}
+
+}  // namespace tunica

@@ -1,0 +1,213 @@
+#include "tunica/io/result/detail/result_grid.hpp"
+
+#include "tunica/core/error.hpp"
+#include "tunica/mechanics/runs/curved_displacement.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+namespace tunica {
+namespace {
+
+constexpr std::size_t most_fine_triangles = 200'000;
+constexpr int finest_level = 4;
+
+constexpr std::array fixed_fields{GridField{"normal", 3, false}, GridField{"thickness", 1, false}};
+constexpr std::array point_fields{GridField{"displacement", 3, false}, GridField{"rotation", 3, false},
+                                  GridField{"von_mises", 1, false}};
+constexpr std::array state_fields{point_fields[0],
+                                  point_fields[1],
+                                  point_fields[2],
+                                  GridField{"pressure", 1, true},
+                                  GridField{"von_mises_top", 1, true},
+                                  GridField{"von_mises_bottom", 1, true},
+                                  GridField{"membrane_force", 3, true},
+                                  GridField{"bending_moment", 3, true},
+                                  GridField{"principal_strain_top", 2, true},
+                                  GridField{"principal_strain_bottom", 2, true}};
+
+using Floats = std::vector<float>;
+
+template <typename Vector>
+void add(Floats& values, const Vector& v) {
+  for (Eigen::Index axis = 0; axis < v.size(); ++axis) {
+    values.push_back(static_cast<float>(v[axis]));
+  }
+}
+
+void add(Floats& values, double value) { values.push_back(static_cast<float>(value)); }
+
+template <typename Value>
+Floats flat(const std::vector<Value>& list) {
+  Floats values;
+  for (const Value& value : list) {
+    add(values, value);
+  }
+  return values;
+}
+
+// Linear between the corners of a triangle.
+template <typename Value>
+Value between(const std::array<Index, 3>& corners, const Vec2& b, const Value* of_nodes) {
+  return Value((1 - b.x() - b.y()) * of_nodes[corners[0]] + b.x() * of_nodes[corners[1]] +
+               b.y() * of_nodes[corners[2]]);
+}
+
+}  // namespace
+
+int drawing_level(std::size_t shells) {
+  int level = finest_level;
+  while (level > 1 && shells * static_cast<std::size_t>(level * level) > most_fine_triangles) {
+    --level;
+  }
+  return level;
+}
+
+std::span<const GridField> ResultGrid::fixed_layout() { return fixed_fields; }
+std::span<const GridField> ResultGrid::layout() { return state_fields; }
+
+ResultGrid::Body ResultGrid::make_body(const ShellMesh& mesh, int level) {
+  Body body{tessellate_uniformly(mesh, level), {}, {}, mesh.vertices.size()};
+  // Where a vertex is, as the weights of the nodes it depends on: the same from both sides of an edge.
+  using Key = std::array<std::pair<Index, int>, 2>;
+  std::map<Key, Index> of_edges;
+  std::vector<double> shared(body.points, 0);
+  for (std::size_t v = 0; v < body.surface.mesh.vertices.size(); ++v) {
+    const Vec2& b = body.surface.barycentric[v];
+    const auto& corners = mesh.triangles[body.surface.vertex_shell[v]];
+    const auto second = static_cast<int>(std::lround(level * b.x()));
+    const auto third = static_cast<int>(std::lround(level * b.y()));
+    std::vector<std::pair<Index, int>> weights;
+    for (const auto& [node, weight] :
+         {std::pair{corners[0], level - second - third}, std::pair{corners[1], second}, std::pair{corners[2], third}}) {
+      if (weight > 0) {
+        weights.emplace_back(node, weight);
+      }
+    }
+    auto point = static_cast<Index>(shared.size());  // a new one, where no other shares it
+    if (weights.size() == 1) {
+      point = weights[0].first;
+    } else if (weights.size() == 2) {
+      point = of_edges.emplace(Key{std::min(weights[0], weights[1]), std::max(weights[0], weights[1])}, point)
+                  .first->second;
+    }
+    shared.resize(std::max<std::size_t>(shared.size(), std::size_t{point} + 1), 0);
+    shared[point] += 1;
+    body.point.push_back(point);
+  }
+  body.points = shared.size();
+  for (const Index point : body.point) {
+    body.weight.push_back(1 / shared[point]);
+  }
+  return body;
+}
+
+template <typename OfVertex>
+void ResultGrid::add_means(const Body& body, const OfVertex& of_vertex, std::vector<float>& values) {
+  using Value = std::decay_t<decltype(of_vertex(std::size_t{0}))>;
+  std::vector<Value> means;
+  if constexpr (std::is_same_v<Value, double>) {
+    means.assign(body.points, 0);
+  } else {
+    means.assign(body.points, Value::Zero());
+  }
+  for (std::size_t v = 0; v < body.point.size(); ++v) {
+    means[body.point[v]] += body.weight[v] * of_vertex(v);
+  }
+  for (const Value& mean : means) {
+    add(values, mean);
+  }
+}
+
+ResultGrid::ResultGrid(const Model& model, int level) : model_(model) {
+  for (const ShellBody& body : model.shells) {
+    elements_ += body.mesh.triangles.size();
+  }
+  if (level == 0) {
+    level = drawing_level(elements_);
+  }
+  Floats normals;
+  Floats thicknesses;
+  std::size_t first_element = 0;
+  for (std::size_t b = 0; b < model.shells.size(); ++b) {
+    const ShellBody& shell = model.shells[b];
+    const Body& body = bodies_.emplace_back(make_body(shell.mesh, level));
+    const Tessellation& surface = body.surface;
+    const auto patches = curved_patches(shell.mesh);
+    const std::size_t first = points();
+    TUNICA_ASSERT(first + body.points <= max_index);
+    std::vector<Vec3> means(body.points, Vec3::Zero());
+    std::vector<Vec3> normal(body.points, Vec3::Zero());
+    for (std::size_t v = 0; v < body.point.size(); ++v) {
+      means[body.point[v]] += body.weight[v] * surface.mesh.vertices[v];
+      normal[body.point[v]] += patches[surface.vertex_shell[v]].normal(surface.barycentric[v]);
+    }
+    std::copy(shell.mesh.vertices.begin(), shell.mesh.vertices.end(), means.begin());  // to the bit
+    for (std::size_t i = 0; i < means.size(); ++i) {
+      coordinates_.insert(coordinates_.end(), means[i].data(), means[i].data() + 3);
+      add(normals, normal[i].stableNormalized());
+    }
+    add_means(
+        body,
+        [&](std::size_t v) {
+          return shell.thickness.size() == 1 ? shell.thickness.front()
+                                             : between(shell.mesh.triangles[surface.vertex_shell[v]],
+                                                       surface.barycentric[v], shell.thickness.data());
+        },
+        thicknesses);
+    for (const auto& triangle : surface.mesh.triangles) {
+      for (const Index v : triangle) {
+        connectivity_.push_back(static_cast<std::int32_t>(first + body.point[v]));
+      }
+    }
+    body_of_cell_.insert(body_of_cell_.end(), surface.mesh.triangles.size(), static_cast<std::int32_t>(b));
+    for (const Index element : surface.shell) {
+      element_of_cell_.push_back(first_element + element);
+    }
+    first_element += shell.mesh.triangles.size();
+  }
+  fixed_ = {std::move(normals), std::move(thicknesses)};
+}
+
+std::vector<std::vector<float>> ResultGrid::values(const State& state, const ElementFields& fields) const {
+  std::vector<Floats> values(point_fields.size());
+  for (std::size_t b = 0; b < bodies_.size(); ++b) {
+    const Body& body = bodies_[b];
+    const std::size_t first = model_.first_node(b);
+    const std::vector<Vec3> moved = curved_displacement(model_, b, state, body.surface);
+    const auto linear = [&](const auto* of_nodes) {
+      return [&body, &mesh = model_.shells[b].mesh, of_nodes](std::size_t v) {
+        return between(mesh.triangles[body.surface.vertex_shell[v]], body.surface.barycentric[v], of_nodes);
+      };
+    };
+    add_means(
+        body, [&](std::size_t v) { return moved[v]; }, values[0]);
+    add_means(body, linear(state.rotation.data() + first), values[1]);
+    add_means(body, linear(fields.von_mises.data() + first), values[2]);
+  }
+  for (const Floats& of_elements : element_values(fields)) {
+    const std::size_t components = state_fields[values.size()].components;
+    TUNICA_ASSERT(of_elements.size() == components * elements_);
+    Floats& of_cells = values.emplace_back();
+    of_cells.reserve(components * cells());
+    for (const std::size_t element : element_of_cell_) {
+      const auto first = of_elements.begin() + static_cast<std::ptrdiff_t>(components * element);
+      of_cells.insert(of_cells.end(), first, first + static_cast<std::ptrdiff_t>(components));
+    }
+  }
+  TUNICA_ASSERT(values.size() == state_fields.size());
+  return values;
+}
+
+std::vector<std::vector<float>> element_values(const ElementFields& fields) {
+  return {flat(fields.pressure),
+          flat(fields.von_mises_top),
+          flat(fields.von_mises_bottom),
+          flat(fields.membrane_force),
+          flat(fields.bending_moment),
+          flat(fields.principal_strain_top),
+          flat(fields.principal_strain_bottom)};
+}
+
+}  // namespace tunica

@@ -1,0 +1,191 @@
+#include "tunica/io/result/run_report.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace tunica {
+namespace {
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+Json triple(const Vec3& v) { return Json::array({v.x(), v.y(), v.z()}); }
+
+Json or_null(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
+
+}  // namespace
+
+void prepare_result(Json& result, const Model& model) {
+  std::size_t shells = 0;
+  for (const ShellBody& body : model.shells) {
+    shells += body.mesh.triangles.size();
+  }
+  result = {{"shells", shells},
+            {"tetrahedra", 0},
+            {"nodes", model.node_count()},
+            {"dof", nullptr},
+            {"steps", 0},
+            {"step_parts", 0},
+            {"converged", false},
+            {"max_displacement_mm", nullptr},
+            {"max_node_displacement_mm", nullptr},
+            {"wall", nullptr},
+            {"volume_before_mm3", nullptr},
+            {"volume_after_mm3", nullptr},
+            {"strain_energy_mj", nullptr},
+            {"residual", nullptr},
+            {"algebraic_error_percent", nullptr},
+            {"algebraic_error_is_lower_bound", false},
+            {"newton_iterations", 0},
+            {"cg_iterations", 0},
+            {"ms_per_step", {{"median", nullptr}, {"max", nullptr}}},
+            {"real_time_factor", nullptr},
+            {"probes", Json::object()},
+            {"frequencies_hz", Json::array()},
+            {"buckling_factors", Json::array()},
+            {"limit_load_factors", Json::array()},
+            {"branch_load_factors", Json::array()},
+            {"snaps", Json::array()},
+            {"energy", nullptr},
+            {"short_waves_stiffened_from", nullptr}};
+  for (const Probe& probe : model.probes) {
+    result["probes"][probe.name] = {{"time_s", Json::array()},
+                                    {"load_factor", Json::array()},
+                                    {"displacement_mm", Json::array()},
+                                    {"rotation_rad", Json::array()}};
+  }
+}
+
+void report_state(Json& result, const Model& model, const State& state, const ElementFields& fields, bool dynamic) {
+  double most = 0;
+  for (const Vec3& u : state.displacement) {
+    most = std::max(most, u.norm());
+  }
+  result["max_displacement_mm"] = fields.largest_displacement;
+  result["max_node_displacement_mm"] = most;
+  result["wall"] = {{"stress_p99_mpa", fields.wall.stress_p99},
+                    {"stress_max_mpa", fields.wall.stress_max},
+                    {"stress_max_at_mm", triple(fields.wall.stress_max_at)},
+                    {"strain_p99_percent", 1e2 * fields.wall.strain_p99},
+                    {"strain_max_percent", 1e2 * fields.wall.strain_max}};
+  if (result["volume_before_mm3"].is_null()) {
+    result["volume_before_mm3"] = or_null(state.volume);
+  }
+  result["volume_after_mm3"] = or_null(state.volume);
+  result["strain_energy_mj"] = state.strain_energy;
+  result["residual"] = state.residual;
+  for (const Probe& probe : model.probes) {
+    const std::size_t node = model.first_node(probe.body) + probe.node;
+    Json& record = result["probes"][probe.name];
+    record["time_s"].push_back(dynamic ? Json(state.time) : Json());
+    record["load_factor"].push_back(state.load_factor);
+    record["displacement_mm"].push_back(triple(state.displacement[node]));
+    record["rotation_rad"].push_back(triple(state.rotation[node]));
+  }
+}
+
+void report_summary(Json& result, const Summary& summary, bool converged, std::optional<double> duration) {
+  result["dof"] = summary.dof;
+  result["steps"] = summary.steps;
+  result["step_parts"] = summary.parts;
+  result["converged"] = converged;
+  result["volume_before_mm3"] = or_null(summary.volume_before);
+  result["volume_after_mm3"] = or_null(summary.volume_after);
+  result["strain_energy_mj"] = summary.strain_energy;
+  result["residual"] = summary.residual;
+  result["algebraic_error_percent"] = summary.algebraic_error ? Json(1e2 * *summary.algebraic_error) : Json();
+  result["algebraic_error_is_lower_bound"] = summary.algebraic_error_is_bound;
+  result["newton_iterations"] = summary.newton_iterations;
+  result["short_waves_stiffened_from"] = or_null(summary.stiffened_from);
+  result["limit_load_factors"] = summary.limit_factors;
+  result["branch_load_factors"] = summary.branch_factors;
+  result["cg_iterations"] = summary.cg_iterations;
+  for (const Snap& snap : summary.snaps) {
+    result["snaps"].push_back({{"load_factor", snap.load_factor}, {"distance_mm", snap.distance}});
+  }
+  if (const auto& energy = summary.energy) {
+    result["energy"] = {{"work_mj", energy->work},
+                        {"damped_mj", energy->damped},
+                        {"lost_mj", energy->lost},
+                        {"gained_percent", 1e2 * energy->gained},
+                        {"gaining_step", energy->gaining_step > 0 ? Json(energy->gaining_step) : Json()}};
+  }
+  const std::vector<double>& seconds = summary.seconds_per_step;
+  if (!seconds.empty()) {
+    result["ms_per_step"] = {{"median", 1e3 * median(seconds)},
+                             {"max", 1e3 * *std::max_element(seconds.begin(), seconds.end())}};
+    double wall = 0;
+    for (const double s : seconds) {
+      wall += s;
+    }
+    if (duration && wall > 0) {
+      result["real_time_factor"] = *duration / wall;
+    }
+  }
+}
+
+void report_modes(Json& result, const Summary& summary) {
+  for (const char* key :
+       {"max_displacement_mm", "max_node_displacement_mm", "wall", "volume_after_mm3", "strain_energy_mj"}) {
+    result[key] = nullptr;
+  }
+  result["frequencies_hz"] = summary.frequencies;
+  result["buckling_factors"] = summary.buckling_factors;
+}
+
+std::string modes_note(const Summary& summary, std::size_t asked) {
+  const bool vibrates = !summary.frequencies.empty();
+  const std::vector<double>& values = vibrates ? summary.frequencies : summary.buckling_factors;
+  std::string text =
+      fmt::format("{} {}: {:.6g}", values.size(), vibrates ? "frequencies" : "buckling factors", values.front());
+  if (values.size() > 1) {
+    text += fmt::format(" to {:.6g}", values.back());
+  }
+  return fmt::format("{}{}{}", text, vibrates ? " Hz" : "",
+                     values.size() < asked ? fmt::format(", of {} asked for: there are no more", asked) : "");
+}
+
+std::vector<std::string> run_warnings(const RunSettings& run, const Summary& summary, std::size_t unresolved) {
+  std::vector<std::string> warnings;
+  for (const Snap& snap : summary.snaps) {
+    warnings.push_back(
+        fmt::format("at load factor {:.6g} the path of equilibria breaks off (limit load): the shell snaps, by up "
+                    "to {:.3g} mm, to the next state of rest, from which the load goes on; arc length shows the path, "
+                    "a dynamic run the motion",
+                    snap.load_factor, snap.distance));
+  }
+  if (summary.energy && summary.energy->gaining_step > 0) {
+    warnings.push_back(
+        fmt::format("time integration gains energy, {:.3g} % of the largest so far, more than 10 % from step {} "
+                    "({:.6g} s) on: the steps are too coarse for the motion: take shorter ones, or a smaller "
+                    "spectral_radius",
+                    1e2 * summary.energy->gained, summary.energy->gaining_step, summary.energy->gaining_time));
+  }
+  if (summary.stiffened_from) {
+    warnings.push_back(
+        fmt::format("the mesh is coarse for so thin a curved shell (h^2 > 3 R t): from {} {:.4g} on, where it "
+                    "would have buckled in waves as short as its elements, these were made stiff; whether the shell "
+                    "itself buckles this mesh does not resolve: refine it",
+                    std::holds_alternative<DynamicRun>(run.kind) ? "second" : "load factor", *summary.stiffened_from));
+  }
+  constexpr double notable_residual = 1e-3;
+  if (run.newton_max == 1 && summary.residual > notable_residual) {
+    warnings.push_back(
+        fmt::format("one linearisation per step left {:.2g} of the forces unbalanced in the last one: take "
+                    "smaller steps, or leave newton_max at its default",
+                    summary.residual));
+  }
+  if (unresolved > 0) {
+    warnings.push_back(
+        fmt::format("{} shells bend by more than 30 degrees within themselves: the mesh is too coarse for "
+                    "this load, refine it there",
+                    unresolved));
+  }
+  return warnings;
+}
+
+}  // namespace tunica

@@ -1,0 +1,30 @@
+#pragma once
+
+#include "tunica/core/json.hpp"
+#include "tunica/mechanics/runs/solve.hpp"
+
+/// What a report says of a simulation, key by key as the contract names them (mm, MPa, mJ, s).
+namespace tunica {
+
+/// All keys, undefined until the run fills them.
+void prepare_result(Json& result, const Model& model);
+
+/// What is known of a run that may still fail. The probes' records grow.
+void report_state(Json& result, const Model& model, const State& state, const ElementFields& fields, bool dynamic);
+
+/// Of a run that has ended.
+/// @param duration  s, that was simulated
+void report_summary(Json& result, const Summary& summary, bool converged, std::optional<double> duration);
+
+/// Of a run for modes, after report_summary(): they have shapes, but no size, so nothing of a deformed state is
+/// claimed.
+void report_modes(Json& result, const Summary& summary);
+
+/// A line on the modes found.
+std::string modes_note(const Summary& summary, std::size_t asked);
+
+/// What a user should know of a run that has ended well.
+/// @param unresolved  count_unresolved() of the last state
+std::vector<std::string> run_warnings(const RunSettings& run, const Summary& summary, std::size_t unresolved);
+
+}  // namespace tunica

@@ -1,0 +1,143 @@
+// io/scene: scene files.
+#pragma once
+
+#include "tunica/core/error.hpp"
+#include "tunica/mechanics/model/model.hpp"
+
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+/// What a scene says, before any mesh is read. The scene file (scene_file.hpp) and the flags of tunica-simulate fill
+/// this one structure; check_scene() and load_scene() turn it into a Model for both.
+namespace tunica {
+
+/// Where something was said: "FILE:line:column" or a flag. Every message about it starts with this.
+struct Place {
+  std::string text;
+  bool flag = false;  ///< said on the command line: what is wrong with the value itself is a UsageError
+
+  /// Throws InputError, or UsageError for a flag, with "text: what".
+  [[noreturn]] void fail(const std::string& what) const;
+};
+
+/// The place of an item and of each of its keys.
+struct Places {
+  Place item;
+  std::map<std::string, Place, std::less<>> keys;
+
+  /// The place of `key`, or of the item where the key was not given.
+  [[nodiscard]] const Place& of(std::string_view key) const;
+};
+
+struct SceneShell {
+  std::string name;
+  std::filesystem::path mesh;
+  std::optional<double> unit_mm;  ///< size in mm of the mesh file's unit, for formats that carry none
+  double scale = 1;
+  double thickness = 0;                       ///< mm; not used beside `thickness_from`
+  std::optional<std::string> thickness_from;  ///< per-vertex property of the mesh file, mm
+  Material material;
+  Membrane membrane = Membrane::adapt;
+  Bending bending = Bending::dkt_comas;
+  Rest rest = Rest::curved;
+  Places places;
+};
+
+/// Regions include what lies on their border, to `region_tolerance` of the body's bounding-box diagonal, so that
+/// coordinates written with seven digits (float files, decimal text) still meet their plane.
+inline constexpr double region_tolerance = 1e-6;
+
+struct AllNodes {};
+struct BoundaryNodes {};
+struct RigidMotions {};  ///< not nodes: the six rigid motions of each piece; only in a fix
+struct BoxNodes {
+  Vec3 lower, upper;  ///< mm
+};
+struct HalfSpaceNodes {
+  int axis = 0;
+  double at = 0;  ///< mm
+  bool below = true;
+};
+struct SphereNodes {
+  Vec3 centre;        ///< mm
+  double radius = 0;  ///< mm
+};
+struct ListedNodes {
+  std::vector<Index> nodes;  ///< of the body, in file order
+};
+struct NearestNode {
+  Vec3 point;  ///< mm
+};
+using Selection = std::variant<AllNodes, BoundaryNodes, RigidMotions, BoxNodes, HalfSpaceNodes, SphereNodes,
+                               ListedNodes, NearestNode>;
+
+struct SceneFix {
+  std::string body;
+  Selection where;
+  std::array<bool, 3> translation{true, true, true};
+  std::array<bool, 3> rotation{true, true, true};
+  std::optional<Vec3> displacement;  ///< mm
+  Ramp ramp;
+  Places places;
+};
+
+struct SceneLoad {
+  std::string body;
+  std::optional<Selection> where;  ///< force, moment, edge
+  decltype(Load::kind) kind;       ///< nodes and edges still empty
+  Ramp ramp;
+  Places places;
+};
+
+struct SceneProbe {
+  std::string name;
+  std::string body;
+  Vec3 nearest = Vec3::Zero();  ///< mm
+  Places places;
+};
+
+struct Scene {
+  RunSettings run;
+  bool cg_tolerance_stated = false;
+  std::string until_probe;  ///< of an arc-length run, whose `until` names it; empty where it has none
+  Places run_places;
+  std::vector<SceneShell> shells;
+  std::vector<SceneFix> fixes;
+  std::vector<SceneLoad> loads;
+  std::vector<SceneProbe> probes;
+  std::vector<std::string> notes;  ///< what was understood in a way that the user should know
+};
+
+/// The load factors 1/n, 2/n … 1.
+std::vector<double> equal_load_factors(std::size_t steps);
+
+/// Decides what the statements about CG mean together: a tolerance or a count asks for CG; a count alone is a fixed
+/// count without a requirement (the paper's setting). Errors: a contradiction with solver = "direct".
+void settle_solver(Scene& scene);
+
+/// Finds the probe that `until` of an arc-length run names. Errors: there is none of that name.
+void settle_until(Scene& scene);
+
+/// Checks all that can be checked without a mesh: ranges, signs, required densities, names, duplicates.
+/// Errors: InputError or UsageError that starts with the place.
+void check_scene(const Scene& scene);
+
+struct LoadedScene {
+  Model model;
+  std::vector<std::string> notes;  ///< of the scene and of its meshes (flat facets)
+};
+
+/// Reads the meshes and resolves every name and selection. A mesh without normals is simulated as the flat facets it
+/// holds; a note says so.
+/// Errors: InputError: as read_mesh; a selection that is empty, a node that does not exist.
+LoadedScene load_scene(const Scene& scene);
+
+/// The scene as a scene file with everything resolved: SI units, absolute mesh paths, defaults written out. Reading it
+/// gives the same scene.
+std::string scene_text(const Scene& scene);
+
+}  // namespace tunica

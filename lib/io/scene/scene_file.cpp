@@ -1,0 +1,695 @@
+#include "tunica/io/scene/scene_file.hpp"
+
+#include "tunica/core/quantity.hpp"
+#include "tunica/io/file/output_file.hpp"
+#include "tunica/io/file/suggestion.hpp"
+#include "tunica/io/scene/detail/toml_depth.hpp"
+
+#include <fmt/format.h>
+#include <toml++/toml.h>
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+
+namespace tunica {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr std::size_t most_bytes = std::size_t{64} << 20;
+constexpr std::int64_t most_steps = 1'000'000'000;
+constexpr std::int64_t most_load_steps = 1'000'000;
+constexpr std::int64_t most_modes = 10'000;
+
+using Keys = std::span<const std::string_view>;
+
+// One table of the file, and what it may hold.
+class Table {
+public:
+  // @param known  keys of this table; `later`: keys that a later version brings
+  Table(const toml::table& table, const std::string& file, std::string name, Keys known, Keys later = {})
+      : table_(table), file_(file), name_(std::move(name)) {
+    for (const auto& [key, value] : table) {
+      const Place place = at(key.source());
+      places_.keys.emplace(std::string(key.str()), at(value.source()));
+      if (std::find(later.begin(), later.end(), key.str()) != later.end()) {
+        throw UsageError(fmt::format("{}: {} in {}: not available yet", place.text, key.str(), name_));
+      }
+      if (std::find(known.begin(), known.end(), key.str()) == known.end()) {
+        place.fail(fmt::format("unknown key '{}' in {}: {}", key.str(), name_, suggestion(key.str(), known)));
+      }
+    }
+    places_.item = at(table.source());
+  }
+
+  [[nodiscard]] const Places& places() const { return places_; }
+  [[nodiscard]] const Place& place(std::string_view key) const { return places_.of(key); }
+  [[nodiscard]] bool has(std::string_view key) const { return table_.contains(key); }
+
+  [[nodiscard]] const toml::node& required(std::string_view key, std::string_view why = {}) const {
+    const toml::node* node = table_.get(key);
+    if (node == nullptr) {
+      places_.item.fail(fmt::format("{} has no '{}'{}: add it", name_, key, why));
+    }
+    return *node;
+  }
+
+  [[nodiscard]] std::string text(std::string_view key) const { return text_of(required(key), key); }
+  [[nodiscard]] std::optional<std::string> optional_text(std::string_view key) const {
+    return has(key) ? std::optional(text(key)) : std::nullopt;
+  }
+
+  template <typename Value>
+  void choice(std::string_view key, Value& value,
+              std::initializer_list<std::pair<std::string_view, Value>> choices) const {
+    if (!has(key)) {
+      return;
+    }
+    const std::string word = text(key);
+    std::vector<std::string_view> words;
+    for (const auto& [name, meaning] : choices) {
+      if (word == name) {
+        value = meaning;
+        return;
+      }
+      words.push_back(name);
+    }
+    place(key).fail(fmt::format("{} = \"{}\" in {} is not known: {}", key, word, name_, suggestion(word, words)));
+  }
+
+  [[nodiscard]] double quantity(std::string_view key, Dimension dimension, std::string_view why = {}) const {
+    return quantity_of(required(key, why), key, dimension);
+  }
+
+  [[nodiscard]] double number(std::string_view key) const { return number_of(required(key), key); }
+
+  [[nodiscard]] bool flag(std::string_view key) const {
+    const auto value = required(key).value_exact<bool>();
+    if (!value) {
+      place(key).fail(fmt::format("{} must be true or false", key));
+    }
+    return *value;
+  }
+
+  // A whole number from 1 to `most`.
+  [[nodiscard]] std::size_t count(std::string_view key, std::int64_t most = most_steps) const {
+    const auto value = required(key).value_exact<std::int64_t>();
+    if (!value || *value < 1 || *value > most) {
+      place(key).fail(fmt::format("{} must be a whole number from 1 to {}", key, most));
+    }
+    return static_cast<std::size_t>(*value);
+  }
+
+  [[nodiscard]] const toml::array& array(std::string_view key, std::string_view like) const {
+    const toml::array* values = required(key).as_array();
+    if (values == nullptr) {
+      place(key).fail(fmt::format("{} must be a list, for example {}", key, like));
+    }
+    return *values;
+  }
+
+  [[nodiscard]] Vec3 vector(std::string_view key, Dimension dimension, std::string_view like) const {
+    return vector_of(required(key), key, dimension, like);
+  }
+
+  [[nodiscard]] Vec3 vector_of(const toml::node& node, std::string_view key, Dimension dimension,
+                               std::string_view like) const {
+    const toml::array* values = node.as_array();
+    if (values == nullptr || values->size() != 3) {
+      at(node.source()).fail(fmt::format("{} must be a list of three quantities, for example {}", key, like));
+    }
+    Vec3 result;
+    for (std::size_t i = 0; i < 3; ++i) {
+      result[static_cast<Eigen::Index>(i)] = quantity_of((*values)[i], key, dimension);
+    }
+    return result;
+  }
+
+  [[nodiscard]] double quantity_of(const toml::node& node, std::string_view key, Dimension dimension) const {
+    const auto text = node.value_exact<std::string>();
+    try {
+      if (!text && (node.is_integer() || node.is_floating_point())) {
+        // The message of a bare number, which shows the right spelling.
+        return parse_quantity(fmt::format("{}", node.value<double>().value_or(0)), dimension);
+      }
+      if (!text) {
+        at(node.source()).fail(fmt::format("{} must be a text with a number and a unit", key));
+      }
+      return parse_quantity(*text, dimension);
+    } catch (const UsageError& error) {
+      at(node.source()).fail(fmt::format("{}: {}", key, error.what()));
+    }
+  }
+
+  [[nodiscard]] double number_of(const toml::node& node, std::string_view key) const {
+    const auto value = node.value<double>();
+    if (!value || !(node.is_integer() || node.is_floating_point()) || !std::isfinite(*value)) {
+      at(node.source()).fail(fmt::format("{} must be a finite number without a unit", key));
+    }
+    return *value;
+  }
+
+  [[nodiscard]] std::string text_of(const toml::node& node, std::string_view key) const {
+    const auto value = node.value_exact<std::string>();
+    if (!value) {
+      at(node.source()).fail(fmt::format("{} must be a text in quotes", key));
+    }
+    if (value->find('\0') != std::string::npos) {
+      at(node.source()).fail(fmt::format("{} holds a zero byte", key));
+    }
+    return *value;
+  }
+
+  [[nodiscard]] const toml::table& table(std::string_view key, std::string_view like) const {
+    const toml::table* inner = required(key).as_table();
+    if (inner == nullptr) {
+      place(key).fail(fmt::format("{} must be a table, for example {}", key, like));
+    }
+    return *inner;
+  }
+
+  [[nodiscard]] Place at(const toml::source_region& region) const {
+    return {fmt::format("{}:{}:{}", file_, region.begin.line, region.begin.column)};
+  }
+
+  [[nodiscard]] const std::string& file() const { return file_; }
+  [[nodiscard]] const std::string& name() const { return name_; }
+
+private:
+  const toml::table& table_;
+  const std::string& file_;
+  std::string name_;
+  Places places_;
+};
+
+constexpr std::string_view like_point = R"(["0mm", "0mm", "10mm"])";
+
+HalfSpaceNodes read_half_space(const Table& where, std::string_view key) {
+  constexpr std::array<std::string_view, 2> keys{"axis", "at"};
+  const Table inner(where.table(key, R"({axis = "z", at = "1mm"})"), where.file(), std::string(key), keys);
+  HalfSpaceNodes half;
+  half.below = key == "below";
+  (void)inner.required("axis");
+  inner.choice<int>("axis", half.axis, {{"x", 0}, {"y", 1}, {"z", 2}});
+  half.at = inner.quantity("at", dimension::length);
+  return half;
+}
+
+Selection read_where(const Table& item) {
+  constexpr std::array<std::string_view, 9> forms{"boundary", "rigid_motions", "all",   "box",    "below",
+                                                  "above",    "sphere",        "nodes", "nearest"};
+  const toml::table& table = item.table("where", "{boundary = true}");
+  const Table where(table, item.file(), "where", forms);
+  if (table.size() != 1) {
+    item.place("where").fail(
+        fmt::format("where must hold exactly one of {}, this one holds {}", fmt::join(forms, ", "), table.size()));
+  }
+  const std::string_view form = table.begin()->first.str();
+  if (form == "boundary" || form == "rigid_motions" || form == "all") {
+    if (!where.flag(form)) {
+      where.place(form).fail(fmt::format("{} = false selects nothing: remove it", form));
+    }
+    if (form == "all") {
+      return AllNodes{};
+    }
+    return form == "boundary" ? Selection(BoundaryNodes{}) : Selection(RigidMotions{});
+  }
+  if (form == "box") {
+    constexpr std::string_view like = R"([["0mm", "0mm", "0mm"], ["1mm", "1mm", "1mm"]])";
+    const toml::array& corners = where.array(form, like);
+    if (corners.size() != 2) {
+      where.place(form).fail(fmt::format("box must be its lower and its upper corner, for example {}", like));
+    }
+    const BoxNodes box{where.vector_of(corners[0], "box", dimension::length, like_point),
+                       where.vector_of(corners[1], "box", dimension::length, like_point)};
+    if (!(box.lower.array() <= box.upper.array()).all()) {
+      where.place(form).fail("box has a lower corner above its upper one: swap the coordinates");
+    }
+    return box;
+  }
+  if (form == "below" || form == "above") {
+    return read_half_space(where, form);
+  }
+  if (form == "sphere") {
+    constexpr std::array<std::string_view, 2> keys{"centre", "radius"};
+    constexpr std::string_view like = R"({centre = ["0mm", "0mm", "0mm"], radius = "2mm"})";
+    const Table inner(where.table(form, like), where.file(), "sphere", keys);
+    const SphereNodes sphere{inner.vector("centre", dimension::length, like_point),
+                             inner.quantity("radius", dimension::length)};
+    if (!(sphere.radius >= 0)) {
+      inner.place("radius").fail("radius must not be negative");
+    }
+    return sphere;
+  }
+  if (form == "nodes") {
+    ListedNodes list;
+    for (const toml::node& node : where.array(form, "[3, 4]")) {
+      const auto index = node.value_exact<std::int64_t>();
+      if (!index || *index < 0 || *index > static_cast<std::int64_t>(max_index)) {
+        where.at(node.source()).fail("nodes must be whole numbers from 0, in the order of the mesh file");
+      }
+      list.nodes.push_back(static_cast<Index>(*index));
+    }
+    return list;
+  }
+  return NearestNode{where.vector("nearest", dimension::length, like_point)};
+}
+
+// A table over time; in a static run the load factor plays the part of time.
+Ramp read_ramp(const Table& item, bool dynamic, Scene& scene) {
+  Ramp ramp;
+  if (!item.has("ramp")) {
+    return ramp;
+  }
+  const std::string_view like = dynamic ? R"([["0s", 0.0], ["1s", 1.0]])" : "[[0.0, 0.0], [1.0, 1.0]]";
+  for (const toml::node& node : item.array("ramp", like)) {
+    const toml::array* point = node.as_array();
+    if (point == nullptr || point->size() != 2) {
+      item.at(node.source()).fail(fmt::format("ramp must be a list of pairs, for example {}", like));
+    }
+    const toml::node& when = (*point)[0];
+    const bool load_factor = !dynamic && (when.is_integer() || when.is_floating_point());
+    const double time = load_factor ? item.number_of(when, "ramp") : item.quantity_of(when, "ramp", dimension::time);
+    if (!dynamic && !load_factor && ramp.points.empty()) {
+      scene.notes.push_back(item.place("ramp").text +
+                            ": a static run has no time: the ramp is read over the load factor, 1s as factor 1");
+    }
+    if (!ramp.points.empty() && !(time > ramp.points.back().first)) {
+      item.at(when.source()).fail("the times of a ramp must increase");
+    }
+    ramp.points.emplace_back(time, item.number_of((*point)[1], "ramp"));
+  }
+  if (ramp.points.empty()) {
+    item.place("ramp").fail(fmt::format("ramp is empty: write for example {}", like));
+  }
+  return ramp;
+}
+
+// A fix says which components it holds: neither "all" nor "none" may be meant by silence.
+std::array<bool, 3> read_components(const Table& item, std::string_view key) {
+  const std::string text = item.text_of(item.required(key, R"( ("xyz" holds all axes, "" none))"), key);
+  std::array<bool, 3> held{false, false, false};
+  for (const char c : text) {
+    const std::size_t axis = static_cast<std::size_t>(c - 'x');
+    if (c < 'x' || c > 'z' || held[axis]) {
+      item.place(key).fail(
+          fmt::format("{} = \"{}\" must name each held axis once: \"xyz\", \"z\", or \"\" for none", key, text));
+    }
+    held[axis] = true;
+  }
+  return held;
+}
+
+// Which kinds of run a key belongs to; `kind` is none of them.
+void refuse_keys(const Table& run, std::string_view kind, std::string_view owners,
+                 std::initializer_list<std::string_view> keys) {
+  for (const std::string_view key : keys) {
+    if (run.has(key)) {
+      run.place(key).fail(fmt::format("{} belongs to a {} run, and kind is \"{}\": remove it", key, owners, kind));
+    }
+  }
+}
+
+void read_static(const Table& run, StaticRun& settings) {
+  run.choice<bool>("geometry", settings.linear, {{"nonlinear", false}, {"linear", true}});
+  if (run.has("load_steps") && run.has("load_factors")) {
+    run.place("load_factors").fail("load_steps and load_factors contradict each other: give one");
+  }
+  if (!run.has("load_factors")) {
+    settings.load_factors = equal_load_factors(run.has("load_steps") ? run.count("load_steps", most_load_steps) : 1);
+    return;
+  }
+  for (const toml::node& node : run.array("load_factors", "[0.1, 0.2, 1.0]")) {
+    const double factor = run.number_of(node, "load_factors");
+    if (!(factor > (settings.load_factors.empty() ? 0 : settings.load_factors.back()))) {
+      run.at(node.source()).fail("load_factors must increase from above 0");
+    }
+    settings.load_factors.push_back(factor);
+  }
+  if (settings.load_factors.empty()) {
+    run.place("load_factors").fail("load_factors is empty: write for example [0.1, 0.2, 1.0]");
+  }
+}
+
+void read_arc_length(const Table& run, Scene& scene) {
+  auto& settings = scene.run.kind.emplace<ArcLengthRun>();
+  bool linear = false;
+  run.choice<bool>("geometry", linear, {{"nonlinear", false}, {"linear", true}});
+  if (linear) {
+    run.place("geometry").fail("a linear run has no path to follow: remove control = \"arc-length\"");
+  }
+  if (run.has("load_factors")) {
+    run.place("load_factors").fail("arc length finds the load factors: remove load_factors");
+  }
+  if (run.has("load_steps")) {
+    settings.first_factor = 1 / static_cast<double>(run.count("load_steps", most_load_steps));
+  }
+  if (run.has("max_steps")) {
+    settings.max_steps = run.count("max_steps", most_load_steps);
+  }
+  if (run.has("max_factor")) {
+    settings.max_factor = run.number("max_factor");
+  }
+  if (run.has("until")) {
+    constexpr std::array<std::string_view, 3> keys{"probe", "axis", "reaches"};
+    const Table until(run.table("until", R"({probe = "tip", axis = "z", reaches = "30mm"})"), run.file(), "until",
+                      keys);
+    scene.until_probe = until.text("probe");
+    ArcLengthRun::Until& goal = settings.until.emplace();
+    (void)until.required("axis");
+    until.choice<int>("axis", goal.axis, {{"x", 0}, {"y", 1}, {"z", 2}});
+    goal.reaches = until.quantity("reaches", dimension::length);
+  } else if (!settings.max_factor && !run.has("max_steps")) {
+    settings.max_factor = 1;
+  }
+}
+
+void read_dynamic(const Table& run, DynamicRun& settings) {
+  bool linear = false;
+  run.choice<bool>("geometry", linear, {{"nonlinear", false}, {"linear", true}});
+  if (linear) {
+    throw UsageError(
+        fmt::format("{}: geometry = \"linear\" in a dynamic run: not available yet", run.place("geometry").text));
+  }
+  settings.duration = run.quantity("duration", dimension::time, " (a dynamic run needs it)");
+  settings.step = run.quantity("step", dimension::time, " (a dynamic run needs it)");
+  run.choice<Integrator>(
+      "integrator", settings.integrator,
+      {{"backward-euler", Integrator::backward_euler}, {"generalised-alpha", Integrator::generalised_alpha}});
+  if (run.has("spectral_radius")) {
+    if (settings.integrator != Integrator::generalised_alpha) {
+      run.place("spectral_radius")
+          .fail("spectral_radius belongs to integrator = \"generalised-alpha\": remove it, or choose that integrator");
+    }
+    settings.spectral_radius = run.number("spectral_radius");
+  }
+  if (run.has("adaptive")) {
+    try {
+      settings.adaptive = parse_length_tolerance(run.text("adaptive"));
+    } catch (const UsageError& error) {
+      run.place("adaptive").fail(fmt::format("adaptive: {}", error.what()));
+    }
+  }
+  if (run.has("damping")) {
+    constexpr std::array<std::string_view, 2> keys{"mass", "stiffness"};
+    const Table damping(run.table("damping", R"({mass = "0.1/s", stiffness = "2ms"})"), run.file(), "damping", keys);
+    settings.damping.mass = damping.has("mass") ? damping.quantity("mass", dimension::rate) : 0;
+    settings.damping.stiffness = damping.has("stiffness") ? damping.quantity("stiffness", dimension::time) : 0;
+    for (const std::string_view key : keys) {
+      if ((key == "mass" ? settings.damping.mass : settings.damping.stiffness) < 0) {
+        damping.place(key).fail(fmt::format("damping {} must not be negative", key));
+      }
+    }
+  }
+}
+
+double read_cg_tolerance(const Table& run) {
+  const toml::node& node = run.required("cg_tolerance");
+  if (!node.is_string()) {
+    return run.number_of(node, "cg_tolerance");
+  }
+  try {
+    return parse_percent(run.text("cg_tolerance"));
+  } catch (const UsageError& error) {
+    run.place("cg_tolerance").fail(fmt::format("cg_tolerance: {}", error.what()));
+  }
+}
+
+void read_run(const toml::table& table, const std::string& file, Scene& scene) {
+  constexpr std::array<std::string_view, 21> keys{
+      "kind",    "geometry",   "load_steps",      "load_factors", "control",       "duration",   "step",
+      "damping", "integrator", "solver",          "cg_tolerance", "cg_iterations", "converge",   "newton_max",
+      "every",   "count",      "spectral_radius", "adaptive",     "max_steps",     "max_factor", "until"};
+  const Table run(table, file, "[run]", keys);
+  scene.run_places = run.places();
+
+  enum class Kind { is_static, dynamic, frequencies, buckling } kind = Kind::is_static;
+  const std::string name = run.text("kind");
+  run.choice<Kind>("kind", kind,
+                   {{"static", Kind::is_static},
+                    {"dynamic", Kind::dynamic},
+                    {"frequencies", Kind::frequencies},
+                    {"buckling", Kind::buckling}});
+  if (kind != Kind::dynamic) {
+    refuse_keys(run, name, "dynamic", {"duration", "step", "damping", "integrator", "spectral_radius", "adaptive"});
+  }
+  if (kind != Kind::is_static) {
+    refuse_keys(run, name, "control = \"arc-length\"", {"max_steps", "max_factor", "until"});
+  }
+  if (kind != Kind::frequencies && kind != Kind::buckling) {
+    refuse_keys(run, name, "frequencies or buckling", {"count"});
+  }
+  const auto read_count = [&](std::size_t& count) {
+    if (run.has("count")) {
+      count = run.count("count", most_modes);
+    }
+  };
+  switch (kind) {
+    case Kind::is_static: {
+      bool by_arc_length = false;
+      run.choice<bool>("control", by_arc_length, {{"load", false}, {"arc-length", true}});
+      if (by_arc_length) {
+        read_arc_length(run, scene);
+      } else {
+        refuse_keys(run, name, "control = \"arc-length\"", {"max_steps", "max_factor", "until"});
+        read_static(run, scene.run.kind.emplace<StaticRun>());
+      }
+      break;
+    }
+    case Kind::dynamic:
+      refuse_keys(run, name, "static", {"load_steps", "load_factors", "control"});
+      read_dynamic(run, scene.run.kind.emplace<DynamicRun>());
+      break;
+    case Kind::frequencies: {
+      refuse_keys(run, name, "static", {"control"});
+      auto& frequencies = scene.run.kind.emplace<FrequencyRun>();
+      read_static(run, frequencies.preload);
+      if (frequencies.preload.linear) {
+        refuse_keys(run, name, "nonlinear", {"load_steps", "load_factors"});
+      }
+      read_count(frequencies.count);
+      break;
+    }
+    case Kind::buckling:
+      refuse_keys(run, name, "static", {"geometry", "load_steps", "load_factors", "control"});
+      read_count(scene.run.kind.emplace<BucklingRun>().count);
+      break;
+  }
+
+  run.choice<Solver>("solver", scene.run.solver,
+                     {{"auto", Solver::automatic}, {"cg", Solver::cg}, {"direct", Solver::direct}});
+  if (run.has("cg_tolerance")) {
+    scene.run.cg_tolerance = read_cg_tolerance(run);
+    scene.cg_tolerance_stated = true;
+  }
+  if (run.has("cg_iterations")) {
+    scene.run.cg_iterations = run.count("cg_iterations");
+  }
+  if (run.has("converge")) {
+    scene.run.converge = run.number("converge");
+  }
+  if (run.has("newton_max")) {
+    scene.run.newton_max = run.count("newton_max");
+  }
+  if (run.has("every")) {
+    scene.run.every = run.count("every");
+  }
+}
+
+void read_shell(const Table& table, const fs::path& folder, Scene& scene) {
+  SceneShell shell;
+  shell.places = table.places();
+  shell.name = table.text("name");
+  shell.mesh = folder / table.text("mesh");
+  if (table.has("unit")) {
+    try {
+      shell.unit_mm = parse_length_unit(table.text("unit"));
+    } catch (const UsageError& error) {
+      table.place("unit").fail(fmt::format("unit: {}", error.what()));
+    }
+  }
+  if (table.has("scale")) {
+    shell.scale = table.number("scale");
+  }
+  shell.thickness_from = table.optional_text("thickness_from");
+  if (shell.thickness_from && table.has("thickness")) {
+    table.place("thickness_from").fail("thickness and thickness_from contradict each other: give one");
+  }
+  if (!shell.thickness_from) {
+    shell.thickness = table.quantity("thickness", dimension::length, " (nor thickness_from)");
+  }
+  shell.material.young = table.quantity("young", dimension::pressure);
+  shell.material.poisson = table.number("poisson");
+  if (table.has("density")) {
+    shell.material.density = table.quantity("density", dimension::density);
+  }
+  table.choice<Membrane>("membrane", shell.membrane,
+                         {{"cst", Membrane::cst}, {"opt", Membrane::opt}, {"adapt", Membrane::adapt}});
+  table.choice<Bending>("bending", shell.bending,
+                        {{"comas", Bending::comas},
+                         {"comas-consistent", Bending::comas_consistent},
+                         {"dkt", Bending::dkt},
+                         {"dkt-comas", Bending::dkt_comas}});
+  table.choice<Rest>("rest", shell.rest, {{"curved", Rest::curved}, {"flat", Rest::flat}});
+  scene.shells.push_back(std::move(shell));
+}
+
+void read_fix(const Table& table, bool dynamic, Scene& scene) {
+  SceneFix fix;
+  fix.places = table.places();
+  fix.body = table.text("body");
+  fix.where = read_where(table);
+  if (std::holds_alternative<RigidMotions>(fix.where)) {
+    for (const std::string_view key : {"translation", "rotation", "displacement", "ramp"}) {
+      if (table.has(key)) {
+        table.place(key).fail(fmt::format("{} means nothing beside rigid_motions: remove it", key));
+      }
+    }
+  } else {
+    fix.translation = read_components(table, "translation");
+    fix.rotation = read_components(table, "rotation");
+    if (table.has("displacement")) {
+      fix.displacement = table.vector("displacement", dimension::length, R"(["0mm", "0mm", "1mm"])");
+    }
+    if (table.has("ramp") && !fix.displacement) {
+      table.place("ramp").fail("ramp in [[fix]] needs a displacement: add it, or remove the ramp");
+    }
+    fix.ramp = read_ramp(table, dynamic, scene);
+  }
+  scene.fixes.push_back(std::move(fix));
+}
+
+void read_load(const toml::table& node, const std::string& file, bool dynamic, Scene& scene) {
+  constexpr std::array<std::string_view, 6> all{"body", "kind", "value", "follower", "ramp", "where"};
+  const Table table(node, file, "[[load]]", all);
+  SceneLoad load;
+  load.places = table.places();
+  load.body = table.text("body");
+
+  enum class Kind { pressure, force, moment, edge, area, gravity } kind = Kind::pressure;
+  (void)table.required("kind");
+  table.choice<Kind>("kind", kind,
+                     {{"pressure", Kind::pressure},
+                      {"force", Kind::force},
+                      {"moment", Kind::moment},
+                      {"edge", Kind::edge},
+                      {"area", Kind::area},
+                      {"gravity", Kind::gravity}});
+  if (kind != Kind::pressure && table.has("follower")) {
+    table.place("follower").fail("follower belongs to a pressure: remove it");
+  }
+  if (kind == Kind::force || kind == Kind::moment || kind == Kind::edge) {
+    (void)table.required("where", " (which nodes carry the load)");
+    load.where = read_where(table);
+    if (std::holds_alternative<RigidMotions>(*load.where)) {
+      table.place("where").fail("rigid_motions belongs to [[fix]]: select nodes");
+    }
+  } else if (table.has("where")) {
+    table.place("where").fail(
+        fmt::format("a load of kind {} acts on the whole body: remove where", table.text("kind")));
+  }
+  switch (kind) {
+    case Kind::pressure:
+      load.kind =
+          PressureLoad{table.quantity("value", dimension::pressure), !table.has("follower") || table.flag("follower")};
+      break;
+    case Kind::force:
+      load.kind = ForceLoad{{}, table.vector("value", dimension::force, R"(["0N", "0N", "-1N"])")};
+      break;
+    case Kind::moment:
+      load.kind = MomentLoad{{}, table.vector("value", dimension::moment, R"(["0N*mm", "0N*mm", "1N*mm"])")};
+      break;
+    case Kind::edge:
+      load.kind = EdgeLoad{{}, table.vector("value", dimension::force_per_length, R"(["0N/mm", "0N/mm", "1N/mm"])")};
+      break;
+    case Kind::area:
+      load.kind = AreaLoad{table.vector("value", dimension::pressure, R"(["0kPa", "0kPa", "1kPa"])")};
+      break;
+    case Kind::gravity:
+      load.kind = GravityLoad{table.vector("value", dimension::acceleration, R"(["0m/s2", "0m/s2", "-9.81m/s2"])")};
+      break;
+  }
+  load.ramp = read_ramp(table, dynamic, scene);
+  scene.loads.push_back(std::move(load));
+}
+
+toml::table parse_toml(const std::string& bytes, const std::string& file) {
+  constexpr std::size_t deepest = 64;
+  if (longest_dotted_key(bytes) > deepest) {
+    throw InputError(fmt::format("{}: it has a key of more than {} dotted parts, which no scene needs", file, deepest));
+  }
+  try {
+    return toml::parse(bytes, std::string_view(file));
+  } catch (const toml::parse_error& error) {
+    const auto& begin = error.source().begin;
+    throw InputError(fmt::format("{}:{}:{}: {}, correct the TOML there", file, begin.line, begin.column,
+                                 std::string(error.description())));
+  }
+}
+
+// The tables of [[name]]; an empty list where there are none.
+std::vector<const toml::table*> tables_of(const toml::table& root, std::string_view name, const Table& top) {
+  std::vector<const toml::table*> tables;
+  const toml::node* node = root.get(name);
+  if (node == nullptr) {
+    return tables;
+  }
+  const toml::array* items = node->as_array();
+  if (items == nullptr) {
+    top.place(name).fail(fmt::format("{0} must be written as [[{0}]], once per item", name));
+  }
+  for (const toml::node& item : *items) {
+    if (!item.is_table()) {
+      top.at(item.source()).fail(fmt::format("{0} must be written as [[{0}]], once per item", name));
+    }
+    tables.push_back(item.as_table());
+  }
+  return tables;
+}
+
+}  // namespace
+
+Scene read_scene(const fs::path& path) { return parse_scene(read_file(path, most_bytes), path); }
+
+Scene parse_scene(const std::string& text, const fs::path& name) {
+  const std::string file = name.string();
+  const toml::table root = parse_toml(text, file);
+  constexpr std::array<std::string_view, 5> sections{"run", "shell", "fix", "load", "probe"};
+  constexpr std::array<std::string_view, 4> later{"solid", "rigid", "attach", "contact"};
+  const Table top(root, file, "the scene", sections, later);
+
+  Scene scene;
+  const toml::table* run = top.required("run").as_table();
+  if (run == nullptr) {
+    top.place("run").fail("run must be written as [run], once");
+  }
+  read_run(*run, file, scene);
+  const bool dynamic = std::holds_alternative<DynamicRun>(scene.run.kind);
+
+  constexpr std::array<std::string_view, 12> shell_keys{"name",      "mesh",           "unit",    "scale",
+                                                        "thickness", "thickness_from", "young",   "poisson",
+                                                        "density",   "membrane",       "bending", "rest"};
+  for (const toml::table* table : tables_of(root, "shell", top)) {
+    read_shell(Table(*table, file, "[[shell]]", shell_keys), name.parent_path(), scene);
+  }
+  constexpr std::array<std::string_view, 6> fix_keys{"body",     "where",        "translation",
+                                                     "rotation", "displacement", "ramp"};
+  for (const toml::table* table : tables_of(root, "fix", top)) {
+    read_fix(Table(*table, file, "[[fix]]", fix_keys), dynamic, scene);
+  }
+  for (const toml::table* table : tables_of(root, "load", top)) {
+    read_load(*table, file, dynamic, scene);
+  }
+  constexpr std::array<std::string_view, 3> probe_keys{"name", "body", "nearest"};
+  for (const toml::table* node : tables_of(root, "probe", top)) {
+    const Table table(*node, file, "[[probe]]", probe_keys);
+    scene.probes.push_back({table.text("name"), table.text("body"),
+                            table.vector("nearest", dimension::length, like_point), table.places()});
+  }
+  settle_until(scene);
+  settle_solver(scene);
+  check_scene(scene);
+  return scene;
+}
+
+}  // namespace tunica

@@ -1,0 +1,330 @@
+#include "tunica/io/scene/scene.hpp"
+
+#include "tunica/core/quantity.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <cmath>
+
+namespace tunica {
+namespace {
+
+// The shortest decimal with this unit that reads as the same double again. Where no decimal does (scaling by the unit
+// skips some doubles), the nearest value that has one.
+std::string quantity(double value, std::string_view unit, Dimension dimension) {
+  const double size = parse_quantity(fmt::format("1{}", unit), dimension);
+  const auto text_with = [&](double wanted, int digits) {
+    return fmt::format("{:.{}g}{}", wanted / size, digits, unit);
+  };
+  for (int attempt = 0; attempt < 2; ++attempt) {
+    for (int digits = 1; digits <= 17; ++digits) {
+      const std::string text = text_with(value, digits);
+      if (parse_quantity(text, dimension) == value) {
+        return text;
+      }
+    }
+    value = parse_quantity(text_with(value, 17), dimension);
+  }
+  return text_with(value, 17);
+}
+
+std::string toml_string(std::string_view text) {
+  std::string result = "\"";
+  for (const char c : text) {
+    const auto code = static_cast<unsigned char>(c);
+    if (c == '"' || c == '\\') {
+      result += '\\';
+      result += c;
+    } else if (code < 0x20 || code == 0x7f) {
+      result += fmt::format("\\u{:04X}", code);
+    } else {
+      result += c;
+    }
+  }
+  return result + "\"";
+}
+
+// A TOML float: "1" alone would be an integer, which reads the same but says less.
+std::string number(double value) {
+  std::string text = fmt::format("{}", value);
+  return text.find_first_of(".en") == std::string::npos ? text + ".0" : text;
+}
+
+std::string vector(const Vec3& value, std::string_view unit, Dimension dimension) {
+  return fmt::format("[{}, {}, {}]", toml_string(quantity(value.x(), unit, dimension)),
+                     toml_string(quantity(value.y(), unit, dimension)),
+                     toml_string(quantity(value.z(), unit, dimension)));
+}
+
+std::string point(const Vec3& value) { return vector(value, "m", dimension::length); }
+
+class Text {
+public:
+  void section(std::string_view header) { text_ += fmt::format("{}{}\n", text_.empty() ? "" : "\n", header); }
+  void line(std::string_view key, const std::string& value) { text_ += fmt::format("{} = {}\n", key, value); }
+  void word(std::string_view key, std::string_view value) { line(key, toml_string(value)); }
+  void value(std::string_view key, double value, std::string_view unit, Dimension dimension) {
+    word(key, quantity(value, unit, dimension));
+  }
+  void ramp(const Ramp& ramp, bool dynamic) {
+    if (ramp.points.empty()) {
+      return;
+    }
+    std::vector<std::string> pairs;
+    for (const auto& [time, factor] : ramp.points) {
+      const std::string when = dynamic ? toml_string(quantity(time, "s", dimension::time)) : number(time);
+      pairs.push_back(fmt::format("[{}, {}]", when, number(factor)));
+    }
+    line("ramp", fmt::format("[{}]", fmt::join(pairs, ", ")));
+  }
+  [[nodiscard]] const std::string& str() const { return text_; }
+
+private:
+  std::string text_;
+};
+
+void write_load_factors(const std::vector<double>& factors, Text& text) {
+  const std::size_t steps = factors.size();
+  if (factors == equal_load_factors(steps)) {
+    text.line("load_steps", std::to_string(steps));
+    return;
+  }
+  std::vector<std::string> numbers;
+  for (const double factor : factors) {
+    numbers.push_back(number(factor));
+  }
+  text.line("load_factors", fmt::format("[{}]", fmt::join(numbers, ", ")));
+}
+
+void write_kind_of_run(const StaticRun& run, Text& text) {
+  text.word("kind", "static");
+  text.word("geometry", run.linear ? "linear" : "nonlinear");
+  text.word("control", "load");
+  write_load_factors(run.load_factors, text);
+}
+
+void write_kind_of_run(const DynamicRun& run, Text& text) {
+  text.word("kind", "dynamic");
+  text.word("geometry", "nonlinear");
+  text.value("duration", run.duration, "s", dimension::time);
+  text.value("step", run.step, "s", dimension::time);
+  text.line("damping",
+            fmt::format("{{mass = {}, stiffness = {}}}", toml_string(quantity(run.damping.mass, "/s", dimension::rate)),
+                        toml_string(quantity(run.damping.stiffness, "s", dimension::time))));
+  if (run.integrator == Integrator::generalised_alpha) {
+    text.word("integrator", "generalised-alpha");
+    text.line("spectral_radius", number(run.spectral_radius));
+  } else {
+    text.word("integrator", "backward-euler");
+  }
+  if (run.adaptive) {
+    text.word("adaptive", run.adaptive->relative ? number(1e2 * run.adaptive->value) + "%"
+                                                 : quantity(run.adaptive->value, "m", dimension::length));
+  }
+}
+
+void write_kind_of_run(const FrequencyRun& run, Text& text) {
+  text.word("kind", "frequencies");
+  text.line("count", std::to_string(run.count));
+  text.word("geometry", run.preload.linear ? "linear" : "nonlinear");
+  if (!run.preload.linear) {
+    write_load_factors(run.preload.load_factors, text);
+  }
+}
+
+void write_kind_of_run(const ArcLengthRun&, Text&) { TUNICA_ASSERT(false && "needs the probe's name"); }
+
+void write_kind_of_run(const BucklingRun& run, Text& text) {
+  text.word("kind", "buckling");
+  text.line("count", std::to_string(run.count));
+}
+
+void write_path(const ArcLengthRun& run, const std::string& probe, Text& text) {
+  text.word("kind", "static");
+  text.word("geometry", "nonlinear");
+  text.word("control", "arc-length");
+  text.line("load_steps", std::to_string(std::lround(1 / run.first_factor)));
+  text.line("max_steps", std::to_string(run.max_steps));
+  if (run.max_factor) {
+    text.line("max_factor", number(*run.max_factor));
+  }
+  if (run.until) {
+    text.line("until", fmt::format("{{probe = {}, axis = \"{}\", reaches = {}}}", toml_string(probe),
+                                   "xyz"[static_cast<std::size_t>(run.until->axis)],
+                                   toml_string(quantity(run.until->reaches, "m", dimension::length))));
+  }
+}
+
+void write_run(const Scene& scene, Text& text) {
+  const RunSettings& run = scene.run;
+  text.section("[run]");
+  if (const auto* path = std::get_if<ArcLengthRun>(&run.kind)) {
+    write_path(*path, scene.until_probe, text);
+  } else {
+    std::visit([&](const auto& kind) { write_kind_of_run(kind, text); }, run.kind);
+  }
+  text.word("solver", run.solver == Solver::cg ? "cg" : run.solver == Solver::direct ? "direct" : "auto");
+  if (scene.cg_tolerance_stated) {
+    text.line("cg_tolerance", number(run.cg_tolerance));
+  }
+  if (run.cg_iterations) {
+    text.line("cg_iterations", std::to_string(*run.cg_iterations));
+  }
+  text.line("converge", number(run.converge));
+  text.line("newton_max", std::to_string(run.newton_max));
+  text.line("every", std::to_string(run.every));
+}
+
+std::string_view name_of(Membrane membrane) {
+  switch (membrane) {
+    case Membrane::cst:
+      return "cst";
+    case Membrane::opt:
+      return "opt";
+    case Membrane::adapt:
+      return "adapt";
+  }
+  return {};
+}
+
+std::string_view name_of(Bending bending) {
+  switch (bending) {
+    case Bending::comas:
+      return "comas";
+    case Bending::comas_consistent:
+      return "comas-consistent";
+    case Bending::dkt:
+      return "dkt";
+    case Bending::dkt_comas:
+      return "dkt-comas";
+  }
+  return {};
+}
+
+void write_shell(const SceneShell& shell, Text& text) {
+  text.section("[[shell]]");
+  text.word("name", shell.name);
+  text.word("mesh", std::filesystem::absolute(shell.mesh).lexically_normal().string());
+  if (shell.unit_mm) {
+    const double unit = *shell.unit_mm;
+    text.word("unit", unit == 1 ? "mm" : unit == 10 ? "cm" : unit == 1000 ? "m" : "um");
+  }
+  text.line("scale", number(shell.scale));
+  if (shell.thickness_from) {
+    text.word("thickness_from", *shell.thickness_from);
+  } else {
+    text.value("thickness", shell.thickness, "m", dimension::length);
+  }
+  text.value("young", shell.material.young, "Pa", dimension::pressure);
+  text.line("poisson", number(shell.material.poisson));
+  if (shell.material.density) {
+    text.value("density", *shell.material.density, "kg/m3", dimension::density);
+  }
+  text.word("membrane", name_of(shell.membrane));
+  text.word("bending", name_of(shell.bending));
+  text.word("rest", shell.rest == Rest::curved ? "curved" : "flat");
+}
+
+std::string text_of(const AllNodes&) { return "all = true"; }
+std::string text_of(const BoundaryNodes&) { return "boundary = true"; }
+std::string text_of(const RigidMotions&) { return "rigid_motions = true"; }
+std::string text_of(const BoxNodes& box) { return fmt::format("box = [{}, {}]", point(box.lower), point(box.upper)); }
+std::string text_of(const HalfSpaceNodes& half) {
+  return fmt::format("{} = {{axis = \"{}\", at = {}}}", half.below ? "below" : "above",
+                     "xyz"[static_cast<std::size_t>(half.axis)],
+                     toml_string(quantity(half.at, "m", dimension::length)));
+}
+std::string text_of(const SphereNodes& sphere) {
+  return fmt::format("sphere = {{centre = {}, radius = {}}}", point(sphere.centre),
+                     toml_string(quantity(sphere.radius, "m", dimension::length)));
+}
+std::string text_of(const ListedNodes& list) { return fmt::format("nodes = [{}]", fmt::join(list.nodes, ", ")); }
+std::string text_of(const NearestNode& nearest) { return fmt::format("nearest = {}", point(nearest.point)); }
+
+std::string where_text(const Selection& where) {
+  return fmt::format("{{{}}}", std::visit([](const auto& form) { return text_of(form); }, where));
+}
+
+std::string components(const std::array<bool, 3>& held) {
+  std::string text;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (held[axis]) {
+      text += "xyz"[axis];
+    }
+  }
+  return text;
+}
+
+void write_fix(const SceneFix& fix, bool dynamic, Text& text) {
+  text.section("[[fix]]");
+  text.word("body", fix.body);
+  text.line("where", where_text(fix.where));
+  if (std::holds_alternative<RigidMotions>(fix.where)) {
+    return;
+  }
+  text.word("translation", components(fix.translation));
+  text.word("rotation", components(fix.rotation));
+  if (fix.displacement) {
+    text.line("displacement", point(*fix.displacement));
+  }
+  text.ramp(fix.ramp, dynamic);
+}
+
+void write_kind(const PressureLoad& load, Text& text) {
+  text.word("kind", "pressure");
+  text.value("value", load.value, "Pa", dimension::pressure);
+  text.line("follower", load.follower ? "true" : "false");
+}
+void write_kind(const ForceLoad& load, Text& text) {
+  text.word("kind", "force");
+  text.line("value", vector(load.total, "N", dimension::force));
+}
+void write_kind(const MomentLoad& load, Text& text) {
+  text.word("kind", "moment");
+  text.line("value", vector(load.total, "N*m", dimension::moment));
+}
+void write_kind(const EdgeLoad& load, Text& text) {
+  text.word("kind", "edge");
+  text.line("value", vector(load.per_length, "N/m", dimension::force_per_length));
+}
+void write_kind(const AreaLoad& load, Text& text) {
+  text.word("kind", "area");
+  text.line("value", vector(load.per_area, "Pa", dimension::pressure));
+}
+void write_kind(const GravityLoad& load, Text& text) {
+  text.word("kind", "gravity");
+  text.line("value", vector(load.acceleration, "m/s2", dimension::acceleration));
+}
+
+}  // namespace
+
+std::string scene_text(const Scene& scene) {
+  Text text;
+  const bool dynamic = std::holds_alternative<DynamicRun>(scene.run.kind);
+  write_run(scene, text);
+  for (const SceneShell& shell : scene.shells) {
+    write_shell(shell, text);
+  }
+  for (const SceneFix& fix : scene.fixes) {
+    write_fix(fix, dynamic, text);
+  }
+  for (const SceneLoad& load : scene.loads) {
+    text.section("[[load]]");
+    text.word("body", load.body);
+    if (load.where) {
+      text.line("where", where_text(*load.where));
+    }
+    std::visit([&](const auto& kind) { write_kind(kind, text); }, load.kind);
+    text.ramp(load.ramp, dynamic);
+  }
+  for (const SceneProbe& probe : scene.probes) {
+    text.section("[[probe]]");
+    text.word("name", probe.name);
+    text.word("body", probe.body);
+    text.line("nearest", point(probe.nearest));
+  }
+  return text.str();
+}
+
+}  // namespace tunica

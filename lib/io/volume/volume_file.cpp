@@ -1,0 +1,98 @@
+#include "tunica/io/volume/volume_file.hpp"
+
+#include "tunica/core/error.hpp"
+#include "tunica/io/volume/detail/volume_format.hpp"
+
+#include <fmt/format.h>
+
+namespace tunica {
+namespace fs = std::filesystem;
+namespace {
+
+using namespace volume_format;
+
+// What the content is, when it is something else that people have in such folders.
+std::string other_content(const fs::path& path, std::string_view head) {
+  const auto begins = [&](std::string_view magic) { return head.starts_with(magic); };
+  const std::string extension = lower_case(path.extension().string());
+  if (begins("ply") || begins("OFF") || begins("glTF") || begins("solid") || begins("# vtk DataFile") ||
+      begins("<?xml") || begins("<VTKFile") || extension == ".stl" || extension == ".obj" || extension == ".off" ||
+      extension == ".vtk" || extension == ".vtp") {
+    return "is a surface mesh or another VTK file, not a volume; the volume is wanted here";
+  }
+  if (head.size() >= 132 && head.substr(128, 4) == "DICM") {
+    return "is DICOM: convert the series to NIfTI first (for example with dcm2niix)";
+  }
+  if (begins("\x89HDF")) {
+    return "is an HDF5 file: convert the volume to NIfTI, NRRD or MetaImage first";
+  }
+  if (begins("\xff\xd8\xff") || begins("GIF8") || begins("BM")) {
+    return "is a picture whose format is not exact enough for labels: save the slices as PNG or TIFF";
+  }
+  return "is not a volume that tunica knows: NIfTI (.nii, .nii.gz), NRRD (.nrrd, .seg.nrrd, .nhdr), MetaImage (.mha, "
+         ".mhd), a multi-page TIFF, or a folder of TIFF or PNG slices";
+}
+
+VolumeFile read_any(const fs::path& path, const VolumeOptions& options, const SlabSink* sink) {
+  const auto refuse_spacing = [&] {
+    if (options.spacing) {
+      throw UsageError(fmt::format("{}: --spacing is for slice stacks; this file brings its own", path.string()));
+    }
+  };
+  std::error_code error;
+  if (fs::is_directory(path, error)) {
+    return read_slices(path, options, sink);
+  }
+  ByteStream stream(path, 0, coding_of(path));
+  std::string head(1024, '\0');
+  head.resize(stream.read(head.data(), head.size()));
+  if (head.empty()) {
+    throw InputError(fmt::format("{}: is empty", path.string()));
+  }
+  if (looks_like_tiff(head) || looks_like_png(head)) {
+    return read_slices(path, options, sink);
+  }
+  if (looks_like_nifti(head)) {
+    refuse_spacing();
+    return read_nifti(path, options, sink);
+  }
+  if (looks_like_nrrd(head)) {
+    refuse_spacing();
+    return read_nrrd(path, options, sink);
+  }
+  if (looks_like_metaimage(head)) {
+    refuse_spacing();
+    return read_metaimage(path, options, sink);
+  }
+  throw InputError(fmt::format("{}: {}", path.string(), other_content(path, head)));
+}
+
+}  // namespace
+
+VolumeFile read_volume(const fs::path& path, const VolumeOptions& options) {
+  VolumeFile file = read_any(path, options, nullptr);
+  const std::size_t values = std::visit([](const auto& data) { return data.size(); }, file.volume.data);
+  TUNICA_ASSERT(values == file.volume.voxels());
+  return file;
+}
+
+VolumeFile read_volume_slabs(const fs::path& path, const VolumeOptions& options, const SlabSize& size,
+                             const SlabVisitor& visit) {
+  std::size_t taken = 0;
+  const SlabSink sink{size, [&](const VolumeFile& file, const Volume& slab, std::size_t first_slice) {
+                        TUNICA_ASSERT(first_slice == taken && slab.dims[0] == file.volume.dims[0] &&
+                                      slab.dims[1] == file.volume.dims[1]);
+                        taken += slab.dims[2];
+                        visit(file, slab, first_slice);
+                      }};
+  VolumeFile file = read_any(path, options, &sink);
+  TUNICA_ASSERT(taken == file.volume.dims[2]);
+  return file;
+}
+
+VolumeFile read_volume_header(const fs::path& path, const VolumeOptions& options) {
+  const SlabSink nowhere{};
+  return read_any(path, options, &nowhere);
+}
+
+}  // namespace tunica

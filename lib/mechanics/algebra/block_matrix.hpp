@@ -1,0 +1,46 @@
+#pragma once
+
+#include "tunica/core/types.hpp"
+
+#include <Eigen/Core>
+
+#include <vector>
+
+namespace tunica {
+
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
+using VectorX = Eigen::VectorXd;
+
+/// A square sparse matrix of 6x6 blocks (one row of blocks per node), with a symmetric pattern, rows in order.
+/// A block is stored by columns.
+struct BlockMatrix {
+  std::vector<std::size_t> row_start;                            ///< #nodes + 1
+  std::vector<Index> column;                                     ///< #blocks, increasing within a row
+  std::vector<std::size_t> transposed;                           ///< #blocks: where block (j, i) is
+  std::vector<double, Eigen::aligned_allocator<double>> values;  ///< 36 #blocks
+
+  [[nodiscard]] std::size_t node_count() const { return row_start.size() - 1; }
+  [[nodiscard]] Eigen::Map<Matrix6> block(std::size_t k) { return Eigen::Map<Matrix6>(values.data() + 36 * k); }
+  [[nodiscard]] Eigen::Map<const Matrix6> block(std::size_t k) const {
+    return Eigen::Map<const Matrix6>(values.data() + 36 * k);
+  }
+  /// Place of block (row, column), which must exist.
+  [[nodiscard]] std::size_t find(Index row, Index column) const;
+};
+
+/// The pattern of a mesh: nodes that share a triangle, and every node with itself. Values are zero.
+BlockMatrix make_block_matrix(std::size_t nodes, const std::vector<std::array<Index, 3>>& triangles);
+
+/// y = A x, in parallel; the same to the bit whatever the number of threads.
+void multiply(const BlockMatrix& matrix, const VectorX& x, VectorX& y);
+
+/// y = B x for one 6x6 block stored by columns.
+void multiply_block(const double* block, const double* x, double* y);
+
+/// A = (A + A') / 2.
+void symmetrise(BlockMatrix& matrix);
+
+/// Dot product in blocks: the same to the bit whatever the number of threads.
+double dot(const VectorX& a, const VectorX& b);
+
+}  // namespace tunica

@@ -1,0 +1,200 @@
+#include "tunica/mechanics/algebra/linear_solver.hpp"
+
+#include "tunica/core/error.hpp"
+#include "tunica/core/progress.hpp"
+#include "tunica/core/threads.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Dense>
+
+#include <cmath>
+
+namespace tunica {
+
+void mask(const FreeMask& free, VectorX& v) {
+  for (std::size_t i = 0; i < free.size(); ++i) {
+    if (!free[i]) {
+      v[static_cast<Eigen::Index>(i)] = 0;
+    }
+  }
+}
+
+namespace {
+
+/// Inverses of the diagonal blocks. Held rows and columns are left out; a unit keeps the blocks regular.
+struct BlockJacobi {
+  std::vector<Matrix6, Eigen::aligned_allocator<Matrix6>> inverse;
+  bool positive = true;  ///< every block is positive definite; the others are replaced by units
+
+  BlockJacobi(const BlockMatrix& matrix, const FreeMask& free) : inverse(matrix.node_count()) {
+    std::vector<char> good(matrix.node_count(), 1);
+    parallel_for_blocks(matrix.node_count(), 256, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        Matrix6 block = matrix.block(matrix.find(static_cast<Index>(i), static_cast<Index>(i)));
+        for (int c = 0; c < 6; ++c) {
+          if (!free[6 * i + static_cast<std::size_t>(c)]) {
+            block.row(c).setZero();
+            block.col(c).setZero();
+            block(c, c) = 1;
+          }
+        }
+        const Eigen::LLT<Matrix6> factor(block);
+        good[i] = factor.info() == Eigen::Success ? 1 : 0;
+        inverse[i] = good[i] != 0 ? Matrix6(factor.solve(Matrix6::Identity())) : Matrix6::Identity();
+      }
+    });
+    positive = std::find(good.begin(), good.end(), 0) == good.end();
+  }
+
+  void apply(const VectorX& r, VectorX& z) const {
+    z.resize(r.size());
+    parallel_for_blocks(inverse.size(), 1024, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        multiply_block(inverse[i].data(), r.data() + 6 * i, z.data() + 6 * i);
+      }
+    });
+  }
+};
+
+}  // namespace
+
+CgResult conjugate_gradients(const BlockMatrix& matrix, const FreeMask& free, const VectorX& b,
+                             const CgOptions& options, VectorX& x) {
+  const BlockJacobi preconditioner(matrix, free);
+  std::vector<Eigen::Index> held;
+  for (std::size_t i = 0; i < free.size(); ++i) {
+    if (!free[i]) {
+      held.push_back(static_cast<Eigen::Index>(i));
+    }
+  }
+  CgResult result;
+  result.negative_curvature = !preconditioner.positive;
+
+  VectorX r = b;
+  mask(free, r);
+  x.setZero(b.size());
+  const double norm = std::sqrt(dot(r, r));
+  if (norm == 0) {
+    result.converged = true;
+    result.error.emplace();
+    return result;
+  }
+  VectorX z, p, q;
+  preconditioner.apply(r, z);
+  p = z;
+  double rho = dot(r, z);
+  const std::size_t most = options.most.value_or(20 * free.size());
+  const double wanted = options.fixed_count ? 1e-15 : options.tolerance;
+  result.residual = 1;
+  std::vector<double> terms;
+  bool done = false;       // x is final, what follows is for its error
+  std::size_t enough = 0;  // terms after which that ends
+  while (true) {
+    if (!done && (result.residual <= wanted || result.iterations >= most)) {
+      done = true;
+      enough =
+          result.iterations + (result.residual <= wanted ? 4 * result.iterations + 100 : result.iterations / 10 + 1);
+    }
+    if (done &&
+        (terms.size() >= enough || (result.residual <= wanted && estimate_is_settled(terms, result.iterations)))) {
+      break;
+    }
+    if (terms.size() % 64 == 0) {
+      check_interrupt();
+    }
+    multiply(matrix, p, q);
+    for (const Eigen::Index i : held) {
+      q[i] = 0;
+    }
+    const double curvature = dot(p, q);
+    if (!(curvature > 0)) {
+      if (!done) {
+        result.negative_curvature = result.negative_curvature || curvature < 0;
+        if (result.iterations == 0) {
+          x = p;  // a direction of descent is better than none
+        }
+      }
+      break;
+    }
+    const double step = rho / curvature;
+    terms.push_back(step * rho);
+    r -= step * q;
+    if (!done) {
+      x += step * p;
+      ++result.iterations;
+      result.residual = std::sqrt(dot(r, r)) / norm;
+    }
+    preconditioner.apply(r, z);
+    const double next = dot(r, z);
+    p = z + next / rho * p;
+    rho = next;
+  }
+  result.converged = !options.fixed_count && result.residual <= options.tolerance;
+  if (!result.negative_curvature && !terms.empty() && std::isfinite(terms.back())) {
+    result.error = error_of_iterate(terms, std::min(result.iterations, terms.size()));
+    result.error->is_lower_bound = result.residual > wanted || !done || !estimate_is_settled(terms, result.iterations);
+  }
+  return result;
+}
+
+AlgebraicError error_by_factor(const BlockMatrix& matrix, const FreeMask& free, const DirectSolver& solver,
+                               const VectorX& b, const VectorX& x) {
+  VectorX product;
+  multiply(matrix, x, product);
+  VectorX r = b - product;
+  mask(free, r);
+  VectorX e;
+  solver.solve(r, e);
+  return {std::sqrt(std::abs(dot(r, e))), std::sqrt(std::abs(dot(b, x))), false};
+}
+
+double gmres(const BlockMatrix& matrix, const FreeMask& free, const DirectSolver& solver, const VectorX& b,
+             double tolerance, std::size_t most, VectorX& x) {
+  const double norm = std::sqrt(dot(b, b));
+  VectorX product;
+  const auto residual = [&] {
+    multiply(matrix, x, product);
+    mask(free, product);
+    return VectorX(b - product);
+  };
+  VectorX r = residual();
+  double beta = std::sqrt(dot(r, r));
+  if (norm == 0 || beta <= tolerance * norm) {
+    return norm == 0 ? 0 : beta / norm;
+  }
+  // Right preconditioning: the residual that is made small is the true one.
+  std::vector<VectorX> basis{r / beta};
+  std::vector<VectorX> directions;
+  Eigen::MatrixXd hessenberg =
+      Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(most) + 1, static_cast<Eigen::Index>(most));
+  Eigen::VectorXd coefficients;
+  for (std::size_t j = 0; j < most; ++j) {
+    VectorX direction;
+    solver.solve(basis[j], direction);
+    multiply(matrix, direction, product);
+    mask(free, product);
+    directions.push_back(direction);
+    const auto column = static_cast<Eigen::Index>(j);
+    for (std::size_t i = 0; i <= j; ++i) {
+      const double h = dot(basis[i], product);
+      hessenberg(static_cast<Eigen::Index>(i), column) = h;
+      product -= h * basis[i];
+    }
+    const double length = std::sqrt(dot(product, product));
+    hessenberg(column + 1, column) = length;
+    const auto reduced = hessenberg.topLeftCorner(column + 2, column + 1);
+    const Eigen::VectorXd right = beta * Eigen::VectorXd::Unit(column + 2, 0);
+    coefficients = reduced.colPivHouseholderQr().solve(right);
+    if ((reduced * coefficients - right).norm() <= tolerance * norm || length <= 1e-14 * beta) {
+      break;
+    }
+    basis.push_back(product / length);
+  }
+  for (Eigen::Index j = 0; j < coefficients.size(); ++j) {
+    x += coefficients[j] * directions[static_cast<std::size_t>(j)];
+  }
+  r = residual();
+  return std::sqrt(dot(r, r)) / norm;
+}
+
+}  // namespace tunica

@@ -1,0 +1,197 @@
+// mechanics/model: what a scene says, resolved: bodies, walls, loads, supports.
+#pragma once
+
+#include "tunica/core/quantity.hpp"
+#include "tunica/shell/patch/shell_mesh.hpp"
+
+#include <optional>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+/// What a scene says, resolved: selections are node lists, quantities are in mm, N, s (MPa, tonne). Nothing here
+/// computes; mechanics/solve.hpp does.
+namespace tunica {
+
+enum class Membrane {
+  cst,    ///< constant-strain triangle, with a drilling stiffness small enough not to stiffen
+  opt,    ///< Felippa's optimal ANDES triangle with drilling freedoms
+  adapt,  ///< opt, its higher-order part reduced where the shell curves within an element
+};
+
+enum class Bending {
+  comas,             ///< the paper's 9-term cubic, faithful: depends on the first vertex, converges to a wrong limit
+  comas_consistent,  ///< the same cubic, its mean curvature replaced by the boundary-integral one; isotropic
+  dkt,               ///< discrete Kirchhoff triangle
+  dkt_comas,         ///< four fifths dkt, one fifth comas_consistent
+};
+
+enum class Rest {
+  curved,  ///< the shell's own curvature is stress-free
+  flat,    ///< the facets are stress-free and flat (classical benchmarks)
+};
+
+/// Isotropic linear elasticity, in the co-rotated frame.
+struct Material {
+  double young = 0;               ///< MPa
+  double poisson = 0;             ///< in (-1, 0.5)
+  std::optional<double> density;  ///< tonne / mm^3; required by dynamics and gravity
+};
+
+struct ShellBody {
+  std::string name;
+  ShellMesh mesh;  ///< reference geometry, mm
+  /// False where the file held no normals: the patches are then the flat facets themselves.
+  bool curved = true;
+  std::vector<double> thickness;  ///< mm: one value for the whole body, or one per vertex
+  Material material;
+  Membrane membrane = Membrane::adapt;
+  Bending bending = Bending::dkt_comas;
+  Rest rest = Rest::curved;
+  std::string said_at{};  ///< where the user said it, for messages; may be empty, here and below
+};
+
+/// A piecewise linear table over time (dynamic) or load factor (static); constant beyond its ends. Empty: 1.
+struct Ramp {
+  std::vector<std::pair<double, double>> points;  ///< (time s, factor), times increasing
+
+  [[nodiscard]] double at(double time) const;
+};
+
+/// Held or prescribed components of some nodes, in world axes. Several on one node unite.
+struct Fix {
+  std::size_t body = 0;
+  std::vector<Index> nodes;
+  std::array<bool, 3> translation{true, true, true};
+  std::array<bool, 3> rotation{true, true, true};
+  Vec3 displacement = Vec3::Zero();  ///< mm; of the held translations; follows the load factor (static) or `ramp`
+  Ramp ramp;
+  std::string said_at{};
+};
+
+/// Holds the six rigid motions of every connected piece of a body without adding stress.
+struct RigidMotionsFix {
+  std::size_t body = 0;
+};
+
+/// Pressure along the outward normals (positive: along them), on the whole body.
+struct PressureLoad {
+  double value = 0;      ///< MPa
+  bool follower = true;  ///< turns and grows with the surface
+};
+struct ForceLoad {
+  std::vector<Index> nodes;
+  Vec3 total = Vec3::Zero();  ///< N, shared equally by the nodes
+};
+/// About fixed world axes; it does work on the spin.
+struct MomentLoad {
+  std::vector<Index> nodes;
+  Vec3 total = Vec3::Zero();  ///< N mm, shared equally by the nodes
+};
+struct EdgeLoad {
+  std::vector<std::array<Index, 2>> edges;
+  Vec3 per_length = Vec3::Zero();  ///< N / mm, integrated consistently
+};
+struct AreaLoad {
+  Vec3 per_area = Vec3::Zero();  ///< MPa, fixed direction, on the whole body
+};
+struct GravityLoad {
+  Vec3 acceleration = Vec3::Zero();  ///< mm / s^2
+};
+
+struct Load {
+  std::size_t body = 0;
+  std::variant<PressureLoad, ForceLoad, MomentLoad, EdgeLoad, AreaLoad, GravityLoad> kind;
+  Ramp ramp;
+  std::string said_at{};
+};
+
+struct Probe {
+  std::string name;
+  std::size_t body = 0;
+  Index node = 0;
+};
+
+struct Model {
+  std::vector<ShellBody> shells;  ///< global node numbers: the bodies' vertices one after the other
+  std::vector<Fix> fixes;
+  std::vector<RigidMotionsFix> rigid_motions;
+  std::vector<Load> loads;
+  std::vector<Probe> probes;
+
+  [[nodiscard]] std::size_t node_count() const;
+  /// Global number of the first node of a body.
+  [[nodiscard]] std::size_t first_node(std::size_t body) const;
+};
+
+enum class Solver {
+  cg,      ///< preconditioned conjugate gradients
+  direct,  ///< sparse factorisation (ordering by CHOLMOD), symbolic analysis once
+  automatic,
+};
+
+enum class Integrator {
+  backward_euler,     ///< the paper's: first order, strong numerical damping
+  generalised_alpha,  ///< second order, damping of what is too fast for the step as chosen
+};
+
+struct Damping {
+  double mass = 0;       ///< 1 / s
+  double stiffness = 0;  ///< s
+};
+
+struct StaticRun {
+  bool linear = false;               ///< one solve with the initial tangent
+  std::vector<double> load_factors;  ///< increasing; the last is usually 1
+};
+
+/// The whole path of equilibria from the reference on, through limit points: the load factor is found, not given.
+struct ArcLengthRun {
+  std::size_t max_steps = 200;
+  double first_factor = 0.1;         ///< change of the load factor in the first step; the others find their length
+  std::optional<double> max_factor;  ///< the path ends where the load factor reaches this, up or down
+  struct Until {
+    std::size_t probe = 0;  ///< of the model's
+    int axis = 0;
+    double reaches = 0;  ///< mm, its displacement
+  };
+  std::optional<Until> until;  ///< the path ends there, and must get there
+};
+
+/// Natural frequencies about the reference, or, where there are loads or prescribed displacements, about the state of
+/// rest under them.
+struct FrequencyRun {
+  std::size_t count = 10;
+  StaticRun preload;  ///< how that state is found
+};
+
+/// Factors of the loads (and prescribed displacements) at which the stiffness about the linear solution under them,
+/// growing in proportion, becomes singular.
+struct BucklingRun {
+  std::size_t count = 10;
+};
+
+struct DynamicRun {
+  double duration = 0;  ///< s
+  double step = 0;      ///< s
+  Damping damping;
+  Integrator integrator = Integrator::backward_euler;
+  double spectral_radius = 0.8;  ///< generalised_alpha, 0 ... 1: what a step keeps of what is too fast for it
+  /// Steps are cut into parts that each add at most this much to the error: root mean square over the nodes,
+  /// rotations times the mean edge; relative to the diagonal of the model's bounding box.
+  std::optional<LengthTolerance> adaptive{};
+};
+
+struct RunSettings {
+  std::variant<StaticRun, DynamicRun, FrequencyRun, BucklingRun, ArcLengthRun> kind;
+  Solver solver = Solver::automatic;
+  double cg_tolerance = 1e-10;               ///< relative residual at which a CG solve stops
+  std::optional<std::size_t> cg_iterations;  ///< at most this many CG iterations in a solve
+  bool cg_fixed_count = false;               ///< run exactly cg_iterations and ask for no tolerance (the paper's)
+  double converge = 1e-8;                    ///< relative, scale-aware residual at which Newton's method stops
+  std::size_t newton_max = 20;               ///< 1 is the paper's: one linearisation per step
+  std::size_t every = 1;                     ///< hand over every n-th state
+};
+
+}  // namespace tunica

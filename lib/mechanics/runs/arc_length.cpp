@@ -1,0 +1,422 @@
+#include "tunica/core/error.hpp"
+#include "tunica/mechanics/runs/detail/run.hpp"
+#include "tunica/mechanics/runs/detail/supports.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+
+namespace tunica {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr double gmres_tolerance = 1e-4;
+constexpr std::size_t gmres_iterations = 30;
+constexpr double largest_turn = 0.3;  // rad in one step, by its predictor
+constexpr double largest_correction = 0.5;
+/// Straight lines between the states may depart from the path by this part of the largest factor and displacement.
+constexpr double chord_of_factor = 0.002;
+constexpr double chord_of_displacement = 0.005;
+/// A step whose chord departs by this many times more is taken again, shorter.
+constexpr double retried = 6;
+/// Steps are not cut below this part of the path so far.
+constexpr double smallest_step = 1e-6;
+constexpr std::size_t wanted_iterations = 4;
+constexpr std::size_t most_iterations = 10;
+
+Eigen::Index at(std::size_t node) { return 6 * static_cast<Eigen::Index>(node); }
+
+double largest_rotation(const VectorX& increment) {
+  double largest = 0;
+  for (Eigen::Index i = 3; i < increment.size(); i += 6) {
+    largest = std::max(largest, increment.segment<3>(i).norm());
+  }
+  return largest;
+}
+
+/// A converged state, with the tangent of the path there.
+struct PathState {
+  Configuration configuration;
+  double factor = 0;
+  VectorX direction;        ///< d (displacement, spin) / d arc length
+  double factor_slope = 0;  ///< d factor / d arc length
+  std::size_t negative_pivots = 0;
+  double residual = 0;
+  std::size_t iterations = 0;
+};
+
+/// Balance and bordered solves along lambda -> configuration. The length of an increment is the root mean square over
+/// the nodes of displacements and (mean edge length x) rotations; the factor does not count.
+class PathSolver {
+public:
+  PathSolver(const ShellSystem& system, const Model& model, const RunSettings& settings)
+      : system_(system),
+        model_(model),
+        settings_(settings),
+        free_(free_freedoms(system)),
+        matrix_(system.pattern),
+        solver_(system.pattern, free_),
+        prescribed_(prescribed_positions(system, model, 1)),
+        weights_(VectorX::Zero(at(system.node_count()))) {
+    const double share = 1 / static_cast<double>(system.node_count());
+    for (std::size_t i = 0; i < system.node_count(); ++i) {
+      weights_.segment<3>(at(i)).setConstant(share);
+      weights_.segment<3>(at(i) + 3).setConstant(share * system.length * system.length);
+    }
+  }
+
+  [[nodiscard]] std::size_t freedom_count() const {
+    return static_cast<std::size_t>(std::count(free_.begin(), free_.end(), true));
+  }
+
+  /// Fills the tangent of the path at `state`, on the side of `before` (empty: the factor grows).
+  /// @return false where the stiffness is singular to the last digit.
+  bool find_direction(PathState& state, const VectorX& before) {
+    VectorX response;
+    const Balance balance = evaluate_at(state.configuration, state.factor);
+    if (!balance.valid || !factor_matrix(state.negative_pivots) || !respond(state.configuration, response)) {
+      return false;
+    }
+    const double length = std::sqrt(product(response, response));
+    if (!(length > 0)) {
+      throw InputError("arc length: the loads do not deform anything");
+    }
+    const double sign = before.size() == 0 || product(response, before) > 0 ? 1 : -1;
+    state.direction = sign / length * response;
+    state.factor_slope = sign / length;
+    return true;
+  }
+
+  /// From `start`, with a prediction along its tangent, by Newton's method in the plane across the tangent one step
+  /// ahead. @return false where that fails; `state` is then of no use.
+  bool find_state(const PathState& start, double step, PathState& state) {
+    const VectorX across = weights_.cwiseProduct(start.direction);
+    state.configuration = start.configuration;
+    VectorX change = step * start.direction;
+    double factor_change = step * start.factor_slope;
+    advance_configuration(state.configuration, change);
+    const std::size_t most = std::min(settings_.newton_max, most_iterations);
+    for (state.iterations = 0;; ++state.iterations) {
+      check_interrupt();
+      state.factor = start.factor + factor_change;
+      const Balance balance = evaluate_at(state.configuration, state.factor);
+      if (!balance.valid) {
+        return false;
+      }
+      VectorX right = balance.unbalanced;
+      mask(free_, right);
+      const double norm = force_norm(system_, right);
+      state.residual = balance.scale > 0 ? norm / balance.scale : 0;
+      const double missed = step - across.dot(change);
+      const bool balanced = state.residual <= settings_.converge || norm <= balance.floor;
+      if (balanced && std::abs(missed) <= 1e-9 * step) {
+        return true;
+      }
+      if (state.iterations == most || !std::isfinite(norm)) {
+        return false;
+      }
+      VectorX correction, response;
+      std::size_t pivots = 0;
+      if (!factor_matrix(pivots) || !solve(right, correction) || !respond(state.configuration, response)) {
+        return false;
+      }
+      const double by = (missed - across.dot(correction)) / across.dot(response);
+      if (!std::isfinite(by)) {
+        return false;
+      }
+      correction += by * response;
+      if (largest_rotation(correction) > largest_correction) {
+        return false;
+      }
+      change += correction;
+      factor_change += by;
+      advance_configuration(state.configuration, correction);
+    }
+  }
+
+  [[nodiscard]] double product(const VectorX& a, const VectorX& b) const { return a.dot(weights_.cwiseProduct(b)); }
+
+private:
+  Balance evaluate_at(const Configuration& configuration, double factor) {
+    return static_balance(system_, model_, configuration, factor, forces_, &matrix_);
+  }
+
+  bool factor_matrix(std::size_t& negative_pivots) {
+    const DirectSolver::Factored factored = solver_.factor(matrix_);
+    negative_pivots = factored.negative_pivots;
+    return factored.regular;
+  }
+
+  bool solve(const VectorX& right, VectorX& x) {
+    solver_.solve(right, x);
+    if (!x.allFinite()) {
+      return false;
+    }
+    (void)gmres(matrix_, free_, solver_, right, gmres_tolerance, gmres_iterations, x);
+    return x.allFinite();
+  }
+
+  /// How displacements and spins follow the factor.
+  bool respond(const Configuration& configuration, VectorX& response) {
+    evaluate(system_, model_, configuration, std::vector<double>(model_.loads.size(), 1.0), {}, forces_, nullptr);
+    VectorX moved;
+    multiply(matrix_, prescribed_, moved);
+    VectorX right = forces_.external - moved;
+    mask(free_, right);
+    if (!solve(right, response)) {
+      return false;
+    }
+    response += prescribed_;
+    return true;
+  }
+
+  const ShellSystem& system_;
+  const Model& model_;
+  const RunSettings& settings_;
+  FreeMask free_;
+  BlockMatrix matrix_;
+  DirectSolver solver_;
+  VectorX prescribed_;
+  VectorX weights_;
+  Forces forces_;
+};
+
+/// The extreme of the factor between two states at which its slope changes sign: of the cubic through both.
+double limit_factor(const PathState& a, const PathState& b, double step) {
+  const double ma = a.factor_slope * step;
+  const double mb = b.factor_slope * step;
+  const double rise = b.factor - a.factor;
+  // Slope of the Hermite cubic at t: ma + 2 c t + 3 d t^2.
+  const double c = 3 * rise - 2 * ma - mb;
+  const double d = ma + mb - 2 * rise;
+  const double root = std::sqrt(std::max(0.0, c * c - 3 * d * ma));
+  const double q = -(c + std::copysign(root, c));
+  for (const double t : {q / (3 * d), ma / q}) {
+    if (t >= 0 && t <= 1) {
+      return a.factor + t * (ma + t * (c + t * d));
+    }
+  }
+  return std::abs(a.factor_slope) < std::abs(b.factor_slope) ? a.factor : b.factor;
+}
+
+class PathRun {
+public:
+  PathRun(ShellSystem& system, const Model& model, const RunSettings& settings, const ArcLengthRun& run,
+          const StateCallback& on_state)
+      : system_(system),
+        model_(model),
+        settings_(settings),
+        run_(run),
+        on_state_(on_state),
+        path_(system, model, settings) {
+    // A body under follower pressure alone may be turned as it stands.
+    only_follows_ = std::all_of(model.loads.begin(), model.loads.end(), [](const Load& load) {
+      const auto* pressure = std::get_if<PressureLoad>(&load.kind);
+      return pressure != nullptr && pressure->follower;
+    });
+  }
+
+  Summary run(const Progress& progress) {
+    summary_.dof = path_.freedom_count();
+    if (has_soft_waves(system_)) {  // else the limit points could be those of the mesh
+      stiffen_short_waves(system_);
+      summary_.stiffened_from = 0;
+    }
+    PathState now;
+    now.configuration = reference_configuration(system_);
+    State state = make_state(system_, model_, now.configuration, 0);
+    state.converged = true;
+    on_state_(state);
+    summary_.volume_before = state.volume;
+    if (!path_.find_direction(now, {})) {
+      throw RequirementError("arc length: the stiffness of the reference is singular");
+    }
+    double step = run_.first_factor / now.factor_slope;
+    double length = step;
+    while (true) {
+      const auto start = Clock::now();
+      step = std::min(step, largest_turn / std::max(largest_rotation(now.direction), 1e-300));
+      PathState next;
+      bool ended = false;
+      if (!find(now, step, next) || departure(now, next, step, length) > retried) {
+        step /= 2;
+        if (step < smallest_step * length) {
+          fail(now);
+        }
+        continue;
+      }
+      const double depart = departure(now, next, step, length);
+      if (const auto end = end_between(now, next)) {
+        next = end_at(now, next, step, *end);
+        ended = true;
+        reached_ = reached_ || !end->factor;
+      }
+      note_stability(now, next, step);
+      const double grown =
+          std::clamp(std::min(std::sqrt(1 / std::max(depart, 1e-300)),
+                              std::sqrt(static_cast<double>(wanted_iterations) /
+                                        static_cast<double>(std::max<std::size_t>(1, next.iterations)))),
+                     0.5, 2.0);
+      length += step;
+      step *= grown;
+      now = std::move(next);
+      largest_factor_ = std::max(largest_factor_, std::abs(now.factor));
+      ended = ended || summary_.steps + 1 == run_.max_steps;
+      hand_over(now, ended, std::chrono::duration<double>(Clock::now() - start).count());
+      advance(progress, std::max(static_cast<double>(summary_.steps) / static_cast<double>(run_.max_steps),
+                                 run_.max_factor ? std::min(1.0, std::abs(now.factor) / *run_.max_factor) : 0.0));
+      if (ended) {
+        require_goal(now);
+        return summary_;
+      }
+    }
+  }
+
+private:
+  /// The next state, without the rigid motion of bodies that are held by it, and the tangent there.
+  bool find(const PathState& from, double step, PathState& state) {
+    if (!path_.find_state(from, step, state)) {
+      return false;
+    }
+    for (const Piece& piece : system_.pieces) {
+      if (only_follows_ && held_by_rigid_motions(model_, piece.body)) {
+        take_out_rigid_motion(system_, piece, state.configuration);
+      }
+    }
+    return path_.find_direction(state, from.direction);
+  }
+
+  /// How far a straight line departs from the path between two states, in units of what is allowed.
+  [[nodiscard]] double departure(const PathState& a, const PathState& b, double step, double length) const {
+    const VectorX turned = b.direction - a.direction;
+    const double of_displacement = std::sqrt(path_.product(turned, turned)) * step / 8 / length;
+    const double largest = std::max({largest_factor_, std::abs(b.factor), run_.first_factor});
+    const double of_factor = std::abs(b.factor_slope - a.factor_slope) * step / 8 / largest;
+    return std::max(of_displacement / chord_of_displacement, of_factor / chord_of_factor);
+  }
+
+  [[nodiscard]] double goal_of(const Configuration& configuration) const {
+    const Probe& probe = model_.probes[run_.until->probe];
+    return configuration.displacement[model_.first_node(probe.body) + probe.node][run_.until->axis];
+  }
+
+  /// What is led to its goal in the last step: a displacement of the probe, or the load factor.
+  struct End {
+    bool factor = false;
+    double goal = 0;
+  };
+
+  [[nodiscard]] double value_of(const End& end, const PathState& state) const {
+    return end.factor ? state.factor : goal_of(state.configuration);
+  }
+
+  [[nodiscard]] std::optional<End> end_between(const PathState& a, const PathState& b) const {
+    if (run_.until) {
+      const End end{false, run_.until->reaches};
+      if ((value_of(end, a) - end.goal) * (value_of(end, b) - end.goal) <= 0) {
+        return end;
+      }
+    }
+    if (run_.max_factor && std::abs(b.factor) >= *run_.max_factor) {
+      return End{true, std::copysign(*run_.max_factor, b.factor)};
+    }
+    return std::nullopt;
+  }
+
+  /// The end of the path itself, between a state before and one beyond it: the length of the step by the Illinois
+  /// method. Where a state on the way is not found, the one beyond.
+  PathState end_at(const PathState& a, const PathState& b, double step, const End& end) {
+    constexpr int most_rounds = 60;
+    const auto miss = [&](const PathState& state) { return value_of(end, state) - end.goal; };
+    std::array<double, 2> bound{0, step};
+    std::array<double, 2> missed{miss(a), miss(b)};
+    std::size_t last = 2;  // the bound that was moved last
+    PathState middle = b;
+    for (int round = 0; round < most_rounds && std::abs(miss(middle)) > 1e-10 * std::abs(end.goal); ++round) {
+      const double length = (bound[0] * missed[1] - bound[1] * missed[0]) / (missed[1] - missed[0]);
+      if (!(length > 0) || !find(a, length, middle)) {
+        return std::abs(miss(a)) <= 1e-10 * std::abs(end.goal) ? a : b;
+      }
+      const std::size_t moved = (miss(middle) > 0) == (missed[1] > 0) ? 1 : 0;
+      bound[moved] = length;
+      missed[moved] = miss(middle);
+      if (moved == last) {
+        missed[1 - moved] /= 2;
+      }
+      last = moved;
+    }
+    return middle;
+  }
+
+  void note_stability(const PathState& a, const PathState& b, double step) {
+    const bool limit = a.factor_slope * b.factor_slope < 0;
+    if (limit) {
+      summary_.limit_factors.push_back(limit_factor(a, b, step));
+    }
+    const auto change = static_cast<long>(b.negative_pivots) - static_cast<long>(a.negative_pivots);
+    if (std::abs(change) > (limit ? 1 : 0)) {
+      summary_.branch_factors.push_back((a.factor + b.factor) / 2);
+    }
+  }
+
+  void hand_over(const PathState& now, bool last, double seconds) {
+    State state = make_state(system_, model_, now.configuration, static_cast<double>(summary_.steps + 1));
+    state.load_factor = now.factor;
+    state.residual = now.residual;
+    state.newton_iterations = now.iterations;
+    state.converged = true;
+    record_step(state, seconds, summary_);
+    if (summary_.steps % settings_.every == 0 || last) {
+      on_state_(state);
+      shown_ = summary_.steps;
+    }
+  }
+
+  void require_goal(const PathState& now) const {
+    if (run_.until && !reached_) {
+      const bool by_steps = summary_.steps == run_.max_steps;
+      throw RequirementError(fmt::format(
+          "arc length: the path ended after {} steps at load factor {:.6g}, by {}, before {} reached {:.6g} mm along "
+          "{}: "
+          "it is at {:.6g} mm",
+          summary_.steps, now.factor, by_steps ? "max_steps" : "max_factor", model_.probes[run_.until->probe].name,
+          run_.until->reaches, "xyz"[static_cast<std::size_t>(run_.until->axis)], goal_of(now.configuration)));
+    }
+  }
+
+  [[noreturn]] void fail(const PathState& now) {
+    if (shown_ != summary_.steps) {  // the last good state
+      --summary_.steps;
+      hand_over(now, true, 0);
+    }
+    throw RequirementError(fmt::format(
+        "arc length: no state was found beyond load factor {:.6g}, after {} steps, even with steps of {:.0e} "
+        "of the path: it ends there, turns sharply or folds an element; the last good state is there",
+        now.factor, summary_.steps, smallest_step));
+  }
+
+  ShellSystem& system_;
+  const Model& model_;
+  const RunSettings& settings_;
+  const ArcLengthRun& run_;
+  const StateCallback& on_state_;
+  PathSolver path_;
+  Summary summary_;
+  bool only_follows_ = false;
+  double largest_factor_ = 0;
+  std::size_t shown_ = 0;
+  bool reached_ = false;  ///< what `until` asks for
+};
+
+}  // namespace
+
+Summary run_arc_length(ShellSystem& system, const Model& model, const RunSettings& settings, const ArcLengthRun& run,
+                       const StateCallback& on_state, const Progress& progress) {
+  return PathRun(system, model, settings, run, on_state).run(progress);
+}
+
+}  // namespace tunica

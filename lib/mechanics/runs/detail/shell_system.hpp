@@ -1,0 +1,142 @@
+#pragma once
+
+#include "tunica/core/lane_count.hpp"
+#include "tunica/mechanics/algebra/block_matrix.hpp"
+#include "tunica/mechanics/model/model.hpp"
+#include "tunica/mechanics/elements/pressure.hpp"
+#include "tunica/mechanics/elements/shell_element.hpp"
+
+#include <optional>
+
+/// A model made ready for solving: elements, loads, masses and supports by global node, and the sums over them.
+namespace tunica {
+
+/// Displacements (not positions: those would lose the digits) and rotations of all nodes, from the reference.
+struct Configuration {
+  std::vector<Vec3> displacement;
+  std::vector<Eigen::Quaterniond> rotation;
+};
+
+/// A load that keeps its direction, for a factor of 1. `director` of a node is the sum over the triangles around it of
+/// n g', for normals n that turn with the node and vectors g fixed in space: its energy is -trace(R n g').
+struct DeadLoad {
+  VectorX force;               ///< 6 per node: force, moment about fixed axes
+  std::vector<Mat3> director;  ///< empty, or #nodes
+};
+
+struct PrescribedFreedom {
+  std::size_t freedom = 0;
+  double value = 0;  ///< mm, for a factor of 1
+  std::size_t fix = 0;
+};
+
+/// A connected part of a body.
+struct Piece {
+  std::size_t body = 0;
+  std::vector<Index> nodes;  ///< global
+};
+
+/// Elements that are computed at once; those beyond `count` repeat another.
+struct Batch {
+  std::array<Index, lane_count> elements{};
+  std::size_t count = 0;
+};
+
+struct ShellSystem {
+  std::vector<Vec3> reference;  ///< #nodes
+  std::vector<ShellElement> elements;
+  /// Reference normals at the corners of each element: of the curved surface, or the facet's.
+  std::vector<std::array<Vec3, 3>> normals;
+  std::vector<PatchHeight> heights;                   ///< of the curved patches over the facets, for pressure
+  std::vector<std::vector<Batch>> colours;            ///< elements of one colour share no node
+  std::vector<std::array<std::size_t, 9>> placement;  ///< where each element's blocks go in the matrix
+  BlockMatrix pattern;
+  std::vector<std::size_t> first_element;  ///< per body, and the end
+  std::vector<Piece> pieces;
+  std::vector<char> used;  ///< #nodes: belongs to a triangle
+
+  std::vector<DeadLoad> dead;  ///< per load; empty vectors for follower pressure
+  std::vector<std::pair<std::size_t, std::size_t>> follower_pressures;  ///< (load, body)
+
+  VectorX area;            ///< per node: a third of the triangles around it
+  VectorX mass;            ///< tonne per node
+  VectorX inertia;         ///< tonne mm^2 per node, about every axis: rho t^3 / 12 times the area
+  std::vector<bool> held;  ///< 6 per node
+  std::vector<PrescribedFreedom> prescribed;
+  double length = 0;  ///< mean edge, mm: what makes moments comparable with forces
+  /// Norms of the elements' stiffness, moments divided by `length`: forces by displacements (N/mm), by rotations (N).
+  double translation_stiffness = 0;
+  double rotation_stiffness = 0;
+
+  [[nodiscard]] std::size_t node_count() const { return reference.size(); }
+};
+
+/// Errors: InputError for what only shows when loads and supports are put on the nodes (a load on a node without
+/// triangles, an edge load on an edge that is not there).
+ShellSystem make_system(const Model& model);
+
+/// Makes the edges' skewness stiff (shell_element.hpp): for frequencies and buckling, whose answers are the spectrum
+/// itself, and for static and dynamic runs where the shell would buckle in waves as short as its elements.
+void stiffen_short_waves(ShellSystem& system);
+
+/// Whether somewhere bending alone does not hold such waves: h^2 > 3 R t.
+bool has_soft_waves(const ShellSystem& system);
+
+/// The configuration without displacements and rotations.
+Configuration reference_configuration(const ShellSystem& system);
+
+/// Adds spin and displacement increments (6 per node).
+void advance_configuration(Configuration& configuration, const VectorX& increment);
+
+/// Factors of the loads, in their order.
+std::vector<double> load_factors(const Model& model, bool is_static, double time);
+double factor_of(const Ramp& ramp, bool is_static, double time);
+
+struct ViscousState {
+  double factor = 0;                                    ///< beta / dt
+  const std::vector<ElementState>* previous = nullptr;  ///< deformations at the start of the step
+};
+
+struct Forces {
+  VectorX internal;  ///< 6 per node: force, moment
+  VectorX external;
+  double energy = 0;
+  std::vector<ElementState> deformation;  ///< per element
+  bool valid = false;                     ///< false: an element has collapsed or folded by more than the normals allow
+};
+
+/// Internal and external forces, and d(internal - external)/d(displacement, spin) where `tangent` is given (its
+/// pattern is system.pattern). In parallel; the same to the bit whatever the number of threads.
+void evaluate(const ShellSystem& system, const Model& model, const Configuration& configuration,
+              const std::vector<double>& factors, const ViscousState& viscous, Forces& forces, BlockMatrix* tangent);
+
+/// Stiffness of the linear theory at the reference, without any load.
+void linear_stiffness(const ShellSystem& system, BlockMatrix& matrix);
+
+/// That stiffness times displacements and rotation vectors (6 per node), summed over the elements' stresses: its error
+/// is round-off of strains, not of stiffnesses, whose entries are larger by (h / t)^2 and more than what a thin shell
+/// bends with.
+void linear_forces(const ShellSystem& system, const VectorX& displacement, VectorX& forces);
+
+/// Root of the sum of squares of forces and moments / length.
+double force_norm(const ShellSystem& system, const VectorX& force);
+
+/// What round-off makes of the internal forces: below this a residual says nothing.
+double round_off(const ShellSystem& system, const Configuration& configuration);
+
+/// Deformed geometry of one body, with its normals at the corners.
+ShellMesh deformed_mesh(const ShellSystem& system, const Model& model, const Configuration& configuration,
+                        std::size_t body);
+
+/// Volume of the closed bodies together; none when a body is open.
+std::optional<double> enclosed_volume(const ShellSystem& system, const Model& model,
+                                      const Configuration& configuration);
+
+/// The rigid motion of a piece that leaves the mean displacement and the mean rotation, weighted by area, at zero is
+/// added to its nodes. Follower loads and internal forces only turn with it.
+void take_out_rigid_motion(const ShellSystem& system, const Piece& piece, Configuration& configuration);
+
+/// The same in the linear theory, on 6 numbers per node, for the bodies that are held by their rigid motions.
+void take_out_linear_rigid_motion(const ShellSystem& system, const Model& model, VectorX& displacement);
+
+}  // namespace tunica

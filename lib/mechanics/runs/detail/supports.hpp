@@ -1,0 +1,29 @@
+#pragma once
+
+#include "tunica/mechanics/runs/detail/shell_system.hpp"
+
+namespace tunica {
+
+/// Fills `held` and `prescribed`: the union of the fixes, six statically determinate supports in every piece of a body
+/// that is held by its rigid motions only (static runs), and nodes that no triangle uses.
+/// Errors: InputError when two fixes ask for different displacements of one component.
+void make_supports(ShellSystem& system, const Model& model);
+
+/// Number of rigid motions of a piece that its held freedoms leave free (0 ... 6).
+int free_rigid_motions(const ShellSystem& system, const Piece& piece);
+
+/// The rigid motions of a piece, displaced as in `configuration`, that its held freedoms leave free: 6 per node, of all
+/// nodes; lengths of order one.
+std::vector<VectorX> free_rigid_modes(const ShellSystem& system, const Piece& piece,
+                                      const Configuration& configuration);
+
+/// Net force and moment of all loads at their full value on a piece, relative to the sum of their magnitudes.
+double imbalance(const ShellSystem& system, const Piece& piece, const VectorX& external);
+
+/// Whether a body is held by its rigid motions.
+bool held_by_rigid_motions(const Model& model, std::size_t body);
+
+/// Releases the supports of bodies held by their rigid motions: in a dynamic run inertia holds them.
+void release_rigid_motion_supports(ShellSystem& system, const Model& model);
+
+}  // namespace tunica

@@ -1,0 +1,250 @@
+#include "tunica/mechanics/runs/doubts.hpp"
+
+#include "tunica/shell/distance/target.hpp"
+#include "tunica/surface/mesh/measure.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace tunica {
+namespace {
+
+// Of the body's area: one crease, rim or branch says nothing of the whole wall.
+constexpr double most_of_it = 0.5;
+// Of the diagonal of the body's box, beyond which theories of thin shells do not claim to hold.
+constexpr double thickest = 0.1;
+
+std::string at(const std::string& said_at, const std::string& otherwise) {
+  return said_at.empty() ? otherwise : said_at + ": " + otherwise;
+}
+
+// Mean thickness at the corners of a triangle, mm.
+double thickness_of(const ShellBody& body, std::size_t triangle) {
+  if (body.thickness.size() == 1) {
+    return body.thickness.front();
+  }
+  const auto& v = body.mesh.triangles[triangle];
+  return (body.thickness[v[0]] + body.thickness[v[1]] + body.thickness[v[2]]) / 3;
+}
+
+void doubt_thickness(const ShellBody& body, std::vector<std::string>& found) {
+  const double diagonal_mm = diagonal(flat_facets(body.mesh));
+  const double most = *std::max_element(body.thickness.begin(), body.thickness.end());
+  if (most > thickest * diagonal_mm) {
+    found.push_back(
+        fmt::format("{}: its thickness, {:.4g} mm, is more than a tenth of the body's diagonal, {:.4g} mm: "
+                    "this is no thin shell; is the unit right?",
+                    at(body.said_at, body.name), most, diagonal_mm));
+    return;
+  }
+  const std::vector<double> curvatures = largest_curvatures(body.mesh, body.curved);
+  std::vector<std::pair<double, double>> by_share;  // thickness over radius of curvature, area
+  double whole = 0;
+  for (std::size_t t = 0; t < curvatures.size(); ++t) {
+    const auto& v = body.mesh.triangles[t];
+    const auto& x = body.mesh.vertices;
+    by_share.emplace_back(thickness_of(body, t) * curvatures[t], triangle_area(x[v[0]], x[v[1]], x[v[2]]));
+    whole += by_share.back().second;
+  }
+  double thick = 0;
+  for (const auto& [share, area] : by_share) {
+    thick += share > 1 ? area : 0;
+  }
+  if (thick > most_of_it * whole) {
+    found.push_back(
+        fmt::format("{}: its thickness, {:.4g} mm, is more than the radius of curvature over {:.0f} % of its "
+                    "area: the wall would pass through itself; is the unit right?",
+                    at(body.said_at, body.name), most, 100 * thick / whole));
+  }
+}
+
+// Freedoms that the fixes hold, 6 per node of one body: translations, rotations.
+std::vector<std::array<bool, 6>> held_freedoms(const Model& model, std::size_t body) {
+  std::vector<std::array<bool, 6>> held(model.shells[body].mesh.vertices.size());
+  for (const Fix& fix : model.fixes) {
+    if (fix.body != body) {
+      continue;
+    }
+    for (const Index node : fix.nodes) {
+      for (std::size_t c = 0; c < 3; ++c) {
+        held[node][c] |= fix.translation[c];
+        held[node][c + 3] |= fix.rotation[c];
+      }
+    }
+  }
+  return held;
+}
+
+bool cannot_move(const Model& model, std::size_t body, const std::vector<std::array<bool, 6>>& held) {
+  const bool moved = std::any_of(model.fixes.begin(), model.fixes.end(),
+                                 [&](const Fix& fix) { return fix.body == body && prescribes(fix); });
+  const auto& triangles = model.shells[body].mesh.triangles;
+  return !moved && std::all_of(triangles.begin(), triangles.end(), [&](const auto& triangle) {
+    return std::all_of(triangle.begin(), triangle.end(),
+                       [&](Index node) { return held[node][0] && held[node][1] && held[node][2]; });
+  });
+}
+
+// The nodes, vector and first freedom of a load that nodes share; none of a load on the whole body.
+struct Shared {
+  std::vector<Index> nodes;
+  Vec3 value;
+  std::size_t first;
+  const char* name;
+};
+
+std::optional<Shared> shared(const Load& load) {
+  if (const auto* force = std::get_if<ForceLoad>(&load.kind)) {
+    return Shared{force->nodes, force->total, 0, "force"};
+  }
+  if (const auto* moment = std::get_if<MomentLoad>(&load.kind)) {
+    return Shared{moment->nodes, moment->total, 3, "moment"};
+  }
+  if (const auto* edge = std::get_if<EdgeLoad>(&load.kind)) {
+    Shared on_edges{{}, edge->per_length, 0, "edge load"};
+    for (const auto& ends : edge->edges) {
+      on_edges.nodes.insert(on_edges.nodes.end(), ends.begin(), ends.end());
+    }
+    return on_edges;
+  }
+  return {};
+}
+
+bool only_held_nodes_bear(const Shared& load, const std::vector<std::array<bool, 6>>& held) {
+  for (std::size_t c = 0; c < 3; ++c) {
+    if (load.value[static_cast<Eigen::Index>(c)] != 0 &&
+        !std::all_of(load.nodes.begin(), load.nodes.end(), [&](Index node) { return held[node][load.first + c]; })) {
+      return false;
+    }
+  }
+  return true;
+}
+
+bool is_zero(const Load& load) {
+  if (const auto* pressure = std::get_if<PressureLoad>(&load.kind)) {
+    return pressure->value == 0;
+  }
+  if (const auto* area = std::get_if<AreaLoad>(&load.kind)) {
+    return area->per_area.isZero(0);
+  }
+  if (const auto* gravity = std::get_if<GravityLoad>(&load.kind)) {
+    return gravity->acceleration.isZero(0);
+  }
+  return shared(load)->value.isZero(0);
+}
+
+// Whether a ramp is zero wherever the run looks: it is linear between its points.
+bool stays_zero(const Ramp& ramp, const RunSettings& settings) {
+  std::vector<double> times;
+  if (const auto* dynamic = std::get_if<DynamicRun>(&settings.kind)) {
+    times.push_back(dynamic->duration);
+    for (const auto& [time, factor] : ramp.points) {
+      if (time < dynamic->duration) {
+        times.push_back(time);
+      }
+    }
+  } else if (const auto* statics = std::get_if<StaticRun>(&settings.kind)) {
+    times = statics->load_factors;
+  } else if (const auto* frequencies = std::get_if<FrequencyRun>(&settings.kind)) {
+    times = frequencies->preload.load_factors;
+  }
+  return !ramp.points.empty() && !times.empty() &&
+         std::all_of(times.begin(), times.end(), [&](double time) { return ramp.at(time) == 0; });
+}
+
+void doubt_loads(const Model& model, const RunSettings& settings,
+                 const std::vector<std::vector<std::array<bool, 6>>>& held, std::vector<std::string>& found) {
+  for (const Load& load : model.loads) {
+    const std::string where = at(load.said_at, model.shells[load.body].name);
+    if (is_zero(load)) {
+      found.push_back(where + ": this load is zero");
+    } else if (stays_zero(load.ramp, settings)) {
+      found.push_back(where + ": the ramp of this load is zero during the whole run, so it never acts");
+    } else if (const auto on = shared(load); on && only_held_nodes_bear(*on, held[load.body])) {
+      found.push_back(fmt::format("{}: this {} acts on held nodes only, so it moves nothing", where, on->name));
+    }
+  }
+  for (const Fix& fix : model.fixes) {
+    if (prescribes(fix) && stays_zero(fix.ramp, settings)) {
+      found.push_back(at(fix.said_at, model.shells[fix.body].name) +
+                      ": the ramp of this displacement is zero during the whole run, so it moves nothing");
+    }
+  }
+}
+
+}  // namespace
+
+bool prescribes(const Fix& fix) {
+  for (int c = 0; c < 3; ++c) {
+    if (fix.translation[static_cast<std::size_t>(c)] && fix.displacement[c] != 0) {
+      return true;
+    }
+  }
+  return false;
+}
+
+bool is_loaded(const Model& model) {
+  return !std::all_of(model.loads.begin(), model.loads.end(), is_zero) ||
+         std::any_of(model.fixes.begin(), model.fixes.end(), prescribes);
+}
+
+std::vector<std::string> doubts(const Model& model, const RunSettings& settings) {
+  std::vector<std::string> found;
+  std::vector<std::vector<std::array<bool, 6>>> held;
+  for (std::size_t b = 0; b < model.shells.size(); ++b) {
+    const ShellBody& body = model.shells[b];
+    doubt_thickness(body, found);
+    held.push_back(held_freedoms(model, b));
+    if (cannot_move(model, b, held.back())) {
+      found.push_back(at(body.said_at, body.name) + ": all its nodes are held, so nothing of it can move");
+    }
+  }
+  doubt_loads(model, settings, held, found);
+  const bool needs_load =
+      std::holds_alternative<StaticRun>(settings.kind) || std::holds_alternative<DynamicRun>(settings.kind);
+  if (needs_load && !is_loaded(model)) {
+    found.push_back(at(model.shells.front().said_at, "nothing loads the model, so it stays as it is: add a load"));
+  }
+  return found;
+}
+
+std::vector<double> largest_curvatures(const ShellMesh& mesh, bool curved) {
+  const bool own = curved && (!mesh.corner_normals.empty() || mesh.normals.size() == mesh.vertices.size());
+  const std::vector<Vec3> of_vertices = own ? std::vector<Vec3>() : vertex_normals(flat_facets(mesh));
+  std::vector<double> curvatures;
+  curvatures.reserve(mesh.triangles.size());
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const auto& v = mesh.triangles[t];
+    const auto normal = [&](std::size_t k) { return own ? mesh.normal(t, static_cast<int>(k)) : of_vertices[v[k]]; };
+    const Vec3 along = mesh.vertices[v[1]] - mesh.vertices[v[0]];
+    const Vec3 across = along.cross(mesh.vertices[v[2]] - mesh.vertices[v[0]]);
+    if (!(across.norm() > 0)) {
+      curvatures.push_back(0);
+      continue;
+    }
+    const Vec3 x = along.normalized();
+    const Vec3 y = across.cross(along).normalized();
+    Eigen::Matrix3d left = Eigen::Matrix3d::Zero();
+    Vec3 right = Vec3::Zero();
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vec3 edge = mesh.vertices[v[(k + 1) % 3]] - mesh.vertices[v[k]];
+      const Vec3 turn = normal((k + 1) % 3) - normal(k);
+      const double u = edge.dot(x);
+      const double w = edge.dot(y);
+      Eigen::Matrix<double, 2, 3> rows;
+      rows << u, w, 0, 0, u, w;
+      left += rows.transpose() * rows;
+      right += rows.transpose() * Vec2(turn.dot(x), turn.dot(y));
+    }
+    const Vec3 shape = left.ldlt().solve(right);  // xx, xy, yy
+    curvatures.push_back(std::abs(shape[0] + shape[2]) / 2 + std::hypot((shape[0] - shape[2]) / 2, shape[1]));
+  }
+  return curvatures;
+}
+
+}  // namespace tunica

@@ -1,0 +1,29 @@
+#pragma once
+
+#include "tunica/mechanics/model/model.hpp"
+
+#include <string>
+#include <vector>
+
+namespace tunica {
+
+/// Whether a fix moves something.
+bool prescribes(const Fix& fix);
+
+/// Whether any load or prescribed displacement is other than zero, ramps aside.
+bool is_loaded(const Model& model);
+
+/// What of a model can be solved but hardly be meant, a sentence each that begins with where it was said: walls thicker
+/// than the radius of curvature over most of a body, or than a tenth of its diagonal; bodies that cannot move; forces
+/// and moments that only held nodes bear; loads that are zero or stay so during the run; nothing that loads at all
+/// (static and dynamic runs).
+/// The model must have passed check_model(). Cost: linear.
+std::vector<std::string> doubts(const Model& model, const RunSettings& settings);
+
+/// The larger principal curvature of the shells (1/mm, #F): of each the symmetric shape operator that fits best how the
+/// normals turn along its edges; the corners' normals, or those of the vertices where `mesh` has none of its own
+/// (`curved` false: flat facets). Zero where a facet has no area.
+/// Source: Rusinkiewicz, "Estimating curvatures and their derivatives on triangle meshes", 3DPVT 2004, section 3.
+std::vector<double> largest_curvatures(const ShellMesh& mesh, bool curved);
+
+}  // namespace tunica

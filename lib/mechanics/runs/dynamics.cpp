@@ -1,0 +1,673 @@
+#include "tunica/core/error.hpp"
+#include "tunica/mechanics/elements/rotation.hpp"
+#include "tunica/mechanics/runs/detail/run.hpp"
+#include "tunica/mechanics/runs/detail/settle.hpp"
+#include "tunica/mechanics/runs/detail/supports.hpp"
+#include "tunica/mechanics/runs/detail/time_scheme.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+
+#include <chrono>
+#include <cmath>
+
+namespace tunica {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// Smallest part of a step's change that is tried on its own.
+constexpr double smallest_part = 1.0 / 256;
+/// Smallest part of a step's time that error control may ask for.
+constexpr double shortest_part = 1.0 / 4096;
+
+Eigen::Index at(std::size_t node) { return 6 * static_cast<Eigen::Index>(node); }
+
+/// Whether a step's result may stand.
+bool is_solved(const RunSettings& settings, const NewtonResult& result) {
+  if (!result.valid) {
+    return false;
+  }
+  if (settings.cg_fixed_count) {
+    return true;
+  }
+  return settings.newton_max == 1 ? result.linear_converged && result.residual <= largest_unchecked_residual
+                                  : result.converged && result.stable;
+}
+
+/// A gain of energy by time integration that passes this part of the largest energy is told. What trapezia leave of the
+/// work of loads that follow a coarse step stays below.
+constexpr double tolerated_gain = 0.1;
+
+struct Motion {
+  Configuration configuration;
+  Rates rates;
+};
+
+/// M a1 + alpha M v1 + f_int(x1) = f_ext(x1, t1), with velocity and acceleration at the end of a step as the scheme
+/// says. Masses are lumped; rotary inertia is rho t^3 / 12 per area about every axis (that of a plate about the axes in
+/// its plane), so it needs no gyroscopic term. Damping is alpha M and, in each element's own frame, beta K times the
+/// rate of its deformation: a rigid motion is not damped by beta.
+class TimeStepper {
+public:
+  TimeStepper(const ShellSystem& system, const Model& model, const RunSettings& settings, const DynamicRun& run)
+      : system_(system),
+        model_(model),
+        settings_(settings),
+        run_(run),
+        scheme_(run),
+        solver_(system, settings),
+        matrix_(system.pattern),
+        mass_(VectorX::Zero(at(system.node_count()))),
+        part_(run.step) {
+    for (std::size_t i = 0; i < system.node_count(); ++i) {
+      mass_.segment<3>(at(i)).setConstant(system.mass[static_cast<Eigen::Index>(i)]);
+      mass_.segment<3>(at(i) + 3).setConstant(system.inertia[static_cast<Eigen::Index>(i)]);
+    }
+    if (run.adaptive) {
+      Vec3 low = system.reference.front();
+      Vec3 high = low;
+      for (const Vec3& x : system.reference) {
+        low = low.cwiseMin(x);
+        high = high.cwiseMax(x);
+      }
+      tolerance_ = run.adaptive->millimetres((high - low).norm());
+    }
+  }
+
+  struct StepResult {
+    NewtonResult newton;
+    double reached = 1;  ///< part of the step's change of load up to which solutions were found
+    bool ran_away = false;
+    std::size_t parts = 1;
+    bool precise = true;  ///< false: no part is short enough for the tolerance
+  };
+
+  /// The forces that act at time 0, and the accelerations with which a second-order scheme begins.
+  void start(Motion& motion) {
+    evaluate(system_, model_, motion.configuration, load_factors(model_, false, 0), {}, forces_, nullptr);
+    keep_acting(motion);
+    if (!scheme_.second_order()) {
+      return;
+    }
+    for (Eigen::Index i = 0; i < mass_.size(); ++i) {
+      const bool moves = !system_.held[static_cast<std::size_t>(i)] && mass_[i] > 0;
+      motion.rates.acceleration[i] = moves ? (forces_.external[i] - forces_.internal[i]) / mass_[i] : 0;
+    }
+    motion.rates.auxiliary = motion.rates.acceleration;
+  }
+
+  /// One step, with error control in as many parts as it takes.
+  StepResult advance(double time, double length, Motion& motion) {
+    if (tolerance_ == 0) {
+      const StepResult result = step(time, length, true, motion);
+      accept(length, motion);
+      return result;
+    }
+    StepResult total;
+    total.parts = 0;
+    std::size_t iterations = 0;
+    std::size_t cg_iterations = 0;
+    for (double done = 0; done < length * (1 - 1e-12);) {
+      const double left = length - done;
+      // No tiny rest: what is between one and two parts is halved.
+      const double h = part_ >= left * (1 - 1e-9) ? left : part_ > left / 2 ? left / 2 : part_;
+      const bool shortest = h <= length * shortest_part;
+      Motion attempt = motion;
+      StepResult result = step(time + done, h, shortest, attempt);
+      iterations += result.newton.iterations;
+      cg_iterations += result.newton.cg_iterations;
+      const bool solved = is_solved(settings_, result.newton);
+      const double error = increment_size(system_, scheme_.local_error(h, motion.rates, attempt.rates)) / tolerance_;
+      const double wanted = h * std::clamp(0.9 * std::pow(error, -1 / scheme_.local_order()), 0.2, 2.0);
+      if (solved && error <= 1) {
+        motion = std::move(attempt);
+        accept(h, motion);
+        done = h == left ? length : done + h;
+        part_ = std::min(h < part_ && wanted >= h ? std::max(wanted, part_) : wanted, run_.step);
+        ++total.parts;
+      } else if (shortest) {
+        motion = std::move(attempt);
+        total.reached = (done + result.reached * h) / length;
+        total.ran_away = result.ran_away;
+        total.precise = !solved;
+        total.newton = result.newton;
+        break;
+      } else {
+        part_ = std::max(solved && std::isfinite(wanted) ? std::min(wanted, h / 2) : h / 4, length * shortest_part);
+        continue;
+      }
+      total.newton = result.newton;
+    }
+    total.newton.iterations = iterations;
+    total.newton.cg_iterations = cg_iterations;
+    return total;
+  }
+
+  /// What a run must keep between its steps to go on as if nothing had happened, beyond the configuration.
+  [[nodiscard]] std::map<std::string, std::vector<double>, std::less<>> memory(const Motion& motion) const {
+    const auto values = [](const VectorX& v) { return std::vector<double>(v.begin(), v.end()); };
+    std::map<std::string, std::vector<double>, std::less<>> result{{"velocity", values(motion.rates.velocity)},
+                                                                   {"acceleration", values(motion.rates.acceleration)},
+                                                                   {"auxiliary", values(motion.rates.auxiliary)},
+                                                                   {"acting", values(acting_)},
+                                                                   {"part", {part_}},
+                                                                   {"at_rest", {at_rest_ ? 1.0 : 0.0}}};
+    if (!before_.empty()) {
+      std::vector<double>& before = result["deformation_before"];
+      for (const ElementState& d : before_) {
+        before.insert(before.end(), d.begin(), d.end());
+      }
+      result["length_before"] = {length_before_};
+    }
+    return result;
+  }
+
+  void recall(const std::map<std::string, std::vector<double>, std::less<>>& memory, Motion& motion) {
+    for (auto [name, vector] :
+         {std::pair{"velocity", &motion.rates.velocity}, std::pair{"acceleration", &motion.rates.acceleration},
+          std::pair{"auxiliary", &motion.rates.auxiliary}, std::pair{"acting", &acting_}}) {
+      const std::vector<double>& values = memory.at(name);
+      TUNICA_ASSERT(values.size() == static_cast<std::size_t>(mass_.size()));
+      vector->resize(mass_.size());
+      std::copy(values.begin(), values.end(), vector->begin());
+    }
+    deformation_.clear();
+    before_.clear();
+    work_ = damped_ = 0;
+    part_ = memory.at("part").at(0);
+    at_rest_ = memory.at("at_rest").at(0) != 0;
+    if (const auto found = memory.find("deformation_before"); found != memory.end()) {
+      TUNICA_ASSERT(found->second.size() ==
+                    static_cast<std::size_t>(ElementState::SizeAtCompileTime) * system_.elements.size());
+      before_.resize(system_.elements.size());
+      for (std::size_t e = 0; e < before_.size(); ++e) {
+        before_[e] = Eigen::Map<const ElementState>(found->second.data() +
+                                                    ElementState::SizeAtCompileTime * static_cast<std::ptrdiff_t>(e));
+      }
+      length_before_ = memory.at("length_before").at(0);
+    }
+  }
+
+  [[nodiscard]] double kinetic_energy(const VectorX& velocity) const {
+    return 0.5 * velocity.dot(mass_.cwiseProduct(velocity));
+  }
+
+  /// Closes the balance of energy after a step.
+  void balance_energy(std::size_t step, double time, const Motion& motion, EnergyBalance& energy) {
+    const double stored = forces_.energy + kinetic_energy(motion.rates.velocity);
+    energy.work += std::exchange(work_, 0);
+    energy.damped += std::exchange(damped_, 0);
+    energy.lost = energy.work - energy.damped - stored;
+    energy.most_lost = std::max(energy.most_lost, energy.lost);
+    energy.largest = std::max({energy.largest, stored, std::abs(energy.work)});
+    if (energy.largest > 0) {
+      energy.gained = std::max(energy.gained, (energy.most_lost - energy.lost) / energy.largest);
+    }
+    if (energy.gained > tolerated_gain && energy.gaining_step == 0) {
+      energy.gaining_step = step;
+      energy.gaining_time = time;
+    }
+  }
+
+  [[nodiscard]] std::size_t freedom_count() const { return solver_.freedom_count(); }
+  void tell_direct_error(bool tell) { solver_.tell_direct_error(tell); }
+  [[nodiscard]] double tolerance() const { return tolerance_; }
+
+private:
+  struct Step {
+    Configuration start;
+    Rates rates_before;
+    double length = 0;  ///< s
+    std::vector<double> factors_before;
+    std::vector<double> factors;
+    VectorX held;           ///< prescribed displacements of the whole step
+    VectorX left_at_start;  ///< unbalanced forces of the start, for a path that begins there
+    VectorX change;
+    Rates rates;
+    double viscosity = 0;  ///< beta / s: of the deformation's rate by the deformation
+  };
+
+  /// One step or part of one. Where Newton's method does not lead from the state before to the end at once, and it
+  /// may_follow, the change (of loads, prescribed displacements, and what inertia leaves unbalanced at the start) is
+  /// put on in parts; where that path loses its stability the shell is let go, and creeps to where the step's forces
+  /// are in balance.
+  StepResult step(double time, double length, bool may_follow, Motion& motion) {
+    Step s;
+    s.start = motion.configuration;
+    s.rates_before = motion.rates;
+    s.length = length;
+    s.factors = load_factors(model_, false, time + length);
+    // A load that is there from time 0 on comes onto a shell at rest without load.
+    s.factors_before = time > 0 ? load_factors(model_, false, time) : std::vector<double>(model_.loads.size(), 0.0);
+    if (deformation_.empty()) {
+      evaluate(system_, model_, s.start, s.factors_before, {}, forces_, nullptr);
+      deformation_ = forces_.deformation;
+    }
+    s.viscosity = find_viscosity(length);
+    s.held = VectorX::Zero(motion.rates.velocity.size());
+    for (const PrescribedFreedom& p : system_.prescribed) {
+      const Ramp& ramp = model_.fixes[p.fix].ramp;
+      s.held[static_cast<Eigen::Index>(p.freedom)] =
+          p.value * ramp.at(time + length) -
+          s.start.displacement[p.freedom / 6][static_cast<Eigen::Index>(p.freedom % 6)];
+    }
+    StepResult result;
+    result.newton = run(s, 0, 1, motion.configuration);
+    if (may_follow && settings_.newton_max > 1 && !settings_.cg_fixed_count && !acceptable(result.newton)) {
+      follow(s, result, motion.configuration);
+    }
+    find_change(s.start, motion.configuration, change_);
+    scheme_.end_rates(length, system_.held, s.rates_before, change_, motion.rates);
+    for (const Piece& piece : system_.pieces) {
+      if (held_by_rigid_motions(model_, piece.body)) {
+        stop_rigid_motion(piece, length, motion);
+      }
+    }
+    return result;
+  }
+
+  /// Beta times the derivative of the rate of deformation, and `viscous_zero_`, from which on it resists: the backward
+  /// difference, or that of second order through the step before.
+  double find_viscosity(double length) {
+    if (run_.damping.stiffness == 0) {
+      return 0;
+    }
+    if (!scheme_.second_order() || before_.empty()) {
+      viscous_zero_ = deformation_;
+      return run_.damping.stiffness / length;
+    }
+    const double r = length / length_before_;
+    const double leading = (1 + 2 * r) / (1 + r);
+    viscous_zero_.resize(deformation_.size());
+    for (std::size_t e = 0; e < deformation_.size(); ++e) {
+      viscous_zero_[e] = ((1 + r) * deformation_[e] - r * r / (1 + r) * before_[e]) / leading;
+    }
+    return run_.damping.stiffness * leading / length;
+  }
+
+  /// The step is done: its end is where the next one starts.
+  void accept(double length, const Motion& motion) {
+    const VectorX acted = std::move(acting_);
+    keep_acting(motion);
+    work_ += 0.5 * (acted + acting_).dot(change_);
+    damped_ += run_.damping.mass * length * 2 * kinetic_energy(change_ / length);
+    for (std::size_t e = 0; run_.damping.stiffness > 0 && e < system_.elements.size(); ++e) {
+      damped_ += run_.damping.stiffness / length * 2 *
+                 strain_energy(system_.elements[e], forces_.deformation[e] - deformation_[e]);
+    }
+    if (run_.damping.stiffness > 0 && scheme_.second_order()) {
+      before_.swap(deformation_);
+      length_before_ = length;
+    }
+    deformation_ = forces_.deformation;
+  }
+
+  /// Loads, and on held freedoms what moves them.
+  void keep_acting(const Motion& motion) {
+    acting_ = forces_.external;
+    for (std::size_t i = 0; i < system_.held.size(); ++i) {
+      if (system_.held[i]) {
+        const auto k = static_cast<Eigen::Index>(i);
+        acting_[k] = forces_.internal[k] +
+                     mass_[k] * (motion.rates.acceleration[k] + run_.damping.mass * motion.rates.velocity[k]);
+      }
+    }
+  }
+
+  static bool acceptable(const NewtonResult& result) { return result.converged && result.valid && result.stable; }
+
+  /// Balance of the step with a part of its change; 1: the equation of the step itself.
+  Balance balance(Step& s, double part, const Configuration& c, BlockMatrix* tangent) {
+    const ViscousState viscous{s.viscosity, s.viscosity > 0 ? &viscous_zero_ : nullptr};
+    std::vector<double> factors = s.factors;
+    for (std::size_t l = 0; part < 1 && l < factors.size(); ++l) {
+      factors[l] = s.factors_before[l] + part * (s.factors[l] - s.factors_before[l]);
+    }
+    evaluate(system_, model_, c, factors, viscous, forces_, tangent);
+    find_change(s.start, c, s.change);
+    scheme_.end_rates(s.length, system_.held, s.rates_before, s.change, s.rates);
+    const VectorX inertia = mass_.cwiseProduct(s.rates.acceleration + run_.damping.mass * s.rates.velocity);
+    if (tangent != nullptr) {
+      add_inertia(s.change, s.length, *tangent);
+    }
+    Balance result;
+    result.valid = forces_.valid;
+    result.unbalanced = forces_.external - forces_.internal - inertia;
+    if (part < 1 && s.left_at_start.size() > 0) {
+      result.unbalanced -= (1 - part) * s.left_at_start;
+    }
+    VectorX reactions = forces_.internal + inertia;
+    for (std::size_t i = 0; i < system_.held.size(); ++i) {
+      if (!system_.held[i]) {
+        reactions[static_cast<Eigen::Index>(i)] = 0;
+      }
+    }
+    result.scale =
+        std::max({force_norm(system_, forces_.external), force_norm(system_, inertia), force_norm(system_, reactions)});
+    result.floor = round_off(system_, c);
+    return result;
+  }
+
+  NewtonResult run(Step& s, double from, double to, Configuration& configuration) {
+    const auto function = [&](const Configuration& c, BlockMatrix* tangent) { return balance(s, to, c, tangent); };
+    const NewtonResult result =
+        newton(system_, settings_, solver_, function, (to - from) * s.held, matrix_, configuration, at_rest_);
+    at_rest_ = result.iterations == 0;
+    return result;
+  }
+
+  void follow(Step& s, StepResult& result, Configuration& configuration) {
+    configuration = s.start;
+    s.left_at_start = balance(s, 0, configuration, nullptr).unbalanced;
+    double done = 0;
+    double part = 0.5;
+    NewtonResult attempted;
+    const auto count = [&] {
+      result.newton.iterations += attempted.iterations;
+      result.newton.cg_iterations += attempted.cg_iterations;
+    };
+    while (done < 1 && part >= smallest_part) {
+      const double next = std::min(1.0, done + part);
+      Configuration attempt = configuration;
+      attempted = run(s, done, next, attempt);
+      count();
+      if (acceptable(attempted)) {
+        configuration = std::move(attempt);
+        done = next;
+        part = std::min(2 * part, 0.5);
+      } else {
+        part /= 2;
+      }
+    }
+    result.reached = done;
+    if (done == 1) {
+      const auto [iterations, cg_iterations] = std::pair(result.newton.iterations, result.newton.cg_iterations);
+      result.newton = attempted;
+      result.newton.iterations = iterations;
+      result.newton.cg_iterations = cg_iterations;
+      return;
+    }
+    if (s.held.squaredNorm() > 0) {
+      return;
+    }
+    const auto whole = [&](const Configuration& c, BlockMatrix* tangent) { return balance(s, 1, c, tangent); };
+    const SettleResult settled = settle(system_, settings_, solver_, whole, matrix_, configuration);
+    result.ran_away = settled.ran_away;
+    result.newton.converged = settled.settled;
+    result.newton.stable = settled.settled;
+    result.newton.valid = settled.settled;
+    result.newton.linear_converged = settled.settled;
+    result.newton.residual = settled.residual;
+    result.newton.iterations += settled.iterations;
+    result.newton.cg_iterations += settled.cg_iterations;
+  }
+
+  static void find_change(const Configuration& start, const Configuration& end, VectorX& change) {
+    change.resize(at(start.displacement.size()));
+    for (std::size_t i = 0; i < start.displacement.size(); ++i) {
+      change.segment<3>(at(i)) = end.displacement[i] - start.displacement[i];
+      change.segment<3>(at(i) + 3) = logarithm(end.rotation[i] * start.rotation[i].conjugate());
+    }
+  }
+
+  void add_inertia(const VectorX& change, double length, BlockMatrix& tangent) const {
+    const double factor = scheme_.acceleration_factor(length) + run_.damping.mass * scheme_.velocity_factor(length);
+    for (std::size_t i = 0; i < system_.node_count(); ++i) {
+      auto block = tangent.block(tangent.find(static_cast<Index>(i), static_cast<Index>(i)));
+      block.diagonal().head<3>() += factor * mass_.segment<3>(at(i));
+      const Vec3 turn = change.segment<3>(at(i) + 3);
+      block.block<3, 3>(3, 3) +=
+          factor * mass_[at(i) + 3] * spin_to_rate(turn, spin_coefficients(turn.squaredNorm()).eta);
+    }
+  }
+
+  /// The rigid motion with the linear and angular momentum of a piece whose nodes have these velocities.
+  struct RigidMotion {
+    Vec3 velocity, turn, centre;
+
+    [[nodiscard]] Vec3 at(const Vec3& position) const { return velocity + turn.cross(position - centre); }
+  };
+
+  RigidMotion rigid_motion(const Piece& piece, const Configuration& c, const VectorX& velocities) const {
+    double mass = 0;
+    Vec3 centre = Vec3::Zero();
+    Vec3 momentum = Vec3::Zero();
+    for (const Index i : piece.nodes) {
+      mass += system_.mass[i];
+      centre += system_.mass[i] * (system_.reference[i] + c.displacement[i]);
+      momentum += system_.mass[i] * velocities.segment<3>(at(i));
+    }
+    centre /= mass;
+    Vec3 spin = Vec3::Zero();
+    Mat3 inertia = Mat3::Zero();
+    for (const Index i : piece.nodes) {
+      const Vec3 arm = system_.reference[i] + c.displacement[i] - centre;
+      spin += system_.mass[i] * arm.cross(velocities.segment<3>(at(i))) +
+              system_.inertia[i] * velocities.segment<3>(at(i) + 3);
+      inertia += system_.mass[i] * (arm.squaredNorm() * Mat3::Identity() - arm * arm.transpose()) +
+                 system_.inertia[i] * Mat3::Identity();
+    }
+    return {momentum / mass, inertia.ldlt().solve(spin), centre};
+  }
+
+  /// Takes linear and angular momentum out of a piece. The loads are in balance, so there is only what the solver's
+  /// tolerance left.
+  void stop_rigid_motion(const Piece& piece, double length, Motion& motion) const {
+    Configuration& c = motion.configuration;
+    const Configuration moved = c;
+    for (VectorX* rates : {&motion.rates.velocity, &motion.rates.acceleration, &motion.rates.auxiliary}) {
+      const RigidMotion rigid = rigid_motion(piece, moved, *rates);
+      const bool velocity = rates == &motion.rates.velocity;
+      for (const Index i : piece.nodes) {
+        const Vec3 change = rigid.at(system_.reference[i] + moved.displacement[i]);
+        rates->segment<3>(at(i)) -= change;
+        rates->segment<3>(at(i) + 3) -= rigid.turn;
+        if (velocity) {
+          c.displacement[i] -= length * change;
+          c.rotation[i] = (exponential(-length * rigid.turn) * c.rotation[i]).normalized();
+        }
+      }
+    }
+  }
+
+  const ShellSystem& system_;
+  const Model& model_;
+  const RunSettings& settings_;
+  const DynamicRun& run_;
+  const TimeScheme scheme_;
+  TangentSolver solver_;
+  BlockMatrix matrix_;
+  VectorX mass_;
+  Forces forces_;
+  std::vector<ElementState> deformation_;  ///< at the start of the step
+  std::vector<ElementState> before_;       ///< at the start of the step before, where damping asks for it
+  VectorX change_;                         ///< displacements and rotations of the last step
+  VectorX acting_;                         ///< at the start of the step
+  double work_ = 0;                        ///< mJ, since energies were last balanced
+  double damped_ = 0;
+  std::vector<ElementState> viscous_zero_;  ///< the deformation at which damping by beta K vanishes
+  double length_before_ = 0;                ///< s
+  double tolerance_ = 0;                    ///< mm, of error control; 0: none
+  double part_ = 0;                         ///< s: length of the next part under error control
+  bool at_rest_ = false;                    ///< the last step changed nothing
+};
+
+double first_load_factor(const Model& model, double time) {
+  return model.loads.empty() ? 0 : model.loads.front().ramp.at(time);
+}
+
+/// The steps of a run, what they hand over, and why one fails.
+class TimeLoop {
+public:
+  TimeLoop(ShellSystem& system, const Model& model, const RunSettings& settings, const DynamicRun& run,
+           const StateCallback& on_state)
+      : system_(system),
+        model_(model),
+        settings_(settings),
+        run_(run),
+        on_state_(on_state),
+        stepper_(system, model, settings, run),
+        motion_{reference_configuration(system), Rates::zero(at(system.node_count()))} {}
+
+  Summary follow(const Progress& progress, const Resumption& resumption) {
+    if (resumption.from) {
+      resume(*resumption.from);
+    } else {
+      begin();
+    }
+    // The last step may be shorter: the run ends at its duration.
+    const auto steps = static_cast<std::size_t>(std::max(1.0, std::ceil(run_.duration / run_.step - 1e-9)));
+    for (std::size_t s = summary_.steps; s < steps; ++s) {
+      const bool last = s + 1 == steps;
+      // Not of the first step, which is the longest without.
+      stepper_.tell_direct_error(s == 1 || last);
+      take_step(last ? run_.duration : static_cast<double>(s + 1) * run_.step, last);
+      resumption.offer([&] {
+        return Checkpoint{summary_, time_, motion_.configuration.displacement, motion_.configuration.rotation,
+                          stepper_.memory(motion_)};
+      });
+      advance(progress, static_cast<double>(s + 1) / static_cast<double>(steps));
+    }
+    return summary_;
+  }
+
+private:
+  void begin() {
+    summary_.dof = stepper_.freedom_count();
+    summary_.energy.emplace();
+    stepper_.start(motion_);
+    State state = make_state(system_, model_, motion_.configuration, 0);
+    state.converged = true;
+    hand_over(state);
+    summary_.volume_before = state.volume;
+    summary_.volume_after = state.volume;
+  }
+
+  void resume(const Checkpoint& from) {
+    summary_ = from.summary;
+    if (summary_.stiffened_from) {
+      stiffen_short_waves(system_);
+    }
+    time_ = from.position;
+    motion_.configuration = {from.displacement, from.rotation};
+    stepper_.recall(from.memory, motion_);
+    shown_ = summary_.steps / settings_.every * settings_.every;
+  }
+
+  void take_step(double end, bool last) {
+    const auto start = Clock::now();
+    const Motion before = motion_;
+    const TimeStepper::StepResult step = advance_stiffening(end);
+    const NewtonResult& result = step.newton;
+    if (!step.precise) {
+      throw RequirementError(fmt::format(
+          "the step from {:.6g} s to {:.6g} s adds more than the tolerance of {:.3g} mm to the error however "
+          "short its parts are: allow a larger one (adaptive), or put the load on by a ramp",
+          time_, end, stepper_.tolerance()));
+    }
+    if (!is_solved(settings_, result)) {
+      fail(step, before, end);
+    }
+    time_ = end;
+    stepper_.balance_energy(summary_.steps + 1, end, motion_, *summary_.energy);
+    const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
+    const bool wanted = (summary_.steps + 1) % settings_.every == 0 || last;
+    State state = wanted ? make_state(system_, model_, motion_.configuration, time_) : State();
+    state.residual = result.residual;
+    state.newton_iterations = result.iterations;
+    state.cg_iterations = result.cg_iterations;
+    set_algebraic_error(result.algebraic_error, state);
+    state.converged = settings_.newton_max == 1 ? result.linear_converged : result.converged;
+    if (wanted) {
+      hand_over(state);
+      shown_ = summary_.steps + 1;
+    }
+    summary_.parts += step.parts;
+    record_step(state, seconds, summary_);
+  }
+
+  /// A step that fails is taken again with its short waves made stiff, where the mesh is coarse for the thickness.
+  TimeStepper::StepResult advance_stiffening(double end) {
+    if (summary_.stiffened_from || !soft_waves_) {
+      return stepper_.advance(time_, end - time_, motion_);
+    }
+    const Motion before = motion_;
+    const auto memory = stepper_.memory(motion_);
+    const TimeStepper::StepResult step = stepper_.advance(time_, end - time_, motion_);
+    if (step.precise && is_solved(settings_, step.newton)) {
+      return step;
+    }
+    stiffen_short_waves(system_);
+    summary_.stiffened_from = time_;
+    motion_ = before;
+    stepper_.recall(memory, motion_);
+    return stepper_.advance(time_, end - time_, motion_);
+  }
+
+  [[noreturn]] void fail(const TimeStepper::StepResult& step, const Motion& before, double end) {
+    if (summary_.steps > shown_) {  // the last good state, also where it is none of every `every` steps
+      motion_ = before;
+      State state = make_state(system_, model_, motion_.configuration, time_);
+      state.converged = true;
+      hand_over(state);
+    }
+    const NewtonResult& result = step.newton;
+    const std::vector<double> wanted = load_factors(model_, false, end);
+    std::vector<double> carried =
+        time_ > 0 ? load_factors(model_, false, time_) : std::vector<double>(wanted.size(), 0.0);
+    for (std::size_t l = 0; l < carried.size(); ++l) {
+      carried[l] += step.reached * (wanted[l] - carried[l]);
+    }
+    if (step.reached < 1 && carried != wanted) {
+      throw RequirementError(fmt::format(
+          "no equilibrium in the step from {:.6g} s to {:.6g} s: the limit load is reached at "
+          "{:.3g} of its change of load ({}); beyond it {}; the last good state is at {:.6g} s",
+          time_, end, step.reached, describe_loads(model_, carried, wanted),
+          step.ran_away ? "the shell yields without bound" : "no state was found that the shell could rest in", time_));
+    }
+    throw RequirementError(
+        fmt::format("the step from {:.6g} s to {:.6g} s {} (relative residual {:.3g} after {} "
+                    "iterations): take a smaller step, a ramp or damping; the last good state is at {:.6g} s",
+                    time_, end,
+                    !result.valid                        ? "made elements collapse or fold"
+                    : result.converged && !result.stable ? "leads to a state that is not stable"
+                                                         : "did not converge",
+                    result.residual, result.iterations, time_));
+  }
+
+  void hand_over(State& state) {
+    state.load_factor = first_load_factor(model_, state.time);
+    state.kinetic_energy = stepper_.kinetic_energy(motion_.rates.velocity);
+    state.velocity.resize(system_.node_count());
+    state.angular_velocity.resize(system_.node_count());
+    for (std::size_t i = 0; i < system_.node_count(); ++i) {
+      state.velocity[i] = motion_.rates.velocity.segment<3>(at(i));
+      state.angular_velocity[i] = motion_.rates.velocity.segment<3>(at(i) + 3);
+    }
+    on_state_(state);
+  }
+
+  ShellSystem& system_;
+  const Model& model_;
+  const RunSettings& settings_;
+  const DynamicRun& run_;
+  const StateCallback& on_state_;
+  TimeStepper stepper_;
+  Motion motion_;
+  Summary summary_;
+  const bool soft_waves_ = has_soft_waves(system_);
+  double time_ = 0;
+  std::size_t shown_ = 0;  ///< steps done at the last state handed over
+};
+
+}  // namespace
+
+Summary run_dynamic(ShellSystem& system, const Model& model, const RunSettings& settings, const DynamicRun& run,
+                    const StateCallback& on_state, const Progress& progress, const Resumption& resumption) {
+  release_rigid_motion_supports(system, model);
+  return TimeLoop(system, model, settings, run, on_state).follow(progress, resumption);
+}
+
+}  // namespace tunica

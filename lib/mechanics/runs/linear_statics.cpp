@@ -1,0 +1,185 @@
+#include "tunica/core/error.hpp"
+#include "tunica/mechanics/elements/rotation.hpp"
+#include "tunica/mechanics/runs/detail/run.hpp"
+#include "tunica/mechanics/runs/detail/supports.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+namespace tunica {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// Corrections stop where they fall below this part of the solution (energy norm), or do not halve any more.
+constexpr double fine_enough = 1e-9;
+constexpr int most_corrections = 10;
+
+/// What the linear theory leaves unbalanced, by the elements' strains (linear_forces()).
+VectorX unbalanced_by(const ShellSystem& system, const FreeMask& free, const VectorX& external, const VectorX& moved) {
+  VectorX internal;
+  linear_forces(system, moved, internal);
+  VectorX left = external - internal;
+  mask(free, left);
+  return left;
+}
+
+/// Iterative refinement of a direct solution, and its error. The entries of the stiffness are rounded where the
+/// membrane is larger than the bending by (h R / t^2)^2; the elements' strains are not, so that a residual by them sees
+/// what that has done to the solution, and corrections by the factor at hand take it out again.
+/// Source: Higham 2002, "Accuracy and Stability of Numerical Algorithms", chapter 12. Cost: a solve per correction,
+/// mostly one in all.
+AlgebraicError refine(const ShellSystem& system, TangentSolver& solver, BlockMatrix& matrix, const VectorX& external,
+                      VectorX& moved) {
+  AlgebraicError error;
+  for (int round = 0;; ++round) {
+    VectorX internal, correction;
+    linear_forces(system, moved, internal);
+    VectorX left = external - internal;
+    mask(solver.free(), left);
+    if (!solver.solve(matrix, left, correction, true).solved) {
+      return error;
+    }
+    const double before = error.relative();
+    error = {std::sqrt(std::abs(dot(left, correction))), std::sqrt(std::abs(dot(moved, internal))), false};
+    const bool stagnates = round > 0 && !(error.relative() < before / 2);
+    if (error.relative() <= fine_enough || stagnates || round == most_corrections) {
+      return error;
+    }
+    moved += correction;
+  }
+}
+
+class LinearLoads {
+public:
+  LinearLoads(ShellSystem& system, const Model& model, const RunSettings& settings)
+      : system_(system), model_(model), settings_(settings), solver_(system, settings), matrix_(system.pattern) {
+    linear_stiffness(system, matrix_);
+  }
+
+  [[nodiscard]] std::size_t freedom_count() const { return solver_.freedom_count(); }
+
+  /// The state at a load factor. Errors: RequirementError.
+  State solve(double factor, bool same_matrix) {
+    Forces forces;
+    evaluate(system_, model_, reference_configuration(system_), load_factors(model_, true, factor), {}, forces,
+             nullptr);
+    const VectorX& external = forces.external;
+    VectorX moved = prescribed_positions(system_, model_, factor);
+    const VectorX right = unbalanced_by(system_, solver_.free(), external, moved);
+    VectorX solution;
+    const TangentSolver::Result solved = solver_.solve(matrix_, right, solution, same_matrix);
+    if (!solved.solved || !solved.positive_definite) {
+      throw RequirementError(
+          "the linear stiffness is not positive definite: the model is not held, or its elements are "
+          "too distorted for double precision");
+    }
+    moved += solution;
+    std::optional<AlgebraicError> error = solved.error;
+    if (settings_.solver != Solver::cg) {
+      error = refine(system_, solver_, matrix_, external, moved);
+      require_digits(error->relative());
+    } else if (!settings_.cg_fixed_count) {
+      if (!solved.converged) {
+        throw RequirementError(
+            fmt::format("conjugate gradients stopped at a relative residual of {:.3g} after {} "
+                        "iterations: use the direct solver or allow more iterations",
+                        solved.residual, solved.cg_iterations));
+      }
+      require_digits(unseen_error(right, solution, external, moved));
+    }
+    take_out_linear_rigid_motion(system_, model_, moved);
+    State state = state_of(moved, external, factor);
+    state.cg_iterations = solved.cg_iterations;
+    state.converged = solved.converged;
+    set_algebraic_error(error, state);
+    return state;
+  }
+
+private:
+  /// Of a solution by conjugate gradients, along itself: what the stiffness and the elements' strains disagree by.
+  double unseen_error(const VectorX& right, const VectorX& solution, const VectorX& external, const VectorX& moved) {
+    VectorX product;
+    multiply(matrix_, solution, product);
+    mask(solver_.free(), product);
+    const VectorX by_strains = right - unbalanced_by(system_, solver_.free(), external, moved);
+    const double energy = std::abs(dot(solution, by_strains));
+    return energy > 0 ? std::abs(dot(solution, product - by_strains)) / energy : 0;
+  }
+
+  static void require_digits(double error) {
+    if (error > largest_round_off) {
+      throw RequirementError(fmt::format(
+          "round-off leaves an error of {:.2g} % in the linear solution, more than {:g} %: the shell is too "
+          "thin for double precision on this mesh: take fewer elements, or a thicker wall",
+          100 * error, 100 * largest_round_off));
+    }
+  }
+
+  [[nodiscard]] State state_of(const VectorX& moved, const VectorX& external, double factor) const {
+    VectorX internal;
+    linear_forces(system_, moved, internal);
+    Configuration configuration = reference_configuration(system_);
+    for (std::size_t i = 0; i < system_.node_count(); ++i) {
+      configuration.displacement[i] = moved.segment<3>(6 * static_cast<Eigen::Index>(i));
+      configuration.rotation[i] = exponential(moved.segment<3>(6 * static_cast<Eigen::Index>(i) + 3));
+    }
+    State state = make_state(system_, model_, configuration, factor);
+    for (std::size_t i = 0; i < system_.node_count(); ++i) {
+      state.rotation[i] = moved.segment<3>(6 * static_cast<Eigen::Index>(i) + 3);
+    }
+    VectorX left = external - internal;
+    mask(solver_.free(), left);
+    const double scale = std::max(force_norm(system_, external), force_norm(system_, internal));
+    state.linear = true;
+    state.load_factor = factor;
+    state.strain_energy = 0.5 * moved.dot(internal);
+    state.residual = scale > 0 ? force_norm(system_, left) / scale : 0;
+    state.newton_iterations = 1;
+    return state;
+  }
+
+  ShellSystem& system_;
+  const Model& model_;
+  const RunSettings& settings_;
+  TangentSolver solver_;
+  BlockMatrix matrix_;
+};
+
+}  // namespace
+
+Summary run_linear(ShellSystem& system, const Model& model, const RunSettings& settings, const StaticRun& run,
+                   const StateCallback& on_state, const Progress& progress, const Resumption& resumption) {
+  Summary summary;
+  LinearLoads loads(system, model, settings);
+  if (resumption.from) {
+    summary = resumption.from->summary;
+  } else {
+    summary.dof = loads.freedom_count();
+    State state = make_state(system, model, reference_configuration(system), 0);
+    state.converged = true;
+    state.linear = true;
+    on_state(state);
+    summary.volume_before = state.volume;
+    summary.volume_after = state.volume;
+  }
+  const std::size_t first = summary.steps;
+  const std::size_t steps = run.load_factors.size();
+  for (std::size_t s = first; s < steps; ++s) {
+    const auto start = Clock::now();
+    const double factor = run.load_factors[s];
+    const State state = loads.solve(factor, s > first);
+    record_step(state, std::chrono::duration<double>(Clock::now() - start).count(), summary);
+    if ((s + 1) % settings.every == 0 || s + 1 == steps) {
+      on_state(state);
+    }
+    resumption.offer([&] { return Checkpoint{summary, factor, {}, {}, {}}; });  // no step needs the one before
+    advance(progress, static_cast<double>(s + 1) / static_cast<double>(steps));
+  }
+  return summary;
+}
+
+}  // namespace tunica

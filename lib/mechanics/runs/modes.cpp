@@ -1,0 +1,482 @@
+#include "tunica/core/error.hpp"
+#include "tunica/mechanics/algebra/lanczos.hpp"
+#include "tunica/mechanics/elements/rotation.hpp"
+#include "tunica/mechanics/runs/detail/run.hpp"
+#include "tunica/mechanics/runs/detail/supports.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <numbers>
+
+namespace tunica {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+/// Largest displacement of a mode that is handed over, as part of the model's longest side.
+constexpr double shown_amplitude = 0.01;
+/// Strain or rotation (rad) at which the tangent is differenced: central differences leave its square, round-off 1e-16
+/// over it.
+constexpr double difference_size = 1e-4;
+/// Work of a rigid motion below this part of the terms it is summed from is zero.
+constexpr double no_work = 1e-10;
+/// Beyond this strain a linear solution means nothing, nor does a factor of it.
+constexpr double largest_linear_strain = 0.2;
+/// The shift of a free body, of its lowest eigenvalue.
+constexpr double near_part = 0.2;
+
+Eigen::Index at(std::size_t node) { return 6 * static_cast<Eigen::Index>(node); }
+
+double longest_side(const ShellSystem& system) {
+  Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity());
+  Vec3 high = -low;
+  for (std::size_t i = 0; i < system.node_count(); ++i) {
+    if (system.used[i] != 0) {
+      low = low.cwiseMin(system.reference[i]);
+      high = high.cwiseMax(system.reference[i]);
+    }
+  }
+  return (high - low).maxCoeff();
+}
+
+void require_freedoms(std::size_t wanted, std::size_t there) {
+  if (wanted > there) {
+    throw InputError(fmt::format("count = {}, but the model has only {} modes: ask for fewer", wanted, there));
+  }
+}
+
+/// The linear displacements and rotations (6 per node) under the loads and prescribed displacements at full value.
+VectorX linear_solution(ShellSystem& system, const Model& model, const RunSettings& settings) {
+  State last;
+  run_linear(system, model, settings, {true, {1}}, [&](const State& state) { last = state; }, {}, {});
+  VectorX solution(at(system.node_count()));
+  for (std::size_t i = 0; i < system.node_count(); ++i) {
+    solution.segment<3>(at(i)) = last.displacement[i];
+    solution.segment<3>(at(i) + 3) = last.rotation[i];
+  }
+  return solution;
+}
+
+/// Largest stretch of an edge in a linear solution.
+double largest_strain(const ShellSystem& system, const VectorX& solution) {
+  double largest = 0;
+  for (const ShellElement& element : system.elements) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Index a = element.nodes[k];
+      const Index b = element.nodes[(k + 1) % 3];
+      const Vec3 edge = system.reference[b] - system.reference[a];
+      const Vec3 change = solution.segment<3>(at(b)) - solution.segment<3>(at(a));
+      largest = std::max(largest, std::abs(edge.dot(change)) / edge.squaredNorm());
+    }
+  }
+  return largest;
+}
+
+double largest_rotation(const VectorX& solution) {
+  double largest = 0;
+  for (Eigen::Index i = 0; i < solution.size(); i += 6) {
+    largest = std::max(largest, solution.segment<3>(i + 3).norm());
+  }
+  return largest;
+}
+
+/// How the tangent changes per unit of the factor along a linear solution, at the reference: central differences.
+BlockMatrix tangent_change(const ShellSystem& system, const Model& model, const VectorX& solution) {
+  const double part = difference_size / std::max(largest_strain(system, solution), largest_rotation(solution));
+  std::vector<double> full = load_factors(model, true, 1);
+  std::array<BlockMatrix, 2> tangent{system.pattern, system.pattern};
+  Forces forces;
+  for (std::size_t side = 0; side < 2; ++side) {
+    const double signed_part = side == 0 ? part : -part;
+    Configuration configuration = reference_configuration(system);
+    advance_configuration(configuration, signed_part * solution);
+    std::vector<double> factors = full;
+    for (double& factor : factors) {
+      factor *= signed_part;
+    }
+    evaluate(system, model, configuration, factors, {}, forces, &tangent[side]);
+  }
+  for (std::size_t k = 0; k < tangent[0].values.size(); ++k) {
+    tangent[0].values[k] = (tangent[0].values[k] - tangent[1].values[k]) / (2 * part);
+  }
+  symmetrise(tangent[0]);
+  return std::move(tangent[0]);
+}
+
+void add(BlockMatrix& matrix, double factor, const VectorX& diagonal) {
+  for (std::size_t i = 0; i < matrix.node_count(); ++i) {
+    auto block = matrix.block(matrix.find(static_cast<Index>(i), static_cast<Index>(i)));
+    block.diagonal() += factor * diagonal.segment<6>(at(i));
+  }
+}
+
+State reference_state(const ShellSystem& system, const Model& model, Summary& summary) {
+  State state = make_state(system, model, reference_configuration(system), 0);
+  state.converged = true;
+  state.linear = true;
+  summary.volume_before = state.volume;
+  if (has_soft_waves(system)) {
+    summary.stiffened_from = 0;
+  }
+  return state;
+}
+
+/// Hands the modes over, the first `values.size()` of `pairs`; each starts at a time after the one before.
+void hand_over(const ShellSystem& system, const Model& model, const RunSettings& settings,
+               const std::vector<double>& values, const EigenPairs& pairs, double load_factor, bool take_out_rigid,
+               Summary& summary, const StateCallback& on_state) {
+  const double amplitude = shown_amplitude * longest_side(system);
+  double before = 0;
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    VectorX mode = pairs.vectors[k];
+    if (take_out_rigid) {
+      take_out_linear_rigid_motion(system, model, mode);
+    }
+    Eigen::Index top = 0;
+    double largest = 0;
+    for (Eigen::Index i = 0; i < mode.size(); i += 6) {
+      if (mode.segment<3>(i).norm() > largest) {
+        largest = mode.segment<3>(i).norm();
+        top = i;
+      }
+    }
+    Eigen::Index axis = 0;
+    mode.segment<3>(top).cwiseAbs().maxCoeff(&axis);
+    const double sign = mode[top + axis] < 0 ? -1 : 1;
+    mode *= sign * amplitude / std::max(largest, std::numeric_limits<double>::min());
+    State state;
+    state.time = values[k] > before ? values[k] : std::nextafter(before, std::numeric_limits<double>::infinity());
+    before = state.time;
+    state.load_factor = load_factor < 0 ? values[k] : load_factor;
+    for (std::size_t i = 0; i < system.node_count(); ++i) {
+      state.displacement.emplace_back(mode.segment<3>(at(i)));
+      state.rotation.emplace_back(mode.segment<3>(at(i) + 3));
+    }
+    state.linear = true;
+    state.residual = pairs.residuals[k];
+    state.converged = pairs.converged;
+    ++summary.steps;
+    summary.residual = std::max(summary.residual, state.residual);
+    if ((k + 1) % settings.every == 0 || k + 1 == values.size()) {
+      on_state(state);
+    }
+  }
+}
+
+/// K x = -value C x for the modes nearest above a shift, by Lanczos' method on -C x = theta (K + shift C) x: with C =
+/// -M vibration, with C = K1 buckling.
+class ShiftedPencil {
+public:
+  /// `combine(matrix, shift)` adds what changes with the shift.
+  using AddShift = std::function<void(BlockMatrix& matrix, double change)>;
+
+  ShiftedPencil(const ShellSystem& system, const FreeMask& free, BlockMatrix stiffness, AddShift add_shift,
+                SymmetricPencil::Product multiply_b)
+      : system_(system),
+        free_(free),
+        matrix_(std::move(stiffness)),
+        solver_(system.pattern, free),
+        add_shift_(std::move(add_shift)),
+        multiply_b_(std::move(multiply_b)) {}
+
+  /// Moves the shift. @return how many values lie below it.
+  DirectSolver::Factored move_to(double shift) {
+    add_shift_(matrix_, shift - shift_);
+    shift_ = shift;
+    return solver_.factor(matrix_);
+  }
+  [[nodiscard]] double shift() const { return shift_; }
+  [[nodiscard]] double value(double theta) const { return shift_ + 1 / theta; }
+
+  [[nodiscard]] EigenPairs nearest(const std::vector<VectorX>& deflated, const LanczosOptions& options) const {
+    const SymmetricPencil pencil{[&](const VectorX& x, VectorX& y) { solver_.solve(x, y); },
+                                 [&](const VectorX& x, VectorX& y) {
+                                   multiply(matrix_, x, y);
+                                   mask(free_, y);
+                                 },
+                                 [&](const VectorX& x, VectorX& y) {
+                                   multiply_b_(x, y);
+                                   mask(free_, y);
+                                 }};
+    return largest_eigenpairs(pencil, free_, deflated, options);
+  }
+
+  /// The values found, checked by Sturm's count: none below the last that is less than `most` is missing.
+  EigenPairs all_nearest(const std::vector<VectorX>& deflated, LanczosOptions options, double most) {
+    // Equal bodies have equal modes, two of each where they are round.
+    const std::size_t most_block = 96;
+    const double near = shift_;
+    for (options.block = std::clamp<std::size_t>(2 * system_.pieces.size(), 6, most_block);; options.block *= 2) {
+      EigenPairs pairs = nearest(deflated, options);
+      std::vector<double> values;
+      for (const double theta : pairs.values) {
+        if (theta > 0 && value(theta) < most) {
+          values.push_back(value(theta));
+        }
+      }
+      if (pairs.converged && values.empty()) {
+        return pairs;
+      }
+      if (pairs.converged) {
+        const double below_last = values.back() - 1e-5 * std::abs(values.back() - near);
+        const auto found = static_cast<std::size_t>(
+            std::count_if(values.begin(), values.end(), [&](double v) { return v < below_last; }));
+        const std::size_t there = move_to(below_last).negative_pivots;
+        (void)move_to(near);
+        if (there <= found + deflated.size()) {
+          return pairs;
+        }
+      }
+      if (options.block >= most_block) {
+        throw RequirementError(fmt::format(
+            "the eigenvalues did not converge in {} solves (largest relative residual {:.3g}): ask for fewer, or mend "
+            "slivers in the mesh",
+            pairs.solves,
+            pairs.residuals.empty() ? 1.0 : *std::max_element(pairs.residuals.begin(), pairs.residuals.end())));
+      }
+    }
+  }
+
+private:
+  const ShellSystem& system_;
+  const FreeMask& free_;
+  BlockMatrix matrix_;
+  DirectSolver solver_;
+  AddShift add_shift_;
+  SymmetricPencil::Product multiply_b_;
+  double shift_ = 0;
+};
+
+/// Enough to place a shift by.
+LanczosOptions rough_options() {
+  LanczosOptions options;
+  options.tolerance = 0.01;
+  options.most_solves = 300;
+  return options;
+}
+
+VectorX masses(const ShellSystem& system) {
+  VectorX mass(at(system.node_count()));
+  for (std::size_t i = 0; i < system.node_count(); ++i) {
+    mass.segment<3>(at(i)).setConstant(system.mass[static_cast<Eigen::Index>(i)]);
+    mass.segment<3>(at(i) + 3).setConstant(system.inertia[static_cast<Eigen::Index>(i)]);
+  }
+  return mass;
+}
+
+/// The square of a circular frequency that is low against the flexible ones, yet far above round-off: (t / L)^2 times
+/// that of a membrane wave along the model.
+double small_shift(const ShellSystem& system, const Model& model) {
+  const double size = longest_side(system);
+  double shift = std::numeric_limits<double>::infinity();
+  for (const ShellBody& body : model.shells) {
+    const double t = *std::min_element(body.thickness.begin(), body.thickness.end());
+    shift = std::min(shift, body.material.young / *body.material.density * t * t / std::pow(size, 4));
+  }
+  return shift;
+}
+
+/// Rigid motions against which nothing works: they have no frequency.
+std::vector<VectorX> idle_rigid_modes(const ShellSystem& system, const Configuration& configuration,
+                                      const BlockMatrix& stiffness) {
+  std::vector<VectorX> idle;
+  for (const Piece& piece : system.pieces) {
+    const std::vector<VectorX> modes = free_rigid_modes(system, piece, configuration);
+    if (modes.empty()) {
+      continue;
+    }
+    const auto count = static_cast<Eigen::Index>(modes.size());
+    Eigen::MatrixXd work(count, count);
+    Eigen::MatrixXd terms(count, count);
+    VectorX diagonal(at(system.node_count()));
+    for (std::size_t i = 0; i < system.node_count(); ++i) {
+      diagonal.segment<6>(at(i)) =
+          stiffness.block(stiffness.find(static_cast<Index>(i), static_cast<Index>(i))).diagonal().cwiseAbs();
+    }
+    VectorX product;
+    for (Eigen::Index a = 0; a < count; ++a) {
+      multiply(stiffness, modes[static_cast<std::size_t>(a)], product);
+      for (Eigen::Index b = 0; b < count; ++b) {
+        work(b, a) = modes[static_cast<std::size_t>(b)].dot(product);
+        terms(b, a) = modes[static_cast<std::size_t>(b)].dot(diagonal.cwiseProduct(modes[static_cast<std::size_t>(a)]));
+      }
+    }
+    const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> eigen(0.5 * (work + work.transpose()), terms);
+    for (Eigen::Index k = 0; k < count; ++k) {
+      if (std::abs(eigen.eigenvalues()[k]) < no_work) {
+        VectorX mode = VectorX::Zero(at(system.node_count()));
+        for (Eigen::Index a = 0; a < count; ++a) {
+          mode += eigen.eigenvectors()(a, k) * modes[static_cast<std::size_t>(a)];
+        }
+        idle.push_back(mode);
+      }
+    }
+  }
+  return idle;
+}
+
+/// The tangent about which a model vibrates; `configuration` becomes the state of rest.
+BlockMatrix stiffness_at_rest(ShellSystem& system, const Model& model, const RunSettings& settings,
+                              const FrequencyRun& run, Configuration& configuration) {
+  BlockMatrix stiffness = system.pattern;
+  if (model.loads.empty() && system.prescribed.empty()) {
+    linear_stiffness(system, stiffness);
+    return stiffness;
+  }
+  if (run.preload.linear) {
+    linear_stiffness(system, stiffness);
+    const VectorX solution = linear_solution(system, model, settings);
+    if (solution.squaredNorm() > 0) {
+      const BlockMatrix change = tangent_change(system, model, solution);
+      for (std::size_t k = 0; k < stiffness.values.size(); ++k) {
+        stiffness.values[k] += change.values[k];
+      }
+    }
+    return stiffness;
+  }
+  State last;
+  run_static(system, model, settings, run.preload, [&](const State& state) { last = state; }, {}, {});
+  configuration.displacement = last.displacement;
+  for (std::size_t i = 0; i < system.node_count(); ++i) {
+    configuration.rotation[i] = exponential(last.rotation[i]);
+  }
+  Forces forces;
+  evaluate(system, model, configuration, load_factors(model, true, last.load_factor), {}, forces, &stiffness);
+  symmetrise(stiffness);
+  return stiffness;
+}
+
+}  // namespace
+
+Summary run_frequencies(ShellSystem& system, const Model& model, const RunSettings& settings, const FrequencyRun& run,
+                        const StateCallback& on_state, const Progress& progress) {
+  const auto start = Clock::now();
+  Summary summary;
+  on_state(reference_state(system, model, summary));
+  Configuration configuration = reference_configuration(system);
+  BlockMatrix stiffness = stiffness_at_rest(system, model, settings, run, configuration);
+  advance(progress, 0.3);
+  release_rigid_motion_supports(system, model);
+  const FreeMask free = free_freedoms(system);
+  summary.dof = static_cast<std::size_t>(std::count(free.begin(), free.end(), true));
+
+  const std::vector<VectorX> rigid = idle_rigid_modes(system, configuration, stiffness);
+  require_freedoms(run.count, summary.dof - rigid.size());
+  const VectorX mass = masses(system);
+  // Where a body is free the first shift is only known to be small against the lowest value; one that is near it keeps
+  // the rigid motions, which the inverse enlarges, from drowning the modes in round-off.
+  ShiftedPencil pencil(
+      system, free, std::move(stiffness), [&](BlockMatrix& matrix, double change) { add(matrix, -change, mass); },
+      [&](const VectorX& x, VectorX& y) { y = mass.cwiseProduct(x); });
+  const auto move_to = [&](double shift) {
+    const DirectSolver::Factored factored = pencil.move_to(shift);
+    if (!factored.regular || factored.negative_pivots > 0) {
+      throw RequirementError(
+          "the stiffness under the loads is not positive: the state is unstable and has no frequencies; lower the "
+          "loads");
+    }
+  };
+  move_to(rigid.empty() ? 0 : -small_shift(system, model));
+  advance(progress, 0.4);
+  LanczosOptions options;
+  options.count = run.count;
+  if (!rigid.empty()) {
+    LanczosOptions rough = rough_options();
+    rough.deflated_value = -1 / pencil.shift();
+    const EigenPairs first = pencil.nearest(rigid, rough);
+    move_to(std::min(pencil.shift(), -near_part * pencil.value(first.values.front())));
+    options.deflated_value = -1 / pencil.shift();
+  }
+  const EigenPairs pairs = pencil.all_nearest(rigid, options, std::numeric_limits<double>::infinity());
+  for (const double theta : pairs.values) {
+    summary.frequencies.push_back(std::sqrt(std::max(0.0, pencil.value(theta))) / (2 * std::numbers::pi));
+  }
+  const bool loaded = !model.loads.empty() || !system.prescribed.empty();
+  hand_over(system, model, settings, summary.frequencies, pairs, loaded ? 1 : 0, false, summary, on_state);
+  summary.converged = true;
+  summary.seconds_per_step.push_back(seconds_since(start));
+  advance(progress, 1.0);
+  return summary;
+}
+
+Summary run_buckling(ShellSystem& system, const Model& model, const RunSettings& settings, const BucklingRun& run,
+                     const StateCallback& on_state, const Progress& progress) {
+  const auto start = Clock::now();
+  Summary summary;
+  on_state(reference_state(system, model, summary));
+  const FreeMask free = free_freedoms(system);
+  summary.dof = static_cast<std::size_t>(std::count(free.begin(), free.end(), true));
+  require_freedoms(run.count, summary.dof);
+
+  const VectorX solution = linear_solution(system, model, settings);
+  const double strain = largest_strain(system, solution);
+  const double largest_factor = strain > 0 ? largest_linear_strain / strain : std::numeric_limits<double>::infinity();
+  if (!(std::max(strain, largest_rotation(solution)) > 0)) {
+    throw InputError("the loads do not deform anything: buckling needs a load that does");
+  }
+  const BlockMatrix change = tangent_change(system, model, solution);
+  advance(progress, 0.3);
+  BlockMatrix stiffness = system.pattern;
+  linear_stiffness(system, stiffness);
+  ShiftedPencil pencil(
+      system, free, std::move(stiffness),
+      [&](BlockMatrix& matrix, double by) {
+        for (std::size_t k = 0; k < matrix.values.size(); ++k) {
+          matrix.values[k] += by * change.values[k];
+        }
+      },
+      [&](const VectorX& x, VectorX& y) {
+        multiply(change, x, y);
+        y = -y;
+      });
+  const auto positive_at = [&](double shift) {
+    const DirectSolver::Factored factored = pencil.move_to(shift);
+    return factored.regular && factored.negative_pivots == 0;
+  };
+  if (!positive_at(0)) {
+    throw RequirementError(
+        "the linear stiffness is not positive definite: the elements are too distorted for double "
+        "precision");
+  }
+  advance(progress, 0.4);
+  // A shift just below the first factor: without it the factors of a thin shell, which are many and close to each
+  // other, are hard to tell apart.
+  const EigenPairs first = pencil.nearest({}, rough_options());
+  const double lowest = first.values.empty() || !(first.values.front() > 0) ? 0 : pencil.value(first.values.front());
+  if (lowest > 0 && lowest < largest_factor) {
+    for (const double part : {0.98, 0.9, 0.5, 0.0}) {
+      if (positive_at(part * lowest)) {
+        break;
+      }
+    }
+  }
+  LanczosOptions options;
+  options.count = run.count;
+  const EigenPairs pairs = pencil.all_nearest({}, options, largest_factor);
+  for (const double theta : pairs.values) {
+    if (theta > no_work * pairs.largest_magnitude && pencil.value(theta) < largest_factor) {
+      summary.buckling_factors.push_back(pencil.value(theta));
+    }
+  }
+  if (summary.buckling_factors.empty()) {
+    throw RequirementError(
+        fmt::format("the loads buckle nothing: no factor up to {:.4g}, where they strain the shell by {:.0f} %",
+                    largest_factor, 100 * largest_linear_strain));
+  }
+  hand_over(system, model, settings, summary.buckling_factors, pairs, -1, true, summary, on_state);
+  summary.converged = true;
+  summary.seconds_per_step.push_back(seconds_since(start));
+  advance(progress, 1.0);
+  return summary;
+}
+
+}  // namespace tunica

@@ -1,0 +1,256 @@
+#include "tunica/mechanics/runs/detail/newton.hpp"
+
+#include "tunica/core/progress.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tunica {
+namespace {
+
+constexpr double largest_turn = 0.5;        // rad per iteration
+constexpr std::size_t free_iterations = 6;  // full steps before the line search sets in
+constexpr double gmres_tolerance = 1e-4;    // relative residual of the unsymmetric system
+constexpr std::size_t gmres_iterations = 30;
+
+double largest_rotation(const VectorX& increment) {
+  double largest = 0;
+  for (Eigen::Index i = 3; i < increment.size(); i += 6) {
+    largest = std::max(largest, increment.segment<3>(i).norm());
+  }
+  return largest;
+}
+
+bool uses_cg(const RunSettings& settings) { return settings.solver == Solver::cg; }
+
+}  // namespace
+
+FreeMask free_freedoms(const ShellSystem& system) {
+  FreeMask free = system.held;
+  free.flip();
+  return free;
+}
+
+TangentSolver::TangentSolver(const ShellSystem& system, const RunSettings& settings)
+    : settings_(settings), free_(free_freedoms(system)) {
+  if (!uses_cg(settings)) {
+    direct_.emplace(system.pattern, free_);
+  }
+}
+
+std::size_t TangentSolver::freedom_count() const {
+  return static_cast<std::size_t>(std::count(free_.begin(), free_.end(), true));
+}
+
+TangentSolver::Result TangentSolver::solve(BlockMatrix& matrix, const VectorX& b, VectorX& x, bool same_matrix) {
+  Result result;
+  if (freedom_count() == 0) {
+    x.setZero(b.size());
+    return {true, true, true, 0, 0, AlgebraicError{}};
+  }
+  if (!direct_) {
+    symmetrise(matrix);
+    const CgOptions options{settings_.cg_tolerance, settings_.cg_iterations, settings_.cg_fixed_count};
+    const CgResult cg = conjugate_gradients(matrix, free_, b, options, x);
+    result.solved = x.allFinite();
+    result.converged = cg.converged;
+    result.positive_definite = !cg.negative_curvature;
+    result.residual = cg.residual;
+    result.cg_iterations = cg.iterations;
+    result.error = cg.error;
+    return result;
+  }
+  if (!same_matrix) {
+    factored_ = direct_->factor(matrix);
+  }
+  if (!factored_.regular) {
+    return result;
+  }
+  result.positive_definite = factored_.negative_pivots == 0;
+  direct_->solve(b, x);
+  if (!x.allFinite()) {
+    return result;
+  }
+  result.residual = gmres(matrix, free_, *direct_, b, gmres_tolerance, gmres_iterations, x);
+  result.solved = x.allFinite();
+  result.converged = result.solved;
+  if (tell_direct_error_ && result.solved && result.positive_definite) {
+    result.error = error_by_factor(matrix, free_, *direct_, b, x);
+  }
+  return result;
+}
+
+double increment_size(const ShellSystem& system, const VectorX& increment) {
+  double sum = 0;
+  for (Eigen::Index i = 0; i < increment.size(); i += 6) {
+    sum += increment.segment<3>(i).squaredNorm() +
+           system.length * system.length * increment.segment<3>(i + 3).squaredNorm();
+  }
+  return std::sqrt(sum / (static_cast<double>(increment.size()) / 6));
+}
+
+namespace {
+
+/// One call of newton().
+class NewtonIteration {
+public:
+  NewtonIteration(const ShellSystem& system, const RunSettings& settings, TangentSolver& solver,
+                  const BalanceFunction& balance, const VectorX& held_increment, BlockMatrix& matrix,
+                  Configuration& configuration)
+      : system_(system),
+        settings_(settings),
+        solver_(solver),
+        balance_(balance),
+        held_increment_(held_increment),
+        matrix_(matrix),
+        configuration_(configuration),
+        moving_(held_increment.squaredNorm() > 0),
+        whole_(VectorX::Zero(held_increment.size())) {}
+
+  NewtonResult run(bool likely_at_rest) {
+    now_ = balance_(configuration_, likely_at_rest ? nullptr : &matrix_);
+    tangent_is_current_ = !likely_at_rest;
+    if (!now_.valid) {
+      return result_;
+    }
+    result_.valid = result_.stable = result_.linear_converged = true;
+    result_.residual = residual_of(now_);
+    result_.converged = !moving_ && (now_.scale == 0 || result_.residual <= settings_.converge);
+    while (!result_.converged && result_.valid && result_.iterations < settings_.newton_max) {
+      check_interrupt();
+      const bool at_floor = result_.iterations > 0 && is_at_floor();
+      result_.valid = find_increment();
+      // What is left of the increments there is noise: told, but not added.
+      result_.converged =
+          result_.valid && at_floor && increment_size(system_, increment_) <= largest_round_off * result_.reached;
+      if (result_.valid && !result_.converged) {
+        result_.valid = advance();
+        result_.converged = result_.valid && at_rest();
+      }
+    }
+    return result_;
+  }
+
+private:
+  [[nodiscard]] double residual_of(const Balance& balance) const {
+    VectorX free = balance.unbalanced;
+    mask(solver_.free(), free);
+    const double norm = force_norm(system_, free);
+    return balance.scale > 0 ? norm / balance.scale : (norm > 0 ? 1.0 : 0.0);
+  }
+
+  [[nodiscard]] bool is_at_floor() const { return result_.residual * now_.scale <= now_.floor; }
+
+  /// At the floor of round-off a residual says nothing about the error any more; the increments still do.
+  [[nodiscard]] bool at_rest() const {
+    return result_.residual <= settings_.converge ||
+           (is_at_floor() && last_size_ <= largest_round_off * result_.reached);
+  }
+
+  /// By the tangent; prescribed displacements move in the first. @return false where there is no solution.
+  bool find_increment() {
+    if (!tangent_is_current_) {
+      now_ = balance_(configuration_, &matrix_);
+    }
+    VectorX right = now_.unbalanced;
+    if (moving_) {
+      VectorX product;
+      multiply(matrix_, held_increment_, product);
+      right -= product;
+    }
+    mask(solver_.free(), right);
+    const TangentSolver::Result solved = solver_.solve(matrix_, right, increment_);
+    result_.cg_iterations += solved.cg_iterations;
+    result_.stable = solved.positive_definite;
+    result_.linear_converged = solved.converged;
+    result_.algebraic_error = solved.error;
+    if (solved.error) {
+      largest_solution_ = std::max(largest_solution_, solved.error->solution);
+      result_.algebraic_error->solution = largest_solution_;
+    }
+    ++result_.iterations;
+    if (!solved.solved) {
+      return false;
+    }
+    work_ = right.dot(increment_);
+    if (moving_) {
+      increment_ += held_increment_;
+    } else if (const double turn = largest_rotation(increment_); turn > largest_turn) {
+      increment_ *= largest_turn / turn;
+    }
+    if (result_.iterations == 1) {
+      result_.predicted = increment_size(system_, increment_);
+    }
+    return true;
+  }
+
+  /// Along the increment, as far as the line search says. @return false where the state there cannot be used.
+  bool advance() {
+    // Where another iteration will follow, judged by quadratic convergence, its tangent is made with the forces.
+    const double expected =
+        result_.iterations > 1 ? std::pow(result_.residual, 3) / (previous_residual_ * previous_residual_) : 1;
+    const bool more = result_.iterations < settings_.newton_max && expected > settings_.converge;
+    previous_residual_ = result_.residual;
+    const Configuration before = configuration_;
+    double length = 1;
+    for (int trial = 0;; ++trial) {
+      configuration_ = before;
+      advance_configuration(configuration_, length * increment_);
+      tangent_is_current_ = more && trial == 0;
+      now_ = balance_(configuration_, tangent_is_current_ ? &matrix_ : nullptr);
+      if (moving_ || trial == 6) {
+        break;
+      }
+      if (!now_.valid) {
+        length /= 2;
+        continue;
+      }
+      if (result_.iterations <= free_iterations) {
+        break;
+      }
+      VectorX free = now_.unbalanced;
+      mask(solver_.free(), free);
+      const double left = free.dot(increment_);
+      if (std::abs(left) <= 0.8 * std::abs(work_) || work_ <= 0) {
+        break;
+      }
+      length = std::clamp(length * work_ / (work_ - left), 0.2 * length, 0.7 * length);
+    }
+    moving_ = false;
+    whole_ += length * increment_;
+    last_size_ = length * increment_size(system_, increment_);
+    result_.reached = increment_size(system_, whole_);
+    if (now_.valid) {
+      result_.residual = residual_of(now_);
+    }
+    return now_.valid && std::isfinite(result_.residual);
+  }
+
+  const ShellSystem& system_;
+  const RunSettings& settings_;
+  TangentSolver& solver_;
+  const BalanceFunction& balance_;
+  const VectorX& held_increment_;
+  BlockMatrix& matrix_;
+  Configuration& configuration_;
+  NewtonResult result_;
+  Balance now_;
+  bool moving_;  ///< prescribed displacements are still to be moved
+  bool tangent_is_current_ = false;
+  VectorX increment_;
+  VectorX whole_;         ///< the sum of all increments
+  double work_ = 0;       ///< of the unbalanced forces along the increment
+  double last_size_ = 0;  ///< of the last increment
+  double largest_solution_ = 0;
+  double previous_residual_ = 0;
+};
+
+}  // namespace
+
+NewtonResult newton(const ShellSystem& system, const RunSettings& settings, TangentSolver& solver,
+                    const BalanceFunction& balance, const VectorX& held_increment, BlockMatrix& matrix,
+                    Configuration& configuration, bool likely_at_rest) {
+  return NewtonIteration(system, settings, solver, balance, held_increment, matrix, configuration).run(likely_at_rest);
+}
+
+}  // namespace tunica

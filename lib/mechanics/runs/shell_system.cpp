@@ -1,0 +1,666 @@
+#include "tunica/mechanics/runs/detail/shell_system.hpp"
+
+#include "tunica/core/disjoint_sets.hpp"
+#include "tunica/core/error.hpp"
+#include "tunica/core/threads.hpp"
+#include "tunica/mechanics/elements/element_lanes.hpp"
+#include "tunica/mechanics/elements/pressure.hpp"
+#include "tunica/mechanics/elements/rotation.hpp"
+#include "tunica/mechanics/runs/detail/supports.hpp"
+#include "tunica/shell/patch/curved_surface.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <numeric>
+
+namespace tunica {
+namespace {
+
+constexpr std::size_t grain = 16;  // batches
+
+Eigen::Index at(std::size_t node) { return 6 * static_cast<Eigen::Index>(node); }
+
+double mean_thickness(const ShellBody& body, const std::array<Index, 3>& triangle) {
+  if (body.thickness.size() == 1) {
+    return body.thickness[0];
+  }
+  return (body.thickness[triangle[0]] + body.thickness[triangle[1]] + body.thickness[triangle[2]]) / 3;
+}
+
+/// Area-weighted mean of the facets' normals at every vertex.
+std::vector<Vec3> facet_normals_at_vertices(const ShellMesh& mesh) {
+  std::vector<Vec3> normals(mesh.vertices.size(), Vec3::Zero());
+  for (const auto& t : mesh.triangles) {
+    const Vec3 n = (mesh.vertices[t[1]] - mesh.vertices[t[0]]).cross(mesh.vertices[t[2]] - mesh.vertices[t[0]]);
+    for (const Index v : t) {
+      normals[v] += n;
+    }
+  }
+  for (Vec3& n : normals) {
+    n.normalize();
+  }
+  return normals;
+}
+
+void colour_elements(ShellSystem& system) {
+  // Greedy: the smallest colour that no element around the three nodes has yet. 64 colours are plenty for a manifold
+  // mesh of sane valence; a node of a higher valence opens further groups.
+  std::vector<std::vector<bool>> taken(system.node_count());
+  for (std::size_t e = 0; e < system.elements.size(); ++e) {
+    std::size_t colour = 0;
+    const auto is_taken = [&](std::size_t c) {
+      return std::any_of(system.elements[e].nodes.begin(), system.elements[e].nodes.end(),
+                         [&](Index v) { return c < taken[v].size() && taken[v][c]; });
+    };
+    while (is_taken(colour)) {
+      ++colour;
+    }
+    for (const Index v : system.elements[e].nodes) {
+      if (taken[v].size() <= colour) {
+        taken[v].resize(colour + 1, false);
+      }
+      taken[v][colour] = true;
+    }
+    if (system.colours.size() <= colour) {
+      system.colours.resize(colour + 1);
+    }
+    std::vector<Batch>& batches = system.colours[colour];
+    if (batches.empty() || batches.back().count == lane_count ||
+        system.elements[batches.back().elements[0]].curved != system.elements[e].curved) {
+      batches.emplace_back();
+      batches.back().elements.fill(static_cast<Index>(e));
+    }
+    batches.back().elements[batches.back().count++] = static_cast<Index>(e);
+  }
+}
+
+void find_pieces(ShellSystem& system, const Model& model) {
+  DisjointSets joined(system.node_count());
+  for (const ShellElement& e : system.elements) {
+    joined.join(e.nodes[0], e.nodes[1]);
+    joined.join(e.nodes[0], e.nodes[2]);
+  }
+  std::vector<std::size_t> piece_of(system.node_count(), SIZE_MAX);
+  for (std::size_t body = 0; body < model.shells.size(); ++body) {
+    for (std::size_t i = model.first_node(body); i < model.first_node(body + 1); ++i) {
+      if (system.used[i] == 0) {
+        continue;
+      }
+      std::size_t& piece = piece_of[joined.root(static_cast<Index>(i))];
+      if (piece == SIZE_MAX) {
+        piece = system.pieces.size();
+        system.pieces.push_back({body, {}});
+      }
+      system.pieces[piece].nodes.push_back(static_cast<Index>(i));
+    }
+  }
+}
+
+std::array<Vec3, 3> reference_corners(const ShellElement& e) {
+  return {e.from_centroid.col(0), e.from_centroid.col(1), e.from_centroid.col(2)};
+}
+
+void add_dead_pressure(const ShellSystem& system, std::size_t element, double value, DeadLoad& load) {
+  const ShellElement& e = system.elements[element];
+  Vector9 force;
+  unit_pressure(reference_corners(e), system.heights[element], force, nullptr);
+  for (int k = 0; k < 3; ++k) {
+    load.force.segment<3>(at(e.nodes[static_cast<std::size_t>(k)])) += value * force.segment<3>(3 * k);
+  }
+}
+
+/// A force per area of fixed direction: its normal part works on the deflection of the cubic.
+void add_area_load(const ShellSystem& system, std::size_t element, const Vec3& per_area, DeadLoad& load) {
+  const ShellElement& e = system.elements[element];
+  const Vec3 normal = e.axes.row(2).transpose();
+  const double across = normal.dot(per_area);
+  const Vec3 in_plane = (per_area - across * normal) * (e.area / 3);
+  const auto corners = reference_corners(e);
+  const PlateLoad plate = plate_load(corners);
+  // The patch has more area than its facet.
+  const double spread = 2 * e.area / (corners[1] - corners[0]).cross(corners[2] - corners[0]).norm();
+  for (std::size_t k = 0; k < 3; ++k) {
+    load.force.segment<3>(at(e.nodes[k])) += in_plane + spread * across * plate.force[k] * normal;
+    load.director[e.nodes[k]] += spread * across * normal * plate.director[k].transpose();
+  }
+}
+
+Index used_node(const ShellSystem& system, const Model& model, std::size_t body, Index node) {
+  const std::size_t global = model.first_node(body) + node;
+  if (node >= model.shells[body].mesh.vertices.size() || system.used[global] == 0) {
+    throw InputError(fmt::format("{}: a load acts on node {}, which no triangle uses", model.shells[body].name, node));
+  }
+  return static_cast<Index>(global);
+}
+
+void add_edge_load(const ShellSystem& system, const Model& model, std::size_t body, const EdgeLoad& edge_load,
+                   DeadLoad& load) {
+  for (const auto& edge : edge_load.edges) {
+    const Index a = used_node(system, model, body, edge[0]);
+    const Index b = used_node(system, model, body, edge[1]);
+    const double length = (system.reference[a] - system.reference[b]).norm();
+    load.force.segment<3>(at(a)) += edge_load.per_length * (length / 2);
+    load.force.segment<3>(at(b)) += edge_load.per_length * (length / 2);
+  }
+}
+
+void make_loads(ShellSystem& system, const Model& model) {
+  system.dead.resize(model.loads.size());
+  for (std::size_t l = 0; l < model.loads.size(); ++l) {
+    const Load& load = model.loads[l];
+    DeadLoad& dead = system.dead[l];
+    const std::size_t begin = system.first_element[load.body];
+    const std::size_t end = system.first_element[load.body + 1];
+    if (const auto* pressure = std::get_if<PressureLoad>(&load.kind); pressure != nullptr && pressure->follower) {
+      system.follower_pressures.emplace_back(l, load.body);
+      continue;
+    }
+    dead.force = VectorX::Zero(at(system.node_count()));
+    if (std::holds_alternative<AreaLoad>(load.kind)) {
+      dead.director.assign(system.node_count(), Mat3::Zero());
+    }
+    if (const auto* pressure = std::get_if<PressureLoad>(&load.kind)) {
+      for (std::size_t e = begin; e < end; ++e) {
+        add_dead_pressure(system, e, pressure->value, dead);
+      }
+    } else if (const auto* area = std::get_if<AreaLoad>(&load.kind)) {
+      for (std::size_t e = begin; e < end; ++e) {
+        add_area_load(system, e, area->per_area, dead);
+      }
+    } else if (const auto* force = std::get_if<ForceLoad>(&load.kind)) {
+      for (const Index node : force->nodes) {
+        dead.force.segment<3>(at(used_node(system, model, load.body, node))) +=
+            force->total / static_cast<double>(force->nodes.size());
+      }
+    } else if (const auto* moment = std::get_if<MomentLoad>(&load.kind)) {
+      for (const Index node : moment->nodes) {
+        dead.force.segment<3>(at(used_node(system, model, load.body, node)) + 3) +=
+            moment->total / static_cast<double>(moment->nodes.size());
+      }
+    } else if (const auto* edge = std::get_if<EdgeLoad>(&load.kind)) {
+      add_edge_load(system, model, load.body, *edge, dead);
+    } else if (const auto* gravity = std::get_if<GravityLoad>(&load.kind)) {
+      for (std::size_t i = model.first_node(load.body); i < model.first_node(load.body + 1); ++i) {
+        dead.force.segment<3>(at(i)) = system.mass[static_cast<Eigen::Index>(i)] * gravity->acceleration;
+      }
+    }
+  }
+}
+
+ElementGroup members(const ShellSystem& system, const Batch& batch) {
+  ElementGroup group{};
+  for (std::size_t k = 0; k < lane_count; ++k) {
+    group[k] = &system.elements[batch.elements[k]];
+  }
+  return group;
+}
+
+MotionLanes corner_motion(const ElementGroup& elements, const Configuration& configuration) {
+  MotionLanes motion;
+  for (std::size_t corner = 0; corner < 3; ++corner) {
+    const auto node = [&](std::size_t k) { return elements[k]->nodes[corner]; };
+    LaneVec3 displacement;
+    set_lanes(
+        displacement, [&](std::size_t k) -> const auto& { return configuration.displacement[node(k)]; });
+    motion.displacement.col(static_cast<Eigen::Index>(corner)) = displacement;
+    Eigen::Matrix<Lanes, 4, 1> coefficients;
+    set_lanes(
+        coefficients, [&](std::size_t k) -> const auto& { return configuration.rotation[node(k)].coeffs(); });
+    const Eigen::Quaternion<Lanes> rotation(coefficients);
+    motion.rotation[corner] = rotation.toRotationMatrix();
+  }
+  return motion;
+}
+
+/// Unit pressure on elements whose slopes do not count: on the facet and its patch's frozen height.
+void push_facets(const ShellSystem& system, const Batch& batch, const MotionLanes& motion, LaneVector18& force,
+                 LaneMatrix18* stiffness) {
+  std::array<Vector18, lane_count> forces;
+  std::array<Matrix18, lane_count> stiffnesses;
+  for (std::size_t l = 0; l < lane_count; ++l) {
+    const ShellElement& element = system.elements[batch.elements[l]];
+    const Mat3 displacement = lane(motion.displacement, l);
+    std::array<Vec3, 3> corners;
+    for (int k = 0; k < 3; ++k) {
+      corners[static_cast<std::size_t>(k)] = element.from_centroid.col(k) + (displacement.col(k) - displacement.col(0));
+    }
+    Vector9 on_corners;
+    Matrix9 between_corners;
+    unit_pressure(corners, system.heights[batch.elements[l]], on_corners,
+                  stiffness == nullptr ? nullptr : &between_corners);
+    forces[l].setZero();
+    stiffnesses[l].setZero();
+    for (int i = 0; i < 3; ++i) {
+      forces[l].segment<3>(6 * i) = on_corners.segment<3>(3 * i);
+      for (int j = 0; stiffness != nullptr && j < 3; ++j) {
+        stiffnesses[l].block<3, 3>(6 * i, 6 * j) = between_corners.block<3, 3>(3 * i, 3 * j);
+      }
+    }
+  }
+  set_lanes(
+      force, [&](std::size_t l) -> const auto& { return forces[l]; });
+  if (stiffness != nullptr) {
+    set_lanes(
+        *stiffness, [&](std::size_t l) -> const auto& { return stiffnesses[l]; });
+  }
+}
+
+void scatter(const ShellSystem& system, const Batch& batch, const LaneMatrix18& matrices, BlockMatrix& target) {
+  constexpr int width = static_cast<int>(lane_count);
+  for (int j = 0; j < 3; ++j) {
+    for (int i = 0; i < 3; ++i) {
+      const auto place = static_cast<std::size_t>(3 * i + j);
+      for (int first = 0; first < 36; first += width) {
+        std::array<Lanes, lane_count> part;
+        for (int k = 0; k < width; ++k) {
+          part[static_cast<std::size_t>(k)] = matrices(6 * i + (first + k) % 6, 6 * j + (first + k) / 6);
+        }
+        transpose(part);
+        for (std::size_t l = 0; l < batch.count; ++l) {
+          double* const values = target.values.data() + 36 * system.placement[batch.elements[l]][place] + first;
+          (Lanes(values, std::experimental::element_aligned) + part[l])
+              .copy_to(values, std::experimental::element_aligned);
+        }
+      }
+    }
+  }
+}
+
+void add_dead_loads(const ShellSystem& system, const Configuration& configuration, const std::vector<double>& factors,
+                    VectorX& external, BlockMatrix* tangent) {
+  for (std::size_t l = 0; l < system.dead.size(); ++l) {
+    const DeadLoad& load = system.dead[l];
+    const double factor = factors[l];
+    if (load.force.size() == 0 || factor == 0) {
+      continue;
+    }
+    external += factor * load.force;
+    for (std::size_t i = 0; i < load.director.size(); ++i) {
+      // Moment: sum of (R n) x g. With M = R n g' its spin derivative is M - trace(M).
+      const Mat3 m = factor * (configuration.rotation[i] * load.director[i]);
+      external.segment<3>(at(i) + 3) += Vec3(m(1, 2) - m(2, 1), m(2, 0) - m(0, 2), m(0, 1) - m(1, 0));
+      if (tangent != nullptr) {
+        auto block = tangent->block(tangent->find(static_cast<Index>(i), static_cast<Index>(i)));
+        block.block<3, 3>(3, 3) += m.trace() * Mat3::Identity() - m;
+      }
+    }
+  }
+}
+
+/// What round_off() needs. The element matrices themselves, not E t: those of a sliver are larger by the square of its
+/// edge over its height, and so is the noise that one unit in the last place of a rotation makes there.
+void add_stiffness_norms(ShellSystem& system) {
+  double translation = 0;
+  double rotation = 0;
+  for (const ShellElement& element : system.elements) {
+    const Matrix18 stiffness = linear_stiffness(element);
+    for (int row = 0; row < 18; ++row) {
+      for (int column = 0; column < 18; ++column) {
+        const double entry = stiffness(row, column) / (row % 6 < 3 ? 1 : system.length);
+        (column % 6 < 3 ? translation : rotation) += entry * entry;
+      }
+    }
+  }
+  system.translation_stiffness = std::sqrt(translation);
+  system.rotation_stiffness = std::sqrt(rotation);
+}
+
+}  // namespace
+
+void stiffen_short_waves(ShellSystem& system) {
+  for (ShellElement& element : system.elements) {
+    element.skewing = element.short_waves;
+  }
+}
+
+bool has_soft_waves(const ShellSystem& system) {
+  return std::any_of(system.elements.begin(), system.elements.end(),
+                     [](const ShellElement& element) { return element.thinness > 3; });
+}
+
+ShellSystem make_system(const Model& model) {
+  ShellSystem system;
+  const std::size_t nodes = model.node_count();
+  system.reference.reserve(nodes);
+  system.used.assign(nodes, 0);
+  system.first_element.push_back(0);
+  double edges = 0;
+  for (std::size_t b = 0; b < model.shells.size(); ++b) {
+    const ShellBody& body = model.shells[b];
+    const auto offset = static_cast<Index>(model.first_node(b));
+    system.reference.insert(system.reference.end(), body.mesh.vertices.begin(), body.mesh.vertices.end());
+    const std::vector<Vec3> at_vertices = facet_normals_at_vertices(body.mesh);
+    const bool curved = body.curved && body.rest == Rest::curved;
+    for (std::size_t t = 0; t < body.mesh.triangles.size(); ++t) {
+      const auto& v = body.mesh.triangles[t];
+      const std::array<Vec3, 3> corners{body.mesh.vertices[v[0]], body.mesh.vertices[v[1]], body.mesh.vertices[v[2]]};
+      const Vec3 facet = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalized();
+      const double thickness = mean_thickness(body, v);
+      ShellSurface surface;
+      surface.curved = curved && body.membrane == Membrane::adapt;
+      std::array<Vec3, 3> bulge;  // the normals that tell how far the shell bulges over an edge
+      for (std::size_t k = 0; k < 3; ++k) {
+        surface.normals[k] = curved ? body.mesh.normal(t, static_cast<int>(k)) : facet;
+        bulge[k] = curved ? surface.normals[k] : at_vertices[v[k]];
+      }
+      const double scale = body.membrane == Membrane::adapt ? adapted_scale(corners, bulge, thickness) : 1;
+      ShellElement element =
+          make_shell_element(corners, surface, body.material, thickness, body.membrane, body.bending, scale);
+      element.body = b;
+      for (std::size_t k = 0; k < 3; ++k) {
+        element.nodes[k] = v[k] + offset;
+        system.used[element.nodes[k]] = 1;
+        edges += (corners[(k + 1) % 3] - corners[k]).norm();
+      }
+      system.normals.push_back(surface.normals);
+      system.heights.push_back(patch_height(corners, surface.normals));
+      system.elements.push_back(element);
+    }
+    system.first_element.push_back(system.elements.size());
+  }
+  system.length = edges / (3 * static_cast<double>(std::max<std::size_t>(1, system.elements.size())));
+  add_stiffness_norms(system);
+
+  std::vector<std::array<Index, 3>> triangles;
+  triangles.reserve(system.elements.size());
+  for (const ShellElement& e : system.elements) {
+    triangles.push_back(e.nodes);
+  }
+  system.pattern = make_block_matrix(nodes, triangles);
+  system.placement.resize(system.elements.size());
+  for (std::size_t e = 0; e < system.elements.size(); ++e) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      for (std::size_t j = 0; j < 3; ++j) {
+        system.placement[e][3 * i + j] = system.pattern.find(triangles[e][i], triangles[e][j]);
+      }
+    }
+  }
+  colour_elements(system);
+  find_pieces(system, model);
+
+  system.area = VectorX::Zero(static_cast<Eigen::Index>(nodes));
+  system.mass = system.area;
+  system.inertia = system.area;
+  for (const ShellElement& e : system.elements) {
+    const double mass = model.shells[e.body].material.density.value_or(0) * e.thickness * e.area / 3;
+    for (const Index node : e.nodes) {
+      system.area[node] += e.area / 3;
+      system.mass[node] += mass;
+      system.inertia[node] += mass * e.thickness * e.thickness / 12;
+    }
+  }
+  make_loads(system, model);
+  make_supports(system, model);
+  return system;
+}
+
+Configuration reference_configuration(const ShellSystem& system) {
+  return {std::vector<Vec3>(system.node_count(), Vec3::Zero()),
+          std::vector<Eigen::Quaterniond>(system.node_count(), Eigen::Quaterniond::Identity())};
+}
+
+void advance_configuration(Configuration& configuration, const VectorX& increment) {
+  for (std::size_t i = 0; i < configuration.displacement.size(); ++i) {
+    configuration.displacement[i] += increment.segment<3>(at(i));
+    const Vec3 spin = increment.segment<3>(at(i) + 3);
+    if (spin != Vec3::Zero()) {
+      configuration.rotation[i] = (exponential(spin) * configuration.rotation[i]).normalized();
+    }
+  }
+}
+
+double factor_of(const Ramp& ramp, bool is_static, double time) {
+  return is_static && ramp.points.empty() ? time : ramp.at(time);
+}
+
+std::vector<double> load_factors(const Model& model, bool is_static, double time) {
+  std::vector<double> factors;
+  for (const Load& load : model.loads) {
+    factors.push_back(factor_of(load.ramp, is_static, time));
+  }
+  return factors;
+}
+
+void evaluate(const ShellSystem& system, const Model& model, const Configuration& configuration,
+              const std::vector<double>& factors, const ViscousState& viscous, Forces& forces, BlockMatrix* tangent) {
+  const Eigen::Index size = at(system.node_count());
+  forces.internal.setZero(size);
+  forces.external.setZero(size);
+  forces.deformation.resize(system.elements.size());
+  if (tangent != nullptr) {
+    std::fill(tangent->values.begin(), tangent->values.end(), 0.0);
+  }
+  std::vector<double> pressure(model.shells.size(), 0);
+  for (const auto& [load, body] : system.follower_pressures) {
+    pressure[body] += factors[load] * std::get<PressureLoad>(model.loads[load].kind).value;
+  }
+  std::vector<double> energies(system.elements.size());
+  std::atomic<bool> valid{true};
+  for (const std::vector<Batch>& colour : system.colours) {
+    parallel_for_blocks(colour.size(), grain, [&](std::size_t begin, std::size_t end) {
+      ElementLanes elements;
+      ResponseLanes response;
+      ViscousLanes damping;
+      LaneMatrix18 stiffness, push_stiffness;
+      LaneVector18 pushed;
+      for (std::size_t b = begin; b < end; ++b) {
+        const Batch& batch = colour[b];
+        const ElementGroup group = members(system, batch);
+        gather(group, elements);
+        const MotionLanes motion = corner_motion(group, configuration);
+        damping.factor = viscous.previous == nullptr ? 0 : viscous.factor;
+        if (damping.factor > 0) {
+          set_lanes(
+              damping.previous, [&](std::size_t l) -> const auto& { return (*viscous.previous)[batch.elements[l]]; });
+        }
+        const LaneMask whole =
+            corotational_response(elements, motion, damping, response, tangent == nullptr ? nullptr : &stiffness);
+        if (!all_of(whole)) {
+          valid = false;
+          continue;
+        }
+        Lanes p = Lanes([&](auto l) { return pressure[group[l]->body]; });
+        const bool is_pushed = any_of(p != 0);
+        if (is_pushed) {
+          LaneMatrix18* const its_stiffness = tangent == nullptr ? nullptr : &push_stiffness;
+          if (elements.curved) {
+            unit_pressure(elements, motion, pushed, its_stiffness);
+          } else {
+            push_facets(system, batch, motion, pushed, its_stiffness);
+          }
+          pushed *= p;
+        }
+        for (std::size_t l = 0; l < batch.count; ++l) {
+          const Index e = batch.elements[l];
+          forces.deformation[e] = lane(response.deformation, l);
+          energies[e] = response.energy[l];
+          const Vector18 internal = lane(response.force, l);
+          for (int k = 0; k < 3; ++k) {
+            forces.internal.segment<6>(at(group[l]->nodes[static_cast<std::size_t>(k)])) += internal.segment<6>(6 * k);
+          }
+          if (is_pushed) {
+            const Vector18 external = lane(pushed, l);
+            for (int k = 0; k < 3; ++k) {
+              forces.external.segment<6>(at(group[l]->nodes[static_cast<std::size_t>(k)])) +=
+                  external.segment<6>(6 * k);
+            }
+          }
+        }
+        if (tangent != nullptr) {
+          if (is_pushed) {
+            stiffness -= p * push_stiffness;
+          }
+          scatter(system, batch, stiffness, *tangent);
+        }
+      }
+    });
+  }
+  forces.energy = std::accumulate(energies.begin(), energies.end(), 0.0);
+  add_dead_loads(system, configuration, factors, forces.external, tangent);
+  forces.valid = valid && forces.internal.allFinite() && forces.external.allFinite();
+}
+
+void linear_stiffness(const ShellSystem& system, BlockMatrix& matrix) {
+  std::fill(matrix.values.begin(), matrix.values.end(), 0.0);
+  for (const std::vector<Batch>& colour : system.colours) {
+    parallel_for_blocks(colour.size(), grain, [&](std::size_t begin, std::size_t end) {
+      ElementLanes elements;
+      for (std::size_t b = begin; b < end; ++b) {
+        gather(members(system, colour[b]), elements);
+        scatter(system, colour[b], linear_stiffness(elements), matrix);
+      }
+    });
+  }
+}
+
+void linear_forces(const ShellSystem& system, const VectorX& displacement, VectorX& forces) {
+  forces.setZero(at(system.node_count()));
+  for (const std::vector<Batch>& colour : system.colours) {
+    parallel_for_blocks(colour.size(), grain, [&](std::size_t begin, std::size_t end) {
+      ElementLanes elements;
+      LaneVector18 motion;
+      for (std::size_t b = begin; b < end; ++b) {
+        const ElementGroup group = members(system, colour[b]);
+        gather(group, elements);
+        for (int k = 0; k < 3; ++k) {
+          const auto corner = static_cast<std::size_t>(k);
+          LaneVector6 moved;
+          set_lanes(moved, [&](std::size_t l) { return displacement.segment<6>(at(group[l]->nodes[corner])); });
+          motion.segment<6>(6 * k) = moved;
+        }
+        const LaneVector18 force = linear_force(elements, motion);
+        for (std::size_t l = 0; l < colour[b].count; ++l) {
+          const Vector18 one = lane(force, l);
+          for (int k = 0; k < 3; ++k) {
+            forces.segment<6>(at(group[l]->nodes[static_cast<std::size_t>(k)])) += one.segment<6>(6 * k);
+          }
+        }
+      }
+    });
+  }
+}
+
+double force_norm(const ShellSystem& system, const VectorX& force) {
+  double sum = 0;
+  for (std::size_t i = 0; i < system.node_count(); ++i) {
+    sum += force.segment<3>(at(i)).squaredNorm() +
+           force.segment<3>(at(i) + 3).squaredNorm() / (system.length * system.length);
+  }
+  return std::sqrt(sum);
+}
+
+double round_off(const ShellSystem& system, const Configuration& configuration) {
+  double largest = 0;
+  for (const Vec3& u : configuration.displacement) {
+    largest = std::max(largest, u.squaredNorm());
+  }
+  return 4 * std::numeric_limits<double>::epsilon() *
+         std::hypot(system.translation_stiffness * (system.length + std::sqrt(largest)), system.rotation_stiffness);
+}
+
+ShellMesh deformed_mesh(const ShellSystem& system, const Model& model, const Configuration& configuration,
+                        std::size_t body) {
+  ShellMesh mesh = model.shells[body].mesh;
+  const std::size_t offset = model.first_node(body);
+  for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
+    mesh.vertices[i] += configuration.displacement[offset + i];
+  }
+  mesh.corner_normals.resize(mesh.triangles.size());
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      mesh.corner_normals[t][k] =
+          configuration.rotation[offset + mesh.triangles[t][k]] * system.normals[system.first_element[body] + t][k];
+    }
+  }
+  return mesh;
+}
+
+std::optional<double> enclosed_volume(const ShellSystem& system, const Model& model,
+                                      const Configuration& configuration) {
+  double volume = 0;
+  for (std::size_t body = 0; body < model.shells.size(); ++body) {
+    try {
+      volume += curved_volume(deformed_mesh(system, model, configuration, body));
+    } catch (const InputError&) {
+      return std::nullopt;  // open
+    }
+  }
+  return model.shells.empty() ? std::nullopt : std::optional(volume);
+}
+
+void take_out_rigid_motion(const ShellSystem& system, const Piece& piece, Configuration& configuration) {
+  double weight = 0;
+  Vec3 centre = Vec3::Zero();
+  for (const Index i : piece.nodes) {
+    weight += system.area[i];
+    centre += system.area[i] * system.reference[i];
+  }
+  centre /= weight;
+  for (int iteration = 0; iteration < 30; ++iteration) {
+    Vec3 shift = Vec3::Zero();
+    Vec3 moment = Vec3::Zero();
+    Mat3 inertia = Mat3::Zero();
+    for (const Index i : piece.nodes) {
+      shift += system.area[i] / weight * configuration.displacement[i];
+    }
+    for (const Index i : piece.nodes) {
+      const Vec3 arm = system.reference[i] - centre;
+      const Vec3 now = arm + configuration.displacement[i] - shift;
+      moment += system.area[i] * arm.cross(configuration.displacement[i] - shift);
+      inertia += system.area[i] * (arm.dot(now) * Mat3::Identity() - now * arm.transpose());
+    }
+    const Vec3 turn = -inertia.partialPivLu().solve(moment);
+    const Eigen::Quaterniond q = exponential(turn);
+    // (q - 1) x, so that small displacements keep their digits.
+    const auto change = [&](const Vec3& x) {
+      const Vec3 t = 2 * q.vec().cross(x);
+      return Vec3(q.w() * t + q.vec().cross(t));
+    };
+    for (const Index i : piece.nodes) {
+      Vec3& u = configuration.displacement[i];
+      u -= shift;
+      u += change(system.reference[i] - centre + u);
+      configuration.rotation[i] = (q * configuration.rotation[i]).normalized();
+    }
+    if (!(turn.norm() > 1e-14)) {
+      break;
+    }
+  }
+}
+
+void take_out_linear_rigid_motion(const ShellSystem& system, const Model& model, VectorX& displacement) {
+  for (const Piece& piece : system.pieces) {
+    if (!held_by_rigid_motions(model, piece.body)) {
+      continue;
+    }
+    double weight = 0;
+    Vec3 centre = Vec3::Zero();
+    Vec3 shift = Vec3::Zero();
+    for (const Index i : piece.nodes) {
+      weight += system.area[i];
+      centre += system.area[i] * system.reference[i];
+      shift += system.area[i] * displacement.segment<3>(at(i));
+    }
+    centre /= weight;
+    shift /= weight;
+    Vec3 moment = Vec3::Zero();
+    Mat3 inertia = Mat3::Zero();
+    for (const Index i : piece.nodes) {
+      const Vec3 arm = system.reference[i] - centre;
+      moment += system.area[i] * arm.cross(displacement.segment<3>(at(i)) - shift);
+      inertia += system.area[i] * (arm.squaredNorm() * Mat3::Identity() - arm * arm.transpose());
+    }
+    const Vec3 turn = inertia.ldlt().solve(moment);
+    for (const Index i : piece.nodes) {
+      displacement.segment<3>(at(i)) -= shift + turn.cross(system.reference[i] - centre);
+      displacement.segment<3>(at(i) + 3) -= turn;
+    }
+  }
+}
+
+}  // namespace tunica

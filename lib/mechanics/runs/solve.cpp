@@ -1,0 +1,216 @@
+#include "tunica/mechanics/runs/solve.hpp"
+
+#include "tunica/core/error.hpp"
+#include "tunica/mechanics/runs/curved_displacement.hpp"
+#include "tunica/mechanics/elements/rotation.hpp"
+#include "tunica/mechanics/runs/detail/run.hpp"
+#include "tunica/mechanics/model/wall.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace tunica {
+
+State make_state(const ShellSystem& system, const Model& model, const Configuration& configuration, double time) {
+  State state;
+  state.time = time;
+  state.displacement = configuration.displacement;
+  state.rotation.reserve(configuration.rotation.size());
+  for (const Eigen::Quaterniond& q : configuration.rotation) {
+    state.rotation.push_back(logarithm(q));
+  }
+  state.volume = enclosed_volume(system, model, configuration);
+  for (const ShellElement& element : system.elements) {
+    CornerMotion motion;
+    for (int k = 0; k < 3; ++k) {
+      const Index node = element.nodes[static_cast<std::size_t>(k)];
+      motion.displacement.col(k) = configuration.displacement[node];
+      motion.rotation[static_cast<std::size_t>(k)] = configuration.rotation[node].toRotationMatrix();
+    }
+    ElementState d;
+    if (deformation(element, motion, d)) {
+      state.strain_energy += strain_energy(element, d);
+    }
+  }
+  return state;
+}
+
+std::string describe_loads(const Model& model, const std::vector<double>& reached, const std::vector<double>& wanted) {
+  std::string text;
+  for (std::size_t l = 0; l < model.loads.size(); ++l) {
+    if (const auto* pressure = std::get_if<PressureLoad>(&model.loads[l].kind)) {
+      const ShellBody& body = model.shells[model.loads[l].body];
+      text += fmt::format("{}{:.4g} kPa of {:.4g} kPa on {}, {:.4g} mm thick{}", text.empty() ? "" : "; ",
+                          1e3 * reached[l] * pressure->value, 1e3 * wanted[l] * pressure->value, body.name,
+                          *std::min_element(body.thickness.begin(), body.thickness.end()),
+                          body.thickness.size() > 1 ? " at its thinnest" : "");
+    }
+  }
+  if (model.loads.empty()) {
+    return "of the prescribed displacements";
+  }
+  return text.empty() ? fmt::format("{:.4g} of {:.4g} times the loads", reached.front(), wanted.front()) : text;
+}
+
+void set_algebraic_error(const std::optional<AlgebraicError>& error, State& state) {
+  if (error) {
+    state.algebraic_error = error->relative();
+    state.algebraic_error_is_bound = error->is_lower_bound;
+  }
+}
+
+void record_step(const State& state, double seconds, Summary& summary) {
+  ++summary.steps;
+  summary.converged = state.converged && (summary.steps == 1 || summary.converged);
+  summary.residual = state.residual;
+  summary.newton_iterations += state.newton_iterations;
+  summary.cg_iterations += state.cg_iterations;
+  summary.seconds_per_step.push_back(seconds);
+  if (state.algebraic_error) {
+    summary.algebraic_error = std::max(summary.algebraic_error.value_or(0), *state.algebraic_error);
+    summary.algebraic_error_is_bound = summary.algebraic_error_is_bound || state.algebraic_error_is_bound;
+  }
+  if (state.displacement.empty()) {
+    return;
+  }
+  summary.volume_after = state.volume;
+  summary.strain_energy = state.strain_energy;
+  summary.max_displacement = 0;
+  for (const Vec3& u : state.displacement) {
+    summary.max_displacement = std::max(summary.max_displacement, u.norm());
+  }
+}
+
+Summary solve(const Model& model, const RunSettings& settings, const std::function<void(const State&)>& on_state,
+              const Progress& progress, const Resumption& resumption) {
+  ShellSystem system = make_checked_system(model, settings);
+  if (const auto* dynamic = std::get_if<DynamicRun>(&settings.kind)) {
+    return run_dynamic(system, model, settings, *dynamic, on_state, progress, resumption);
+  }
+  if (const auto* frequencies = std::get_if<FrequencyRun>(&settings.kind)) {
+    return run_frequencies(system, model, settings, *frequencies, on_state, progress);
+  }
+  if (const auto* buckling = std::get_if<BucklingRun>(&settings.kind)) {
+    return run_buckling(system, model, settings, *buckling, on_state, progress);
+  }
+  if (const auto* path = std::get_if<ArcLengthRun>(&settings.kind)) {
+    return run_arc_length(system, model, settings, *path, on_state, progress);
+  }
+  const auto& run = std::get<StaticRun>(settings.kind);
+  return run.linear ? run_linear(system, model, settings, run, on_state, progress, resumption)
+                    : run_static(system, model, settings, run, on_state, progress, resumption);
+}
+
+namespace {
+
+/// From the fields of the elements what of them is large.
+void find_wall(const Model& model, ElementFields& fields) {
+  constexpr double above = 0.01;
+  constexpr double equal_stress = 1e-6;
+  const auto larger = [&](std::vector<double> top, const std::vector<double>& bottom) {
+    top = averaged_at_nodes(model, top);
+    const std::vector<double> other = averaged_at_nodes(model, bottom);
+    std::transform(top.begin(), top.end(), other.begin(), top.begin(),
+                   [](double a, double b) { return std::max(a, b); });
+    return top;
+  };
+  const auto first = [](const std::vector<Vec2>& pairs) {
+    std::vector<double> values;
+    for (const Vec2& pair : pairs) {
+      values.push_back(pair[0]);
+    }
+    return values;
+  };
+  Wall& wall = fields.wall;
+  fields.von_mises = larger(fields.von_mises_top, fields.von_mises_bottom);
+  wall.stress_max = *std::max_element(fields.von_mises.begin(), fields.von_mises.end());
+  // The first of equal ones, so that on a symmetric body it is not round-off that chooses.
+  const auto highest = std::ranges::find_if(
+      fields.von_mises, [&](double stress) { return stress >= (1 - equal_stress) * wall.stress_max; });
+  auto node = static_cast<std::size_t>(highest - fields.von_mises.begin());
+  wall.stress_p99 = area_quantile(model, fields.von_mises, above);
+  for (const ShellBody& body : model.shells) {
+    if (node < body.mesh.vertices.size()) {
+      wall.stress_max_at = body.mesh.vertices[node];
+      break;
+    }
+    node -= body.mesh.vertices.size();
+  }
+  const std::vector<double> strain = larger(first(fields.principal_strain_top), first(fields.principal_strain_bottom));
+  wall.strain_max = *std::max_element(strain.begin(), strain.end());
+  wall.strain_p99 = area_quantile(model, strain, above);
+}
+
+}  // namespace
+
+struct ElementFieldEvaluator::Implementation {
+  const Model& model;
+  ShellSystem system;
+};
+
+ElementFieldEvaluator::ElementFieldEvaluator(const Model& model)
+    : implementation_(new Implementation{model, make_system(model)}) {}
+ElementFieldEvaluator::~ElementFieldEvaluator() = default;
+
+ElementFields element_fields(const Model& model, const State& state) { return ElementFieldEvaluator(model)(state); }
+
+ElementFields ElementFieldEvaluator::operator()(const State& state) const {
+  const auto& [model, system] = *implementation_;
+  ElementFields fields;
+  const std::size_t nodes = model.node_count();
+  TUNICA_ASSERT(state.displacement.size() == nodes && state.rotation.size() == nodes);
+  std::vector<double> pressure(model.shells.size(), 0);
+  for (const Load& load : model.loads) {
+    if (const auto* p = std::get_if<PressureLoad>(&load.kind)) {
+      pressure[load.body] += p->value * factor_of(load.ramp, state.velocity.empty(),
+                                                  state.velocity.empty() ? state.load_factor : state.time);
+    }
+  }
+  const auto von_mises = [](const Vec3& s) {
+    return std::sqrt(std::max(0.0, s[0] * s[0] - s[0] * s[1] + s[1] * s[1] + 3 * s[2] * s[2]));
+  };
+  const auto principal = [](const Vec3& strain) {  // xx, yy, and twice the tensor's xy
+    const double mean = (strain[0] + strain[1]) / 2;
+    const double radius = std::hypot((strain[0] - strain[1]) / 2, strain[2] / 2);
+    return Vec2(mean + radius, mean - radius);
+  };
+  for (const ShellElement& element : system.elements) {
+    ElementState d = ElementState::Zero();
+    if (state.linear) {
+      Vector18 moved;
+      for (int k = 0; k < 3; ++k) {
+        const Index node = element.nodes[static_cast<std::size_t>(k)];
+        moved.segment<3>(6 * k) = state.displacement[node];
+        moved.segment<3>(6 * k + 3) = state.rotation[node];
+      }
+      d = linear_deformation(element, moved);
+    } else {
+      CornerMotion motion;
+      for (int k = 0; k < 3; ++k) {
+        const Index node = element.nodes[static_cast<std::size_t>(k)];
+        motion.displacement.col(k) = state.displacement[node];
+        motion.rotation[static_cast<std::size_t>(k)] = exponential(state.rotation[node]).toRotationMatrix();
+      }
+      deformation(element, motion, d);
+    }
+    const double t = element.thickness;
+    const Mat3 elasticity = plane_stress(model.shells[element.body].material);
+    const Vec3 strain = d.head<3>();
+    const Vec3 curvature = element.curvature * d.segment<9>(3);
+    const Vec3 force = t * elasticity * strain;
+    const Vec3 moment = t * t * t / 12 * elasticity * curvature;
+    fields.membrane_force.push_back(force);
+    fields.bending_moment.push_back(moment);
+    fields.von_mises_top.push_back(von_mises(force / t + 6 / (t * t) * moment));
+    fields.von_mises_bottom.push_back(von_mises(force / t - 6 / (t * t) * moment));
+    fields.principal_strain_top.push_back(principal(strain + t / 2 * curvature));
+    fields.principal_strain_bottom.push_back(principal(strain - t / 2 * curvature));
+    fields.pressure.push_back(pressure[element.body]);
+  }
+  find_wall(model, fields);
+  fields.largest_displacement = largest_displacement(model, state);
+  return fields;
+}
+
+}  // namespace tunica

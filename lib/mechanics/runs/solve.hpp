@@ -1,0 +1,171 @@
+#pragma once
+
+#include "tunica/core/progress.hpp"
+#include "tunica/mechanics/model/model.hpp"
+
+#include <Eigen/Geometry>
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+
+namespace tunica {
+
+/// One state of a run, as handed to the callback; everything is for all nodes of all bodies in global order.
+struct State {
+  /// s; the load factor in a static run, the number of the step on a path by arc length, the frequency (Hz) or the
+  /// buckling factor of a mode.
+  double time = 0;
+  double load_factor = 0;              ///< static: of this step; dynamic: of the first load's ramp
+  std::vector<Vec3> displacement;      ///< mm, #nodes
+  std::vector<Vec3> rotation;          ///< rotation vectors, rad, #nodes
+  std::vector<Vec3> velocity;          ///< mm/s, dynamic only
+  std::vector<Vec3> angular_velocity;  ///< rad/s, dynamic only
+  std::optional<double> volume;        ///< mm^3 of the closed bodies' curved surfaces together; none when one is open
+  double strain_energy = 0;            ///< N mm = mJ
+  double kinetic_energy = 0;           ///< mJ
+  double residual = 0;                 ///< relative, as compared with RunSettings::converge
+  std::size_t newton_iterations = 0;
+  std::size_t cg_iterations = 0;
+  std::optional<double> algebraic_error;  ///< of this step, relative; see Summary
+  bool algebraic_error_is_bound = false;
+  bool converged = false;
+  bool linear = false;  ///< of the linear theory: rotations are not finite ones
+};
+
+/// What the wall bears, over all bodies: of von Mises stress and largest principal strain, each the larger of both
+/// faces after averaging at the nodes within a body. p99 is passed on 1 % of the area.
+struct Wall {
+  double stress_p99 = 0;  ///< MPa
+  double stress_max = 0;
+  Vec3 stress_max_at = Vec3::Zero();  ///< mm, the node, in the reference
+  double strain_p99 = 0;              ///< engineering strain of the co-rotated frame
+  double strain_max = 0;
+};
+
+/// Per-element results of one state (#elements of all bodies in order; components in the element's own frame whose
+/// x axis is the projection of the first edge).
+struct ElementFields {
+  std::vector<Vec3> membrane_force;      ///< N/mm: xx, yy, xy
+  std::vector<Vec3> bending_moment;      ///< N: xx, yy, xy
+  std::vector<double> von_mises_top;     ///< MPa, at the face the normal points to
+  std::vector<double> von_mises_bottom;  ///< MPa
+  /// At the faces, largest first; engineering strains of the co-rotated frame.
+  std::vector<Vec2> principal_strain_top;
+  std::vector<Vec2> principal_strain_bottom;
+  std::vector<double> pressure;   ///< MPa, of this state
+  std::vector<double> von_mises;  ///< MPa, #nodes: the larger of both faces' averages at the nodes
+  Wall wall;
+  double largest_displacement = 0;  ///< mm, of the curved surfaces, also between the nodes
+};
+
+/// Where a static path broke off and the shell moved by itself to the next state of rest.
+struct Snap {
+  double load_factor = 0;
+  double distance = 0;  ///< mm, the farthest that a node moved
+};
+
+/// Of a dynamic run: work = stored + damped + lost. All from the beginning, mJ unless said.
+struct EnergyBalance {
+  double work = 0;               ///< by loads and prescribed displacements, by trapezia over each step
+  double damped = 0;             ///< by physical damping
+  double lost = 0;               ///< to time integration; below zero: gained from it
+  double most_lost = 0;          ///< so far
+  double largest = 0;            ///< energy so far, stored or brought in
+  double gained = 0;             ///< the most that time integration has given back or added, relative to `largest`
+  std::size_t gaining_step = 0;  ///< in which that passed a tenth; 0: in none
+  double gaining_time = 0;       ///< s, the end of that step
+};
+
+struct Summary {
+  std::size_t dof = 0;    ///< free degrees of freedom
+  std::size_t steps = 0;  ///< steps done (not only handed over)
+  std::size_t parts = 0;  ///< dynamic: parts of steps that were accepted; without `adaptive` as many as steps
+  bool converged = false;
+  double residual = 0;  ///< of the last step
+  std::size_t newton_iterations = 0;
+  std::size_t cg_iterations = 0;
+  /// What the linear solver's error leaves of a step's change, relative, in the energy norm of the tangent; the largest
+  /// of all steps with cg, of an early one and the last with the direct solver. None where no system was solved, or
+  /// where the tangent was not positive definite.
+  std::optional<double> algebraic_error;
+  bool algebraic_error_is_bound = false;  ///< some step's solve ended before its tolerance: at least this
+  std::optional<double> volume_before;    ///< mm^3; none when a body is open
+  std::optional<double> volume_after;
+  double strain_energy = 0;              ///< mJ
+  double max_displacement = 0;           ///< mm, of the nodes in the last state
+  std::vector<double> seconds_per_step;  ///< wall
+  std::vector<double> frequencies;       ///< Hz, increasing
+  std::vector<double> buckling_factors;  ///< increasing
+  /// Load factor (static) or time (s) from which waves as short as the elements were made stiff, because the shell
+  /// would have buckled in them (shell_element.hpp).
+  std::optional<double> stiffened_from;
+  std::optional<EnergyBalance> energy;  ///< of a dynamic run
+  std::vector<Snap> snaps;              ///< under load control, in order
+  std::vector<double> limit_factors;    ///< load factors at which a path by arc length turns, in its order
+  std::vector<double> branch_factors;   ///< and near which other paths leave it
+};
+
+/// Everything a run needs to go on after a step as if nothing had happened: the numbers as they stand in memory, so
+/// that a run that goes on from here repeats the uninterrupted one (to the bit with the direct solver; what a solver
+/// keeps only to be faster, such as a factor of an earlier matrix, is not here, so with others to their tolerance).
+struct Checkpoint {
+  Summary summary;                           ///< of the steps done; `steps` says where the run goes on
+  double position = 0;                       ///< s; static: the load factor
+  std::vector<Vec3> displacement;            ///< mm, #nodes
+  std::vector<Eigen::Quaterniond> rotation;  ///< #nodes
+  /// What the kind of run remembers between its steps beyond the configuration, by name: velocities, step sizes.
+  std::map<std::string, std::vector<double>, std::less<>> memory;
+};
+
+/// How a run is made to outlive its process.
+struct Resumption {
+  std::optional<Checkpoint> from;  ///< goes on here; the reference state is then not handed over again
+  /// Called after every step, when what `on_state` got is complete up to it; `make` builds the checkpoint, so that none
+  /// is built that nobody wants.
+  std::function<void(const std::function<Checkpoint()>& make)> on_step;
+
+  void offer(const std::function<Checkpoint()>& make) const {
+    if (on_step) {
+      on_step(make);
+    }
+  }
+};
+
+/// Finds what makes a model unsolvable before any time is spent, and names it: degenerate or non-manifold elements,
+/// inconsistent orientation, a normal nearly in its facet's plane, pieces that can move freely (static), a
+/// non-positive thickness, net force on a body held by its rigid motions only.
+/// Errors: InputError.
+void check_model(const Model& model, const RunSettings& settings);
+
+/// Runs a model. Every `settings.every`-th state, the reference state (time 0) and the last one go to `on_state`. After
+/// the reference, a run for frequencies or buckling hands over its modes: linear states, their largest displacement 1 %
+/// of the model's longest side.
+/// Errors: InputError as check_model; RequirementError when a step does not converge, has no equilibrium, or becomes
+/// unstable (the last good state has been handed over). With `cg_fixed_count` a run ends normally, `converged` false.
+/// A run that goes on from a checkpoint must have the model and the settings of the run that made it.
+Summary solve(const Model& model, const RunSettings& settings, const std::function<void(const State&)>& on_state,
+              const Progress& progress = {}, const Resumption& resumption = {});
+
+/// Forces, moments and stresses of every triangle in one state, and what is largest. For many states of one model: the
+/// elements are made ready once. The model must outlive it.
+class ElementFieldEvaluator {
+public:
+  explicit ElementFieldEvaluator(const Model& model);
+  ~ElementFieldEvaluator();
+  ElementFieldEvaluator(const ElementFieldEvaluator&) = delete;
+  ElementFieldEvaluator& operator=(const ElementFieldEvaluator&) = delete;
+
+  [[nodiscard]] ElementFields operator()(const State& state) const;
+
+private:
+  struct Implementation;
+  std::unique_ptr<Implementation> implementation_;
+};
+
+/// The same for one state.
+ElementFields element_fields(const Model& model, const State& state);
+
+}  // namespace tunica

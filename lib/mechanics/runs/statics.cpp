@@ -1,0 +1,387 @@
+#include "tunica/core/error.hpp"
+#include "tunica/mechanics/elements/rotation.hpp"
+#include "tunica/mechanics/runs/detail/run.hpp"
+#include "tunica/mechanics/runs/detail/settle.hpp"
+#include "tunica/mechanics/runs/detail/supports.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+
+namespace tunica {
+
+VectorX prescribed_positions(const ShellSystem& system, const Model& model, double factor) {
+  VectorX positions = VectorX::Zero(static_cast<Eigen::Index>(6 * system.node_count()));
+  for (const PrescribedFreedom& p : system.prescribed) {
+    positions[static_cast<Eigen::Index>(p.freedom)] = p.value * factor_of(model.fixes[p.fix].ramp, true, factor);
+  }
+  return positions;
+}
+
+Balance static_balance(const ShellSystem& system, const Model& model, const Configuration& configuration, double factor,
+                       Forces& forces, BlockMatrix* tangent) {
+  evaluate(system, model, configuration, load_factors(model, true, factor), {}, forces, tangent);
+  Balance balance;
+  balance.valid = forces.valid;
+  balance.unbalanced = forces.external - forces.internal;
+  VectorX reactions = forces.internal;
+  for (std::size_t i = 0; i < system.held.size(); ++i) {
+    if (!system.held[i]) {
+      reactions[static_cast<Eigen::Index>(i)] = 0;
+    }
+  }
+  balance.scale = std::max(force_norm(system, forces.external), force_norm(system, reactions));
+  balance.floor = round_off(system, configuration);
+  return balance;
+}
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+/// Smallest increment that is tried before the load counts as one without equilibrium near: this part of the whole
+/// load, and of a load step.
+constexpr double smallest_of_load = 1.0 / 4096;
+constexpr double smallest_of_step = 1.0 / 16;
+/// Where a path breaks off, the shell is let go this many smallest increments beyond, so that it does not come back.
+constexpr double beyond_the_limit = 4;
+/// A step whose change is more than this times its linear prediction has left the path: up to a limit point a quadratic
+/// fold gives at most 2.
+constexpr double largest_departure = 3;
+/// A shell that gives way by less than this part of its thickness (root mean square) has branched off its path; more is
+/// a snap.
+constexpr double largest_branch = 0.25;
+/// Part of the thickness by which a shell is pushed off a path that it may leave.
+constexpr double nudge = 0.01;
+/// Net load that the supports of a body held by its rigid motions may carry, relative to the load.
+constexpr double largest_imbalance = 1e-3;
+
+/// One load step to equilibrium, bodies held by their rigid motions included: their mean displacement and rotation are
+/// taken out, and equilibrium found again, until both hold.
+class LoadStep {
+public:
+  LoadStep(ShellSystem& system, const Model& model, const RunSettings& settings)
+      : system_(system), model_(model), settings_(settings), solver_(system, settings), matrix_(system.pattern) {}
+
+  NewtonResult run(double factor, double previous_factor, Configuration& configuration) {
+    const auto balance = [&](const Configuration& c, BlockMatrix* tangent) {
+      return static_balance(system_, model_, c, factor, forces_, tangent);
+    };
+    const VectorX held =
+        prescribed_positions(system_, model_, factor) - prescribed_positions(system_, model_, previous_factor);
+    NewtonResult result = newton(system_, settings_, solver_, balance, held, matrix_, configuration);
+    const VectorX still = VectorX::Zero(held.size());
+    for (int round = 0; round < 8 && result.converged; ++round) {
+      bool changed = false;
+      for (const Piece& piece : system_.pieces) {
+        if (held_by_rigid_motions(model_, piece.body)) {
+          take_out_rigid_motion(system_, piece, configuration);
+          changed = true;
+        }
+      }
+      if (!changed) {
+        break;
+      }
+      const NewtonResult again = newton(system_, settings_, solver_, balance, still, matrix_, configuration);
+      result.converged = again.converged;
+      result.valid = again.valid;
+      result.residual = again.residual;
+      result.iterations += again.iterations;
+      result.cg_iterations += again.cg_iterations;
+      if (again.algebraic_error && result.algebraic_error) {
+        result.algebraic_error->error = again.algebraic_error->error;
+      }
+      if (again.iterations == 0) {
+        break;
+      }
+    }
+    if (result.converged) {
+      require_balance(configuration, factor);
+    }
+    return result;
+  }
+
+  /// Where the path has lost its stability: moves what is prescribed, pushes the shell off it, and lets it creep to
+  /// where it can rest.
+  SettleResult let_go(double factor, double previous_factor, double thickness, Configuration& configuration) {
+    const auto balance = [&](const Configuration& c, BlockMatrix* tangent) {
+      return static_balance(system_, model_, c, factor, forces_, tangent);
+    };
+    advance_configuration(configuration, prescribed_positions(system_, model_, factor) -
+                                             prescribed_positions(system_, model_, previous_factor));
+    advance_configuration(configuration,
+                          nudge * thickness * weakest_direction(system_, solver_, balance, matrix_, configuration));
+    return settle(system_, settings_, solver_, balance, matrix_, configuration);
+  }
+
+  [[nodiscard]] std::size_t freedom_count() const { return solver_.freedom_count(); }
+  void tell_direct_error(bool tell) { solver_.tell_direct_error(tell); }
+
+private:
+  void require_balance(const Configuration& configuration, double factor) {
+    static_balance(system_, model_, configuration, factor, forces_, nullptr);
+    for (const Piece& piece : system_.pieces) {
+      if (held_by_rigid_motions(model_, piece.body) && imbalance_of(piece, configuration) > largest_imbalance) {
+        throw RequirementError(
+            fmt::format("{}: at load factor {:.6g} the loads are no longer in balance on the deformed body, which only "
+                        "its rigid motions hold: hold it by a [[fix]]",
+                        model_.shells[piece.body].name, factor));
+      }
+    }
+  }
+
+  double imbalance_of(const Piece& piece, const Configuration& configuration) {
+    ShellSystem& s = system_;
+    std::vector<Vec3> reference = s.reference;
+    for (const Index i : piece.nodes) {
+      s.reference[i] += configuration.displacement[i];
+    }
+    const double value = imbalance(s, piece, forces_.external);
+    s.reference = std::move(reference);
+    return value;
+  }
+
+  ShellSystem& system_;
+  const Model& model_;
+  const RunSettings& settings_;
+  TangentSolver solver_;
+  BlockMatrix matrix_;
+  Forces forces_;
+};
+
+double least_thickness(const Model& model) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const ShellBody& body : model.shells) {
+    least = std::min(least, *std::min_element(body.thickness.begin(), body.thickness.end()));
+  }
+  return least;
+}
+
+/// Root mean square over the nodes.
+double distance(const Configuration& a, const Configuration& b) {
+  double sum = 0;
+  for (std::size_t i = 0; i < a.displacement.size(); ++i) {
+    sum += (a.displacement[i] - b.displacement[i]).squaredNorm();
+  }
+  return std::sqrt(sum / static_cast<double>(a.displacement.size()));
+}
+
+double largest_distance(const Configuration& a, const Configuration& b) {
+  double largest = 0;
+  for (std::size_t i = 0; i < a.displacement.size(); ++i) {
+    largest = std::max(largest, (a.displacement[i] - b.displacement[i]).norm());
+  }
+  return largest;
+}
+
+struct Failure {
+  std::string found;
+  std::string reason;
+};
+
+Failure why(const NewtonResult& result, const SettleResult& let_go, bool prescribed) {
+  // Prescribed displacements hold a shell that loads alone would carry off: what cannot follow them has no limit load.
+  const std::string limit = prescribed ? "limit point" : "limit load";
+  const std::string none = "no stable static equilibrium";
+  if (let_go.ran_away) {
+    return {none, limit + ": beyond it there is no equilibrium, the shell yields without bound"};
+  }
+  if (!result.stable || let_go.lost_stability) {
+    return {none,
+            limit + ": the stiffness is no longer positive, and no state was found in which the shell could rest"};
+  }
+  return {"no static equilibrium found", result.valid ? "Newton's method does not converge, although the stiffness is "
+                                                        "positive as far as it came: take more load steps"
+                                                      : "elements collapse or fold"};
+}
+
+/// What load control does: the load grows to one load factor after the other, each in one step, which is cut only where
+/// Newton's method fails. Where the path of equilibria breaks off, the shell goes on from the state of rest that it
+/// then finds.
+class LoadControl {
+public:
+  LoadControl(ShellSystem& system, const Model& model, const RunSettings& settings, const StaticRun& run,
+              const StateCallback& on_state)
+      : system_(system),
+        model_(model),
+        settings_(settings),
+        run_(run),
+        on_state_(on_state),
+        step_(system, model, settings),
+        thickness_(least_thickness(model)),
+        configuration_(reference_configuration(system)) {}
+
+  Summary follow(const Progress& progress, const Resumption& resumption) {
+    if (resumption.from) {
+      resume(*resumption.from);
+    } else {
+      begin();
+    }
+    const std::size_t steps = run_.load_factors.size();
+    for (std::size_t s = summary_.steps; s < steps; ++s) {
+      const auto start = Clock::now();
+      step_.tell_direct_error(s == 0 || s + 1 == steps);
+      const NewtonResult result = reach(run_.load_factors[s]);
+      const State state = state_of(result);
+      record_step(state, seconds_since(start), summary_);
+      if ((s + 1) % settings_.every == 0 || s + 1 == steps) {
+        show(state);
+      }
+      resumption.offer([&] {
+        return Checkpoint{summary_,
+                          factor_,
+                          configuration_.displacement,
+                          configuration_.rotation,
+                          {{"shown", {shown_}}, {"increment", {increment_}}}};
+      });
+      advance(progress, static_cast<double>(s + 1) / static_cast<double>(steps));
+    }
+    return summary_;
+  }
+
+private:
+  void begin() {
+    summary_.dof = step_.freedom_count();
+    State state = make_state(system_, model_, configuration_, 0);
+    state.converged = true;
+    on_state_(state);
+    summary_.volume_before = state.volume;
+    summary_.volume_after = state.volume;
+  }
+
+  void resume(const Checkpoint& from) {
+    summary_ = from.summary;
+    if (summary_.stiffened_from) {
+      stiffen_short_waves(system_);
+    }
+    configuration_ = {from.displacement, from.rotation};
+    factor_ = from.position;
+    shown_ = from.memory.at("shown").at(0);
+    increment_ = from.memory.at("increment").at(0);
+  }
+
+  /// Equilibrium at a load factor. Errors: RequirementError: there is none.
+  /// @return of the last increment, with the iterations of all
+  NewtonResult reach(double target) {
+    const double step = target - factor_;
+    const double smallest = std::min(smallest_of_load * run_.load_factors.back(), smallest_of_step * step);
+    NewtonResult result;
+    std::size_t iterations = 0;
+    std::size_t cg_iterations = 0;
+    while (factor_ != target) {
+      const double before = factor_;
+      const double next = increment_ >= target - factor_ - 1e-12 * step ? target : factor_ + increment_;
+      Configuration attempt = configuration_;
+      result = step_.run(next, factor_, attempt);
+      iterations += result.iterations;
+      cg_iterations += result.cg_iterations;
+      if (may_stand(result)) {
+        configuration_ = std::move(attempt);
+        factor_ = next;
+        increment_ *= 2;
+        continue;
+      }
+      increment_ = (next - before) / 2;
+      if (increment_ >= smallest) {
+        continue;
+      }
+      if (!summary_.stiffened_from && has_soft_waves(system_)) {
+        stiffen_short_waves(system_);
+        summary_.stiffened_from = factor_;
+        increment_ = step;
+        continue;
+      }
+      const SettleResult settled = leave_path(std::min(target, factor_ + beyond_the_limit * smallest), result);
+      iterations += settled.iterations;
+      cg_iterations += settled.cg_iterations;
+      result.residual = settled.residual;
+      result.converged = true;
+      increment_ = beyond_the_limit * smallest;
+    }
+    result.iterations = iterations;
+    result.cg_iterations = cg_iterations;
+    return result;
+  }
+
+  [[nodiscard]] bool may_stand(const NewtonResult& result) const {
+    // With a fixed count of iterations, or one linearisation, nobody asks for a tolerance.
+    if (settings_.cg_fixed_count) {
+      return result.valid;
+    }
+    const bool one_linearisation = settings_.newton_max == 1 && result.residual <= largest_unchecked_residual;
+    const bool left_the_path = result.predicted > 0 && result.reached > largest_departure * result.predicted;
+    return (result.converged || (result.valid && one_linearisation)) && result.stable && !left_the_path;
+  }
+
+  /// From where the path breaks off to the next state of rest, at a load factor beyond. Errors: RequirementError: none.
+  SettleResult leave_path(double beyond, const NewtonResult& failed) {
+    Configuration attempt = configuration_;
+    const SettleResult settled = step_.let_go(beyond, factor_, thickness_, attempt);
+    if (!settled.settled) {
+      fail(failed, settled);
+    }
+    if (distance(attempt, configuration_) > largest_branch * thickness_) {
+      summary_.snaps.push_back({factor_, largest_distance(attempt, configuration_)});
+    }
+    configuration_ = std::move(attempt);
+    factor_ = beyond;
+    return settled;
+  }
+
+  [[noreturn]] void fail(const NewtonResult& failed, const SettleResult& let_go) {
+    if (factor_ != shown_) {  // the last good state, also between two load steps
+      NewtonResult good;
+      good.converged = true;
+      show(state_of(good));
+    }
+    const double last = run_.load_factors.back();
+    const auto [found, reason] = why(failed, let_go, !system_.prescribed.empty());
+    throw RequirementError(
+        fmt::format("{} beyond load factor {:.6g} of {:.6g} ({}): {}; the last good state is at {:.6g}", found, factor_,
+                    last, describe_loads(model_, load_factors(model_, true, factor_), load_factors(model_, true, last)),
+                    reason, factor_));
+  }
+
+  [[nodiscard]] State state_of(const NewtonResult& result) const {
+    State state = make_state(system_, model_, configuration_, factor_);
+    state.load_factor = factor_;
+    state.residual = result.residual;
+    state.newton_iterations = result.iterations;
+    state.cg_iterations = result.cg_iterations;
+    set_algebraic_error(result.algebraic_error, state);
+    state.converged = result.converged;
+    return state;
+  }
+
+  void show(const State& state) {
+    on_state_(state);
+    shown_ = factor_;
+  }
+
+  ShellSystem& system_;
+  const Model& model_;
+  const RunSettings& settings_;
+  const StaticRun& run_;
+  const StateCallback& on_state_;
+  LoadStep step_;
+  const double thickness_;
+  Configuration configuration_;
+  Summary summary_;
+  double factor_ = 0;
+  double shown_ = 0;                                            ///< load factor of the last state handed over
+  double increment_ = std::numeric_limits<double>::infinity();  ///< of the load factor, to be tried next
+};
+
+}  // namespace
+
+Summary run_static(ShellSystem& system, const Model& model, const RunSettings& settings, const StaticRun& run,
+                   const StateCallback& on_state, const Progress& progress, const Resumption& resumption) {
+  return LoadControl(system, model, settings, run, on_state).follow(progress, resumption);
+}
+
+}  // namespace tunica

@@ -1,0 +1,22 @@
+#pragma once
+
+#include "tunica/shell/patch/shell_mesh.hpp"
+#include "tunica/shell/distance/target.hpp"
+
+namespace tunica {
+
+/// What the answer to a load depends on besides the largest distance.
+struct ShellQuality {
+  double mean_distance = 0;      ///< mm: the larger of the two one-sided means over area
+  double mean_normal_error = 0;  ///< degrees, of the curved surface's normal against the target's at its closest point
+  double max_normal_error = 0;   ///< degrees; both away from the target's creases
+  double gap = 0;         ///< mm: largest distance of two neighbouring patches along their common edge, at equal parts
+  double size_ratio = 1;  ///< largest ratio of the longest edges of two neighbouring facets
+};
+
+/// Sampled: some 20,000 points of the curved surface, and the target's centroids. A crease is an edge of the target
+/// with a dihedral above 40 degrees; points whose closest triangle has one are left out of the normals' errors.
+/// Cost: about 0.1 s. Parallel.
+ShellQuality shell_quality(const ShellMesh& shell, const Target& target);
+
+}  // namespace tunica

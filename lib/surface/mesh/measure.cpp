@@ -1,0 +1,101 @@
+#include "tunica/surface/mesh/measure.hpp"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+namespace tunica {
+
+Box bounding_box(const TriangleMesh& mesh) {
+  if (mesh.triangles.empty()) {
+    return {};
+  }
+  const Vec3& first = mesh.vertices[mesh.triangles[0][0]];
+  Box box{first, first};
+  for (const auto& triangle : mesh.triangles) {
+    for (const Index v : triangle) {
+      box.lower = box.lower.cwiseMin(mesh.vertices[v]);
+      box.upper = box.upper.cwiseMax(mesh.vertices[v]);
+    }
+  }
+  return box;
+}
+
+double diagonal(const TriangleMesh& mesh) { return bounding_box(mesh).diagonal(); }
+
+double triangle_area(const Vec3& a, const Vec3& b, const Vec3& c) { return 0.5 * (b - a).cross(c - a).norm(); }
+
+double area(const TriangleMesh& mesh) {
+  double sum = 0;
+  for (const auto& [i, j, k] : mesh.triangles) {
+    sum += triangle_area(mesh.vertices[i], mesh.vertices[j], mesh.vertices[k]);
+  }
+  return sum;
+}
+
+double signed_volume(const TriangleMesh& mesh) {
+  // About the centre of the box: far from the origin the products would cancel.
+  const Box box = bounding_box(mesh);
+  const Vec3 centre = 0.5 * (box.lower + box.upper);
+  double sum = 0;
+  for (const auto& [i, j, k] : mesh.triangles) {
+    sum += (mesh.vertices[i] - centre).dot((mesh.vertices[j] - centre).cross(mesh.vertices[k] - centre));
+  }
+  return sum / 6;
+}
+
+double longest_edge(const TriangleMesh& mesh, Index triangle) {
+  const auto& [i, j, k] = mesh.triangles[triangle];
+  const Vec3 &a = mesh.vertices[i], &b = mesh.vertices[j], &c = mesh.vertices[k];
+  return std::sqrt(std::max({(b - a).squaredNorm(), (c - a).squaredNorm(), (c - b).squaredNorm()}));
+}
+
+double angle_degrees(const Vec3& p, const Vec3& a, const Vec3& b) {
+  return std::atan2((a - p).cross(b - p).norm(), (a - p).dot(b - p)) * 180 / std::numbers::pi;
+}
+
+double smallest_angle_degrees(const Vec3& a, const Vec3& b, const Vec3& c) {
+  const double doubled_area = (b - a).cross(c - a).norm();
+  // atan2 of sine and cosine: acos would lose half the digits of a small angle.
+  const auto angle = [&](const Vec3& p, const Vec3& q, const Vec3& r) {
+    return std::atan2(doubled_area, (q - p).dot(r - p));
+  };
+  if (!(doubled_area > 0)) {
+    return 0;
+  }
+  return std::min({angle(a, b, c), angle(b, c, a), angle(c, a, b)}) * 180 / std::numbers::pi;
+}
+
+double radius_ratio(const Vec3& a, const Vec3& b, const Vec3& c) {
+  const double x = (b - c).norm();
+  const double y = (c - a).norm();
+  const double z = (a - b).norm();
+  const double squared_doubled_area = (b - a).cross(c - a).squaredNorm();
+  // inradius = 2 area / perimeter, circumradius = x y z / (4 area)
+  const double denominator = (x + y + z) * (x * y * z);
+  return denominator > 0 ? 4 * squared_doubled_area / denominator : 0;
+}
+
+double min_angle_degrees(const TriangleMesh& mesh) {
+  double smallest = 60;
+  for (const auto& [i, j, k] : mesh.triangles) {
+    smallest = std::min(smallest, smallest_angle_degrees(mesh.vertices[i], mesh.vertices[j], mesh.vertices[k]));
+  }
+  return smallest;
+}
+
+double mean_quality(const TriangleMesh& mesh) {
+  if (mesh.triangles.empty()) {
+    return 1;
+  }
+  double sum = 0;
+  for (const auto& [i, j, k] : mesh.triangles) {
+    sum += radius_ratio(mesh.vertices[i], mesh.vertices[j], mesh.vertices[k]);
+  }
+  return sum / static_cast<double>(mesh.triangles.size());
+}
+
+}  // namespace tunica

@@ -1,0 +1,58 @@
+#pragma once
+
+#include "tunica/volume/cubes/marching_cubes.hpp"
+#include "tunica/volume/labels/mask.hpp"
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace tunica {
+
+struct Label {
+  double value = 0;        ///< slope * v + intercept
+  std::size_t voxels = 0;  ///< at least 1
+  double volume_mm3 = 0;   ///< voxels times the volume of one
+  std::string name;        ///< empty where the file has none
+};
+
+/// All labels of a segmentation that comes slab by slab, so that the surfaces of hundreds of them take one pass over
+/// its voxels: for each label the words of its mask that are not 0. Labels are values other than 0 and NaN. Cost: one
+/// pass over the volume; 12 bytes for every 64 voxels of a row and every label among them; for most atlases a quarter
+/// of a byte for each voxel that has a label. Limits: a volume of more than 2^38 voxels (InputError).
+class LabelIndex {
+public:
+  /// @param limit  with more different values the volume is an image, not a segmentation, and nothing is kept
+  LabelIndex(const std::array<std::size_t, 3>& dims, const Eigen::Matrix<double, 3, 4>& affine,
+             std::size_t limit = 65536);
+
+  /// Takes the slices [first_slice, first_slice + slab.dims[2]).
+  void add(const Volume& slab, std::size_t first_slice);
+
+  /// In increasing order, with their sizes; none of an image. @param names  of labels, by value
+  [[nodiscard]] std::optional<std::vector<Label>> labels(
+      const std::vector<std::pair<double, std::string>>& names = {}) const;
+
+  /// The voxels with a label that labels() lists, and where they are.
+  [[nodiscard]] Mask mask(double label) const;
+  [[nodiscard]] MaskBounds bounds(double label) const;
+
+private:
+  struct Entry {
+    std::size_t voxels = 0;
+    MaskBounds bounds{};
+    std::vector<std::uint32_t> at;    ///< words of the mask in memory order
+    std::vector<std::uint64_t> bits;  ///< and what they hold
+  };
+  template <typename T>
+  void add_values(const Volume& slab, const std::vector<T>& values, std::size_t first_slice);
+
+  std::array<std::size_t, 3> dims_;
+  Eigen::Matrix<double, 3, 4> affine_;
+  std::size_t limit_;
+  bool image_ = false;  ///< there were too many values
+  std::map<double, Entry> entries_;
+};
+
+}  // namespace tunica

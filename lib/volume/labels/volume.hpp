@@ -1,0 +1,31 @@
+#pragma once
+
+#include "tunica/core/types.hpp"
+
+#include <cstddef>
+#include <string>
+#include <variant>
+#include <vector>
+
+namespace tunica {
+
+/// A voxel volume in the machine's memory. Voxel (i, j, k) is data[i + dims[0] * (j + dims[1] * k)].
+struct Volume {
+  using Data =
+      std::variant<std::vector<std::uint8_t>, std::vector<std::int8_t>, std::vector<std::uint16_t>,
+                   std::vector<std::int16_t>, std::vector<std::uint32_t>, std::vector<std::int32_t>,
+                   std::vector<std::uint64_t>, std::vector<std::int64_t>, std::vector<float>, std::vector<double>>;
+
+  std::array<std::size_t, 3> dims{0, 0, 0};
+  Data data;  ///< stored values; the meaning of v is slope * v + intercept
+  double slope = 1;
+  double intercept = 0;
+  /// Voxel index (i, j, k) of a voxel's centre to world millimetres, LPS, rows x y z.
+  Eigen::Matrix<double, 3, 4> affine = Eigen::Matrix<double, 3, 4>::Identity();
+  /// Names of labels where the file has them (.seg.nrrd), by label value.
+  std::vector<std::pair<double, std::string>> label_names;
+
+  [[nodiscard]] std::size_t voxels() const { return dims[0] * dims[1] * dims[2]; }
+};
+
+}  // namespace tunica
