@@ -30,13 +30,7 @@ std::vector<Report> read_good_reports(cli::Tool& tool, const std::vector<std::fi
   return reports;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  cli::Tool tool("chart", "Draws speed against accuracy, or any two numbers, from the tools' own reports as SVG.",
-                 "tunica-chart relax.json -o chart.svg\n"
-                 "  tunica-chart relax.json -o rounds.svg --x result.iterations.seconds --y "
-                 "result.iterations.hausdorff_percent.upper --lines --csv rounds.csv");
+struct Arguments {
   std::vector<std::filesystem::path> paths;
   std::filesystem::path out;
   std::filesystem::path csv;
@@ -44,72 +38,93 @@ int main(int argc, char** argv) {
   ReportChartOptions options;
   std::string x_scale = "auto";
   std::string y_scale = "auto";
+};
+
+void declare(cli::Tool& tool, Arguments& given) {
   CLI::App& arguments = tool.arguments();
-  arguments.add_option("REPORT", paths, "reports of runs, written by --report")->required()->type_name("FILE");
-  arguments.add_option("-o,--output", out, "the chart")->required()->type_name("OUT.svg");
-  arguments.add_option("--x", options.x, "dotted key of the x axis, e.g. seconds.total (default: time)")
+  arguments.add_option("REPORT", given.paths, "reports of runs, written by --report")->required()->type_name("FILE");
+  arguments.add_option("-o,--output", given.out, "the chart")->required()->type_name("OUT.svg");
+  tool.group("What is drawn");
+  arguments.add_option("--x", given.options.x, "dotted key of the x axis, e.g. seconds.total (default: time)")
       ->type_name("KEY");
   arguments
-      .add_option("--y", options.y, "dotted key of the y axis, e.g. result.hausdorff_percent.upper (default: error)")
+      .add_option("--y", given.options.y,
+                  "dotted key of the y axis, e.g. result.hausdorff_percent.upper (default: error)")
       ->type_name("KEY");
-  arguments.add_option("--series", options.series, "colour, marker and legend by the value of KEY, or by 'file'")
+  arguments.add_option("--series", given.options.series, "colour, marker and legend by the value of KEY, or by 'file'")
       ->type_name("KEY");
-  arguments.add_option("--label", options.label, "write the value of KEY, or 'file', beside each mark")
+  arguments.add_option("--label", given.options.label, "write the value of KEY, or 'file', beside each mark")
       ->type_name("KEY");
   arguments
-      .add_option("--reference", reference,
+      .add_option("--reference", given.reference,
                   "a finer run: errors are taken against its probes, largest displacement or distance")
       ->type_name("REPORT");
-  arguments.add_option("--csv", csv, "write the numbers behind the picture")->type_name("OUT.csv");
-  arguments.add_option("--title", options.title, "text above the chart")->type_name("TEXT");
-  arguments.add_option("--x-label", options.x_label, "text of the x axis (default: from the key)")->type_name("TEXT");
-  arguments.add_option("--y-label", options.y_label, "text of the y axis (default: from the key)")->type_name("TEXT");
-  arguments.add_option("--x-scale", x_scale, "scale of the x axis (default auto: log where that helps)")
+  tool.group("Output");
+  arguments.add_option("--csv", given.csv, "write the numbers behind the picture")->type_name("OUT.csv");
+  tool.group("Look");
+  arguments.add_option("--title", given.options.title, "text above the chart")->type_name("TEXT");
+  arguments.add_option("--x-label", given.options.x_label, "text of the x axis (default: from the key)")
+      ->type_name("TEXT");
+  arguments.add_option("--y-label", given.options.y_label, "text of the y axis (default: from the key)")
+      ->type_name("TEXT");
+  arguments.add_option("--x-scale", given.x_scale, "scale of the x axis (default auto: log where that helps)")
       ->check(CLI::IsMember(scales))
       ->type_name("SCALE");
-  arguments.add_option("--y-scale", y_scale, "scale of the y axis (default auto: log where that helps)")
+  arguments.add_option("--y-scale", given.y_scale, "scale of the y axis (default auto: log where that helps)")
       ->check(CLI::IsMember(scales))
       ->type_name("SCALE");
-  arguments.add_flag("--lines", options.joined, "join the marks of a series by a line, in the order of x");
+  arguments.add_flag("--lines", given.options.joined, "join the marks of a series by a line, in the order of x");
+}
 
+void run(cli::Tool& tool, Arguments& given) {
+  tool.output(given.out, {".svg"});
+  if (!given.csv.empty()) {
+    tool.output(given.csv, {".csv"});
+  }
+  Json skipped = Json::array();
+  std::vector<Report> reports;
+  {
+    const auto stage = tool.stage("read");
+    reports = read_good_reports(tool, given.paths, skipped);
+    if (!given.reference.empty()) {
+      given.options.reference = read_report(tool.input(given.reference));
+      if (!given.options.reference->ok()) {
+        throw InputError(given.reference.string() + ": the reference run failed; give one that succeeded");
+      }
+    }
+  }
+  ReportChart made;
+  std::string svg;
+  {
+    const auto stage = tool.stage("draw");
+    given.options.x_scale = scale_of(given.x_scale);
+    given.options.y_scale = scale_of(given.y_scale);
+    made = chart_of_reports(reports, given.options);
+    svg = chart_svg(made.chart);
+  }
+  for (const std::string& warning : made.warnings) {
+    tool.warn(warning);
+  }
+  {
+    const auto stage = tool.stage("write");
+    write_file(given.out, svg, tool.force());
+    if (!given.csv.empty()) {
+      write_file(given.csv, made.csv, tool.force());
+    }
+  }
+  tool.result() = {
+      {"x", made.x_key}, {"y", made.y_key}, {"marks", made.marks}, {"on_front", made.on_front}, {"skipped", skipped}};
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  cli::Tool tool("chart", "Draws speed against accuracy, or any two numbers, from the tools' own reports as SVG.",
+                 "tunica-chart relax.json -o chart.svg\n"
+                 "  tunica-chart relax.json -o rounds.svg --x result.iterations.seconds --y "
+                 "result.iterations.hausdorff_percent.upper --lines --csv rounds.csv");
+  Arguments given;
+  declare(tool, given);
   tool.stages({"read", "draw", "write"});
-  return tool.run(argc, argv, [&] {
-    tool.output(out, {".svg"});
-    if (!csv.empty()) {
-      tool.output(csv, {".csv"});
-    }
-    Json skipped = Json::array();
-    std::vector<Report> reports;
-    {
-      const auto stage = tool.stage("read");
-      reports = read_good_reports(tool, paths, skipped);
-      if (!reference.empty()) {
-        options.reference = read_report(tool.input(reference));
-        if (!options.reference->ok()) {
-          throw InputError(reference.string() + ": the reference run failed; give one that succeeded");
-        }
-      }
-    }
-    ReportChart made;
-    std::string svg;
-    {
-      const auto stage = tool.stage("draw");
-      options.x_scale = scale_of(x_scale);
-      options.y_scale = scale_of(y_scale);
-      made = chart_of_reports(reports, options);
-      svg = chart_svg(made.chart);
-    }
-    for (const std::string& warning : made.warnings) {
-      tool.warn(warning);
-    }
-    {
-      const auto stage = tool.stage("write");
-      write_file(out, svg, tool.force());
-      if (!csv.empty()) {
-        write_file(csv, made.csv, tool.force());
-      }
-    }
-    tool.result() = {
-        {"x", made.x_key}, {"y", made.y_key}, {"marks", made.marks}, {"on_front", made.on_front}, {"skipped", skipped}};
-  });
+  return tool.run(argc, argv, [&] { run(tool, given); });
 }

@@ -1,11 +1,11 @@
 #include "tunica/cli/tool.hpp"
+#include "tunica/draw/picture.hpp"
 #include "tunica/io/mesh/mesh_file.hpp"
 #include "tunica/io/mesh/mesh_pair.hpp"
-#include "tunica/draw/picture.hpp"
 #include "tunica/shell/distance/boundary_distance.hpp"
-#include "tunica/shell/patch/curved_surface.hpp"
 #include "tunica/shell/distance/shell_distance.hpp"
 #include "tunica/shell/distance/target.hpp"
+#include "tunica/shell/patch/curved_surface.hpp"
 #include "tunica/surface/distance/hausdorff.hpp"
 #include "tunica/surface/mesh/measure.hpp"
 #include "tunica/surface/mesh/subdivide.hpp"
@@ -39,13 +39,17 @@ void declare(cli::Tool& tool, Arguments& given) {
   auto& app = tool.arguments();
   app.add_option("A", given.a, "a surface, or with --shell a shell mesh")->required();
   app.add_option("B", given.b, "the surface it is compared with; percentages are of its diagonal")->required();
+  tool.group("Input");
   app.add_flag("--shell", given.shell, "A is curved shells: positions and unit normals");
+  tool.group("Distance");
   tool.tolerance("--tolerance", given.width, "width of the certified intervals (default: 0.01%)");
   tool.tolerance("--max", given.max, "exit code 4 unless the distance is certainly at most this");
+  tool.group("Output");
   app.add_option("--map", given.map, "error map: A with its distance to B as 'quality', mm, PLY")->type_name("OUT.ply");
   app.add_option("--picture", given.picture, "picture of the error map")->type_name("OUT.png");
   app.add_option("--curved", given.curved, "the curved surface of A as a fine triangle mesh (needs --shell)")
       ->type_name("OUT.ply");
+  tool.group("Input");
   app.add_option("--mesh-unit", given.mesh_unit, "unit of mesh files that do not state one: mm, cm, m or um")
       ->type_name("mm|cm|m|um");
 }
@@ -213,6 +217,37 @@ void write_outputs(const cli::Tool& tool, const Arguments& given, const Surface&
 
 Json interval(const Interval& mm, double scale) { return {{"lower", mm.lower * scale}, {"upper", mm.upper * scale}}; }
 
+void tell(cli::Tool& tool, const Surface& a, const Other& b, const HausdorffResult& distance, double diagonal_mm,
+          double width) {
+  const double percent = 100 / diagonal_mm;
+  tool.result() = {
+      {"hausdorff_mm", interval(distance.both, 1)},
+      {"hausdorff_percent", interval(distance.both, percent)},
+      {"one_sided_percent",
+       {{"a_to_b", interval(distance.a_to_b, percent)}, {"b_to_a", interval(distance.b_to_a, percent)}}},
+      {"mean_percent", distance.mean * percent},
+      {"rms_percent", distance.rms * percent},
+      {"diagonal_mm", diagonal_mm},
+      {"triangles_a", a.flat.triangles.size()},
+      {"triangles_b", b.tree().triangles().size()},
+      {"farthest_mm",
+       {{"a", {distance.worst_a.x(), distance.worst_a.y(), distance.worst_a.z()}},
+        {"b", {distance.worst_b.x(), distance.worst_b.y(), distance.worst_b.z()}}}},
+  };
+  if (a.shell) {
+    const auto boundary = boundary_distance(boundary_curves(*a.shell), *b.target, width);
+    tool.result()["boundary_percent"] = boundary ? interval(boundary->both, percent) : Json();
+  }
+  const std::string means = std::isfinite(distance.mean) ? fmt::format(", mean {:.4f} %, rms {:.4f} %",
+                                                                       percent * distance.mean, percent * distance.rms)
+                                                         : ", no mean over a surface without area";
+  tool.note(fmt::format("distance {:.6g} to {:.6g} mm ({:.4f} to {:.4f} %){}", distance.both.lower, distance.both.upper,
+                        percent * distance.both.lower, percent * distance.both.upper, means));
+  if (distance.both.upper - distance.both.lower > 1.01 * width) {
+    tool.warn("the interval is wider than asked for: rounding allows no less, or the work would have passed its bound");
+  }
+}
+
 void run(cli::Tool& tool, const Arguments& given) {
   if (given.curved && !given.shell) {
     throw UsageError("--curved writes the curved surface of shells: it needs --shell");
@@ -255,44 +290,17 @@ void run(cli::Tool& tool, const Arguments& given) {
   }
 
   const auto stage = tool.stage("compare");
-  const std::size_t triangles_b = target.triangles.size();
   const Other b(std::move(target), given.shell);
   const HausdorffResult distance =
       measure_and_decide(a, b, width, limit, std::min(width, narrowest_width * diagonal_mm), tool.progress("compare"));
-  const double percent = 100 / diagonal_mm;
-  tool.result() = {
-      {"hausdorff_mm", interval(distance.both, 1)},
-      {"hausdorff_percent", interval(distance.both, percent)},
-      {"one_sided_percent",
-       {{"a_to_b", interval(distance.a_to_b, percent)}, {"b_to_a", interval(distance.b_to_a, percent)}}},
-      {"mean_percent", distance.mean * percent},
-      {"rms_percent", distance.rms * percent},
-      {"diagonal_mm", diagonal_mm},
-      {"triangles_a", a.flat.triangles.size()},
-      {"triangles_b", triangles_b},
-      {"farthest_mm",
-       {{"a", {distance.worst_a.x(), distance.worst_a.y(), distance.worst_a.z()}},
-        {"b", {distance.worst_b.x(), distance.worst_b.y(), distance.worst_b.z()}}}},
-  };
-  if (a.shell) {
-    const auto boundary = boundary_distance(boundary_curves(*a.shell), *b.target, width);
-    tool.result()["boundary_percent"] = boundary ? interval(boundary->both, percent) : Json();
-  }
-  const std::string means = std::isfinite(distance.mean) ? fmt::format(", mean {:.4f} %, rms {:.4f} %",
-                                                                       percent * distance.mean, percent * distance.rms)
-                                                         : ", no mean over a surface without area";
-  tool.note(fmt::format("distance {:.6g} to {:.6g} mm ({:.4f} to {:.4f} %){}", distance.both.lower, distance.both.upper,
-                        percent * distance.both.lower, percent * distance.both.upper, means));
-  if (distance.both.upper - distance.both.lower > 1.01 * width) {
-    tool.warn("the interval is wider than asked for: rounding allows no less, or the work would have passed its bound");
-  }
+  tell(tool, a, b, distance, diagonal_mm, width);
   write_outputs(tool, given, a, b, distance, diagonal_mm);
   if (limit && distance.both.upper > *limit) {
+    const bool certain = distance.both.lower > *limit;
+    const double mm = certain ? distance.both.lower : distance.both.upper, percent = 100 / diagonal_mm;
     throw RequirementError(fmt::format(
         "{}: its distance to {} is {} {:.6g} mm ({:.4f} %), not at most {:.6g} mm ({:.4f} %) as --max demands",
-        given.a.string(), given.b.string(), distance.both.lower > *limit ? "at least" : "not certainly below",
-        distance.both.lower > *limit ? distance.both.lower : distance.both.upper,
-        percent * (distance.both.lower > *limit ? distance.both.lower : distance.both.upper), *limit,
+        given.a.string(), given.b.string(), certain ? "at least" : "not certainly below", mm, percent * mm, *limit,
         percent * *limit));
   }
 }

@@ -1,9 +1,9 @@
 #include "tunica/surface/decimation/decimate.hpp"
 #include "tunica/cli/tool.hpp"
 #include "tunica/io/mesh/mesh_file.hpp"
-#include "tunica/surface/mesh/checks.hpp"
 #include "tunica/surface/decimation/degenerate.hpp"
 #include "tunica/surface/distance/hausdorff.hpp"
+#include "tunica/surface/mesh/checks.hpp"
 #include "tunica/surface/mesh/measure.hpp"
 #include "tunica/surface/repair/repair.hpp"
 
@@ -32,17 +32,21 @@ void declare(cli::Tool& tool, Arguments& given) {
   auto& app = tool.arguments();
   app.add_option("IN", given.in, "surface mesh: PLY, OBJ, STL, OFF or GLB")->required();
   app.add_option("OUT.ply", given.out, "the coarser mesh")->required();
+  tool.group("How far");
   app.add_option("--triangles", given.triangles, "at most N triangles")->type_name("N");
   tool.tolerance(
       "--max-error", given.max_error,
       "largest distance to IN, both ways, e.g. 0.5% of IN's diagonal or 0.2mm; with --triangles it wins, and "
       "the exit code is 4 when both cannot hold");
+  tool.group("Input");
   app.add_option("--mesh-unit", given.mesh_unit, "unit of mesh files that do not state one: mm, cm, m or um")
       ->type_name("mm|cm|m|um");
+  tool.group("How far");
   app.add_option("--min-angle", given.min_angle,
                  "well-shaped triangles for a larger error: no angle below DEG degrees (e.g. 20, at most 40) but where "
                  "IN's own corners are sharper; exit code 4 when that cannot be held")
       ->type_name("DEG");
+  tool.group("Input");
   app.add_flag(
       "--repair", given.repair,
       "mend an IN that is no oriented manifold: drop double triangles and pieces without area, turn triangles that "
@@ -149,103 +153,121 @@ std::optional<std::string> what_failed(const Arguments& given, const DecimateRes
   return std::nullopt;
 }
 
-void run(cli::Tool& tool, const Arguments& given) {
-  const auto triangles = wanted_triangles(given);
+// A coarse mesh and what there is to say of it.
+struct Coarse {
+  DecimateResult made;
+  std::optional<Repairs> repairs;
+  Interval distance;    // mm, to the input, two-sided
+  double diagonal = 0;  // mm
+  double angle = 0;     // degrees, smallest
+};
+
+DecimateResult decimated(cli::Tool& tool, const Arguments& given, const TriangleMesh& mesh, double diagonal_mm) {
+  const auto stage = tool.stage("decimate");
+  DecimateOptions options;
+  options.triangles = wanted_triangles(given);
+  options.min_angle = wanted_angle(given);
+  if (given.max_error) {
+    options.max_error = given.max_error->millimetres(diagonal_mm);
+  }
+  options.progress = tool.progress("decimate");
+  try {
+    return decimate(mesh, options);
+  } catch (const InputError& error) {
+    throw InputError(fmt::format("{}: {}", given.in.string(), error.what()));
+  }
+}
+
+Interval measured(cli::Tool& tool, const DecimateResult& coarse, const TriangleMesh& fine, double diagonal_mm) {
+  HausdorffOptions options;
+  options.width = interval_width * diagonal_mm;
+  options.samples = 0;
+  // Among collinear needles of the input no number of cuts is enough; others need far fewer.
+  options.max_splits = std::max(least_splits, splits_per_triangle * fine.triangles.size());
+  options.progress = tool.progress("measure");
+  Interval distance = hausdorff(coarse.mesh, fine, options).both;
+  if (coarse.error) {
+    distance.upper = std::min(distance.upper, coarse.error->upper);
+  }
+  return distance;
+}
+
+void tell(cli::Tool& tool, const Arguments& given, const Coarse& coarse, std::size_t triangles_in) {
+  const TriangleMesh& mesh = coarse.made.mesh;
+  const MeshFacts facts = examine(mesh);
+  const std::size_t degenerate = count_degenerate(mesh);
   const auto min_angle = wanted_angle(given);
+  warn_of_changes(tool, given.in, coarse.made, degenerate);
+  if (min_angle && coarse.angle < *min_angle) {
+    tool.warn(fmt::format("the smallest angle is {:.3g} degrees, below --min-angle: {}", coarse.angle,
+                          coarse.made.angle_held ? "there IN's own corners are sharper" : "no better mesh was found"));
+  }
+  const Interval &mm = coarse.distance, percent{100 * mm.lower / coarse.diagonal, 100 * mm.upper / coarse.diagonal};
+  tool.result() = {
+      {"triangles_in", triangles_in},
+      {"triangles", mesh.triangles.size()},
+      {"hausdorff_percent", {{"lower", percent.lower}, {"upper", percent.upper}}},
+      {"hausdorff_mm", {{"lower", mm.lower}, {"upper", mm.upper}}},
+      {"min_angle_deg", coarse.angle},
+      {"min_angle_held", min_angle ? Json(coarse.made.angle_held) : Json()},
+      {"mean_quality", mean_quality(mesh)},
+      {"manifold", facts.manifold && facts.oriented},
+      {"euler", facts.euler},
+      {"boundary_loops", facts.boundary_loops},
+      {"degenerate_triangles", degenerate},
+      {"closed_loops", coarse.made.closed_loops},
+      {"longest_spike_mm", coarse.made.longest_spike},
+      {"diagonal_mm", coarse.diagonal},
+  };
+  if (const auto& repairs = coarse.repairs) {
+    tool.result()["repairs"] = {{"dropped_triangles", repairs->dropped_triangles},
+                                {"turned_triangles", repairs->turned_triangles},
+                                {"opened_edges", repairs->opened_edges},
+                                {"split_vertices", repairs->split_vertices},
+                                {"cut_edges", repairs->cut_edges}};
+  }
+  tool.note(fmt::format(
+      "{} of {} triangles, at most {:.4g} % ({:.4g} mm) from the input, no angle below {:.3g} degrees",
+      mesh.triangles.size(), triangles_in, percent.upper, mm.upper, std::floor(1000 * coarse.angle) / 1000));
+}
+
+void run(cli::Tool& tool, const Arguments& given) {
+  wanted_triangles(given);  // refused before the work
+  wanted_angle(given);
   std::optional<double> unit_mm;
   if (given.mesh_unit) {
     unit_mm = parse_length_unit(*given.mesh_unit);
   }
   tool.output(given.out, {".ply"});
 
-  MeshFile in;
-  std::optional<Repairs> repairs;
+  Coarse coarse;
   if (given.repair) {
-    repairs.emplace();
+    coarse.repairs.emplace();
   }
+  MeshFile in;
   {
     const auto stage = tool.stage("read");
     const bool in_millimetres = given.max_error && !given.max_error->relative;
-    in = read_surface(tool.input(given.in), unit_mm, in_millimetres, repairs);
+    in = read_surface(tool.input(given.in), unit_mm, in_millimetres, coarse.repairs);
   }
-  const double diagonal_mm = diagonal(in.mesh);
-
-  DecimateResult coarse;
-  {
-    const auto stage = tool.stage("decimate");
-    DecimateOptions options;
-    options.triangles = triangles;
-    options.min_angle = min_angle;
-    if (given.max_error) {
-      options.max_error = given.max_error->millimetres(diagonal_mm);
-    }
-    options.progress = tool.progress("decimate");
-    try {
-      coarse = decimate(in.mesh, options);
-    } catch (const InputError& error) {
-      throw InputError(fmt::format("{}: {}", given.in.string(), error.what()));
-    }
-  }
-  const double angle = min_angle_degrees(coarse.mesh);
-  const auto failure = what_failed(given, coarse, angle);
-
+  coarse.diagonal = diagonal(in.mesh);
+  coarse.made = decimated(tool, given, in.mesh, coarse.diagonal);
+  coarse.angle = min_angle_degrees(coarse.made.mesh);
   {
     const auto stage = tool.stage("measure");
-    HausdorffOptions options;
-    options.width = interval_width * diagonal_mm;
-    options.samples = 0;
-    // Among collinear needles of the input no number of cuts is enough; others need far fewer.
-    options.max_splits = std::max(least_splits, splits_per_triangle * in.mesh.triangles.size());
-    options.progress = tool.progress("measure");
-    Interval distance = hausdorff(coarse.mesh, in.mesh, options).both;
-    if (coarse.error) {
-      distance.upper = std::min(distance.upper, coarse.error->upper);
-    }
-    const MeshFacts facts = examine(coarse.mesh);
-    const std::size_t degenerate = count_degenerate(coarse.mesh);
-    warn_of_changes(tool, given.in, coarse, degenerate);
-    if (min_angle && angle < *min_angle) {
-      tool.warn(fmt::format("the smallest angle is {:.3g} degrees, below --min-angle: {}", angle,
-                            coarse.angle_held ? "there IN's own corners are sharper" : "no better mesh was found"));
-    }
-    tool.result() = {
-        {"triangles_in", in.mesh.triangles.size()},
-        {"triangles", coarse.mesh.triangles.size()},
-        {"hausdorff_percent",
-         {{"lower", 100 * distance.lower / diagonal_mm}, {"upper", 100 * distance.upper / diagonal_mm}}},
-        {"hausdorff_mm", {{"lower", distance.lower}, {"upper", distance.upper}}},
-        {"min_angle_deg", angle},
-        {"min_angle_held", min_angle ? Json(coarse.angle_held) : Json()},
-        {"mean_quality", mean_quality(coarse.mesh)},
-        {"manifold", facts.manifold && facts.oriented},
-        {"euler", facts.euler},
-        {"boundary_loops", facts.boundary_loops},
-        {"degenerate_triangles", degenerate},
-        {"closed_loops", coarse.closed_loops},
-        {"longest_spike_mm", coarse.longest_spike},
-        {"diagonal_mm", diagonal_mm},
-    };
-    if (repairs) {
-      tool.result()["repairs"] = {{"dropped_triangles", repairs->dropped_triangles},
-                                  {"turned_triangles", repairs->turned_triangles},
-                                  {"opened_edges", repairs->opened_edges},
-                                  {"split_vertices", repairs->split_vertices},
-                                  {"cut_edges", repairs->cut_edges}};
-    }
-    tool.note(
-        fmt::format("{} of {} triangles, at most {:.4g} % ({:.4g} mm) from the input, no angle below {:.3g} degrees",
-                    coarse.mesh.triangles.size(), in.mesh.triangles.size(), 100 * distance.upper / diagonal_mm,
-                    distance.upper, std::floor(1000 * angle) / 1000));
+    coarse.distance = measured(tool, coarse.made, in.mesh, coarse.diagonal);
+    tell(tool, given, coarse, in.mesh.triangles.size());
   }
 
   const auto stage = tool.stage("write");
+  const auto failure = what_failed(given, coarse.made, coarse.angle);
   PlyOptions options;
   options.comments = {"made by " + tool.command()};
   options.space = in.space.value_or(options.space);
   options.millimetres = !in.unit_unknown;
   options.overwrite = tool.force();
   options.partial = failure.has_value();
-  write_ply(given.out, coarse.mesh, options);
+  write_ply(given.out, coarse.made.mesh, options);
   if (failure) {
     throw RequirementError(
         fmt::format("{}: {}; the best mesh is in {}.part", given.in.string(), *failure, given.out.string()));

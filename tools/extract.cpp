@@ -5,10 +5,10 @@
 #include "tunica/io/volume/volume_file.hpp"
 #include "tunica/surface/mesh/checks.hpp"
 #include "tunica/surface/mesh/measure.hpp"
-#include "tunica/volume/labels/components.hpp"
 #include "tunica/volume/cubes/label_index.hpp"
 #include "tunica/volume/cubes/marching_cubes.hpp"
 #include "tunica/volume/cubes/outward.hpp"
+#include "tunica/volume/labels/components.hpp"
 #include "tunica/volume/smoothing/smoothing.hpp"
 
 #include <fmt/format.h>
@@ -54,9 +54,11 @@ struct Target {
   std::string name;  // "label 3 (aorta)", "above 200"
 };
 
-void declare(CLI::App& app, Arguments& arguments) {
+void declare(cli::Tool& tool, Arguments& arguments) {
+  CLI::App& app = tool.arguments();
   app.add_option("VOLUME", arguments.volume, "segmented or grey volume: NIfTI, NRRD, MetaImage, slices")->required();
   app.add_option("OUT.ply", arguments.out, "the surface; with --all-labels {label} in it is the label");
+  tool.group("What is inside");
   app.add_option("--label", arguments.label, "the label whose surface is wanted, by value or by the name in the file")
       ->type_name("N");
   app.add_option("--isovalue", arguments.isovalue, "the value on the surface of a grey volume")->type_name("V");
@@ -65,6 +67,7 @@ void declare(CLI::App& app, Arguments& arguments) {
       ->check(CLI::IsMember({"above", "below"}))
       ->type_name("above|below");
   app.add_flag("--all-labels", arguments.all_labels, "one file per label");
+  tool.group("Surface");
   app.add_flag("--largest", arguments.largest, "keep the largest component only");
   app.add_flag("--fill-cavities", arguments.fill_cavities, "drop the surfaces of cavities");
   app.add_flag("--open-border", arguments.open_border,
@@ -75,6 +78,7 @@ void declare(CLI::App& app, Arguments& arguments) {
   app.add_option("--space", arguments.space, "world axes of the surface (default lps)")
       ->check(CLI::IsMember({"lps", "ras"}))
       ->type_name("lps|ras");
+  tool.group("Reading");
   app.add_option("--frame", arguments.volume_options.frame, "which volume of a time series, from 0")
       ->check(cli::whole_number(0))
       ->type_name("N");
@@ -689,7 +693,7 @@ int main(int argc, char** argv) {
                  "  tunica-extract aneurysm.nii.gz surface.ply --label 1 --largest --open-border --smooth staircase\n"
                  "  tunica-extract aneurysm.nii.gz grey.ply --isovalue 0.5 --smooth 1mm");
   Arguments arguments;
-  declare(tool.arguments(), arguments);
+  declare(tool, arguments);
   tool.stages({"read", "smooth", "extract", "write"});
   return tool.run(argc, argv, [&] { run(tool, arguments); });
 }

@@ -42,12 +42,14 @@ int main(int argc, char** argv) {
   PhantomOptions options;
   tool.arguments().add_option("SHAPE", shape, "sphere, tube, aneurysm, capsule, bladder or colon")->required();
   tool.arguments().add_option("OUT.nii.gz", out, "volume: 1 inside, 0 outside")->required();
+  tool.group("Voxels");
   tool.arguments().add_option("--size", options.size, "voxels on the longest side (default 128)")->type_name("N");
   tool.arguments().add_option("--spacing", spacing, "size of a voxel in mm (default 1)")->type_name("X[,Y,Z]");
   tool.arguments()
       .add_option("--noise", options.noise, "probability with which a border voxel is flipped (default 0)")
       ->type_name("P");
   tool.arguments().add_option("--seed", options.seed, "of the noise (default 1)")->type_name("N");
+  tool.group("Output");
   tool.arguments().add_option("--truth", truth, "the true surface as a dense mesh, PLY")->type_name("OUT.ply");
   tool.stages({"make", "truth", "write"});
   return tool.run(argc, argv, [&] {

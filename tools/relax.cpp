@@ -2,17 +2,17 @@
 #include "tunica/cli/tool.hpp"
 #include "tunica/cli/usage.hpp"
 #include "tunica/core/quantity.hpp"
+#include "tunica/draw/picture.hpp"
 #include "tunica/fit/fit.hpp"
 #include "tunica/io/mesh/mesh_file.hpp"
 #include "tunica/io/mesh/mesh_pair.hpp"
-#include "tunica/draw/picture.hpp"
 #include "tunica/shell/distance/boundary_distance.hpp"
-#include "tunica/shell/patch/curved_surface.hpp"
 #include "tunica/shell/distance/shell_crossings.hpp"
 #include "tunica/shell/distance/shell_quality.hpp"
-#include "tunica/surface/mesh/checks.hpp"
+#include "tunica/shell/patch/curved_surface.hpp"
 #include "tunica/surface/decimation/degenerate.hpp"
 #include "tunica/surface/distance/hausdorff.hpp"
+#include "tunica/surface/mesh/checks.hpp"
 #include "tunica/surface/mesh/measure.hpp"
 
 #include <fmt/core.h>
@@ -54,9 +54,11 @@ void declare(cli::Tool& tool, Arguments& given) {
   app.add_option("COARSE", given.coarse, "coarse mesh, e.g. from tunica-decimate")->required();
   app.add_option("TARGET", given.target, "surface that the shells are to become")->required();
   app.add_option("OUT.ply", given.out, "shell mesh: positions and unit normals")->required();
+  tool.group("How close, with how many");
   tool.tolerance("--tolerance", given.tolerance,
                  "stop when the two-sided distance is certainly below it, e.g. 0.5% of the target's diagonal or 0.2mm; "
                  "exit code 4 when it cannot be reached");
+  tool.group("Method");
   app.add_option(
          "--method", given.method,
          "fit (least error: positions, normals and connectivity are chosen together; the default) or barycentre (the "
@@ -65,6 +67,7 @@ void declare(cli::Tool& tool, Arguments& given) {
   app.add_option("--surface", given.surface,
                  "the patch: watertight (the default: cubics that meet exactly) or comas (the paper's 9-term cubic)")
       ->check(CLI::IsMember({"comas", "watertight"}));
+  tool.group("How close, with how many");
   app.add_flag("--refine", given.refine,
                "keep COARSE's triangles and split them where the distance is above the tolerance; without a "
                "tolerance split every shell in four and refit, once or as --max-shells or --max-iterations say; "
@@ -85,10 +88,12 @@ void declare(cli::Tool& tool, Arguments& given) {
          "--refine and no tolerance: 2, the first is COARSE's own)")
       ->check(cli::whole_number(1, 100000))
       ->type_name("N");
+  tool.group("Output");
   app.add_option("--map", given.map, "error map: the curved surface with its distance to the target, PLY")
       ->type_name("OUT.ply");
   app.add_option("--picture", given.picture, "picture of the error map, PNG")->type_name("OUT.png");
   app.add_option("--curved", given.curved, "the curved surface as a fine triangle mesh, PLY")->type_name("OUT.ply");
+  tool.group("Input");
   app.add_option("--mesh-unit", given.mesh_unit, "unit of mesh files that do not state one: mm, cm, m or um")
       ->type_name("mm|cm|m|um");
 }

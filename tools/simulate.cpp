@@ -48,11 +48,14 @@ void declare(cli::Tool& tool, Arguments& a) {
   app.add_option("FILES", a.files, "SHELL.ply OUT.hdf; with --scene only OUT.hdf; with --check OUT.hdf may be left out")
       ->expected(0, 2)
       ->type_name("FILE");
+  tool.group("Scene");
   app.add_option(scene_flag, a.scene, "read everything from a scene file (TOML)")->type_name("SCENE.toml");
+  tool.group("Wall");
   tool.quantity("--young", a.young, dimension::pressure, "Young's modulus, e.g. 1MPa");
   app.add_option("--poisson", a.poisson, "Poisson's ratio, in (-1, 0.5)")->type_name("NUMBER");
   tool.quantity("--thickness", a.thickness, dimension::length, "thickness of the shell, e.g. 1.5mm");
   tool.quantity("--density", a.density, dimension::density, "mass density, e.g. 1100kg/m3 (dynamic runs need it)");
+  tool.group("Load and supports");
   tool.quantity("--pressure", a.pressure, dimension::pressure,
                 "pressure that follows the surface; positive pushes along the normals, outward");
   app.add_option("--fix", a.fixes,
@@ -62,6 +65,7 @@ void declare(cli::Tool& tool, Arguments& a) {
       ->expected(1)
       ->allow_extra_args(false)  // the next word is a file
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  tool.group("Run");
   app.add_flag("--static", a.is_static, "solve for the state of rest");
   app.add_option("--load-steps", a.load_steps,
                  "static: steps in which the load grows, each written (default: all at once)")
@@ -70,10 +74,12 @@ void declare(cli::Tool& tool, Arguments& a) {
   tool.quantity("--step", a.step, dimension::time, "dynamic: time step, e.g. 40ms");
   tool.quantity("--ramp", a.ramp, dimension::time,
                 "dynamic: the load grows from zero over this time (default: at once)");
+  tool.group("Elements");
   app.add_option("--membrane", a.membrane, "membrane element: cst | opt | adapt (default adapt)")->type_name("NAME");
   app.add_option("--bending", a.bending,
                  "bending element: comas (the paper's) | comas-consistent | dkt | dkt-comas (default dkt-comas)")
       ->type_name("NAME");
+  tool.group("Solver");
   app.add_option("--solver", a.solver, "cg | direct | auto (default auto)")->type_name("NAME");
   app.add_option("--cg-tolerance", a.cg_tolerance, "relative residual at which CG stops, e.g. 5% (the paper's)")
       ->type_name("PERCENT");
@@ -82,14 +88,18 @@ void declare(cli::Tool& tool, Arguments& a) {
       ->type_name("N");
   app.add_option("--converge", a.converge, "relative residual at which a step counts as solved (default 1e-8)")
       ->type_name("NUMBER");
+  tool.group("Output");
   app.add_option("--every", a.every, "write every N-th state (default 1); the first and the last always")
       ->type_name("N");
+  tool.group("Scene");
   app.add_option("--mesh-unit", a.mesh_unit, "unit of length of a mesh in a format that carries none: mm | cm | m | um")
       ->type_name("mm|cm|m|um");
+  tool.group("Run");
   app.add_flag("--check", a.check, "validate, print the resolved scene in SI units, and stop");
   app.add_option(resume_flag, a.resume,
                  "go on with a run that was interrupted, also by kill -9: alone, or beside the same command as before")
       ->type_name("OUT.hdf.part");
+  tool.group("Output");
   app.add_option("--tessellation", a.tessellation,
                  "pieces per edge into which a curved shell is cut for drawing (default 4, less for many shells)")
       ->type_name("N");
@@ -412,136 +422,186 @@ RunIdentity identity_of_run(const cli::Tool& tool, const Scene& scene, const std
   return identity;
 }
 
-void simulate(cli::Tool& tool, const Arguments& a) {
-  const fs::path out = output_path(tool.arguments(), a);
-  std::optional<cli::Tool::Stage> stage(std::in_place, tool, "read");
-  std::optional<RunJournal> journal;
-  if (!a.resume.empty()) {
-    journal.emplace(RunJournal::open(a.resume));
+class Simulation {
+public:
+  Simulation(cli::Tool& tool, const Arguments& given) : tool_(tool), given_(given) {}
+
+  void run() {
+    stage("read");
+    read();
+    stage("setup");
+    prepare_result(tool_.result(), model());
+    naming(subject(), [&] { check_model(model(), scene_.run); });
+    for (const std::string& doubt : doubts(model(), scene_.run)) {
+      tool_.warn(doubt);
+    }
+    if (given_.check) {
+      tool_.print(scene_text(scene_));
+      return;
+    }
+    begin();
+    const Summary summary = solved();
+    stage("write");
+    // A fixed count of iterations asks for no convergence, so none is claimed.
+    const bool converged = summary.converged && !scene_.run.cg_fixed_count;
+    const auto* dynamic = kind<DynamicRun>();
+    report_summary(tool_.result(), summary, converged,
+                   dynamic != nullptr ? std::optional(dynamic->duration) : std::nullopt);
+    if (exported_) {
+      exported_->commit();
+    }
+    file_->commit(converged);  // last: what is not renamed can still be resumed
+    journal_->remove();
+    if (is_modes()) {
+      tell_modes(summary);
+    } else {
+      tell(summary, converged);
+    }
   }
-  const Drawing drawing = journal ? drawing_of_run(a, journal->identity()) : drawing_of_flags(a);
-  std::vector<fs::path> inputs;
-  const Scene scene = read_scene_of_run(tool, a, journal, inputs);
-  const auto* dynamic = std::get_if<DynamicRun>(&scene.run.kind);
-  const auto* frequencies = std::get_if<FrequencyRun>(&scene.run.kind);
-  const auto* buckling = std::get_if<BucklingRun>(&scene.run.kind);
-  const bool modes = frequencies != nullptr || buckling != nullptr;
-  const bool by_arc_length = std::holds_alternative<ArcLengthRun>(scene.run.kind);
-  const bool series = dynamic != nullptr || modes || by_arc_length;
-  // A run that goes on replaces what it has exported itself.
-  const bool replace_exports = tool.force() || journal.has_value();
-  const ExportOptions exports{drawing.pvd, drawing.xmf, series, drawing.level(), replace_exports};
-  if (!a.check) {
-    tool.output(out);
-    for (const fs::path& path : export_paths(out, exports)) {
-      if (journal) {
-        fs::remove(path);  // of the same run, stopped between its renames
+
+private:
+  void stage(const char* name) { stage_.emplace(tool_, name); }
+
+  [[nodiscard]] const Model& model() const { return loaded_->model; }
+  [[nodiscard]] const fs::path& subject() const { return inputs_.front(); }
+
+  template <typename Kind>
+  [[nodiscard]] const Kind* kind() const {
+    return std::get_if<Kind>(&scene_.run.kind);
+  }
+
+  [[nodiscard]] bool is_modes() const { return kind<FrequencyRun>() != nullptr || kind<BucklingRun>() != nullptr; }
+
+  /// States that follow each other, in a file that says when.
+  [[nodiscard]] bool is_series() const {
+    return kind<DynamicRun>() != nullptr || is_modes() || kind<ArcLengthRun>() != nullptr;
+  }
+
+  [[nodiscard]] ExportOptions exports() const {
+    // A run that goes on replaces what it has exported itself.
+    return {drawing_.pvd, drawing_.xmf, is_series(), drawing_.level(), tool_.force() || !given_.resume.empty()};
+  }
+
+  void read() {
+    out_ = output_path(tool_.arguments(), given_);
+    if (!given_.resume.empty()) {
+      journal_.emplace(RunJournal::open(given_.resume));
+    }
+    drawing_ = journal_ ? drawing_of_run(given_, journal_->identity()) : drawing_of_flags(given_);
+    scene_ = read_scene_of_run(tool_, given_, journal_, inputs_);
+    if (!given_.check) {
+      tool_.output(out_);
+      for (const fs::path& path : export_paths(out_, exports())) {
+        if (journal_) {
+          fs::remove(path);  // of the same run, stopped between its renames
+        }
+        tool_.output(path);
       }
-      tool.output(path);
+    }
+    loaded_.emplace(load_scene(scene_));
+    for (const std::string& note : loaded_->notes) {
+      tool_.note(note);
     }
   }
-  const LoadedScene loaded = load_scene(scene);
-  const Model& model = loaded.model;
-  for (const std::string& note : loaded.notes) {
-    tool.note(note);
-  }
 
-  stage.emplace(tool, "setup");
-  prepare_result(tool.result(), model);
-  const fs::path& subject = inputs.front();
-  naming(subject, [&] { check_model(model, scene.run); });
-  for (const std::string& doubt : doubts(model, scene.run)) {
-    tool.warn(doubt);
-  }
-  if (a.check) {
-    tool.print(scene_text(scene));
-    return;
-  }
-  const RunIdentity identity = identity_of_run(tool, scene, inputs, drawing);
-  if (!journal) {
-    journal.emplace(RunJournal::create(part_of(out), identity));
-  } else if (const std::string differs = difference(journal->identity(), identity); !differs.empty()) {
-    throw InputError(fmt::format("{}: is another run: {}", a.resume.string(), differs));
-  }
-  const RunIdentity& origin = journal->identity();
-
-  stage.emplace(tool, "write");
-  const char* const time_units = dynamic != nullptr ? "s" : frequencies != nullptr ? "Hz" : "1";
-  ResultFile file(out, model,
-                  {series, time_units, origin.command, origin.scene, origin.inputs, drawing.level(), tool.force()});
-  std::optional<ResultExport> exported;
-  if (drawing.pvd || drawing.xmf) {
-    exported.emplace(out, model, exports);
-  }
-  const ElementFieldEvaluator fields(model);
-  constexpr double most_bending = std::numbers::pi / 6;
-  std::size_t unresolved = 0;
-  const auto record = [&](const State& state) {
-    const ElementFields of_state = fields(state);
-    report_state(tool.result(), model, state, of_state, dynamic != nullptr);
-    file.append(state, of_state);
-    if (const auto written = exported ? exported->append(state, of_state) : std::nullopt) {
-      tool.wrote(*written);
+  /// Opens what the run writes: its journal, the result, what other programs draw.
+  void begin() {
+    const RunIdentity identity = identity_of_run(tool_, scene_, inputs_, drawing_);
+    if (!journal_) {
+      journal_.emplace(RunJournal::create(part_of(out_), identity));
+    } else if (const std::string differs = difference(journal_->identity(), identity); !differs.empty()) {
+      throw InputError(fmt::format("{}: is another run: {}", given_.resume.string(), differs));
     }
-    unresolved = count_unresolved(model, state, most_bending);
-  };
-  Resumption resumption;
-  if (!a.resume.empty()) {
-    resumption.from = journal->replay(model.node_count(), record);
-    tool.note(resumption.from
-                  ? fmt::format("{}: goes on after step {}", a.resume.string(), resumption.from->summary.steps)
-                  : fmt::format("{}: begins again, it has no checkpoint yet", a.resume.string()));
+    const RunIdentity& origin = journal_->identity();
+    stage("write");
+    const char* const time_units = kind<DynamicRun>() != nullptr ? "s" : kind<FrequencyRun>() != nullptr ? "Hz" : "1";
+    file_.emplace(out_, model(),
+                  ResultOptions{is_series(), time_units, origin.command, origin.scene, origin.inputs, drawing_.level(),
+                                tool_.force()});
+    if (drawing_.pvd || drawing_.xmf) {
+      exported_.emplace(out_, model(), exports());
+    }
+    fields_.emplace(model());
   }
-  stage.emplace(tool, "solve");
-  resumption.on_step = [&](const std::function<Checkpoint()>& make) {
-    stage.emplace(tool, "write");
-    journal->offer(make);
-    stage.emplace(tool, "solve");
-  };
-  const auto on_state = [&](const State& state) {
-    stage.emplace(tool, "write");
-    journal->append(state);
-    record(state);
-    stage.emplace(tool, "solve");
-  };
-  Summary summary;
-  try {
-    summary = naming(subject, [&] { return solve(model, scene.run, on_state, tool.progress("solve"), resumption); });
-  } catch (const InputError&) {
-    journal->remove();
-    throw;
-  } catch (const RequirementError&) {
-    journal->remove();  // it would end at the same step again
-    throw;
+
+  void record(const State& state) {
+    constexpr double most_bending = std::numbers::pi / 6;
+    const ElementFields of_state = (*fields_)(state);
+    report_state(tool_.result(), model(), state, of_state, kind<DynamicRun>() != nullptr);
+    file_->append(state, of_state);
+    if (const auto written = exported_ ? exported_->append(state, of_state) : std::nullopt) {
+      tool_.wrote(*written);
+    }
+    unresolved_ = count_unresolved(model(), state, most_bending);
   }
-  stage.emplace(tool, "write");
-  // A fixed count of iterations asks for no convergence, so none is claimed.
-  const bool converged = summary.converged && !scene.run.cg_fixed_count;
-  report_summary(tool.result(), summary, converged,
-                 dynamic != nullptr ? std::optional(dynamic->duration) : std::nullopt);
-  if (exported) {
-    exported->commit();
+
+  Summary solved() {
+    Resumption resumption;
+    if (!given_.resume.empty()) {
+      resumption.from = journal_->replay(model().node_count(), [&](const State& state) { record(state); });
+      tool_.note(resumption.from
+                     ? fmt::format("{}: goes on after step {}", given_.resume.string(), resumption.from->summary.steps)
+                     : fmt::format("{}: begins again, it has no checkpoint yet", given_.resume.string()));
+    }
+    stage("solve");
+    resumption.on_step = [&](const std::function<Checkpoint()>& make) {
+      stage("write");
+      journal_->offer(make);
+      stage("solve");
+    };
+    const auto on_state = [&](const State& state) {
+      stage("write");
+      journal_->append(state);
+      record(state);
+      stage("solve");
+    };
+    try {
+      return naming(subject(),
+                    [&] { return solve(model(), scene_.run, on_state, tool_.progress("solve"), resumption); });
+    } catch (const InputError&) {
+      journal_->remove();
+      throw;
+    } catch (const RequirementError&) {
+      journal_->remove();  // it would end at the same step again
+      throw;
+    }
   }
-  file.commit(converged);  // last: what is not renamed can still be resumed
-  journal->remove();
-  if (modes) {
-    report_modes(tool.result(), summary);
-    tool.note(modes_note(summary, frequencies != nullptr ? frequencies->count : buckling->count));
-    if (summary.stiffened_from && buckling != nullptr) {
-      tool.warn(
+
+  void tell_modes(const Summary& summary) {
+    const auto* frequencies = kind<FrequencyRun>();
+    report_modes(tool_.result(), summary);
+    tool_.note(modes_note(summary, frequencies != nullptr ? frequencies->count : kind<BucklingRun>()->count));
+    if (summary.stiffened_from && frequencies == nullptr) {
+      tool_.warn(
           fmt::format("{}: the mesh is coarse for so thin a curved shell (h^2 > 3 R t): buckles shorter than its "
                       "elements are not seen, and the factors may be too high: refine it",
-                      subject.string()));
+                      subject().string()));
     }
-    return;
   }
-  tool.note(fmt::format("{} nodes in {} steps, {}: largest displacement {:.4g} mm", model.node_count(), summary.steps,
-                        converged ? "converged" : "not asked to converge",
-                        tool.result()["max_displacement_mm"].get<double>()));
-  for (const std::string& text : run_warnings(scene.run, summary, unresolved)) {
-    tool.warn(fmt::format("{}: {}", subject.string(), text));
+
+  void tell(const Summary& summary, bool converged) {
+    tool_.note(fmt::format("{} nodes in {} steps, {}: largest displacement {:.4g} mm", model().node_count(),
+                           summary.steps, converged ? "converged" : "not asked to converge",
+                           tool_.result()["max_displacement_mm"].get<double>()));
+    for (const std::string& text : run_warnings(scene_.run, summary, unresolved_)) {
+      tool_.warn(fmt::format("{}: {}", subject().string(), text));
+    }
   }
-}
+
+  cli::Tool& tool_;
+  const Arguments& given_;
+  std::optional<cli::Tool::Stage> stage_;
+  fs::path out_;
+  std::vector<fs::path> inputs_;
+  Scene scene_;
+  std::optional<LoadedScene> loaded_;
+  Drawing drawing_;
+  std::optional<RunJournal> journal_;
+  std::optional<ResultFile> file_;
+  std::optional<ResultExport> exported_;
+  std::optional<ElementFieldEvaluator> fields_;
+  std::size_t unresolved_ = 0;  // elements that bend more than the mesh can show
+};
 
 }  // namespace
 }  // namespace tunica
@@ -556,5 +616,5 @@ int main(int argc, char** argv) {
   Arguments arguments;
   declare(tool, arguments);
   tool.stages({"read", "setup", "solve", "write"});
-  return tool.run(argc, argv, [&] { simulate(tool, arguments); });
+  return tool.run(argc, argv, [&] { Simulation(tool, arguments).run(); });
 }

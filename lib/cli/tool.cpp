@@ -26,6 +26,7 @@ namespace tunica::cli {
 namespace {
 
 constexpr const char* report_flag = "--report";
+constexpr const char* standard_output = "-";  // as its value
 constexpr const char* no_memory = "out of memory: give it more, or a smaller input";
 
 extern "C" void on_signal(int signal) {
@@ -142,9 +143,17 @@ void require_no_other_file(const std::filesystem::path& report) {
 Tool::Tool(std::string verb, std::string summary, std::string example)
     : verb_(std::move(verb)), app_(std::move(summary), "tunica-" + verb_) {
   app_.footer("Example:\n  " + std::regex_replace(example, std::regex("\n *"), "\n  "));
-  app_.set_help_flag("--help", "print this help and stop");
-  app_.set_version_flag("--version", fmt::format("tunica-{} {}", verb_, version), "print name and version and stop");
-  app_.add_option(report_flag, report_, "write a JSON record of the run to FILE, also when the run fails")
+  app_.set_help_flag();
+}
+
+void Tool::declare_common() {
+  const char* const common = "Options of every tool";
+  group(common);
+  app_.set_help_flag("-h,--help", "print this help and stop")->group(common);
+  app_.set_version_flag("--version", fmt::format("tunica-{} {}", verb_, version), "print name and version and stop")
+      ->group(common);
+  app_.add_option(report_flag, report_,
+                  "write a JSON record of the run to FILE, also when the run fails; -: to standard output")
       ->type_name("FILE");
   app_.add_option("--threads", threads_,
                   "at most N threads (default: TUNICA_THREADS, else SLURM_CPUS_PER_TASK, else all cores)")
@@ -153,6 +162,8 @@ Tool::Tool(std::string verb, std::string summary, std::string example)
   app_.add_flag("--verbose", verbose_, "print more detail");
   app_.add_flag("--force", force_, "overwrite an existing output");
 }
+
+void Tool::group(const std::string& name) { app_.option_defaults()->group(name); }
 
 void Tool::not_yet(const std::string& name) {
   app_.add_option_function<std::string>(
@@ -225,12 +236,17 @@ std::optional<int> Tool::parse(int argc, char** argv) {
         return 0;
       }
     }
+    if (argc == 1) {
+      throw UsageError(short_usage(app_));
+    }
     app_.parse(argc, argv);
     parse_common();
     return std::nullopt;
   } catch (const CLI::Success&) {
     try {
-      print(app_.get_help_ptr()->count() > 0 ? app_.help() : app_.version() + "\n");
+      // The parser puts two empty lines between groups.
+      print(app_.get_help_ptr()->count() > 0 ? std::regex_replace(app_.help(), std::regex("\n{3,}"), "\n\n")
+                                             : app_.version() + "\n");
       return 0;
     } catch (const OutputError& error) {
       return finish(error.code(), error.what());
@@ -257,6 +273,7 @@ int Tool::run(int argc, char** argv, const std::function<void()>& body) {
   }
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);  // writing past a limit on file sizes is then an error like a full disk
+  declare_common();
   tidy_options(app_);
   try {
     if (const auto code = parse(argc, argv)) {
@@ -309,7 +326,7 @@ std::string Tool::out_of_memory(const std::string& why) const {
 }
 
 void Tool::register_report() {
-  if (report_.empty()) {
+  if (report_.empty() || report_ == standard_output) {
     return;
   }
   // A report that is refused is not to be written by finish() either.
@@ -373,16 +390,22 @@ void Tool::write_report(bool ok, const std::string& error) {
       {"threads", thread_count()},
       {"result", result_},
   };
-  require_no_other_file(report_);
   // A file name need not be UTF-8; the report has to be.
-  write_file(report_, report.dump(2, ' ', false, Json::error_handler_t::replace) + "\n", force_);
+  const std::string text = report.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  if (report_ == standard_output) {
+    tunica::print(text);
+    return;
+  }
+  require_no_other_file(report_);
+  write_file(report_, text, force_);
 }
 
 void Tool::claim(const std::filesystem::path& path, bool written) {
   const std::filesystem::path place = resolved(path);
   const std::filesystem::path part = resolved(path.parent_path() / ".") / part_of(path.filename());
-  if (!report_.empty() && (place == resolved(report_) || is_kept_under(place, part_of(resolved(report_))) ||
-                           (written && is_kept_under(resolved(report_), part)))) {
+  if (!report_.empty() && report_ != standard_output &&
+      (place == resolved(report_) || is_kept_under(place, part_of(resolved(report_))) ||
+       (written && is_kept_under(resolved(report_), part)))) {
     report_.clear();
     throw UsageError(fmt::format("{}: --report names a file of the run itself, name another", path.string()));
   }
@@ -497,6 +520,9 @@ void Tool::warn(const std::string& text) const {
 }
 
 void Tool::print(const std::string& text) const {
+  if (report_ == standard_output) {
+    throw UsageError("--report - leaves standard output to the report: name a file, or leave it out");
+  }
   say_line("");
   tunica::print(text);
 }

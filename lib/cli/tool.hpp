@@ -45,6 +45,9 @@ public:
   /// Where the tool declares its own arguments, before run().
   [[nodiscard]] CLI::App& arguments() { return app_; }
 
+  /// The heading in --help under which the options declared from here on stand.
+  void group(const std::string& name);
+
   /// Declares a flag or option that a later step of the roadmap brings: using it is a UsageError "not available yet".
   void not_yet(const std::string& name);
 
@@ -97,7 +100,7 @@ public:
   void detail(const std::string& text) const;
   void warn(const std::string& text) const;
 
-  /// What was asked for on standard output. Errors: OutputError when it is lost.
+  /// What was asked for on standard output. Errors: OutputError when it is lost, UsageError when the report goes there.
   void print(const std::string& text) const;
 
   /// The `result` object of the report. A value that is undefined is set to null (`Json()`).
@@ -111,6 +114,7 @@ public:
   [[nodiscard]] const std::string& command() const { return command_; }
 
 private:
+  void declare_common();
   std::optional<int> parse(int argc, char** argv);
   int perform(const std::function<void()>& body);
   int finish(ExitCode code, const std::string& error);

@@ -7,8 +7,11 @@
 
 namespace tunica::cli {
 
+/// One line: the tool's name and what it needs.
+std::string short_usage(const CLI::App& app);
+
 /// The parser's error in words that say what to do: an unknown flag is named before a missing argument, which is often
-/// only its consequence.
+/// only its consequence; the option that was probably meant is named.
 std::string usage_message(const CLI::App& app, const CLI::ParseError& error);
 
 /// A validator for a whole number from `lower` to `upper`.

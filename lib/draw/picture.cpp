@@ -493,8 +493,7 @@ void mark_worst(Canvas& canvas, const View& view, const Raster& raster, const Ve
   canvas.circle(px, py, 13, 2.5, ring_colour);
 }
 
-std::string draw(const TriangleMesh& surface, const std::vector<double>& values,
-          const PictureOptions& options) {
+std::string draw(const TriangleMesh& surface, const std::vector<double>& values, const PictureOptions& options) {
   TUNICA_ASSERT(!surface.triangles.empty());
   TUNICA_ASSERT(values.empty() || values.size() == surface.vertices.size());
   Scene scene{surface, used_vertices(surface), {}, Vec3::Zero(), Mat3::Identity()};

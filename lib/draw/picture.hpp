@@ -18,9 +18,9 @@ struct PictureOptions {
       {};  ///< mm, segments on the surface drawn dark, e.g. the edges of the shells
 };
 
-/// Draws a surface, coloured by a value per vertex, from two opposite sides, with a colour bar. @return a PNG of 1600 x 900.
-/// The longest extent, the direction of view and the arrangement of the two views follow from the principal axes; the
-/// side with the largest value is drawn first, with a ring around that place. The same input gives the same bytes
+/// Draws a surface, coloured by a value per vertex, from two opposite sides, with a colour bar. @return a PNG of 1600 x
+/// 900. The longest extent, the direction of view and the arrangement of the two views follow from the principal axes;
+/// the side with the largest value is drawn first, with a ring around that place. The same input gives the same bytes
 /// whatever the number of threads.
 /// @param surface    at least one triangle, finite positions, mm
 /// @param values_mm  #V values >= 0, mm; what is not finite is drawn grey and does not count

@@ -6,8 +6,8 @@
 #include "tunica/fit/detail/start.hpp"
 #include "tunica/shell/distance/boundary_distance.hpp"
 #include "tunica/shell/distance/curved_hausdorff.hpp"
-#include "tunica/shell/patch/refine.hpp"
 #include "tunica/shell/distance/shell_crossings.hpp"
+#include "tunica/shell/patch/refine.hpp"
 #include "tunica/surface/mesh/checks.hpp"
 #include "tunica/surface/mesh/measure.hpp"
 

@@ -3,8 +3,8 @@
 #include "tunica/core/progress.hpp"
 #include "tunica/fit/barycentre.hpp"
 #include "tunica/shell/distance/shell_distance.hpp"
-#include "tunica/shell/patch/shell_mesh.hpp"
 #include "tunica/shell/distance/target.hpp"
+#include "tunica/shell/patch/shell_mesh.hpp"
 
 #include <functional>
 #include <optional>

@@ -3,10 +3,10 @@
 #include "tunica/core/disjoint_sets.hpp"
 #include "tunica/fit/detail/fit_mesh.hpp"
 #include "tunica/shell/distance/normals.hpp"
-#include "tunica/surface/distance/boundary_curves.hpp"
-#include "tunica/surface/mesh/checks.hpp"
 #include "tunica/surface/decimation/decimate.hpp"
+#include "tunica/surface/distance/boundary_curves.hpp"
 #include "tunica/surface/distance/hausdorff.hpp"
+#include "tunica/surface/mesh/checks.hpp"
 
 #include <Eigen/Geometry>
 

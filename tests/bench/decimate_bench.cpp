@@ -11,9 +11,9 @@
 #include "tunica/core/error.hpp"
 #include "tunica/core/threads.hpp"
 #include "tunica/io/mesh/mesh_file.hpp"
-#include "tunica/surface/mesh/checks.hpp"
 #include "tunica/surface/decimation/decimate.hpp"
 #include "tunica/surface/distance/hausdorff.hpp"
+#include "tunica/surface/mesh/checks.hpp"
 #include "tunica/surface/mesh/measure.hpp"
 #ifdef TUNICA_HAS_MESHOPTIMIZER
 #include "meshoptimizer_decimate.hpp"

@@ -4,8 +4,8 @@
 // Processor time on one thread, but for `real-time`: wall time on all threads that are allowed.
 // Prints tab-separated lines; a ratio has its bar beside it.
 
-#include "tunica/core/threads.hpp"
 #include "mechanics/benchmarks.hpp"
+#include "tunica/core/threads.hpp"
 #include "tunica/mechanics/algebra/linear_solver.hpp"
 #include "tunica/mechanics/runs/detail/shell_system.hpp"
 

@@ -6,6 +6,7 @@ import re
 import resource
 import shutil
 import signal
+import struct
 import subprocess
 import tempfile
 import time
@@ -107,6 +108,62 @@ class WholeTools(unittest.TestCase):
                     code = self.run_shell(redirection, verb, *words)
                 self.assertEqual(code, 5, (verb, redirection))
 
+    def test_help_has_the_tools_own_options_first(self):
+        for verb in self.COMMANDS:
+            with self.subTest(verb):
+                text = subprocess.run([tool(verb), "-h"], capture_output=True, text=True, check=True).stdout
+                long = subprocess.run([tool(verb), "--help"], capture_output=True, text=True, check=True).stdout
+                self.assertEqual(text, long)
+                headings = re.findall(r"(?m)^([A-Z][^\n]*):$", text)
+                self.assertEqual(headings[-2:], ["Options of every tool", "Example"])
+                self.assertEqual(len(headings), len(set(headings)))
+                self.assertGreaterEqual(len(headings), 4 if verb != "phantom" else 3)
+                self.assertNotIn("\n\n\n", text)
+                common = text[text.index("Options of every tool:"):]
+                for flag in ("--help", "--version", "--report", "--threads", "--quiet", "--verbose", "--force"):
+                    self.assertEqual((flag in common, text.count(f"{flag} ") - common.count(f"{flag} ")), (True, 0), flag)
+
+    def test_a_bare_call_shows_the_short_usage(self):
+        for verb in self.COMMANDS:
+            run = subprocess.run([tool(verb)], capture_output=True, text=True)
+            self.assertEqual((run.returncode, run.stdout), (2, ""), verb)
+            self.assertRegex(run.stderr, rf"^tunica-{verb}: usage: tunica-{verb} \[OPTIONS\] \S+.*\n$")
+
+    def test_a_mistyped_flag_gets_the_nearest_one(self):
+        for verb, flag, meant in (("relax", "--tolerence=1%", "--tolerance"), ("simulate", "--presure", "--pressure"),
+                                  ("decimate", "--triangle", "--triangles"), ("extract", "--fill-cavites", "--fill-cavities")):
+            run = subprocess.run([tool(verb), *self.COMMANDS[verb][0], flag], cwd=self.folder, capture_output=True, text=True)
+            self.assertEqual(run.returncode, 2)
+            self.assertIn(f"did you mean {meant}?", run.stderr)
+        run = subprocess.run([tool("relax"), "--nonsense"], capture_output=True, text=True)
+        self.assertNotIn("did you mean", run.stderr)
+
+    def test_report_on_standard_output(self):
+        for verb, (arguments, output) in self.COMMANDS.items():
+            with self.subTest(verb):
+                run = subprocess.run([tool(verb), *arguments, "--report", "-"], cwd=self.folder, capture_output=True)
+                self.assertEqual(run.returncode, 0, run.stderr)
+                report = json.loads(run.stdout)
+                self.assertEqual((report["ok"], report["tool"]), (True, "tunica-" + verb))
+                self.assertTrue(report["inputs"] or verb == "phantom")
+                self.assertFalse(os.path.exists(self.path("-")))
+                self.setUp()
+        run = subprocess.run([tool("relax"), "none.ply", "surface.ply", "out.ply", "--report", "-"], cwd=self.folder,
+                             capture_output=True)
+        self.assertEqual((run.returncode, json.loads(run.stdout)["ok"]), (3, False))
+        run = subprocess.run([tool("relax"), "--report", "-", "--nonsense"], cwd=self.folder, capture_output=True)
+        self.assertEqual((run.returncode, json.loads(run.stdout)["ok"]), (2, False))
+        with open("/dev/full", "wb") as full:
+            run = subprocess.run([tool("decimate"), *self.COMMANDS["decimate"][0], "--report", "-"], cwd=self.folder,
+                                 stdout=full, stderr=subprocess.PIPE)
+        self.assertEqual(run.returncode, 5, run.stderr)
+        self.assertTrue(os.path.exists(self.path("out.ply")))
+        run = subprocess.run([tool("extract"), "ball.nii.gz", "--info", "--report", "-"], cwd=self.folder,
+                             capture_output=True)
+        self.assertEqual(run.returncode, 2)
+        self.assertIn(b"leaves standard output to the report", run.stderr)
+        self.assertFalse(json.loads(run.stdout)["ok"])
+
     def test_a_second_run_on_one_output_is_refused(self):
         for verb in ("extract", "decimate", "relax", "simulate"):
             arguments, output = self.COMMANDS[verb]
@@ -160,6 +217,51 @@ class WholeTools(unittest.TestCase):
                 self.assertIn(output + ".part: is a", done.stderr)
                 self.assertFalse(os.path.exists(self.path("out.elsewhere")))
                 os.remove(part)
+
+    def test_a_small_file_that_promises_much_costs_little(self):
+        many = 4_000_000_000
+        scene = json.dumps({
+            "asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+            "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}] * 9}],
+            "accessors": [{"bufferView": 0, "componentType": 5126, "count": many, "type": "VEC3"},
+                          {"componentType": 5125, "count": many, "type": "SCALAR", "sparse": {"count": many}}],
+            "bufferViews": [{"buffer": 0, "byteLength": many, "byteStride": 4}],
+            "buffers": [{"byteLength": many}]}).encode()
+        scene += b" " * (-len(scene) % 4)
+        glb = (b"glTF" + struct.pack("<II", 2, 28 + len(scene) + 64) + struct.pack("<I", len(scene)) + b"JSON" + scene +
+               struct.pack("<I", 64) + b"BIN\0" + bytes(64))
+        ply = (f"ply\nformat {{}}\ncomment units mm\nelement vertex {many}\nproperty double x\nproperty double y\n"
+               f"property double z\nelement face {many}\nproperty list uint int vertex_indices\nend_header\n")
+        nifti = bytearray(352)
+        struct.pack_into("<i", nifti, 0, 348)
+        struct.pack_into("<8h", nifti, 40, 3, 30000, 30000, 30000, 1, 1, 1, 1)
+        struct.pack_into("<hh", nifti, 70, 2, 8)
+        struct.pack_into("<8f", nifti, 76, *[1] * 8)
+        struct.pack_into("<f", nifti, 108, 352)
+        nifti[344:348] = b"n+1\0"
+        side = " ".join(["100000"] * 3)
+        files = {
+            "h.glb": glb, "h.ply": ply.format("binary_little_endian 1.0").encode() + bytes(60),
+            "a.ply": ply.format("ascii 1.0").encode() + b"0 0 0\n",
+            "h.stl": bytes(80) + struct.pack("<I", many) + bytes(50), "h.off": f"OFF\n{many} {many} 0\n0 0 0\n".encode(),
+            "h.obj": f"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 {many}\n".encode(), "h.nii": bytes(nifti) + bytes(99),
+            "h.nrrd": f"NRRD0004\ntype: uchar\ndimension: 3\nsizes: {side}\nencoding: raw\n\n".encode() + bytes(99),
+            "h.mha": (f"ObjectType = Image\nNDims = 3\nDimSize = {side}\nElementType = MET_UCHAR\n"
+                      "ElementDataFile = LOCAL\n").encode() + bytes(99)}
+
+        def limit():
+            resource.setrlimit(resource.RLIMIT_AS, (600 << 20, 600 << 20))
+            resource.setrlimit(resource.RLIMIT_CPU, (5, 5))
+
+        for name, data in files.items():
+            with open(self.path(name), "wb") as file:
+                file.write(data)
+            command = ([tool("extract"), name, "out.ply", "--label", "1"] if name[2:] in ("nii", "nrrd", "mha") else
+                       [tool("decimate"), name, "out.ply", "--triangles", "4", "--mesh-unit", "mm"])
+            run = subprocess.run(command + ["--threads", "1"], cwd=self.folder, capture_output=True, text=True,
+                                 preexec_fn=limit)
+            self.assertEqual(run.returncode, 3, (name, run.stderr))
+            self.assertIn(name, run.stderr)
 
     def test_memory_that_ends_has_a_code_of_its_own(self):
         """Address space from what the program needs to start to what it needs: done or exit code 6, nothing else."""

@@ -1,15 +1,15 @@
 // Least squares on one node and on all; edits keep topology, curves and shapes.
 #include "tunica/fit/detail/edits.hpp"
 
+#include "shell/families.hpp"
+#include "surface/shapes.hpp"
 #include "tunica/core/error.hpp"
 #include "tunica/fit/detail/least_squares.hpp"
 #include "tunica/fit/detail/start.hpp"
-#include "tunica/shell/patch/curved_surface.hpp"
-#include "shell/families.hpp"
 #include "tunica/shell/distance/normals.hpp"
+#include "tunica/shell/patch/curved_surface.hpp"
 #include "tunica/surface/mesh/checks.hpp"
 #include "tunica/surface/mesh/measure.hpp"
-#include "surface/shapes.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>

@@ -1,10 +1,10 @@
 #include "tunica/fit/fit.hpp"
 
-#include "tunica/core/threads.hpp"
-#include "tunica/shell/patch/curved_surface.hpp"
 #include "shell/families.hpp"
+#include "tunica/core/threads.hpp"
 #include "tunica/shell/distance/normals.hpp"
 #include "tunica/shell/distance/shell_distance.hpp"
+#include "tunica/shell/patch/curved_surface.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>

@@ -2,16 +2,16 @@
 // node, counts with room.
 #include "tunica/fit/fit.hpp"
 
+#include "shell/families.hpp"
+#include "surface/shapes.hpp"
 #include "tunica/core/threads.hpp"
 #include "tunica/shell/distance/curved_hausdorff.hpp"
-#include "tunica/shell/patch/curved_surface.hpp"
-#include "shell/families.hpp"
 #include "tunica/shell/distance/shell_crossings.hpp"
 #include "tunica/shell/distance/shell_quality.hpp"
-#include "tunica/surface/mesh/checks.hpp"
+#include "tunica/shell/patch/curved_surface.hpp"
 #include "tunica/surface/decimation/decimate.hpp"
+#include "tunica/surface/mesh/checks.hpp"
 #include "tunica/surface/mesh/measure.hpp"
-#include "surface/shapes.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>

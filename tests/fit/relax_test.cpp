@@ -1,8 +1,8 @@
 #include "tunica/fit/relax.hpp"
 
+#include "shell/families.hpp"
 #include "tunica/core/error.hpp"
 #include "tunica/shell/patch/curved_surface.hpp"
-#include "shell/families.hpp"
 #include "tunica/surface/mesh/checks.hpp"
 #include "tunica/surface/mesh/measure.hpp"
 

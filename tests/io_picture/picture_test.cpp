@@ -1,10 +1,10 @@
 #include "tunica/draw/picture.hpp"
 
+#include "io_picture/shapes.hpp"
+#include "support/temporary_folder.hpp"
 #include "tunica/core/error.hpp"
 #include "tunica/core/threads.hpp"
 #include "tunica/io/file/output_file.hpp"
-#include "io_picture/shapes.hpp"
-#include "support/temporary_folder.hpp"
 
 #include <gtest/gtest.h>
 #include <png.h>

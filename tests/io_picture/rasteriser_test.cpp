@@ -1,7 +1,7 @@
 #include "tunica/draw/detail/rasteriser.hpp"
 
-#include "tunica/core/threads.hpp"
 #include "io_picture/shapes.hpp"
+#include "tunica/core/threads.hpp"
 
 #include <gtest/gtest.h>
 

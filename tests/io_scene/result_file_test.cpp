@@ -1,8 +1,8 @@
 #include "scene_fixture.hpp"
 
 #include "tunica/core/error.hpp"
-#include "tunica/io/result/result_file.hpp"
 #include "tunica/io/result/detail/result_grid.hpp"
+#include "tunica/io/result/result_file.hpp"
 #include "tunica/mechanics/runs/curved_displacement.hpp"
 
 #include <gmock/gmock.h>

@@ -1,8 +1,8 @@
 #pragma once
 
+#include "support/temporary_folder.hpp"
 #include "tunica/io/mesh/mesh_file.hpp"
 #include "tunica/io/scene/scene_file.hpp"
-#include "support/temporary_folder.hpp"
 
 namespace tunica::test {
 

@@ -1,8 +1,8 @@
 #pragma once
 
+#include "support/temporary_folder.hpp"
 #include "tunica/core/error.hpp"
 #include "tunica/io/volume/volume_file.hpp"
-#include "support/temporary_folder.hpp"
 
 #include <zlib.h>
 

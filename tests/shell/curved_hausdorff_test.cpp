@@ -1,8 +1,8 @@
 #include "tunica/shell/distance/curved_hausdorff.hpp"
 
+#include "shell/families.hpp"
 #include "tunica/core/threads.hpp"
 #include "tunica/shell/patch/curved_surface.hpp"
-#include "shell/families.hpp"
 #include "tunica/surface/distance/hausdorff.hpp"
 
 #include <gtest/gtest.h>

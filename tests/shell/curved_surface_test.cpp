@@ -1,7 +1,7 @@
 #include "tunica/shell/patch/curved_surface.hpp"
 
-#include "tunica/core/error.hpp"
 #include "shell/families.hpp"
+#include "tunica/core/error.hpp"
 #include "tunica/shell/patch/shape_function.hpp"
 
 #include <gmock/gmock.h>

@@ -1,9 +1,9 @@
 #include "tunica/shell/distance/normals.hpp"
 
-#include "tunica/core/threads.hpp"
-#include "tunica/shell/patch/curved_surface.hpp"
 #include "shell/families.hpp"
+#include "tunica/core/threads.hpp"
 #include "tunica/shell/distance/shell_distance.hpp"
+#include "tunica/shell/patch/curved_surface.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>

@@ -1,7 +1,7 @@
 #include "tunica/shell/patch/refine.hpp"
 
-#include "tunica/shell/patch/curved_surface.hpp"
 #include "shell/families.hpp"
+#include "tunica/shell/patch/curved_surface.hpp"
 #include "tunica/surface/mesh/checks.hpp"
 #include "tunica/surface/mesh/measure.hpp"
 

@@ -1,9 +1,9 @@
 #include "tunica/shell/distance/shell_crossings.hpp"
 
-#include "tunica/shell/patch/curved_surface.hpp"
 #include "shell/families.hpp"
-#include "tunica/surface/mesh/self_intersections.hpp"
 #include "surface/shapes.hpp"
+#include "tunica/shell/patch/curved_surface.hpp"
+#include "tunica/surface/mesh/self_intersections.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>

@@ -1,8 +1,8 @@
 #include "tunica/shell/patch/curved_surface.hpp"
 
-#include "tunica/core/error.hpp"
 #include "shell/families.hpp"
 #include "shell/gaps.hpp"
+#include "tunica/core/error.hpp"
 #include "tunica/shell/distance/target.hpp"
 #include "tunica/surface/mesh/measure.hpp"
 

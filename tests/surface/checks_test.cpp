@@ -1,8 +1,8 @@
 #include "tunica/surface/mesh/checks.hpp"
 
+#include "surface/shapes.hpp"
 #include "tunica/surface/mesh/incidence.hpp"
 #include "tunica/surface/mesh/measure.hpp"
-#include "surface/shapes.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

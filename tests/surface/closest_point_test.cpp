@@ -1,7 +1,7 @@
 #include "tunica/surface/distance/closest_point.hpp"
 
-#include "tunica/core/threads.hpp"
 #include "surface/shapes.hpp"
+#include "tunica/core/threads.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,8 +1,8 @@
 // CGAL's Garland-Heckbert planes as the measure of decimation.
 #include "bench/cgal_decimate.hpp"
-#include "tunica/surface/mesh/checks.hpp"
 #include "surface/decimated.hpp"
 #include "surface/shapes.hpp"
+#include "tunica/surface/mesh/checks.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,9 +1,9 @@
 #include "surface/decimated.hpp"
 
+#include "surface/shapes.hpp"
 #include "tunica/core/error.hpp"
 #include "tunica/surface/mesh/checks.hpp"
 #include "tunica/surface/mesh/incidence.hpp"
-#include "surface/shapes.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,10 +1,10 @@
 #include "tunica/surface/decimation/degenerate.hpp"
 
+#include "surface/decimated.hpp"
+#include "surface/shapes.hpp"
 #include "tunica/core/error.hpp"
 #include "tunica/surface/mesh/checks.hpp"
-#include "surface/decimated.hpp"
 #include "tunica/surface/mesh/incidence.hpp"
-#include "surface/shapes.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,9 +1,9 @@
 // A vertex with as many triangles as the mesh: what walks around a vertex for every triangle there would take minutes.
-#include "tunica/surface/mesh/checks.hpp"
+#include "surface/shapes.hpp"
 #include "tunica/surface/decimation/decimate.hpp"
 #include "tunica/surface/decimation/detail/edit_mesh.hpp"
+#include "tunica/surface/mesh/checks.hpp"
 #include "tunica/surface/mesh/incidence.hpp"
-#include "surface/shapes.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,8 +1,8 @@
 // CGAL's bounded-error Hausdorff distance as an oracle: another implementation, on exact predicates.
 #include "bench/cgal_mesh.hpp"
+#include "surface/shapes.hpp"
 #include "tunica/surface/distance/hausdorff.hpp"
 #include "tunica/surface/mesh/measure.hpp"
-#include "surface/shapes.hpp"
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/Polygon_mesh_processing/distance.h>

@@ -1,8 +1,8 @@
 #include "tunica/surface/distance/hausdorff.hpp"
 
+#include "surface/shapes.hpp"
 #include "tunica/core/threads.hpp"
 #include "tunica/surface/mesh/measure.hpp"
-#include "surface/shapes.hpp"
 
 #include <gtest/gtest.h>
 

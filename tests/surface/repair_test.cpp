@@ -1,10 +1,10 @@
 #include "tunica/surface/repair/repair.hpp"
 
-#include "tunica/core/error.hpp"
-#include "tunica/surface/mesh/checks.hpp"
-#include "tunica/surface/distance/hausdorff.hpp"
-#include "tunica/surface/mesh/measure.hpp"
 #include "surface/shapes.hpp"
+#include "tunica/core/error.hpp"
+#include "tunica/surface/distance/hausdorff.hpp"
+#include "tunica/surface/mesh/checks.hpp"
+#include "tunica/surface/mesh/measure.hpp"
 
 #include <gtest/gtest.h>
 

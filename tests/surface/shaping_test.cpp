@@ -1,12 +1,12 @@
 #include "tunica/surface/decimation/detail/shaping.hpp"
 
+#include "surface/decimated.hpp"
+#include "surface/shapes.hpp"
+#include "tunica/surface/decimation/detail/shape_patch.hpp"
 #include "tunica/surface/distance/boundary_curves.hpp"
 #include "tunica/surface/mesh/checks.hpp"
-#include "surface/decimated.hpp"
 #include "tunica/surface/mesh/incidence.hpp"
 #include "tunica/surface/mesh/measure.hpp"
-#include "tunica/surface/decimation/detail/shape_patch.hpp"
-#include "surface/shapes.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,9 +1,9 @@
 #include "tunica/surface/distance/surface_walk.hpp"
 
+#include "surface/shapes.hpp"
 #include "tunica/surface/distance/closest_point.hpp"
 #include "tunica/surface/distance/facet_distances.hpp"
 #include "tunica/surface/mesh/measure.hpp"
-#include "surface/shapes.hpp"
 #include "tunica/surface/mesh/subdivide.hpp"
 
 #include <gtest/gtest.h>

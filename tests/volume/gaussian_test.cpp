@@ -1,5 +1,5 @@
-#include "tunica/core/error.hpp"
 #include "mesh_check.hpp"
+#include "tunica/core/error.hpp"
 #include "tunica/volume/cubes/marching_cubes.hpp"
 #include "tunica/volume/smoothing/smoothing.hpp"
 #include "volumes.hpp"

@@ -1,8 +1,8 @@
 #include "tunica/volume/cubes/marching_cubes.hpp"
 
+#include "mesh_check.hpp"
 #include "tunica/core/error.hpp"
 #include "tunica/core/threads.hpp"
-#include "mesh_check.hpp"
 #include "volumes.hpp"
 
 #include <gtest/gtest.h>

@@ -2,11 +2,11 @@
 
 #include "tunica/core/error.hpp"
 #include "tunica/core/threads.hpp"
-#include "tunica/surface/mesh/checks.hpp"
 #include "tunica/surface/distance/closest_point.hpp"
+#include "tunica/surface/mesh/checks.hpp"
 #include "tunica/surface/mesh/measure.hpp"
-#include "tunica/volume/labels/components.hpp"
 #include "tunica/volume/cubes/marching_cubes.hpp"
+#include "tunica/volume/labels/components.hpp"
 #include "volumes.hpp"
 
 #include <gmock/gmock.h>

@@ -1,5 +1,5 @@
-#include "tunica/core/threads.hpp"
 #include "mesh_check.hpp"
+#include "tunica/core/threads.hpp"
 #include "tunica/volume/cubes/label_index.hpp"
 #include "tunica/volume/cubes/marching_cubes.hpp"
 #include "volumes.hpp"

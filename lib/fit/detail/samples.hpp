@@ -1,8 +1,8 @@
 #pragma once
 
 #include "tunica/fit/detail/fit_mesh.hpp"
-#include "tunica/shell/patch/patch_lanes.hpp"
 #include "tunica/shell/distance/target.hpp"
+#include "tunica/shell/patch/patch_lanes.hpp"
 #include "tunica/surface/distance/surface_walk.hpp"
 
 namespace tunica {

@@ -1,7 +1,7 @@
 #pragma once
 
-#include "tunica/shell/patch/shell_mesh.hpp"
 #include "tunica/shell/distance/target.hpp"
+#include "tunica/shell/patch/shell_mesh.hpp"
 
 namespace tunica {
 

@@ -30,7 +30,7 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
 
 }  // namespace
 
-std::string suggestion(std::string_view word, std::span<const std::string_view> known) {
+std::string nearest(std::string_view word, std::span<const std::string_view> known) {
   constexpr std::size_t longest = 64;  // more is no slip of the keyboard, but may be an attempt to take our memory
   word = word.substr(0, longest);
   const auto closest = std::min_element(known.begin(), known.end(), [&](std::string_view a, std::string_view b) {
@@ -39,10 +39,12 @@ std::string suggestion(std::string_view word, std::span<const std::string_view> 
   const auto near = [&](std::string_view name) {
     return edit_distance(word, name) <= std::min(name.size() - 1, 1 + name.size() / 4);
   };
-  if (closest != known.end() && near(*closest)) {
-    return fmt::format("did you mean '{}'?", *closest);
-  }
-  return fmt::format("known are {}", fmt::join(known, ", "));
+  return closest != known.end() && near(*closest) ? std::string(*closest) : std::string();
+}
+
+std::string suggestion(std::string_view word, std::span<const std::string_view> known) {
+  const std::string near = nearest(word, known);
+  return near.empty() ? fmt::format("known are {}", fmt::join(known, ", ")) : fmt::format("did you mean '{}'?", near);
 }
 
 }  // namespace tunica

@@ -8,8 +8,8 @@
 
 #include "tunica/core/error.hpp"
 #include "tunica/core/quantity.hpp"
-#include "tunica/io/mesh/detail/mesh_formats.hpp"
 #include "tunica/io/file/output_file.hpp"
+#include "tunica/io/mesh/detail/mesh_formats.hpp"
 
 #include <fmt/format.h>
 

@@ -1,8 +1,8 @@
 // Wavefront OBJ: vertices and faces; everything else (texture, normals, groups, materials, lines) is passed over.
 #include "tunica/core/error.hpp"
 #include "tunica/core/progress.hpp"
-#include "tunica/io/mesh/detail/mesh_formats.hpp"
 #include "tunica/io/file/text_scanner.hpp"
+#include "tunica/io/mesh/detail/mesh_formats.hpp"
 
 #include <fmt/format.h>
 

@@ -1,8 +1,8 @@
 // Geomview OFF, ASCII, with or without normals, colours and texture coordinates, which are passed over.
 #include "tunica/core/error.hpp"
 #include "tunica/core/progress.hpp"
-#include "tunica/io/mesh/detail/mesh_formats.hpp"
 #include "tunica/io/file/text_scanner.hpp"
+#include "tunica/io/mesh/detail/mesh_formats.hpp"
 
 #include <fmt/format.h>
 

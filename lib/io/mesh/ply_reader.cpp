@@ -3,9 +3,9 @@
 // Format: G. Turk, "The PLY polygon file format", 1994.
 #include "tunica/core/error.hpp"
 #include "tunica/core/progress.hpp"
+#include "tunica/io/file/text_scanner.hpp"
 #include "tunica/io/mesh/detail/mesh_formats.hpp"
 #include "tunica/io/mesh/detail/ply_header.hpp"
-#include "tunica/io/file/text_scanner.hpp"
 
 #include <fmt/format.h>
 

@@ -1,6 +1,6 @@
 #include "tunica/core/error.hpp"
-#include "tunica/io/mesh/mesh_file.hpp"
 #include "tunica/io/file/output_file.hpp"
+#include "tunica/io/mesh/mesh_file.hpp"
 
 #include <fmt/format.h>
 

@@ -1,8 +1,8 @@
 // STL, binary and ASCII. A binary file may begin with "solid" too, so its length decides: 84 bytes and 50 per triangle.
 #include "tunica/core/error.hpp"
 #include "tunica/core/progress.hpp"
-#include "tunica/io/mesh/detail/mesh_formats.hpp"
 #include "tunica/io/file/text_scanner.hpp"
+#include "tunica/io/mesh/detail/mesh_formats.hpp"
 
 #include <fmt/format.h>
 

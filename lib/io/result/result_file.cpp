@@ -2,8 +2,8 @@
 
 #include "tunica/core/error.hpp"
 #include "tunica/core/version.hpp"
-#include "tunica/io/result/detail/hdf5_file.hpp"
 #include "tunica/io/file/output_file.hpp"
+#include "tunica/io/result/detail/hdf5_file.hpp"
 #include "tunica/io/result/detail/result_grid.hpp"
 
 #include <fmt/format.h>

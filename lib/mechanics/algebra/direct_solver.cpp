@@ -99,6 +99,49 @@ int signed_cholesky(Eigen::Ref<MatrixXd> f, Eigen::Ref<Eigen::VectorXd> signs) {
   return negative;
 }
 
+/// Nodes in the order of elimination, and CHOLMOD's supernodes of them.
+struct Elimination {
+  Elimination(const cholmod_factor& symbolic, const std::vector<Index>& nodes, std::size_t node_count)
+      : super(static_cast<const int*>(symbolic.super)),
+        row_starts(static_cast<const int*>(symbolic.pi)),
+        rows(static_cast<const int*>(symbolic.s)),
+        node(nodes.size()),
+        first_freedom(nodes.size() + 1, 0),
+        place(node_count, -1),
+        front_of(nodes.size()),
+        row_in_front(nodes.size(), 0) {
+    const auto* const order = static_cast<const int*>(symbolic.Perm);
+    for (std::size_t k = 0; k < nodes.size(); ++k) {
+      node[k] = nodes[static_cast<std::size_t>(order[k])];
+      place[node[k]] = static_cast<std::int32_t>(k);
+    }
+    for (std::size_t s = 0; s < symbolic.nsuper; ++s) {
+      std::fill(front_of.begin() + super[s], front_of.begin() + super[s + 1], static_cast<std::int32_t>(s));
+    }
+  }
+
+  [[nodiscard]] std::int32_t size_of(std::size_t k) const { return first_freedom[k + 1] - first_freedom[k]; }
+
+  /// The first of a front's rows that it does not eliminate.
+  [[nodiscard]] int first_below(std::size_t s) const { return row_starts[s] + super[s + 1] - super[s]; }
+
+  /// Fills row_in_front for the rows of one front. @return how many there are
+  std::int32_t number_rows(std::size_t s) {
+    std::int32_t row = 0;
+    for (int r = row_starts[s]; r < row_starts[s + 1]; ++r) {
+      row_in_front[static_cast<std::size_t>(rows[r])] = row;
+      row += size_of(static_cast<std::size_t>(rows[r]));
+    }
+    return row;
+  }
+
+  const int* super;       ///< first node of each front
+  const int* row_starts;  ///< of each front in `rows`
+  const int* rows;
+  std::vector<Index> node;
+  std::vector<std::int32_t> first_freedom, place, front_of, row_in_front;
+};
+
 }  // namespace
 
 struct DirectSolver::Implementation {
@@ -126,6 +169,8 @@ struct DirectSolver::Implementation {
 
   void analyse(const BlockMatrix& pattern, const FreeMask& free);
   void make_fronts(const cholmod_factor& symbolic, const std::vector<Index>& nodes, const BlockMatrix& pattern);
+  void make_front(std::size_t s, Elimination& order, const BlockMatrix& pattern);
+  void find_runs(std::size_t s, const Elimination& order);
   void make_arenas();
   void add_children(const Front& front, std::size_t index, Panel& columns, Panel& rest);
   int eliminate(std::size_t index, const BlockMatrix& matrix, bool in_slices);
@@ -193,103 +238,87 @@ void DirectSolver::Implementation::analyse(const BlockMatrix& pattern, const Fre
 
 void DirectSolver::Implementation::make_fronts(const cholmod_factor& symbolic, const std::vector<Index>& nodes,
                                                const BlockMatrix& pattern) {
-  const auto* const order = static_cast<const int*>(symbolic.Perm);
-  const auto* const super = static_cast<const int*>(symbolic.super);
-  const auto* const row_starts = static_cast<const int*>(symbolic.pi);
-  const auto* const rows = static_cast<const int*>(symbolic.s);
-  const std::size_t count = nodes.size();
-  // Nodes are counted in the order of elimination from here on.
-  std::vector<Index> node(count);
-  std::vector<std::int32_t> first_freedom(count + 1, 0);
-  std::vector<std::int32_t> place(pattern.node_count(), -1);
-  std::vector<std::int32_t> front_of(count);
-  for (std::size_t k = 0; k < count; ++k) {
-    node[k] = nodes[static_cast<std::size_t>(order[k])];
-    place[node[k]] = static_cast<std::int32_t>(k);
-    for (const int c : components[node[k]]) {
-      freedoms.push_back(6 * static_cast<Eigen::Index>(node[k]) + c);
+  Elimination order(symbolic, nodes, pattern.node_count());
+  for (std::size_t k = 0; k < order.node.size(); ++k) {
+    for (const int c : components[order.node[k]]) {
+      freedoms.push_back(6 * static_cast<Eigen::Index>(order.node[k]) + c);
     }
-    first_freedom[k + 1] = static_cast<std::int32_t>(freedoms.size());
+    order.first_freedom[k + 1] = static_cast<std::int32_t>(freedoms.size());
   }
-  const auto size_of = [&](std::size_t k) { return first_freedom[k + 1] - first_freedom[k]; };
   fronts.resize(symbolic.nsuper);
   children.resize(symbolic.nsuper);
-  for (std::size_t s = 0; s < fronts.size(); ++s) {
-    for (int k = super[s]; k < super[s + 1]; ++k) {
-      front_of[static_cast<std::size_t>(k)] = static_cast<std::int32_t>(s);
-    }
-  }
-  std::vector<std::int32_t> row_in_front(count, 0);
-  const auto number_rows = [&](std::size_t s) {
-    std::int32_t row = 0;
-    for (int r = row_starts[s]; r < row_starts[s + 1]; ++r) {
-      row_in_front[static_cast<std::size_t>(rows[r])] = row;
-      row += size_of(static_cast<std::size_t>(rows[r]));
-    }
-    return row;
-  };
   std::size_t storage = 0;
   for (std::size_t s = 0; s < fronts.size(); ++s) {
-    Front& f = fronts[s];
-    f.rows = number_rows(s);
-    f.first = static_cast<std::size_t>(first_freedom[static_cast<std::size_t>(super[s])]);
-    f.columns = first_freedom[static_cast<std::size_t>(super[s + 1])] - static_cast<std::int32_t>(f.first);
-    f.panel = storage;
-    storage += static_cast<std::size_t>(f.rows * f.columns);
-    f.below = below.size();
-    const int first_below = row_starts[s] + super[s + 1] - super[s];
-    for (int r = first_below; r < row_starts[s + 1]; ++r) {
-      const auto k = static_cast<std::size_t>(rows[r]);
-      for (std::int32_t d = first_freedom[k]; d < first_freedom[k + 1]; ++d) {
-        below.push_back(d);
-      }
-    }
-    if (first_below < row_starts[s + 1]) {
-      f.parent = front_of[static_cast<std::size_t>(rows[first_below])];
-      children[static_cast<std::size_t>(f.parent)].push_back(s);
-    }
-    f.first_descendant = children[s].empty() ? s : fronts[children[s].front()].first_descendant;
-    f.entries[0] = entries.size();
-    for (int k = super[s]; k < super[s + 1]; ++k) {
-      const Index j = node[static_cast<std::size_t>(k)];
-      for (std::size_t b = pattern.row_start[j]; b < pattern.row_start[j + 1]; ++b) {
-        const std::int32_t other = place[pattern.column[b]];
-        if (other >= k) {
-          entries.push_back({static_cast<std::uint32_t>(pattern.transposed[b]), static_cast<std::uint32_t>(b),
-                             row_in_front[static_cast<std::size_t>(other)], row_in_front[static_cast<std::size_t>(k)],
-                             pattern.column[b], j});
-        }
-      }
-    }
-    f.entries[1] = entries.size();
-    const auto n = static_cast<double>(f.columns);
-    const auto m = static_cast<double>(f.left());
-    f.work = n * n * n / 6 + n * n * m / 2 + n * m * m / 2;
-    factor_work += f.work;
-    solve_work += 2 * static_cast<double>(f.rows * f.columns);
+    fronts[s].panel = storage;
+    make_front(s, order, pattern);
+    storage += static_cast<std::size_t>(fronts[s].rows * fronts[s].columns);
   }
   for (std::size_t s = 0; s < fronts.size(); ++s) {
-    number_rows(s);
+    order.number_rows(s);
     for (const std::size_t c : children[s]) {
-      Front& child = fronts[c];
-      child.runs[0] = runs.size();
-      std::int32_t row = 0;
-      for (int r = row_starts[c] + super[c + 1] - super[c]; r < row_starts[c + 1]; ++r) {
-        const auto k = static_cast<std::size_t>(rows[r]);
-        if (runs.size() > child.runs[0] && runs.back().parent + runs.back().length == row_in_front[k]) {
-          runs.back().length += size_of(k);
-        } else {
-          runs.push_back({row, row_in_front[k], size_of(k)});
-        }
-        row += size_of(k);
-      }
-      child.runs[1] = runs.size();
+      find_runs(c, order);
     }
   }
   factor.reset(new double[storage]);
   map_now(factor.get(), storage);
   signs = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(freedoms.size()));
   negative.resize(fronts.size());
+}
+
+/// Rows, columns and entries of one front, and its place in the tree.
+void DirectSolver::Implementation::make_front(std::size_t s, Elimination& order, const BlockMatrix& pattern) {
+  Front& f = fronts[s];
+  f.rows = order.number_rows(s);
+  f.first = static_cast<std::size_t>(order.first_freedom[static_cast<std::size_t>(order.super[s])]);
+  f.columns = order.first_freedom[static_cast<std::size_t>(order.super[s + 1])] - static_cast<std::int32_t>(f.first);
+  f.below = below.size();
+  const int first_below = order.first_below(s);
+  for (int r = first_below; r < order.row_starts[s + 1]; ++r) {
+    const auto k = static_cast<std::size_t>(order.rows[r]);
+    for (std::int32_t d = order.first_freedom[k]; d < order.first_freedom[k + 1]; ++d) {
+      below.push_back(d);
+    }
+  }
+  if (first_below < order.row_starts[s + 1]) {
+    f.parent = order.front_of[static_cast<std::size_t>(order.rows[first_below])];
+    children[static_cast<std::size_t>(f.parent)].push_back(s);
+  }
+  f.first_descendant = children[s].empty() ? s : fronts[children[s].front()].first_descendant;
+  f.entries[0] = entries.size();
+  for (int k = order.super[s]; k < order.super[s + 1]; ++k) {
+    const Index j = order.node[static_cast<std::size_t>(k)];
+    for (std::size_t b = pattern.row_start[j]; b < pattern.row_start[j + 1]; ++b) {
+      const std::int32_t other = order.place[pattern.column[b]];
+      if (other >= k) {
+        entries.push_back({static_cast<std::uint32_t>(pattern.transposed[b]), static_cast<std::uint32_t>(b),
+                           order.row_in_front[static_cast<std::size_t>(other)],
+                           order.row_in_front[static_cast<std::size_t>(k)], pattern.column[b], j});
+      }
+    }
+  }
+  f.entries[1] = entries.size();
+  const auto n = static_cast<double>(f.columns);
+  const auto m = static_cast<double>(f.left());
+  f.work = n * n * n / 6 + n * n * m / 2 + n * m * m / 2;
+  factor_work += f.work;
+  solve_work += 2 * static_cast<double>(f.rows * f.columns);
+}
+
+/// Where the rows that a front leaves lie in its parent, whose rows are numbered.
+void DirectSolver::Implementation::find_runs(std::size_t s, const Elimination& order) {
+  Front& child = fronts[s];
+  child.runs[0] = runs.size();
+  std::int32_t row = 0;
+  for (int r = order.first_below(s); r < order.row_starts[s + 1]; ++r) {
+    const auto k = static_cast<std::size_t>(order.rows[r]);
+    if (runs.size() > child.runs[0] && runs.back().parent + runs.back().length == order.row_in_front[k]) {
+      runs.back().length += order.size_of(k);
+    } else {
+      runs.push_back({row, order.row_in_front[k], order.size_of(k)});
+    }
+    row += order.size_of(k);
+  }
+  child.runs[1] = runs.size();
 }
 
 /// Subtrees of which none is more than an eighth of the work, and what is above them. The update matrices of an arena

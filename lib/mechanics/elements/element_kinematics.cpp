@@ -1,7 +1,7 @@
 #include "tunica/mechanics/elements/detail/element_kinematics.hpp"
 
-#include "tunica/mechanics/elements/rotation.hpp"
 #include "tunica/mechanics/elements/detail/shell_element_reference.hpp"
+#include "tunica/mechanics/elements/rotation.hpp"
 
 namespace tunica {
 namespace {

@@ -2,8 +2,8 @@
 
 #include "tunica/core/error.hpp"
 #include "tunica/mechanics/elements/detail/element_kinematics.hpp"
-#include "tunica/mechanics/elements/rotation.hpp"
 #include "tunica/mechanics/elements/detail/shell_element_reference.hpp"
+#include "tunica/mechanics/elements/rotation.hpp"
 
 namespace tunica {
 namespace {
@@ -258,6 +258,39 @@ void add_edge_stiffness(const EdgeNow& edge, int start, int carrier, const LaneV
   t.block<3, 3>(spin, spin) += carried * e.transpose() - value * LaneMat3::Identity();
 }
 
+/// Slopes and bows: one carried vector per end of an edge collects what works on both.
+void add_edge_forces(const Kinematics& now, const LaneVector6& on_slopes, const LaneVec3& on_bows,
+                     std::array<std::array<LaneVec3, 2>, 3>& carried, LaneVector18& force) {
+  for (int k = 0; k < 3; ++k) {
+    const EdgeNow& edge = now.edges[static_cast<std::size_t>(k)];
+    for (int end = 0; end < 2; ++end) {
+      const auto e = static_cast<std::size_t>(end);
+      LaneVec3& v = carried[static_cast<std::size_t>(k)][e];
+      v = -on_slopes[2 * k + end] * edge.normal[e] - (end == 0 ? -on_bows[k] : on_bows[k]) * edge.side[e];
+      const LaneVec3 p = (v - edge.direction * edge.direction.dot(v)) / edge.length;
+      force.segment<3>(6 * next_corner(k)) += p;
+      force.segment<3>(6 * k) -= p;
+      force.segment<3>(6 * corner_at(k, end) + 3) += v.cross(edge.direction);
+    }
+  }
+}
+
+void add_curved_stiffness(const Kinematics& now, const Derivatives& d, const LaneMatrix6& slope_stiffness,
+                          const LaneVec3& on_sides, const std::array<std::array<LaneVec3, 2>, 3>& carried,
+                          LaneMatrix18& t) {
+  const LaneMatrix6x18 on_slope_changes = slope_stiffness.lazyProduct(d.slopes);
+  add_symmetric_product(d.slopes, on_slope_changes, t);
+  const LaneMatrix3x18 on_bulge_changes = on_sides.asDiagonal() * d.tilts;
+  const LaneMatrix18 coupling = d.bulges.transpose().lazyProduct(on_bulge_changes);
+  t += coupling + coupling.transpose();
+  for (int k = 0; k < 3; ++k) {
+    for (int end = 0; end < 2; ++end) {
+      add_edge_stiffness(now.edges[static_cast<std::size_t>(k)], k, corner_at(k, end),
+                         carried[static_cast<std::size_t>(k)][static_cast<std::size_t>(end)], t);
+    }
+  }
+}
+
 /// What the derivatives need at the reference.
 struct Reference {
   Derivatives derivatives;
@@ -452,19 +485,9 @@ LaneMask corotational_response(const ElementLanes& element, const MotionLanes& m
     result.segment<3>(6 * k) = force[s];
     result.segment<3>(6 * k + 3) = moment[s];
   }
-  // Slopes and bows: one carried vector per end of an edge collects what works on both.
   std::array<std::array<LaneVec3, 2>, 3> carried;
-  for (int k = 0; k < 3 && element.curved; ++k) {
-    const EdgeNow& edge = now.edges[static_cast<std::size_t>(k)];
-    for (int end = 0; end < 2; ++end) {
-      const auto e = static_cast<std::size_t>(end);
-      LaneVec3& v = carried[static_cast<std::size_t>(k)][e];
-      v = -on_slopes[2 * k + end] * edge.normal[e] - (end == 0 ? -on_bows[k] : on_bows[k]) * edge.side[e];
-      const LaneVec3 p = (v - edge.direction * edge.direction.dot(v)) / edge.length;
-      result.segment<3>(6 * next_corner(k)) += p;
-      result.segment<3>(6 * k) -= p;
-      result.segment<3>(6 * corner_at(k, end) + 3) += v.cross(edge.direction);
-    }
+  if (element.curved) {
+    add_edge_forces(now, on_slopes, on_bows, carried, result);
   }
   for (int k = 0; k < 6; ++k) {
     response.force.segment<3>(3 * k) = now.frame.axes.transpose() * result.segment<3>(3 * k);
@@ -480,17 +503,7 @@ LaneMask corotational_response(const ElementLanes& element, const MotionLanes& m
   add_material(element, 1 + viscous.factor, h, g, d, t);
   add_corotational_stiffness(element, now, n, local_moment, spin, h, g, current_gradients, total, force, moment, t);
   if (element.curved) {
-    const LaneMatrix6x18 on_slope_changes = slope_stiffness.lazyProduct(d.slopes);
-    add_symmetric_product(d.slopes, on_slope_changes, t);
-    const LaneMatrix3x18 on_bulge_changes = on_sides.asDiagonal() * d.tilts;
-    const LaneMatrix18 coupling = d.bulges.transpose().lazyProduct(on_bulge_changes);
-    t += coupling + coupling.transpose();
-    for (int k = 0; k < 3; ++k) {
-      for (int end = 0; end < 2; ++end) {
-        add_edge_stiffness(now.edges[static_cast<std::size_t>(k)], k, corner_at(k, end),
-                           carried[static_cast<std::size_t>(k)][static_cast<std::size_t>(end)], t);
-      }
-    }
+    add_curved_stiffness(now, d, slope_stiffness, on_sides, carried, t);
   }
   rotate_to_world(now.frame.axes, t);
   return valid;

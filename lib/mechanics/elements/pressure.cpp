@@ -15,6 +15,36 @@ double weight(const Vec3& edge, const Vec3& to_opposite) {
 
 std::size_t next(std::size_t i) { return (i + 1) % 3; }
 
+struct End {
+  int corner = 0;
+  Lanes weight = 0;
+  LaneVec3 carried;
+};
+
+/// What an edge's own change does to the height: of its length, its direction, and the vectors carried by its ends.
+void add_edge(const LaneVec3& edge, const Lanes& area, const Lanes& of_length, int k, const std::array<End, 2>& ends,
+              LaneMatrix18& t) {
+  const int start = 6 * k;
+  const int stop = 6 * ((k + 1) % 3);
+  const Lanes length = edge.norm();
+  const LaneVec3 direction = edge / length;
+  const LaneMat3 stretch = area * of_length / length * (LaneMat3::Identity() - direction * direction.transpose());
+  t.block<3, 3>(stop, stop) += stretch;
+  t.block<3, 3>(start, start) += stretch;
+  t.block<3, 3>(stop, start) -= stretch;
+  t.block<3, 3>(start, stop) -= stretch;
+  for (const End& end : ends) {
+    const int spin = 6 * end.corner + 3;
+    const LaneMat3 turned = area * end.weight * skew(end.carried);
+    t.block<3, 3>(stop, spin) += turned;
+    t.block<3, 3>(start, spin) -= turned;
+    t.block<3, 3>(spin, stop) -= turned;
+    t.block<3, 3>(spin, start) += turned;
+    t.block<3, 3>(spin, spin) +=
+        area * end.weight * (edge.dot(end.carried) * LaneMat3::Identity() - end.carried * edge.transpose());
+  }
+}
+
 }  // namespace
 
 PatchHeight patch_height(const std::array<Vec3, 3>& corners, const std::array<Vec3, 3>& normals) {
@@ -105,11 +135,6 @@ void unit_pressure(const ElementLanes& element, const MotionLanes& motion, LaneV
   LaneVector18 height_gradient = LaneVector18::Zero();
   LaneMat3 opposite;
   LaneMat3 area_gradient;
-  struct End {
-    int corner = 0;
-    Lanes weight = 0;
-    LaneVec3 carried;
-  };
   std::array<std::array<End, 2>, 3> ends;
   std::array<Lanes, 3> of_length{Lanes(0), Lanes(0), Lanes(0)};
   for (int k = 0; k < 3; ++k) {
@@ -148,27 +173,8 @@ void unit_pressure(const ElementLanes& element, const MotionLanes& motion, LaneV
   LaneMatrix18& t = *stiffness;
   t.setZero();
   for (int k = 0; k < 3; ++k) {
-    const int start = 6 * k;
-    const int stop = 6 * ((k + 1) % 3);
-    const LaneVec3 edge = x.col((k + 1) % 3) - x.col(k);
-    const Lanes length = edge.norm();
-    const LaneVec3 direction = edge / length;
-    const LaneMat3 stretch = area * of_length[static_cast<std::size_t>(k)] / length *
-                             (LaneMat3::Identity() - direction * direction.transpose());
-    t.block<3, 3>(stop, stop) += stretch;
-    t.block<3, 3>(start, start) += stretch;
-    t.block<3, 3>(stop, start) -= stretch;
-    t.block<3, 3>(start, stop) -= stretch;
-    for (const End& end : ends[static_cast<std::size_t>(k)]) {
-      const int spin = 6 * end.corner + 3;
-      const LaneMat3 turned = area * end.weight * skew(end.carried);
-      t.block<3, 3>(stop, spin) += turned;
-      t.block<3, 3>(start, spin) -= turned;
-      t.block<3, 3>(spin, stop) -= turned;
-      t.block<3, 3>(spin, start) += turned;
-      t.block<3, 3>(spin, spin) +=
-          area * end.weight * (edge.dot(end.carried) * LaneMat3::Identity() - end.carried * edge.transpose());
-    }
+    const auto s = static_cast<std::size_t>(k);
+    add_edge(x.col((k + 1) % 3) - x.col(k), area, of_length[s], k, ends[s], t);
   }
   // height x d2A/dx_i dx_j + d(2A n / 6)/dx_j + what the gradients of area and height make together.
   const LaneMat3 across = 0.25 * height / area * n * n.transpose();

@@ -1,7 +1,7 @@
 #include "tunica/core/error.hpp"
-#include "tunica/mechanics/runs/doubts.hpp"
 #include "tunica/mechanics/runs/detail/run.hpp"
 #include "tunica/mechanics/runs/detail/supports.hpp"
+#include "tunica/mechanics/runs/doubts.hpp"
 #include "tunica/shell/patch/curved_surface.hpp"
 
 #include <fmt/format.h>

@@ -45,6 +45,56 @@ struct Motion {
   Rates rates;
 };
 
+/// The rigid motion with the linear and angular momentum of a piece whose nodes have these velocities.
+struct RigidMotion {
+  Vec3 velocity, turn, centre;
+
+  [[nodiscard]] Vec3 at(const Vec3& position) const { return velocity + turn.cross(position - centre); }
+};
+
+RigidMotion rigid_motion(const ShellSystem& system, const Piece& piece, const Configuration& c,
+                         const VectorX& velocities) {
+  double mass = 0;
+  Vec3 centre = Vec3::Zero();
+  Vec3 momentum = Vec3::Zero();
+  for (const Index i : piece.nodes) {
+    mass += system.mass[i];
+    centre += system.mass[i] * (system.reference[i] + c.displacement[i]);
+    momentum += system.mass[i] * velocities.segment<3>(at(i));
+  }
+  centre /= mass;
+  Vec3 spin = Vec3::Zero();
+  Mat3 inertia = Mat3::Zero();
+  for (const Index i : piece.nodes) {
+    const Vec3 arm = system.reference[i] + c.displacement[i] - centre;
+    spin +=
+        system.mass[i] * arm.cross(velocities.segment<3>(at(i))) + system.inertia[i] * velocities.segment<3>(at(i) + 3);
+    inertia += system.mass[i] * (arm.squaredNorm() * Mat3::Identity() - arm * arm.transpose()) +
+               system.inertia[i] * Mat3::Identity();
+  }
+  return {momentum / mass, inertia.ldlt().solve(spin), centre};
+}
+
+/// Takes linear and angular momentum out of a piece. The loads are in balance, so there is only what the solver's
+/// tolerance left.
+void stop_rigid_motion(const ShellSystem& system, const Piece& piece, double length, Motion& motion) {
+  Configuration& c = motion.configuration;
+  const Configuration moved = c;
+  for (VectorX* rates : {&motion.rates.velocity, &motion.rates.acceleration, &motion.rates.auxiliary}) {
+    const RigidMotion rigid = rigid_motion(system, piece, moved, *rates);
+    const bool velocity = rates == &motion.rates.velocity;
+    for (const Index i : piece.nodes) {
+      const Vec3 change = rigid.at(system.reference[i] + moved.displacement[i]);
+      rates->segment<3>(at(i)) -= change;
+      rates->segment<3>(at(i) + 3) -= rigid.turn;
+      if (velocity) {
+        c.displacement[i] -= length * change;
+        c.rotation[i] = (exponential(-length * rigid.turn) * c.rotation[i]).normalized();
+      }
+    }
+  }
+}
+
 /// M a1 + alpha M v1 + f_int(x1) = f_ext(x1, t1), with velocity and acceleration at the end of a step as the scheme
 /// says. Masses are lumped; rotary inertia is rho t^3 / 12 per area about every axis (that of a plate about the axes in
 /// its plane), so it needs no gyroscopic term. Damping is alpha M and, in each element's own frame, beta K times the
@@ -262,7 +312,7 @@ private:
     scheme_.end_rates(length, system_.held, s.rates_before, change_, motion.rates);
     for (const Piece& piece : system_.pieces) {
       if (held_by_rigid_motions(model_, piece.body)) {
-        stop_rigid_motion(piece, length, motion);
+        stop_rigid_motion(system_, piece, length, motion);
       }
     }
     return result;
@@ -420,55 +470,6 @@ private:
       const Vec3 turn = change.segment<3>(at(i) + 3);
       block.block<3, 3>(3, 3) +=
           factor * mass_[at(i) + 3] * spin_to_rate(turn, spin_coefficients(turn.squaredNorm()).eta);
-    }
-  }
-
-  /// The rigid motion with the linear and angular momentum of a piece whose nodes have these velocities.
-  struct RigidMotion {
-    Vec3 velocity, turn, centre;
-
-    [[nodiscard]] Vec3 at(const Vec3& position) const { return velocity + turn.cross(position - centre); }
-  };
-
-  RigidMotion rigid_motion(const Piece& piece, const Configuration& c, const VectorX& velocities) const {
-    double mass = 0;
-    Vec3 centre = Vec3::Zero();
-    Vec3 momentum = Vec3::Zero();
-    for (const Index i : piece.nodes) {
-      mass += system_.mass[i];
-      centre += system_.mass[i] * (system_.reference[i] + c.displacement[i]);
-      momentum += system_.mass[i] * velocities.segment<3>(at(i));
-    }
-    centre /= mass;
-    Vec3 spin = Vec3::Zero();
-    Mat3 inertia = Mat3::Zero();
-    for (const Index i : piece.nodes) {
-      const Vec3 arm = system_.reference[i] + c.displacement[i] - centre;
-      spin += system_.mass[i] * arm.cross(velocities.segment<3>(at(i))) +
-              system_.inertia[i] * velocities.segment<3>(at(i) + 3);
-      inertia += system_.mass[i] * (arm.squaredNorm() * Mat3::Identity() - arm * arm.transpose()) +
-                 system_.inertia[i] * Mat3::Identity();
-    }
-    return {momentum / mass, inertia.ldlt().solve(spin), centre};
-  }
-
-  /// Takes linear and angular momentum out of a piece. The loads are in balance, so there is only what the solver's
-  /// tolerance left.
-  void stop_rigid_motion(const Piece& piece, double length, Motion& motion) const {
-    Configuration& c = motion.configuration;
-    const Configuration moved = c;
-    for (VectorX* rates : {&motion.rates.velocity, &motion.rates.acceleration, &motion.rates.auxiliary}) {
-      const RigidMotion rigid = rigid_motion(piece, moved, *rates);
-      const bool velocity = rates == &motion.rates.velocity;
-      for (const Index i : piece.nodes) {
-        const Vec3 change = rigid.at(system_.reference[i] + moved.displacement[i]);
-        rates->segment<3>(at(i)) -= change;
-        rates->segment<3>(at(i) + 3) -= rigid.turn;
-        if (velocity) {
-          c.displacement[i] -= length * change;
-          c.rotation[i] = (exponential(-length * rigid.turn) * c.rotation[i]).normalized();
-        }
-      }
     }
   }
 

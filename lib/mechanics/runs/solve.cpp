@@ -1,10 +1,10 @@
 #include "tunica/mechanics/runs/solve.hpp"
 
 #include "tunica/core/error.hpp"
-#include "tunica/mechanics/runs/curved_displacement.hpp"
 #include "tunica/mechanics/elements/rotation.hpp"
-#include "tunica/mechanics/runs/detail/run.hpp"
 #include "tunica/mechanics/model/wall.hpp"
+#include "tunica/mechanics/runs/curved_displacement.hpp"
+#include "tunica/mechanics/runs/detail/run.hpp"
 
 #include <fmt/format.h>
 

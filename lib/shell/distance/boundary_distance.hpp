@@ -1,8 +1,8 @@
 // shell/distance: certified distances of the curved surface to a target.
 #pragma once
 
-#include "tunica/shell/patch/curved_surface.hpp"
 #include "tunica/shell/distance/target.hpp"
+#include "tunica/shell/patch/curved_surface.hpp"
 
 #include <optional>
 #include <span>

@@ -1,8 +1,8 @@
 #pragma once
 
 #include "tunica/core/progress.hpp"
-#include "tunica/shell/patch/shell_mesh.hpp"
 #include "tunica/shell/distance/target.hpp"
+#include "tunica/shell/patch/shell_mesh.hpp"
 
 #include <algorithm>
 #include <optional>

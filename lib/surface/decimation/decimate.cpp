@@ -1,13 +1,13 @@
 #include "tunica/surface/decimation/decimate.hpp"
 
 #include "tunica/core/error.hpp"
-#include "tunica/surface/mesh/checks.hpp"
 #include "tunica/surface/decimation/degenerate.hpp"
 #include "tunica/surface/decimation/detail/edge_collapse.hpp"
-#include "tunica/surface/distance/hausdorff.hpp"
 #include "tunica/surface/decimation/detail/levelling.hpp"
-#include "tunica/surface/mesh/measure.hpp"
 #include "tunica/surface/decimation/detail/shaping.hpp"
+#include "tunica/surface/distance/hausdorff.hpp"
+#include "tunica/surface/mesh/checks.hpp"
+#include "tunica/surface/mesh/measure.hpp"
 
 #include <fmt/format.h>
 

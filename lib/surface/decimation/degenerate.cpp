@@ -1,7 +1,7 @@
 #include "tunica/surface/decimation/degenerate.hpp"
 
-#include "tunica/surface/distance/closest_point.hpp"
 #include "tunica/surface/decimation/detail/edit_mesh.hpp"
+#include "tunica/surface/distance/closest_point.hpp"
 #include "tunica/surface/mesh/incidence.hpp"
 
 #include <Eigen/Geometry>

@@ -1,10 +1,10 @@
 #include "tunica/surface/decimation/detail/levelling.hpp"
 
-#include "tunica/surface/distance/facet_distances.hpp"
-#include "tunica/surface/mesh/measure.hpp"
 #include "tunica/surface/decimation/detail/shape_patch.hpp"
-#include "tunica/surface/mesh/subdivide.hpp"
+#include "tunica/surface/distance/facet_distances.hpp"
 #include "tunica/surface/distance/surface_walk.hpp"
+#include "tunica/surface/mesh/measure.hpp"
+#include "tunica/surface/mesh/subdivide.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,9 +1,9 @@
 #include "tunica/surface/decimation/detail/shape_patch.hpp"
 
 #include "tunica/surface/distance/facet_distances.hpp"
+#include "tunica/surface/distance/surface_walk.hpp"
 #include "tunica/surface/mesh/incidence.hpp"
 #include "tunica/surface/mesh/measure.hpp"
-#include "tunica/surface/distance/surface_walk.hpp"
 
 #include <Eigen/Geometry>
 

@@ -1,9 +1,9 @@
 #include "tunica/surface/decimation/detail/shaping.hpp"
 
-#include "tunica/surface/mesh/incidence.hpp"
 #include "tunica/surface/decimation/detail/levelling.hpp"
-#include "tunica/surface/mesh/measure.hpp"
 #include "tunica/surface/decimation/detail/shape_patch.hpp"
+#include "tunica/surface/mesh/incidence.hpp"
+#include "tunica/surface/mesh/measure.hpp"
 
 #include <Eigen/Geometry>
 
@@ -68,6 +68,77 @@ bool has_sharp_sector(const TriangleMesh& mesh, Index v, std::span<const Index> 
   return false;
 }
 
+// Where the target has a corner sharper than the angle asked for, and the mesh has it too, the vertex there is put
+// into it for good: to widen the corner would cost its tip, and the angle does not count.
+void pin_sharp_corners(TriangleMesh coarse, const ShapingOptions& options, ShapedMesh& state) {
+  if (options.sharp_corners.empty()) {
+    return;
+  }
+  const Incidence around = incidence(coarse);
+  const auto across = neighbours(coarse, around);
+  const ClosestPoint tree(coarse);
+  std::vector<Index> rim;
+  for (Index v = 0; v < coarse.vertices.size(); ++v) {
+    if (state.mesh().on_boundary[v] != 0) {
+      rim.push_back(v);
+    }
+  }
+  for (const SharpCorner& corner : options.sharp_corners) {
+    const auto& near = coarse.triangles[tree.closest(corner.at).triangle];
+    const std::vector<Index> candidates = corner.on_boundary ? rim : std::vector<Index>(near.begin(), near.end());
+    const auto apart = [&](Index v) { return (coarse.vertices[v] - corner.at).squaredNorm(); };
+    const auto closest =
+        std::min_element(candidates.begin(), candidates.end(), [&](Index l, Index r) { return apart(l) < apart(r); });
+    if (closest == candidates.end() || state.is_pinned(*closest) ||
+        (state.mesh().on_boundary[*closest] != 0) != corner.on_boundary) {
+      continue;
+    }
+    const Vec3 before = std::exchange(coarse.vertices[*closest], corner.at);
+    const bool has_it = has_sharp_sector(coarse, *closest, around.of(*closest), across, options.min_angle);
+    if (!has_it || !state.pin(*closest, corner.at)) {
+      coarse.vertices[*closest] = before;
+    }
+  }
+}
+
+std::array<Index, 2> edge_by_length(const EditMesh& mesh, Index t, bool longest) {
+  const auto& c = mesh.triangles[t];
+  std::array<Index, 2> best{c[0], c[1]};
+  double best_length = longest ? -1 : std::numeric_limits<double>::infinity();
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double length = (mesh.positions[c[k]] - mesh.positions[c[(k + 1) % 3]]).norm();
+    if (longest ? length > best_length : length < best_length) {
+      best_length = length;
+      best = {c[k], c[(k + 1) % 3]};
+    }
+  }
+  return best;
+}
+
+bool share_triangles(const PatchTrial& a, const PatchTrial& b) {
+  return std::any_of(a.removed.begin(), a.removed.end(),
+                     [&](Index t) { return std::find(b.removed.begin(), b.removed.end(), t) != b.removed.end(); });
+}
+
+template <typename Visit>
+void for_each_triangle(const EditMesh& mesh, const Visit& visit) {
+  for (Index t = 0; t < mesh.triangles.size(); ++t) {
+    if (mesh.is_alive(t)) {
+      visit(t);
+    }
+  }
+}
+
+std::vector<Index> below_angle(const ShapedMesh& state, double angle) {
+  std::vector<Index> bad;
+  for_each_triangle(state.mesh(), [&](Index t) {
+    if (state.smallest_angle(t) < angle) {
+      bad.push_back(t);
+    }
+  });
+  return bad;
+}
+
 class Shaper {
 public:
   Shaper(const TriangleMesh& mesh, const TriangleMesh& target, const ClosestPoint& tree, const BoundaryCurves& curves,
@@ -78,7 +149,7 @@ public:
         nearest_(nearest),
         options_(options) {
     state_.measure_all();
-    pin_sharp_corners(mesh);
+    pin_sharp_corners(mesh, options, state_);
     weights_.error = 1e-3 * diagonal(target);
     weights_.angle_wanted = safe_angle * options.min_angle;
   }
@@ -105,48 +176,6 @@ public:
 private:
   [[nodiscard]] const EditMesh& mesh() const { return state_.mesh(); }
 
-  template <typename Visit>
-  void for_each_triangle(const Visit& visit) const {
-    for (Index t = 0; t < mesh().triangles.size(); ++t) {
-      if (mesh().is_alive(t)) {
-        visit(t);
-      }
-    }
-  }
-
-  // Where the target has a corner sharper than the angle asked for, and the mesh has it too, the vertex there is put
-  // into it for good: to widen the corner would cost its tip, and the angle does not count.
-  void pin_sharp_corners(TriangleMesh coarse) {
-    if (options_.sharp_corners.empty()) {
-      return;
-    }
-    const Incidence around = incidence(coarse);
-    const auto across = neighbours(coarse, around);
-    const ClosestPoint tree(coarse);
-    std::vector<Index> rim;
-    for (Index v = 0; v < coarse.vertices.size(); ++v) {
-      if (mesh().on_boundary[v] != 0) {
-        rim.push_back(v);
-      }
-    }
-    for (const SharpCorner& corner : options_.sharp_corners) {
-      const auto& near = coarse.triangles[tree.closest(corner.at).triangle];
-      const std::vector<Index> candidates = corner.on_boundary ? rim : std::vector<Index>(near.begin(), near.end());
-      const auto apart = [&](Index v) { return (coarse.vertices[v] - corner.at).squaredNorm(); };
-      const auto closest =
-          std::min_element(candidates.begin(), candidates.end(), [&](Index l, Index r) { return apart(l) < apart(r); });
-      if (closest == candidates.end() || state_.is_pinned(*closest) ||
-          (mesh().on_boundary[*closest] != 0) != corner.on_boundary) {
-        continue;
-      }
-      const Vec3 before = std::exchange(coarse.vertices[*closest], corner.at);
-      const bool has_it = has_sharp_sector(coarse, *closest, around.of(*closest), across, options_.min_angle);
-      if (!has_it || !state_.pin(*closest, corner.at)) {
-        coarse.vertices[*closest] = before;
-      }
-    }
-  }
-
   void improve() {
     adapt();
     for (int pass = 0; pass < 3; ++pass) {
@@ -158,7 +187,7 @@ private:
   // What counts as a large error, what no change may leave, and how much shape weighs, follow from the state.
   void adapt() {
     std::vector<double> errors;
-    for_each_triangle([&](Index t) { errors.push_back(state_.error(t)); });
+    for_each_triangle(mesh(), [&](Index t) { errors.push_back(state_.error(t)); });
     const auto at = errors.begin() + static_cast<std::ptrdiff_t>(large_error * static_cast<double>(errors.size() - 1));
     std::nth_element(errors.begin(), at, errors.end());
     weights_.error = std::max(*at, 1e-9 * weights_.error);
@@ -263,24 +292,10 @@ private:
     return cost;
   }
 
-  [[nodiscard]] std::array<Index, 2> edge_by_length(Index t, bool longest) const {
-    const auto& c = mesh().triangles[t];
-    std::array<Index, 2> best{c[0], c[1]};
-    double best_length = longest ? -1 : std::numeric_limits<double>::infinity();
-    for (std::size_t k = 0; k < 3; ++k) {
-      const double length = (mesh().positions[c[k]] - mesh().positions[c[(k + 1) % 3]]).norm();
-      if (longest ? length > best_length : length < best_length) {
-        best_length = length;
-        best = {c[k], c[(k + 1) % 3]};
-      }
-    }
-    return best;
-  }
-
   // The triangles with the largest errors, worst first, but no more than `most`.
   [[nodiscard]] std::vector<Index> worst(std::size_t most, double above) const {
     std::vector<Index> found;
-    for_each_triangle([&](Index t) {
+    for_each_triangle(mesh(), [&](Index t) {
       if (state_.error(t) > above) {
         found.push_back(t);
       }
@@ -305,7 +320,7 @@ private:
         trial_ = std::move(trial);
       }
     };
-    const auto longest = edge_by_length(t, true);
+    const auto longest = edge_by_length(mesh(), t, true);
     try_edge(longest[0], longest[1]);
     for (std::size_t k = 0; k < 3; ++k) {
       const Index u = c[k], v = c[(k + 1) % 3];
@@ -430,25 +445,10 @@ private:
     }
     touched_.resize(touched_.size() + 1, 1);
   }
-  static bool share_triangles(const PatchTrial& a, const PatchTrial& b) {
-    return std::any_of(a.removed.begin(), a.removed.end(),
-                       [&](Index t) { return std::find(b.removed.begin(), b.removed.end(), t) != b.removed.end(); });
-  }
-
-  [[nodiscard]] std::vector<Index> below_angle() const {
-    std::vector<Index> bad;
-    for_each_triangle([&](Index t) {
-      if (state_.smallest_angle(t) < 1.005 * options_.min_angle) {
-        bad.push_back(t);
-      }
-    });
-    return bad;
-  }
-
   // Triangles with angles still too small: shape weighs more and more, and everything may be tried.
   void mend() {
     for (int round = 0; round < mending_rounds; ++round) {
-      const auto bad = below_angle();
+      const auto bad = below_angle(state_, 1.005 * options_.min_angle);
       if (bad.empty()) {
         return;
       }
@@ -484,7 +484,7 @@ private:
     if (moved) {
       return;
     }
-    const auto [a, b] = edge_by_length(t, false);
+    const auto [a, b] = edge_by_length(mesh(), t, false);
     if (evaluate_collapse(a, b, 0, trial_) < 0) {
       const PatchTrial collapse = trial_;
       accept(collapse);

@@ -5,8 +5,8 @@
 #include "tunica/core/threads.hpp"
 #include "tunica/volume/cubes/cell_crossings.hpp"
 #include "tunica/volume/smoothing/detail/local_quadrics.hpp"
-#include "tunica/volume/smoothing/smoothing.hpp"
 #include "tunica/volume/smoothing/detail/vertex_neighbours.hpp"
+#include "tunica/volume/smoothing/smoothing.hpp"
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>

@@ -2,9 +2,9 @@
 
 #include "tunica/core/lane_count.hpp"
 #include "tunica/mechanics/algebra/block_matrix.hpp"
-#include "tunica/mechanics/model/model.hpp"
 #include "tunica/mechanics/elements/pressure.hpp"
 #include "tunica/mechanics/elements/shell_element.hpp"
+#include "tunica/mechanics/model/model.hpp"
 
 #include <optional>
 

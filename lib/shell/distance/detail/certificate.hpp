@@ -1,9 +1,9 @@
 #pragma once
 
 #include "tunica/core/types.hpp"
-#include "tunica/shell/patch/curved_surface.hpp"
 #include "tunica/shell/distance/shell_distance.hpp"
 #include "tunica/shell/distance/target.hpp"
+#include "tunica/shell/patch/curved_surface.hpp"
 
 #include <algorithm>
 #include <map>

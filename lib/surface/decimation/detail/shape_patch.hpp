@@ -1,8 +1,8 @@
 #pragma once
 
+#include "tunica/surface/decimation/detail/edit_mesh.hpp"
 #include "tunica/surface/distance/boundary_curves.hpp"
 #include "tunica/surface/distance/closest_point.hpp"
-#include "tunica/surface/decimation/detail/edit_mesh.hpp"
 
 #include <Eigen/Geometry>
 

@@ -1,8 +1,8 @@
 #pragma once
 
 #include "tunica/surface/mesh/triangle_mesh.hpp"
-#include "tunica/volume/labels/padded_grid.hpp"
 #include "tunica/volume/cubes/detail/pinched_vertices.hpp"
+#include "tunica/volume/labels/padded_grid.hpp"
 
 #include <array>
 #include <cstddef>
