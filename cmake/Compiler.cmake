@@ -20,7 +20,8 @@ if(TUNICA_X86_64_V3 AND CMAKE_SYSTEM_PROCESSOR STREQUAL "x86_64")
   check_cxx_source_runs("int main() { return __builtin_cpu_supports(\"avx2\") && __builtin_cpu_supports(\"fma\") &&
                                        __builtin_cpu_supports(\"bmi2\") ? 0 : 1; }" TUNICA_HAS_X86_64_V3)
   if(TUNICA_HAS_X86_64_V3)
-    target_compile_options(tunica_flags INTERFACE -march=x86-64-v3)
+    set(TUNICA_INSTRUCTIONS -march=x86-64-v3)
+    target_compile_options(tunica_flags INTERFACE ${TUNICA_INSTRUCTIONS})
   endif()
 endif()
 
@@ -34,8 +35,13 @@ function(tunica_library name)
   cmake_parse_arguments(arg "" "" "LINKS;PRIVATE" ${ARGN})
   file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*.cpp)
   add_library(tunica_${name} STATIC ${sources})
-  target_include_directories(tunica_${name} PUBLIC ${PROJECT_BINARY_DIR}/include ${PROJECT_BINARY_DIR}/include/generated)
-  target_link_libraries(tunica_${name} PUBLIC ${arg_LINKS} PRIVATE tunica_flags ${arg_PRIVATE})
+  target_include_directories(tunica_${name} PUBLIC
+                             $<BUILD_INTERFACE:${PROJECT_BINARY_DIR}/include>
+                             $<BUILD_INTERFACE:${PROJECT_BINARY_DIR}/include/generated> $<INSTALL_INTERFACE:include>)
+  target_link_libraries(tunica_${name} PUBLIC ${arg_LINKS} PRIVATE $<BUILD_INTERFACE:tunica_flags> ${arg_PRIVATE})
+  target_compile_features(tunica_${name} PUBLIC cxx_std_20)
+  # How Eigen aligns its vectors depends on it: who links these libraries needs the same.
+  target_compile_options(tunica_${name} PUBLIC $<INSTALL_INTERFACE:${TUNICA_INSTRUCTIONS}>)
 endfunction()
 
 # tunica_test(NAME LINKS lib...): every .cpp of the current folder as one GoogleTest program.

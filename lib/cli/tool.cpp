@@ -236,7 +236,9 @@ std::optional<int> Tool::parse(int argc, char** argv) {
         return 0;
       }
     }
-    if (argc == 1) {
+    const auto& options = app_.get_options();
+    if (argc == 1 &&
+        std::ranges::any_of(options, [](const CLI::Option* o) { return o->get_required() || o->get_positional(); })) {
       throw UsageError(short_usage(app_));
     }
     app_.parse(argc, argv);

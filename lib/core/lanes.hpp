@@ -1,16 +1,15 @@
 #pragma once
 
 #include "tunica/core/lane_count.hpp"
+#include "tunica/core/simd.hpp"
 
 #include <Eigen/Core>
-
-#include <experimental/simd>
 
 /// Several numbers that go through the same arithmetic at once, as the scalar of small Eigen matrices: the same formula
 /// for several things. What Eigen vectorises within one 3x3 or 6x6 block is little; across things it is everything.
 namespace tunica {
 
-using Lanes = std::experimental::simd<double, std::experimental::simd_abi::deduce_t<double, lane_count>>;
+using Lanes = simd::Vector<double, lane_count>;
 using LaneMask = Lanes::mask_type;
 
 }  // namespace tunica

@@ -1,5 +1,6 @@
 #!/usr/bin/python3
-"""What cmake --install leaves: every tool, and for each a manual page and a bash completion that know its flags."""
+"""What cmake --install leaves: every tool with a manual page and a bash completion that know its flags, and the library,
+against which the examples are built as somebody else's project."""
 
 import os
 import re
@@ -94,6 +95,40 @@ class Installed(unittest.TestCase):
         simulate = self.completion("tunica-simulate")
         self.assertIn("comas", complete(simulate, "tunica-simulate", "--bending", "com"))
         self.assertEqual(complete(simulate, "tunica-simulate", "--solver", "d"), ["direct"])
+
+    def test_examples_are_built_and_run_against_the_package(self):
+        build = self.prefix / "examples"
+        cmake = os.environ["CMAKE"]
+        subprocess.run([cmake, "-S", Path(os.environ["TUNICA_SOURCE"]) / "examples", "-B", build,
+                        f"-DCMAKE_PREFIX_PATH={self.prefix}", "-DCMAKE_BUILD_TYPE=Debug"], check=True, capture_output=True)
+        made = subprocess.run([cmake, "--build", build, "--parallel", "2"], capture_output=True, text=True)
+        self.assertEqual(made.returncode, 0, made.stdout[-4000:])
+
+        def run(name, *arguments):
+            done = subprocess.run([build / name, *arguments], capture_output=True, text=True)
+            self.assertEqual((done.returncode, done.stderr), (0, ""), name)
+            return done.stdout
+
+        self.assertRegex(run("extract_and_fit"), r"^\d+ shells, certainly within 0\.\d+ mm of \d+ triangles\n$")
+        self.assertIn("by Laplace's law 0.017", run("wall_stress"))
+        for name, height in (("a", 0), ("b", 2)):
+            (self.prefix / f"{name}.off").write_text(f"OFF\n3 1 0\n0 0 {height}\n1 0 {height}\n0 1 {height}\n3 0 1 2\n")
+        lower, upper = map(float, re.match(r"(\S+) to (\S+) mm", run("certified_distance", self.prefix / "a.off",
+                                                                     self.prefix / "b.off")).groups())
+        self.assertLessEqual(lower, 2)
+        self.assertGreaterEqual(upper, 2)
+        self.assertLess(upper - lower, 0.001)
+
+    def test_installed_headers_need_nothing_else(self):
+        """Each public header compiles alone, from the installed ones only."""
+        headers = sorted(path.relative_to(self.prefix / "include") for path in (self.prefix / "include").rglob("*.hpp"))
+        self.assertGreater(len(headers), 40)
+        self.assertEqual([header for header in headers if "detail" in header.parts or "cli" in header.parts], [])
+        source = self.prefix / "all.cpp"
+        source.write_text("".join(f"#include <{header}>\n" for header in headers) + "int main() {}\n")
+        made = subprocess.run(["c++", "-std=c++20", "-fsyntax-only", "-isystem", "/usr/include/eigen3",
+                               "-I", self.prefix / "include", source], capture_output=True, text=True)
+        self.assertEqual(made.returncode, 0, made.stderr[:3000])
 
 
 if __name__ == "__main__":

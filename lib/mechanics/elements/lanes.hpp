@@ -3,7 +3,7 @@
 #include "tunica/core/lanes.hpp"
 
 #include <array>
-#ifdef __AVX__
+#if defined(__AVX__) && defined(TUNICA_STANDARD_SIMD)
 #include <immintrin.h>
 #endif
 
@@ -31,7 +31,7 @@ auto lane(const Matrix& matrix, std::size_t k) {
 
 /// Element k of vector i becomes element i of vector k.
 inline void transpose(std::array<Lanes, lane_count>& vectors) {
-#ifdef __AVX__
+#if defined(__AVX__) && defined(TUNICA_STANDARD_SIMD)
   const auto bits = [&](std::size_t i) { return static_cast<__m256d>(vectors[i]); };
   const __m256d even_low = _mm256_unpacklo_pd(bits(0), bits(1));
   const __m256d odd_low = _mm256_unpackhi_pd(bits(0), bits(1));
@@ -55,7 +55,7 @@ void set_lanes(To& result, const Get& matrix) {
   for (; i + static_cast<Eigen::Index>(lane_count) <= result.size(); i += lane_count) {
     std::array<Lanes, lane_count> part;
     for (std::size_t k = 0; k < lane_count; ++k) {
-      part[k].copy_from(matrix(k).data() + i, std::experimental::element_aligned);
+      part[k].copy_from(matrix(k).data() + i, simd::element_aligned);
     }
     transpose(part);
     for (std::size_t k = 0; k < lane_count; ++k) {

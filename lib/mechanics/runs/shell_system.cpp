@@ -263,8 +263,7 @@ void scatter(const ShellSystem& system, const Batch& batch, const LaneMatrix18& 
         transpose(part);
         for (std::size_t l = 0; l < batch.count; ++l) {
           double* const values = target.values.data() + 36 * system.placement[batch.elements[l]][place] + first;
-          (Lanes(values, std::experimental::element_aligned) + part[l])
-              .copy_to(values, std::experimental::element_aligned);
+          (Lanes(values, simd::element_aligned) + part[l]).copy_to(values, simd::element_aligned);
         }
       }
     }

@@ -3,8 +3,6 @@
 namespace tunica {
 namespace {
 
-namespace stdx = std::experimental;
-
 constexpr int steps = 2;            // Gauss-Newton's
 constexpr double singular = 1e-14;  // determinant of a patch's metric, relative
 constexpr double arrival = 1e-6;    // in a patch's parameters: a step to the foot that is the last
@@ -13,7 +11,7 @@ Lanes dot(const LaneVec3& a, const LaneVec3& b) { return a[0] * b[0] + a[1] * b[
 Lanes dot(const LaneVec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 /// Of places side by side, as in PatchAxes.
-double dot(const Lanes& a, const Lanes& b) { return stdx::reduce(a * b); }
+double dot(const Lanes& a, const Lanes& b) { return simd::reduce(a * b); }
 
 Vec2 inside(Vec2 b) {
   b = b.cwiseMax(0);
@@ -25,15 +23,15 @@ LaneVec3 minus(const LaneVec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b
 
 /// Into the triangle.
 void clamp_inside(Lanes& x, Lanes& y) {
-  x = stdx::max(x, Lanes(0.0));
-  y = stdx::max(y, Lanes(0.0));
-  const Lanes shrink = 1.0 / stdx::max(x + y, Lanes(1.0));
+  x = simd::max(x, Lanes(0.0));
+  y = simd::max(y, Lanes(0.0));
+  const Lanes shrink = 1.0 / simd::max(x + y, Lanes(1.0));
   x *= shrink;
   y *= shrink;
 }
 
 Lanes chosen(const LaneMask& mask, const Lanes& yes, Lanes no) {
-  stdx::where(mask, no) = yes;
+  simd::where(mask, no) = yes;
   return no;
 }
 
@@ -175,7 +173,7 @@ LaneFeet feet_on_patch(const PatchPowers& patch, const LaneVec3& q) {
     const Lanes scale = 1.0 / chosen(going, determinant, Lanes(1.0));
     Lanes x = best.x + (e * f - b * g) * scale, y = best.y + (a * g - b * f) * scale;
     const LaneMask outside = x < 0.0 || y < 0.0 || x + y > 1.0;
-    if (stdx::any_of(outside && going)) {
+    if (simd::any_of(outside && going)) {
       // Along the border that is crossed the step is taken anew.
       Lanes bx = x, by = y;
       clamp_inside(bx, by);
@@ -185,7 +183,7 @@ LaneFeet feet_on_patch(const PatchPowers& patch, const LaneVec3& q) {
       const auto [ex, ey] = patch.tangents(bx, by);
       const LaneVec3 tangent = ax * ex + ay * ey;
       const LaneVec3 rest = q - patch.point(bx, by);
-      const Lanes along = dot(tangent, rest) / stdx::max(dot(tangent, tangent), Lanes(1e-300));
+      const Lanes along = dot(tangent, rest) / simd::max(dot(tangent, tangent), Lanes(1e-300));
       bx += along * ax;
       by += along * ay;
       clamp_inside(bx, by);
@@ -196,7 +194,7 @@ LaneFeet feet_on_patch(const PatchPowers& patch, const LaneVec3& q) {
     const LaneVec3 left = q - point;
     const Lanes squared = dot(left, left);
     going = going && squared < best.squared_distance;
-    if (stdx::none_of(going)) {
+    if (simd::none_of(going)) {
       break;
     }
     const Lanes mx = x - best.x, my = y - best.y;

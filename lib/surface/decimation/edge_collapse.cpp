@@ -325,7 +325,7 @@ double EdgeCollapse::squared_loss(HalfEdge h, const Vec3& position) const {
       const Index j = to(next(spoke));
       if (i != u && i != v && j != u && j != v) {
         const FacetDistances facet({position, vertex_[i].position, vertex_[j].position});
-        least = std::experimental::min(least, facet.squared_distance(ends));
+        least = simd::min(least, facet.squared_distance(ends));
       }
     });
   }
@@ -404,7 +404,6 @@ EdgeCollapse::Target EdgeCollapse::inner_target(const Vertex& u, const Vertex& v
 
 /// What inner_target() would cost, for several edges at once.
 Lanes EdgeCollapse::inner_costs(const std::array<HalfEdge, lane_count>& edges) const {
-  namespace stdx = std::experimental;
   const auto sum = [&](double Quadric::*member) {
     return lanes_of(
         [&](std::size_t k) { return vertex_[from(edges[k])].quadric.*member + vertex_[to(edges[k])].quadric.*member; });
@@ -427,20 +426,20 @@ Lanes EdgeCollapse::inner_costs(const std::array<HalfEdge, lane_count>& edges) c
               gz = xz * mx + yz * my + zz * mz + bz;
   const LaneMask solvable = determinant > Quadric::least_determinant * trace * trace * trace;
   Lanes inverse = 0.0;
-  stdx::where(solvable, inverse) = 1.0 / determinant;
+  simd::where(solvable, inverse) = 1.0 / determinant;
   Lanes sx = -(c00 * gx + c01 * gy + c02 * gz) * inverse, sy = -(c01 * gx + c11 * gy + c12 * gz) * inverse,
         sz = -(c02 * gx + c12 * gy + c22 * gz) * inverse;
   const LaneMask too_far = sx * sx + sy * sy + sz * sz > 4 * squared_length;
-  stdx::where(too_far, sx) = 0.0;
-  stdx::where(too_far, sy) = 0.0;
-  stdx::where(too_far, sz) = 0.0;
+  simd::where(too_far, sx) = 0.0;
+  simd::where(too_far, sy) = 0.0;
+  simd::where(too_far, sz) = 0.0;
   const Lanes x = mx + sx, y = my + sy, z = mz + sz;
   const Lanes at_best = x * (xx * x + xy * y + xz * z) + y * (xy * x + yy * y + yz * z) +
                         z * (xz * x + yz * y + zz * z) + 2 * (bx * x + by * y + bz * z) + c;
-  const Lanes power = area * stdx::sqrt(area * stdx::sqrt(area));  // per_area()
+  const Lanes power = area * simd::sqrt(area * simd::sqrt(area));  // per_area()
   Lanes weight = 1.0;
-  stdx::where(area > 0.0, weight) = 1.0 / stdx::sqrt(power);
-  const Lanes error = stdx::max(at_best - invisible * trace, Lanes(0.0));
+  simd::where(area > 0.0, weight) = 1.0 / simd::sqrt(power);
+  const Lanes error = simd::max(at_best - invisible * trace, Lanes(0.0));
   return weight * (error + length_weight * trace * squared_length);
 }
 

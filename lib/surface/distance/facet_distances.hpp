@@ -24,7 +24,6 @@ public:
         inverse_determinant_(inverse_or_zero(uu_ * vv_ - uv_ * uv_)) {}
 
   [[nodiscard]] Lanes squared_distance(const LaneVec3& p) const {
-    namespace stdx = std::experimental;
     const Lanes x = p[0] - a_[0], y = p[1] - a_[1], z = p[2] - a_[2];
     const auto squared_at = [&](const Lanes& s, const Lanes& t) {
       const Lanes dx = x - s * ab_[0] - t * ac_[0];
@@ -32,15 +31,15 @@ public:
       const Lanes dz = z - s * ab_[2] - t * ac_[2];
       return Lanes(dx * dx + dy * dy + dz * dz);
     };
-    const auto within = [](const Lanes& part) { return Lanes(stdx::min(stdx::max(part, Lanes(0.0)), Lanes(1.0))); };
+    const auto within = [](const Lanes& part) { return Lanes(simd::min(simd::max(part, Lanes(0.0)), Lanes(1.0))); };
     const Lanes pu = x * ab_[0] + y * ab_[1] + z * ab_[2];
     const Lanes pv = x * ac_[0] + y * ac_[1] + z * ac_[2];
     const Lanes on_bc = within((pv - pu + (uu_ - uv_)) * inverse_bc_);
-    Lanes least = stdx::min(squared_at(within(pu * inverse_ab_), 0.0), squared_at(0.0, within(pv * inverse_ac_)));
-    least = stdx::min(least, squared_at(1.0 - on_bc, on_bc));
+    Lanes least = simd::min(squared_at(within(pu * inverse_ab_), 0.0), squared_at(0.0, within(pv * inverse_ac_)));
+    least = simd::min(least, squared_at(1.0 - on_bc, on_bc));
     const Lanes s = (vv_ * pu - uv_ * pv) * inverse_determinant_;
     const Lanes t = (uu_ * pv - uv_ * pu) * inverse_determinant_;
-    stdx::where(s > 0.0 && t > 0.0 && s + t < 1.0, least) = stdx::min(least, squared_at(s, t));
+    simd::where(s > 0.0 && t > 0.0 && s + t < 1.0, least) = simd::min(least, squared_at(s, t));
     return least;
   }
 
@@ -60,8 +59,8 @@ struct NearestFacet {
   void try_facet(const FacetDistances& facet, const LaneVec3& p, double number) {
     const Lanes distance = facet.squared_distance(p);
     const LaneMask nearer = distance < squared;
-    std::experimental::where(nearer, squared) = distance;
-    std::experimental::where(nearer, which) = number;
+    simd::where(nearer, squared) = distance;
+    simd::where(nearer, which) = number;
   }
 };
 

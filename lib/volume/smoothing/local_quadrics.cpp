@@ -9,7 +9,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 
-#include <experimental/simd>
+#include "tunica/core/simd.hpp"
 
 #include <algorithm>
 #include <array>
@@ -44,7 +44,7 @@ using Quadric = Eigen::Matrix<double, 6, 1>;
 /// Several numbers at a time, of single precision: what is gathered around a crossing lies within a dozen voxels and is
 /// known to a tenth.
 constexpr std::size_t several = 8;
-using Several = std::experimental::simd<float, std::experimental::simd_abi::deduce_t<float, several>>;
+using Several = simd::Vector<float, several>;
 using SeveralPoints = std::array<Several, 3>;
 
 Several dot(const SeveralPoints& a, const SeveralPoints& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
@@ -53,7 +53,7 @@ SeveralPoints all(const Vec3& p) {
   return {static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2])};
 }
 
-double total(const Several& values) { return std::experimental::reduce(values); }
+double total(const Several& values) { return simd::reduce(values); }
 
 /// A crossing as it is needed around another, in units of a voxel.
 struct Site {
@@ -81,7 +81,7 @@ public:
               columns_[zero].begin() + static_cast<std::ptrdiff_t>(whole), 0.0F);
   }
   [[nodiscard]] Several get(std::size_t column, std::size_t row) const {
-    return {columns_[column].data() + row, std::experimental::element_aligned};
+    return {columns_[column].data() + row, simd::element_aligned};
   }
   [[nodiscard]] SeveralPoints get_point(std::size_t column, std::size_t row) const {
     return {get(column, row), get(column + 1, row), get(column + 2, row)};
@@ -93,7 +93,7 @@ public:
     }
   }
   void set(std::size_t column, std::size_t row, const Several& value) {
-    value.copy_to(columns_[column].data() + row, std::experimental::element_aligned);
+    value.copy_to(columns_[column].data() + row, simd::element_aligned);
   }
 
 private:
@@ -266,8 +266,8 @@ private:
   }
 
   [[nodiscard]] Several kernel(std::size_t row, double radius) const {
-    const Several near = std::experimental::max(
-        1 - flat_.get(squared_distance, row) * static_cast<float>(1 / (radius * radius)), Several(0.0F));
+    const Several near =
+        simd::max(1 - flat_.get(squared_distance, row) * static_cast<float>(1 / (radius * radius)), Several(0.0F));
     return near * near * near * flat_.get(worth, row);
   }
 
@@ -330,8 +330,8 @@ private:
       const Several u = scale * flat_.get(along_u, row);
       const Several w = scale * flat_.get(along_w, row);
       const Several surface = q[0] + u * (q[1] + q[3] * u + q[4] * w) + w * (q[2] + q[5] * w);
-      const Several away = std::experimental::abs(flat_.get(up, row) - surface) - around_.get(half, row);
-      const Several beyond = std::experimental::max(away, Several(0.0F));
+      const Several away = simd::abs(flat_.get(up, row) - surface) - around_.get(half, row);
+      const Several beyond = simd::max(away, Several(0.0F));
       sum += kernel(row, radius) * around_.get(weight, row) * beyond * beyond;
     }
     return total(sum) / weights_;
