@@ -1,5 +1,6 @@
 #include "fit/fit.hpp"
 
+#include "core/clock.hpp"
 #include "core/error.hpp"
 #include "fit/edits.hpp"
 #include "fit/least_squares.hpp"
@@ -14,7 +15,6 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
 namespace tunica {
@@ -161,10 +161,8 @@ private:
         result_.reached = holds;
       }
     }
-    const auto now = std::chrono::steady_clock::now();
-    result_.iterations.push_back(
-        {shell.triangles.size(), distance.both, std::chrono::duration<double>(now - last_).count(), {}});
-    last_ = now;
+    result_.iterations.push_back({shell.triangles.size(), distance.both, seconds_since(last_), {}});
+    last_ = Clock::now();
     if (options_.on_iteration) {
       options_.on_iteration(result_.iterations.back(), result_.shell);
     }
@@ -370,7 +368,7 @@ private:
   std::array<double, 4> rank_{};                 // of the result: see certified()
   std::vector<std::array<Index, 2>> crossings_;  // of the shells that were certified last
   std::vector<Index> thin_;                      // likewise
-  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+  Clock::time_point last_ = Clock::now();
 };
 
 }  // namespace

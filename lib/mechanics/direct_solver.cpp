@@ -99,6 +99,48 @@ int signed_cholesky(Eigen::Ref<MatrixXd> f, Eigen::Ref<Eigen::VectorXd> signs) {
   return negative;
 }
 
+/// The supernodes that CHOLMOD has found, a front each. Nodes are counted in the order of elimination.
+struct Supernodes {
+  const int* first;                        ///< #fronts + 1: the first node of each
+  const int* row_starts;                   ///< #fronts + 1: where each begins in `rows`
+  const int* rows;                         ///< the nodes of each front's rows, its columns first
+  std::vector<Index> node;                 ///< its number in the matrix
+  std::vector<std::int32_t> place;         ///< #nodes of the matrix: in the order of elimination; -1: none
+  std::vector<std::int32_t> first_row;     ///< #nodes + 1: of its free freedoms
+  std::vector<std::int32_t> row_in_front;  ///< of the front whose rows were numbered last
+
+  Supernodes(const cholmod_factor& symbolic, const std::vector<Index>& nodes,
+             const std::vector<std::vector<int>>& components, std::size_t matrix_nodes)
+      : first(static_cast<const int*>(symbolic.super)),
+        row_starts(static_cast<const int*>(symbolic.pi)),
+        rows(static_cast<const int*>(symbolic.s)),
+        node(nodes.size()),
+        place(matrix_nodes, -1),
+        first_row(nodes.size() + 1, 0),
+        row_in_front(nodes.size(), 0) {
+    const auto* const order = static_cast<const int*>(symbolic.Perm);
+    for (std::size_t k = 0; k < nodes.size(); ++k) {
+      node[k] = nodes[static_cast<std::size_t>(order[k])];
+      place[node[k]] = static_cast<std::int32_t>(k);
+      first_row[k + 1] = first_row[k] + static_cast<std::int32_t>(components[node[k]].size());
+    }
+  }
+
+  [[nodiscard]] std::int32_t size_of(std::size_t k) const { return first_row[k + 1] - first_row[k]; }
+  [[nodiscard]] int first_below(std::size_t front) const { return row_starts[front] + first[front + 1] - first[front]; }
+
+  /// @return how many there are
+  std::int32_t number_rows(std::size_t front) {
+    std::int32_t row = 0;
+    for (int r = row_starts[front]; r < row_starts[front + 1]; ++r) {
+      const auto k = static_cast<std::size_t>(rows[r]);
+      row_in_front[k] = row;
+      row += size_of(k);
+    }
+    return row;
+  }
+};
+
 }  // namespace
 
 struct DirectSolver::Implementation {
@@ -126,6 +168,10 @@ struct DirectSolver::Implementation {
 
   void analyse(const BlockMatrix& pattern, const FreeMask& free);
   void make_fronts(const cholmod_factor& symbolic, const std::vector<Index>& nodes, const BlockMatrix& pattern);
+  void list_below(const Supernodes& of, const std::vector<std::int32_t>& front_of, std::size_t index);
+  void list_entries(const Supernodes& of, const BlockMatrix& pattern, std::size_t index);
+  void count_work(Front& f);
+  void list_runs(const Supernodes& of, std::size_t index);
   void make_arenas();
   void add_children(const Front& front, std::size_t index, Panel& columns, Panel& rest);
   int eliminate(std::size_t index, const BlockMatrix& matrix, bool in_slices);
@@ -137,7 +183,7 @@ void DirectSolver::Implementation::analyse(const BlockMatrix& pattern, const Fre
   std::vector<int> number(pattern.node_count(), -1);
   for (std::size_t i = 0; i < pattern.node_count(); ++i) {
     for (std::size_t c = 0; c < 6; ++c) {
-      if (free[6 * i + c]) {
+      if (free[freedom(i, c)]) {
         components[i].push_back(static_cast<int>(c));
       }
     }
@@ -193,103 +239,104 @@ void DirectSolver::Implementation::analyse(const BlockMatrix& pattern, const Fre
 
 void DirectSolver::Implementation::make_fronts(const cholmod_factor& symbolic, const std::vector<Index>& nodes,
                                                const BlockMatrix& pattern) {
-  const auto* const order = static_cast<const int*>(symbolic.Perm);
-  const auto* const super = static_cast<const int*>(symbolic.super);
-  const auto* const row_starts = static_cast<const int*>(symbolic.pi);
-  const auto* const rows = static_cast<const int*>(symbolic.s);
-  const std::size_t count = nodes.size();
-  // Nodes are counted in the order of elimination from here on.
-  std::vector<Index> node(count);
-  std::vector<std::int32_t> first_freedom(count + 1, 0);
-  std::vector<std::int32_t> place(pattern.node_count(), -1);
-  std::vector<std::int32_t> front_of(count);
-  for (std::size_t k = 0; k < count; ++k) {
-    node[k] = nodes[static_cast<std::size_t>(order[k])];
-    place[node[k]] = static_cast<std::int32_t>(k);
-    for (const int c : components[node[k]]) {
-      freedoms.push_back(6 * static_cast<Eigen::Index>(node[k]) + c);
+  Supernodes of(symbolic, nodes, components, pattern.node_count());
+  for (const Index node : of.node) {
+    for (const int c : components[node]) {
+      freedoms.push_back(first_freedom(node) + c);
     }
-    first_freedom[k + 1] = static_cast<std::int32_t>(freedoms.size());
   }
-  const auto size_of = [&](std::size_t k) { return first_freedom[k + 1] - first_freedom[k]; };
+  std::vector<std::int32_t> front_of(nodes.size());
   fronts.resize(symbolic.nsuper);
   children.resize(symbolic.nsuper);
   for (std::size_t s = 0; s < fronts.size(); ++s) {
-    for (int k = super[s]; k < super[s + 1]; ++k) {
+    for (int k = of.first[s]; k < of.first[s + 1]; ++k) {
       front_of[static_cast<std::size_t>(k)] = static_cast<std::int32_t>(s);
     }
   }
-  std::vector<std::int32_t> row_in_front(count, 0);
-  const auto number_rows = [&](std::size_t s) {
-    std::int32_t row = 0;
-    for (int r = row_starts[s]; r < row_starts[s + 1]; ++r) {
-      row_in_front[static_cast<std::size_t>(rows[r])] = row;
-      row += size_of(static_cast<std::size_t>(rows[r]));
-    }
-    return row;
-  };
   std::size_t storage = 0;
   for (std::size_t s = 0; s < fronts.size(); ++s) {
     Front& f = fronts[s];
-    f.rows = number_rows(s);
-    f.first = static_cast<std::size_t>(first_freedom[static_cast<std::size_t>(super[s])]);
-    f.columns = first_freedom[static_cast<std::size_t>(super[s + 1])] - static_cast<std::int32_t>(f.first);
+    f.rows = of.number_rows(s);
+    f.first = static_cast<std::size_t>(of.first_row[static_cast<std::size_t>(of.first[s])]);
+    f.columns = of.first_row[static_cast<std::size_t>(of.first[s + 1])] - static_cast<std::int32_t>(f.first);
     f.panel = storage;
     storage += static_cast<std::size_t>(f.rows * f.columns);
-    f.below = below.size();
-    const int first_below = row_starts[s] + super[s + 1] - super[s];
-    for (int r = first_below; r < row_starts[s + 1]; ++r) {
-      const auto k = static_cast<std::size_t>(rows[r]);
-      for (std::int32_t d = first_freedom[k]; d < first_freedom[k + 1]; ++d) {
-        below.push_back(d);
-      }
-    }
-    if (first_below < row_starts[s + 1]) {
-      f.parent = front_of[static_cast<std::size_t>(rows[first_below])];
-      children[static_cast<std::size_t>(f.parent)].push_back(s);
-    }
-    f.first_descendant = children[s].empty() ? s : fronts[children[s].front()].first_descendant;
-    f.entries[0] = entries.size();
-    for (int k = super[s]; k < super[s + 1]; ++k) {
-      const Index j = node[static_cast<std::size_t>(k)];
-      for (std::size_t b = pattern.row_start[j]; b < pattern.row_start[j + 1]; ++b) {
-        const std::int32_t other = place[pattern.column[b]];
-        if (other >= k) {
-          entries.push_back({static_cast<std::uint32_t>(pattern.transposed[b]), static_cast<std::uint32_t>(b),
-                             row_in_front[static_cast<std::size_t>(other)], row_in_front[static_cast<std::size_t>(k)],
-                             pattern.column[b], j});
-        }
-      }
-    }
-    f.entries[1] = entries.size();
-    const auto n = static_cast<double>(f.columns);
-    const auto m = static_cast<double>(f.left());
-    f.work = n * n * n / 6 + n * n * m / 2 + n * m * m / 2;
-    factor_work += f.work;
-    solve_work += 2 * static_cast<double>(f.rows * f.columns);
+    list_below(of, front_of, s);
+    list_entries(of, pattern, s);
+    count_work(f);
   }
   for (std::size_t s = 0; s < fronts.size(); ++s) {
-    number_rows(s);
-    for (const std::size_t c : children[s]) {
-      Front& child = fronts[c];
-      child.runs[0] = runs.size();
-      std::int32_t row = 0;
-      for (int r = row_starts[c] + super[c + 1] - super[c]; r < row_starts[c + 1]; ++r) {
-        const auto k = static_cast<std::size_t>(rows[r]);
-        if (runs.size() > child.runs[0] && runs.back().parent + runs.back().length == row_in_front[k]) {
-          runs.back().length += size_of(k);
-        } else {
-          runs.push_back({row, row_in_front[k], size_of(k)});
-        }
-        row += size_of(k);
-      }
-      child.runs[1] = runs.size();
+    of.number_rows(s);
+    for (const std::size_t child : children[s]) {
+      list_runs(of, child);
     }
   }
   factor.reset(new double[storage]);
   map_now(factor.get(), storage);
   signs = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(freedoms.size()));
   negative.resize(fronts.size());
+}
+
+/// The rows of a front below its columns, and by the first of them its parent.
+void DirectSolver::Implementation::list_below(const Supernodes& of, const std::vector<std::int32_t>& front_of,
+                                              std::size_t index) {
+  Front& f = fronts[index];
+  f.below = below.size();
+  const int first_below = of.first_below(index);
+  for (int r = first_below; r < of.row_starts[index + 1]; ++r) {
+    const auto k = static_cast<std::size_t>(of.rows[r]);
+    for (std::int32_t d = of.first_row[k]; d < of.first_row[k + 1]; ++d) {
+      below.push_back(d);
+    }
+  }
+  if (first_below < of.row_starts[index + 1]) {
+    f.parent = front_of[static_cast<std::size_t>(of.rows[first_below])];
+    children[static_cast<std::size_t>(f.parent)].push_back(index);
+  }
+  f.first_descendant = children[index].empty() ? index : fronts[children[index].front()].first_descendant;
+}
+
+/// Which blocks of the matrix a front takes, and where to; its rows are numbered.
+void DirectSolver::Implementation::list_entries(const Supernodes& of, const BlockMatrix& pattern, std::size_t index) {
+  Front& f = fronts[index];
+  f.entries[0] = entries.size();
+  for (int k = of.first[index]; k < of.first[index + 1]; ++k) {
+    const Index j = of.node[static_cast<std::size_t>(k)];
+    for (std::size_t b = pattern.row_start[j]; b < pattern.row_start[j + 1]; ++b) {
+      const std::int32_t other = of.place[pattern.column[b]];
+      if (other >= k) {
+        entries.push_back({static_cast<std::uint32_t>(pattern.transposed[b]), static_cast<std::uint32_t>(b),
+                           of.row_in_front[static_cast<std::size_t>(other)],
+                           of.row_in_front[static_cast<std::size_t>(k)], pattern.column[b], j});
+      }
+    }
+  }
+  f.entries[1] = entries.size();
+}
+
+void DirectSolver::Implementation::count_work(Front& f) {
+  const auto n = static_cast<double>(f.columns);
+  const auto m = static_cast<double>(f.left());
+  f.work = n * n * n / 6 + n * n * m / 2 + n * m * m / 2;
+  factor_work += f.work;
+  solve_work += 2 * static_cast<double>(f.rows * f.columns);
+}
+
+/// Where the rows of a child's update go in its parent, whose rows are numbered.
+void DirectSolver::Implementation::list_runs(const Supernodes& of, std::size_t index) {
+  Front& child = fronts[index];
+  child.runs[0] = runs.size();
+  std::int32_t row = 0;
+  for (int r = of.first_below(index); r < of.row_starts[index + 1]; ++r) {
+    const auto k = static_cast<std::size_t>(of.rows[r]);
+    if (runs.size() > child.runs[0] && runs.back().parent + runs.back().length == of.row_in_front[k]) {
+      runs.back().length += of.size_of(k);
+    } else {
+      runs.push_back({row, of.row_in_front[k], of.size_of(k)});
+    }
+    row += of.size_of(k);
+  }
+  child.runs[1] = runs.size();
 }
 
 /// Subtrees of which none is more than an eighth of the work, and what is above them. The update matrices of an arena

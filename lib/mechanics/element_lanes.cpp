@@ -192,13 +192,72 @@ void add_material(const ElementLanes& element, double factor, const std::array<L
   }
 }
 
-/// What chord strain and rotation vectors add to the geometric stiffness: n are the corners' forces, m their moments.
-void add_corotational_stiffness(const ElementLanes& element, const Kinematics& now, const std::array<LaneVec3, 3>& n,
-                                const std::array<LaneVec3, 3>& local_moment,
-                                const std::array<SpinCoefficients<Lanes>, 3>& spin, const std::array<LaneMat3, 3>& h,
-                                const std::array<LaneMat3, 3>& g, const LaneMat23& current_gradients,
-                                const LaneVec3& total, const std::array<LaneVec3, 3>& force,
-                                const std::array<LaneVec3, 3>& moment, LaneMatrix18& t) {
+/// What the membrane force does on slopes and rotations.
+struct SlopeForces {
+  LaneVector6 on_slopes;
+  LaneMatrix6 stiffness;
+  LaneVec3 on_bows, on_sides;
+};
+
+/// @param stress  of the deformation; what bends corners is added to it
+SlopeForces find_slope_forces(const ElementLanes& element, const Kinematics& now, LaneState& stress) {
+  SlopeForces f{LaneVector6::Zero(), LaneMatrix6::Zero(), element.bow.transpose() * stress.head<3>(), LaneVec3::Zero()};
+  if (!element.curved) {
+    for (int k = 0; k < 3; ++k) {
+      stress[5 + 3 * k] += f.on_bows[(k + 2) % 3] - f.on_bows[k];
+    }
+    return f;
+  }
+  f.on_sides = element.sideways.transpose() * stress.head<3>();
+  for (int i = 0; i < 3; ++i) {
+    f.stiffness += stress[i] * element.bulging[static_cast<std::size_t>(i)];
+  }
+  f.on_slopes = f.stiffness.lazyProduct(now.slopes);
+  for (int k = 0; k < 3; ++k) {
+    f.on_slopes[2 * k] += f.on_sides[k] * now.tilts[k] + 0.5 * stress[12 + k];
+    f.on_slopes[2 * k + 1] += -f.on_sides[k] * now.tilts[k] + 0.5 * stress[12 + k];
+    const LaneVec2 on_bending = 0.5 * f.on_sides[k] * now.bulges[k] * element.edge_directions.col(k);
+    stress.segment<2>(3 + 3 * k) += on_bending;
+    stress.segment<2>(3 + 3 * next_corner(k)) += on_bending;
+  }
+  return f;
+}
+
+/// Of chord strain and rotation vectors: what works on the corners in the frame, and what keeps it in balance.
+struct CornerForces {
+  std::array<LaneMat3, 3> g;  ///< frame_spin()
+  LaneMat23 current_gradients;
+  std::array<SpinCoefficients<Lanes>, 3> spin;
+  std::array<LaneMat3, 3> h;                ///< of rotation vectors by spins
+  std::array<LaneVec3, 3> n, local_moment;  ///< against chords and rotation vectors
+  std::array<LaneVec3, 3> force, moment;
+  LaneVec3 total;  ///< moment
+};
+
+void find_corner_forces(const ElementLanes& element, const Kinematics& now, const LaneState& stress,
+                        CornerForces& corners) {
+  auto& [g, current_gradients, spin, h, n, local_moment, force, moment, total] = corners;
+  g = frame_spin(element, now.frame, current_gradients);
+  total = LaneVec3::Zero();
+  for (int k = 0; k < 3; ++k) {
+    const auto s = static_cast<std::size_t>(k);
+    const LaneVec2 gk = element.gradients.col(k);
+    n[s] << stress[0] * gk.x() + stress[2] * gk.y(), stress[1] * gk.y() + stress[2] * gk.x(), 0;
+    local_moment[s] = stress.segment<3>(3 + 3 * k);
+    spin[s] = spin_coefficients(now.rotation(k));
+    h[s] = spin_to_rate(now.rotation(k), spin[s].eta);
+    moment[s] = h[s].transpose() * local_moment[s];
+    total += LaneVec3(0, 0, now.frame.plane(0, k) * n[s].y() - now.frame.plane(1, k) * n[s].x()) + moment[s];
+  }
+  for (std::size_t s = 0; s < 3; ++s) {
+    force[s] = n[s] - g[s].transpose() * total;
+  }
+}
+
+/// What chord strain and rotation vectors add to the geometric stiffness.
+void add_corotational_stiffness(const ElementLanes& element, const Kinematics& now, const CornerForces& corners,
+                                LaneMatrix18& t) {
+  const auto& [g, current_gradients, spin, h, n, local_moment, force, moment, total] = corners;
   const Frame& frame = now.frame;
   // The derivative of H, where spins of the frame count against those of the corners.
   LaneMat3 all = LaneMat3::Zero();
@@ -237,6 +296,24 @@ void add_corotational_stiffness(const ElementLanes& element, const Kinematics& n
   }
 }
 
+/// Slopes and bows: one carried vector per end of an edge collects what works on both.
+using CarriedForces = std::array<std::array<LaneVec3, 2>, 3>;
+
+void add_carried_forces(const Kinematics& now, const SlopeForces& f, CarriedForces& carried, LaneVector18& force) {
+  for (int k = 0; k < 3; ++k) {
+    const EdgeNow& edge = now.edges[static_cast<std::size_t>(k)];
+    for (int end = 0; end < 2; ++end) {
+      const auto e = static_cast<std::size_t>(end);
+      LaneVec3& v = carried[static_cast<std::size_t>(k)][e];
+      v = -f.on_slopes[2 * k + end] * edge.normal[e] - (end == 0 ? -f.on_bows[k] : f.on_bows[k]) * edge.side[e];
+      const LaneVec3 p = (v - edge.direction * edge.direction.dot(v)) / edge.length;
+      force.segment<3>(6 * next_corner(k)) += p;
+      force.segment<3>(6 * k) -= p;
+      force.segment<3>(6 * corner_at(k, end) + 3) += v.cross(edge.direction);
+    }
+  }
+}
+
 /// Second derivative of e.(R v) for a vector v carried by the end of an edge.
 void add_edge_stiffness(const EdgeNow& edge, int start, int carrier, const LaneVec3& carried, LaneMatrix18& t) {
   const LaneVec3& e = edge.direction;
@@ -256,6 +333,22 @@ void add_edge_stiffness(const EdgeNow& edge, int start, int carrier, const LaneV
   t.block<3, 3>(spin, 6 * stop) += turned;
   t.block<3, 3>(spin, 6 * start) -= turned;
   t.block<3, 3>(spin, spin) += carried * e.transpose() - value * LaneMat3::Identity();
+}
+
+/// What slopes, bulges and tilts of a curved element add.
+void add_curved_stiffness(const Kinematics& now, const SlopeForces& f, const CarriedForces& carried,
+                          const Derivatives& d, LaneMatrix18& t) {
+  const LaneMatrix6x18 on_slope_changes = f.stiffness.lazyProduct(d.slopes);
+  add_symmetric_product(d.slopes, on_slope_changes, t);
+  const LaneMatrix3x18 on_bulge_changes = f.on_sides.asDiagonal() * d.tilts;
+  const LaneMatrix18 coupling = d.bulges.transpose().lazyProduct(on_bulge_changes);
+  t += coupling + coupling.transpose();
+  for (int k = 0; k < 3; ++k) {
+    for (int end = 0; end < 2; ++end) {
+      add_edge_stiffness(now.edges[static_cast<std::size_t>(k)], k, corner_at(k, end),
+                         carried[static_cast<std::size_t>(k)][static_cast<std::size_t>(end)], t);
+    }
+  }
 }
 
 /// What the derivatives need at the reference.
@@ -404,67 +497,17 @@ LaneMask corotational_response(const ElementLanes& element, const MotionLanes& m
   if (viscous.factor > 0) {
     stress += viscous.factor * element_force(element, now.state - viscous.previous);
   }
-  // What the membrane force does on slopes and rotations.
-  LaneVector6 on_slopes = LaneVector6::Zero();
-  LaneMatrix6 slope_stiffness = LaneMatrix6::Zero();
-  const LaneVec3 on_bows = element.bow.transpose() * stress.head<3>();
-  const LaneVec3 on_sides =
-      element.curved ? LaneVec3(element.sideways.transpose() * stress.head<3>()) : LaneVec3(LaneVec3::Zero());
-  if (element.curved) {
-    for (int i = 0; i < 3; ++i) {
-      slope_stiffness += stress[i] * element.bulging[static_cast<std::size_t>(i)];
-    }
-    on_slopes = slope_stiffness.lazyProduct(now.slopes);
-    for (int k = 0; k < 3; ++k) {
-      on_slopes[2 * k] += on_sides[k] * now.tilts[k] + 0.5 * stress[12 + k];
-      on_slopes[2 * k + 1] += -on_sides[k] * now.tilts[k] + 0.5 * stress[12 + k];
-      const LaneVec2 on_bending = 0.5 * on_sides[k] * now.bulges[k] * element.edge_directions.col(k);
-      stress.segment<2>(3 + 3 * k) += on_bending;
-      stress.segment<2>(3 + 3 * next_corner(k)) += on_bending;
-    }
-  } else {
-    for (int k = 0; k < 3; ++k) {
-      stress[5 + 3 * k] += on_bows[(k + 2) % 3] - on_bows[k];
-    }
-  }
-
-  LaneMat23 current_gradients;
-  const std::array<LaneMat3, 3> g = frame_spin(element, now.frame, current_gradients);
-  // Chord strain and rotation vectors: forces n and moments in the frame, and what keeps them in balance.
-  std::array<LaneVec3, 3> n, local_moment, moment, force;
-  std::array<SpinCoefficients<Lanes>, 3> spin;
-  std::array<LaneMat3, 3> h;
-  LaneVec3 total = LaneVec3::Zero();
-  for (int k = 0; k < 3; ++k) {
-    const auto s = static_cast<std::size_t>(k);
-    const LaneVec2 gk = element.gradients.col(k);
-    n[s] << stress[0] * gk.x() + stress[2] * gk.y(), stress[1] * gk.y() + stress[2] * gk.x(), 0;
-    local_moment[s] = stress.segment<3>(3 + 3 * k);
-    spin[s] = spin_coefficients(now.rotation(k));
-    h[s] = spin_to_rate(now.rotation(k), spin[s].eta);
-    moment[s] = h[s].transpose() * local_moment[s];
-    total += LaneVec3(0, 0, now.frame.plane(0, k) * n[s].y() - now.frame.plane(1, k) * n[s].x()) + moment[s];
-  }
+  const SlopeForces slopes = find_slope_forces(element, now, stress);
+  CornerForces corners;
+  find_corner_forces(element, now, stress, corners);
   LaneVector18 result;
   for (int k = 0; k < 3; ++k) {
-    const auto s = static_cast<std::size_t>(k);
-    force[s] = n[s] - g[s].transpose() * total;
-    result.segment<3>(6 * k) = force[s];
-    result.segment<3>(6 * k + 3) = moment[s];
+    result.segment<3>(6 * k) = corners.force[static_cast<std::size_t>(k)];
+    result.segment<3>(6 * k + 3) = corners.moment[static_cast<std::size_t>(k)];
   }
-  // Slopes and bows: one carried vector per end of an edge collects what works on both.
-  std::array<std::array<LaneVec3, 2>, 3> carried;
-  for (int k = 0; k < 3 && element.curved; ++k) {
-    const EdgeNow& edge = now.edges[static_cast<std::size_t>(k)];
-    for (int end = 0; end < 2; ++end) {
-      const auto e = static_cast<std::size_t>(end);
-      LaneVec3& v = carried[static_cast<std::size_t>(k)][e];
-      v = -on_slopes[2 * k + end] * edge.normal[e] - (end == 0 ? -on_bows[k] : on_bows[k]) * edge.side[e];
-      const LaneVec3 p = (v - edge.direction * edge.direction.dot(v)) / edge.length;
-      result.segment<3>(6 * next_corner(k)) += p;
-      result.segment<3>(6 * k) -= p;
-      result.segment<3>(6 * corner_at(k, end) + 3) += v.cross(edge.direction);
-    }
+  CarriedForces carried;
+  if (element.curved) {
+    add_carried_forces(now, slopes, carried, result);
   }
   for (int k = 0; k < 6; ++k) {
     response.force.segment<3>(3 * k) = now.frame.axes.transpose() * result.segment<3>(3 * k);
@@ -474,23 +517,13 @@ LaneMask corotational_response(const ElementLanes& element, const MotionLanes& m
   }
 
   Derivatives d;
-  find_derivatives(element, now, h, g, d);
+  find_derivatives(element, now, corners.h, corners.g, d);
   LaneMatrix18& t = *tangent;
   t.setZero();
-  add_material(element, 1 + viscous.factor, h, g, d, t);
-  add_corotational_stiffness(element, now, n, local_moment, spin, h, g, current_gradients, total, force, moment, t);
+  add_material(element, 1 + viscous.factor, corners.h, corners.g, d, t);
+  add_corotational_stiffness(element, now, corners, t);
   if (element.curved) {
-    const LaneMatrix6x18 on_slope_changes = slope_stiffness.lazyProduct(d.slopes);
-    add_symmetric_product(d.slopes, on_slope_changes, t);
-    const LaneMatrix3x18 on_bulge_changes = on_sides.asDiagonal() * d.tilts;
-    const LaneMatrix18 coupling = d.bulges.transpose().lazyProduct(on_bulge_changes);
-    t += coupling + coupling.transpose();
-    for (int k = 0; k < 3; ++k) {
-      for (int end = 0; end < 2; ++end) {
-        add_edge_stiffness(now.edges[static_cast<std::size_t>(k)], k, corner_at(k, end),
-                           carried[static_cast<std::size_t>(k)][static_cast<std::size_t>(end)], t);
-      }
-    }
+    add_curved_stiffness(now, slopes, carried, d, t);
   }
   rotate_to_world(now.frame.axes, t);
   return valid;

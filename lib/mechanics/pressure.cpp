@@ -89,30 +89,43 @@ void unit_pressure(const std::array<Vec3, 3>& corners, const PatchHeight& height
   }
 }
 
-void unit_pressure(const ElementLanes& element, const MotionLanes& motion, LaneVector18& force, LaneMatrix18* stiffness,
-                   Lanes* volume) {
-  LaneMat3 x;
-  for (int k = 0; k < 3; ++k) {
-    x.col(k) = element.from_centroid.col(k) - element.from_centroid.col(0) +
-               (motion.displacement.col(k) - motion.displacement.col(0));
-  }
-  const LaneVec3 twice = x.col(1).cross(x.col(2));
-  const Lanes twice_area = twice.norm();
-  const Lanes area = twice_area / 2;
-  const LaneVec3 n = twice / twice_area;
-  // Height: sum over the ends of the edges of length x slope x weight / 30, with the sign of the edge's direction.
-  Lanes height = 0;
-  LaneVector18 height_gradient = LaneVector18::Zero();
-  LaneMat3 opposite;
-  LaneMat3 area_gradient;
+namespace {
+
+/// What works on an edge: its normals at both ends, carried by the corners.
+struct PressedEdge {
   struct End {
     int corner = 0;
     Lanes weight = 0;
     LaneVec3 carried;
   };
-  std::array<std::array<End, 2>, 3> ends;
-  std::array<Lanes, 3> of_length{Lanes(0), Lanes(0), Lanes(0)};
+  std::array<End, 2> ends;
+  Lanes of_length = 0;  ///< height by the edge's length
+};
+
+/// Corners about the first, area, and the height of the patch over the facet: the sum over the ends of the edges of
+/// length x slope x weight / 30, with the sign of the edge's direction.
+struct PressedPatch {
+  LaneMat3 x, opposite, area_gradient;
+  LaneVec3 twice, n;
+  Lanes area, height;
+  LaneVector18 height_gradient;
+  std::array<PressedEdge, 3> edges;
+};
+
+void find_patch(const ElementLanes& element, const MotionLanes& motion, PressedPatch& patch) {
+  auto& [x, opposite, area_gradient, twice, n, area, height, height_gradient, edges] = patch;
   for (int k = 0; k < 3; ++k) {
+    x.col(k) = element.from_centroid.col(k) - element.from_centroid.col(0) +
+               (motion.displacement.col(k) - motion.displacement.col(0));
+  }
+  twice = x.col(1).cross(x.col(2));
+  const Lanes twice_area = twice.norm();
+  area = twice_area / 2;
+  n = twice / twice_area;
+  height = 0;
+  height_gradient.setZero();
+  for (int k = 0; k < 3; ++k) {
+    PressedEdge& pressed = edges[static_cast<std::size_t>(k)];
     const int next_corner = (k + 1) % 3;
     opposite.col(k) = x.col((k + 2) % 3) - x.col(next_corner);
     area_gradient.col(k) = 0.5 * n.cross(opposite.col(k));
@@ -121,56 +134,52 @@ void unit_pressure(const ElementLanes& element, const MotionLanes& motion, LaneV
     const LaneVec3 normal = element.axes.transpose() * element.edge_normals.col(k);
     LaneVec3 carried = LaneVec3::Zero();
     for (int e = 0; e < 2; ++e) {
-      End& end = ends[static_cast<std::size_t>(k)][static_cast<std::size_t>(e)];
+      PressedEdge::End& end = pressed.ends[static_cast<std::size_t>(e)];
       end.corner = e == 0 ? k : next_corner;
       end.weight = element.height_weights[2 * k + e];
       end.carried = motion.rotation[static_cast<std::size_t>(end.corner)] * normal;
-      of_length[static_cast<std::size_t>(k)] +=
-          end.weight * (element.slopes[2 * k + e] + element.rest_normals[2 * k + e]);
+      pressed.of_length += end.weight * (element.slopes[2 * k + e] + element.rest_normals[2 * k + e]);
       carried += end.weight * end.carried;
       height_gradient.segment<3>(6 * end.corner + 3) -= end.weight * end.carried.cross(edge);
     }
-    height += of_length[static_cast<std::size_t>(k)] * length - edge.dot(carried);
-    const LaneVec3 along = of_length[static_cast<std::size_t>(k)] / length * edge - carried;
+    height += pressed.of_length * length - edge.dot(carried);
+    const LaneVec3 along = pressed.of_length / length * edge - carried;
     height_gradient.segment<3>(6 * next_corner) += along;
     height_gradient.segment<3>(6 * k) -= along;
   }
-  force = area * height_gradient;
+}
+
+/// Area x second derivative of the height.
+void add_height_stiffness(const PressedPatch& patch, LaneMatrix18& t) {
   for (int k = 0; k < 3; ++k) {
-    force.segment<3>(6 * k) += twice / 6 + height * area_gradient.col(k);
-  }
-  if (volume != nullptr) {
-    *volume = area * height;
-  }
-  if (stiffness == nullptr) {
-    return;
-  }
-  LaneMatrix18& t = *stiffness;
-  t.setZero();
-  for (int k = 0; k < 3; ++k) {
+    const PressedEdge& pressed = patch.edges[static_cast<std::size_t>(k)];
     const int start = 6 * k;
     const int stop = 6 * ((k + 1) % 3);
-    const LaneVec3 edge = x.col((k + 1) % 3) - x.col(k);
+    const LaneVec3 edge = patch.x.col((k + 1) % 3) - patch.x.col(k);
     const Lanes length = edge.norm();
     const LaneVec3 direction = edge / length;
-    const LaneMat3 stretch = area * of_length[static_cast<std::size_t>(k)] / length *
-                             (LaneMat3::Identity() - direction * direction.transpose());
+    const LaneMat3 stretch =
+        patch.area * pressed.of_length / length * (LaneMat3::Identity() - direction * direction.transpose());
     t.block<3, 3>(stop, stop) += stretch;
     t.block<3, 3>(start, start) += stretch;
     t.block<3, 3>(stop, start) -= stretch;
     t.block<3, 3>(start, stop) -= stretch;
-    for (const End& end : ends[static_cast<std::size_t>(k)]) {
+    for (const PressedEdge::End& end : pressed.ends) {
       const int spin = 6 * end.corner + 3;
-      const LaneMat3 turned = area * end.weight * skew(end.carried);
+      const LaneMat3 turned = patch.area * end.weight * skew(end.carried);
       t.block<3, 3>(stop, spin) += turned;
       t.block<3, 3>(start, spin) -= turned;
       t.block<3, 3>(spin, stop) -= turned;
       t.block<3, 3>(spin, start) += turned;
       t.block<3, 3>(spin, spin) +=
-          area * end.weight * (edge.dot(end.carried) * LaneMat3::Identity() - end.carried * edge.transpose());
+          patch.area * end.weight * (edge.dot(end.carried) * LaneMat3::Identity() - end.carried * edge.transpose());
     }
   }
-  // height x d2A/dx_i dx_j + d(2A n / 6)/dx_j + what the gradients of area and height make together.
+}
+
+/// height x d2A/dx_i dx_j + d(2A n / 6)/dx_j + what the gradients of area and height make together.
+void add_area_stiffness(const PressedPatch& patch, LaneMatrix18& t) {
+  const auto& [x, opposite, area_gradient, twice, n, area, height, height_gradient, edges] = patch;
   const LaneMat3 across = 0.25 * height / area * n * n.transpose();
   for (int j = 0; j < 3; ++j) {
     t.middleRows<3>(6 * j).noalias() += area_gradient.col(j) * height_gradient.transpose();
@@ -180,6 +189,26 @@ void unit_pressure(const ElementLanes& element, const MotionLanes& motion, LaneV
       const LaneVec3 axis = opposite.col(j) / 6 + sign * height * n;
       t.block<3, 3>(6 * i, 6 * j) += opposite.col(i).dot(opposite.col(j)) * across + skew(axis);
     }
+  }
+}
+
+}  // namespace
+
+void unit_pressure(const ElementLanes& element, const MotionLanes& motion, LaneVector18& force, LaneMatrix18* stiffness,
+                   Lanes* volume) {
+  PressedPatch patch;
+  find_patch(element, motion, patch);
+  force = patch.area * patch.height_gradient;
+  for (int k = 0; k < 3; ++k) {
+    force.segment<3>(6 * k) += patch.twice / 6 + patch.height * patch.area_gradient.col(k);
+  }
+  if (volume != nullptr) {
+    *volume = patch.area * patch.height;
+  }
+  if (stiffness != nullptr) {
+    stiffness->setZero();
+    add_height_stiffness(patch, *stiffness);
+    add_area_stiffness(patch, *stiffness);
   }
 }
 

@@ -95,10 +95,8 @@ const Triangles& better(const std::vector<Vec3>& p, const Triangles& one, const 
   return worst(other) > worst(one) ? other : one;
 }
 
-}  // namespace
-
-ShellMesh split_shells(const ShellMesh& shell, const std::vector<Split>& wanted) {
-  const Edges edges = edges_of(shell);
+/// Which edges to cut: those wanted, and the longest of every triangle that has one of them.
+std::vector<std::uint8_t> edges_to_cut(const ShellMesh& shell, const Edges& edges, const std::vector<Split>& wanted) {
   std::vector<std::uint8_t> cut(edges.ends.size(), 0);
   std::vector<std::size_t> waiting;
   const auto cut_edge = [&](Index e) {
@@ -125,69 +123,90 @@ ShellMesh split_shells(const ShellMesh& shell, const std::vector<Split>& wanted)
     waiting.pop_back();
     cut_edge(edges.of_triangle[t][longest(shell, edges, t)]);
   }
+  return cut;
+}
 
+/// The middle of an edge on the curved surface: of the patches at it, which may not meet there.
+struct Middle {
+  Vec3 point;
+  Vec3 normal;
+  std::array<Vec3, 2> normal_of;  ///< on either side
+};
+
+Middle middle_of(const ShellMesh& shell, const Edges& edges, const std::vector<CubicPatch>& patches, Index edge) {
+  Middle middle{Vec3::Zero(), Vec3::Zero(), {}};
+  double sides = 0;
+  for (std::size_t side = 0; side < 2; ++side) {
+    const Index t = edges.triangles[edge][side];
+    if (t != none) {
+      const std::size_t k = place_of(edges, t, edge);
+      const Vec2 at(halfway[k][0], halfway[k][1]);
+      middle.point += patches[t].point(at);
+      middle.normal_of[side] = patches[t].normal(at);
+      sides += 1;
+    }
+  }
+  if (sides == 1) {
+    middle.normal_of[1] = middle.normal_of[0];
+  }
+  middle.point /= sides;
+  middle.normal = (middle.normal_of[0] + middle.normal_of[1]).stableNormalized();
+  if (!is_crease(shell, edges, edge)) {
+    middle.normal_of = {middle.normal, middle.normal};
+  }
+  return middle;
+}
+
+/// A triangle whose longest edge runs from a to b, cut at the middles of its edges; that edge is cut if any is.
+Triangles pieces_of(const std::vector<Vec3>& p, Index a, Index b, Index c, Index ab, Index bc, Index ca) {
+  if (ab == none) {
+    return {{a, b, c}};
+  }
+  if (bc == none && ca == none) {
+    return {{a, ab, c}, {ab, b, c}};
+  }
+  if (ca == none) {
+    return better(p, {{a, ab, c}, {ab, b, bc}, {ab, bc, c}}, {{a, ab, bc}, {a, bc, c}, {ab, b, bc}});
+  }
+  if (bc == none) {
+    return better(p, {{a, ab, ca}, {ab, b, c}, {ab, c, ca}}, {{a, ab, ca}, {ab, b, ca}, {b, c, ca}});
+  }
+  return better(p, {{a, ab, ca}, {ab, b, bc}, {ca, bc, c}, {ab, bc, ca}},
+                {{a, ab, ca}, {ab, b, bc}, {ab, c, ca}, {ab, bc, c}});
+}
+
+}  // namespace
+
+ShellMesh split_shells(const ShellMesh& shell, const std::vector<Split>& wanted) {
+  const Edges edges = edges_of(shell);
+  const auto cut = edges_to_cut(shell, edges, wanted);
   const auto patches = curved_patches(shell);
   ShellMesh out{shell.vertices, {}, shell.normals, {}, shell.patch};
   std::vector<Index> middle(edges.ends.size(), none);
-  std::vector<std::array<Vec3, 2>> normal_of(edges.ends.size());  // on either side
-  for (std::size_t e = 0; e < edges.ends.size(); ++e) {
-    if (cut[e] == 0) {
-      continue;
+  std::vector<std::array<Vec3, 2>> normal_of(edges.ends.size());
+  for (Index e = 0; e < edges.ends.size(); ++e) {
+    if (cut[e] != 0) {
+      const Middle found = middle_of(shell, edges, patches, e);
+      middle[e] = static_cast<Index>(out.vertices.size());
+      normal_of[e] = found.normal_of;
+      out.vertices.push_back(found.point);
+      out.normals.push_back(found.normal);
     }
-    Vec3 point = Vec3::Zero();
-    double sides = 0;
-    for (std::size_t side = 0; side < 2; ++side) {
-      const Index t = edges.triangles[e][side];
-      if (t != none) {
-        const std::size_t k = place_of(edges, t, static_cast<Index>(e));
-        const Vec2 at(halfway[k][0], halfway[k][1]);
-        point += patches[t].point(at);
-        normal_of[e][side] = patches[t].normal(at);
-        sides += 1;
-      }
-    }
-    if (sides == 1) {
-      normal_of[e][1] = normal_of[e][0];
-    }
-    const Vec3 mean = (normal_of[e][0] + normal_of[e][1]).stableNormalized();
-    if (!is_crease(shell, edges, static_cast<Index>(e))) {
-      normal_of[e] = {mean, mean};
-    }
-    middle[e] = static_cast<Index>(out.vertices.size());
-    out.vertices.emplace_back(point / sides);
-    out.normals.push_back(mean);
   }
-
   for (std::size_t t = 0; t < shell.triangles.size(); ++t) {
-    // Turned so that the longest edge runs from a to b; it is cut if any is.
-    const std::size_t k = longest(shell, edges, t);
     const auto& v = shell.triangles[t];
-    const Index a = v[k], b = v[(k + 1) % 3], c = v[(k + 2) % 3];
-    const Index ab = middle[edges.of_triangle[t][k]], bc = middle[edges.of_triangle[t][(k + 1) % 3]],
-                ca = middle[edges.of_triangle[t][(k + 2) % 3]];
-    Triangles pieces;
-    if (ab == none) {
-      pieces = {{a, b, c}};
-    } else if (bc == none && ca == none) {
-      pieces = {{a, ab, c}, {ab, b, c}};
-    } else if (ca == none) {
-      pieces = better(out.vertices, {{a, ab, c}, {ab, b, bc}, {ab, bc, c}}, {{a, ab, bc}, {a, bc, c}, {ab, b, bc}});
-    } else if (bc == none) {
-      pieces = better(out.vertices, {{a, ab, ca}, {ab, b, c}, {ab, c, ca}}, {{a, ab, ca}, {ab, b, ca}, {b, c, ca}});
-    } else {
-      pieces = better(out.vertices, {{a, ab, ca}, {ab, b, bc}, {ca, bc, c}, {ab, bc, ca}},
-                      {{a, ab, ca}, {ab, b, bc}, {ab, c, ca}, {ab, bc, c}});
-    }
+    const auto& own = edges.of_triangle[t];
+    const std::size_t k = longest(shell, edges, t), l = (k + 1) % 3, m = (k + 2) % 3;
+    const Triangles pieces = pieces_of(out.vertices, v[k], v[l], v[m], middle[own[k]], middle[own[l]], middle[own[m]]);
     out.triangles.insert(out.triangles.end(), pieces.begin(), pieces.end());
     for (std::size_t i = 0; i < pieces.size() && !shell.corner_normals.empty(); ++i) {
       auto& normals = out.corner_normals.emplace_back();
       for (std::size_t corner = 0; corner < 3; ++corner) {
         for (std::size_t j = 0; j < 3; ++j) {
-          const Index e = edges.of_triangle[t][j];
           if (pieces[i][corner] == v[j]) {
             normals[corner] = shell.corner_normals[t][j];
-          } else if (pieces[i][corner] == middle[e]) {
-            normals[corner] = normal_of[e][edges.triangles[e][0] == t ? 0 : 1];
+          } else if (pieces[i][corner] == middle[own[j]]) {
+            normals[corner] = normal_of[own[j]][edges.triangles[own[j]][0] == t ? 0 : 1];
           }
         }
       }
