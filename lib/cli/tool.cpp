@@ -2,6 +2,7 @@
 
 #include "tunica/cli/detail/documentation.hpp"
 #include "tunica/cli/usage.hpp"
+#include "tunica/core/clock.hpp"
 #include "tunica/core/threads.hpp"
 #include "tunica/core/version.hpp"
 #include "tunica/core/words.hpp"
@@ -33,10 +34,6 @@ extern "C" void on_signal(int signal) {
   request_stop(signal);
   // The second signal ends the program at once: somebody is waiting.
   std::signal(signal, SIG_DFL);
-}
-
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
 /// Of this program: ru_maxrss also counts the process that started it, as it was before exec().

@@ -1,4 +1,3 @@
-// core: errors, quantities with units, progress, threads; what every room uses.
 #pragma once
 
 #include "tunica/core/types.hpp"

@@ -1,5 +1,6 @@
 #include "tunica/fit/fit.hpp"
 
+#include "tunica/core/clock.hpp"
 #include "tunica/core/error.hpp"
 #include "tunica/fit/detail/edits.hpp"
 #include "tunica/fit/detail/least_squares.hpp"
@@ -14,7 +15,6 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
 namespace tunica {
@@ -78,10 +78,8 @@ public:
         result.reached = holds;
       }
     }
-    const auto now = std::chrono::steady_clock::now();
-    result.iterations.push_back(
-        {shell.triangles.size(), distance.both, std::chrono::duration<double>(now - last_).count(), {}});
-    last_ = now;
+    result.iterations.push_back({shell.triangles.size(), distance.both, seconds_since(last_), {}});
+    last_ = Clock::now();
     if (options_.on_iteration) {
       options_.on_iteration(result.iterations.back(), result.shell);
     }
@@ -108,7 +106,7 @@ private:
   bool like_target_;
   double width_;
   std::array<double, 4> rank_{};  // of the best
-  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+  Clock::time_point last_ = Clock::now();
 };
 
 class Fitting {

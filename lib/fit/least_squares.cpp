@@ -204,10 +204,7 @@ private:
     Eigen::Matrix<double, 30, 1> reach;
     for (Eigen::Index i = 0; i < count; ++i) {
       const Residual& r = p.residuals[static_cast<std::size_t>(i)];
-      const double l2 = r.at[0], l3 = r.at[1], l1 = 1 - l2 - l3;
-      const std::array<double, 10> basis{l1 * l1 * l1,     l2 * l2 * l2,     l3 * l3 * l3,     3 * l1 * l1 * l2,
-                                         3 * l1 * l2 * l2, 3 * l2 * l2 * l3, 3 * l2 * l3 * l3, 3 * l3 * l3 * l1,
-                                         3 * l3 * l1 * l1, 6 * l1 * l2 * l3};
+      const auto basis = bernstein(r.at);
       for (std::size_t j = 0; j < 10; ++j) {
         reach.segment<3>(static_cast<Eigen::Index>(3 * j)) = basis[j] * r.direction;
       }

@@ -1,11 +1,12 @@
 #include "tunica/fit/relax.hpp"
 
+#include "tunica/core/clock.hpp"
 #include "tunica/core/error.hpp"
 #include "tunica/fit/detail/edits.hpp"
-#include "tunica/fit/detail/start.hpp"
 #include "tunica/fit/fit.hpp"
-#include "tunica/shell/distance/normals.hpp"
+#include "tunica/fit/detail/start.hpp"
 #include "tunica/shell/patch/curved_surface.hpp"
+#include "tunica/shell/distance/normals.hpp"
 #include "tunica/shell/patch/refine.hpp"
 #include "tunica/surface/mesh/checks.hpp"
 
@@ -13,7 +14,6 @@
 #include <Eigen/Geometry>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
 namespace tunica {
@@ -87,7 +87,7 @@ public:
 private:
   /// @return the distance's upper bound; nothing when the mesh has folded beyond repair
   std::optional<double> iterate() {
-    const auto start = std::chrono::steady_clock::now();
+    const auto start = Clock::now();
     RelaxIteration iteration;
     TriangleMesh mesh = flat_facets(current_);
     const double off_target = std::min(default_off_target * target_.diagonal(),
@@ -118,7 +118,7 @@ private:
     }
     iteration.shells = current_.triangles.size();
     iteration.hausdorff = distance.both;
-    iteration.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    iteration.seconds = seconds_since(start);
     result_.iterations.push_back(iteration);
     if (options_.on_iteration) {
       options_.on_iteration(iteration, result_.shell);

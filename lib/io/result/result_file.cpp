@@ -48,6 +48,11 @@ std::vector<double> flattened(const std::vector<Vec3>& vectors) {
   return values;
 }
 
+// Of the values of a field, in so many rows.
+std::vector<Size> shape_of(Size rows, Size components) {
+  return components == 1 ? std::vector<Size>{rows} : std::vector<Size>{rows, components};
+}
+
 // A field of the grid: in a series it grows and its offset is noted per state, else the one state is written again.
 class Field {
 public:
@@ -55,13 +60,11 @@ public:
   Field(const Writer& writer, hid_t group, hid_t offsets, const std::string& name, Size rows, Size components,
         bool series)
       : rows_(rows) {
-    const std::vector<Size> row = components == 1 ? std::vector<Size>{} : std::vector<Size>{components};
+    const std::vector<Size> shape = shape_of(rows, components);
     if (series) {
-      values_ = Series(writer, group, name, H5T_NATIVE_FLOAT, row, rows, true);
+      values_ = Series(writer, group, name, H5T_NATIVE_FLOAT, {shape.begin() + 1, shape.end()}, rows, true);
       offsets_ = Series(writer, offsets, name, H5T_NATIVE_INT64, {}, history_chunk, false);
     } else {
-      std::vector<Size> shape{rows};
-      shape.insert(shape.end(), row.begin(), row.end());
       only_ = writer.dataset(group, name, H5T_NATIVE_FLOAT, shape, nullptr, true);
     }
   }
@@ -254,12 +257,8 @@ struct ResultFile::Implementation {
     }
     const auto fixed_layout = ResultGrid::fixed_layout();
     for (std::size_t i = 0; i < fixed_layout.size(); ++i) {
-      std::vector<Size> shape{grid.points()};
-      if (fixed_layout[i].components > 1) {
-        shape.push_back(fixed_layout[i].components);
-      }
-      fixed.emplace_back(writer, point_data.get(), point_offsets.get(), fixed_layout[i].name, H5T_NATIVE_FLOAT, shape,
-                         grid.fixed()[i].data(), series);
+      fixed.emplace_back(writer, point_data.get(), point_offsets.get(), fixed_layout[i].name, H5T_NATIVE_FLOAT,
+                         shape_of(grid.points(), fixed_layout[i].components), grid.fixed()[i].data(), series);
     }
     fixed.emplace_back(writer, cell_data.get(), cell_offsets.get(), "body", H5T_NATIVE_INT32,
                        std::vector<Size>{grid.cells()}, grid.body_of_cell().data(), series);
@@ -270,11 +269,8 @@ struct ResultFile::Implementation {
                           (field.of_cells ? cell_offsets : point_offsets).get(), field.name,
                           field.of_cells ? grid.cells() : grid.points(), field.components, series);
       if (field.of_cells) {
-        std::vector<Size> row{grid.elements()};
-        if (field.components > 1) {
-          row.push_back(field.components);
-        }
-        elements.emplace_back(writer, element_group.get(), field.name, H5T_NATIVE_FLOAT, row, 1, true);
+        elements.emplace_back(writer, element_group.get(), field.name, H5T_NATIVE_FLOAT,
+                              shape_of(grid.elements(), field.components), 1, true);
       }
     }
   }

@@ -1,5 +1,6 @@
 #include "tunica/io/result/run_journal.hpp"
 
+#include "tunica/core/clock.hpp"
 #include "tunica/core/error.hpp"
 #include "tunica/core/version.hpp"
 #include "tunica/io/file/output_file.hpp"
@@ -11,7 +12,6 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <chrono>
 #include <cstring>
 #include <sstream>
 #include <type_traits>
@@ -19,8 +19,6 @@
 namespace tunica {
 namespace fs = std::filesystem;
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 constexpr std::string_view states_magic = "TUNICA STATES 1\n";
 constexpr std::string_view checkpoint_magic = "TUNICA CHECKPOINT 1\n";

@@ -1,6 +1,7 @@
 #include "tunica/io/scene/scene.hpp"
 
 #include "tunica/io/mesh/mesh_file.hpp"
+#include "tunica/surface/mesh/incidence.hpp"
 #include "tunica/surface/mesh/measure.hpp"
 
 #include <fmt/format.h>
@@ -124,29 +125,15 @@ std::vector<Index> boundary_nodes(const std::vector<std::array<Index, 2>>& edges
   return {nodes.begin(), nodes.end()};
 }
 
-// Edges with one triangle, in the direction of that triangle.
-std::vector<std::array<Index, 2>> boundary_edges(const ShellMesh& mesh) {
-  std::vector<std::array<Index, 4>> edges;  // smaller, larger, first, second
-  edges.reserve(3 * mesh.triangles.size());
-  for (const auto& triangle : mesh.triangles) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      const Index a = triangle[k];
-      const Index b = triangle[(k + 1) % 3];
-      edges.push_back({std::min(a, b), std::max(a, b), a, b});
-    }
-  }
-  std::sort(edges.begin(), edges.end());
+// The nodes of the boundary edges, in the direction of their triangles; in the order of (smaller, larger) node.
+std::vector<std::array<Index, 2>> boundary_of(const ShellMesh& mesh) {
+  const auto& triangles = mesh.triangles;
   std::vector<std::array<Index, 2>> boundary;
-  for (std::size_t i = 0; i < edges.size();) {
-    std::size_t next = i + 1;
-    while (next < edges.size() && edges[next][0] == edges[i][0] && edges[next][1] == edges[i][1]) {
-      ++next;
-    }
-    if (next == i + 1) {
-      boundary.push_back({edges[i][2], edges[i][3]});
-    }
-    i = next;
+  for (const auto& [t, k] : boundary_edges(neighbours(triangles, incidence(mesh.vertices.size(), triangles)))) {
+    boundary.push_back({triangles[t][k], triangles[t][(k + 1) % 3]});
   }
+  std::ranges::sort(boundary, {},
+                    [](const auto& edge) { return std::pair(std::min(edge[0], edge[1]), std::max(edge[0], edge[1])); });
   return boundary;
 }
 
@@ -159,7 +146,7 @@ struct Body {
 
   explicit Body(const ShellMesh& shell)
       : mesh(shell),
-        boundary(boundary_edges(shell)),
+        boundary(boundary_of(shell)),
         used(shell.vertices.size(), 0),
         tolerance(region_tolerance * diagonal(flat_facets(shell))) {
     for (const auto& triangle : shell.triangles) {

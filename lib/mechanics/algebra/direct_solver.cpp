@@ -106,7 +106,7 @@ struct Elimination {
         row_starts(static_cast<const int*>(symbolic.pi)),
         rows(static_cast<const int*>(symbolic.s)),
         node(nodes.size()),
-        first_freedom(nodes.size() + 1, 0),
+        first_row(nodes.size() + 1, 0),
         place(node_count, -1),
         front_of(nodes.size()),
         row_in_front(nodes.size(), 0) {
@@ -120,7 +120,7 @@ struct Elimination {
     }
   }
 
-  [[nodiscard]] std::int32_t size_of(std::size_t k) const { return first_freedom[k + 1] - first_freedom[k]; }
+  [[nodiscard]] std::int32_t size_of(std::size_t k) const { return first_row[k + 1] - first_row[k]; }
 
   /// The first of a front's rows that it does not eliminate.
   [[nodiscard]] int first_below(std::size_t s) const { return row_starts[s] + super[s + 1] - super[s]; }
@@ -139,7 +139,7 @@ struct Elimination {
   const int* row_starts;  ///< of each front in `rows`
   const int* rows;
   std::vector<Index> node;
-  std::vector<std::int32_t> first_freedom, place, front_of, row_in_front;
+  std::vector<std::int32_t> first_row, place, front_of, row_in_front;
 };
 
 }  // namespace
@@ -241,9 +241,9 @@ void DirectSolver::Implementation::make_fronts(const cholmod_factor& symbolic, c
   Elimination order(symbolic, nodes, pattern.node_count());
   for (std::size_t k = 0; k < order.node.size(); ++k) {
     for (const int c : components[order.node[k]]) {
-      freedoms.push_back(6 * static_cast<Eigen::Index>(order.node[k]) + c);
+      freedoms.push_back(first_freedom(order.node[k]) + c);
     }
-    order.first_freedom[k + 1] = static_cast<std::int32_t>(freedoms.size());
+    order.first_row[k + 1] = static_cast<std::int32_t>(freedoms.size());
   }
   fronts.resize(symbolic.nsuper);
   children.resize(symbolic.nsuper);
@@ -269,13 +269,13 @@ void DirectSolver::Implementation::make_fronts(const cholmod_factor& symbolic, c
 void DirectSolver::Implementation::make_front(std::size_t s, Elimination& order, const BlockMatrix& pattern) {
   Front& f = fronts[s];
   f.rows = order.number_rows(s);
-  f.first = static_cast<std::size_t>(order.first_freedom[static_cast<std::size_t>(order.super[s])]);
-  f.columns = order.first_freedom[static_cast<std::size_t>(order.super[s + 1])] - static_cast<std::int32_t>(f.first);
+  f.first = static_cast<std::size_t>(order.first_row[static_cast<std::size_t>(order.super[s])]);
+  f.columns = order.first_row[static_cast<std::size_t>(order.super[s + 1])] - static_cast<std::int32_t>(f.first);
   f.below = below.size();
   const int first_below = order.first_below(s);
   for (int r = first_below; r < order.row_starts[s + 1]; ++r) {
     const auto k = static_cast<std::size_t>(order.rows[r]);
-    for (std::int32_t d = order.first_freedom[k]; d < order.first_freedom[k + 1]; ++d) {
+    for (std::int32_t d = order.first_row[k]; d < order.first_row[k + 1]; ++d) {
       below.push_back(d);
     }
   }

@@ -32,7 +32,7 @@ struct BlockJacobi {
       for (std::size_t i = begin; i < end; ++i) {
         Matrix6 block = matrix.block(matrix.find(static_cast<Index>(i), static_cast<Index>(i)));
         for (int c = 0; c < 6; ++c) {
-          if (!free[6 * i + static_cast<std::size_t>(c)]) {
+          if (!free[freedom(i, static_cast<std::size_t>(c))]) {
             block.row(c).setZero();
             block.col(c).setZero();
             block(c, c) = 1;

@@ -1,18 +1,15 @@
 #include "tunica/core/error.hpp"
-#include "tunica/mechanics/runs/detail/run.hpp"
+#include "tunica/mechanics/runs/detail/stepped_run.hpp"
 #include "tunica/mechanics/runs/detail/supports.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
 
 namespace tunica {
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 constexpr double gmres_tolerance = 1e-4;
 constexpr std::size_t gmres_iterations = 30;
@@ -27,8 +24,6 @@ constexpr double retried = 6;
 constexpr double smallest_step = 1e-6;
 constexpr std::size_t wanted_iterations = 4;
 constexpr std::size_t most_iterations = 10;
-
-Eigen::Index at(std::size_t node) { return 6 * static_cast<Eigen::Index>(node); }
 
 double largest_rotation(const VectorX& increment) {
   double largest = 0;
@@ -61,11 +56,11 @@ public:
         matrix_(system.pattern),
         solver_(system.pattern, free_),
         prescribed_(prescribed_positions(system, model, 1)),
-        weights_(VectorX::Zero(at(system.node_count()))) {
+        weights_(VectorX::Zero(first_freedom(system.node_count()))) {
     const double share = 1 / static_cast<double>(system.node_count());
     for (std::size_t i = 0; i < system.node_count(); ++i) {
-      weights_.segment<3>(at(i)).setConstant(share);
-      weights_.segment<3>(at(i) + 3).setConstant(share * system.length * system.length);
+      weights_.segment<3>(first_freedom(i)).setConstant(share);
+      weights_.segment<3>(first_freedom(i) + 3).setConstant(share * system.length * system.length);
     }
   }
 
@@ -203,16 +198,11 @@ double limit_factor(const PathState& a, const PathState& b, double step) {
   return std::abs(a.factor_slope) < std::abs(b.factor_slope) ? a.factor : b.factor;
 }
 
-class PathRun {
+class PathRun final : public SteppedRun {
 public:
   PathRun(ShellSystem& system, const Model& model, const RunSettings& settings, const ArcLengthRun& run,
           const StateCallback& on_state)
-      : system_(system),
-        model_(model),
-        settings_(settings),
-        run_(run),
-        on_state_(on_state),
-        path_(system, model, settings) {
+      : SteppedRun(system, model, settings, on_state, run.max_steps), run_(run), path_(system, model, settings) {
     // A body under follower pressure alone may be turned as it stands.
     only_follows_ = std::all_of(model.loads.begin(), model.loads.end(), [](const Load& load) {
       const auto* pressure = std::get_if<PressureLoad>(&load.kind);
@@ -221,62 +211,74 @@ public:
   }
 
   Summary run(const Progress& progress) {
+    Summary summary = follow(progress);
+    require_goal();
+    return summary;
+  }
+
+private:
+  State begin() override {
     summary_.dof = path_.freedom_count();
     if (has_soft_waves(system_)) {  // else the limit points could be those of the mesh
       stiffen_short_waves(system_);
       summary_.stiffened_from = 0;
     }
-    PathState now;
-    now.configuration = reference_configuration(system_);
-    State state = make_state(system_, model_, now.configuration, 0);
-    state.converged = true;
-    on_state_(state);
-    summary_.volume_before = state.volume;
-    if (!path_.find_direction(now, {})) {
-      throw RequirementError("arc length: the stiffness of the reference is singular");
-    }
-    double step = run_.first_factor / now.factor_slope;
-    double length = step;
-    while (true) {
-      const auto start = Clock::now();
-      step = std::min(step, largest_turn / std::max(largest_rotation(now.direction), 1e-300));
-      PathState next;
-      bool ended = false;
-      if (!find(now, step, next) || departure(now, next, step, length) > retried) {
-        step /= 2;
-        if (step < smallest_step * length) {
-          fail(now);
-        }
-        continue;
-      }
-      const double depart = departure(now, next, step, length);
-      if (const auto end = end_between(now, next)) {
-        next = end_at(now, next, step, *end);
-        ended = true;
-        reached_ = reached_ || !end->factor;
-      }
-      note_stability(now, next, step);
-      const double grown =
-          std::clamp(std::min(std::sqrt(1 / std::max(depart, 1e-300)),
-                              std::sqrt(static_cast<double>(wanted_iterations) /
-                                        static_cast<double>(std::max<std::size_t>(1, next.iterations)))),
-                     0.5, 2.0);
-      length += step;
-      step *= grown;
-      now = std::move(next);
-      largest_factor_ = std::max(largest_factor_, std::abs(now.factor));
-      ended = ended || summary_.steps + 1 == run_.max_steps;
-      hand_over(now, ended, std::chrono::duration<double>(Clock::now() - start).count());
-      advance(progress, std::max(static_cast<double>(summary_.steps) / static_cast<double>(run_.max_steps),
-                                 run_.max_factor ? std::min(1.0, std::abs(now.factor) / *run_.max_factor) : 0.0));
-      if (ended) {
-        require_goal(now);
-        return summary_;
-      }
-    }
+    now_.configuration = reference_configuration(system_);
+    return reference_state();
   }
 
-private:
+  State take_step() override {
+    if (summary_.steps == 0) {
+      set_out();
+    }
+    PathState next;
+    double depart = 0;
+    while (true) {
+      step_ = std::min(step_, largest_turn / std::max(largest_rotation(now_.direction), 1e-300));
+      next = PathState();
+      if (find(now_, step_, next)) {
+        depart = departure(now_, next);
+        if (!(depart > retried)) {
+          break;
+        }
+      }
+      step_ /= 2;
+      if (step_ < smallest_step * length_) {
+        fail();
+      }
+    }
+    if (const auto end = end_between(now_, next)) {
+      next = end_at(now_, next, step_, *end);
+      ended_ = true;
+      reached_ = reached_ || !end->factor;
+    }
+    note_stability(now_, next, step_);
+    length_ += step_;
+    step_ *= growth(depart, next.iterations);
+    now_ = std::move(next);
+    largest_factor_ = std::max(largest_factor_, std::abs(now_.factor));
+    return state_now(summary_.steps + 1);
+  }
+
+  [[nodiscard]] double part_done() const override {
+    return std::max(SteppedRun::part_done(),
+                    run_.max_factor ? std::min(1.0, std::abs(now_.factor) / *run_.max_factor) : 0.0);
+  }
+
+  void set_out() {
+    if (!path_.find_direction(now_, {})) {
+      throw RequirementError("arc length: the stiffness of the reference is singular");
+    }
+    length_ = step_ = run_.first_factor / now_.factor_slope;
+  }
+
+  /// By which the next step is longer than one that departs from its chord so far, in so many iterations.
+  static double growth(double depart, std::size_t iterations) {
+    const double by_iterations =
+        static_cast<double>(wanted_iterations) / static_cast<double>(std::max<std::size_t>(1, iterations));
+    return std::clamp(std::min(std::sqrt(1 / std::max(depart, 1e-300)), std::sqrt(by_iterations)), 0.5, 2.0);
+  }
+
   /// The next state, without the rigid motion of bodies that are held by it, and the tangent there.
   bool find(const PathState& from, double step, PathState& state) {
     if (!path_.find_state(from, step, state)) {
@@ -291,11 +293,11 @@ private:
   }
 
   /// How far a straight line departs from the path between two states, in units of what is allowed.
-  [[nodiscard]] double departure(const PathState& a, const PathState& b, double step, double length) const {
+  [[nodiscard]] double departure(const PathState& a, const PathState& b) const {
     const VectorX turned = b.direction - a.direction;
-    const double of_displacement = std::sqrt(path_.product(turned, turned)) * step / 8 / length;
+    const double of_displacement = std::sqrt(path_.product(turned, turned)) * step_ / 8 / length_;
     const double largest = std::max({largest_factor_, std::abs(b.factor), run_.first_factor});
-    const double of_factor = std::abs(b.factor_slope - a.factor_slope) * step / 8 / largest;
+    const double of_factor = std::abs(b.factor_slope - a.factor_slope) * step_ / 8 / largest;
     return std::max(of_displacement / chord_of_displacement, of_factor / chord_of_factor);
   }
 
@@ -363,52 +365,44 @@ private:
     }
   }
 
-  void hand_over(const PathState& now, bool last, double seconds) {
-    State state = make_state(system_, model_, now.configuration, static_cast<double>(summary_.steps + 1));
-    state.load_factor = now.factor;
-    state.residual = now.residual;
-    state.newton_iterations = now.iterations;
+  [[nodiscard]] State state_now(std::size_t step) const {
+    State state = make_state(system_, model_, now_.configuration, static_cast<double>(step));
+    state.load_factor = now_.factor;
+    state.residual = now_.residual;
+    state.newton_iterations = now_.iterations;
     state.converged = true;
-    record_step(state, seconds, summary_);
-    if (summary_.steps % settings_.every == 0 || last) {
-      on_state_(state);
-      shown_ = summary_.steps;
-    }
+    return state;
   }
 
-  void require_goal(const PathState& now) const {
+  void require_goal() const {
     if (run_.until && !reached_) {
       const bool by_steps = summary_.steps == run_.max_steps;
       throw RequirementError(fmt::format(
           "arc length: the path ended after {} steps at load factor {:.6g}, by {}, before {} reached {:.6g} mm along "
           "{}: "
           "it is at {:.6g} mm",
-          summary_.steps, now.factor, by_steps ? "max_steps" : "max_factor", model_.probes[run_.until->probe].name,
-          run_.until->reaches, "xyz"[static_cast<std::size_t>(run_.until->axis)], goal_of(now.configuration)));
+          summary_.steps, now_.factor, by_steps ? "max_steps" : "max_factor", model_.probes[run_.until->probe].name,
+          run_.until->reaches, "xyz"[static_cast<std::size_t>(run_.until->axis)], goal_of(now_.configuration)));
     }
   }
 
-  [[noreturn]] void fail(const PathState& now) {
+  [[noreturn]] void fail() {
     if (shown_ != summary_.steps) {  // the last good state
-      --summary_.steps;
-      hand_over(now, true, 0);
+      hand_over(state_now(summary_.steps));
     }
     throw RequirementError(fmt::format(
         "arc length: no state was found beyond load factor {:.6g}, after {} steps, even with steps of {:.0e} "
         "of the path: it ends there, turns sharply or folds an element; the last good state is there",
-        now.factor, summary_.steps, smallest_step));
+        now_.factor, summary_.steps, smallest_step));
   }
 
-  ShellSystem& system_;
-  const Model& model_;
-  const RunSettings& settings_;
   const ArcLengthRun& run_;
-  const StateCallback& on_state_;
   PathSolver path_;
-  Summary summary_;
+  PathState now_;
+  double step_ = 0;    ///< arc length of the next step
+  double length_ = 0;  ///< of the path so far, and the first step
   bool only_follows_ = false;
   double largest_factor_ = 0;
-  std::size_t shown_ = 0;
   bool reached_ = false;  ///< what `until` asks for
 };
 

@@ -1,7 +1,7 @@
 #include "tunica/core/error.hpp"
 #include "tunica/mechanics/elements/rotation.hpp"
-#include "tunica/mechanics/runs/detail/run.hpp"
 #include "tunica/mechanics/runs/detail/settle.hpp"
+#include "tunica/mechanics/runs/detail/stepped_run.hpp"
 #include "tunica/mechanics/runs/detail/supports.hpp"
 #include "tunica/mechanics/runs/detail/time_scheme.hpp"
 
@@ -9,20 +9,15 @@
 
 #include <Eigen/Dense>
 
-#include <chrono>
 #include <cmath>
 
 namespace tunica {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 /// Smallest part of a step's change that is tried on its own.
 constexpr double smallest_part = 1.0 / 256;
 /// Smallest part of a step's time that error control may ask for.
 constexpr double shortest_part = 1.0 / 4096;
-
-Eigen::Index at(std::size_t node) { return 6 * static_cast<Eigen::Index>(node); }
 
 /// Whether a step's result may stand.
 bool is_solved(const RunSettings& settings, const NewtonResult& result) {
@@ -60,15 +55,15 @@ RigidMotion rigid_motion(const ShellSystem& system, const Piece& piece, const Co
   for (const Index i : piece.nodes) {
     mass += system.mass[i];
     centre += system.mass[i] * (system.reference[i] + c.displacement[i]);
-    momentum += system.mass[i] * velocities.segment<3>(at(i));
+    momentum += system.mass[i] * velocities.segment<3>(first_freedom(i));
   }
   centre /= mass;
   Vec3 spin = Vec3::Zero();
   Mat3 inertia = Mat3::Zero();
   for (const Index i : piece.nodes) {
     const Vec3 arm = system.reference[i] + c.displacement[i] - centre;
-    spin +=
-        system.mass[i] * arm.cross(velocities.segment<3>(at(i))) + system.inertia[i] * velocities.segment<3>(at(i) + 3);
+    spin += system.mass[i] * arm.cross(velocities.segment<3>(first_freedom(i))) +
+            system.inertia[i] * velocities.segment<3>(first_freedom(i) + 3);
     inertia += system.mass[i] * (arm.squaredNorm() * Mat3::Identity() - arm * arm.transpose()) +
                system.inertia[i] * Mat3::Identity();
   }
@@ -85,8 +80,8 @@ void stop_rigid_motion(const ShellSystem& system, const Piece& piece, double len
     const bool velocity = rates == &motion.rates.velocity;
     for (const Index i : piece.nodes) {
       const Vec3 change = rigid.at(system.reference[i] + moved.displacement[i]);
-      rates->segment<3>(at(i)) -= change;
-      rates->segment<3>(at(i) + 3) -= rigid.turn;
+      rates->segment<3>(first_freedom(i)) -= change;
+      rates->segment<3>(first_freedom(i) + 3) -= rigid.turn;
       if (velocity) {
         c.displacement[i] -= length * change;
         c.rotation[i] = (exponential(-length * rigid.turn) * c.rotation[i]).normalized();
@@ -109,12 +104,8 @@ public:
         scheme_(run),
         solver_(system, settings),
         matrix_(system.pattern),
-        mass_(VectorX::Zero(at(system.node_count()))),
+        mass_(lumped_masses(system)),
         part_(run.step) {
-    for (std::size_t i = 0; i < system.node_count(); ++i) {
-      mass_.segment<3>(at(i)).setConstant(system.mass[static_cast<Eigen::Index>(i)]);
-      mass_.segment<3>(at(i) + 3).setConstant(system.inertia[static_cast<Eigen::Index>(i)]);
-    }
     if (run.adaptive) {
       Vec3 low = system.reference.front();
       Vec3 high = low;
@@ -389,11 +380,7 @@ private:
       result.unbalanced -= (1 - part) * s.left_at_start;
     }
     VectorX reactions = forces_.internal + inertia;
-    for (std::size_t i = 0; i < system_.held.size(); ++i) {
-      if (!system_.held[i]) {
-        reactions[static_cast<Eigen::Index>(i)] = 0;
-      }
-    }
+    mask(system_.held, reactions);
     result.scale =
         std::max({force_norm(system_, forces_.external), force_norm(system_, inertia), force_norm(system_, reactions)});
     result.floor = round_off(system_, c);
@@ -455,10 +442,10 @@ private:
   }
 
   static void find_change(const Configuration& start, const Configuration& end, VectorX& change) {
-    change.resize(at(start.displacement.size()));
+    change.resize(first_freedom(start.displacement.size()));
     for (std::size_t i = 0; i < start.displacement.size(); ++i) {
-      change.segment<3>(at(i)) = end.displacement[i] - start.displacement[i];
-      change.segment<3>(at(i) + 3) = logarithm(end.rotation[i] * start.rotation[i].conjugate());
+      change.segment<3>(first_freedom(i)) = end.displacement[i] - start.displacement[i];
+      change.segment<3>(first_freedom(i) + 3) = logarithm(end.rotation[i] * start.rotation[i].conjugate());
     }
   }
 
@@ -466,10 +453,10 @@ private:
     const double factor = scheme_.acceleration_factor(length) + run_.damping.mass * scheme_.velocity_factor(length);
     for (std::size_t i = 0; i < system_.node_count(); ++i) {
       auto block = tangent.block(tangent.find(static_cast<Index>(i), static_cast<Index>(i)));
-      block.diagonal().head<3>() += factor * mass_.segment<3>(at(i));
-      const Vec3 turn = change.segment<3>(at(i) + 3);
+      block.diagonal().head<3>() += factor * mass_.segment<3>(first_freedom(i));
+      const Vec3 turn = change.segment<3>(first_freedom(i) + 3);
       block.block<3, 3>(3, 3) +=
-          factor * mass_[at(i) + 3] * spin_to_rate(turn, spin_coefficients(turn.squaredNorm()).eta);
+          factor * mass_[first_freedom(i) + 3] * spin_to_rate(turn, spin_coefficients(turn.squaredNorm()).eta);
     }
   }
 
@@ -500,65 +487,42 @@ double first_load_factor(const Model& model, double time) {
 }
 
 /// The steps of a run, what they hand over, and why one fails.
-class TimeLoop {
+class TimeLoop final : public SteppedRun {
 public:
   TimeLoop(ShellSystem& system, const Model& model, const RunSettings& settings, const DynamicRun& run,
            const StateCallback& on_state)
-      : system_(system),
-        model_(model),
-        settings_(settings),
+      : SteppedRun(system, model, settings, on_state, step_count(run)),
         run_(run),
-        on_state_(on_state),
         stepper_(system, model, settings, run),
-        motion_{reference_configuration(system), Rates::zero(at(system.node_count()))} {}
-
-  Summary follow(const Progress& progress, const Resumption& resumption) {
-    if (resumption.from) {
-      resume(*resumption.from);
-    } else {
-      begin();
-    }
-    // The last step may be shorter: the run ends at its duration.
-    const auto steps = static_cast<std::size_t>(std::max(1.0, std::ceil(run_.duration / run_.step - 1e-9)));
-    for (std::size_t s = summary_.steps; s < steps; ++s) {
-      const bool last = s + 1 == steps;
-      // Not of the first step, which is the longest without.
-      stepper_.tell_direct_error(s == 1 || last);
-      take_step(last ? run_.duration : static_cast<double>(s + 1) * run_.step, last);
-      resumption.offer([&] {
-        return Checkpoint{summary_, time_, motion_.configuration.displacement, motion_.configuration.rotation,
-                          stepper_.memory(motion_)};
-      });
-      advance(progress, static_cast<double>(s + 1) / static_cast<double>(steps));
-    }
-    return summary_;
-  }
+        motion_{reference_configuration(system), Rates::zero(first_freedom(system.node_count()))} {}
 
 private:
-  void begin() {
+  static std::size_t step_count(const DynamicRun& run) {
+    return static_cast<std::size_t>(std::max(1.0, std::ceil(run.duration / run.step - 1e-9)));
+  }
+
+  State begin() override {
     summary_.dof = stepper_.freedom_count();
     summary_.energy.emplace();
     stepper_.start(motion_);
-    State state = make_state(system_, model_, motion_.configuration, 0);
-    state.converged = true;
-    hand_over(state);
-    summary_.volume_before = state.volume;
-    summary_.volume_after = state.volume;
+    return state_now();
   }
 
-  void resume(const Checkpoint& from) {
-    summary_ = from.summary;
-    if (summary_.stiffened_from) {
-      stiffen_short_waves(system_);
-    }
+  void resume(const Checkpoint& from) override {
     time_ = from.position;
     motion_.configuration = {from.displacement, from.rotation};
     stepper_.recall(from.memory, motion_);
-    shown_ = summary_.steps / settings_.every * settings_.every;
   }
 
-  void take_step(double end, bool last) {
-    const auto start = Clock::now();
+  [[nodiscard]] Checkpoint checkpoint() const override {
+    return {{}, time_, motion_.configuration.displacement, motion_.configuration.rotation, stepper_.memory(motion_)};
+  }
+
+  State take_step() override {
+    // Not of the first step, which is the longest without.
+    stepper_.tell_direct_error(summary_.steps == 1 || is_last());
+    // The last step may be shorter: the run ends at its duration.
+    const double end = is_last() ? run_.duration : static_cast<double>(summary_.steps + 1) * run_.step;
     const Motion before = motion_;
     const TimeStepper::StepResult step = advance_stiffening(end);
     const NewtonResult& result = step.newton;
@@ -573,20 +537,14 @@ private:
     }
     time_ = end;
     stepper_.balance_energy(summary_.steps + 1, end, motion_, *summary_.energy);
-    const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
-    const bool wanted = (summary_.steps + 1) % settings_.every == 0 || last;
-    State state = wanted ? make_state(system_, model_, motion_.configuration, time_) : State();
+    summary_.parts += step.parts;
+    State state = wants_state() ? state_now() : State();
     state.residual = result.residual;
     state.newton_iterations = result.iterations;
     state.cg_iterations = result.cg_iterations;
     set_algebraic_error(result.algebraic_error, state);
     state.converged = settings_.newton_max == 1 ? result.linear_converged : result.converged;
-    if (wanted) {
-      hand_over(state);
-      shown_ = summary_.steps + 1;
-    }
-    summary_.parts += step.parts;
-    record_step(state, seconds, summary_);
+    return state;
   }
 
   /// A step that fails is taken again with its short waves made stiff, where the mesh is coarse for the thickness.
@@ -610,9 +568,7 @@ private:
   [[noreturn]] void fail(const TimeStepper::StepResult& step, const Motion& before, double end) {
     if (summary_.steps > shown_) {  // the last good state, also where it is none of every `every` steps
       motion_ = before;
-      State state = make_state(system_, model_, motion_.configuration, time_);
-      state.converged = true;
-      hand_over(state);
+      hand_over(state_now());
     }
     const NewtonResult& result = step.newton;
     const std::vector<double> wanted = load_factors(model_, false, end);
@@ -638,29 +594,25 @@ private:
                     result.residual, result.iterations, time_));
   }
 
-  void hand_over(State& state) {
+  [[nodiscard]] State state_now() const {
+    State state = make_state(system_, model_, motion_.configuration, time_);
+    state.converged = true;
     state.load_factor = first_load_factor(model_, state.time);
     state.kinetic_energy = stepper_.kinetic_energy(motion_.rates.velocity);
     state.velocity.resize(system_.node_count());
     state.angular_velocity.resize(system_.node_count());
     for (std::size_t i = 0; i < system_.node_count(); ++i) {
-      state.velocity[i] = motion_.rates.velocity.segment<3>(at(i));
-      state.angular_velocity[i] = motion_.rates.velocity.segment<3>(at(i) + 3);
+      state.velocity[i] = motion_.rates.velocity.segment<3>(first_freedom(i));
+      state.angular_velocity[i] = motion_.rates.velocity.segment<3>(first_freedom(i) + 3);
     }
-    on_state_(state);
+    return state;
   }
 
-  ShellSystem& system_;
-  const Model& model_;
-  const RunSettings& settings_;
   const DynamicRun& run_;
-  const StateCallback& on_state_;
   TimeStepper stepper_;
   Motion motion_;
-  Summary summary_;
   const bool soft_waves_ = has_soft_waves(system_);
   double time_ = 0;
-  std::size_t shown_ = 0;  ///< steps done at the last state handed over
 };
 
 }  // namespace

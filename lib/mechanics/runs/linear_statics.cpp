@@ -1,18 +1,15 @@
 #include "tunica/core/error.hpp"
 #include "tunica/mechanics/elements/rotation.hpp"
-#include "tunica/mechanics/runs/detail/run.hpp"
+#include "tunica/mechanics/runs/detail/stepped_run.hpp"
 #include "tunica/mechanics/runs/detail/supports.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
 namespace tunica {
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 /// Corrections stop where they fall below this part of the solution (energy norm), or do not halve any more.
 constexpr double fine_enough = 1e-9;
@@ -53,17 +50,31 @@ AlgebraicError refine(const ShellSystem& system, TangentSolver& solver, BlockMat
   }
 }
 
-class LinearLoads {
+class LinearLoads final : public SteppedRun {
 public:
-  LinearLoads(ShellSystem& system, const Model& model, const RunSettings& settings)
-      : system_(system), model_(model), settings_(settings), solver_(system, settings), matrix_(system.pattern) {
+  LinearLoads(ShellSystem& system, const Model& model, const RunSettings& settings, const StaticRun& run,
+              const StateCallback& on_state)
+      : SteppedRun(system, model, settings, on_state, run.load_factors.size()),
+        run_(run),
+        solver_(system, settings),
+        matrix_(system.pattern) {
     linear_stiffness(system, matrix_);
   }
 
-  [[nodiscard]] std::size_t freedom_count() const { return solver_.freedom_count(); }
+private:
+  State begin() override {
+    summary_.dof = solver_.freedom_count();
+    State state = reference_state();
+    state.linear = true;
+    return state;
+  }
 
-  /// The state at a load factor. Errors: RequirementError.
-  State solve(double factor, bool same_matrix) {
+  [[nodiscard]] Checkpoint checkpoint() const override {
+    return {{}, run_.load_factors[summary_.steps - 1], {}, {}, {}};
+  }
+
+  State take_step() override {
+    const double factor = run_.load_factors[summary_.steps];
     Forces forces;
     evaluate(system_, model_, reference_configuration(system_), load_factors(model_, true, factor), {}, forces,
              nullptr);
@@ -71,7 +82,8 @@ public:
     VectorX moved = prescribed_positions(system_, model_, factor);
     const VectorX right = unbalanced_by(system_, solver_.free(), external, moved);
     VectorX solution;
-    const TangentSolver::Result solved = solver_.solve(matrix_, right, solution, same_matrix);
+    const TangentSolver::Result solved = solver_.solve(matrix_, right, solution, factored_);
+    factored_ = true;
     if (!solved.solved || !solved.positive_definite) {
       throw RequirementError(
           "the linear stiffness is not positive definite: the model is not held, or its elements are "
@@ -99,7 +111,6 @@ public:
     return state;
   }
 
-private:
   /// Of a solution by conjugate gradients, along itself: what the stiffness and the elements' strains disagree by.
   double unseen_error(const VectorX& right, const VectorX& solution, const VectorX& external, const VectorX& moved) {
     VectorX product;
@@ -124,12 +135,12 @@ private:
     linear_forces(system_, moved, internal);
     Configuration configuration = reference_configuration(system_);
     for (std::size_t i = 0; i < system_.node_count(); ++i) {
-      configuration.displacement[i] = moved.segment<3>(6 * static_cast<Eigen::Index>(i));
-      configuration.rotation[i] = exponential(moved.segment<3>(6 * static_cast<Eigen::Index>(i) + 3));
+      configuration.displacement[i] = moved.segment<3>(first_freedom(i));
+      configuration.rotation[i] = exponential(moved.segment<3>(first_freedom(i) + 3));
     }
     State state = make_state(system_, model_, configuration, factor);
     for (std::size_t i = 0; i < system_.node_count(); ++i) {
-      state.rotation[i] = moved.segment<3>(6 * static_cast<Eigen::Index>(i) + 3);
+      state.rotation[i] = moved.segment<3>(first_freedom(i) + 3);
     }
     VectorX left = external - internal;
     mask(solver_.free(), left);
@@ -142,44 +153,17 @@ private:
     return state;
   }
 
-  ShellSystem& system_;
-  const Model& model_;
-  const RunSettings& settings_;
+  const StaticRun& run_;
   TangentSolver solver_;
   BlockMatrix matrix_;
+  bool factored_ = false;
 };
 
 }  // namespace
 
 Summary run_linear(ShellSystem& system, const Model& model, const RunSettings& settings, const StaticRun& run,
                    const StateCallback& on_state, const Progress& progress, const Resumption& resumption) {
-  Summary summary;
-  LinearLoads loads(system, model, settings);
-  if (resumption.from) {
-    summary = resumption.from->summary;
-  } else {
-    summary.dof = loads.freedom_count();
-    State state = make_state(system, model, reference_configuration(system), 0);
-    state.converged = true;
-    state.linear = true;
-    on_state(state);
-    summary.volume_before = state.volume;
-    summary.volume_after = state.volume;
-  }
-  const std::size_t first = summary.steps;
-  const std::size_t steps = run.load_factors.size();
-  for (std::size_t s = first; s < steps; ++s) {
-    const auto start = Clock::now();
-    const double factor = run.load_factors[s];
-    const State state = loads.solve(factor, s > first);
-    record_step(state, std::chrono::duration<double>(Clock::now() - start).count(), summary);
-    if ((s + 1) % settings.every == 0 || s + 1 == steps) {
-      on_state(state);
-    }
-    resumption.offer([&] { return Checkpoint{summary, factor, {}, {}, {}}; });  // no step needs the one before
-    advance(progress, static_cast<double>(s + 1) / static_cast<double>(steps));
-  }
-  return summary;
+  return LinearLoads(system, model, settings, run, on_state).follow(progress, resumption);
 }
 
 }  // namespace tunica

@@ -1,3 +1,4 @@
+#include "tunica/core/clock.hpp"
 #include "tunica/core/error.hpp"
 #include "tunica/mechanics/algebra/lanczos.hpp"
 #include "tunica/mechanics/elements/rotation.hpp"
@@ -9,7 +10,6 @@
 #include <Eigen/Dense>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -17,10 +17,6 @@
 
 namespace tunica {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 /// Largest displacement of a mode that is handed over, as part of the model's longest side.
 constexpr double shown_amplitude = 0.01;
@@ -33,8 +29,6 @@ constexpr double no_work = 1e-10;
 constexpr double largest_linear_strain = 0.2;
 /// The shift of a free body, of its lowest eigenvalue.
 constexpr double near_part = 0.2;
-
-Eigen::Index at(std::size_t node) { return 6 * static_cast<Eigen::Index>(node); }
 
 double longest_side(const ShellSystem& system) {
   Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity());
@@ -58,10 +52,10 @@ void require_freedoms(std::size_t wanted, std::size_t there) {
 VectorX linear_solution(ShellSystem& system, const Model& model, const RunSettings& settings) {
   State last;
   run_linear(system, model, settings, {true, {1}}, [&](const State& state) { last = state; }, {}, {});
-  VectorX solution(at(system.node_count()));
+  VectorX solution(first_freedom(system.node_count()));
   for (std::size_t i = 0; i < system.node_count(); ++i) {
-    solution.segment<3>(at(i)) = last.displacement[i];
-    solution.segment<3>(at(i) + 3) = last.rotation[i];
+    solution.segment<3>(first_freedom(i)) = last.displacement[i];
+    solution.segment<3>(first_freedom(i) + 3) = last.rotation[i];
   }
   return solution;
 }
@@ -74,7 +68,7 @@ double largest_strain(const ShellSystem& system, const VectorX& solution) {
       const Index a = element.nodes[k];
       const Index b = element.nodes[(k + 1) % 3];
       const Vec3 edge = system.reference[b] - system.reference[a];
-      const Vec3 change = solution.segment<3>(at(b)) - solution.segment<3>(at(a));
+      const Vec3 change = solution.segment<3>(first_freedom(b)) - solution.segment<3>(first_freedom(a));
       largest = std::max(largest, std::abs(edge.dot(change)) / edge.squaredNorm());
     }
   }
@@ -115,7 +109,7 @@ BlockMatrix tangent_change(const ShellSystem& system, const Model& model, const 
 void add(BlockMatrix& matrix, double factor, const VectorX& diagonal) {
   for (std::size_t i = 0; i < matrix.node_count(); ++i) {
     auto block = matrix.block(matrix.find(static_cast<Index>(i), static_cast<Index>(i)));
-    block.diagonal() += factor * diagonal.segment<6>(at(i));
+    block.diagonal() += factor * diagonal.segment<6>(first_freedom(i));
   }
 }
 
@@ -158,8 +152,8 @@ void hand_over(const ShellSystem& system, const Model& model, const RunSettings&
     before = state.time;
     state.load_factor = load_factor < 0 ? values[k] : load_factor;
     for (std::size_t i = 0; i < system.node_count(); ++i) {
-      state.displacement.emplace_back(mode.segment<3>(at(i)));
-      state.rotation.emplace_back(mode.segment<3>(at(i) + 3));
+      state.displacement.emplace_back(mode.segment<3>(first_freedom(i)));
+      state.rotation.emplace_back(mode.segment<3>(first_freedom(i) + 3));
     }
     state.linear = true;
     state.residual = pairs.residuals[k];
@@ -264,15 +258,6 @@ LanczosOptions rough_options() {
   return options;
 }
 
-VectorX masses(const ShellSystem& system) {
-  VectorX mass(at(system.node_count()));
-  for (std::size_t i = 0; i < system.node_count(); ++i) {
-    mass.segment<3>(at(i)).setConstant(system.mass[static_cast<Eigen::Index>(i)]);
-    mass.segment<3>(at(i) + 3).setConstant(system.inertia[static_cast<Eigen::Index>(i)]);
-  }
-  return mass;
-}
-
 /// The square of a circular frequency that is low against the flexible ones, yet far above round-off: (t / L)^2 times
 /// that of a membrane wave along the model.
 double small_shift(const ShellSystem& system, const Model& model) {
@@ -297,9 +282,9 @@ std::vector<VectorX> idle_rigid_modes(const ShellSystem& system, const Configura
     const auto count = static_cast<Eigen::Index>(modes.size());
     Eigen::MatrixXd work(count, count);
     Eigen::MatrixXd terms(count, count);
-    VectorX diagonal(at(system.node_count()));
+    VectorX diagonal(first_freedom(system.node_count()));
     for (std::size_t i = 0; i < system.node_count(); ++i) {
-      diagonal.segment<6>(at(i)) =
+      diagonal.segment<6>(first_freedom(i)) =
           stiffness.block(stiffness.find(static_cast<Index>(i), static_cast<Index>(i))).diagonal().cwiseAbs();
     }
     VectorX product;
@@ -313,7 +298,7 @@ std::vector<VectorX> idle_rigid_modes(const ShellSystem& system, const Configura
     const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> eigen(0.5 * (work + work.transpose()), terms);
     for (Eigen::Index k = 0; k < count; ++k) {
       if (std::abs(eigen.eigenvalues()[k]) < no_work) {
-        VectorX mode = VectorX::Zero(at(system.node_count()));
+        VectorX mode = VectorX::Zero(first_freedom(system.node_count()));
         for (Eigen::Index a = 0; a < count; ++a) {
           mode += eigen.eigenvectors()(a, k) * modes[static_cast<std::size_t>(a)];
         }
@@ -371,7 +356,7 @@ Summary run_frequencies(ShellSystem& system, const Model& model, const RunSettin
 
   const std::vector<VectorX> rigid = idle_rigid_modes(system, configuration, stiffness);
   require_freedoms(run.count, summary.dof - rigid.size());
-  const VectorX mass = masses(system);
+  const VectorX mass = lumped_masses(system);
   // Where a body is free the first shift is only known to be small against the lowest value; one that is near it keeps
   // the rigid motions, which the inverse enlarges, from drowning the modes in round-off.
   ShiftedPencil pencil(

@@ -16,17 +16,15 @@ constexpr double largest_viscosity = 1e6;
 constexpr double largest_push_back = 0.5;
 constexpr double largest_turn = 0.3;  // rad per iteration
 
-Eigen::Index at(std::size_t node) { return 6 * static_cast<Eigen::Index>(node); }
-
 /// The diagonal of the linear stiffness, one value per node for displacements and one for spins.
 VectorX viscous_diagonal(const ShellSystem& system) {
   BlockMatrix stiffness = system.pattern;
   linear_stiffness(system, stiffness);
-  VectorX diagonal(at(system.node_count()));
+  VectorX diagonal(first_freedom(system.node_count()));
   for (std::size_t i = 0; i < system.node_count(); ++i) {
     const auto block = stiffness.block(stiffness.find(static_cast<Index>(i), static_cast<Index>(i)));
-    diagonal.segment<3>(at(i)).setConstant(block.diagonal().head<3>().mean());
-    diagonal.segment<3>(at(i) + 3).setConstant(block.diagonal().tail<3>().mean());
+    diagonal.segment<3>(first_freedom(i)).setConstant(block.diagonal().head<3>().mean());
+    diagonal.segment<3>(first_freedom(i) + 3).setConstant(block.diagonal().tail<3>().mean());
   }
   return diagonal;
 }
@@ -34,7 +32,7 @@ VectorX viscous_diagonal(const ShellSystem& system) {
 void add_diagonal(double factor, const VectorX& diagonal, BlockMatrix& matrix) {
   for (std::size_t i = 0; i < matrix.node_count(); ++i) {
     auto block = matrix.block(matrix.find(static_cast<Index>(i), static_cast<Index>(i)));
-    block.diagonal() += factor * diagonal.segment<6>(at(i));
+    block.diagonal() += factor * diagonal.segment<6>(first_freedom(i));
   }
 }
 

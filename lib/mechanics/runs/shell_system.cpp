@@ -23,8 +23,6 @@ namespace {
 
 constexpr std::size_t grain = 16;  // batches
 
-Eigen::Index at(std::size_t node) { return 6 * static_cast<Eigen::Index>(node); }
-
 double mean_thickness(const ShellBody& body, const std::array<Index, 3>& triangle) {
   if (body.thickness.size() == 1) {
     return body.thickness[0];
@@ -110,7 +108,7 @@ void add_dead_pressure(const ShellSystem& system, std::size_t element, double va
   Vector9 force;
   unit_pressure(reference_corners(e), system.heights[element], force, nullptr);
   for (int k = 0; k < 3; ++k) {
-    load.force.segment<3>(at(e.nodes[static_cast<std::size_t>(k)])) += value * force.segment<3>(3 * k);
+    load.force.segment<3>(first_freedom(e.nodes[static_cast<std::size_t>(k)])) += value * force.segment<3>(3 * k);
   }
 }
 
@@ -125,7 +123,7 @@ void add_area_load(const ShellSystem& system, std::size_t element, const Vec3& p
   // The patch has more area than its facet.
   const double spread = 2 * e.area / (corners[1] - corners[0]).cross(corners[2] - corners[0]).norm();
   for (std::size_t k = 0; k < 3; ++k) {
-    load.force.segment<3>(at(e.nodes[k])) += in_plane + spread * across * plate.force[k] * normal;
+    load.force.segment<3>(first_freedom(e.nodes[k])) += in_plane + spread * across * plate.force[k] * normal;
     load.director[e.nodes[k]] += spread * across * normal * plate.director[k].transpose();
   }
 }
@@ -144,8 +142,8 @@ void add_edge_load(const ShellSystem& system, const Model& model, std::size_t bo
     const Index a = used_node(system, model, body, edge[0]);
     const Index b = used_node(system, model, body, edge[1]);
     const double length = (system.reference[a] - system.reference[b]).norm();
-    load.force.segment<3>(at(a)) += edge_load.per_length * (length / 2);
-    load.force.segment<3>(at(b)) += edge_load.per_length * (length / 2);
+    load.force.segment<3>(first_freedom(a)) += edge_load.per_length * (length / 2);
+    load.force.segment<3>(first_freedom(b)) += edge_load.per_length * (length / 2);
   }
 }
 
@@ -160,7 +158,7 @@ void make_loads(ShellSystem& system, const Model& model) {
       system.follower_pressures.emplace_back(l, load.body);
       continue;
     }
-    dead.force = VectorX::Zero(at(system.node_count()));
+    dead.force = VectorX::Zero(first_freedom(system.node_count()));
     if (std::holds_alternative<AreaLoad>(load.kind)) {
       dead.director.assign(system.node_count(), Mat3::Zero());
     }
@@ -174,19 +172,19 @@ void make_loads(ShellSystem& system, const Model& model) {
       }
     } else if (const auto* force = std::get_if<ForceLoad>(&load.kind)) {
       for (const Index node : force->nodes) {
-        dead.force.segment<3>(at(used_node(system, model, load.body, node))) +=
+        dead.force.segment<3>(first_freedom(used_node(system, model, load.body, node))) +=
             force->total / static_cast<double>(force->nodes.size());
       }
     } else if (const auto* moment = std::get_if<MomentLoad>(&load.kind)) {
       for (const Index node : moment->nodes) {
-        dead.force.segment<3>(at(used_node(system, model, load.body, node)) + 3) +=
+        dead.force.segment<3>(first_freedom(used_node(system, model, load.body, node)) + 3) +=
             moment->total / static_cast<double>(moment->nodes.size());
       }
     } else if (const auto* edge = std::get_if<EdgeLoad>(&load.kind)) {
       add_edge_load(system, model, load.body, *edge, dead);
     } else if (const auto* gravity = std::get_if<GravityLoad>(&load.kind)) {
       for (std::size_t i = model.first_node(load.body); i < model.first_node(load.body + 1); ++i) {
-        dead.force.segment<3>(at(i)) = system.mass[static_cast<Eigen::Index>(i)] * gravity->acceleration;
+        dead.force.segment<3>(first_freedom(i)) = system.mass[static_cast<Eigen::Index>(i)] * gravity->acceleration;
       }
     }
   }
@@ -282,7 +280,7 @@ void add_dead_loads(const ShellSystem& system, const Configuration& configuratio
     for (std::size_t i = 0; i < load.director.size(); ++i) {
       // Moment: sum of (R n) x g. With M = R n g' its spin derivative is M - trace(M).
       const Mat3 m = factor * (configuration.rotation[i] * load.director[i]);
-      external.segment<3>(at(i) + 3) += Vec3(m(1, 2) - m(2, 1), m(2, 0) - m(0, 2), m(0, 1) - m(1, 0));
+      external.segment<3>(first_freedom(i) + 3) += Vec3(m(1, 2) - m(2, 1), m(2, 0) - m(0, 2), m(0, 1) - m(1, 0));
       if (tangent != nullptr) {
         auto block = tangent->block(tangent->find(static_cast<Index>(i), static_cast<Index>(i)));
         block.block<3, 3>(3, 3) += m.trace() * Mat3::Identity() - m;
@@ -405,8 +403,8 @@ Configuration reference_configuration(const ShellSystem& system) {
 
 void advance_configuration(Configuration& configuration, const VectorX& increment) {
   for (std::size_t i = 0; i < configuration.displacement.size(); ++i) {
-    configuration.displacement[i] += increment.segment<3>(at(i));
-    const Vec3 spin = increment.segment<3>(at(i) + 3);
+    configuration.displacement[i] += increment.segment<3>(first_freedom(i));
+    const Vec3 spin = increment.segment<3>(first_freedom(i) + 3);
     if (spin != Vec3::Zero()) {
       configuration.rotation[i] = (exponential(spin) * configuration.rotation[i]).normalized();
     }
@@ -427,7 +425,7 @@ std::vector<double> load_factors(const Model& model, bool is_static, double time
 
 void evaluate(const ShellSystem& system, const Model& model, const Configuration& configuration,
               const std::vector<double>& factors, const ViscousState& viscous, Forces& forces, BlockMatrix* tangent) {
-  const Eigen::Index size = at(system.node_count());
+  const Eigen::Index size = first_freedom(system.node_count());
   forces.internal.setZero(size);
   forces.external.setZero(size);
   forces.deformation.resize(system.elements.size());
@@ -480,12 +478,13 @@ void evaluate(const ShellSystem& system, const Model& model, const Configuration
           energies[e] = response.energy[l];
           const Vector18 internal = lane(response.force, l);
           for (int k = 0; k < 3; ++k) {
-            forces.internal.segment<6>(at(group[l]->nodes[static_cast<std::size_t>(k)])) += internal.segment<6>(6 * k);
+            forces.internal.segment<6>(first_freedom(group[l]->nodes[static_cast<std::size_t>(k)])) +=
+                internal.segment<6>(6 * k);
           }
           if (is_pushed) {
             const Vector18 external = lane(pushed, l);
             for (int k = 0; k < 3; ++k) {
-              forces.external.segment<6>(at(group[l]->nodes[static_cast<std::size_t>(k)])) +=
+              forces.external.segment<6>(first_freedom(group[l]->nodes[static_cast<std::size_t>(k)])) +=
                   external.segment<6>(6 * k);
             }
           }
@@ -518,7 +517,7 @@ void linear_stiffness(const ShellSystem& system, BlockMatrix& matrix) {
 }
 
 void linear_forces(const ShellSystem& system, const VectorX& displacement, VectorX& forces) {
-  forces.setZero(at(system.node_count()));
+  forces.setZero(first_freedom(system.node_count()));
   for (const std::vector<Batch>& colour : system.colours) {
     parallel_for_blocks(colour.size(), grain, [&](std::size_t begin, std::size_t end) {
       ElementLanes elements;
@@ -529,14 +528,15 @@ void linear_forces(const ShellSystem& system, const VectorX& displacement, Vecto
         for (int k = 0; k < 3; ++k) {
           const auto corner = static_cast<std::size_t>(k);
           LaneVector6 moved;
-          set_lanes(moved, [&](std::size_t l) { return displacement.segment<6>(at(group[l]->nodes[corner])); });
+          set_lanes(moved,
+                    [&](std::size_t l) { return displacement.segment<6>(first_freedom(group[l]->nodes[corner])); });
           motion.segment<6>(6 * k) = moved;
         }
         const LaneVector18 force = linear_force(elements, motion);
         for (std::size_t l = 0; l < colour[b].count; ++l) {
           const Vector18 one = lane(force, l);
           for (int k = 0; k < 3; ++k) {
-            forces.segment<6>(at(group[l]->nodes[static_cast<std::size_t>(k)])) += one.segment<6>(6 * k);
+            forces.segment<6>(first_freedom(group[l]->nodes[static_cast<std::size_t>(k)])) += one.segment<6>(6 * k);
           }
         }
       }
@@ -544,11 +544,20 @@ void linear_forces(const ShellSystem& system, const VectorX& displacement, Vecto
   }
 }
 
+VectorX lumped_masses(const ShellSystem& system) {
+  VectorX mass(first_freedom(system.node_count()));
+  for (std::size_t i = 0; i < system.node_count(); ++i) {
+    mass.segment<3>(first_freedom(i)).setConstant(system.mass[static_cast<Eigen::Index>(i)]);
+    mass.segment<3>(first_freedom(i) + 3).setConstant(system.inertia[static_cast<Eigen::Index>(i)]);
+  }
+  return mass;
+}
+
 double force_norm(const ShellSystem& system, const VectorX& force) {
   double sum = 0;
   for (std::size_t i = 0; i < system.node_count(); ++i) {
-    sum += force.segment<3>(at(i)).squaredNorm() +
-           force.segment<3>(at(i) + 3).squaredNorm() / (system.length * system.length);
+    sum += force.segment<3>(first_freedom(i)).squaredNorm() +
+           force.segment<3>(first_freedom(i) + 3).squaredNorm() / (system.length * system.length);
   }
   return std::sqrt(sum);
 }
@@ -643,7 +652,7 @@ void take_out_linear_rigid_motion(const ShellSystem& system, const Model& model,
     for (const Index i : piece.nodes) {
       weight += system.area[i];
       centre += system.area[i] * system.reference[i];
-      shift += system.area[i] * displacement.segment<3>(at(i));
+      shift += system.area[i] * displacement.segment<3>(first_freedom(i));
     }
     centre /= weight;
     shift /= weight;
@@ -651,13 +660,13 @@ void take_out_linear_rigid_motion(const ShellSystem& system, const Model& model,
     Mat3 inertia = Mat3::Zero();
     for (const Index i : piece.nodes) {
       const Vec3 arm = system.reference[i] - centre;
-      moment += system.area[i] * arm.cross(displacement.segment<3>(at(i)) - shift);
+      moment += system.area[i] * arm.cross(displacement.segment<3>(first_freedom(i)) - shift);
       inertia += system.area[i] * (arm.squaredNorm() * Mat3::Identity() - arm * arm.transpose());
     }
     const Vec3 turn = inertia.ldlt().solve(moment);
     for (const Index i : piece.nodes) {
-      displacement.segment<3>(at(i)) -= shift + turn.cross(system.reference[i] - centre);
-      displacement.segment<3>(at(i) + 3) -= turn;
+      displacement.segment<3>(first_freedom(i)) -= shift + turn.cross(system.reference[i] - centre);
+      displacement.segment<3>(first_freedom(i) + 3) -= turn;
     }
   }
 }

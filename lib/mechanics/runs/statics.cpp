@@ -1,20 +1,19 @@
 #include "tunica/core/error.hpp"
 #include "tunica/mechanics/elements/rotation.hpp"
-#include "tunica/mechanics/runs/detail/run.hpp"
 #include "tunica/mechanics/runs/detail/settle.hpp"
+#include "tunica/mechanics/runs/detail/stepped_run.hpp"
 #include "tunica/mechanics/runs/detail/supports.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 
 namespace tunica {
 
 VectorX prescribed_positions(const ShellSystem& system, const Model& model, double factor) {
-  VectorX positions = VectorX::Zero(static_cast<Eigen::Index>(6 * system.node_count()));
+  VectorX positions = VectorX::Zero(first_freedom(system.node_count()));
   for (const PrescribedFreedom& p : system.prescribed) {
     positions[static_cast<Eigen::Index>(p.freedom)] = p.value * factor_of(model.fixes[p.fix].ramp, true, factor);
   }
@@ -28,21 +27,13 @@ Balance static_balance(const ShellSystem& system, const Model& model, const Conf
   balance.valid = forces.valid;
   balance.unbalanced = forces.external - forces.internal;
   VectorX reactions = forces.internal;
-  for (std::size_t i = 0; i < system.held.size(); ++i) {
-    if (!system.held[i]) {
-      reactions[static_cast<Eigen::Index>(i)] = 0;
-    }
-  }
+  mask(system.held, reactions);
   balance.scale = std::max(force_norm(system, forces.external), force_norm(system, reactions));
   balance.floor = round_off(system, configuration);
   return balance;
 }
 
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 /// Smallest increment that is tried before the load counts as one without equilibrium near: this part of the whole
 /// load, and of a load step.
@@ -203,66 +194,35 @@ Failure why(const NewtonResult& result, const SettleResult& let_go, bool prescri
 /// What load control does: the load grows to one load factor after the other, each in one step, which is cut only where
 /// Newton's method fails. Where the path of equilibria breaks off, the shell goes on from the state of rest that it
 /// then finds.
-class LoadControl {
+class LoadControl final : public SteppedRun {
 public:
   LoadControl(ShellSystem& system, const Model& model, const RunSettings& settings, const StaticRun& run,
               const StateCallback& on_state)
-      : system_(system),
-        model_(model),
-        settings_(settings),
+      : SteppedRun(system, model, settings, on_state, run.load_factors.size()),
         run_(run),
-        on_state_(on_state),
         step_(system, model, settings),
         thickness_(least_thickness(model)),
         configuration_(reference_configuration(system)) {}
 
-  Summary follow(const Progress& progress, const Resumption& resumption) {
-    if (resumption.from) {
-      resume(*resumption.from);
-    } else {
-      begin();
-    }
-    const std::size_t steps = run_.load_factors.size();
-    for (std::size_t s = summary_.steps; s < steps; ++s) {
-      const auto start = Clock::now();
-      step_.tell_direct_error(s == 0 || s + 1 == steps);
-      const NewtonResult result = reach(run_.load_factors[s]);
-      const State state = state_of(result);
-      record_step(state, seconds_since(start), summary_);
-      if ((s + 1) % settings_.every == 0 || s + 1 == steps) {
-        show(state);
-      }
-      resumption.offer([&] {
-        return Checkpoint{summary_,
-                          factor_,
-                          configuration_.displacement,
-                          configuration_.rotation,
-                          {{"shown", {shown_}}, {"increment", {increment_}}}};
-      });
-      advance(progress, static_cast<double>(s + 1) / static_cast<double>(steps));
-    }
-    return summary_;
-  }
-
 private:
-  void begin() {
+  State begin() override {
     summary_.dof = step_.freedom_count();
-    State state = make_state(system_, model_, configuration_, 0);
-    state.converged = true;
-    on_state_(state);
-    summary_.volume_before = state.volume;
-    summary_.volume_after = state.volume;
+    return reference_state();
   }
 
-  void resume(const Checkpoint& from) {
-    summary_ = from.summary;
-    if (summary_.stiffened_from) {
-      stiffen_short_waves(system_);
-    }
+  void resume(const Checkpoint& from) override {
     configuration_ = {from.displacement, from.rotation};
     factor_ = from.position;
-    shown_ = from.memory.at("shown").at(0);
     increment_ = from.memory.at("increment").at(0);
+  }
+
+  State take_step() override {
+    step_.tell_direct_error(summary_.steps == 0 || is_last());
+    return state_of(reach(run_.load_factors[summary_.steps]));
+  }
+
+  [[nodiscard]] Checkpoint checkpoint() const override {
+    return {{}, factor_, configuration_.displacement, configuration_.rotation, {{"increment", {increment_}}}};
   }
 
   /// Equilibrium at a load factor. Errors: RequirementError: there is none.
@@ -334,10 +294,10 @@ private:
   }
 
   [[noreturn]] void fail(const NewtonResult& failed, const SettleResult& let_go) {
-    if (factor_ != shown_) {  // the last good state, also between two load steps
+    if (factor_ != (shown_ == 0 ? 0 : run_.load_factors[shown_ - 1])) {  // the last good state, also within a step
       NewtonResult good;
       good.converged = true;
-      show(state_of(good));
+      hand_over(state_of(good));
     }
     const double last = run_.load_factors.back();
     const auto [found, reason] = why(failed, let_go, !system_.prescribed.empty());
@@ -358,22 +318,11 @@ private:
     return state;
   }
 
-  void show(const State& state) {
-    on_state_(state);
-    shown_ = factor_;
-  }
-
-  ShellSystem& system_;
-  const Model& model_;
-  const RunSettings& settings_;
   const StaticRun& run_;
-  const StateCallback& on_state_;
   LoadStep step_;
   const double thickness_;
   Configuration configuration_;
-  Summary summary_;
   double factor_ = 0;
-  double shown_ = 0;                                            ///< load factor of the last state handed over
   double increment_ = std::numeric_limits<double>::infinity();  ///< of the load factor, to be tried next
 };
 

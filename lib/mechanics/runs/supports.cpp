@@ -67,8 +67,7 @@ std::vector<std::size_t> determinate_supports(const ShellSystem& system, const P
   std::vector<std::size_t> freedoms;
   for (int k = 0; k < 6; ++k) {
     const int chosen = qr.colsPermutation().indices()[k];
-    freedoms.push_back(6 * std::size_t{nodes[static_cast<std::size_t>(chosen / 3)]} +
-                       static_cast<std::size_t>(chosen % 3));
+    freedoms.push_back(freedom(nodes[static_cast<std::size_t>(chosen / 3)], static_cast<std::size_t>(chosen % 3)));
   }
   return freedoms;
 }
@@ -81,17 +80,17 @@ bool held_by_rigid_motions(const Model& model, std::size_t body) {
 }
 
 void make_supports(ShellSystem& system, const Model& model) {
-  system.held.assign(6 * system.node_count(), false);
+  system.held.assign(freedom(system.node_count(), 0), false);
   system.prescribed.clear();
   std::map<std::size_t, std::pair<double, std::size_t>> values;  // freedom -> (displacement, fix)
   for (std::size_t f = 0; f < model.fixes.size(); ++f) {
     const Fix& fix = model.fixes[f];
     for (const Index node : fix.nodes) {
       for (std::size_t c = 0; c < 3; ++c) {
-        const std::size_t freedom = 6 * (model.first_node(fix.body) + node) + c;
+        const std::size_t moved = freedom(model.first_node(fix.body) + node, c);
         if (fix.translation[c]) {
           const double value = fix.displacement[static_cast<Eigen::Index>(c)];
-          const auto [place, is_new] = values.emplace(freedom, std::pair(value, f));
+          const auto [place, is_new] = values.emplace(moved, std::pair(value, f));
           if (!is_new && place->second.first != value) {
             const Fix& other = model.fixes[place->second.second];
             throw InputError(fmt::format(
@@ -99,10 +98,10 @@ void make_supports(ShellSystem& system, const Model& model) {
                 fix.said_at.empty() ? "" : fix.said_at + ": ", model.shells[fix.body].name, place->second.first,
                 other.said_at.empty() ? "" : " (" + other.said_at + ")", value, "xyz"[c], node));
           }
-          system.held[freedom] = true;
+          system.held[moved] = true;
         }
         if (fix.rotation[c]) {
-          system.held[freedom + 3] = true;
+          system.held[moved + 3] = true;
         }
       }
     }
@@ -121,7 +120,7 @@ void make_supports(ShellSystem& system, const Model& model) {
   }
   for (std::size_t i = 0; i < system.node_count(); ++i) {
     if (system.used[i] == 0) {
-      std::fill_n(system.held.begin() + static_cast<std::ptrdiff_t>(6 * i), 6, true);
+      std::fill_n(system.held.begin() + first_freedom(i), 6, true);
     }
   }
 }
@@ -130,7 +129,7 @@ void release_rigid_motion_supports(ShellSystem& system, const Model& model) {
   for (const Piece& piece : system.pieces) {
     if (held_by_rigid_motions(model, piece.body)) {
       for (const Index i : piece.nodes) {
-        std::fill_n(system.held.begin() + static_cast<std::ptrdiff_t>(6 * std::size_t{i}), 6, false);
+        std::fill_n(system.held.begin() + first_freedom(i), 6, false);
       }
     }
   }
@@ -150,7 +149,7 @@ std::vector<VectorX> free_rigid_modes(const ShellSystem& system, const Piece& pi
   Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
   for (const Index i : piece.nodes) {
     for (int c = 0; c < 6; ++c) {
-      if (system.held[6 * std::size_t{i} + static_cast<std::size_t>(c)]) {
+      if (system.held[freedom(i, static_cast<std::size_t>(c))]) {
         const Row6 row = row_of(i, c);
         normal += row.transpose() * row;
       }
@@ -160,11 +159,11 @@ std::vector<VectorX> free_rigid_modes(const ShellSystem& system, const Piece& pi
   std::vector<VectorX> modes;
   for (int k = 0; k < 6; ++k) {
     if (eigen.eigenvalues()[k] < 1e-10) {
-      VectorX mode = VectorX::Zero(6 * static_cast<Eigen::Index>(system.node_count()));
+      VectorX mode = VectorX::Zero(first_freedom(system.node_count()));
       for (const Index i : piece.nodes) {
         for (int c = 0; c < 6; ++c) {
           const double motion = row_of(i, c) * eigen.eigenvectors().col(k);
-          mode[6 * static_cast<Eigen::Index>(i) + c] = c < 3 ? motion : motion / size;
+          mode[first_freedom(i) + c] = c < 3 ? motion : motion / size;
         }
       }
       modes.push_back(mode);
@@ -180,8 +179,8 @@ double imbalance(const ShellSystem& system, const Piece& piece, const VectorX& e
   Vec3 moment = Vec3::Zero();
   double magnitude = 0;
   for (const Index i : piece.nodes) {
-    const Vec3 f = external.segment<3>(6 * static_cast<Eigen::Index>(i));
-    const Vec3 m = external.segment<3>(6 * static_cast<Eigen::Index>(i) + 3);
+    const Vec3 f = external.segment<3>(first_freedom(i));
+    const Vec3 m = external.segment<3>(first_freedom(i) + 3);
     force += f;
     moment += (system.reference[i] - centre).cross(f) + m;
     magnitude += f.norm() + m.norm() / size;

@@ -36,17 +36,12 @@ Vec2 place_on_edge(std::size_t k, double s) {
 }
 
 std::vector<CubicCurve> boundary_curves(const ShellMesh& shell) {
-  const auto across = neighbours(flat_facets(shell), incidence(flat_facets(shell)));
-  std::vector<CubicPatch> patches;
+  const auto edges = boundary_edges(neighbours(flat_facets(shell), incidence(flat_facets(shell))));
   std::vector<CubicCurve> curves;
-  for (std::size_t t = 0; t < across.size(); ++t) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      if (across[t][k] == no_neighbour) {
-        if (patches.empty()) {
-          patches = curved_patches(shell);
-        }
-        curves.push_back(edge_curve(patches[t], k));
-      }
+  if (!edges.empty()) {
+    const auto patches = curved_patches(shell);
+    for (const auto& [t, k] : edges) {
+      curves.push_back(edge_curve(patches[t], k));
     }
   }
   return curves;

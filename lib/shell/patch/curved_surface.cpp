@@ -21,23 +21,6 @@ constexpr std::size_t patches_per_block = 64;
 constexpr double least_height = 1e-6;  // of the longest edge: less has no usable stiffness in double precision
 constexpr double crease_squared = 0.12061475842818326;  // (2 sin 10 degrees)^2: normals 20 degrees apart
 
-// Cubic Bernstein polynomials and derivatives in the order of CubicPatch::control, l = (l1, l2, l3).
-using Basis = std::array<double, 10>;
-
-Basis bernstein(double l1, double l2, double l3) {
-  return {l1 * l1 * l1,     l2 * l2 * l2,     l3 * l3 * l3,     3 * l1 * l1 * l2, 3 * l1 * l2 * l2,
-          3 * l2 * l2 * l3, 3 * l2 * l3 * l3, 3 * l3 * l3 * l1, 3 * l3 * l1 * l1, 6 * l1 * l2 * l3};
-}
-
-template <typename T>
-T combine(const Basis& basis, const std::array<T, 10>& control) {
-  T sum = basis[0] * control[0];
-  for (std::size_t i = 1; i < 10; ++i) {
-    sum += basis[i] * control[i];
-  }
-  return sum;
-}
-
 /// The quadratic Bezier triangle of derivatives along the direction with barycentric components d (sum 0), divided by
 /// 3: control points 200, 020, 002, 110, 011, 101.
 std::array<Vec3, 6> directional(const std::array<Vec3, 10>& p, const Vec3& d) {
@@ -177,7 +160,20 @@ double flux_volume(const CubicPatch& patch, const Vec3& origin) {
 
 }  // namespace
 
-Vec3 CubicPatch::point(const Vec2& b) const { return combine(bernstein(1 - b[0] - b[1], b[0], b[1]), control); }
+std::array<double, 10> bernstein(const Vec2& b) {
+  const double l1 = 1 - b[0] - b[1], l2 = b[0], l3 = b[1];
+  return {l1 * l1 * l1,     l2 * l2 * l2,     l3 * l3 * l3,     3 * l1 * l1 * l2, 3 * l1 * l2 * l2,
+          3 * l2 * l2 * l3, 3 * l2 * l3 * l3, 3 * l3 * l3 * l1, 3 * l3 * l1 * l1, 6 * l1 * l2 * l3};
+}
+
+Vec3 CubicPatch::point(const Vec2& b) const {
+  const auto basis = bernstein(b);
+  Vec3 sum = basis[0] * control[0];
+  for (std::size_t i = 1; i < 10; ++i) {
+    sum += basis[i] * control[i];
+  }
+  return sum;
+}
 
 std::array<Vec3, 2> CubicPatch::tangents(const Vec2& b) const {
   const double l1 = 1 - b[0] - b[1];

@@ -28,6 +28,9 @@ struct CubicPatch {
   [[nodiscard]] Vec3 normal(const Vec2& b) const;
 };
 
+/// The ten cubic Bernstein polynomials in the order of CubicPatch::control.
+std::array<double, 10> bernstein(const Vec2& b);
+
 /// The patch of the paper's shape function over a facet: flat point + w n, w(corners) = 0, gradient of w at a corner
 /// -(N·e)/(N·n) for in-plane axes e, averaged over the three choices of the first vertex.
 /// @param corners  positions, counter-clockwise; normals  unit normals N at them

@@ -87,6 +87,18 @@ std::vector<std::vector<Index>> loops_of(std::vector<DirectedEdge> edges) {
 
 }  // namespace
 
+std::vector<std::array<Index, 2>> boundary_edges(std::span<const std::array<Index, 3>> across) {
+  std::vector<std::array<Index, 2>> edges;
+  for (Index t = 0; t < across.size(); ++t) {
+    for (Index k = 0; k < 3; ++k) {
+      if (across[t][k] == no_neighbour) {
+        edges.push_back({t, k});
+      }
+    }
+  }
+  return edges;
+}
+
 std::vector<std::vector<Index>> boundary_loops(const TriangleMesh& mesh) {
   // The edges known so far in a list at their end with fewer triangles, each with the number of its triangles.
   struct Edge {
@@ -135,12 +147,8 @@ std::vector<std::vector<Index>> boundary_loops(const TriangleMesh& mesh) {
 std::vector<std::vector<Index>> boundary_loops(std::span<const std::array<Index, 3>> triangles,
                                                std::span<const std::array<Index, 3>> across) {
   std::vector<DirectedEdge> edges;
-  for (std::size_t t = 0; t < triangles.size(); ++t) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      if (across[t][k] == no_neighbour) {
-        edges.emplace_back(triangles[t][k], triangles[t][(k + 1) % 3]);
-      }
-    }
+  for (const auto& [t, k] : boundary_edges(across)) {
+    edges.emplace_back(triangles[t][k], triangles[t][(k + 1) % 3]);
   }
   return loops_of(std::move(edges));
 }

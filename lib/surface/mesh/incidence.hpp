@@ -29,6 +29,10 @@ inline std::vector<std::array<Index, 3>> neighbours(const TriangleMesh& mesh, co
   return neighbours(mesh.triangles, around);
 }
 
+/// The boundary edges: triangle t, and k of the edge from its corner k to corner k + 1; in the order of (t, k).
+/// @param across  neighbours()
+std::vector<std::array<Index, 2>> boundary_edges(std::span<const std::array<Index, 3>> across);
+
 /// The boundary of an oriented manifold as closed loops of vertices, each in the direction of its triangles' edges.
 /// Limits: where the boundary touches itself at a vertex, the loops there are split in one of the possible ways.
 /// @param across  neighbours(), where known

@@ -118,6 +118,9 @@ void linear_stiffness(const ShellSystem& system, BlockMatrix& matrix);
 /// bends with.
 void linear_forces(const ShellSystem& system, const VectorX& displacement, VectorX& forces);
 
+/// Mass and rotary inertia of each freedom.
+VectorX lumped_masses(const ShellSystem& system);
+
 /// Root of the sum of squares of forces and moments / length.
 double force_norm(const ShellSystem& system, const VectorX& force);
 
