@@ -3,10 +3,10 @@
 #include "tunica/core/clock.hpp"
 #include "tunica/core/error.hpp"
 #include "tunica/fit/detail/edits.hpp"
-#include "tunica/fit/fit.hpp"
 #include "tunica/fit/detail/start.hpp"
-#include "tunica/shell/patch/curved_surface.hpp"
+#include "tunica/fit/fit.hpp"
 #include "tunica/shell/distance/normals.hpp"
+#include "tunica/shell/patch/curved_surface.hpp"
 #include "tunica/shell/patch/refine.hpp"
 #include "tunica/surface/mesh/checks.hpp"
 
