@@ -87,6 +87,22 @@ class House(unittest.TestCase):
                 first = headers[0].read_text(encoding="utf-8").split("\n")[0]
                 self.assertRegex(first, rf"^// {name}: \S.*\.$", headers[0])
 
+    def test_links_of_the_pages_lead_somewhere(self):
+        pages = [SOURCE / path for path, _ in text_files() if path.endswith(".md")]
+        self.assertGreater(len(pages), 10)
+        for page in pages:
+            text = page.read_text(encoding="utf-8")
+            for link in re.findall(r"\]\(([^)\s]+)\)|<img src=\"([^\"]+)\"", text):
+                path, _, place = "".join(link).partition("#")
+                if "://" in path:
+                    continue
+                target = page.parent / path if path else page
+                self.assertTrue(target.exists(), f"{page}: {path}")
+                if place:
+                    heads = re.findall(r"^#+ (.*)", target.read_text(encoding="utf-8"), flags=re.M)
+                    places = [re.sub(r"[^\w -]", "", head.lower()).replace(" ", "-") for head in heads]
+                    self.assertIn(place, places, f"{page}: {path}")
+
     def test_clang_format(self):
         program = shutil.which("clang-format")
         version = subprocess.run([program, "--version"], capture_output=True, text=True).stdout if program else ""

@@ -1,7 +1,10 @@
 #!/usr/bin/python3
-"""The worked examples of every tool's --help run as printed: one after the other, from phantom to chart, in one folder."""
+"""The worked examples of every tool's --help run as printed: one after the other, from phantom to chart, in one folder;
+and so do the tutorial's commands."""
 
+import json
 import os
+import re
 import resource
 import subprocess
 import tempfile
@@ -37,6 +40,25 @@ class Examples(unittest.TestCase):
                         after = resource.getrusage(resource.RUSAGE_CHILDREN)
                         self.assertEqual(run.returncode, 0, run.stderr)
                         self.assertLess(after.ru_utime - before.ru_utime, LONGEST_SECONDS)
+
+    def test_tutorial(self):
+        source = Path(os.environ["TUNICA_SOURCE"])
+        text = (source / "docs" / "tutorial.md").read_text(encoding="utf-8")
+        commands = re.findall(r"^```sh\n(.*?)^```", text, flags=re.M | re.S)
+        self.assertGreater(len(commands), 6)
+        with tempfile.TemporaryDirectory(prefix="tunica-test-") as folder:
+            os.symlink(source / "data-samples", os.path.join(folder, "data-samples"))
+            os.makedirs(os.path.join(folder, "build", "release"))
+            os.symlink(TOOLS, os.path.join(folder, "build", "release", "bin"))
+            run = subprocess.run(["sh", "-ec", "".join(commands)], cwd=folder, capture_output=True, text=True)
+            self.assertEqual(run.returncode, 0, run.stderr)
+            # The numbers it names.
+            for name, value in re.findall(r"`result\.([a-z0-9_.]+)`, ([\d.]+) M?[mP]", text):
+                with open(os.path.join(folder, "out", "tutorial", "simulate.json"), encoding="utf-8") as file:
+                    result = json.load(file)["result"]
+                for part in name.split("."):
+                    result = result[part]
+                self.assertAlmostEqual(result, float(value), delta=0.05 * float(value), msg=name)
 
 
 if __name__ == "__main__":
