@@ -1,9 +1,15 @@
 # Flags for every target, and the functions that make one.
 add_library(tunica_flags INTERFACE)
-target_compile_options(tunica_flags INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor
+target_compile_options(tunica_flags INTERFACE -Wall -Wextra -Wpedantic -Wnon-virtual-dtor
                        -Woverloaded-virtual -Wcast-qual -Wformat=2)
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
   target_compile_options(tunica_flags INTERFACE -Wno-restrict)  # false alarms on string + string (GCC bug 105651)
+endif()
+if(TUNICA_UNITY)
+  # A .cpp counts as a header there, and what is local to one is seen by others; the check preset looks at each alone.
+  target_compile_options(tunica_flags INTERFACE -Wno-subobject-linkage -Wshadow=local)
+else()
+  target_compile_options(tunica_flags INTERFACE -Wshadow)
 endif()
 if(TUNICA_WERROR)
   target_compile_options(tunica_flags INTERFACE -Werror)
@@ -25,6 +31,9 @@ if(TUNICA_X86_64_V3 AND CMAKE_SYSTEM_PROCESSOR STREQUAL "x86_64")
   endif()
 endif()
 
+# Command lines compute nothing, and more takes longer to compile.
+set(TUNICA_RECIPE $<$<CONFIG:Release>:-O1>)
+
 # Headers are included as tunica/ROOM/name.hpp, here as where they are installed.
 file(MAKE_DIRECTORY ${PROJECT_BINARY_DIR}/include)
 file(CREATE_LINK ${PROJECT_SOURCE_DIR}/lib ${PROJECT_BINARY_DIR}/include/tunica SYMBOLIC)
@@ -39,6 +48,9 @@ function(tunica_library name)
                              $<BUILD_INTERFACE:${PROJECT_BINARY_DIR}/include>
                              $<BUILD_INTERFACE:${PROJECT_BINARY_DIR}/include/generated> $<INSTALL_INTERFACE:include>)
   target_link_libraries(tunica_${name} PUBLIC ${arg_LINKS} PRIVATE $<BUILD_INTERFACE:tunica_flags> ${arg_PRIVATE})
+  if(TUNICA_UNITY)
+    set_target_properties(tunica_${name} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 8)
+  endif()
   target_compile_features(tunica_${name} PUBLIC cxx_std_20)
   # How Eigen aligns its vectors depends on it: who links these libraries needs the same.
   target_compile_options(tunica_${name} PUBLIC $<INSTALL_INTERFACE:${TUNICA_INSTRUCTIONS}>)

@@ -15,7 +15,7 @@
 namespace tunica {
 namespace {
 
-constexpr double picture_height = 600;
+constexpr double chart_height = 600;
 constexpr double plot_width = 720;
 constexpr double tick_size = 13;
 constexpr double label_size = 14.5;
@@ -292,7 +292,7 @@ public:
     plot_.left = 24 + label_size + 12 + widest + 10;
     plot_.right = plot_.left + plot_width;
     plot_.top = chart.title.empty() ? 44 : 68;
-    plot_.bottom = picture_height - 66;
+    plot_.bottom = chart_height - 66;
   }
 
   std::string svg() {
@@ -305,8 +305,7 @@ public:
         "font-family=\"Helvetica, Arial, 'Liberation Sans', 'DejaVu Sans', sans-serif\">\n"
         "<title>{2}</title>\n"
         "<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n",
-        width, picture_height,
-        safe(chart_.title.empty() ? chart_.y.label + " against " + chart_.x.label : chart_.title));
+        width, chart_height, safe(chart_.title.empty() ? chart_.y.label + " against " + chart_.x.label : chart_.title));
     if (!chart_.title.empty()) {
       const double size = std::clamp(18 * (width - 48) / std::max(1.0, text_width(chart_.title, 18)), 11.0, 18.0);
       const auto fits = static_cast<std::size_t>(std::max(10.0, (width - 48) / (0.55 * size)));

@@ -310,7 +310,7 @@ Palette colour_map() {
   for (int i = 0; i < 256; ++i) {
     const cv::Vec3b colour = coloured.at<cv::Vec3b>(i);
     for (int c = 0; c < 3; ++c) {
-      palette[static_cast<std::size_t>(i)][c] = cv::saturate_cast<unsigned char>(colour[c] + lift * (255 - colour[c]));
+      palette[i][c] = cv::saturate_cast<unsigned char>(colour[c] + lift * (255 - colour[c]));
     }
   }
   return palette;
@@ -331,7 +331,7 @@ cv::Vec3b surface_colour(const Paint& paint, float value) {
     return {170, 170, 170};
   }
   const double level = paint.top > 0 ? 255 * static_cast<double>(value) / paint.top : 0;
-  return paint.palette[static_cast<std::size_t>(std::lround(std::clamp(level, 0.0, 255.0)))];
+  return paint.palette[std::lround(std::clamp(level, 0.0, 255.0))];
 }
 
 bool on_outline(const Raster& raster, int x, int y, float step) {
@@ -422,7 +422,7 @@ void draw_colour_bar(Canvas& canvas, const Paint& paint, const PictureOptions& o
   for (int i = 0; i < 256; ++i) {
     const double y0 = bottom + (top - bottom) * i / 256;
     const double y1 = bottom + (top - bottom) * (i + 1) / 256;
-    const cv::Vec3b colour = paint.palette[static_cast<std::size_t>(i)];
+    const cv::Vec3b colour = paint.palette[i];
     canvas.rectangle(left, y1, right, y0, cv::Scalar(colour[0], colour[1], colour[2]));
   }
   const auto place = [&](double part) { return bottom + (top - bottom) * part; };

@@ -19,7 +19,7 @@ namespace {
 constexpr double joins_features = 1;  // shortfall of an edge between two features: outweighs an angle
 constexpr double hopeless = 8;        // times the limit after the first step
 constexpr int placing_steps = 3;      // of least squares, then largest errors, twice
-constexpr int largest_power = 6;      // of the residuals, where the largest counts
+constexpr int largest_counts = 6;     // of the residuals, where the largest counts
 constexpr int spreading_steps = 4;    // with the nodes around free: of least squares and smoothing
 constexpr double spreading = 1;       // of the stiffness: smoothing, there
 
@@ -208,7 +208,7 @@ Trial tried(const FitMesh& mesh, const FitSamples& samples, const FitLimits& lim
   bool sound = keeps_shape();
   for (std::size_t i = 1; i < trial.edit.starts.size() && !sound; ++i) {
     const auto moved = std::find(trial.nodes.begin(), trial.nodes.end(), trial.edit.node) - trial.nodes.begin();
-    piece.positions[static_cast<std::size_t>(moved)] = trial.edit.starts[i];
+    piece.positions[moved] = trial.edit.starts[i];
     sound = keeps_shape();
   }
   const bool wide = !trial.edit.others.empty();
@@ -225,7 +225,7 @@ Trial tried(const FitMesh& mesh, const FitSamples& samples, const FitLimits& lim
   const int steps = trial.edit.node == no_index ? 0 : wide ? spreading_steps : placing_steps;
   for (int step = 0; step < steps; ++step) {
     const bool spreads = wide && step < steps - 1;
-    squares.power = step == 0 || spreads ? 2 : largest_power;
+    squares.power = step == 0 || spreads ? 2 : largest_counts;
     squares.smoothing = spreads ? spreading : 0;
     if (least_squares_step(piece, samples, squares) >= 1 || largest_error(piece) > hopeless * limits.error) {
       break;

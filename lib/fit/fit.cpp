@@ -20,22 +20,21 @@
 namespace tunica {
 namespace {
 
-constexpr double default_width = 1e-4;  // of the diagonal: of certified intervals
-constexpr double margin = 0.97;         // of the tolerance: what the samples may say, for they miss a little
-constexpr double start_error = 1;       // of the tolerance: flat error of the mesh that the search starts from
-constexpr double surplus = 1.5;         // of triangles at the start of a search for a count
-constexpr double longest_edge = 2;      // of the mean: no region without nodes of its own
-constexpr double fewest_across = 4;     // of the longest edges: along a square of the surface's area, likewise
+constexpr double margin = 0.97;      // of the tolerance: what the samples may say, for they miss a little
+constexpr double start_error = 1;    // of the tolerance: flat error of the mesh that the search starts from
+constexpr double surplus = 1.5;      // of triangles at the start of a search for a count
+constexpr double longest_edge = 2;   // of the mean: no region without nodes of its own
+constexpr double fewest_across = 4;  // of the longest edges: along a square of the surface's area, likewise
 constexpr int mean_power = 2, largest_power = 4;  // of residuals: the mean counts, or the largest
 constexpr int settling_steps = 6;
 constexpr double angle_margin = 1.01;  // of the smallest angle: what steps may give away
-constexpr int mending_passes = 3;
+constexpr int crossing_passes = 3;
 constexpr double smoothing = 0.1;               // of the stiffness against sliding
 constexpr int default_rounds = 12;              // of exchanges
 constexpr double fewer_by = 0.92;               // of the shells: the next count to be tried
 constexpr int certificates = 12, patience = 4;  // of these in a row that are no better
 constexpr double out_of_reach = 8;              // tolerances: as far after `patience` certificates, it stays so
-constexpr double worth_it = 0.985;              // a round that leaves more than this brings nothing
+constexpr double round_worth_it = 0.985;        // a round that leaves more than this brings nothing
 constexpr std::size_t fewest_sampled = 8;       // shells: as few want no fewer points of the target
 constexpr std::array<double, 3> exchanged{1.0 / 40, 1.0 / 150, 1.0 / 15};  // of the shells, in a round
 
@@ -150,7 +149,7 @@ private:
       const double left = least_squares_step(mesh, samples, squares);
       samples.attach(mesh);
       error = samples.measure(mesh);
-      if (left > worth_it) {
+      if (left > round_worth_it) {
         break;
       }
     }
@@ -176,7 +175,7 @@ private:
     limit_lengths(mesh, mesh.alive);
     FitLimits limits = limits_;
     limits.error = std::max(limits_.error, settle(mesh, samples, mean_power, 0));
-    for (int pass = 0; pass < mending_passes; ++pass) {
+    for (int pass = 0; pass < crossing_passes; ++pass) {
       mend_shapes(mesh, samples, limits, most_, no_shell);
     }
     return FitMesh(creased_where_folded(mesh.shell()));
@@ -185,7 +184,7 @@ private:
   void improve(FitMesh& mesh, const FitSamples& samples) {
     limit_lengths(mesh, mesh.alive);
     flip_edges(mesh, samples, limits_);
-    for (int pass = 0; pass < mending_passes; ++pass) {
+    for (int pass = 0; pass < crossing_passes; ++pass) {
       mend_shapes(mesh, samples, limits_, most_);
     }
   }
@@ -227,7 +226,7 @@ private:
       collapse_edges(mesh, samples, limits_, 4, options_.progress);
       settle(mesh, samples, largest_power, settling_steps);
       improve(mesh, samples);
-      if (static_cast<double>(mesh.alive) > worth_it * static_cast<double>(before)) {
+      if (static_cast<double>(mesh.alive) > round_worth_it * static_cast<double>(before)) {
         break;
       }
     }
@@ -264,7 +263,7 @@ private:
         if (i >= patience && distance.both.lower > out_of_reach * tolerance) {
           return;
         }
-        fruitless = distance.upper() < worth_it * closest ? 0 : fruitless + 1;
+        fruitless = distance.upper() < round_worth_it * closest ? 0 : fruitless + 1;
         closest = std::min(closest, distance.upper());
       }
       for (const FarPlace& place : distance.beyond_of_target) {
@@ -335,7 +334,7 @@ private:
       const double many = exchanged[fruitless] * static_cast<double>(shells);
       split_worst(other, samples, limits_, std::max<std::size_t>(1, static_cast<std::size_t>(many)));
       const double now = reduce(other, samples, shells);
-      fruitless = other.alive <= shells && now < worth_it * error ? 0 : fruitless + 1;
+      fruitless = other.alive <= shells && now < round_worth_it * error ? 0 : fruitless + 1;
       if (other.alive <= shells && now < error) {
         mesh = std::move(other);
         error = now;

@@ -28,7 +28,6 @@ constexpr int trials = 5;                  // the last without the nodes that st
 constexpr double may_grow = 1.05;          // the sum around a node: what its neighbours' steps gain or cost it
 constexpr double keeps_facing = 0.3;       // cosine between a facet's normals before and after
 constexpr Eigen::Index few_unknowns = 80;  // solved as a dense system
-constexpr std::size_t patches_per_block = 16;
 constexpr int most_columns = 27;
 
 using Jacobian = Eigen::Matrix<double, 30, Eigen::Dynamic, Eigen::ColMajor, 30, most_columns>;
@@ -82,7 +81,7 @@ Jacobian jacobian(const FitPiece& piece, const FitPatch& p, const Unknowns& of, 
     const Eigen::Index first = of.node[p.nodes[k]];
     for (Eigen::Index axis = 0; first >= 0 && axis < 3; ++axis) {
       changed.corners[k][axis] += step;
-      out.col(static_cast<Eigen::Index>(unknowns.size())) = (control(changed) - base) / step;
+      out.col(unknowns.size()) = (control(changed) - base) / step;
       unknowns.push_back(first + axis);
       changed.corners[k] = shape.corners[k];
     }
@@ -98,14 +97,14 @@ Jacobian jacobian(const FitPiece& piece, const FitPatch& p, const Unknowns& of, 
   for (const Index s : slots) {
     const auto axes = tilt_axes(piece.normals[s]);
     for (Eigen::Index axis = 0; of.slot[s] >= 0 && axis < 2; ++axis) {
-      const Vec3 tilted = piece.normals[s] + tilt * axes[static_cast<std::size_t>(axis)];
+      const Vec3 tilted = piece.normals[s] + tilt * axes[axis];
       for (std::size_t k = 0; k < 3; ++k) {
         changed.normals[k] = p.slots[k] == s ? tilted : shape.normals[k];
         for (std::size_t end = 0; end < 2; ++end) {
           changed.across[k][end] = p.across[k][end] == s ? tilted : shape.across[k][end];
         }
       }
-      out.col(static_cast<Eigen::Index>(unknowns.size())) = (control(changed) - base) / tilt;
+      out.col(unknowns.size()) = (control(changed) - base) / tilt;
       unknowns.push_back(of.slot[s] + axis);
     }
   }
@@ -203,10 +202,10 @@ private:
     Eigen::VectorXd weighted(count);
     Eigen::Matrix<double, 30, 1> reach;
     for (Eigen::Index i = 0; i < count; ++i) {
-      const Residual& r = p.residuals[static_cast<std::size_t>(i)];
+      const Residual& r = p.residuals[i];
       const auto basis = bernstein(r.at);
       for (std::size_t j = 0; j < 10; ++j) {
-        reach.segment<3>(static_cast<Eigen::Index>(3 * j)) = basis[j] * r.direction;
+        reach.segment<3>(3 * j) = basis[j] * r.direction;
       }
       const double part = std::max(std::abs(r.distance) / scale_, least_weight);
       const double root = std::sqrt(powered(part, options_.power - 2));

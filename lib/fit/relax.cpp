@@ -22,11 +22,10 @@ namespace {
 constexpr int mending_passes = 10;  // while facets fold
 constexpr int default_iterations = 20;
 constexpr int default_iterations_refining = 60;
-constexpr double default_width = 1e-4;       // of the diagonal
 constexpr double default_off_target = 1e-3;  // of the diagonal
-constexpr double worth_it = 0.99;            // an iteration that brings less than 1 % brings nothing
+constexpr double iteration_worth_it = 0.99;  // an iteration that brings less than 1 % brings nothing
 constexpr std::size_t triangles_judged = 5000;
-constexpr int patience = 3;                                // iterations that bring nothing
+constexpr int fruitless_iterations = 3;                    // iterations that bring nothing
 constexpr double least_angle = 10, least_agreement = 0.4;  // degrees, cosine: what curved shells can stand on
 
 class Relaxation {
@@ -61,7 +60,7 @@ public:
         result_.stopped = "the tolerance holds";
         break;
       }
-      fruitless = upper < worth_it * level_best ? 0 : fruitless + 1;
+      fruitless = upper < iteration_worth_it * level_best ? 0 : fruitless + 1;
       level_best = std::min(level_best, upper);
       if (options_.refine) {
         // Far from the tolerance another move of the same nodes is not worth its time.
@@ -73,7 +72,7 @@ public:
           fruitless = 0;
           level_best = std::numeric_limits<double>::infinity();
         }
-      } else if (fruitless >= patience) {
+      } else if (fruitless >= fruitless_iterations) {
         result_.stopped = "further moves bring nothing: the rule has settled";
         break;
       }

@@ -20,6 +20,9 @@ struct RelaxIteration {
   NodeMoves moves;  ///< by the paper's rule
 };
 
+/// Of the diagonal: width of the intervals that are measured.
+inline constexpr double default_width = 1e-4;
+
 /// What both ways to put shells on a target need to know: the paper's rule (relax_by_barycentre) and the fit (fit).
 struct RelaxOptions {
   Patch surface = Patch::watertight;  ///< what positions and normals are to stand for

@@ -18,7 +18,6 @@ constexpr double other_wall = 4;  // times as far: beyond that a closest point t
 constexpr double beside = 0.99;   // cosine of 8 degrees: farther off the normal a distance counts along itself
 constexpr int points_per_edge = 4;              // of the boundary: pieces between them
 constexpr int edge_starts = 4, edge_steps = 4;  // of the search for the foot on a cubic edge: its extrema are at most 5
-constexpr std::size_t patches_per_block = 16;
 
 /// Along the given normal, or along the distance itself where it points elsewhere (off an edge, rim or boundary).
 Residual residual(const Vec2& at, const Vec3& away, const Vec3& normal) {
@@ -120,7 +119,7 @@ FitSamples::FitSamples(const Target& target, std::size_t shells, bool boundaries
   const auto& order = target.tree().spatial_order();
   const double stride = std::max(1.0, static_cast<double>(order.size()) / static_cast<double>(wanted));
   for (double i = stride / 2; i < static_cast<double>(order.size()); i += stride) {
-    for (const Index v : mesh.triangles[order[static_cast<std::size_t>(i)]]) {
+    for (const Index v : mesh.triangles[order[i]]) {
       if (used[v] == 0) {
         points_.push_back({mesh.vertices[v]});
         used[v] = 1;
@@ -192,7 +191,7 @@ void FitSamples::attach(FitPiece& piece) const {
       nearest.try_facet(facets[j], at, static_cast<double>(j));
     }
     for (std::size_t k = 0; k < count; ++k) {
-      piece.patches[static_cast<std::size_t>(nearest.which[k])].attached.push_back(group[k]);
+      piece.patches[nearest.which[k]].attached.push_back(group[k]);
     }
     count = 0;
   };

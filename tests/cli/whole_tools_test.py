@@ -290,8 +290,8 @@ class WholeTools(unittest.TestCase):
                                       preexec_fn=limit, check=False)
 
             loaded = next(k for k in range(4 << 10, 1 << 20, 1 << 9) if run(k, ["--version"]).returncode == 0)
-            # Half a mebibyte more, for libraries make objects before main().
-            for kibibytes in range(loaded + (1 << 9), loaded + (5 << 10), 1 << 8):
+            # A mebibyte more, for libraries make objects before main(), and not the same amount each time.
+            for kibibytes in range(loaded + (1 << 10), loaded + (5 << 10), 1 << 8):
                 done = run(kibibytes, [*arguments, "--force"])
                 self.assertIn(done.returncode, (0, 6), (verb, kibibytes, done.stderr))
                 self.assertNotIn("terminate", done.stderr)

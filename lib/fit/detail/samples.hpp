@@ -7,6 +7,9 @@
 
 namespace tunica {
 
+/// Of threads.
+inline constexpr std::size_t patches_per_block = 16;
+
 /// A point of the target that shells must be close to; one of its boundary, their boundary edges.
 struct SamplePoint {
   Vec3 point;

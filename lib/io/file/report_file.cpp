@@ -63,7 +63,7 @@ void follow_list(const Json& list, std::string_view rest, Search& search) {
     const auto size = static_cast<long>(list.size());
     const long index = *number < 0 ? size + *number : *number;
     if (index >= 0 && index < size) {
-      follow(list[static_cast<std::size_t>(index)], tail, search);
+      follow(list[index], tail, search);
     } else {
       search.found.values.emplace_back();
     }

@@ -92,7 +92,7 @@ std::string one_line(std::string text) {
   return text;
 }
 
-std::string header_of(const Content& content, const PlyOptions& options) {
+std::string ply_header(const Content& content, const PlyOptions& options) {
   std::string header = "ply\nformat binary_little_endian 1.0\n";
   header += fmt::format("comment SPACE={}\n", one_line(options.space));
   if (options.millimetres) {
@@ -126,7 +126,7 @@ void write(const std::filesystem::path& path, const Content& content, const PlyO
   TUNICA_ASSERT(content.corner_normals == nullptr || content.corner_normals->size() == content.triangles.size());
   OutputFile output(path, options.overwrite);
   Writer writer(output.partial_path());
-  writer.text(header_of(content, options));
+  writer.text(ply_header(content, options));
   for (std::size_t v = 0; v < content.vertices.size(); ++v) {
     writer.vector(content.vertices[v]);
     if (content.normals != nullptr) {

@@ -25,7 +25,7 @@ constexpr Size most_chunk_bytes = Size{4} << 20;
 // nothing more is asked of it: what was flushed before is whole, and the process is about to end with an error.
 bool library_failed = false;
 
-Size product(const std::vector<Size>& shape) {
+Size count_of(const std::vector<Size>& shape) {
   return std::accumulate(shape.begin(), shape.end(), Size{1}, std::multiplies<>());
 }
 
@@ -119,8 +119,8 @@ Handle Writer::dataset(Id parent, const std::string& name, Id type, const std::v
                            ? own(H5Screate(H5S_SCALAR), "written")
                            : own(H5Screate_simple(static_cast<int>(shape.size()), shape.data(), nullptr), "written");
   const Handle creation = own(H5Pcreate(H5P_DATASET_CREATE), "written");
-  if (!rewritten && !shape.empty() && product(shape) >= 1024) {
-    const Size row_bytes = H5Tget_size(type) * product({shape.begin() + 1, shape.end()});
+  if (!rewritten && !shape.empty() && count_of(shape) >= 1024) {
+    const Size row_bytes = H5Tget_size(type) * count_of({shape.begin() + 1, shape.end()});
     std::vector<Size> chunk = shape;
     chunk[0] = std::clamp<Size>(most_chunk_bytes / row_bytes, 1, shape[0]);
     check(H5Pset_chunk(creation.get(), static_cast<int>(chunk.size()), chunk.data()), "written");
@@ -185,7 +185,7 @@ Series::Series(const Writer& writer, Id parent, const std::string& name, Id type
   std::vector<Size> chunk = shape_;
   chunk[0] = std::max<Size>(1, rows_per_chunk);
   for (std::size_t axis = 0; axis < chunk.size(); ++axis) {
-    const Size bytes = product(chunk) * H5Tget_size(type);
+    const Size bytes = count_of(chunk) * H5Tget_size(type);
     if (bytes > most_chunk_bytes) {
       const Size rest = bytes / chunk[axis];
       chunk[axis] = std::max<Size>(1, most_chunk_bytes / rest);

@@ -127,7 +127,7 @@ Coordinate key_against_reference(const std::vector<Report>& reports, const std::
   return error;
 }
 
-std::string text_of(const Json& value) {
+std::string shown(const Json& value) {
   if (value.is_string()) {
     return value.get<std::string>();
   }
@@ -144,7 +144,7 @@ std::vector<std::string> texts_at(const Report& report, const std::string& key) 
   }
   std::vector<std::string> texts;
   for (const Json& value : values_at(report, key).values) {
-    texts.push_back(text_of(value));
+    texts.push_back(shown(value));
   }
   return texts;
 }

@@ -22,11 +22,8 @@ using hdf5::Series;
 using hdf5::Size;
 using hdf5::Writer;
 
-constexpr unsigned char vtk_triangle = 5;
 constexpr Size history_chunk = 256;
 constexpr Size nodes_chunk_rows = 1;
-
-using Floats = std::vector<float>;
 
 // Before anything of a state is written.
 void require_range(const std::vector<Floats>& fields) {

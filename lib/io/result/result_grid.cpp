@@ -27,8 +27,6 @@ constexpr std::array state_fields{point_fields[0],
                                   GridField{"principal_strain_top", 2, true},
                                   GridField{"principal_strain_bottom", 2, true}};
 
-using Floats = std::vector<float>;
-
 template <typename Vector>
 void add(Floats& values, const Vector& v) {
   for (Eigen::Index axis = 0; axis < v.size(); ++axis) {

@@ -17,7 +17,6 @@ static_assert(std::endian::native == std::endian::little);
 
 constexpr std::size_t block_bytes = std::size_t{1} << 20;
 constexpr int fast = 1;  // smooth fields compress well at once, and more effort gains little
-constexpr std::uint8_t vtk_triangle = 5;
 
 std::string base64(std::string_view bytes) {
   std::string text;

@@ -110,8 +110,7 @@ void check_fix(const Scene& scene, const SceneFix& fix) {
           "this [[fix]] holds nothing: name an axis in translation or rotation, or remove it");
   if (fix.displacement) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      require(fix.translation[axis] || (*fix.displacement)[static_cast<Eigen::Index>(axis)] == 0,
-              fix.places.of("displacement"),
+      require(fix.translation[axis] || (*fix.displacement)[axis] == 0, fix.places.of("displacement"),
               fmt::format("displacement along {0} is prescribed but not held: add {0} to translation", "xyz"[axis]));
     }
   }

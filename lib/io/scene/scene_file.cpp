@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::size_t most_bytes = std::size_t{64} << 20;
-constexpr std::int64_t most_steps = 1'000'000'000;
+constexpr std::int64_t most_counted = 1'000'000'000;
 constexpr std::int64_t most_load_steps = 1'000'000;
 constexpr std::int64_t most_modes = 10'000;
 
@@ -92,7 +92,7 @@ public:
   }
 
   // A whole number from 1 to `most`.
-  [[nodiscard]] std::size_t count(std::string_view key, std::int64_t most = most_steps) const {
+  [[nodiscard]] std::size_t count(std::string_view key, std::int64_t most = most_counted) const {
     const auto value = required(key).value_exact<std::int64_t>();
     if (!value || *value < 1 || *value > most) {
       place(key).fail(fmt::format("{} must be a whole number from 1 to {}", key, most));
@@ -120,7 +120,7 @@ public:
     }
     Vec3 result;
     for (std::size_t i = 0; i < 3; ++i) {
-      result[static_cast<Eigen::Index>(i)] = quantity_of((*values)[i], key, dimension);
+      result[i] = quantity_of((*values)[i], key, dimension);
     }
     return result;
   }

@@ -604,18 +604,16 @@ void set_affine(VolumeFile& file, const fs::path& path, const Eigen::Matrix<doub
     for (int row = 0; row < 3; ++row) {
       for (int column = 0; column < 3; ++column) {
         const double cosine = std::abs(axes(row, column)) / file.spacing[column];
-        if (!row_done[static_cast<std::size_t>(row)] && !column_done[static_cast<std::size_t>(column)] &&
-            cosine > best) {
+        if (!row_done[row] && !column_done[column] && cosine > best) {
           best = cosine;
           best_row = row;
           best_column = column;
         }
       }
     }
-    row_done[static_cast<std::size_t>(best_row)] = true;
-    column_done[static_cast<std::size_t>(best_column)] = true;
-    file.orientation[static_cast<std::size_t>(best_column)] =
-        letters[static_cast<std::size_t>(best_row)][axes(best_row, best_column) > 0 ? 1 : 0];
+    row_done[best_row] = true;
+    column_done[best_column] = true;
+    file.orientation[best_column] = letters[best_row][axes(best_row, best_column) > 0 ? 1 : 0];
   }
 }
 

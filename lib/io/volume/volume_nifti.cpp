@@ -210,7 +210,7 @@ Affine sform(const Header& header) {
   Affine affine;
   for (Eigen::Index row = 0; row < 3; ++row) {
     for (Eigen::Index column = 0; column < 4; ++column) {
-      affine(row, column) = header.srow[static_cast<std::size_t>(row * 4 + column)];
+      affine(row, column) = header.srow[row * 4 + column];
     }
   }
   return affine;
@@ -254,7 +254,7 @@ double difference(const Affine& a, const Affine& b, const std::array<std::size_t
   for (int corner = 0; corner < 8; ++corner) {
     Eigen::Vector4d index(0, 0, 0, 1);
     for (int axis = 0; axis < 3; ++axis) {
-      index[axis] = ((corner >> axis) & 1) != 0 ? static_cast<double>(dims[static_cast<std::size_t>(axis)] - 1) : 0;
+      index[axis] = ((corner >> axis) & 1) != 0 ? static_cast<double>(dims[axis] - 1) : 0;
     }
     largest = std::max(largest, ((a - b) * index).norm());
   }

@@ -76,7 +76,7 @@ std::string header_of(const fs::path& path, const Volume& volume, std::size_t by
   ras.topRows<2>() = -ras.topRows<2>();
   const Vec3 spacing = ras.leftCols<3>().colwise().norm();
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    put(header, 80 + 4 * axis, static_cast<float>(spacing[static_cast<Eigen::Index>(axis)]));
+    put(header, 80 + 4 * axis, static_cast<float>(spacing[axis]));
   }
   put<float>(header, 108, 352);
   put(header, 112, static_cast<float>(volume.slope));

@@ -112,7 +112,7 @@ struct Elimination {
         row_in_front(nodes.size(), 0) {
     const auto* const order = static_cast<const int*>(symbolic.Perm);
     for (std::size_t k = 0; k < nodes.size(); ++k) {
-      node[k] = nodes[static_cast<std::size_t>(order[k])];
+      node[k] = nodes[order[k]];
       place[node[k]] = static_cast<std::int32_t>(k);
     }
     for (std::size_t s = 0; s < symbolic.nsuper; ++s) {
@@ -129,7 +129,7 @@ struct Elimination {
   std::int32_t number_rows(std::size_t s) {
     std::int32_t row = 0;
     for (int r = row_starts[s]; r < row_starts[s + 1]; ++r) {
-      row_in_front[static_cast<std::size_t>(rows[r])] = row;
+      row_in_front[rows[r]] = row;
       row += size_of(static_cast<std::size_t>(rows[r]));
     }
     return row;
@@ -269,8 +269,8 @@ void DirectSolver::Implementation::make_fronts(const cholmod_factor& symbolic, c
 void DirectSolver::Implementation::make_front(std::size_t s, Elimination& order, const BlockMatrix& pattern) {
   Front& f = fronts[s];
   f.rows = order.number_rows(s);
-  f.first = static_cast<std::size_t>(order.first_row[static_cast<std::size_t>(order.super[s])]);
-  f.columns = order.first_row[static_cast<std::size_t>(order.super[s + 1])] - static_cast<std::int32_t>(f.first);
+  f.first = static_cast<std::size_t>(order.first_row[order.super[s]]);
+  f.columns = order.first_row[order.super[s + 1]] - static_cast<std::int32_t>(f.first);
   f.below = below.size();
   const int first_below = order.first_below(s);
   for (int r = first_below; r < order.row_starts[s + 1]; ++r) {
@@ -280,19 +280,18 @@ void DirectSolver::Implementation::make_front(std::size_t s, Elimination& order,
     }
   }
   if (first_below < order.row_starts[s + 1]) {
-    f.parent = order.front_of[static_cast<std::size_t>(order.rows[first_below])];
-    children[static_cast<std::size_t>(f.parent)].push_back(s);
+    f.parent = order.front_of[order.rows[first_below]];
+    children[f.parent].push_back(s);
   }
   f.first_descendant = children[s].empty() ? s : fronts[children[s].front()].first_descendant;
   f.entries[0] = entries.size();
   for (int k = order.super[s]; k < order.super[s + 1]; ++k) {
-    const Index j = order.node[static_cast<std::size_t>(k)];
+    const Index j = order.node[k];
     for (std::size_t b = pattern.row_start[j]; b < pattern.row_start[j + 1]; ++b) {
       const std::int32_t other = order.place[pattern.column[b]];
       if (other >= k) {
         entries.push_back({static_cast<std::uint32_t>(pattern.transposed[b]), static_cast<std::uint32_t>(b),
-                           order.row_in_front[static_cast<std::size_t>(other)],
-                           order.row_in_front[static_cast<std::size_t>(k)], pattern.column[b], j});
+                           order.row_in_front[other], order.row_in_front[k], pattern.column[b], j});
       }
     }
   }
@@ -328,7 +327,7 @@ void DirectSolver::Implementation::make_arenas() {
   for (std::size_t s = 0; s < fronts.size(); ++s) {
     below_work[s] += fronts[s].work;
     if (fronts[s].parent >= 0) {
-      below_work[static_cast<std::size_t>(fronts[s].parent)] += below_work[s];
+      below_work[fronts[s].parent] += below_work[s];
     }
   }
   std::vector<std::size_t> above;
@@ -517,7 +516,7 @@ void DirectSolver::solve(const VectorX& b, VectorX& x) const {
   const Implementation& s = *implementation_;
   Eigen::VectorXd y(static_cast<Eigen::Index>(s.freedoms.size()));
   for (std::size_t k = 0; k < s.freedoms.size(); ++k) {
-    y[static_cast<Eigen::Index>(k)] = b[s.freedoms[k]];
+    y[k] = b[s.freedoms[k]];
   }
   Eigen::VectorXd others;
   for (const Front& f : s.fronts) {
@@ -542,7 +541,7 @@ void DirectSolver::solve(const VectorX& b, VectorX& x) const {
   }
   x.setZero(b.size());
   for (std::size_t k = 0; k < s.freedoms.size(); ++k) {
-    x[s.freedoms[k]] = y[static_cast<Eigen::Index>(k)];
+    x[s.freedoms[k]] = y[k];
   }
 }
 

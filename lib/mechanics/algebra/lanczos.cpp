@@ -110,7 +110,7 @@ private:
     for (std::size_t k = 0; k < options_.block && used_ < most_ + static_cast<Eigen::Index>(options_.block); ++k) {
       VectorX random = VectorX::Zero(size_);
       for (Eigen::Index i = 0; i < size_; ++i) {
-        random[i] = start_[static_cast<std::size_t>(i)] ? normal(engine_) : 0;
+        random[i] = start_[i] ? normal(engine_) : 0;
       }
       pencil_.solve_a(random, x);
       pencil_.multiply_b(x, ax);

@@ -14,7 +14,7 @@ namespace tunica {
 void mask(const FreeMask& free, VectorX& v) {
   for (std::size_t i = 0; i < free.size(); ++i) {
     if (!free[i]) {
-      v[static_cast<Eigen::Index>(i)] = 0;
+      v[i] = 0;
     }
   }
 }
@@ -149,7 +149,9 @@ AlgebraicError error_by_factor(const BlockMatrix& matrix, const FreeMask& free, 
 }
 
 double gmres(const BlockMatrix& matrix, const FreeMask& free, const DirectSolver& solver, const VectorX& b,
-             double tolerance, std::size_t most, VectorX& x) {
+             VectorX& x) {
+  constexpr double tolerance = 1e-4;
+  constexpr std::size_t most = 30;
   const double norm = std::sqrt(dot(b, b));
   VectorX product;
   const auto residual = [&] {
@@ -191,7 +193,7 @@ double gmres(const BlockMatrix& matrix, const FreeMask& free, const DirectSolver
     basis.push_back(product / length);
   }
   for (Eigen::Index j = 0; j < coefficients.size(); ++j) {
-    x += coefficients[j] * directions[static_cast<std::size_t>(j)];
+    x += coefficients[j] * directions[j];
   }
   r = residual();
   return std::sqrt(dot(r, r)) / norm;

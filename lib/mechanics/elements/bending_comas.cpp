@@ -17,7 +17,7 @@ std::array<Matrix39, 3> edge_middle_curvatures(const PlaneTriangle& triangle) {
     second.row(0) = -monomials_dxx(middle.x(), middle.y()).transpose();
     second.row(1) = -monomials_dyy(middle.x(), middle.y()).transpose();
     second.row(2) = -2 * monomials_dxy(middle.x(), middle.y()).transpose();
-    curvatures[static_cast<std::size_t>(k)] = second * inverse;
+    curvatures[k] = second * inverse;
   }
   return curvatures;
 }

@@ -14,7 +14,7 @@ PlaneStiffness bending_dkt(const PlaneTriangle& triangle, const Mat3& elasticity
   // slope across it the mean. Inside they are quadratic.
   std::array<Slope, 6> slopes;
   for (int k = 0; k < 3; ++k) {
-    Slope& slope = slopes[static_cast<std::size_t>(k)];
+    Slope& slope = slopes[k];
     slope.setZero();
     slope(0, 3 * k + 2) = -1;
     slope(1, 3 * k + 1) = 1;
@@ -25,19 +25,19 @@ PlaneStiffness bending_dkt(const PlaneTriangle& triangle, const Mat3& elasticity
     const double length = edge.norm();
     const Vec2 tangent = edge / length;
     const Vec2 normal(-tangent.y(), tangent.x());
-    const Slope sum = slopes[static_cast<std::size_t>(i)] + slopes[static_cast<std::size_t>(j)];
+    const Slope sum = slopes[i] + slopes[j];
     Vector9 along = -0.25 * sum.transpose() * tangent;
     along[3 * j] += 1.5 / length;
     along[3 * i] -= 1.5 / length;
     const Vector9 across = 0.5 * sum.transpose() * normal;
-    slopes[static_cast<std::size_t>(3 + i)] = tangent * along.transpose() + normal * across.transpose();
+    slopes[3 + i] = tangent * along.transpose() + normal * across.transpose();
   }
 
   const Mat3 rigidity = elasticity * (thickness * thickness * thickness / 12);
   PlaneStiffness result{Matrix9::Zero(), Matrix39::Zero()};
   for (int point = 0; point < 3; ++point) {  // the middles of the edges: exact, as curvatures are linear
     std::array<double, 3> barycentric{0.5, 0.5, 0.5};
-    barycentric[static_cast<std::size_t>((point + 2) % 3)] = 0;
+    barycentric[(point + 2) % 3] = 0;
     Matrix39 curvature = Matrix39::Zero();
     const auto add = [&](const Vec2& gradient, const Slope& slope) {
       curvature.row(0) -= gradient.x() * slope.row(0);
@@ -46,10 +46,10 @@ PlaneStiffness bending_dkt(const PlaneTriangle& triangle, const Mat3& elasticity
     };
     for (int i = 0; i < 3; ++i) {
       const int j = (i + 1) % 3;
-      const double li = barycentric[static_cast<std::size_t>(i)];
-      const double lj = barycentric[static_cast<std::size_t>(j)];
-      add((4 * li - 1) * gradients.col(i), slopes[static_cast<std::size_t>(i)]);
-      add(4 * (li * gradients.col(j) + lj * gradients.col(i)), slopes[static_cast<std::size_t>(3 + i)]);
+      const double li = barycentric[i];
+      const double lj = barycentric[j];
+      add((4 * li - 1) * gradients.col(i), slopes[i]);
+      add(4 * (li * gradients.col(j) + lj * gradients.col(i)), slopes[3 + i]);
     }
     result.stiffness += area / 3 * curvature.transpose() * rigidity * curvature;
     result.mean_strain += curvature / 3;

@@ -37,14 +37,14 @@ LaneVec3 curved_strain(const ElementLanes& element, const std::array<LaneMat3, 3
   LaneVec3 strain = LaneVec3::Zero();
   LaneVector6 change;
   for (int k = 0; k < 3; ++k) {
-    EdgeNow& edge = now.edges[static_cast<std::size_t>(k)];
+    EdgeNow& edge = now.edges[k];
     const LaneVec2 along = now.frame.plane.col(next_corner(k)) - now.frame.plane.col(k);
     edge.length = along.norm();
     edge.direction << along / edge.length, Lanes(0);
     LaneVec2 turn;
     for (int end = 0; end < 2; ++end) {
       const auto e = static_cast<std::size_t>(end);
-      const LaneMat3& carrier = relative[static_cast<std::size_t>(corner_at(k, end))];
+      const LaneMat3& carrier = relative[corner_at(k, end)];
       edge.normal[e] = carrier * element.edge_normals.col(k);
       edge.side[e] = carrier * element.edge_sides.col(k);
       change[2 * k + end] = element.rest_normals[2 * k + end] - edge.direction.dot(edge.normal[e]);
@@ -55,7 +55,7 @@ LaneVec3 curved_strain(const ElementLanes& element, const std::array<LaneMat3, 3
   now.slopes = element.slopes + change;
   const LaneVector6 middle = 0.5 * (now.slopes + element.slopes);
   for (int i = 0; i < 3; ++i) {
-    strain[i] += change.dot(element.bulging[static_cast<std::size_t>(i)].lazyProduct(middle));
+    strain[i] += change.dot(element.bulging[i].lazyProduct(middle));
   }
   for (int k = 0; k < 3; ++k) {
     const LaneVec3 turned = 0.5 * (now.rotation(k) + now.rotation(next_corner(k)));

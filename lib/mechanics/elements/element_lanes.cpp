@@ -50,12 +50,12 @@ void add_curved_derivatives(const ElementLanes& element, const Kinematics& now, 
   d.slopes.setZero();
   d.tilts.setZero();
   for (int k = 0; k < 3; ++k) {
-    const EdgeNow& edge = now.edges[static_cast<std::size_t>(k)];
+    const EdgeNow& edge = now.edges[k];
     const auto across = [&](const LaneVec3& carried) {
       return LaneVec3((carried - edge.direction * edge.direction.dot(carried)) / edge.length);
     };
     for (int end = 0; end < 2; ++end) {
-      const LaneVec3& normal = edge.normal[static_cast<std::size_t>(end)];
+      const LaneVec3& normal = edge.normal[end];
       auto row = d.slopes.row(2 * k + end);
       row.segment<3>(6 * next_corner(k)) = -across(normal).transpose();
       row.segment<3>(6 * k) = across(normal).transpose();
@@ -70,7 +70,7 @@ void add_curved_derivatives(const ElementLanes& element, const Kinematics& now, 
   }
   LaneMatrix3x6 of_slopes;
   for (int i = 0; i < 3; ++i) {
-    of_slopes.row(i) = element.bulging[static_cast<std::size_t>(i)].lazyProduct(now.slopes).transpose();
+    of_slopes.row(i) = element.bulging[i].lazyProduct(now.slopes).transpose();
   }
   d.strain += of_slopes.lazyProduct(d.slopes);
   for (int k = 0; k < 3; ++k) {
@@ -78,13 +78,12 @@ void add_curved_derivatives(const ElementLanes& element, const Kinematics& now, 
     // Bending rotations follow the spins of the corners less that of the frame.
     LaneRow3 of_frame = LaneRow3::Zero();
     for (const int corner : {k, next_corner(k)}) {
-      const LaneRow3 of_spin =
-          0.5 * element.edge_directions.col(k).transpose() * h[static_cast<std::size_t>(corner)].topRows<2>();
+      const LaneRow3 of_spin = 0.5 * element.edge_directions.col(k).transpose() * h[corner].topRows<2>();
       d.tilts.block<1, 3>(k, 6 * corner + 3) = of_spin;
       of_frame += of_spin;
     }
     for (int j = 0; j < 3; ++j) {
-      d.tilts.block<1, 3>(k, 6 * j) -= of_frame * g[static_cast<std::size_t>(j)];
+      d.tilts.block<1, 3>(k, 6 * j) -= of_frame * g[j];
     }
   }
   const LaneMat3 of_bulges = element.sideways * now.tilts.asDiagonal();
@@ -104,7 +103,7 @@ void find_derivatives(const ElementLanes& element, const Kinematics& now, const 
     of_turn += d.strain.block<3, 2>(0, 6 * k) * LaneVec2(now.frame.plane(1, k), -now.frame.plane(0, k));
   }
   for (int k = 0; k < 3; ++k) {
-    d.strain.block<3, 3>(0, 6 * k) += of_turn * g[static_cast<std::size_t>(k)].row(2);
+    d.strain.block<3, 3>(0, 6 * k) += of_turn * g[k].row(2);
   }
   if (element.curved) {
     add_curved_derivatives(element, now, h, g, d);
@@ -112,10 +111,10 @@ void find_derivatives(const ElementLanes& element, const Kinematics& now, const 
   }
   for (int k = 0; k < 3; ++k) {
     const LaneVec3 of_rotation = element.bow.col((k + 2) % 3) - element.bow.col(k);
-    const LaneMat3 of_spin = of_rotation * h[static_cast<std::size_t>(k)].row(2);
+    const LaneMat3 of_spin = of_rotation * h[k].row(2);
     d.strain.block<3, 3>(0, 6 * k + 3) += of_spin;
     for (int j = 0; j < 3; ++j) {
-      d.strain.block<3, 3>(0, 6 * j) -= of_spin * g[static_cast<std::size_t>(j)];
+      d.strain.block<3, 3>(0, 6 * j) -= of_spin * g[j];
     }
   }
 }
@@ -126,8 +125,8 @@ std::array<LaneMat3, 3> frame_spin(const ElementLanes& element, const Frame& fra
   for (int k = 0; k < 3; ++k) {
     const LaneVec2 opposite = frame.plane.col((k + 1) % 3) - frame.plane.col((k + 2) % 3);
     current_gradients.col(k) = LaneVec2(opposite.y(), -opposite.x()) / frame.twice_area;
-    g[static_cast<std::size_t>(k)] << 0, 0, current_gradients(1, k), 0, 0, -current_gradients(0, k),
-        -element.gradients(1, k) / frame.trace, element.gradients(0, k) / frame.trace, 0;
+    g[k] << 0, 0, current_gradients(1, k), 0, 0, -current_gradients(0, k), -element.gradients(1, k) / frame.trace,
+        element.gradients(0, k) / frame.trace, 0;
   }
   return g;
 }
@@ -174,20 +173,19 @@ void add_material(const ElementLanes& element, double factor, const std::array<L
   std::array<LaneMat3, 3> rows{LaneMat3::Zero(), LaneMat3::Zero(), LaneMat3::Zero()};
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) {
-      const LaneMat3 block = factor * h[static_cast<std::size_t>(i)].transpose() *
-                             element.rotational.block<3, 3>(3 * i, 3 * j) * h[static_cast<std::size_t>(j)];
+      const LaneMat3 block = factor * h[i].transpose() * element.rotational.block<3, 3>(3 * i, 3 * j) * h[j];
       t.block<3, 3>(6 * i + 3, 6 * j + 3) += block;
-      rows[static_cast<std::size_t>(i)] += block;
+      rows[i] += block;
     }
-    all += rows[static_cast<std::size_t>(i)];
+    all += rows[i];
   }
   for (int j = 0; j < 3; ++j) {
-    const LaneMat3& gj = g[static_cast<std::size_t>(j)];
+    const LaneMat3& gj = g[j];
     for (int i = 0; i < 3; ++i) {
-      const LaneMat3 block = rows[static_cast<std::size_t>(i)] * gj;
+      const LaneMat3 block = rows[i] * gj;
       t.block<3, 3>(6 * i + 3, 6 * j) -= block;
       t.block<3, 3>(6 * j, 6 * i + 3) -= block.transpose();
-      t.block<3, 3>(6 * i, 6 * j) += g[static_cast<std::size_t>(i)].transpose() * all * gj;
+      t.block<3, 3>(6 * i, 6 * j) += g[i].transpose() * all * gj;
     }
   }
 }
@@ -208,14 +206,14 @@ void add_corotational_stiffness(const ElementLanes& element, const Kinematics& n
     all += change;
     t.block<3, 3>(6 * k + 3, 6 * k + 3) += change;
     for (int j = 0; j < 3; ++j) {
-      t.block<3, 3>(6 * k + 3, 6 * j) -= change * g[static_cast<std::size_t>(j)];
-      t.block<3, 3>(6 * j, 6 * k + 3) -= g[static_cast<std::size_t>(j)].transpose() * change;
+      t.block<3, 3>(6 * k + 3, 6 * j) -= change * g[j];
+      t.block<3, 3>(6 * j, 6 * k + 3) -= g[j].transpose() * change;
     }
   }
   // Of the levers q, of G, and of the frame in which the force is expressed.
   LaneMat3 levers = all;
   for (int k = 0; k < 3; ++k) {
-    levers += skew(n[static_cast<std::size_t>(k)]) * skew(LaneVec3(frame.plane(0, k), frame.plane(1, k), 0));
+    levers += skew(n[k]) * skew(LaneVec3(frame.plane(0, k), frame.plane(1, k), 0));
   }
   const LaneVec2 swapped(-total.y(), total.x());
   const Lanes in_plane = total.z() / (frame.trace * frame.trace);
@@ -262,10 +260,10 @@ void add_edge_stiffness(const EdgeNow& edge, int start, int carrier, const LaneV
 void add_edge_forces(const Kinematics& now, const LaneVector6& on_slopes, const LaneVec3& on_bows,
                      std::array<std::array<LaneVec3, 2>, 3>& carried, LaneVector18& force) {
   for (int k = 0; k < 3; ++k) {
-    const EdgeNow& edge = now.edges[static_cast<std::size_t>(k)];
+    const EdgeNow& edge = now.edges[k];
     for (int end = 0; end < 2; ++end) {
       const auto e = static_cast<std::size_t>(end);
-      LaneVec3& v = carried[static_cast<std::size_t>(k)][e];
+      LaneVec3& v = carried[k][e];
       v = -on_slopes[2 * k + end] * edge.normal[e] - (end == 0 ? -on_bows[k] : on_bows[k]) * edge.side[e];
       const LaneVec3 p = (v - edge.direction * edge.direction.dot(v)) / edge.length;
       force.segment<3>(6 * next_corner(k)) += p;
@@ -285,8 +283,7 @@ void add_curved_stiffness(const Kinematics& now, const Derivatives& d, const Lan
   t += coupling + coupling.transpose();
   for (int k = 0; k < 3; ++k) {
     for (int end = 0; end < 2; ++end) {
-      add_edge_stiffness(now.edges[static_cast<std::size_t>(k)], k, corner_at(k, end),
-                         carried[static_cast<std::size_t>(k)][static_cast<std::size_t>(end)], t);
+      add_edge_stiffness(now.edges[k], k, corner_at(k, end), carried[k][end], t);
     }
   }
 }
@@ -376,7 +373,7 @@ LaneState linear_deformation(const ElementLanes& element, const LaneVector18& mo
   }
   LaneVec3 spin = LaneVec3::Zero();
   for (int k = 0; k < 3; ++k) {
-    spin += reference.g[static_cast<std::size_t>(k)] * local.segment<3>(6 * k);
+    spin += reference.g[k] * local.segment<3>(6 * k);
   }
   LaneState state = LaneState::Zero();
   state.head<3>() = reference.derivatives.strain.lazyProduct(local);
@@ -412,7 +409,7 @@ LaneVector18 linear_force(const ElementLanes& element, const LaneVector18& motio
   }
   LaneVector18 force;
   for (int k = 0; k < 3; ++k) {
-    local.segment<3>(6 * k) -= reference.g[static_cast<std::size_t>(k)].transpose() * total;
+    local.segment<3>(6 * k) -= reference.g[k].transpose() * total;
     force.segment<3>(6 * k) = element.axes.transpose() * local.segment<3>(6 * k);
     force.segment<3>(6 * k + 3) = element.axes.transpose() * local.segment<3>(6 * k + 3);
   }
@@ -445,7 +442,7 @@ LaneMask corotational_response(const ElementLanes& element, const MotionLanes& m
       element.curved ? LaneVec3(element.sideways.transpose() * stress.head<3>()) : LaneVec3(LaneVec3::Zero());
   if (element.curved) {
     for (int i = 0; i < 3; ++i) {
-      slope_stiffness += stress[i] * element.bulging[static_cast<std::size_t>(i)];
+      slope_stiffness += stress[i] * element.bulging[i];
     }
     on_slopes = slope_stiffness.lazyProduct(now.slopes);
     for (int k = 0; k < 3; ++k) {

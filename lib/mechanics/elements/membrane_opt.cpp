@@ -45,9 +45,9 @@ MembraneStiffness membrane_opt(const PlaneTriangle& triangle, const Mat3& elasti
   const auto corner_strain = [&](std::array<int, 9> order) {
     Mat3 q;
     for (int column = 0; column < 3; ++column) {
-      q(0, column) = beta[static_cast<std::size_t>(order[static_cast<std::size_t>(column)] - 1)] / l21;
-      q(1, column) = beta[static_cast<std::size_t>(order[static_cast<std::size_t>(column + 3)] - 1)] / l32;
-      q(2, column) = beta[static_cast<std::size_t>(order[static_cast<std::size_t>(column + 6)] - 1)] / l13;
+      q(0, column) = beta[order[column] - 1] / l21;
+      q(1, column) = beta[order[column + 3] - 1] / l32;
+      q(2, column) = beta[order[column + 6] - 1] / l13;
     }
     return Mat3(q * (2 * area / 3));
   };

@@ -64,7 +64,7 @@ PatchHeight patch_height(const std::array<Vec3, 3>& corners, const std::array<Ve
   // Stretch C = sum_kl (x_k.x_l) g_k g_l' with the gradients g of the barycentric coordinates; height = T:(1 + C) / 2.
   Mat3 gradients;
   for (std::size_t k = 0; k < 3; ++k) {
-    gradients.col(static_cast<Eigen::Index>(k)) = n.cross(corners[next(next(k))] - corners[next(k)]) / twice_area;
+    gradients.col(k) = n.cross(corners[next(next(k))] - corners[next(k)]) / twice_area;
   }
   return {t.trace(), gradients.transpose() * (0.5 * (t + t.transpose())) * gradients};
 }
@@ -74,9 +74,7 @@ double patch_volume(const std::array<Vec3, 3>& corners, const PatchHeight& heigh
   for (int k = 0; k < 3; ++k) {
     for (int l = 0; l < 3; ++l) {
       // Relative to the first corner, to keep the digits.
-      mean +=
-          height.coupling(k, l) *
-          (corners[static_cast<std::size_t>(k)] - corners[0]).dot(corners[static_cast<std::size_t>(l)] - corners[0]);
+      mean += height.coupling(k, l) * (corners[k] - corners[0]).dot(corners[l] - corners[0]);
     }
   }
   return mean / 2 * (corners[1] - corners[0]).cross(corners[2] - corners[0]).norm() / 2;
@@ -85,7 +83,7 @@ double patch_volume(const std::array<Vec3, 3>& corners, const PatchHeight& heigh
 void unit_pressure(const std::array<Vec3, 3>& corners, const PatchHeight& height, Vector9& force, Matrix9* stiffness) {
   Mat3 x;
   for (int k = 0; k < 3; ++k) {
-    x.col(k) = corners[static_cast<std::size_t>(k)] - corners[0];
+    x.col(k) = corners[k] - corners[0];
   }
   const Vec3 twice = x.col(1).cross(x.col(2));
   const double twice_area = twice.norm();
@@ -146,17 +144,16 @@ void unit_pressure(const ElementLanes& element, const MotionLanes& motion, LaneV
     const LaneVec3 normal = element.axes.transpose() * element.edge_normals.col(k);
     LaneVec3 carried = LaneVec3::Zero();
     for (int e = 0; e < 2; ++e) {
-      End& end = ends[static_cast<std::size_t>(k)][static_cast<std::size_t>(e)];
+      End& end = ends[k][e];
       end.corner = e == 0 ? k : next_corner;
       end.weight = element.height_weights[2 * k + e];
-      end.carried = motion.rotation[static_cast<std::size_t>(end.corner)] * normal;
-      of_length[static_cast<std::size_t>(k)] +=
-          end.weight * (element.slopes[2 * k + e] + element.rest_normals[2 * k + e]);
+      end.carried = motion.rotation[end.corner] * normal;
+      of_length[k] += end.weight * (element.slopes[2 * k + e] + element.rest_normals[2 * k + e]);
       carried += end.weight * end.carried;
       height_gradient.segment<3>(6 * end.corner + 3) -= end.weight * end.carried.cross(edge);
     }
-    height += of_length[static_cast<std::size_t>(k)] * length - edge.dot(carried);
-    const LaneVec3 along = of_length[static_cast<std::size_t>(k)] / length * edge - carried;
+    height += of_length[k] * length - edge.dot(carried);
+    const LaneVec3 along = of_length[k] / length * edge - carried;
     height_gradient.segment<3>(6 * next_corner) += along;
     height_gradient.segment<3>(6 * k) -= along;
   }

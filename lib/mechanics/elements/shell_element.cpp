@@ -31,7 +31,7 @@ ShellElement make_shell_element(const std::array<Vec3, 3>& corners, const ShellS
     find_edges(surface, element);
     find_bulging(element);
     for (int i = 0; i < 2; ++i) {
-      spread += 0.5 * element.slopes.dot(element.bulging[static_cast<std::size_t>(i)] * element.slopes);
+      spread += 0.5 * element.slopes.dot(element.bulging[i] * element.slopes);
       for (int k = 0; k < 3; ++k) {
         spread += element.sideways(i, k) * (element.slopes[2 * k] - element.slopes[2 * k + 1]) * element.tilts[k];
       }
@@ -72,9 +72,9 @@ ShellElement make_shell_element(const std::array<Vec3, 3>& corners, const ShellS
     Kinematics rest;
     find_kinematics(same(element), no_motion(), rest);
     for (int i = 0; i < 6; ++i) {
-      const EdgeNow& edge = rest.edges[static_cast<std::size_t>(i / 2)];
-      element.rest_normals[i] = edge.direction.dot(edge.normal[static_cast<std::size_t>(i % 2)])[0];
-      element.rest_sides[i] = edge.direction.dot(edge.side[static_cast<std::size_t>(i % 2)])[0];
+      const EdgeNow& edge = rest.edges[i / 2];
+      element.rest_normals[i] = edge.direction.dot(edge.normal[i % 2])[0];
+      element.rest_sides[i] = edge.direction.dot(edge.side[i % 2])[0];
     }
   }
   return element;

@@ -9,7 +9,7 @@ namespace tunica {
 void find_bulging(ShellElement& element) {
   std::array<Vec3, 3> vectors;
   for (int k = 0; k < 3; ++k) {
-    vectors[static_cast<std::size_t>(k)] << element.plane.col(next_corner(k)) - element.plane.col(k), 0;
+    vectors[k] << element.plane.col(next_corner(k)) - element.plane.col(k), 0;
   }
   // Dunavant's six points, exact to degree 4: gradients are quadratic.
   constexpr std::array<std::array<double, 2>, 2> orbits{
@@ -21,27 +21,26 @@ void find_bulging(ShellElement& element) {
   Eigen::Matrix<double, 6, 6> ordinates = Eigen::Matrix<double, 6, 6>::Zero();
   Vector6 centre;
   for (int k = 0; k < 3; ++k) {
-    const double third = vectors[static_cast<std::size_t>(k)].norm() / 3;
+    const double third = vectors[k].norm() / 3;
     ordinates(2 * k, 2 * k) = third;
     ordinates(2 * k + 1, 2 * k + 1) = -third;
   }
   for (int column = 0; column < 6; ++column) {
     std::array<double, 10> all{};
     for (int i = 0; i < 6; ++i) {
-      all[static_cast<std::size_t>(3 + i)] = ordinates(i, column);
+      all[3 + i] = ordinates(i, column);
     }
     centre[column] = averaged_centre(vectors, all);
-    element.height_weights[column] =
-        (ordinates(column, column) + centre[column]) / (10 * vectors[static_cast<std::size_t>(column / 2)].norm());
+    element.height_weights[column] = (ordinates(column, column) + centre[column]) / (10 * vectors[column / 2].norm());
   }
   for (const auto& [near, weight] : orbits) {
     for (int point = 0; point < 3; ++point) {
       std::array<double, 3> l{near, near, near};
-      l[static_cast<std::size_t>(point)] = 1 - 2 * near;
+      l[point] = 1 - 2 * near;
       Eigen::Matrix<double, 2, 6> slope = Eigen::Matrix<double, 2, 6>::Zero();
       for (int k = 0; k < 3; ++k) {
         const int j = next_corner(k);
-        const double lk = l[static_cast<std::size_t>(k)], lj = l[static_cast<std::size_t>(j)];
+        const double lk = l[k], lj = l[j];
         slope +=
             3 * (2 * lk * lj * element.gradients.col(k) + lk * lk * element.gradients.col(j)) * ordinates.row(2 * k);
         slope += 3 * (2 * lk * lj * element.gradients.col(j) + lj * lj * element.gradients.col(k)) *
@@ -71,14 +70,14 @@ void find_edges(const ShellSurface& surface, ShellElement& element) {
     Vec3 direction;
     direction << element.plane.col(next_corner(k)) - element.plane.col(k), 0;
     direction.normalize();
-    const std::array<Vec3, 2> normals{element.axes * surface.normals[static_cast<std::size_t>(k)],
-                                      element.axes * surface.normals[static_cast<std::size_t>(next_corner(k))]};
+    const std::array<Vec3, 2> normals{element.axes * surface.normals[k],
+                                      element.axes * surface.normals[next_corner(k)]};
     Vec3 m = normals[0] + normals[1];
     m = (m - direction * direction.dot(m)).normalized();
     element.edge_normals.col(k) = m;
     element.edge_sides.col(k) = m.cross(direction);
     for (int end = 0; end < 2; ++end) {
-      const double sine = normals[static_cast<std::size_t>(end)].dot(direction);
+      const double sine = normals[end].dot(direction);
       element.slopes[2 * k + end] = -sine / std::sqrt(1 - sine * sine);
     }
   }
@@ -87,7 +86,7 @@ void find_edges(const ShellSurface& surface, ShellElement& element) {
 void find_short_waves(const ShellSurface& surface, double stretching, ShellElement& element) {
   Eigen::Matrix2d gradient = Eigen::Matrix2d::Zero();
   for (int k = 0; k < 3; ++k) {
-    const Vec3 normal = element.axes * surface.normals[static_cast<std::size_t>(k)];
+    const Vec3 normal = element.axes * surface.normals[k];
     gradient += normal.head<2>() * element.gradients.col(k).transpose();
   }
   const Eigen::Matrix2d curvature = 0.5 * (gradient + gradient.transpose());
@@ -108,8 +107,7 @@ void find_rotational(const ShellSurface& surface, const PlaneStiffness& bending,
   element.curvature.setZero();
   element.rotational.setZero();
   for (int i = 0; i < 3; ++i) {
-    const Vec3 normal =
-        surface.curved ? Vec3(element.axes * surface.normals[static_cast<std::size_t>(i)]) : Vec3(Vec3::UnitZ());
+    const Vec3 normal = surface.curved ? Vec3(element.axes * surface.normals[i]) : Vec3(Vec3::UnitZ());
     drilling.block<1, 3>(i, 3 * i) << 0.5 * normal.x() / normal.z(), 0.5 * normal.y() / normal.z(), 1;
     element.curvature.middleCols<2>(3 * i) = bending.mean_strain.middleCols<2>(3 * i + 1);
     for (int j = 0; j < 3; ++j) {

@@ -11,9 +11,7 @@
 namespace tunica {
 namespace {
 
-constexpr double gmres_tolerance = 1e-4;
-constexpr std::size_t gmres_iterations = 30;
-constexpr double largest_turn = 0.3;  // rad in one step, by its predictor
+constexpr double largest_turn_of_step = 0.3;  // rad in one step, by its predictor
 constexpr double largest_correction = 0.5;
 /// Straight lines between the states may depart from the path by this part of the largest factor and displacement.
 constexpr double chord_of_factor = 0.002;
@@ -23,15 +21,7 @@ constexpr double retried = 6;
 /// Steps are not cut below this part of the path so far.
 constexpr double smallest_step = 1e-6;
 constexpr std::size_t wanted_iterations = 4;
-constexpr std::size_t most_iterations = 10;
-
-double largest_rotation(const VectorX& increment) {
-  double largest = 0;
-  for (Eigen::Index i = 3; i < increment.size(); i += 6) {
-    largest = std::max(largest, increment.segment<3>(i).norm());
-  }
-  return largest;
-}
+constexpr std::size_t most_corrections_of_step = 10;
 
 /// A converged state, with the tangent of the path there.
 struct PathState {
@@ -94,7 +84,7 @@ public:
     VectorX change = step * start.direction;
     double factor_change = step * start.factor_slope;
     advance_configuration(state.configuration, change);
-    const std::size_t most = std::min(settings_.newton_max, most_iterations);
+    const std::size_t most = std::min(settings_.newton_max, most_corrections_of_step);
     for (state.iterations = 0;; ++state.iterations) {
       check_interrupt();
       state.factor = start.factor + factor_change;
@@ -151,7 +141,7 @@ private:
     if (!x.allFinite()) {
       return false;
     }
-    (void)gmres(matrix_, free_, solver_, right, gmres_tolerance, gmres_iterations, x);
+    (void)gmres(matrix_, free_, solver_, right, x);
     return x.allFinite();
   }
 
@@ -234,7 +224,7 @@ private:
     PathState next;
     double depart = 0;
     while (true) {
-      step_ = std::min(step_, largest_turn / std::max(largest_rotation(now_.direction), 1e-300));
+      step_ = std::min(step_, largest_turn_of_step / std::max(largest_rotation(now_.direction), 1e-300));
       next = PathState();
       if (find(now_, step_, next)) {
         depart = departure(now_, next);

@@ -14,8 +14,6 @@
 namespace tunica {
 namespace {
 
-constexpr double largest_imbalance = 1e-3;
-
 std::string place(const Vec3& p) { return fmt::format("({:.6g}, {:.6g}, {:.6g}) mm", p.x(), p.y(), p.z()); }
 
 [[noreturn]] void refuse(const ShellBody& body, const std::string& what) {

@@ -15,7 +15,7 @@ namespace {
 constexpr std::size_t vertices_per_block = 4096;
 
 // A shell between two states, as the co-rotational element sees it.
-struct Motion {
+struct PatchMotion {
   std::array<Vec3, 3> displacement;
   std::array<Vec3, 3> bending;  ///< rotation vectors of the corners relative to the facet, in its reference frame
   Mat3 frame;                   ///< rotation of the facet
@@ -29,10 +29,11 @@ bool at_rest(const ShellMesh& mesh, std::size_t triangle, std::size_t first, con
 }
 
 // nullopt when the triangle has collapsed: then it has no facet to turn with.
-std::optional<Motion> motion_of(const ShellMesh& mesh, std::size_t triangle, std::size_t first, const State& state) {
+std::optional<PatchMotion> motion_of(const ShellMesh& mesh, std::size_t triangle, std::size_t first,
+                                     const State& state) {
   const auto& nodes = mesh.triangles[triangle];
   std::array<Vec3, 3> before, after;
-  Motion motion;
+  PatchMotion motion;
   for (std::size_t k = 0; k < 3; ++k) {
     before[k] = mesh.vertices[nodes[k]];
     motion.displacement[k] = state.displacement[first + nodes[k]];

@@ -117,7 +117,7 @@ std::optional<Shared> shared(const Load& load) {
 
 bool only_held_nodes_bear(const Shared& load, const std::vector<std::array<bool, 6>>& held) {
   for (std::size_t c = 0; c < 3; ++c) {
-    if (load.value[static_cast<Eigen::Index>(c)] != 0 &&
+    if (load.value[c] != 0 &&
         !std::all_of(load.nodes.begin(), load.nodes.end(), [&](Index node) { return held[node][load.first + c]; })) {
       return false;
     }
@@ -181,7 +181,7 @@ void doubt_loads(const Model& model, const RunSettings& settings,
 
 bool prescribes(const Fix& fix) {
   for (int c = 0; c < 3; ++c) {
-    if (fix.translation[static_cast<std::size_t>(c)] && fix.displacement[c] != 0) {
+    if (fix.translation[c] && fix.displacement[c] != 0) {
       return true;
     }
   }

@@ -133,7 +133,7 @@ public:
       return;
     }
     for (Eigen::Index i = 0; i < mass_.size(); ++i) {
-      const bool moves = !system_.held[static_cast<std::size_t>(i)] && mass_[i] > 0;
+      const bool moves = !system_.held[i] && mass_[i] > 0;
       motion.rates.acceleration[i] = moves ? (forces_.external[i] - forces_.internal[i]) / mass_[i] : 0;
     }
     motion.rates.auxiliary = motion.rates.acceleration;
@@ -290,9 +290,7 @@ private:
     s.held = VectorX::Zero(motion.rates.velocity.size());
     for (const PrescribedFreedom& p : system_.prescribed) {
       const Ramp& ramp = model_.fixes[p.fix].ramp;
-      s.held[static_cast<Eigen::Index>(p.freedom)] =
-          p.value * ramp.at(time + length) -
-          s.start.displacement[p.freedom / 6][static_cast<Eigen::Index>(p.freedom % 6)];
+      s.held[p.freedom] = p.value * ramp.at(time + length) - s.start.displacement[p.freedom / 6][p.freedom % 6];
     }
     StepResult result;
     result.newton = run(s, 0, 1, motion.configuration);

@@ -30,18 +30,6 @@ constexpr double largest_linear_strain = 0.2;
 /// The shift of a free body, of its lowest eigenvalue.
 constexpr double near_part = 0.2;
 
-double longest_side(const ShellSystem& system) {
-  Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity());
-  Vec3 high = -low;
-  for (std::size_t i = 0; i < system.node_count(); ++i) {
-    if (system.used[i] != 0) {
-      low = low.cwiseMin(system.reference[i]);
-      high = high.cwiseMax(system.reference[i]);
-    }
-  }
-  return (high - low).maxCoeff();
-}
-
 void require_freedoms(std::size_t wanted, std::size_t there) {
   if (wanted > there) {
     throw InputError(fmt::format("count = {}, but the model has only {} modes: ask for fewer", wanted, there));
@@ -71,14 +59,6 @@ double largest_strain(const ShellSystem& system, const VectorX& solution) {
       const Vec3 change = solution.segment<3>(first_freedom(b)) - solution.segment<3>(first_freedom(a));
       largest = std::max(largest, std::abs(edge.dot(change)) / edge.squaredNorm());
     }
-  }
-  return largest;
-}
-
-double largest_rotation(const VectorX& solution) {
-  double largest = 0;
-  for (Eigen::Index i = 0; i < solution.size(); i += 6) {
-    largest = std::max(largest, solution.segment<3>(i + 3).norm());
   }
   return largest;
 }
@@ -289,10 +269,10 @@ std::vector<VectorX> idle_rigid_modes(const ShellSystem& system, const Configura
     }
     VectorX product;
     for (Eigen::Index a = 0; a < count; ++a) {
-      multiply(stiffness, modes[static_cast<std::size_t>(a)], product);
+      multiply(stiffness, modes[a], product);
       for (Eigen::Index b = 0; b < count; ++b) {
-        work(b, a) = modes[static_cast<std::size_t>(b)].dot(product);
-        terms(b, a) = modes[static_cast<std::size_t>(b)].dot(diagonal.cwiseProduct(modes[static_cast<std::size_t>(a)]));
+        work(b, a) = modes[b].dot(product);
+        terms(b, a) = modes[b].dot(diagonal.cwiseProduct(modes[a]));
       }
     }
     const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> eigen(0.5 * (work + work.transpose()), terms);
@@ -300,7 +280,7 @@ std::vector<VectorX> idle_rigid_modes(const ShellSystem& system, const Configura
       if (std::abs(eigen.eigenvalues()[k]) < no_work) {
         VectorX mode = VectorX::Zero(first_freedom(system.node_count()));
         for (Eigen::Index a = 0; a < count; ++a) {
-          mode += eigen.eigenvectors()(a, k) * modes[static_cast<std::size_t>(a)];
+          mode += eigen.eigenvectors()(a, k) * modes[a];
         }
         idle.push_back(mode);
       }

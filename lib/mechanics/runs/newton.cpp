@@ -10,16 +10,6 @@ namespace {
 
 constexpr double largest_turn = 0.5;        // rad per iteration
 constexpr std::size_t free_iterations = 6;  // full steps before the line search sets in
-constexpr double gmres_tolerance = 1e-4;    // relative residual of the unsymmetric system
-constexpr std::size_t gmres_iterations = 30;
-
-double largest_rotation(const VectorX& increment) {
-  double largest = 0;
-  for (Eigen::Index i = 3; i < increment.size(); i += 6) {
-    largest = std::max(largest, increment.segment<3>(i).norm());
-  }
-  return largest;
-}
 
 bool uses_cg(const RunSettings& settings) { return settings.solver == Solver::cg; }
 
@@ -71,7 +61,7 @@ TangentSolver::Result TangentSolver::solve(BlockMatrix& matrix, const VectorX& b
   if (!x.allFinite()) {
     return result;
   }
-  result.residual = gmres(matrix, free_, *direct_, b, gmres_tolerance, gmres_iterations, x);
+  result.residual = gmres(matrix, free_, *direct_, b, x);
   result.solved = x.allFinite();
   result.converged = result.solved;
   if (tell_direct_error_ && result.solved && result.positive_definite) {

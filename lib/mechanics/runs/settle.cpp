@@ -8,13 +8,13 @@
 namespace tunica {
 namespace {
 
-constexpr std::size_t most_iterations = 200;
+constexpr std::size_t most_settling_iterations = 200;
 constexpr double first_viscosity = 1e-3;  // of the stiffness against moving one node alone
 constexpr double least_viscosity = 1e-9;  // less is none
 constexpr double largest_viscosity = 1e6;
 /// Of the work of the unbalanced forces along a step that they may do against it at its end.
 constexpr double largest_push_back = 0.5;
-constexpr double largest_turn = 0.3;  // rad per iteration
+constexpr double largest_settling_turn = 0.3;  // rad per iteration
 
 /// The diagonal of the linear stiffness, one value per node for displacements and one for spins.
 VectorX viscous_diagonal(const ShellSystem& system) {
@@ -36,17 +36,6 @@ void add_diagonal(double factor, const VectorX& diagonal, BlockMatrix& matrix) {
   }
 }
 
-/// The longest side of the box around the model.
-double size_of(const ShellSystem& system) {
-  Vec3 low = system.reference.front();
-  Vec3 high = low;
-  for (const Vec3& x : system.reference) {
-    low = low.cwiseMin(x);
-    high = high.cwiseMax(x);
-  }
-  return (high - low).maxCoeff();
-}
-
 double largest_displacement(const Configuration& configuration) {
   double largest = 0;
   for (const Vec3& u : configuration.displacement) {
@@ -63,7 +52,8 @@ void limit(const ShellSystem& system, VectorX& increment) {
     move = std::max(move, increment.segment<3>(i).norm());
     turn = std::max(turn, increment.segment<3>(i + 3).norm());
   }
-  increment *= std::min({1.0, largest_turn / std::max(turn, largest_turn), system.length / std::max(move, 1e-300)});
+  increment *= std::min(
+      {1.0, largest_settling_turn / std::max(turn, largest_settling_turn), system.length / std::max(move, 1e-300)});
 }
 
 }  // namespace
@@ -86,8 +76,8 @@ public:
         norm_(now_.valid ? norm_of(now_) : 0) {}
 
   SettleResult run() {
-    const double bound = size_of(system_);
-    for (; now_.valid && result_.iterations < most_iterations; ++result_.iterations) {
+    const double bound = longest_side(system_);
+    for (; now_.valid && result_.iterations < most_settling_iterations; ++result_.iterations) {
       check_interrupt();
       result_.residual = now_.scale > 0 ? norm_ / now_.scale : 0;
       const bool at_rest = result_.residual <= settings_.converge || norm_ <= now_.floor;

@@ -108,7 +108,7 @@ void add_dead_pressure(const ShellSystem& system, std::size_t element, double va
   Vector9 force;
   unit_pressure(reference_corners(e), system.heights[element], force, nullptr);
   for (int k = 0; k < 3; ++k) {
-    load.force.segment<3>(first_freedom(e.nodes[static_cast<std::size_t>(k)])) += value * force.segment<3>(3 * k);
+    load.force.segment<3>(first_freedom(e.nodes[k])) += value * force.segment<3>(3 * k);
   }
 }
 
@@ -184,7 +184,7 @@ void make_loads(ShellSystem& system, const Model& model) {
       add_edge_load(system, model, load.body, *edge, dead);
     } else if (const auto* gravity = std::get_if<GravityLoad>(&load.kind)) {
       for (std::size_t i = model.first_node(load.body); i < model.first_node(load.body + 1); ++i) {
-        dead.force.segment<3>(first_freedom(i)) = system.mass[static_cast<Eigen::Index>(i)] * gravity->acceleration;
+        dead.force.segment<3>(first_freedom(i)) = system.mass[i] * gravity->acceleration;
       }
     }
   }
@@ -205,7 +205,7 @@ MotionLanes corner_motion(const ElementGroup& elements, const Configuration& con
     LaneVec3 displacement;
     set_lanes(
         displacement, [&](std::size_t k) -> const auto& { return configuration.displacement[node(k)]; });
-    motion.displacement.col(static_cast<Eigen::Index>(corner)) = displacement;
+    motion.displacement.col(corner) = displacement;
     Eigen::Matrix<Lanes, 4, 1> coefficients;
     set_lanes(
         coefficients, [&](std::size_t k) -> const auto& { return configuration.rotation[node(k)].coeffs(); });
@@ -225,7 +225,7 @@ void push_facets(const ShellSystem& system, const Batch& batch, const MotionLane
     const Mat3 displacement = lane(motion.displacement, l);
     std::array<Vec3, 3> corners;
     for (int k = 0; k < 3; ++k) {
-      corners[static_cast<std::size_t>(k)] = element.from_centroid.col(k) + (displacement.col(k) - displacement.col(0));
+      corners[k] = element.from_centroid.col(k) + (displacement.col(k) - displacement.col(0));
     }
     Vector9 on_corners;
     Matrix9 between_corners;
@@ -256,7 +256,7 @@ void scatter(const ShellSystem& system, const Batch& batch, const LaneMatrix18& 
       for (int first = 0; first < 36; first += width) {
         std::array<Lanes, lane_count> part;
         for (int k = 0; k < width; ++k) {
-          part[static_cast<std::size_t>(k)] = matrices(6 * i + (first + k) % 6, 6 * j + (first + k) / 6);
+          part[k] = matrices(6 * i + (first + k) % 6, 6 * j + (first + k) / 6);
         }
         transpose(part);
         for (std::size_t l = 0; l < batch.count; ++l) {
@@ -478,14 +478,12 @@ void evaluate(const ShellSystem& system, const Model& model, const Configuration
           energies[e] = response.energy[l];
           const Vector18 internal = lane(response.force, l);
           for (int k = 0; k < 3; ++k) {
-            forces.internal.segment<6>(first_freedom(group[l]->nodes[static_cast<std::size_t>(k)])) +=
-                internal.segment<6>(6 * k);
+            forces.internal.segment<6>(first_freedom(group[l]->nodes[k])) += internal.segment<6>(6 * k);
           }
           if (is_pushed) {
             const Vector18 external = lane(pushed, l);
             for (int k = 0; k < 3; ++k) {
-              forces.external.segment<6>(first_freedom(group[l]->nodes[static_cast<std::size_t>(k)])) +=
-                  external.segment<6>(6 * k);
+              forces.external.segment<6>(first_freedom(group[l]->nodes[k])) += external.segment<6>(6 * k);
             }
           }
         }
@@ -536,7 +534,7 @@ void linear_forces(const ShellSystem& system, const VectorX& displacement, Vecto
         for (std::size_t l = 0; l < colour[b].count; ++l) {
           const Vector18 one = lane(force, l);
           for (int k = 0; k < 3; ++k) {
-            forces.segment<6>(first_freedom(group[l]->nodes[static_cast<std::size_t>(k)])) += one.segment<6>(6 * k);
+            forces.segment<6>(first_freedom(group[l]->nodes[k])) += one.segment<6>(6 * k);
           }
         }
       }
@@ -547,10 +545,30 @@ void linear_forces(const ShellSystem& system, const VectorX& displacement, Vecto
 VectorX lumped_masses(const ShellSystem& system) {
   VectorX mass(first_freedom(system.node_count()));
   for (std::size_t i = 0; i < system.node_count(); ++i) {
-    mass.segment<3>(first_freedom(i)).setConstant(system.mass[static_cast<Eigen::Index>(i)]);
-    mass.segment<3>(first_freedom(i) + 3).setConstant(system.inertia[static_cast<Eigen::Index>(i)]);
+    mass.segment<3>(first_freedom(i)).setConstant(system.mass[i]);
+    mass.segment<3>(first_freedom(i) + 3).setConstant(system.inertia[i]);
   }
   return mass;
+}
+
+double longest_side(const ShellSystem& system) {
+  Vec3 low = Vec3::Constant(infinity);
+  Vec3 high = -low;
+  for (std::size_t i = 0; i < system.node_count(); ++i) {
+    if (system.used[i] != 0) {
+      low = low.cwiseMin(system.reference[i]);
+      high = high.cwiseMax(system.reference[i]);
+    }
+  }
+  return (high - low).maxCoeff();
+}
+
+double largest_rotation(const VectorX& freedoms) {
+  double largest = 0;
+  for (Eigen::Index i = 3; i < freedoms.size(); i += 6) {
+    largest = std::max(largest, freedoms.segment<3>(i).norm());
+  }
+  return largest;
 }
 
 double force_norm(const ShellSystem& system, const VectorX& force) {

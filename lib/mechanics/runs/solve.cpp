@@ -24,9 +24,9 @@ State make_state(const ShellSystem& system, const Model& model, const Configurat
   for (const ShellElement& element : system.elements) {
     CornerMotion motion;
     for (int k = 0; k < 3; ++k) {
-      const Index node = element.nodes[static_cast<std::size_t>(k)];
+      const Index node = element.nodes[k];
       motion.displacement.col(k) = configuration.displacement[node];
-      motion.rotation[static_cast<std::size_t>(k)] = configuration.rotation[node].toRotationMatrix();
+      motion.rotation[k] = configuration.rotation[node].toRotationMatrix();
     }
     ElementState d;
     if (deformation(element, motion, d)) {
@@ -180,7 +180,7 @@ ElementFields ElementFieldEvaluator::operator()(const State& state) const {
     if (state.linear) {
       Vector18 moved;
       for (int k = 0; k < 3; ++k) {
-        const Index node = element.nodes[static_cast<std::size_t>(k)];
+        const Index node = element.nodes[k];
         moved.segment<3>(6 * k) = state.displacement[node];
         moved.segment<3>(6 * k + 3) = state.rotation[node];
       }
@@ -188,9 +188,9 @@ ElementFields ElementFieldEvaluator::operator()(const State& state) const {
     } else {
       CornerMotion motion;
       for (int k = 0; k < 3; ++k) {
-        const Index node = element.nodes[static_cast<std::size_t>(k)];
+        const Index node = element.nodes[k];
         motion.displacement.col(k) = state.displacement[node];
-        motion.rotation[static_cast<std::size_t>(k)] = exponential(state.rotation[node]).toRotationMatrix();
+        motion.rotation[k] = exponential(state.rotation[node]).toRotationMatrix();
       }
       deformation(element, motion, d);
     }

@@ -15,7 +15,7 @@ namespace tunica {
 VectorX prescribed_positions(const ShellSystem& system, const Model& model, double factor) {
   VectorX positions = VectorX::Zero(first_freedom(system.node_count()));
   for (const PrescribedFreedom& p : system.prescribed) {
-    positions[static_cast<Eigen::Index>(p.freedom)] = p.value * factor_of(model.fixes[p.fix].ramp, true, factor);
+    positions[p.freedom] = p.value * factor_of(model.fixes[p.fix].ramp, true, factor);
   }
   return positions;
 }
@@ -49,8 +49,6 @@ constexpr double largest_departure = 3;
 constexpr double largest_branch = 0.25;
 /// Part of the thickness by which a shell is pushed off a path that it may leave.
 constexpr double nudge = 0.01;
-/// Net load that the supports of a body held by its rigid motions may carry, relative to the load.
-constexpr double largest_imbalance = 1e-3;
 
 /// One load step to equilibrium, bodies held by their rigid motions included: their mean displacement and rotation are
 /// taken out, and equilibrium found again, until both hold.

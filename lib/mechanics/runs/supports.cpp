@@ -60,14 +60,14 @@ std::vector<std::size_t> determinate_supports(const ShellSystem& system, const P
   Eigen::Matrix<double, 6, 9> columns;
   const std::array<Index, 3> nodes{a, b, c};
   for (int k = 0; k < 9; ++k) {
-    const Index node = nodes[static_cast<std::size_t>(k / 3)];
+    const Index node = nodes[k / 3];
     columns.col(k) = rigid_row(x[node] - centre, size, k % 3).transpose();
   }
   const Eigen::ColPivHouseholderQR<Eigen::Matrix<double, 6, 9>> qr(columns);
   std::vector<std::size_t> freedoms;
   for (int k = 0; k < 6; ++k) {
     const int chosen = qr.colsPermutation().indices()[k];
-    freedoms.push_back(freedom(nodes[static_cast<std::size_t>(chosen / 3)], static_cast<std::size_t>(chosen % 3)));
+    freedoms.push_back(freedom(nodes[chosen / 3], static_cast<std::size_t>(chosen % 3)));
   }
   return freedoms;
 }
@@ -89,7 +89,7 @@ void make_supports(ShellSystem& system, const Model& model) {
       for (std::size_t c = 0; c < 3; ++c) {
         const std::size_t moved = freedom(model.first_node(fix.body) + node, c);
         if (fix.translation[c]) {
-          const double value = fix.displacement[static_cast<Eigen::Index>(c)];
+          const double value = fix.displacement[c];
           const auto [place, is_new] = values.emplace(moved, std::pair(value, f));
           if (!is_new && place->second.first != value) {
             const Fix& other = model.fixes[place->second.second];

@@ -87,7 +87,7 @@ SurfaceFoot PatchSearch::near(const Vec3& p, std::optional<Index>& guess) const 
   const Vec3 weights = weights_in(tree_.corners(hit.triangle), hit.point);
   Vec2 start = Vec2::Zero();
   for (std::size_t k = 0; k < 3; ++k) {
-    start += weights[static_cast<Eigen::Index>(k)] * coarse_.barycentric[coarse_.mesh.triangles[hit.triangle][k]];
+    start += weights[k] * coarse_.barycentric[coarse_.mesh.triangles[hit.triangle][k]];
   }
   return near(p, coarse_.shell[hit.triangle], start);
 }

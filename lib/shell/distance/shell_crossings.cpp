@@ -13,7 +13,7 @@
 namespace tunica {
 namespace {
 
-constexpr std::size_t grain = 256;
+constexpr std::size_t pairs_per_block = 256;
 constexpr double flat_enough = 1e-4;  // of the patch's longest edge: an eye sees no less in a drawing of it
 constexpr double edge_strip = 0.125;  // of the height over a shared edge
 
@@ -195,7 +195,7 @@ std::vector<std::array<Index, 2>> crossing_patches(const ShellMesh& shell) {
   const Crossings crossings(shell);
   const auto candidates = crossings.candidates();
   std::vector<std::uint8_t> cross(candidates.size(), 0);
-  parallel_for_blocks(candidates.size(), grain, [&](std::size_t begin, std::size_t end) {
+  parallel_for_blocks(candidates.size(), pairs_per_block, [&](std::size_t begin, std::size_t end) {
     check_interrupt();
     for (std::size_t i = begin; i < end; ++i) {
       cross[i] = crossings.cross(candidates[i][0], candidates[i][1]) ? 1 : 0;

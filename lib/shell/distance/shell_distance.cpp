@@ -14,7 +14,7 @@
 namespace tunica {
 namespace {
 
-constexpr std::size_t grain = 256;
+constexpr std::size_t samples_per_block = 256;
 constexpr std::size_t mean_samples = 20'000;
 constexpr std::size_t most_fine_triangles = 4'000'000;
 
@@ -65,9 +65,9 @@ std::pair<double, double> mean_distance(const ShellMesh& shell, const Target& ta
   };
   const double per_patch = static_cast<double>(mean_samples) / static_cast<double>(patches.size());
   const int level = std::clamp(static_cast<int>(std::sqrt(per_patch)), 2, 40);
-  std::vector<Sum> sums((patches.size() + grain - 1) / grain);
-  parallel_for_blocks(patches.size(), grain, [&](std::size_t begin, std::size_t end) {
-    Sum& sum = sums[begin / grain];
+  std::vector<Sum> sums((patches.size() + samples_per_block - 1) / samples_per_block);
+  parallel_for_blocks(patches.size(), samples_per_block, [&](std::size_t begin, std::size_t end) {
+    Sum& sum = sums[begin / samples_per_block];
     std::optional<Index> guess;
     for (std::size_t t = begin; t < end; ++t) {
       const auto add = [&](double c, double r) {

@@ -15,7 +15,7 @@ namespace tunica {
 namespace {
 
 constexpr std::size_t samples = 20'000;
-constexpr std::size_t patches_per_block = 64;
+constexpr std::size_t shells_per_block = 64;
 constexpr double crease_cosine = 0.766;  // of 40 degrees
 constexpr int pieces_of_an_edge = 16;
 
@@ -38,9 +38,9 @@ void add_normal_errors(const std::vector<CubicPatch>& patches, const Target& tar
   const auto creased = creased_triangles(target);
   const int level = std::clamp(
       static_cast<int>(std::sqrt(static_cast<double>(samples) / static_cast<double>(patches.size()))), 2, 12);
-  std::vector<Sum> sums((patches.size() + patches_per_block - 1) / patches_per_block);
-  parallel_for_blocks(patches.size(), patches_per_block, [&](std::size_t begin, std::size_t end) {
-    Sum& sum = sums[begin / patches_per_block];
+  std::vector<Sum> sums((patches.size() + shells_per_block - 1) / shells_per_block);
+  parallel_for_blocks(patches.size(), shells_per_block, [&](std::size_t begin, std::size_t end) {
+    Sum& sum = sums[begin / shells_per_block];
     for (std::size_t t = begin; t < end; ++t) {
       for (int r = 0; r < level; ++r) {
         for (int c = 0; c < level - r; ++c) {

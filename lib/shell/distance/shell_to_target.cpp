@@ -13,20 +13,19 @@
 namespace tunica {
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr std::size_t grain = 256;
+constexpr std::size_t pieces_per_block = 256;
 constexpr double bulge_share = 0.25;  // of the distance that settles a piece: what the first cut leaves to bulges
 constexpr int most_level = 24;        // pieces per edge of the first cut
 
 /// A triangle in space with what is closest to its corners.
-struct Corners {
+struct CornerFeet {
   std::array<Vec3, 3> point;
   std::array<double, 3> distance;
   std::array<Index, 3> nearest;
 };
 
 /// Largest distance of a flat triangle from a surface; infinite when nothing at most `enough` can be shown.
-double flat_bound(const ClosestPoint& tree, const CoverBound& cover, const Corners& c, double enough,
+double flat_bound(const ClosestPoint& tree, const CoverBound& cover, const CornerFeet& c, double enough,
                   CoverBound::Visited& visited) {
   double best = infinity;
   for (std::size_t i = 0; i < 3; ++i) {
@@ -50,7 +49,7 @@ double flat_bound(const ClosestPoint& tree, const CoverBound& cover, const Corne
   return best;
 }
 
-void look(const ClosestPoint& tree, Corners& c, std::size_t i, std::optional<Index> guess) {
+void look(const ClosestPoint& tree, CornerFeet& c, std::size_t i, std::optional<Index> guess) {
   const auto hit = guess ? tree.closest(c.point[i], *guess) : tree.closest(c.point[i]);
   c.distance[i] = std::sqrt(hit.squared_distance);
   c.nearest[i] = hit.triangle;
@@ -85,7 +84,7 @@ private:
     int cuts;  // halvings of the first cut
     int level;
     std::array<Vec2, 3> at;
-    Corners corners;
+    CornerFeet corners;
     double upper;
   };
   struct Block {
@@ -105,25 +104,25 @@ private:
 
   /// Every patch cut so that its pieces bulge little against the distances that its corners and middles have.
   std::vector<Piece> first_pieces() {
-    std::vector<Block> middles((patches_.size() + grain - 1) / grain);
-    parallel_for_blocks(patches_.size(), grain, [&](std::size_t begin, std::size_t end) {
+    std::vector<Block> middles((patches_.size() + pieces_per_block - 1) / pieces_per_block);
+    parallel_for_blocks(patches_.size(), pieces_per_block, [&](std::size_t begin, std::size_t end) {
       std::optional<Index> guess;
       for (std::size_t t = begin; t < end; ++t) {
         for (const Vec2& b : {Vec2(1.0 / 3, 1.0 / 3), Vec2(0.5, 0), Vec2(0, 0.5), Vec2(0.5, 0.5)}) {
           const Vec3 p = patches_[t].point(b);
           const auto hit = guess ? tree_.closest(p, *guess) : tree_.closest(p);
           guess = hit.triangle;
-          raise(middles[begin / grain], std::sqrt(hit.squared_distance), p);
+          raise(middles[begin / pieces_per_block], std::sqrt(hit.squared_distance), p);
         }
       }
     });
     collected(middles, aim_, lower_, settled_, farthest_, beyond_);
     const double bulge = bulge_share * aim_.enough(lower_);
-    std::vector<Block> blocks((patches_.size() + grain - 1) / grain);
-    parallel_for_blocks(patches_.size(), grain, [&](std::size_t begin, std::size_t end) {
+    std::vector<Block> blocks((patches_.size() + pieces_per_block - 1) / pieces_per_block);
+    parallel_for_blocks(patches_.size(), pieces_per_block, [&](std::size_t begin, std::size_t end) {
       check_interrupt();
       for (std::size_t t = begin; t < end; ++t) {
-        cut_first(static_cast<Index>(t), bulge, blocks[begin / grain]);
+        cut_first(static_cast<Index>(t), bulge, blocks[begin / pieces_per_block]);
       }
     });
     return collected(blocks, aim_, lower_, settled_, farthest_, beyond_);
@@ -152,7 +151,7 @@ private:
       Piece piece{t, 0, m, {}, {}, infinity};
       for (std::size_t i = 0; i < 3; ++i) {
         const auto [c, r] = corners[i];
-        const Point& p = points[static_cast<std::size_t>(r * (2 * m + 3 - r) / 2 + c)];
+        const Point& p = points[r * (2 * m + 3 - r) / 2 + c];
         piece.at[i] = Vec2(static_cast<double>(c) / m, static_cast<double>(r) / m);
         piece.corners.point[i] = p.at;
         piece.corners.distance[i] = p.distance;
@@ -172,7 +171,7 @@ private:
 
   /// Settles the piece, keeps or lists it.
   void bound(Piece& piece, Block& block) const {
-    const Corners& c = piece.corners;
+    const CornerFeet& c = piece.corners;
     const auto far =
         static_cast<std::size_t>(std::max_element(c.distance.begin(), c.distance.end()) - c.distance.begin());
     if (aim_.is_listed(c.distance[far])) {
@@ -199,10 +198,10 @@ private:
   }
 
   std::vector<Piece> refined(const std::vector<Piece>& pieces) {
-    std::vector<Block> blocks((pieces.size() + grain - 1) / grain);
-    parallel_for_blocks(pieces.size(), grain, [&](std::size_t begin, std::size_t end) {
+    std::vector<Block> blocks((pieces.size() + pieces_per_block - 1) / pieces_per_block);
+    parallel_for_blocks(pieces.size(), pieces_per_block, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
-        cut(pieces[i], blocks[begin / grain]);
+        cut(pieces[i], blocks[begin / pieces_per_block]);
       }
     });
     return collected(blocks, aim_, lower_, settled_, farthest_, beyond_);

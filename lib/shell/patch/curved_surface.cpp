@@ -17,7 +17,7 @@
 namespace tunica {
 namespace {
 
-constexpr std::size_t patches_per_block = 64;
+constexpr std::size_t patches_per_task = 64;
 constexpr double least_height = 1e-6;  // of the longest edge: less has no usable stiffness in double precision
 constexpr double crease_squared = 0.12061475842818326;  // (2 sin 10 degrees)^2: normals 20 degrees apart
 
@@ -100,7 +100,7 @@ Tessellation tessellate_by(const ShellMesh& shell, const std::vector<CubicPatch>
   out.barycentric.resize(first_vertex[count]);
   out.mesh.triangles.resize(first_triangle[count]);
   out.shell.resize(first_triangle[count]);
-  parallel_for_blocks(count, patches_per_block, [&](std::size_t begin, std::size_t end) {
+  parallel_for_blocks(count, patches_per_task, [&](std::size_t begin, std::size_t end) {
     for (std::size_t t = begin; t < end; ++t) {
       const int m = levels[t];
       // Row r holds the points with b3 = r / m; its first vertex stands at row_start(r).
@@ -291,7 +291,7 @@ std::vector<CubicPatch> curved_patches(const ShellMesh& shell) {
     beside = neighbours(flat, incidence(flat));
   }
   std::vector<CubicPatch> patches(shell.triangles.size());
-  parallel_for_blocks(patches.size(), patches_per_block, [&](std::size_t begin, std::size_t end) {
+  parallel_for_blocks(patches.size(), patches_per_task, [&](std::size_t begin, std::size_t end) {
     for (std::size_t t = begin; t < end; ++t) {
       const auto corners = corners_of(shell, t);
       const auto normals = normals_of(shell, t);
@@ -349,7 +349,7 @@ void require_fit(const ShellMesh& shell, const std::string& name) {
   }
   for (std::size_t t = 0; t < shell.triangles.size(); ++t) {
     for (int c = 0; c < 3; ++c) {
-      const Index v = shell.triangles[t][static_cast<std::size_t>(c)];
+      const Index v = shell.triangles[t][c];
       if (v >= shell.vertices.size()) {
         throw InputError(fmt::format("{}: triangle {} names vertex {} of {}", name, t, v, shell.vertices.size()));
       }

@@ -79,7 +79,7 @@ std::array<LaneVec3, 2> PatchPowers::tangents(const Lanes& x, const Lanes& y) co
 PatchAxes::PatchAxes(const CubicPatch& patch) {
   const auto c = powers(patch);
   for (std::size_t i = 0; i < c.size(); ++i) {
-    c_[i] = lanes_of([&](std::size_t k) { return k < 3 ? c[i][static_cast<Eigen::Index>(k)] : 0.0; });
+    c_[i] = lanes_of([&](std::size_t k) { return k < 3 ? c[i][k] : 0.0; });
   }
 }
 
@@ -102,7 +102,7 @@ std::array<Lanes, 3> PatchAxes::second_derivatives(const Vec2& b) const {
 }
 
 PatchFoot foot_on_patch(const PatchAxes& patch, const Vec3& q, Vec2 start, int most) {
-  const Lanes wanted = lanes_of([&](std::size_t k) { return k < 3 ? q[static_cast<Eigen::Index>(k)] : 0.0; });
+  const Lanes wanted = lanes_of([&](std::size_t k) { return k < 3 ? q[k] : 0.0; });
   Vec2 at = start;
   Lanes point = patch.point(at);
   Lanes r = wanted - point;

@@ -72,7 +72,7 @@ bool is_crease(const ShellMesh& shell, const Edges& edges, Index edge) {
   }
   const auto normal_at = [&](Index triangle, Index node) {
     const auto& v = shell.triangles[triangle];
-    return shell.corner_normals[triangle][static_cast<std::size_t>(std::find(v.begin(), v.end(), node) - v.begin())];
+    return shell.corner_normals[triangle][std::find(v.begin(), v.end(), node) - v.begin()];
   };
   const auto differs = [&](Index node) { return normal_at(s, node) != normal_at(t, node); };
   return differs(edges.ends[edge][0]) || differs(edges.ends[edge][1]);

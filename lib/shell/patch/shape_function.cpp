@@ -22,7 +22,7 @@ Matrix9 shape_matrix(const PlaneTriangle& triangle) {
   const std::array<Vec2, 3> corners{Vec2(0, 0), Vec2(triangle.a, 0), Vec2(triangle.b, triangle.h)};
   Matrix9 c;
   for (int k = 0; k < 3; ++k) {
-    const Vec2& p = corners[static_cast<std::size_t>(k)];
+    const Vec2& p = corners[k];
     c.row(3 * k) = monomials(p.x(), p.y()).transpose();
     c.row(3 * k + 1) = monomials_dy(p.x(), p.y()).transpose();
     c.row(3 * k + 2) = -monomials_dx(p.x(), p.y()).transpose();

@@ -21,7 +21,6 @@ constexpr double least_cosine = 0.2;
 /// unless they were worse before. The next limits count when the ones before leave nothing to collapse.
 constexpr std::array<ShapeLimits, 3> shape_limits{{{0, 0.002, 0.08}, {-0.5, 0.002, 0.06}, {-0.9, 0.001, 0.01}}};
 constexpr std::array<ShapeLimits, 3> good_shape_limits{{{0, 0.25, 0.25}, {-0.5, 0.15, 0.15}, {-0.9, 0.01, 0.01}}};
-constexpr double forbidden = std::numeric_limits<double>::infinity();
 /// Uncertainty of the planes' normals, squared, where shape counts: vertices are drawn to the middle of the area that
 /// they stand for (Trettner, Kobbelt, Fast and robust QEF minimization using probabilistic quadrics, 2020).
 constexpr double normal_variance = 0.02;
@@ -268,7 +267,7 @@ void EdgeCollapse::fill_heap() {
   std::vector<double> costs;
   costs_of(edges, costs);
   for (std::size_t i = 0; i < edges.size(); ++i) {
-    if (costs[i] < forbidden) {
+    if (costs[i] < forbidden_cost) {
       heap_.append(edges[i], costs[i]);
     }
   }
@@ -318,7 +317,7 @@ double EdgeCollapse::squared_loss(HalfEdge h, const Vec3& position) const {
   const Index u = from(h);
   const Index v = to(h);
   const LaneVec3 ends = lane_points([&](std::size_t k) -> const Vec3& { return vertex_[k == 0 ? u : v].position; });
-  Lanes least = forbidden;
+  Lanes least = forbidden_cost;
   for (const Index end : {u, v}) {
     around(end, [&](HalfEdge spoke) {
       const Index i = to(spoke);
@@ -344,7 +343,7 @@ bool EdgeCollapse::collapse_cheapest() {
     return false;
   }
   const double penalty = shape_penalty(h, chosen->position);
-  if (penalty == forbidden) {
+  if (penalty == forbidden_cost) {
     if (placement_[edge] == Placement::best) {
       evaluate(edge, Placement::end);
     } else {
@@ -372,7 +371,7 @@ bool EdgeCollapse::collapse_cheapest() {
   costs_of(changed_, changed_cost_);
   for (std::size_t i = 0; i < changed_.size(); ++i) {
     placement_[changed_[i]] = Placement::best;
-    if (changed_cost_[i] < forbidden) {
+    if (changed_cost_[i] < forbidden_cost) {
       heap_.set(changed_[i], changed_cost_[i]);
     } else {
       heap_.remove(changed_[i]);
@@ -544,10 +543,11 @@ bool EdgeCollapse::keeps_topology(HalfEdge h) {
   return keeps_enough(from(previous(h))) && (half_[h].twin == none || keeps_enough(from(previous(half_[h].twin))));
 }
 
-/// By what factor the triangles' shapes raise the cost of a collapse; `forbidden` where it would fold or flatten any.
+/// By what factor the triangles' shapes raise the cost of a collapse; `forbidden_cost` where it would fold or flatten
+/// any.
 double EdgeCollapse::shape_penalty(HalfEdge h, const Vec3& position) const {
   const double one = fan_penalty(from(h), to(h), position);
-  return one == forbidden ? forbidden : std::max(one, fan_penalty(to(h), from(h), position));
+  return one == forbidden_cost ? forbidden_cost : std::max(one, fan_penalty(to(h), from(h), position));
 }
 
 /// The same for the triangles around `vertex` that do not hold `other`, when `vertex` moves to `position`.
@@ -590,7 +590,7 @@ double EdgeCollapse::fan_penalty(Index vertex, Index other, const Vec3& position
       good = after.dot(outer) > limit * length_after || before.dot(outer) <= limit * length_before;
     }
   });
-  return good ? penalty : forbidden;
+  return good ? penalty : forbidden_cost;
 }
 
 /// Makes the twins of two edges of a dying triangle each other's twins. The spoke's edge lives on, the rim's is gone.

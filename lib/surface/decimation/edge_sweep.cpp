@@ -7,7 +7,6 @@
 namespace tunica {
 namespace {
 
-constexpr double forbidden = std::numeric_limits<double>::infinity();
 constexpr double sweep_fraction = 0.3;          // of all edges: the cheapest, that one sweep looks at
 constexpr std::size_t most_looked_at = 20'000;  // edges for a quantile of their costs
 
@@ -18,7 +17,7 @@ constexpr std::size_t most_looked_at = 20'000;  // edges for a quantile of their
 void EdgeCollapse::sweep(std::size_t triangles, const Progress& progress) {
   heap_ = EdgeHeap(half_of_.size());
   touched_.assign(vertex_.size(), 1);
-  sweep_cost_.assign(half_of_.size(), forbidden);
+  sweep_cost_.assign(half_of_.size(), forbidden_cost);
   for (std::size_t before = triangles_ + 1; triangles_ > triangles && triangles_ < before;) {
     before = triangles_;
     evaluate_touched();
@@ -35,8 +34,8 @@ void EdgeCollapse::sweep(std::size_t triangles, const Progress& progress) {
         continue;
       }
       const auto chosen = target(h, Placement::best);
-      const double penalty = keeps_topology(h) ? shape_penalty(h, chosen->position) : forbidden;
-      const double cost = penalty == forbidden ? forbidden : chosen->cost(penalty);
+      const double penalty = keeps_topology(h) ? shape_penalty(h, chosen->position) : forbidden_cost;
+      const double cost = penalty == forbidden_cost ? forbidden_cost : chosen->cost(penalty);
       if (cost > limit) {
         sweep_cost_[edge] = cost;
         continue;
@@ -66,9 +65,10 @@ void EdgeCollapse::evaluate_touched() {
   }
 }
 
-/// The costs of edges in their best places, `forbidden` for those that cannot collapse: inner ones several at once.
+/// The costs of edges in their best places, `forbidden_cost` for those that cannot collapse: inner ones several at
+/// once.
 void EdgeCollapse::costs_of(const std::vector<Index>& edges, std::vector<double>& costs) const {
-  costs.assign(edges.size(), forbidden);
+  costs.assign(edges.size(), forbidden_cost);
   std::array<HalfEdge, lane_count> together{};
   std::array<std::size_t, lane_count> place{};
   std::size_t waiting = 0;
@@ -150,7 +150,7 @@ void EdgeCollapse::compact() {
     }
   }
   std::vector<HalfEdge> half_of(edges, none);
-  std::vector<double> sweep_cost(edges, forbidden);
+  std::vector<double> sweep_cost(edges, forbidden_cost);
   std::vector<std::uint8_t> touched(vertices, 0);
   for (std::size_t e = 0; e < half_of_.size(); ++e) {
     if (new_edge[e] != none) {

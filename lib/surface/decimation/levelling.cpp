@@ -15,7 +15,6 @@
 namespace tunica {
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr int doublings = 4;             // errors count by their 16th power: nearly the largest alone
 constexpr double least_gain = 0.15;      // of the worst triangle's cost, for a change to be made
 constexpr double collapse_share = 0.85;  // of the largest error, at most, may a collapse leave

@@ -14,7 +14,6 @@
 namespace tunica {
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr std::size_t samples_per_triangle = 40;
 constexpr std::size_t most_in_patch = 64;  // triangles of a change; larger ones are refused
 

@@ -35,7 +35,7 @@ struct ShapedMesh::LeastSquares {
 
   void add_sample(const Vec3& p, const std::array<Vec3, 3>& c, std::size_t k, double large) {
     const Vec3 x = closest_point_on_triangle(p, c[0], c[1], c[2]);
-    const double share = barycentric(x, c)[static_cast<Eigen::Index>(k)];
+    const double share = barycentric(x, c)[k];
     const Vec3 residual = p - x;
     const Vec3 normal = area_vector(c).normalized();
     const double off = residual.norm();

@@ -20,9 +20,9 @@ constexpr double large_error = 0.85;  // quantile of the triangles' errors that 
 constexpr double safe_angle = 1.04;   // of the angle asked for: what is worked towards
 /// Of these, what a change may leave: as much as an edge of twice the length sags, which shape may ask for.
 constexpr double most_large_errors = 4;
-constexpr double least_gain = 1e-4;     // smaller ones are not worth another look at the neighbours
-constexpr double good_quality = 0.875;  // mean radius ratio that is worked towards
-constexpr double least_quality = 0.86;  // below it there are further rounds
+constexpr double least_shaping_gain = 1e-4;  // smaller ones are not worth another look at the neighbours
+constexpr double good_quality = 0.875;       // mean radius ratio that is worked towards
+constexpr double least_quality = 0.86;       // below it there are further rounds
 constexpr int further_rounds = 6;
 constexpr double most_loss = 4;  // that a collapse may cost so that a split elsewhere may win more
 constexpr double crease_cosine = 0.5;
@@ -208,7 +208,7 @@ private:
   }
 
   bool flip(Index u, Index v) {
-    if (state_.make_flip(u, v, trial_) && state_.evaluate(trial_, -least_gain) < -least_gain) {
+    if (state_.make_flip(u, v, trial_) && state_.evaluate(trial_, -least_shaping_gain) < -least_shaping_gain) {
       accept(trial_);
       return true;
     }
@@ -256,7 +256,7 @@ private:
   }
 
   bool take_best(Index v) {
-    double best = -least_gain;
+    double best = -least_shaping_gain;
     bool found = false;
     for (const Vec3& candidate : candidates_) {
       state_.make_move(v, candidate, trial_);
@@ -275,7 +275,6 @@ private:
 
   // A collapse in the better of two places: halfway, and where least squares put it from there.
   double evaluate_collapse(Index u, Index v, double limit, PatchTrial& trial) {
-    constexpr double infinity = std::numeric_limits<double>::infinity();
     if (!state_.make_collapse(u, v, trial)) {
       return infinity;
     }
@@ -548,7 +547,7 @@ std::vector<SharpCorner> sharp_corners(const TriangleMesh& mesh, double limit) {
     if (has_sharp_sector(mesh, v, triangles, across, limit)) {
       const bool on_boundary = std::any_of(triangles.begin(), triangles.end(), [&](Index t) {
         const auto& c = mesh.triangles[t];
-        return across[t][static_cast<std::size_t>(std::find(c.begin(), c.end(), v) - c.begin())] == no_neighbour;
+        return across[t][std::find(c.begin(), c.end(), v) - c.begin()] == no_neighbour;
       });
       found.push_back({mesh.vertices[v], on_boundary});
     }

@@ -276,7 +276,7 @@ struct ClosestPoint::Builder {
     part.nodes.emplace_back();
     for (std::size_t lane = 0; lane < 4; ++lane) {
       const std::int32_t child = lane < count ? make_node(parts[lane], part) : 0;
-      set_child(part.nodes[static_cast<std::size_t>(index)], lane, lane < count ? &parts[lane] : nullptr, child);
+      set_child(part.nodes[index], lane, lane < count ? &parts[lane] : nullptr, child);
     }
     return index;
   }
@@ -363,8 +363,8 @@ ClosestPoint::ClosestPoint(const TriangleMesh& mesh) : vertices_(mesh.vertices),
     for (std::size_t axis = 0; axis < 3; ++axis) {
       node.lower[axis].fill(std::numeric_limits<double>::infinity());
       node.upper[axis].fill(-std::numeric_limits<double>::infinity());
-      node.lower[axis][0] = bounds.lower[static_cast<Eigen::Index>(axis)];
-      node.upper[axis][0] = bounds.upper[static_cast<Eigen::Index>(axis)];
+      node.lower[axis][0] = bounds.lower[axis];
+      node.upper[axis][0] = bounds.upper[axis];
     }
     node.child = {root, 0, 0, 0};
   }
@@ -411,8 +411,8 @@ void ClosestPoint::visit_leaf(const Leaf& leaf, const Vec3& p, double& best, Ind
   const Lanes3 ap{p.x() - lanes(leaf.origin[0]), p.y() - lanes(leaf.origin[1]), p.z() - lanes(leaf.origin[2])};
   const Lanes squared = squared_distances(ap, ab, ac);
   for (std::size_t lane = 0; lane < leaf_size; ++lane) {
-    if (squared[static_cast<Eigen::Index>(lane)] < best) {
-      best = squared[static_cast<Eigen::Index>(lane)];
+    if (squared[lane] < best) {
+      best = squared[lane];
       triangle = leaf.triangle[lane];
     }
   }
@@ -430,9 +430,9 @@ ClosestPoint::Hit ClosestPoint::search(const Vec3& p, double best, Index triangl
   std::int32_t current = 0;
   while (true) {
     if (current < 0) {
-      visit_leaf(leaves_[static_cast<std::size_t>(~current)], p, best, triangle);
+      visit_leaf(leaves_[~current], p, best, triangle);
     } else {
-      const Node& node = nodes_[static_cast<std::size_t>(current)];
+      const Node& node = nodes_[current];
       const Lanes dx = (lanes(node.lower[0]) - p.x()).max(p.x() - lanes(node.upper[0])).max(0.0);
       const Lanes dy = (lanes(node.lower[1]) - p.y()).max(p.y() - lanes(node.upper[1])).max(0.0);
       const Lanes dz = (lanes(node.lower[2]) - p.z()).max(p.z() - lanes(node.upper[2])).max(0.0);
@@ -440,7 +440,7 @@ ClosestPoint::Hit ClosestPoint::search(const Vec3& p, double best, Index triangl
       std::array<Pending, 4> nearer;
       std::size_t count = 0;
       for (std::size_t lane = 0; lane < 4; ++lane) {
-        const double distance = squared[static_cast<Eigen::Index>(lane)];
+        const double distance = squared[lane];
         if (distance < best) {
           std::size_t at = count++;
           for (; at > 0 && nearer[at - 1].squared_distance < distance; --at) {

@@ -10,8 +10,6 @@
 namespace tunica {
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
-
 // A point of B seen along the normal of s: signed distances to the three sides of s (inside positive), and height.
 struct Seen {
   std::array<double, 3> inside;

@@ -56,7 +56,7 @@ SurfaceWalk::SurfaceWalk(const TriangleMesh& mesh) : mesh_(mesh), around_(incide
   const double volume = std::max(size.x(), least) * std::max(size.y(), least) * std::max(size.z(), least);
   cells_per_mm_ = std::cbrt(static_cast<double>(mesh.vertices.size()) / volume);
   for (int axis = 0; axis < 3; ++axis) {
-    cells_[static_cast<std::size_t>(axis)] = static_cast<std::size_t>(size[axis] * cells_per_mm_) + 1;
+    cells_[axis] = static_cast<std::size_t>(size[axis] * cells_per_mm_) + 1;
   }
   std::vector<std::uint64_t> following(mesh.vertices.size(), 0), preceding(mesh.vertices.size(), 0);
   for (const auto& c : mesh.triangles) {
@@ -120,8 +120,7 @@ Index SurfaceWalk::cube_of(const Vec3& p) const {
 
 std::size_t SurfaceWalk::cell(double x, int axis) const {
   const double place = (x - origin_[axis]) * cells_per_mm_;
-  return static_cast<std::size_t>(
-      std::clamp(place, 0.0, static_cast<double>(cells_[static_cast<std::size_t>(axis)] - 1)));
+  return static_cast<std::size_t>(std::clamp(place, 0.0, static_cast<double>(cells_[axis] - 1)));
 }
 
 /// A vertex nearer than its neighbours.

@@ -64,7 +64,7 @@ std::vector<std::vector<Index>> loops_of(std::vector<DirectedEdge> edges) {
   std::vector<bool> used(edges.size(), false);
   const auto next_unused = [&](Index from) {
     auto it = std::lower_bound(edges.begin(), edges.end(), DirectedEdge{from, 0});
-    while (it != edges.end() && it->first == from && used[static_cast<std::size_t>(it - edges.begin())]) {
+    while (it != edges.end() && it->first == from && used[it - edges.begin()]) {
       ++it;
     }
     return it != edges.end() && it->first == from ? it : edges.end();
@@ -77,7 +77,7 @@ std::vector<std::vector<Index>> loops_of(std::vector<DirectedEdge> edges) {
     std::vector<Index> loop;
     for (auto it = edges.begin() + static_cast<std::ptrdiff_t>(start); it != edges.end();
          it = next_unused(it->second)) {
-      used[static_cast<std::size_t>(it - edges.begin())] = true;
+      used[it - edges.begin()] = true;
       loop.push_back(it->first);
     }
     loops.push_back(std::move(loop));

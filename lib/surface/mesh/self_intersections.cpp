@@ -19,12 +19,12 @@ namespace tunica {
 namespace {
 
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
-using Box = CGAL::Box_intersection_d::Box_d<double, 3, CGAL::Box_intersection_d::ID_EXPLICIT>;
+using NumberedBox = CGAL::Box_intersection_d::Box_d<double, 3, CGAL::Box_intersection_d::ID_EXPLICIT>;
 
 // A box that knows what it is around.
-class TriangleBox : public Box {
+class TriangleBox : public NumberedBox {
 public:
-  TriangleBox(const CGAL::Bbox_3& bounds, Index triangle) : Box(bounds), triangle_(triangle) {}
+  TriangleBox(const CGAL::Bbox_3& bounds, Index triangle) : NumberedBox(bounds), triangle_(triangle) {}
   [[nodiscard]] Index triangle() const { return triangle_; }
   [[nodiscard]] std::size_t id() const { return triangle_; }
 

@@ -11,7 +11,7 @@
 namespace tunica {
 namespace {
 
-constexpr std::size_t grain = 4096;
+constexpr std::size_t words_per_block = 4096;
 /// A cell's number counts x first, then y, then z, in steps that leave room for every volume that can be indexed.
 constexpr std::uint64_t step_y = std::uint64_t{1} << 21, step_z = step_y << 21;
 
@@ -64,7 +64,7 @@ CellCrossings::CellCrossings(const std::vector<std::array<Index, 3>>& triangles,
 std::vector<std::array<Index, 2>> CellCrossings::find(const std::vector<Vec3>& places) const {
   const std::size_t size = cell_.size();
   std::vector<Bounds> bounds(size);
-  parallel_for_blocks(size, grain, [&](std::size_t begin, std::size_t end) {
+  parallel_for_blocks(size, words_per_block, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       const auto& [a, b, c] = triangles_[in_cell_[i]];
       bounds[i] = {places[a].cwiseMin(places[b]).cwiseMin(places[c]),
@@ -73,8 +73,8 @@ std::vector<std::array<Index, 2>> CellCrossings::find(const std::vector<Vec3>& p
   });
   // Of the rows of three cells around a triangle's own, those after it; the first begins at the triangle itself.
   constexpr std::array<std::uint64_t, 5> rows{0, step_y, step_z - step_y, step_z, step_z + step_y};
-  std::vector<std::vector<std::array<Index, 2>>> found((size + grain - 1) / grain);
-  parallel_for_blocks(size, grain, [&](std::size_t begin, std::size_t end) {
+  std::vector<std::vector<std::array<Index, 2>>> found((size + words_per_block - 1) / words_per_block);
+  parallel_for_blocks(size, words_per_block, [&](std::size_t begin, std::size_t end) {
     check_interrupt();
     std::array<std::size_t, rows.size()> first;
     for (std::size_t r = 0; r < rows.size(); ++r) {
@@ -89,7 +89,8 @@ std::vector<std::array<Index, 2>> CellCrossings::find(const std::vector<Vec3>& p
         }
         for (std::size_t j = r == 0 ? i + 1 : first[r]; j < size && cell_[j] <= middle + 1; ++j) {
           if (bounds[i].meet(bounds[j]) && cross(triangles_[in_cell_[i]], triangles_[in_cell_[j]], places)) {
-            found[begin / grain].push_back({std::min(in_cell_[i], in_cell_[j]), std::max(in_cell_[i], in_cell_[j])});
+            found[begin / words_per_block].push_back(
+                {std::min(in_cell_[i], in_cell_[j]), std::max(in_cell_[i], in_cell_[j])});
           }
         }
       }

@@ -24,18 +24,18 @@ using cell_layers::LayerCounts;
 using cell_layers::Layers;
 using cell_layers::PaddedGrid;
 
-constexpr std::size_t grain = 8;  // slices in a block
+constexpr std::size_t slices_per_block = 8;  // slices in a block
 
 /// Has the layers of [0, size) done in blocks, body(layers, begin, end), by whatever thread is free.
 template <typename Body>
 void for_each_block(const PaddedGrid& grid, std::size_t size, const Body& body) {
-  const std::size_t blocks = (size + grain - 1) / grain;
+  const std::size_t blocks = (size + slices_per_block - 1) / slices_per_block;
   std::atomic<std::size_t> next = 0;
   parallel_for_blocks(std::min(blocks, thread_count()), 1, [&](std::size_t, std::size_t) {
     Layers layers(grid);
     for (std::size_t block = next++; block < blocks; block = next++) {
       check_interrupt();
-      body(layers, block * grain, std::min(size, (block + 1) * grain));
+      body(layers, block * slices_per_block, std::min(size, (block + 1) * slices_per_block));
     }
   });
 }
@@ -112,13 +112,13 @@ public:
     window.first_slice = first_slice;
     const PaddedGrid grid(mask_, window, options_.open_border);
     std::array<Index, 3>* const triangles = mesh_.triangles.data();
-    std::vector<std::vector<PinchedVertex>> pinched((end - begin + grain - 1) / grain);
+    std::vector<std::vector<PinchedVertex>> pinched((end - begin + slices_per_block - 1) / slices_per_block);
     for_each_block(grid, end - begin, [&](Layers& layers, std::size_t from, std::size_t to) {
       const std::size_t slice = begin + from;
       grow_triangles(first_triangle_[begin + to]);
       const cell_layers::Output out{first_vertex_[slice], mesh_.vertices.data() + first_vertex_[slice],
                                     triangles + first_triangle_[slice]};
-      layers.write(slice, begin + to, counts_.data() + slice, out, crossings, pinched[from / grain]);
+      layers.write(slice, begin + to, counts_.data() + slice, out, crossings, pinched[from / slices_per_block]);
     });
     for (const auto& block : pinched) {
       pinched_.insert(pinched_.end(), block.begin(), block.end());

@@ -15,11 +15,11 @@ namespace {
 bool inside(const Mask& mask, bool open_border, const Vec3& index) {
   std::array<std::size_t, 3> voxel{};
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
-    const auto last = static_cast<double>(mask.dims()[static_cast<std::size_t>(axis)] - 1);
+    const auto last = static_cast<double>(mask.dims()[axis] - 1);
     if (!open_border && !(index[axis] >= 0 && index[axis] <= last)) {
       return false;
     }
-    voxel[static_cast<std::size_t>(axis)] = static_cast<std::size_t>(std::clamp(index[axis], 0.0, last));
+    voxel[axis] = static_cast<std::size_t>(std::clamp(index[axis], 0.0, last));
   }
   return mask(voxel[0], voxel[1], voxel[2]);
 }

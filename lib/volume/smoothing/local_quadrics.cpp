@@ -89,7 +89,7 @@ public:
   void set(std::size_t column, std::size_t row, double value) { columns_[column][row] = static_cast<float>(value); }
   void set_point(std::size_t column, std::size_t row, const Vec3& p) {
     for (std::size_t i = 0; i < 3; ++i) {
-      set(column + i, row, p[static_cast<Eigen::Index>(i)]);
+      set(column + i, row, p[i]);
     }
   }
   void set(std::size_t column, std::size_t row, const Several& value) {

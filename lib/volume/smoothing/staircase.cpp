@@ -20,7 +20,7 @@
 namespace tunica {
 namespace {
 
-constexpr std::size_t grain = 4096;
+constexpr std::size_t vertices_per_block = 4096;
 /// Vertices move by at most this many voxels along each axis: a little less than half, so that two walls one voxel
 /// apart cannot meet.
 constexpr double reach = 0.49;
@@ -28,26 +28,26 @@ constexpr double reach = 0.49;
 constexpr double most_volume_change = 1e-3;
 /// A triangle is spoilt when its normal turns by more than the angle with this cosine, or its shape falls below this
 /// ratio of twice its area to its longest edge squared.
-constexpr double least_cosine = 0.1;
+constexpr double least_turned_cosine = 0.1;
 constexpr double least_shape = 0.02;
 
 /// Sum over [0, size) of term(i), in blocks: the same whatever the number of threads.
 template <typename Term>
 double sum_blocks(std::size_t size, const Term& term) {
-  std::vector<double> parts((size + grain - 1) / grain, 0.0);
-  parallel_for_blocks(size, grain, [&](std::size_t begin, std::size_t end) {
+  std::vector<double> parts((size + vertices_per_block - 1) / vertices_per_block, 0.0);
+  parallel_for_blocks(size, vertices_per_block, [&](std::size_t begin, std::size_t end) {
     double sum = 0;
     for (std::size_t i = begin; i < end; ++i) {
       sum += term(i);
     }
-    parts[begin / grain] = sum;
+    parts[begin / vertices_per_block] = sum;
   });
   return std::accumulate(parts.begin(), parts.end(), 0.0);
 }
 
 template <typename Body>
 void for_all(std::size_t size, const Body& body) {
-  parallel_for_blocks(size, grain, [&](std::size_t begin, std::size_t end) {
+  parallel_for_blocks(size, vertices_per_block, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       body(i);
     }
@@ -388,7 +388,7 @@ private:
     const auto shape = [](const Vec3& a, const Vec3& b, const Vec3& n) {
       return n.norm() / std::max({a.squaredNorm(), b.squaredNorm(), (a - b).squaredNorm()});
     };
-    return before.dot(after) < least_cosine * before.norm() * after.norm() ||
+    return before.dot(after) < least_turned_cosine * before.norm() * after.norm() ||
            shape(u, v, after) < std::min(least_shape, 0.5 * shape(p, q, before));
   }
 

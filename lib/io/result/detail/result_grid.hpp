@@ -9,6 +9,9 @@
 /// What of a model and its states is drawn. Inside lib/io: the result file and its exports hold the same.
 namespace tunica {
 
+inline constexpr unsigned char vtk_triangle = 5;  ///< VTK's number of the cell type
+using Floats = std::vector<float>;
+
 /// A field of the grid: its name, numbers per point or cell, and to which it belongs.
 struct GridField {
   const char* name;

@@ -121,6 +121,12 @@ void linear_forces(const ShellSystem& system, const VectorX& displacement, Vecto
 /// Mass and rotary inertia of each freedom.
 VectorX lumped_masses(const ShellSystem& system);
 
+/// The longest side of the box around the model, mm.
+double longest_side(const ShellSystem& system);
+
+/// Largest rotation (rad) of any node in a vector of freedoms.
+double largest_rotation(const VectorX& freedoms);
+
 /// Root of the sum of squares of forces and moments / length.
 double force_norm(const ShellSystem& system, const VectorX& force);
 

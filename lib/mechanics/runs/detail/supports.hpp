@@ -17,6 +17,9 @@ int free_rigid_motions(const ShellSystem& system, const Piece& piece);
 std::vector<VectorX> free_rigid_modes(const ShellSystem& system, const Piece& piece,
                                       const Configuration& configuration);
 
+/// Net load that the supports of a body held by its rigid motions may carry, relative to the load.
+inline constexpr double largest_imbalance = 1e-3;
+
 /// Net force and moment of all loads at their full value on a piece, relative to the sum of their magnitudes.
 double imbalance(const ShellSystem& system, const Piece& piece, const VectorX& external);
 

@@ -8,6 +8,9 @@
 
 namespace tunica {
 
+/// Cost of a collapse that must not be.
+inline constexpr double forbidden_cost = infinity;
+
 /// What a collapse may make of the triangles around it, unless they were worse before.
 struct ShapeLimits {
   double fold_cosine = -1;  ///< of the angle between neighbours' normals
