@@ -14,8 +14,12 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <csignal>
+#include <cstdio>
+#include <cstdlib>
 #include <cstring>
+#include <exception>
 #include <fstream>
 #include <memory>
 #include <new>
@@ -34,6 +38,23 @@ extern "C" void on_signal(int signal) {
   request_stop(signal);
   // The second signal ends the program at once: somebody is waiting.
   std::signal(signal, SIG_DFL);
+}
+
+const std::terminate_handler print_and_abort = std::get_terminate();
+
+/// Memory may end before run() can catch it, while a tool's options are declared, or where a library lets nothing out.
+[[noreturn]] void on_terminate() {
+  try {
+    if (std::current_exception()) {
+      throw;
+    }
+  } catch (const std::bad_alloc&) {
+    std::fprintf(stderr, "%s: %s\n", program_invocation_short_name, no_memory);
+    std::_Exit(static_cast<int>(ExitCode::memory));
+  } catch (...) {
+    print_and_abort();
+  }
+  std::abort();
 }
 
 /// Of this program: ru_maxrss also counts the process that started it, as it was before exec().
@@ -139,6 +160,7 @@ void require_no_other_file(const std::filesystem::path& report) {
 
 Tool::Tool(std::string verb, std::string summary, std::string example)
     : verb_(std::move(verb)), app_(std::move(summary), "tunica-" + verb_) {
+  std::set_terminate(on_terminate);
   app_.footer("Example:\n  " + std::regex_replace(example, std::regex("\n *"), "\n  "));
   app_.set_help_flag();
 }
