@@ -403,6 +403,8 @@ private:
     }
   }
 
+  [[nodiscard]] bool has_front() const { return chart_.x.is_ranked && chart_.y.is_ranked; }
+
   void draw_front() {
     std::vector<Point> corners;
     for (std::size_t s = 0; s < chart_.series.size(); ++s) {
@@ -558,11 +560,11 @@ private:
       return {};
     }
     std::swap(out_, held_);
-    if (named.empty()) {
+    if (!named.empty()) {
+      draw_legend_column(named);
+    } else if (has_front()) {
       line(plot_.right - 130, plot_.top - 14, plot_.right - 96, plot_.top - 14, front_style);
       write(plot_.right - 88, plot_.top - 9.5, "Pareto front", tick_size, "fill=\"#333333\"");
-    } else {
-      draw_legend_column(named);
     }
     std::swap(out_, held_);
     return held_;
@@ -587,9 +589,11 @@ private:
       widest = text_width(title, 1.08 * tick_size);
       y += row;
     }
-    line(left - 8, y, left + 22, y, front_style);
-    entry("Pareto front", 30);
-    y += row;
+    if (has_front()) {
+      line(left - 8, y, left + 22, y, front_style);
+      entry("Pareto front", 30);
+      y += row;
+    }
     const double first = y;
     const std::size_t shown = named.size() > most_names ? most_names - 1 : named.size();
     for (std::size_t i = 0; i < shown; ++i) {
@@ -660,6 +664,9 @@ std::vector<std::vector<bool>> pareto_front(const Chart& chart) {
       const ChartMark& mark = chart.series[s].marks[m];
       entries.push_back({chart.x.more_is_better ? -mark.x : mark.x, chart.y.more_is_better ? -mark.y : mark.y, s, m});
     }
+  }
+  if (!chart.x.is_ranked || !chart.y.is_ranked) {
+    return front;
   }
   std::ranges::sort(entries, [](const Entry& a, const Entry& b) { return a.x != b.x ? a.x < b.x : a.y < b.y; });
   double best = std::numeric_limits<double>::infinity();

@@ -16,6 +16,7 @@ struct ChartAxis {
   std::string label;
   Scale scale = Scale::automatic;
   bool more_is_better = false;  ///< for the Pareto front
+  bool is_ranked = true;        ///< less (or more) is better: a cost or an error, not a count or a parameter
 };
 
 struct ChartMark {
@@ -40,14 +41,15 @@ struct Chart {
 };
 
 /// For each mark of each series whether it is on the Pareto front: no other mark is better in one coordinate and at
-/// least as good in the other. Cost: n log n.
+/// least as good in the other; none where an axis is not ranked. Cost: n log n.
 std::vector<std::vector<bool>> pareto_front(const Chart& chart);
 
 /// The scale that an automatic axis gets for these values.
 Scale resolved_scale(Scale wanted, const std::vector<double>& values);
 
 /// Draws a chart as SVG: round ticks, light grid, marks that differ in colour and shape (colour-blind-safe), the Pareto
-/// front as a dashed staircase, a legend at the right. Plain text in the reader's own sans-serif font; UTF-8.
+/// front, where both axes are ranked, as a dashed staircase, a legend at the right. Plain text in the reader's own
+/// sans-serif font; UTF-8.
 /// @param chart  finite values; a chart without marks gives empty axes
 /// Limits: beyond 40 series the legend ends with "and … more".
 std::string chart_svg(const Chart& chart);

@@ -132,9 +132,9 @@ def sizes(study):
     names = [name for name in names if name not in study.failed]
     common = ("--lines", "--x", "result.shells", "--x-label", "shells")
     study.chart("sizes-time.svg", names, *common, "--y", "study.seconds", "--y-label", "assembly and solve, s, one thread",
-                "--title", "One linear static solve: time", "--csv", os.path.join(study.out, "sizes-time.csv"))
+                "--title", "Vessel: time of one linear static solve from scratch", "--csv", os.path.join(study.out, "sizes-time.csv"))
     study.chart("sizes-memory.svg", names, *common, "--y", "peak_mib", "--y-label", "largest memory of the process, MiB",
-                "--title", "One linear static solve: memory", "--csv", os.path.join(study.out, "sizes-memory.csv"))
+                "--title", "Vessel: memory of one linear static solve from scratch", "--csv", os.path.join(study.out, "sizes-memory.csv"))
 
 
 def paper_mesh(folder, count):
@@ -207,11 +207,11 @@ def figure_6(study, folder):
     names = [name for name in names if name not in study.failed]
     common = ("--lines", "--x", "study.shells", "--x-scale", "linear", "--x-label", "shells")
     study.chart("figure-6-time.svg", names, *common, "--y", "study.ms_per_step", "--y-label",
-                "time of a step, ms, one thread", "--title", "The paper's Fig. 6: computation time",
+                "time of a step, ms, one thread", "--title", "The paper's Fig. 6 again: time of a step of 40 ms",
                 "--csv", os.path.join(study.out, "figure-6-time.csv"))
     study.chart("figure-6-error.svg", names, *common, "--y",
                 "study.true_error_percent", "--y-label", "true error, % of the largest displacement", "--title",
-                "The paper's Fig. 6: and the error", "--csv", os.path.join(study.out, "figure-6-error.csv"))
+                "The paper's Fig. 6 again: the error its settings leave", "--csv", os.path.join(study.out, "figure-6-error.csv"))
 
 
 def main():

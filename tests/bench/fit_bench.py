@@ -180,7 +180,7 @@ def scaling(folder, chart):
     chart = os.path.abspath(chart)
     subprocess.run([os.path.join(BIN, "tunica-chart"), *(path.name for path in reports), "-o", chart, "--x",
                     "result.triangles", "--y", "seconds.processor", "--series", "result.series", "--x-label",
-                    "triangles of the target", "--y-label", "processor time (s)", "--title", "One shape at four densities",
+                    "triangles of the target", "--y-label", "processor time (s)", "--title", "Fit and certificate of one shape at four densities",
                     "--x-scale", "log", "--y-scale", "log", "--lines", "--csv", str(Path(chart).with_suffix(".csv")),
                     "--force", "--quiet"], check=True, cwd=folder)
 

@@ -86,7 +86,7 @@ def counts(study):
             flat = study.run("decimate", "target.ply", "coarse.ply", "--triangles", factor * n)
             if factor == 1 or n == COUNTS[-1]:
                 keep(flat, "flat triangles (tunica-decimate)", flat["result"]["triangles"])
-        study.run("decimate", "target.ply", "coarse.ply", "--triangles", n, "--min-angle", 20)
+        study.run("decimate", "target.ply", "coarse.ply", "--triangles", n, "--min-angle", 15)
         rule = relaxed(study, "coarse.ply", "target.ply", *RULE, check=False)
         if rule:
             keep(rule, "the paper's rule (barycentre)", rule["result"]["shells"])

@@ -133,6 +133,16 @@ TEST(ParetoFront, agrees_with_its_definition) {
   }
 }
 
+TEST(ChartSvg, has_a_front_only_where_both_axes_are_ranked) {
+  Chart chart = chart_of({{1, 2}, {3, 1}});
+  EXPECT_EQ(count(chart_svg(chart), "class=\"front\""), 1u);
+  EXPECT_EQ(count(chart_svg(chart), "Pareto front"), 1u);
+  chart.x.is_ranked = false;
+  EXPECT_EQ(pareto_front(chart), std::vector(1, std::vector(2, false)));
+  EXPECT_EQ(count(chart_svg(chart), "class=\"front\""), 0u);
+  EXPECT_EQ(count(chart_svg(chart), "Pareto front"), 0u);
+}
+
 TEST(ChartSvg, has_a_mark_per_point) {
   EXPECT_EQ(count(chart_svg(chart_of({{1, 2}, {3, 4}, {5, 1}})), "class=\"mark\""), 3u);
   EXPECT_EQ(count(chart_svg(chart_of({})), "class=\"mark\""), 0u);

@@ -158,6 +158,12 @@ class WhatIsDrawn(ChartCase):
         expected = [not any((a <= x and b <= y) and (a < x or b < y) for a, b in points) for x, y in points]
         self.assertEqual([row[6] == "1" for row in rows], expected)
 
+    def test_no_front_against_a_count(self):
+        runs = [self.write(f"{n}.json", relax(n, 200 / n, n / 1000)) for n in (100, 400)]
+        root, _, rows = self.draw(*runs, "--x", "result.shells")
+        self.assertNotIn("Pareto front", texts(root))
+        self.assertEqual([row[6] for row in rows], ["0", "0"])
+
     def test_natural_errors_and_times_of_the_tools(self):
         extract = report("tunica-extract", seconds={"extract": 0.2}, volume_mm3=990.0, voxel_volume_mm3=1000.0)
         _, _, rows = self.draw(self.write("e.json", extract))

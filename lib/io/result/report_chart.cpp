@@ -171,6 +171,13 @@ bool more_is_better(const std::string& key) {
   return std::ranges::any_of(names, [&](const char* name) { return key.find(name) != std::string::npos; });
 }
 
+/// Whether less or more of a key is better: of costs, errors and qualities, not of counts and parameters.
+bool is_ranked(const std::string& key) {
+  constexpr std::array words{"second", "ms_per_step", "mib", "error", "hausdorff", "distance", "residual", "gap"};
+  return more_is_better(key) ||
+         std::ranges::any_of(words, [&](std::string_view word) { return key.find(word) != std::string::npos; });
+}
+
 std::string csv_field(const std::string& text) {
   if (text.find_first_of(",\"\r\n") == std::string::npos) {
     return text;
@@ -274,8 +281,9 @@ ReportChart chart_of_reports(const std::vector<Report>& reports, const ReportCha
 
   Chart& chart = made.chart;
   chart.title = options.title;
-  chart.x = {options.x_label.value_or(x.label), options.x_scale, more_is_better(x.key)};
-  chart.y = {options.y_label.value_or(y.label), options.y_scale, !options.reference && more_is_better(y.key)};
+  chart.x = {options.x_label.value_or(x.label), options.x_scale, more_is_better(x.key), is_ranked(x.key)};
+  chart.y = {options.y_label.value_or(y.label), options.y_scale, !options.reference && more_is_better(y.key),
+             options.reference || is_ranked(y.key)};
   // Marks of a list belong together: without --series each report is a line of its own.
   const bool lists = std::ranges::any_of(rows, [](const Row& row) { return row.index > 0; });
   const bool named = options.series.has_value();
