@@ -2,6 +2,7 @@
 
 #include "tunica/core/error.hpp"
 #include "tunica/io/file/output_file.hpp"
+#include "tunica/io/result/detail/result_grid.hpp"
 
 #include <fmt/format.h>
 #include <openssl/evp.h>
