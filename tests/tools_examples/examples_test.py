@@ -53,7 +53,9 @@ class Examples(unittest.TestCase):
             run = subprocess.run(["sh", "-ec", "".join(commands)], cwd=folder, capture_output=True, text=True)
             self.assertEqual(run.returncode, 0, run.stderr)
             # The numbers it names.
-            for name, value in re.findall(r"`result\.([a-z0-9_.]+)`, ([\d.]+) M?[mP]", text):
+            named = re.findall(r"`result\.([a-z0-9_.]+)`, ([\d.]+) M?[mP]", text)
+            self.assertEqual(len(named), 2)
+            for name, value in named:
                 with open(os.path.join(folder, "out", "tutorial", "simulate.json"), encoding="utf-8") as file:
                     result = json.load(file)["result"]
                 for part in name.split("."):
