@@ -17,7 +17,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 namespace {
@@ -187,7 +186,7 @@ bool are_labels(const std::optional<std::vector<Label>>& labels) {
 struct Contents {
   std::vector<std::string> warnings;
   std::optional<std::vector<Label>> labels;  // none: a grey volume
-  Interval values{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
+  Interval values{infinity, -infinity};
 };
 
 void widen(Interval& range, const Volume& volume) {

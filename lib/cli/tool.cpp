@@ -2,7 +2,6 @@
 
 #include "tunica/cli/detail/documentation.hpp"
 #include "tunica/cli/usage.hpp"
-#include "tunica/core/clock.hpp"
 #include "tunica/core/threads.hpp"
 #include "tunica/core/version.hpp"
 #include "tunica/core/words.hpp"
@@ -284,7 +283,7 @@ std::optional<int> Tool::parse(int argc, char** argv) {
 }
 
 int Tool::run(int argc, char** argv, const std::function<void()>& body) {
-  start_ = std::chrono::steady_clock::now();
+  start_ = Clock::now();
   start_on_disk_ = std::filesystem::file_time_type::clock::now() - std::chrono::milliseconds(20);  // the disk's tick
   occupy_standard_descriptors();
   allow_many_files();
@@ -471,8 +470,7 @@ const std::filesystem::path& Tool::output(const std::filesystem::path& path, con
   return path;
 }
 
-Tool::Stage::Stage(Tool& tool, std::string name)
-    : tool_(tool), name_(std::move(name)), start_(std::chrono::steady_clock::now()) {
+Tool::Stage::Stage(Tool& tool, std::string name) : tool_(tool), name_(std::move(name)), start_(Clock::now()) {
   tool_.running_ = name_;
 }
 
@@ -492,15 +490,15 @@ Progress Tool::progress(const std::string& doing) {
     return {};
   }
   struct Shown {
-    std::chrono::steady_clock::time_point last = std::chrono::steady_clock::now();
-    std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now();
+    Clock::time_point last = Clock::now();
+    Clock::time_point start = Clock::now();
     double most = 0;
   };
   const bool terminal = ::isatty(STDERR_FILENO) == 1;
   return [this, doing, terminal, shown = std::make_shared<Shown>()](double fraction) {
     // What turns out to be more work than it looked waits until it has caught up.
     shown->most = std::max(shown->most, std::min(fraction, 1.0));
-    const auto now = std::chrono::steady_clock::now();
+    const auto now = Clock::now();
     const auto pause = terminal ? std::chrono::milliseconds(100) : std::chrono::milliseconds(10'000);
     if (now - shown->last < pause) {
       return;

@@ -1,6 +1,7 @@
 // cli: what every tool's command line shares.
 #pragma once
 
+#include "tunica/core/clock.hpp"
 #include "tunica/core/error.hpp"
 #include "tunica/core/json.hpp"
 #include "tunica/core/progress.hpp"
@@ -9,7 +10,6 @@
 
 #include <CLI/CLI.hpp>
 
-#include <chrono>
 #include <filesystem>
 #include <functional>
 #include <map>
@@ -84,7 +84,7 @@ public:
   private:
     Tool& tool_;
     std::string name_;
-    std::chrono::steady_clock::time_point start_;
+    Clock::time_point start_;
   };
   [[nodiscard]] Stage stage(const std::string& name) { return {*this, name}; }
 
@@ -152,7 +152,7 @@ private:
   Json result_ = Json::object();
   std::vector<std::function<void()>> after_parse_;
   std::filesystem::file_time_type start_on_disk_;
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+  Clock::time_point start_ = Clock::now();
 };
 
 }  // namespace tunica::cli

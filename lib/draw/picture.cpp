@@ -234,7 +234,7 @@ Camera camera_at(const Vec3& up, const Vec3& towards) {
 
 // Centres the camera on what it sees and returns the extent in mm.
 Vec2 centre_camera(Camera& camera, const Scene& scene) {
-  Vec3 lower = Vec3::Constant(std::numeric_limits<double>::infinity());
+  Vec3 lower = Vec3::Constant(infinity);
   Vec3 upper = -lower;
   for (const Index v : scene.used) {
     const Vec3& p = scene.mesh.vertices[v];
@@ -263,7 +263,7 @@ std::array<View, 2> choose_views(const Scene& scene, const Box2& box) {
       std::array<View, 2> views;
       const double width = beside ? (box.width() - gap) / 2 : box.width();
       const double height = beside ? box.height() : (box.height() - gap) / 2;
-      double scale = std::numeric_limits<double>::infinity();
+      double scale = infinity;
       for (std::size_t i = 0; i < 2; ++i) {
         const auto shift = static_cast<double>(i);
         View& view = views[i];

@@ -34,7 +34,7 @@ public:
   [[nodiscard]] double length() const { return arc_.back(); }
 
   [[nodiscard]] OnCurve closest(const Vec3& p) const {
-    OnCurve best{0, std::numeric_limits<double>::infinity(), Vec3::Zero()};
+    OnCurve best{0, infinity, Vec3::Zero()};
     for (std::size_t i = 0; i < points_.size(); ++i) {
       const Vec3 along = next(i) - points_[i];
       const double squared = along.squaredNorm();
@@ -104,7 +104,7 @@ std::vector<Vec3> along_curve(const ClosedCurve& curve, const std::vector<Vec3>&
       std::min_element(found.begin(), found.end(),
                        [](const OnCurve& a, const OnCurve& b) { return a.squared_distance < b.squared_distance; }) -
       found.begin());
-  double best = std::numeric_limits<double>::infinity();
+  double best = infinity;
   for (const int sign : {1, -1}) {
     std::vector<Vec3> spread(n);
     double squared = 0;
@@ -221,7 +221,7 @@ NodeMoves move_by_barycentre(const Target& target, TriangleMesh& mesh, double of
   NodeMoves moves;
   const std::size_t count = mesh.vertices.size();
   const auto sides = vertex_normals(mesh);
-  std::vector<double> shortest_edge(count, std::numeric_limits<double>::infinity());
+  std::vector<double> shortest_edge(count, infinity);
   for (const auto& v : mesh.triangles) {
     for (std::size_t i = 0; i < 3; ++i) {
       const double length = (mesh.vertices[v[i]] - mesh.vertices[v[(i + 1) % 3]]).norm();

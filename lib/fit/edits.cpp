@@ -197,7 +197,7 @@ Trial tried(const FitMesh& mesh, const FitSamples& samples, const FitLimits& lim
     trial.error_before = std::max(trial.error_before, mesh.patches[t].error);
   }
   trial.shortfall_before = shortfall_of(mesh, trial.edit.removed, limits.shape);
-  trial.error = std::numeric_limits<double>::infinity();
+  trial.error = infinity;
   FitPiece& piece = trial.piece;
   PieceBuilder builder(mesh, limits.shape, trial);
   builder.build();

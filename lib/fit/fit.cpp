@@ -245,7 +245,7 @@ private:
   void make_certain(FitMesh& mesh, FitSamples& samples, double tolerance) {
     result_.stopped = "further splits bring too little";
     std::size_t fewest_faults = std::numeric_limits<std::size_t>::max();
-    double closest = std::numeric_limits<double>::infinity();
+    double closest = infinity;
     int fruitless = 0;  // certificates in a row
     for (int i = 0; i < certificates && fruitless < patience; ++i) {
       std::vector<Index> patch_of;
@@ -308,7 +308,7 @@ private:
   /// Collapses edges until so many shells are left, whatever the error, and settles. @return the largest error, mm
   double reduce(FitMesh& mesh, const FitSamples& samples, std::size_t shells) {
     limit_lengths(mesh, shells);
-    limits_.error = std::numeric_limits<double>::infinity();
+    limits_.error = infinity;
     collapse_edges(mesh, samples, limits_, shells, options_.progress);
     if (mesh.alive > shells) {  // a count outweighs shapes
       FitLimits any = limits_;

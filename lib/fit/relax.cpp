@@ -45,7 +45,7 @@ public:
     const int most =
         options_.max_iterations.value_or(options_.refine ? default_iterations_refining : default_iterations);
     int fruitless = 0;
-    double level_best = std::numeric_limits<double>::infinity();
+    double level_best = infinity;
     result_.stopped = "the limit of iterations was reached";
     for (int i = 0; i < most; ++i) {
       advance(options_.progress, static_cast<double>(i) / most);
@@ -70,7 +70,7 @@ public:
             break;
           }
           fruitless = 0;
-          level_best = std::numeric_limits<double>::infinity();
+          level_best = infinity;
         }
       } else if (fruitless >= fruitless_iterations) {
         result_.stopped = "further moves bring nothing: the rule has settled";
@@ -89,12 +89,12 @@ private:
     const auto start = Clock::now();
     RelaxIteration iteration;
     TriangleMesh mesh = flat_facets(current_);
-    const double off_target = std::min(default_off_target * target_.diagonal(),
-                                       options_.tolerance.value_or(std::numeric_limits<double>::infinity()) / 4);
+    const double off_target =
+        std::min(default_off_target * target_.diagonal(), options_.tolerance.value_or(infinity) / 4);
     iteration.moves = move_by_barycentre(target_, mesh, off_target);
     std::vector<Index> folded;
     for (int pass = 0; pass == 0 || (pass < mending_passes && !folded.empty()); ++pass) {
-      mesh = mended(mesh, pass == 0 ? off_target : std::numeric_limits<double>::infinity());
+      mesh = mended(mesh, pass == 0 ? off_target : infinity);
       current_.vertices = mesh.vertices;
       current_.triangles = mesh.triangles;
       folded = take_normals_from(target_, current_);
@@ -136,7 +136,7 @@ private:
     FitLimits limits;
     limits.shape.min_angle = least_angle;
     limits.shape.agreement = least_agreement;
-    limits.shape.size_ratio = std::numeric_limits<double>::infinity();
+    limits.shape.size_ratio = infinity;
     limits.error = stray;
     mend_shapes(mesh, samples, limits, mesh.alive);
     return flat_facets(mesh.shell());

@@ -36,7 +36,7 @@ Residual residual_of_curve(const Vec2& at, const Vec3& away, const Vec3& facing)
 
 /// Where a curve is closest to q, nearly: Gauss-Newton steps from the best of a few places.
 double foot_on_curve(const CubicCurve& curve, const Vec3& q) {
-  double s = 0, least = std::numeric_limits<double>::infinity();
+  double s = 0, least = infinity;
   for (int i = 0; i <= edge_starts; ++i) {
     const double there = static_cast<double>(i) / edge_starts;
     if (const double squared = (point_on(curve, there) - q).squaredNorm(); squared < least) {
@@ -62,7 +62,7 @@ double foot_on_curve(const CubicCurve& curve, const Vec3& q) {
 
 /// Of a point of the target's boundary, against the closest of a patch's boundary edges.
 Residual residual_on_edges(const CubicPatch& surface, const Vec3& facing, EdgeBits boundary, const Vec3& q) {
-  Residual best{{}, facing, std::numeric_limits<double>::infinity()};
+  Residual best{{}, facing, infinity};
   for (std::size_t k = 0; k < 3; ++k) {
     if ((boundary >> k & 1) != 0) {
       const CubicCurve curve = edge_curve(surface, k);
@@ -77,7 +77,7 @@ Residual residual_on_edges(const CubicPatch& surface, const Vec3& facing, EdgeBi
 /// The patch whose boundary edge, as a chord, is closest; none: there is no boundary edge.
 FitPatch* closest_by_edge(FitPiece& piece, const Vec3& point) {
   FitPatch* closest = nullptr;
-  double least = std::numeric_limits<double>::infinity();
+  double least = infinity;
   for (FitPatch& p : piece.patches) {
     for (std::size_t k = 0; p.boundary != 0 && k < 3; ++k) {
       if ((p.boundary >> k & 1) == 0) {
@@ -240,7 +240,7 @@ double FitSamples::measure(FitPiece& piece) const {
     return largest;
   };
   // Downhill from a wrong start a point may seem far that is not.
-  const double largest = measure_above(0, std::numeric_limits<double>::infinity());
+  const double largest = measure_above(0, infinity);
   return measure_above(largest / 2, largest / 2);
 }
 

@@ -72,7 +72,7 @@ private:
     auto edit = collapse(mesh_, samples_, c.u, c.v);
     if (!edit) {
       Trial none;
-      none.error = std::numeric_limits<double>::infinity();
+      none.error = infinity;
       return none;
     }
     return tried(mesh_, samples_, limits_, *std::move(edit));
@@ -266,7 +266,7 @@ std::size_t split_worst(FitMesh& mesh, const FitSamples& samples, const FitLimit
     anything.shape.min_angle = limits.shape.min_angle / 2;
     anything.may_miss = split_may_miss;
     Trial trial;
-    trial.error = std::numeric_limits<double>::infinity();
+    trial.error = infinity;
     const auto consider = [&](Edit edit) {
       Trial other = tried(mesh, samples, anything, std::move(edit));
       if (other.error < trial.error) {

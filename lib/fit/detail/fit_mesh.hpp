@@ -4,7 +4,6 @@
 #include "tunica/shell/patch/curved_surface.hpp"
 #include "tunica/shell/patch/shell_mesh.hpp"
 
-#include <limits>
 #include <vector>
 
 /// lib/fit: a target and a coarse mesh in, shells of least error out. fit.hpp is its face; relax.hpp has the paper's
@@ -68,10 +67,10 @@ struct FitPiece {
 
 /// What facets keep as far as the target allows.
 struct FacetLimits {
-  double min_angle = 20;    ///< degrees
-  double agreement = 0.3;   ///< N·n of a corner's normal and the facet's: the slope there is below 73 degrees
-  double size_ratio = 2.5;  ///< of the longest edges of neighbours
-  double longest = std::numeric_limits<double>::infinity();  ///< mm, of an edge
+  double min_angle = 20;      ///< degrees
+  double agreement = 0.3;     ///< N·n of a corner's normal and the facet's: the slope there is below 73 degrees
+  double size_ratio = 2.5;    ///< of the longest edges of neighbours
+  double longest = infinity;  ///< mm, of an edge
 };
 
 /// N·n that corners need: a little above what makes a shell, so that round-off costs none.

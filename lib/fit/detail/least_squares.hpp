@@ -9,7 +9,7 @@ struct SquaresOptions {
   int power = 2;          ///< even; of the residuals in the sum that is lessened: large ones bring out the largest
   double smoothing = 0;   ///< pull of nodes towards the middle of their neighbours, within the surface
   bool positions = true;  ///< else only the normals turn
-  double search_beyond = std::numeric_limits<double>::infinity();  ///< see FitSamples::measure()
+  double search_beyond = infinity;  ///< see FitSamples::measure()
 };
 
 /// Moves the free nodes of a piece and turns their normals by one Gauss-Newton step on the residuals, weighted by

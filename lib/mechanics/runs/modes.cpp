@@ -128,7 +128,7 @@ void hand_over(const ShellSystem& system, const Model& model, const RunSettings&
     const double sign = mode[top + axis] < 0 ? -1 : 1;
     mode *= sign * amplitude / std::max(largest, std::numeric_limits<double>::min());
     State state;
-    state.time = values[k] > before ? values[k] : std::nextafter(before, std::numeric_limits<double>::infinity());
+    state.time = values[k] > before ? values[k] : std::nextafter(before, infinity);
     before = state.time;
     state.load_factor = load_factor < 0 ? values[k] : load_factor;
     for (std::size_t i = 0; i < system.node_count(); ++i) {
@@ -242,7 +242,7 @@ LanczosOptions rough_options() {
 /// that of a membrane wave along the model.
 double small_shift(const ShellSystem& system, const Model& model) {
   const double size = longest_side(system);
-  double shift = std::numeric_limits<double>::infinity();
+  double shift = infinity;
   for (const ShellBody& body : model.shells) {
     const double t = *std::min_element(body.thickness.begin(), body.thickness.end());
     shift = std::min(shift, body.material.young / *body.material.density * t * t / std::pow(size, 4));
@@ -361,7 +361,7 @@ Summary run_frequencies(ShellSystem& system, const Model& model, const RunSettin
     move_to(std::min(pencil.shift(), -near_part * pencil.value(first.values.front())));
     options.deflated_value = -1 / pencil.shift();
   }
-  const EigenPairs pairs = pencil.all_nearest(rigid, options, std::numeric_limits<double>::infinity());
+  const EigenPairs pairs = pencil.all_nearest(rigid, options, infinity);
   for (const double theta : pairs.values) {
     summary.frequencies.push_back(std::sqrt(std::max(0.0, pencil.value(theta))) / (2 * std::numbers::pi));
   }
@@ -384,7 +384,7 @@ Summary run_buckling(ShellSystem& system, const Model& model, const RunSettings&
 
   const VectorX solution = linear_solution(system, model, settings);
   const double strain = largest_strain(system, solution);
-  const double largest_factor = strain > 0 ? largest_linear_strain / strain : std::numeric_limits<double>::infinity();
+  const double largest_factor = strain > 0 ? largest_linear_strain / strain : infinity;
   if (!(std::max(strain, largest_rotation(solution)) > 0)) {
     throw InputError("the loads do not deform anything: buckling needs a load that does");
   }

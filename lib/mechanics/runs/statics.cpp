@@ -8,7 +8,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace tunica {
 
@@ -144,7 +143,7 @@ private:
 };
 
 double least_thickness(const Model& model) {
-  double least = std::numeric_limits<double>::infinity();
+  double least = infinity;
   for (const ShellBody& body : model.shells) {
     least = std::min(least, *std::min_element(body.thickness.begin(), body.thickness.end()));
   }
@@ -321,7 +320,7 @@ private:
   const double thickness_;
   Configuration configuration_;
   double factor_ = 0;
-  double increment_ = std::numeric_limits<double>::infinity();  ///< of the load factor, to be tried next
+  double increment_ = infinity;  ///< of the load factor, to be tried next
 };
 
 }  // namespace

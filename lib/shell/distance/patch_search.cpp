@@ -132,7 +132,7 @@ std::size_t PatchSearch::edge_towards(Index patch, Index other) const {
 }
 
 double PatchSearch::nearest(const Vec3& p, double tolerance, SurfaceFoot& foot) const {
-  double lower = std::numeric_limits<double>::infinity();
+  double lower = infinity;
   search_box(levels_.size() - 1, 0, p, tolerance, foot, lower);
   return std::max(0.0, std::min(lower, foot.distance - tolerance));
 }

@@ -3,7 +3,6 @@
 #include "tunica/core/types.hpp"
 
 #include <functional>
-#include <limits>
 
 namespace tunica {
 
@@ -17,7 +16,7 @@ public:
   /// @param reach   only points at most this far away, mm
   /// @return indices of at most k points, nearest first; of two at the same distance the one with the smaller index
   [[nodiscard]] std::vector<Index> nearest(const Vec3& p, std::size_t k, const std::function<bool(Index)>& accept = {},
-                                           double reach = std::numeric_limits<double>::infinity()) const;
+                                           double reach = infinity) const;
 
 private:
   struct Item {

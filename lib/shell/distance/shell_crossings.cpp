@@ -2,6 +2,7 @@
 
 #include "tunica/core/progress.hpp"
 #include "tunica/core/threads.hpp"
+#include "tunica/shell/distance/detail/certificate.hpp"
 #include "tunica/shell/patch/curved_surface.hpp"
 #include "tunica/surface/mesh/self_intersections.hpp"
 
@@ -13,7 +14,6 @@
 namespace tunica {
 namespace {
 
-constexpr std::size_t pairs_per_block = 256;
 constexpr double flat_enough = 1e-4;  // of the patch's longest edge: an eye sees no less in a drawing of it
 constexpr double edge_strip = 0.125;  // of the height over a shared edge
 
@@ -65,7 +65,7 @@ struct Piece {
 /// Whether a plane at right angles to `axis` keeps the pieces apart, but for the node that both have. A patch lies in
 /// the convex hull of its control points.
 bool parts(const Piece& one, const Piece& other, const Vec3& axis) {
-  double most = -std::numeric_limits<double>::infinity();
+  double most = -infinity;
   double least = -most;
   const bool beside_node = one.has_node() && other.has_node();
   if (beside_node) {
@@ -195,7 +195,7 @@ std::vector<std::array<Index, 2>> crossing_patches(const ShellMesh& shell) {
   const Crossings crossings(shell);
   const auto candidates = crossings.candidates();
   std::vector<std::uint8_t> cross(candidates.size(), 0);
-  parallel_for_blocks(candidates.size(), pairs_per_block, [&](std::size_t begin, std::size_t end) {
+  parallel_for_blocks(candidates.size(), items_per_block, [&](std::size_t begin, std::size_t end) {
     check_interrupt();
     for (std::size_t i = begin; i < end; ++i) {
       cross[i] = crossings.cross(candidates[i][0], candidates[i][1]) ? 1 : 0;

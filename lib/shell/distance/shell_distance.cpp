@@ -2,6 +2,7 @@
 
 #include "tunica/core/threads.hpp"
 #include "tunica/shell/distance/curved_hausdorff.hpp"
+#include "tunica/shell/distance/detail/certificate.hpp"
 #include "tunica/shell/patch/curved_surface.hpp"
 #include "tunica/surface/distance/hausdorff.hpp"
 #include "tunica/surface/mesh/incidence.hpp"
@@ -14,7 +15,6 @@
 namespace tunica {
 namespace {
 
-constexpr std::size_t samples_per_block = 256;
 constexpr std::size_t mean_samples = 20'000;
 constexpr std::size_t most_fine_triangles = 4'000'000;
 
@@ -65,9 +65,9 @@ std::pair<double, double> mean_distance(const ShellMesh& shell, const Target& ta
   };
   const double per_patch = static_cast<double>(mean_samples) / static_cast<double>(patches.size());
   const int level = std::clamp(static_cast<int>(std::sqrt(per_patch)), 2, 40);
-  std::vector<Sum> sums((patches.size() + samples_per_block - 1) / samples_per_block);
-  parallel_for_blocks(patches.size(), samples_per_block, [&](std::size_t begin, std::size_t end) {
-    Sum& sum = sums[begin / samples_per_block];
+  std::vector<Sum> sums((patches.size() + items_per_block - 1) / items_per_block);
+  parallel_for_blocks(patches.size(), items_per_block, [&](std::size_t begin, std::size_t end) {
+    Sum& sum = sums[begin / items_per_block];
     std::optional<Index> guess;
     for (std::size_t t = begin; t < end; ++t) {
       const auto add = [&](double c, double r) {

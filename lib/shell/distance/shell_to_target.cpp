@@ -13,7 +13,6 @@
 namespace tunica {
 namespace {
 
-constexpr std::size_t pieces_per_block = 256;
 constexpr double bulge_share = 0.25;  // of the distance that settles a piece: what the first cut leaves to bulges
 constexpr int most_level = 24;        // pieces per edge of the first cut
 
@@ -104,25 +103,25 @@ private:
 
   /// Every patch cut so that its pieces bulge little against the distances that its corners and middles have.
   std::vector<Piece> first_pieces() {
-    std::vector<Block> middles((patches_.size() + pieces_per_block - 1) / pieces_per_block);
-    parallel_for_blocks(patches_.size(), pieces_per_block, [&](std::size_t begin, std::size_t end) {
+    std::vector<Block> middles((patches_.size() + items_per_block - 1) / items_per_block);
+    parallel_for_blocks(patches_.size(), items_per_block, [&](std::size_t begin, std::size_t end) {
       std::optional<Index> guess;
       for (std::size_t t = begin; t < end; ++t) {
         for (const Vec2& b : {Vec2(1.0 / 3, 1.0 / 3), Vec2(0.5, 0), Vec2(0, 0.5), Vec2(0.5, 0.5)}) {
           const Vec3 p = patches_[t].point(b);
           const auto hit = guess ? tree_.closest(p, *guess) : tree_.closest(p);
           guess = hit.triangle;
-          raise(middles[begin / pieces_per_block], std::sqrt(hit.squared_distance), p);
+          raise(middles[begin / items_per_block], std::sqrt(hit.squared_distance), p);
         }
       }
     });
     collected(middles, aim_, lower_, settled_, farthest_, beyond_);
     const double bulge = bulge_share * aim_.enough(lower_);
-    std::vector<Block> blocks((patches_.size() + pieces_per_block - 1) / pieces_per_block);
-    parallel_for_blocks(patches_.size(), pieces_per_block, [&](std::size_t begin, std::size_t end) {
+    std::vector<Block> blocks((patches_.size() + items_per_block - 1) / items_per_block);
+    parallel_for_blocks(patches_.size(), items_per_block, [&](std::size_t begin, std::size_t end) {
       check_interrupt();
       for (std::size_t t = begin; t < end; ++t) {
-        cut_first(static_cast<Index>(t), bulge, blocks[begin / pieces_per_block]);
+        cut_first(static_cast<Index>(t), bulge, blocks[begin / items_per_block]);
       }
     });
     return collected(blocks, aim_, lower_, settled_, farthest_, beyond_);
@@ -198,10 +197,10 @@ private:
   }
 
   std::vector<Piece> refined(const std::vector<Piece>& pieces) {
-    std::vector<Block> blocks((pieces.size() + pieces_per_block - 1) / pieces_per_block);
-    parallel_for_blocks(pieces.size(), pieces_per_block, [&](std::size_t begin, std::size_t end) {
+    std::vector<Block> blocks((pieces.size() + items_per_block - 1) / items_per_block);
+    parallel_for_blocks(pieces.size(), items_per_block, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
-        cut(pieces[i], blocks[begin / pieces_per_block]);
+        cut(pieces[i], blocks[begin / items_per_block]);
       }
     });
     return collected(blocks, aim_, lower_, settled_, farthest_, beyond_);

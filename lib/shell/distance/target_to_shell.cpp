@@ -16,7 +16,6 @@
 namespace tunica {
 namespace {
 
-constexpr std::size_t target_triangles_per_block = 256;
 constexpr double sharp_share = 0.75;      // of the width: corners so far below what is enough are close enough
 constexpr double sharp_tolerance = 0.05;  // of the width
 
@@ -79,9 +78,9 @@ public:
     while (!live.empty() && cuts + live.size() < most_certified_pieces && !aim_.decided_above(lower_)) {
       check_interrupt();
       cuts += live.size();
-      std::vector<Block> blocks((live.size() + target_triangles_per_block - 1) / target_triangles_per_block);
-      parallel_for_blocks(live.size(), target_triangles_per_block, [&](std::size_t begin, std::size_t end) {
-        Block& block = blocks[begin / target_triangles_per_block];
+      std::vector<Block> blocks((live.size() + items_per_block - 1) / items_per_block);
+      parallel_for_blocks(live.size(), items_per_block, [&](std::size_t begin, std::size_t end) {
+        Block& block = blocks[begin / items_per_block];
         block.lower = lower_;
         for (std::size_t i = begin; i < end; ++i) {
           cut(live[i], block);
@@ -143,7 +142,7 @@ private:
         }
       }
     }
-    parallel_for_blocks(used.size(), 8 * target_triangles_per_block, [&](std::size_t begin, std::size_t end) {
+    parallel_for_blocks(used.size(), 8 * items_per_block, [&](std::size_t begin, std::size_t end) {
       check_interrupt();
       std::optional<Index> guess;
       SurfaceFoot last;
@@ -175,10 +174,10 @@ private:
     for (std::size_t i = 0; i < far.size() && !aim_.decided_above(lower_); ++i) {
       sharpen(corners[far[i]], lower_, farthest_);
     }
-    std::vector<Block> blocks((order.size() + 8 * target_triangles_per_block - 1) / (8 * target_triangles_per_block));
-    parallel_for_blocks(order.size(), 8 * target_triangles_per_block, [&](std::size_t begin, std::size_t end) {
+    std::vector<Block> blocks((order.size() + 8 * items_per_block - 1) / (8 * items_per_block));
+    parallel_for_blocks(order.size(), 8 * items_per_block, [&](std::size_t begin, std::size_t end) {
       check_interrupt();
-      Block& block = blocks[begin / (8 * target_triangles_per_block)];
+      Block& block = blocks[begin / (8 * items_per_block)];
       block.lower = lower_;
       for (std::size_t i = begin; i < end; ++i) {
         const auto& v = triangles[order[i]];

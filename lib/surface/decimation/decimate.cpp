@@ -386,8 +386,7 @@ DecimateResult decimate(const TriangleMesh& mesh, const DecimateOptions& options
   if (count_degenerate(mesh) == mesh.triangles.size()) {
     throw InputError("all of its triangles are without area");
   }
-  constexpr double any_length = std::numeric_limits<double>::infinity();
-  const double for_spikes = options.max_error ? most_for_spikes * *options.max_error : any_length;
+  const double for_spikes = options.max_error ? most_for_spikes * *options.max_error : infinity;
   WithoutDegenerate cleaned = without_degenerate_triangles(mesh, for_spikes);
   DecimateOptions within = options;
   if (options.max_error) {
@@ -396,7 +395,7 @@ DecimateResult decimate(const TriangleMesh& mesh, const DecimateOptions& options
   if (options.min_angle && cleaned.long_spikes > 0) {
     // Angles and error cannot both hold: what comes back has the angles.
     const std::size_t too_long = cleaned.long_spikes;
-    cleaned = without_degenerate_triangles(mesh, any_length);
+    cleaned = without_degenerate_triangles(mesh, infinity);
     cleaned.long_spikes = too_long;
     within.max_error = options.max_error;
   }

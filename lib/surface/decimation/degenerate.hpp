@@ -2,8 +2,6 @@
 
 #include "tunica/surface/mesh/triangle_mesh.hpp"
 
-#include <limits>
-
 namespace tunica {
 
 /// Whether a triangle has no area to speak of: its height over the longest edge is below 1e-9 of that edge.
@@ -31,7 +29,6 @@ struct WithoutDegenerate {
 /// Keeps: Euler number (closed loops are one more each), pieces, boundary curves. Deterministic.
 /// Cost: linear but for pockets of degenerate triangles. Limits: one stays where a collapse or flip would change the
 /// topology (two edges between the same vertices, a neck without width), and a piece without area stays whole.
-WithoutDegenerate without_degenerate_triangles(const TriangleMesh& mesh,
-                                               double longest_spike = std::numeric_limits<double>::infinity());
+WithoutDegenerate without_degenerate_triangles(const TriangleMesh& mesh, double longest_spike = infinity);
 
 }  // namespace tunica

@@ -104,7 +104,7 @@ void pin_sharp_corners(TriangleMesh coarse, const ShapingOptions& options, Shape
 std::array<Index, 2> edge_by_length(const EditMesh& mesh, Index t, bool longest) {
   const auto& c = mesh.triangles[t];
   std::array<Index, 2> best{c[0], c[1]};
-  double best_length = longest ? -1 : std::numeric_limits<double>::infinity();
+  double best_length = longest ? -1 : infinity;
   for (std::size_t k = 0; k < 3; ++k) {
     const double length = (mesh.positions[c[k]] - mesh.positions[c[(k + 1) % 3]]).norm();
     if (longest ? length > best_length : length < best_length) {
@@ -309,7 +309,7 @@ private:
   // The longest edge, which gives the better shapes; an edge of the rim, where the error may be the rim's own.
   double split_worst(Index t, double limit) {
     const auto c = mesh().triangles[t];
-    double best = std::numeric_limits<double>::infinity();
+    double best = infinity;
     const auto try_edge = [&](Index u, Index v) {
       PatchTrial trial;
       state_.make_split(u, v, trial);
@@ -335,8 +335,7 @@ private:
     while (mesh().alive + 2 <= options_.triangles) {
       bool any = false;
       for (const Index t : worst((options_.triangles - mesh().alive) / 2, 0)) {
-        if (mesh().alive + 2 <= options_.triangles && mesh().is_alive(t) &&
-            split_worst(t, std::numeric_limits<double>::infinity()) < 1e300) {
+        if (mesh().alive + 2 <= options_.triangles && mesh().is_alive(t) && split_worst(t, infinity) < 1e300) {
           accept(trial_);
           any = true;
         }

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace tunica {
 
@@ -37,7 +36,7 @@ BoundaryCurves::BoundaryCurves(const TriangleMesh& mesh) {
 
 Index BoundaryCurves::curve_of(const std::vector<Vec3>& loop) const {
   Index best = 0;
-  double least = std::numeric_limits<double>::infinity();
+  double least = infinity;
   for (std::size_t c = 0; c < curves_.size(); ++c) {
     double farthest = 0;
     for (const Vec3& p : loop) {
@@ -57,7 +56,7 @@ Index BoundaryCurves::curve_of(const std::vector<Vec3>& loop) const {
 BoundaryCurves::Place BoundaryCurves::nearest(const Vec3& p, Index index) const {
   const Curve& curve = curves_[index];
   Place best{index, 0};
-  double least = std::numeric_limits<double>::infinity();
+  double least = infinity;
   for (std::size_t i = 0; i < curve.points.size(); ++i) {
     const Vec3& a = curve.points[i];
     const Vec3 edge = curve.points[(i + 1) % curve.points.size()] - a;

@@ -71,8 +71,8 @@ struct Primitive {
 };
 
 struct Bounds {
-  Vec3 lower = Vec3::Constant(std::numeric_limits<double>::infinity());
-  Vec3 upper = Vec3::Constant(-std::numeric_limits<double>::infinity());
+  Vec3 lower = Vec3::Constant(infinity);
+  Vec3 upper = Vec3::Constant(-infinity);
   void add(const Vec3& l, const Vec3& u) {
     lower = lower.cwiseMin(l);
     upper = upper.cwiseMax(u);
@@ -98,7 +98,7 @@ Vec3 closest_point_on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, cons
   const double v = n.dot(ap.cross(ac));
   const double w = n.dot(ab.cross(ap));
   Vec3 best = a;
-  double squared_best = std::numeric_limits<double>::infinity();
+  double squared_best = infinity;
   if (squared_n > 0 && v >= 0 && w >= 0 && v + w <= squared_n) {
     best = a + (v / squared_n) * ab + (w / squared_n) * ac;
     squared_best = (p - best).squaredNorm();
@@ -154,7 +154,7 @@ struct ClosestPoint::Builder {
       centres.add(centre, centre);
     }
     const Vec3 extent = centres.upper - centres.lower;
-    double best_cost = std::numeric_limits<double>::infinity();
+    double best_cost = infinity;
     int best_axis = -1;
     std::size_t best_bin = 0;
     const auto bin_of = [&](const Primitive& p, int axis) {
@@ -261,8 +261,8 @@ struct ClosestPoint::Builder {
     node.child[lane] = child;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const auto i = static_cast<Eigen::Index>(axis);
-      node.lower[axis][lane] = content != nullptr ? content->bounds.lower[i] : std::numeric_limits<double>::infinity();
-      node.upper[axis][lane] = content != nullptr ? content->bounds.upper[i] : -std::numeric_limits<double>::infinity();
+      node.lower[axis][lane] = content != nullptr ? content->bounds.lower[i] : infinity;
+      node.upper[axis][lane] = content != nullptr ? content->bounds.upper[i] : -infinity;
     }
   }
 
@@ -361,8 +361,8 @@ ClosestPoint::ClosestPoint(const TriangleMesh& mesh) : vertices_(mesh.vertices),
     Node& node = nodes_.emplace_back();
     const Bounds bounds = builder.range(0, triangles_.size()).bounds;
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      node.lower[axis].fill(std::numeric_limits<double>::infinity());
-      node.upper[axis].fill(-std::numeric_limits<double>::infinity());
+      node.lower[axis].fill(infinity);
+      node.upper[axis].fill(-infinity);
       node.lower[axis][0] = bounds.lower[axis];
       node.upper[axis][0] = bounds.upper[axis];
     }
@@ -478,7 +478,7 @@ ClosestPoint::Hit ClosestPoint::search(const Vec3& p, double best, Index triangl
 }
 
 ClosestPoint::Hit ClosestPoint::closest(const Vec3& p) const {
-  return search(p, std::numeric_limits<double>::infinity(), leaves_.front().triangle[0]);
+  return search(p, infinity, leaves_.front().triangle[0]);
 }
 
 ClosestPoint::Hit ClosestPoint::closest(const Vec3& p, Index guess) const {

@@ -2,8 +2,6 @@
 
 #include "tunica/surface/mesh/triangle_mesh.hpp"
 
-#include <limits>
-
 namespace tunica {
 
 /// The point of the triangle abc closest to p. The result is a convex combination of the corners, so the distance to
@@ -19,7 +17,7 @@ public:
   struct Hit {
     Vec3 point = Vec3::Zero();
     Index triangle = 0;
-    double squared_distance = std::numeric_limits<double>::infinity();
+    double squared_distance = infinity;
   };
 
   /// Copies what it needs: the mesh may go away. Errors: TUNICA_ASSERT on a mesh without triangles.

@@ -53,7 +53,7 @@ private:
 
 /// The nearest of some triangles to each of several points.
 struct NearestFacet {
-  Lanes squared = std::numeric_limits<double>::infinity();
+  Lanes squared = infinity;
   Lanes which = 0.0;  ///< its number
 
   void try_facet(const FacetDistances& facet, const LaneVec3& p, double number) {

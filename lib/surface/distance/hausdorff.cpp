@@ -216,7 +216,7 @@ private:
   }
 
   void bound(Piece& piece, Block& block) const {
-    double squared = std::numeric_limits<double>::infinity();
+    double squared = infinity;
     for (std::size_t i = 0; i < 3; ++i) {
       if (std::find(piece.nearest.begin(), piece.nearest.begin() + static_cast<std::ptrdiff_t>(i), piece.nearest[i]) ==
           piece.nearest.begin() + static_cast<std::ptrdiff_t>(i)) {
@@ -252,7 +252,7 @@ private:
       for (std::size_t i = begin; i < end; ++i) {
         Piece piece;
         piece.corner = a_.corners(order[i]);
-        piece.upper = std::numeric_limits<double>::infinity();
+        piece.upper = infinity;
         if (guess) {
           // The triangle of B that was closest to the neighbour often settles this one too.
           const double upper = std::sqrt(b_.max_squared_distance_to(piece.corner, *guess));

@@ -245,7 +245,7 @@ ClosestPoint::Hit SurfaceWalk::closest(const Vec3& p, Index start, double enough
     const auto& c = mesh_.triangles[hit.triangle];
     const std::array<double, 3> share{1 - place[0] - place[1], place[0], place[1]};
     Index next = centre;
-    double next_squared = std::numeric_limits<double>::infinity();
+    double next_squared = infinity;
     for (std::size_t k = 0; k < 3; ++k) {
       const double squared = (hit.point - mesh_.vertices[c[k]]).squaredNorm();
       if (c[k] != centre && share[k] > 0 && squared < next_squared) {

@@ -11,7 +11,6 @@
 #include <Eigen/Geometry>
 
 #include <algorithm>
-#include <limits>
 #include <vector>
 
 // Boxes that overlap: Zomorodian, Edelsbrunner, Fast software for box intersections (2002), as in CGAL.
@@ -43,7 +42,7 @@ bool is_clear_of_plane(const std::array<Vec3, 3>& one, const std::array<Vec3, 3>
   const Vec3 v = one[2] - one[0];
   const Vec3 normal = u.cross(v);
   double size = std::max(u.cwiseAbs().maxCoeff(), v.cwiseAbs().maxCoeff());
-  double least = std::numeric_limits<double>::infinity();
+  double least = infinity;
   double most = -least;
   for (std::size_t k = first; k < 3; ++k) {
     const Vec3 w = other[k] - one[0];

@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <utility>
 #include <vector>
@@ -90,10 +89,10 @@ std::vector<Loop> trace_loops(unsigned inside) {
 
 /// Adds the triangulation of a loop whose worst triangle is best, among those without a diagonal inside a face.
 void triangulate(const Loop& loop, CubeCase& result) {
-  constexpr double impossible = -std::numeric_limits<double>::infinity();
+  constexpr double impossible = -infinity;
   const std::size_t n = loop.size();
   std::vector<std::vector<std::pair<double, std::size_t>>> best(
-      n, std::vector<std::pair<double, std::size_t>>(n, {std::numeric_limits<double>::infinity(), 0}));
+      n, std::vector<std::pair<double, std::size_t>>(n, {infinity, 0}));
   const auto allowed = [&](std::size_t i, std::size_t j) {
     return j == i + 1 || (i == 0 && j == n - 1) || !on_one_face(loop[i], loop[j]);
   };

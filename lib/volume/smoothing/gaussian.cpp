@@ -9,7 +9,6 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <limits>
 #include <vector>
 
 namespace tunica {
@@ -175,7 +174,7 @@ double level_of_volume(const Volume& field, double volume, double guess) {
   bool has_low = false;
   bool has_high = false;
   double best = guess;
-  double best_excess = std::numeric_limits<double>::infinity();
+  double best_excess = infinity;
   double level = guess;
   for (int step = 0; step < most_steps; ++step) {
     const double e = excess(level);

@@ -13,6 +13,10 @@
 /// The two directions of curved_hausdorff().
 namespace tunica {
 
+/// Of threads: patches, pieces of them, triangles, pairs. Results are summed block by block, so they do not depend on
+/// the number of threads.
+inline constexpr std::size_t items_per_block = 256;
+
 /// When a piece of a surface is settled.
 struct Aim {
   double width;                 ///< mm: upper - lower wanted

@@ -14,7 +14,7 @@ namespace tunica {
 /// What a triangle is charged for. Errors and shapes are weighed against each other by `error` and the two weights.
 struct ShapeWeights {
   /// mm: no triangle may get a larger error than this, unless one that it replaces had it.
-  double most_error = std::numeric_limits<double>::infinity();
+  double most_error = infinity;
   double error = 1;           ///< mm: what counts as a large error
   int doublings = 2;          ///< the error enters by the power 2^doublings
   double quality = 0.3;       ///< of 1 - radius ratio
