@@ -16,12 +16,7 @@
 namespace tunica {
 namespace {
 
-constexpr double joins_features = 1;  // shortfall of an edge between two features: outweighs an angle
-constexpr double hopeless = 8;        // times the limit after the first step
-constexpr int placing_steps = 3;      // of least squares, then largest errors, twice
-constexpr int largest_counts = 6;     // of the residuals, where the largest counts
-constexpr int spreading_steps = 4;    // with the nodes around free: of least squares and smoothing
-constexpr double spreading = 1;       // of the stiffness: smoothing, there
+constexpr int placing_steps = 3;  // of least squares, then largest errors, twice
 
 Vec2 middle_of_edge(std::size_t k) {
   const std::array<Vec2, 3> middles{Vec2(0.5, 0), Vec2(0.5, 0.5), Vec2(0, 0.5)};
@@ -146,7 +141,7 @@ private:
     }
     const auto is_on_feature = [&](Index node) { return (node == edit.node ? edit.rank : mesh_.rank(node)) > 0; };
     if ((p.boundary >> k & 1) == 0 && !p.is_creased(k) && is_on_feature(u) && is_on_feature(v)) {
-      joins_[i] += joins_features;
+      joins_[i] += 1;
     }
   }
 
@@ -183,7 +178,7 @@ double shortfall_of(const FitMesh& mesh, const std::vector<Index>& patches, cons
       }
       sum += size_shortfall(mesh.longest_edge(p), mesh.longest_edge(mesh.patches[other]), limits.size_ratio);
       if (!p.is_creased(k) && mesh.rank(u) > 0 && mesh.rank(v) > 0) {
-        sum += joins_features;
+        sum += 1;
       }
     }
   }
@@ -222,11 +217,10 @@ Trial tried(const FitMesh& mesh, const FitSamples& samples, const FitLimits& lim
   SquaresOptions squares;
   squares.shape = limits.shape;
   squares.search_beyond = limits.error;
-  const int steps = trial.edit.node == no_index ? 0 : wide ? spreading_steps : placing_steps;
+  const int steps = trial.edit.node == no_index ? 0 : placing_steps;
   for (int step = 0; step < steps; ++step) {
-    const bool spreads = wide && step < steps - 1;
-    squares.power = step == 0 || spreads ? 2 : largest_counts;
-    squares.smoothing = spreads ? spreading : 0;
+    squares.smooth = wide && step < steps - 1;
+    squares.largest = step > 0 && !squares.smooth;
     if (least_squares_step(piece, samples, squares) >= 1 || largest_error(piece) > hopeless * limits.error) {
       break;
     }

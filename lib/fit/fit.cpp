@@ -21,22 +21,17 @@ namespace tunica {
 namespace {
 
 constexpr double margin = 0.97;      // of the tolerance: what the samples may say, for they miss a little
-constexpr double start_error = 1;    // of the tolerance: flat error of the mesh that the search starts from
 constexpr double surplus = 1.5;      // of triangles at the start of a search for a count
 constexpr double longest_edge = 2;   // of the mean: no region without nodes of its own
 constexpr double fewest_across = 4;  // of the longest edges: along a square of the surface's area, likewise
-constexpr int mean_power = 2, largest_power = 4;  // of residuals: the mean counts, or the largest
-constexpr int settling_steps = 6;
-constexpr double angle_margin = 1.01;  // of the smallest angle: what steps may give away
-constexpr int crossing_passes = 3;
-constexpr double smoothing = 0.1;               // of the stiffness against sliding
-constexpr int default_rounds = 12;              // of exchanges
-constexpr double fewer_by = 0.92;               // of the shells: the next count to be tried
-constexpr int certificates = 12, patience = 4;  // of these in a row that are no better
-constexpr double out_of_reach = 8;              // tolerances: as far after `patience` certificates, it stays so
-constexpr double round_worth_it = 0.985;        // a round that leaves more than this brings nothing
-constexpr std::size_t fewest_sampled = 8;       // shells: as few want no fewer points of the target
-constexpr std::array<double, 3> exchanged{1.0 / 40, 1.0 / 150, 1.0 / 15};  // of the shells, in a round
+constexpr int settling_steps = 4;
+constexpr int passes = 3;                  // of collapses, of mending: the last brings hardly anything
+constexpr int default_rounds = 12;         // of exchanges
+constexpr double fewer_by = 0.92;          // of the shells: the next count to be tried
+constexpr int certificates = 12;           // each followed by splits
+constexpr int patience = 3;                // rounds in a row that bring nothing
+constexpr std::size_t fewest_sampled = 8;  // shells: as few want no fewer points of the target
+constexpr double exchanged = 0.05;         // of the shells, in a round; half as many where that brought nothing
 
 /// Certifies shells, says what is wrong with them, and keeps the best.
 class Certifier {
@@ -116,7 +111,7 @@ public:
         options_(options),
         like_target_(same_topology(coarse_, target)),
         best_(target, options, like_target_) {
-    limits_.shape.min_angle = angle_margin * options.min_angle;
+    limits_.shape.min_angle = options.min_angle;
     most_ = options.max_shells.value_or(options.tolerance ? options.shells.value_or(max_index) : max_index);
     rounds_ = options.max_iterations.value_or(default_rounds);
   }
@@ -137,23 +132,28 @@ private:
     return {target_, std::max(fewest_sampled, static_cast<std::size_t>(shells)), like_target_};
   }
 
+  enum class Lessened { mean, largest };
+
   /// Least squares of all nodes. @return the largest error left, mm
-  double settle(FitMesh& mesh, const FitSamples& samples, int power, int steps) const {
-    samples.attach(mesh);
-    double error = samples.measure(mesh);
-    for (int i = 0; i < steps; ++i) {
-      SquaresOptions squares;
-      squares.shape = limits_.shape;
-      squares.power = power;
-      squares.smoothing = power == mean_power ? smoothing : 0;
+  double settle(FitMesh& mesh, const FitSamples& samples, Lessened what) const {
+    double error = measured(mesh, samples);
+    SquaresOptions squares;
+    squares.shape = limits_.shape;
+    squares.largest = what == Lessened::largest;
+    squares.smooth = what == Lessened::mean;
+    for (int i = 0; i < settling_steps; ++i) {
       const double left = least_squares_step(mesh, samples, squares);
-      samples.attach(mesh);
-      error = samples.measure(mesh);
-      if (left > round_worth_it) {
+      error = measured(mesh, samples);
+      if (left > worth_it) {
         break;
       }
     }
     return error;
+  }
+
+  static double measured(FitMesh& mesh, const FitSamples& samples) {
+    samples.attach(mesh);
+    return samples.measure(mesh);
   }
 
   /// As they should be with so many shells; while the fewest are looked for, whatever their mean is.
@@ -174,8 +174,8 @@ private:
     }
     limit_lengths(mesh, mesh.alive);
     FitLimits limits = limits_;
-    limits.error = std::max(limits_.error, settle(mesh, samples, mean_power, 0));
-    for (int pass = 0; pass < crossing_passes; ++pass) {
+    limits.error = std::max(limits_.error, measured(mesh, samples));
+    for (int pass = 0; pass < passes; ++pass) {
       mend_shapes(mesh, samples, limits, most_, no_shell);
     }
     return FitMesh(creased_where_folded(mesh.shell()));
@@ -184,7 +184,7 @@ private:
   void improve(FitMesh& mesh, const FitSamples& samples) {
     limit_lengths(mesh, mesh.alive);
     flip_edges(mesh, samples, limits_);
-    for (int pass = 0; pass < crossing_passes; ++pass) {
+    for (int pass = 0; pass < passes; ++pass) {
       mend_shapes(mesh, samples, limits_, most_);
     }
   }
@@ -195,13 +195,13 @@ private:
   void to_tolerance(double tolerance) {
     limits_.error = margin * tolerance;
     const bool keep_coarse = options_.refine || !like_target_;
-    const TriangleMesh start = keep_coarse ? coarse_ : decimation_within(target_, start_error * tolerance);
+    const TriangleMesh start = keep_coarse ? coarse_ : decimation_within(target_, tolerance);
     FitSamples samples = samples_for(static_cast<double>(start.triangles.size()) / (keep_coarse ? 1 : 3));
     FitMesh mesh = started(start, samples);
-    settle(mesh, samples, mean_power, 4);
+    settle(mesh, samples, Lessened::mean);
     improve(mesh, samples);
     if (options_.refine) {
-      settle(mesh, samples, mean_power, 2);
+      settle(mesh, samples, Lessened::mean);
       make_certain(mesh, samples, tolerance);
       return;
     }
@@ -221,12 +221,12 @@ private:
   /// Collapses and settles in turn as long as that leaves fewer shells; then as many fewer as exchanges make good.
   void fewer(FitMesh& mesh, const FitSamples& samples) {
     const double limit = limits_.error;
-    for (int round = 0; round < 3; ++round) {
+    for (int round = 0; round < passes; ++round) {
       const std::size_t before = mesh.alive;
       collapse_edges(mesh, samples, limits_, 4, options_.progress);
-      settle(mesh, samples, largest_power, settling_steps);
+      settle(mesh, samples, Lessened::largest);
       improve(mesh, samples);
-      if (static_cast<double>(mesh.alive) > round_worth_it * static_cast<double>(before)) {
+      if (static_cast<double>(mesh.alive) > worth_it * static_cast<double>(before)) {
         break;
       }
     }
@@ -260,16 +260,16 @@ private:
       } else {
         best_.crossings.clear();  // first things first
         best_.thin.clear();
-        if (i >= patience && distance.both.lower > out_of_reach * tolerance) {
+        if (i >= patience && distance.both.lower > hopeless * tolerance) {
           return;
         }
-        fruitless = distance.upper() < round_worth_it * closest ? 0 : fruitless + 1;
+        fruitless = distance.upper() < worth_it * closest ? 0 : fruitless + 1;
         closest = std::min(closest, distance.upper());
       }
       for (const FarPlace& place : distance.beyond_of_target) {
         samples.add({place.point});
       }
-      settle(mesh, samples, largest_power, 2);
+      settle(mesh, samples, Lessened::largest);
       // The certificate says where: samples alone see errors, too, where the target itself is rough. Of boundaries as
       // curves it says nothing; and where it was said in vain all is tried.
       std::vector<double> far(mesh.patches.size(), 0);
@@ -300,7 +300,7 @@ private:
         return;
       }
       split_worst(mesh, samples, limits_, std::min((most_ - mesh.alive) / 2, mesh.alive / 4 + fewest_sampled));
-      settle(mesh, samples, largest_power, 2);
+      settle(mesh, samples, Lessened::largest);
       improve(mesh, samples);
     }
   }
@@ -315,10 +315,10 @@ private:
       any.may_miss = no_shell / 2;
       collapse_edges(mesh, samples, any, shells, options_.progress);
     }
-    limits_.error = settle(mesh, samples, largest_power, 4);
+    limits_.error = settle(mesh, samples, Lessened::largest);
     flip_edges(mesh, samples, limits_);
     mend_shapes(mesh, samples, limits_, shells);
-    return settle(mesh, samples, largest_power, 1);
+    return settle(mesh, samples, Lessened::largest);
   }
 
   /// Reduces to so many shells; then moves some from where they are hardly needed to where the error is largest, as
@@ -326,15 +326,17 @@ private:
   /// @return the largest error, mm
   double closest(FitMesh& mesh, const FitSamples& samples, std::size_t shells, double enough) {
     double error = reduce(mesh, samples, shells);
-    std::size_t fruitless = 0;
-    while (error > enough && rounds_ > 0 && fruitless < exchanged.size()) {
+    double share = exchanged;
+    for (int fruitless = 0; error > enough && rounds_ > 0 && fruitless < patience;) {
       --rounds_;
       FitMesh other = mesh;
       limits_.error = error / 2;
-      const double many = exchanged[fruitless] * static_cast<double>(shells);
+      const double many = share * static_cast<double>(shells);
       split_worst(other, samples, limits_, std::max<std::size_t>(1, static_cast<std::size_t>(many)));
       const double now = reduce(other, samples, shells);
-      fruitless = other.alive <= shells && now < round_worth_it * error ? 0 : fruitless + 1;
+      const bool helped = other.alive <= shells && now < worth_it * error;
+      fruitless = helped ? 0 : fruitless + 1;
+      share = helped ? share : share / 2;
       if (other.alive <= shells && now < error) {
         mesh = std::move(other);
         error = now;
@@ -349,7 +351,7 @@ private:
     FitMesh mesh = started(
         like_target_ ? decimation(target_, static_cast<std::size_t>(surplus * static_cast<double>(shells))) : coarse_,
         samples);
-    settle(mesh, samples, mean_power, 3);
+    settle(mesh, samples, Lessened::mean);
     if (mesh.alive > shells) {
       closest(mesh, samples, shells, 0);
     } else {
@@ -361,9 +363,9 @@ private:
   void split_everywhere() {
     const FitSamples samples = samples_for(static_cast<double>(coarse_.triangles.size()));
     FitMesh mesh = started(coarse_, samples);
-    limits_.error = settle(mesh, samples, mean_power, 3);
+    limits_.error = settle(mesh, samples, Lessened::mean);
     improve(mesh, samples);
-    settle(mesh, samples, mean_power, 2);
+    settle(mesh, samples, Lessened::mean);
     ShellMesh shell = mesh.shell();
     certified(shell);
     result_.stopped = "the limit of iterations was reached";
@@ -414,10 +416,10 @@ void fit_normals(const Target& target, ShellMesh& shell) {
   const FitSamples samples(target, mesh.alive, true);
   SquaresOptions squares;
   squares.positions = false;
-  for (const int power : {mean_power, largest_power, largest_power}) {
+  for (const bool largest : {false, true, true}) {
     samples.attach(mesh);
     samples.measure(mesh);
-    squares.power = power;
+    squares.largest = largest;
     least_squares_step(mesh, samples, squares);
   }
   for (std::size_t s = 0; s < mesh.normals.size(); ++s) {

@@ -17,33 +17,21 @@
 namespace tunica {
 namespace {
 
-constexpr double largest_tilt = 0.3;       // rad, per step: the model is linear in it
-constexpr double largest_move = 0.3;       // of the mean edge at the node, likewise
+constexpr double largest_step = 0.3;       // rad of a normal, part of the mean edge at a node: the model is linear
 constexpr double least_weight = 0.1;       // residuals below this part of the largest count alike
-constexpr double normal_damping = 1e-4;    // of the diagonal
-constexpr double sliding_damping = 0.3;    // of the diagonal, where errors are as large as edges
-constexpr double least_damping = 1e-6;     // of the diagonal: regular whatever the residuals see
-constexpr double shortening = 0.35;        // of a step that did not help
-constexpr int trials = 5;                  // the last without the nodes that still have no better place
+constexpr double sliding = 0.3;            // damping and smoothing, of the diagonal, where errors are as large as edges
+constexpr double damping = 1e-4;           // of the diagonal: regular whatever the residuals see
+constexpr int trials = 5;                  // halvings; the last without the nodes that still have no better place
 constexpr double may_grow = 1.05;          // the sum around a node: what its neighbours' steps gain or cost it
-constexpr double keeps_facing = 0.3;       // cosine between a facet's normals before and after
 constexpr Eigen::Index few_unknowns = 80;  // solved as a dense system
-constexpr int most_columns = 27;
+constexpr double difference = 1e-6;        // of an edge, rad: derivatives by differences
+constexpr int most_columns = 27;           // of a patch: its nodes, their normals, three across creases
 
 using Jacobian = Eigen::Matrix<double, 30, Eigen::Dynamic, Eigen::ColMajor, 30, most_columns>;
 
 std::array<Vec3, 2> tilt_axes(const Vec3& normal) {
   const Vec3 first = normal.unitOrthogonal();
   return {first, normal.cross(first)};
-}
-
-double powered(double x, int power) {
-  const double squared = x * x;
-  double result = 1;
-  for (int i = 0; i < power; i += 2) {
-    result *= squared;
-  }
-  return result;
 }
 
 /// The part of the normal equations that one patch contributes.
@@ -72,9 +60,8 @@ Jacobian jacobian(const FitPiece& piece, const FitPatch& p, const Unknowns& of, 
     return Eigen::Matrix<double, 30, 1>(Eigen::Map<const Eigen::Matrix<double, 30, 1>>(patch.control[0].data()));
   };
   const Eigen::Matrix<double, 30, 1> base = control(shape);
-  const double step = 1e-6 * std::sqrt((shape.corners[1] - shape.corners[0]).squaredNorm() +
+  const double step = difference * std::sqrt((shape.corners[1] - shape.corners[0]).squaredNorm() +
                                        (shape.corners[2] - shape.corners[0]).squaredNorm());
-  constexpr double tilt = 1e-6;
   Jacobian out(30, most_columns);
   Shape changed = shape;
   for (std::size_t k = 0; k < 3; ++k) {
@@ -97,14 +84,14 @@ Jacobian jacobian(const FitPiece& piece, const FitPatch& p, const Unknowns& of, 
   for (const Index s : slots) {
     const auto axes = tilt_axes(piece.normals[s]);
     for (Eigen::Index axis = 0; of.slot[s] >= 0 && axis < 2; ++axis) {
-      const Vec3 tilted = piece.normals[s] + tilt * axes[axis];
+      const Vec3 tilted = piece.normals[s] + difference * axes[axis];
       for (std::size_t k = 0; k < 3; ++k) {
         changed.normals[k] = p.slots[k] == s ? tilted : shape.normals[k];
         for (std::size_t end = 0; end < 2; ++end) {
           changed.across[k][end] = p.across[k][end] == s ? tilted : shape.across[k][end];
         }
       }
-      out.col(unknowns.size()) = (control(changed) - base) / tilt;
+      out.col(unknowns.size()) = (control(changed) - base) / difference;
       unknowns.push_back(of.slot[s] + axis);
     }
   }
@@ -184,11 +171,15 @@ private:
     }
   }
 
+  [[nodiscard]] double weight(const Residual& r) const {
+    const double part = std::max(std::abs(r.distance) / scale_, least_weight);
+    return options_.largest ? part * part : 1;
+  }
+
   [[nodiscard]] double cost_of(const FitPatch& p) const {
     double cost = 0;
     for (const Residual& r : p.residuals) {
-      const double part = std::abs(r.distance) / scale_;
-      cost += powered(std::max(part, least_weight), options_.power - 2) * part * part;
+      cost += weight(r) * r.distance * r.distance;
     }
     return cost;
   }
@@ -207,8 +198,7 @@ private:
       for (std::size_t j = 0; j < 10; ++j) {
         reach.segment<3>(3 * j) = basis[j] * r.direction;
       }
-      const double part = std::max(std::abs(r.distance) / scale_, least_weight);
-      const double root = std::sqrt(powered(part, options_.power - 2));
+      const double root = std::sqrt(weight(r));
       rows.col(i).noalias() = root * (control.transpose() * reach);
       weighted[i] = root * r.distance;
     }
@@ -288,23 +278,22 @@ private:
       double stiffness = 0;
       if (of_.node[v] >= 0) {
         stiffness = diagonal.segment<3>(of_.node[v]).sum();
-        const double slide = stiffness * std::min(1.0, std::pow(node.error / node.edge, 2));
-        const double pulling = options_.smoothing * std::max(slide, 1e-3 * stiffness);
+        const double slide = sliding * stiffness * std::min(1.0, std::pow(node.error / node.edge, 2));
+        const double pulling = options_.smooth ? std::max(slide, damping * stiffness) : 0;
         const auto [within, way] = pull(v);
-        const Mat3 damping =
-            (least_damping * stiffness + sliding_damping * slide) * Mat3::Identity() + pulling * within;
+        const Mat3 held = (damping * stiffness + slide) * Mat3::Identity() + pulling * within;
         side.segment<3>(of_.node[v]) += pulling * way;
         for (Eigen::Index i = 0; i < 3; ++i) {
           for (Eigen::Index j = 0; j < 3; ++j) {
-            entries.emplace_back(of_.node[v] + i, of_.node[v] + j, damping(i, j));
+            entries.emplace_back(of_.node[v] + i, of_.node[v] + j, held(i, j));
           }
         }
       }
       for (const Index s : node.slots) {
-        const double damping = normal_damping * diagonal.segment<2>(of_.slot[s]).sum() +
-                               least_damping * stiffness * node.edge * node.edge + 1e-300;
-        entries.emplace_back(of_.slot[s], of_.slot[s], damping);
-        entries.emplace_back(of_.slot[s] + 1, of_.slot[s] + 1, damping);
+        const double held =
+            damping * (diagonal.segment<2>(of_.slot[s]).sum() + stiffness * node.edge * node.edge) + 1e-300;
+        entries.emplace_back(of_.slot[s], of_.slot[s], held);
+        entries.emplace_back(of_.slot[s] + 1, of_.slot[s] + 1, held);
       }
     }
     return solve(entries, side);
@@ -314,15 +303,15 @@ private:
     const Node& node = nodes_[v];
     if (of_.node[v] >= 0) {
       Vec3 move = length * x.segment<3>(of_.node[v]);
-      if (const double far = move.norm(); far > largest_move * node.edge) {
-        move *= largest_move * node.edge / far;
+      if (const double far = move.norm(); far > largest_step * node.edge) {
+        move *= largest_step * node.edge / far;
       }
       piece_.positions[v] = positions_[v] + move;
     }
     for (const Index s : node.slots) {
       Vec2 tilt = length * x.segment<2>(of_.slot[s]);
-      if (const double far = tilt.norm(); far > largest_tilt) {
-        tilt *= largest_tilt / far;
+      if (const double far = tilt.norm(); far > largest_step) {
+        tilt *= largest_step / far;
       }
       const auto axes = tilt_axes(normals_[s]);
       piece_.normals[s] = (normals_[s] + tilt[0] * axes[0] + tilt[1] * axes[1]).normalized();
@@ -341,8 +330,8 @@ private:
         if (!p.is_alive() || (moved[p.nodes[0]] | moved[p.nodes[1]] | moved[p.nodes[2]]) == 0) {
           continue;
         }
-        broken[t] = shape_shortfall(piece_, p, options_.shape) > shortfall_[t] + 1e-6 ||
-                    piece_.facing(p).dot(facing_[t]) < keeps_facing;
+        broken[t] = shape_shortfall(piece_, p, options_.shape) > shortfall_[t] ||
+                    piece_.facing(p).dot(facing_[t]) < options_.shape.agreement;
         if (broken[t] == 0) {
           samples_.measure(piece_, p, options_.search_beyond);
           costs[t] = cost_of(p);
@@ -399,7 +388,7 @@ private:
       }
       moved = bad;
       for (std::size_t v = 0; v < nodes_.size(); ++v) {
-        length[v] *= bad[v] == 0 ? 1 : trial < trials - 2 ? shortening : 0;
+        length[v] *= bad[v] == 0 ? 1 : trial < trials - 2 ? 0.5 : 0;
       }
     }
     piece_.positions = positions_;

@@ -12,12 +12,10 @@ namespace tunica {
 namespace {
 
 constexpr std::size_t points_per_shell = 16;  // of the target: a cubic has ten coefficients, seen from two sides
-constexpr int grid_level = 5;                 // pieces per edge of a patch between its points: 21 of them, likewise
+constexpr int grid_level = 5;                 // pieces per edge of a patch, or of its boundary, between its points: 21 of them, likewise
 constexpr int search_level = 3;   // pieces per edge of the flat surface on which points of the target find their patch
 constexpr double other_wall = 4;  // times as far: beyond that a closest point that faces away is one around a rim
 constexpr double beside = 0.99;   // cosine of 8 degrees: farther off the normal a distance counts along itself
-constexpr int points_per_edge = 4;              // of the boundary: pieces between them
-constexpr int edge_starts = 4, edge_steps = 4;  // of the search for the foot on a cubic edge: its extrema are at most 5
 
 /// Along the given normal, or along the distance itself where it points elsewhere (off an edge, rim or boundary).
 Residual residual(const Vec2& at, const Vec3& away, const Vec3& normal) {
@@ -37,27 +35,26 @@ Residual residual_of_curve(const Vec2& at, const Vec3& away, const Vec3& facing)
 /// Where a curve is closest to q, nearly: Gauss-Newton steps from the best of a few places.
 double foot_on_curve(const CubicCurve& curve, const Vec3& q) {
   double s = 0, least = infinity;
-  for (int i = 0; i <= edge_starts; ++i) {
-    const double there = static_cast<double>(i) / edge_starts;
+  for (int i = 0; i <= grid_level; ++i) {
+    const double there = static_cast<double>(i) / grid_level;
     if (const double squared = (point_on(curve, there) - q).squaredNorm(); squared < least) {
       least = squared;
       s = there;
     }
   }
-  for (int i = 0; i < edge_steps; ++i) {
+  for (;;) {
     const double r = 1 - s;
     const Vec3 tangent =
         3 * (r * r * (curve[1] - curve[0]) + 2 * r * s * (curve[2] - curve[1]) + s * s * (curve[3] - curve[2]));
     const double step = tangent.dot(q - point_on(curve, s)) / std::max(tangent.squaredNorm(), 1e-300);
     const double next = std::clamp(s + step, 0.0, 1.0);
     const double squared = (point_on(curve, next) - q).squaredNorm();
-    if (squared >= least) {
-      break;
+    if (!(squared < least)) {
+      return s;
     }
     least = squared;
     s = next;
   }
-  return s;
 }
 
 /// Of a point of the target's boundary, against the closest of a patch's boundary edges.
@@ -150,7 +147,7 @@ void FitSamples::attach(FitMesh& mesh) const {
   }
   std::optional<ClosestPoint> edges;
   if (!curves.empty()) {
-    edges.emplace(chords_of(curves, points_per_edge).mesh);
+    edges.emplace(chords_of(curves, grid_level).mesh);
   }
   std::vector<Index> found(points_.size());
   parallel_for_blocks(points_.size(), 512, [&](std::size_t begin, std::size_t end) {
@@ -158,7 +155,7 @@ void FitSamples::attach(FitMesh& mesh) const {
     for (std::size_t i = begin; i < end; ++i) {
       const auto& [point, of_boundary] = points_[i];
       if (of_boundary && edges) {
-        found[i] = patch_of_curve[edges->closest(point).triangle / points_per_edge];
+        found[i] = patch_of_curve[edges->closest(point).triangle / grid_level];
         continue;
       }
       const auto hit = guess ? tree.closest(point, *guess) : tree.closest(point);
@@ -319,8 +316,8 @@ void FitSamples::from_boundary(const CubicPatch& surface, const Vec3& facing, Fi
       continue;
     }
     const CubicCurve curve = edge_curve(surface, k);
-    for (int i = 0; i <= points_per_edge; ++i) {
-      const double s = static_cast<double>(i) / points_per_edge;
+    for (int i = 0; i <= grid_level; ++i) {
+      const double s = static_cast<double>(i) / grid_level;
       const Vec3 p = point_on(curve, s);
       patch.residuals.push_back(
           residual_of_curve(place_on_edge(k, s), p - target_.boundary_tree()->closest(p).point, facing));

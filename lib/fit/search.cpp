@@ -14,7 +14,6 @@ namespace tunica {
 namespace {
 
 constexpr std::size_t tried_at_once = 8;  // collapses, whatever the number of threads
-constexpr double worth_it = 0.97;         // of an error or a shortfall
 constexpr double split_may_miss = 0.1;    // of shapes: as much as keeps a corner's normal fit for a shell
 
 /// An edge that may go, and what that is known or guessed to cost.

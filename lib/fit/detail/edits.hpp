@@ -10,8 +10,8 @@ namespace tunica {
 /// What shells must keep while they are edited.
 struct FitLimits {
   FacetLimits shape;
-  double error = 0;        ///< mm, of a patch
-  double may_miss = 1e-6;  ///< by which the shapes' shortfall may grow
+  double error = 0;     ///< mm, of a patch
+  double may_miss = 0;  ///< by which the shapes' shortfall may grow
 };
 
 /// Some patches in place of others, and at most one node that looks for its place. Nodes and slots are the mesh's; new
@@ -53,6 +53,9 @@ struct Trial {
                          ///< join two features, between which no node can bend
   double shortfall_before = 0;
 };
+
+/// Times a limit: what is as far off does not come within it.
+inline constexpr double hopeless = 8;
 
 /// Places the node by some steps of least squares; an error that stays far above `limits.error` ends them.
 /// Cost: some 0.1 ms per step.

@@ -79,6 +79,9 @@ inline constexpr double fit_agreement = 1.05 * least_normal_agreement;
 /// Shortfall of a patch that is no shell, since a normal lies nearly in its facet: outweighs all other shapes.
 inline constexpr double no_shell = 1e9;
 
+/// Part of an error, a shortfall or a count above which what is left is no progress.
+inline constexpr double worth_it = 0.97;
+
 /// Sum of squares of the parts by which a patch's facet misses its smallest angle, its agreement, its longest edge; 0
 /// when it keeps them.
 double shape_shortfall(const FitPiece& piece, const FitPatch& patch, const FacetLimits& limits);
