@@ -1,7 +1,7 @@
 # Flags for every target, and the functions that make one.
 add_library(tunica_flags INTERFACE)
 target_compile_options(tunica_flags INTERFACE -Wall -Wextra -Wpedantic -Wnon-virtual-dtor
-                       -Woverloaded-virtual -Wcast-qual -Wformat=2)
+                       -Woverloaded-virtual -Wcast-qual -Wformat=2 -Wfloat-conversion)
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
   target_compile_options(tunica_flags INTERFACE -Wno-restrict)  # false alarms on string + string (GCC bug 105651)
 endif()

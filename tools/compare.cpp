@@ -1,4 +1,5 @@
 #include "tunica/cli/tool.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/draw/picture.hpp"
 #include "tunica/io/mesh/mesh_file.hpp"
 #include "tunica/io/mesh/mesh_pair.hpp"
@@ -140,8 +141,8 @@ Map make_map(const Surface& a, const ClosestPoint& b, double diagonal_mm) {
   Map map;
   const std::size_t facets = a.flat.triangles.size();
   if (a.shell) {
-    const double per_shell = static_cast<double>(map_triangles) / static_cast<double>(facets);
-    const int level = std::clamp(static_cast<int>(std::sqrt(per_shell)), 4, 24);
+    const double per_shell = real(map_triangles) / real(facets);
+    const int level = std::clamp(truncated<int>(std::sqrt(per_shell)), 4, 24);
     const Tessellation fine = tessellate_uniformly(*a.shell, level);
     const auto on_edge = [&](Index i, Index j) {
       const Vec2& p = fine.barycentric[i];

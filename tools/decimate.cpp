@@ -1,5 +1,6 @@
 #include "tunica/surface/decimation/decimate.hpp"
 #include "tunica/cli/tool.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/io/mesh/mesh_file.hpp"
 #include "tunica/surface/decimation/degenerate.hpp"
 #include "tunica/surface/distance/hausdorff.hpp"
@@ -61,10 +62,10 @@ std::optional<std::size_t> wanted_triangles(const Arguments& given) {
     return std::nullopt;
   }
   const auto number = parse_number(*given.triangles);
-  if (!number || *number < 1 || *number > static_cast<double>(max_index) || *number != std::floor(*number)) {
+  if (!number || *number < 1 || *number > real(max_index) || *number != std::floor(*number)) {
     throw UsageError(fmt::format("--triangles: '{}' is not a whole number from 1 to {}", *given.triangles, max_index));
   }
-  return static_cast<std::size_t>(*number);
+  return truncated<std::size_t>(*number);
 }
 
 std::optional<double> wanted_angle(const Arguments& given) {

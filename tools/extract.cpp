@@ -1,5 +1,6 @@
 #include "tunica/cli/tool.hpp"
 #include "tunica/cli/usage.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/version.hpp"
 #include "tunica/io/mesh/mesh_file.hpp"
 #include "tunica/io/volume/volume_file.hpp"
@@ -371,7 +372,7 @@ Surface extract(cli::Tool& tool, Selection selection, const Arguments& arguments
   double voxel_volume = 0;
   {
     const auto stage = tool.stage("extract");
-    voxel_volume = static_cast<double>(count_voxels(selection.mask)) * selection.mask.voxel_volume();
+    voxel_volume = real(count_voxels(selection.mask)) * selection.mask.voxel_volume();
     if (voxel_volume > 0) {
       keep_wanted_pieces(selection.mask, arguments);
     }

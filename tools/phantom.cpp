@@ -1,6 +1,7 @@
 // tunica-phantom: a segmented volume whose true surface is known.
 #include "tunica/volume/phantom/phantom.hpp"
 #include "tunica/cli/tool.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/io/mesh/mesh_file.hpp"
 #include "tunica/io/volume/volume_file.hpp"
 #include "tunica/surface/mesh/measure.hpp"
@@ -75,7 +76,7 @@ int main(int argc, char** argv) {
     tool.result()["dims"] = phantom.volume.dims;
     tool.result()["spacing_mm"] = {options.spacing[0], options.spacing[1], options.spacing[2]};
     tool.result()["voxels"] = phantom.inside;
-    tool.result()["voxel_volume_mm3"] = static_cast<double>(phantom.inside) * options.spacing.prod();
+    tool.result()["voxel_volume_mm3"] = real(phantom.inside) * options.spacing.prod();
     tool.result()["flipped_voxels"] = phantom.flipped;
     for (const char* key : {"truth_triangles", "truth_volume_mm3", "truth_area_mm2"}) {
       tool.result()[key] = nullptr;

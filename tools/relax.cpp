@@ -1,6 +1,7 @@
 // tunica-relax COARSE TARGET OUT.ply: a coarse mesh becomes curved shells on its target, with a certified distance.
 #include "tunica/cli/tool.hpp"
 #include "tunica/cli/usage.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/quantity.hpp"
 #include "tunica/draw/picture.hpp"
 #include "tunica/fit/fit.hpp"
@@ -227,8 +228,8 @@ PlyOptions ply_options(const cli::Tool& tool, const std::string& space) {
 /// @param written  outputs that are finished: what joins them
 void write_maps(cli::Tool& tool, const Arguments& given, const ShellMesh& shell, const Target& target,
                 const ShellDistance& distance, const PlyOptions& ply, std::vector<fs::path>& written) {
-  const double per_shell = static_cast<double>(map_triangles) / static_cast<double>(shell.triangles.size());
-  const int level = std::clamp(static_cast<int>(std::sqrt(per_shell)), 4, 24);
+  const double per_shell = real(map_triangles) / real(shell.triangles.size());
+  const int level = std::clamp(truncated<int>(std::sqrt(per_shell)), 4, 24);
   const Tessellation fine = tessellate_uniformly(shell, level);
   const auto distances = vertex_distances(fine.mesh, target.tree());
   if (given.map) {

@@ -1,4 +1,5 @@
 #include "tunica/cli/tool.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/version.hpp"
 #include "tunica/io/file/output_file.hpp"
 #include "tunica/io/result/result_export.hpp"
@@ -138,7 +139,7 @@ std::optional<std::size_t> count(const std::optional<std::string>& text, const c
   if (!value || *value < 1 || *value > most || *value != std::floor(*value)) {
     throw UsageError(fmt::format("{}: '{}' is not a whole number from 1 to {:.0f}", flag, *text, most));
   }
-  return static_cast<std::size_t>(*value);
+  return truncated<std::size_t>(*value);
 }
 
 template <typename Value>

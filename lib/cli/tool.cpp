@@ -2,6 +2,7 @@
 
 #include "tunica/cli/detail/documentation.hpp"
 #include "tunica/cli/usage.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/threads.hpp"
 #include "tunica/core/version.hpp"
 #include "tunica/core/words.hpp"
@@ -14,6 +15,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
@@ -66,7 +68,7 @@ double peak_mebibytes() {
   }
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
-  return static_cast<double>(usage.ru_maxrss) / 1024.0;
+  return real(usage.ru_maxrss) / 1024.0;
 }
 
 std::string shell_quoted(const std::string& word) {
@@ -228,10 +230,10 @@ void Tool::parse_common() {
   std::size_t count = 0;
   if (threads_) {
     const auto number = parse_number(*threads_);
-    if (!number || *number < 1 || *number > 4096 || *number != static_cast<double>(static_cast<int>(*number))) {
+    if (!number || *number < 1 || *number > 4096 || *number != std::trunc(*number)) {
       throw UsageError(fmt::format("--threads: '{}' is not a whole number from 1 to 4096", *threads_));
     }
-    count = static_cast<std::size_t>(*number);
+    count = truncated<std::size_t>(*number);
   } else {
     count = default_thread_count();
   }
@@ -507,7 +509,7 @@ Progress Tool::progress(const std::string& doing) {
     const double percent = 100 * shown->most;
     if (terminal) {
       constexpr int width = 30;
-      const auto filled = static_cast<std::size_t>(percent / 100 * width);
+      const auto filled = truncated<std::size_t>(percent / 100 * width);
       say(fmt::format("\r{:<10} [{:<{}}] {:5.1f} %  {:.1f} s ", doing, std::string(filled, '#'), width, percent,
                       seconds_since(shown->start)));
       bar_open_ = true;

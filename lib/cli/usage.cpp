@@ -1,5 +1,6 @@
 #include "tunica/cli/usage.hpp"
 
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/quantity.hpp"
 #include "tunica/io/file/suggestion.hpp"
 
@@ -63,9 +64,8 @@ std::string usage_message(const CLI::App& app, const CLI::ParseError& error) {
 CLI::Validator whole_number(std::size_t lower, std::size_t upper) {
   return {[=](const std::string& text) {
             const std::optional<double> number = parse_number(text);
-            const bool good = number && *number == std::floor(*number) && *number >= static_cast<double>(lower) &&
-                              *number <= static_cast<double>(upper) &&
-                              text.find_first_not_of("0123456789") == std::string::npos;
+            const bool good = number && *number == std::floor(*number) && *number >= real(lower) &&
+                              *number <= real(upper) && text.find_first_not_of("0123456789") == std::string::npos;
             return good ? std::string() : fmt::format("'{}' is not a whole number from {} to {}", text, lower, upper);
           },
           "", "whole number"};

@@ -52,7 +52,7 @@ using LaneVec3 = Eigen::Matrix<Lanes, 3, 1>;
 /// A scalar of each thing. @param value  of thing k, 0 <= k < lane_count
 template <typename Value>
 Lanes lanes_of(const Value& value) {
-  return Lanes([&](auto k) { return value(static_cast<std::size_t>(k)); });
+  return Lanes([&](auto k) { return value(std::size_t{k}); });
 }
 
 /// A point of each thing.
@@ -60,7 +60,7 @@ template <typename Point>
 LaneVec3 lane_points(const Point& point) {
   LaneVec3 result;
   for (Eigen::Index i = 0; i < 3; ++i) {
-    result[i] = Lanes([&](auto k) { return point(static_cast<std::size_t>(k))[i]; });
+    result[i] = Lanes([&](auto k) { return point(std::size_t{k})[i]; });
   }
   return result;
 }

@@ -1,6 +1,7 @@
 #include "tunica/core/quantity.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 
 #include <fmt/format.h>
 
@@ -99,7 +100,7 @@ std::optional<double> take_number(std::string_view& text) {
   if (error != std::errc{} || !std::isfinite(value)) {
     return std::nullopt;
   }
-  text = rest.substr(static_cast<std::size_t>(end - rest.data()));
+  text = rest.substr(narrow<std::size_t>(end - rest.data()));
   return value;
 }
 
@@ -136,7 +137,7 @@ std::optional<ParsedUnit> parse_unit(std::string_view text) {
       if (error != std::errc{} || power == 0 || power < -9 || power > 9) {
         return std::nullopt;
       }
-      text.remove_prefix(static_cast<std::size_t>(end - text.data()));
+      text.remove_prefix(narrow<std::size_t>(end - text.data()));
     }
     power *= direction;
     result.value *= std::pow(found->value, power);

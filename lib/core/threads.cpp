@@ -1,6 +1,7 @@
 #include "tunica/core/threads.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 
 #include <fmt/format.h>
 #include <tbb/global_control.h>
@@ -21,7 +22,7 @@ namespace {
 std::size_t usable_processors() {
   cpu_set_t set;
   if (sched_getaffinity(0, sizeof set, &set) == 0) {
-    return static_cast<std::size_t>(std::max(1, CPU_COUNT(&set)));
+    return narrow<std::size_t>(std::max(1, CPU_COUNT(&set)));
   }
   return 1;
 }

@@ -1,6 +1,7 @@
 #include "tunica/core/words.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 
 #include <fcntl.h>
 #include <poll.h>
@@ -17,7 +18,7 @@ int write_all(int descriptor, std::string_view text) noexcept {
   while (!text.empty()) {
     const ssize_t written = ::write(descriptor, text.data(), text.size());
     if (written >= 0) {
-      text.remove_prefix(static_cast<std::size_t>(written));
+      text.remove_prefix(narrow<std::size_t>(written));
     } else if (errno == EAGAIN) {
       pollfd ready{descriptor, POLLOUT, 0};
       (void)::poll(&ready, 1, -1);

@@ -1,6 +1,7 @@
 #include "tunica/draw/chart.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/draw/detail/ticks.hpp"
 
 #include <fmt/format.h>
@@ -185,8 +186,8 @@ Axis logarithmic_axis(const std::vector<double>& values) {
   if (axis.zeros) {
     axis.ticks.push_back({0, "0", ""});
   }
-  const int first = static_cast<int>(std::floor(from));
-  const int last = static_cast<int>(std::ceil(to));
+  const int first = truncated<int>(std::floor(from));
+  const int last = truncated<int>(std::ceil(to));
   const int every = std::max(1, (last - first + 7) / 8);
   const bool close = to - from < 2.6;
   for (int power = first; power <= last; ++power) {
@@ -235,7 +236,7 @@ Axis linear_axis(const std::vector<double>& values) {
   const double size = std::max(std::abs(axis.low), std::abs(axis.high));
   const bool plain = size >= 1e-3 && size < 1e6;
   // All ticks with the power of the largest, with the decimals that the step needs.
-  const int power = static_cast<int>(std::floor(std::log10(size) + 1e-9));
+  const int power = truncated<int>(std::floor(std::log10(size) + 1e-9));
   for (const double value : multiples(axis.low, axis.high, step)) {
     if (plain || value == 0) {
       axis.ticks.push_back({value, value == 0 ? "0" : tick_text(value, step), ""});
@@ -308,7 +309,7 @@ public:
         width, chart_height, safe(chart_.title.empty() ? chart_.y.label + " against " + chart_.x.label : chart_.title));
     if (!chart_.title.empty()) {
       const double size = std::clamp(18 * (width - 48) / std::max(1.0, text_width(chart_.title, 18)), 11.0, 18.0);
-      const auto fits = static_cast<std::size_t>(std::max(10.0, (width - 48) / (0.55 * size)));
+      const auto fits = truncated<std::size_t>(std::max(10.0, (width - 48) / (0.55 * size)));
       write(24, 34, shortened(chart_.title, fits), size, "fill=\"#1a1a1a\" font-weight=\"bold\"");
     }
     draw_axes();
@@ -433,7 +434,7 @@ private:
   }
 
   static std::string colour(std::size_t series) { return palette[series % palette.size()]; }
-  static int shape(std::size_t series) { return static_cast<int>(series % shapes); }
+  static int shape(std::size_t series) { return narrow<int>(series % shapes); }
 
   static std::string mark_shape(const Point& p, std::size_t series) {
     const double r = mark_radius;

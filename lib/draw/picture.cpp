@@ -1,6 +1,7 @@
 #include "tunica/draw/picture.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/threads.hpp"
 #include "tunica/draw/detail/rasteriser.hpp"
 #include "tunica/draw/detail/ticks.hpp"
@@ -154,7 +155,7 @@ std::vector<Index> used_vertices(const TriangleMesh& mesh) {
   std::vector<Index> used;
   for (std::size_t v = 0; v < seen.size(); ++v) {
     if (seen[v] != 0) {
-      used.push_back(static_cast<Index>(v));
+      used.push_back(narrow<Index>(v));
     }
   }
   return used;
@@ -164,7 +165,7 @@ std::vector<Index> used_vertices(const TriangleMesh& mesh) {
 bool turned_inside_out(const TriangleMesh& mesh, const std::vector<Index>& used) {
   Vec3 origin = Vec3::Zero();
   for (const Index v : used) {
-    origin += mesh.vertices[v] / static_cast<double>(used.size());
+    origin += mesh.vertices[v] / real(used.size());
   }
   double volume = 0;
   for (const auto& [a, b, c] : mesh.triangles) {
@@ -177,7 +178,7 @@ bool turned_inside_out(const TriangleMesh& mesh, const std::vector<Index>& used)
 Mat3 principal_axes(const TriangleMesh& mesh, const std::vector<Index>& used) {
   Vec3 origin = Vec3::Zero();
   for (const Index v : used) {
-    origin += mesh.vertices[v] / static_cast<double>(used.size());
+    origin += mesh.vertices[v] / real(used.size());
   }
   double total = 0;
   Vec3 first = Vec3::Zero();
@@ -265,7 +266,7 @@ std::array<View, 2> choose_views(const Scene& scene, const Box2& box) {
       const double height = beside ? box.height() : (box.height() - gap) / 2;
       double scale = infinity;
       for (std::size_t i = 0; i < 2; ++i) {
-        const auto shift = static_cast<double>(i);
+        const auto shift = real(i);
         View& view = views[i];
         view.panel.left = box.left + (beside ? shift * (width + gap) : 0);
         view.panel.top = box.top + (beside ? 0 : shift * (height + gap));
@@ -330,7 +331,7 @@ cv::Vec3b surface_colour(const Paint& paint, float value) {
   if (!std::isfinite(value)) {
     return {170, 170, 170};
   }
-  const double level = paint.top > 0 ? 255 * static_cast<double>(value) / paint.top : 0;
+  const double level = paint.top > 0 ? 255 * value / paint.top : 0;
   return paint.palette[std::lround(std::clamp(level, 0.0, 255.0))];
 }
 
@@ -348,15 +349,15 @@ bool on_outline(const Raster& raster, int x, int y, float step) {
 
 // The raster in colours: diffuse light that leaves the hues readable, dark outlines where the depth jumps.
 void paint_raster(cv::Mat target, const Raster& raster, const Paint& paint, double jump) {
-  parallel_for_blocks(static_cast<std::size_t>(raster.height), 64, [&](std::size_t begin, std::size_t end) {
-    for (int y = static_cast<int>(begin); y < static_cast<int>(end); ++y) {
+  parallel_for_blocks(narrow<std::size_t>(raster.height), 64, [&](std::size_t begin, std::size_t end) {
+    for (int y = narrow<int>(begin); y < narrow<int>(end); ++y) {
       auto* row = target.ptr<cv::Vec3b>(y);
       for (int x = 0; x < raster.width; ++x) {
         const std::size_t at = raster.at(x, y);
         if (raster.depth[at] == Raster::empty) {
           continue;
         }
-        double light = 0.46 + 0.58 * static_cast<double>(raster.light[at]);
+        double light = 0.46 + 0.58 * raster.light[at];
         if ((raster.inner[at] != 0) != paint.inside_out) {
           light *= 0.72;
         }
@@ -383,9 +384,9 @@ void paint_lines(cv::Mat target, const Raster& raster, const Camera& camera,
     if (!(length < 1e5)) {
       continue;
     }
-    const int steps = static_cast<int>(std::ceil(2 * length)) + 1;
+    const int steps = truncated<int>(std::ceil(2 * length)) + 1;
     for (int i = 0; i <= steps; ++i) {
-      const Vec3 p = from + (to - from) * (static_cast<double>(i) / steps);
+      const Vec3 p = from + (to - from) * (real(i) / steps);
       // A pen of 2 x 2 pixels: one pixel in the finished picture.
       for (const auto& [dx, dy] : {std::pair{-0.5, -0.5}, {0.5, -0.5}, {-0.5, 0.5}, {0.5, 0.5}}) {
         const double x = std::floor(p.x() + dx);
@@ -393,8 +394,8 @@ void paint_lines(cv::Mat target, const Raster& raster, const Camera& camera,
         if (x < 0 || y < 0 || x >= raster.width || y >= raster.height) {
           continue;
         }
-        const std::size_t at = raster.at(static_cast<int>(x), static_cast<int>(y));
-        if (raster.depth[at] != Raster::empty && p.z() > static_cast<double>(raster.depth[at]) - bias) {
+        const std::size_t at = raster.at(truncated<int>(x), truncated<int>(y));
+        if (raster.depth[at] != Raster::empty && p.z() > raster.depth[at] - bias) {
           cover[at] = 1;
         }
       }
@@ -484,7 +485,7 @@ void mark_worst(Canvas& canvas, const View& view, const Raster& raster, const Ve
   const Vec3 seen = view.camera.project(place);
   const int x = std::clamp(cvFloor(seen.x()), 0, raster.width - 1);
   const int y = std::clamp(cvFloor(seen.y()), 0, raster.height - 1);
-  if (seen.z() < static_cast<double>(raster.depth[raster.at(x, y)]) - tolerance) {
+  if (seen.z() < raster.depth[raster.at(x, y)] - tolerance) {
     return;
   }
   const double px = view.panel.left + seen.x() / oversampling;

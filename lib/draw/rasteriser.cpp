@@ -1,6 +1,7 @@
 #include "tunica/draw/detail/rasteriser.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/threads.hpp"
 
 #include <Eigen/Geometry>
@@ -37,9 +38,9 @@ ProjectedTriangle project_triangle(const TriangleMesh& mesh, std::size_t triangl
 
 // Pixels whose centres may lie within [low, high], clipped to [first, last).
 std::pair<int, int> pixel_range(double low, double high, int first, int last) {
-  const double from = std::clamp(std::ceil(low - 0.5), static_cast<double>(first), static_cast<double>(last));
-  const double to = std::clamp(std::floor(high - 0.5) + 1, static_cast<double>(first), static_cast<double>(last));
-  return {static_cast<int>(from), static_cast<int>(to)};
+  const double from = std::clamp(std::ceil(low - 0.5), real(first), real(last));
+  const double to = std::clamp(std::floor(high - 0.5) + 1, real(first), real(last));
+  return {truncated<int>(from), truncated<int>(to)};
 }
 
 void draw_triangle(Raster& raster, const ProjectedTriangle& triangle, const std::array<Vec3, 3>& normal,
@@ -104,7 +105,7 @@ std::vector<std::array<Vec3, 3>> shading_normals(const TriangleMesh& mesh) {
   std::vector<std::size_t> next(start.begin(), start.end() - 1);
   for (std::size_t t = 0; t < count; ++t) {
     for (const Index v : mesh.triangles[t]) {
-      around[next[v]++] = static_cast<Index>(t);
+      around[next[v]++] = narrow<Index>(t);
     }
   }
   const double crease = std::cos(40 * std::acos(-1.0) / 180);
@@ -134,8 +135,8 @@ Raster rasterise(const TriangleMesh& mesh, const std::vector<std::array<Vec3, 3>
   TUNICA_ASSERT(camera.width > 0 && camera.height > 0);
   TUNICA_ASSERT(normals.size() == mesh.triangles.size());
   TUNICA_ASSERT(values.empty() || values.size() == mesh.vertices.size());
-  const auto rows = static_cast<std::size_t>(camera.height);
-  const std::size_t pixels = rows * static_cast<std::size_t>(camera.width);
+  const std::size_t rows = camera.height;
+  const std::size_t pixels = rows * narrow<std::size_t>(camera.width);
   const std::size_t count = mesh.triangles.size();
   Raster raster;
   raster.width = camera.width;
@@ -156,8 +157,8 @@ Raster rasterise(const TriangleMesh& mesh, const std::vector<std::array<Vec3, 3>
 
   // Each block owns its rows and takes the triangles in their order: the same picture whatever the number of threads.
   parallel_for_blocks(rows, 64, [&](std::size_t begin, std::size_t end) {
-    const int first = static_cast<int>(begin);
-    const int last = static_cast<int>(end);
+    const int first = narrow<int>(begin);
+    const int last = narrow<int>(end);
     for (std::size_t t = 0; t < count; ++t) {
       const auto& corner = projected[t].corner;
       const double top = std::min({corner[0].y(), corner[1].y(), corner[2].y()});

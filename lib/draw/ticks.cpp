@@ -1,6 +1,7 @@
 #include "tunica/draw/detail/ticks.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 
 #include <fmt/format.h>
 
@@ -75,7 +76,7 @@ std::string tick_text(double tick, double step) {
   // As many digits as tell the tick from its neighbours; of a step like 2.5e-06 both of its own.
   const double mantissa = step / std::pow(10, std::floor(std::log10(step)));
   const int own = std::abs(mantissa - std::round(mantissa)) > 1e-6 ? 2 : 1;
-  const int digits = own + static_cast<int>(std::ceil(std::log10(std::max(1.0, std::abs(tick) / step))));
+  const int digits = own + truncated<int>(std::ceil(std::log10(std::max(1.0, std::abs(tick) / step))));
   return fmt::format("{:.{}g}", tick, std::min(digits, 17));
 }
 

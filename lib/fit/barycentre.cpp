@@ -1,6 +1,7 @@
 #include "tunica/fit/barycentre.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/threads.hpp"
 #include "tunica/surface/mesh/incidence.hpp"
 
@@ -51,7 +52,7 @@ public:
     arc -= length() * std::floor(arc / length());
     const auto after = std::upper_bound(arc_.begin(), arc_.end(), arc);
     const auto i =
-        std::min(points_.size() - 1, static_cast<std::size_t>(std::max<std::ptrdiff_t>(0, after - arc_.begin() - 1)));
+        std::min(points_.size() - 1, narrow<std::size_t>(std::max<std::ptrdiff_t>(0, after - arc_.begin() - 1)));
     const double step = arc_[i + 1] - arc_[i];
     const double s = step > 0 ? (arc - arc_[i]) / step : 0;
     return (1 - s) * points_[i] + s * next(i);
@@ -100,10 +101,10 @@ std::vector<Vec3> along_curve(const ClosedCurve& curve, const std::vector<Vec3>&
   if (!(own[n] > 0)) {
     return loop;
   }
-  const auto first = static_cast<std::size_t>(
+  const std::size_t first =
       std::min_element(found.begin(), found.end(),
                        [](const OnCurve& a, const OnCurve& b) { return a.squared_distance < b.squared_distance; }) -
-      found.begin());
+      found.begin();
   double best = infinity;
   for (const int sign : {1, -1}) {
     std::vector<Vec3> spread(n);
@@ -167,7 +168,7 @@ std::vector<Vec3> without_flips(const TriangleMesh& mesh, const std::vector<Vec3
       }
     }
   }
-  shortened = static_cast<std::size_t>(std::count_if(halved.begin(), halved.end(), [](int h) { return h > 0; }));
+  shortened = narrow<std::size_t>(std::count_if(halved.begin(), halved.end(), [](int h) { return h > 0; }));
   return moved;
 }
 
@@ -182,7 +183,7 @@ double misfit(const ClosedCurve& curve, const TriangleMesh& mesh, const std::vec
     sum += std::sqrt(found.squared_distance);
     along += (next - p).dot(found.direction.stableNormalized());
   }
-  const double mean = sum / static_cast<double>(loop.size());
+  const double mean = sum / real(loop.size());
   return along >= 0 ? mean : 10 * (mean + curve.length());
 }
 

@@ -1,6 +1,7 @@
 // Every edit is a trial: patches in place of others, one node placed by least squares, all beside the mesh.
 #include "tunica/fit/detail/edits.hpp"
 
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/threads.hpp"
 #include "tunica/fit/detail/least_squares.hpp"
 #include "tunica/shell/distance/normals.hpp"
@@ -86,28 +87,28 @@ private:
     auto& known = trial_.nodes;
     const auto at = std::find(known.begin(), known.end(), node);
     if (at != known.end()) {
-      return static_cast<Index>(at - known.begin());
+      return narrow<Index>(at - known.begin());
     }
     known.push_back(node);
     const auto& others = trial_.edit.others;
     const bool moves = node == trial_.edit.node;
     piece_.positions.push_back(moves ? trial_.edit.starts[0] : mesh_.positions[node]);
     piece_.free.push_back(moves || std::find(others.begin(), others.end(), node) != others.end() ? 1 : 0);
-    return static_cast<Index>(known.size() - 1);
+    return narrow<Index>(known.size() - 1);
   }
 
   Index local_slot(Index slot, Index node) {
     auto& known = trial_.slots;
     const auto at = std::find(known.begin(), known.end(), slot);
     if (at != known.end()) {
-      return static_cast<Index>(at - known.begin());
+      return narrow<Index>(at - known.begin());
     }
     known.push_back(slot);
     const auto& starts = trial_.edit.normals;
     const auto start = std::find_if(starts.begin(), starts.end(), [&](const auto& s) { return s.first == slot; });
     piece_.normals.push_back(start != starts.end() ? start->second : mesh_.normals[slot]);
     piece_.node_of_slot.push_back(node);
-    return static_cast<Index>(known.size() - 1);
+    return narrow<Index>(known.size() - 1);
   }
 
   void look_across(std::size_t i, std::size_t k) {
@@ -119,7 +120,7 @@ private:
       const FitPatch& q = piece_.patches[j];
       const std::size_t a = q.corner_of(p.nodes[k]);
       if (j != i && q.has(p.nodes[k]) && q.nodes[(a + 2) % 3] == p.nodes[(k + 1) % 3]) {
-        inside_[i][k] = static_cast<Index>(j);
+        inside_[i][k] = narrow<Index>(j);
         p.across[k] = {q.slots[a], q.slots[(a + 2) % 3]};
       }
     }
@@ -137,7 +138,7 @@ private:
                      local_slot(q.slots[q.corner_of(v)], p.nodes[(k + 1) % 3])};
       outside_[i][k] = mesh_.longest_edge(q);
     } else if (inside_[i][k] == no_index) {
-      p.boundary |= static_cast<EdgeBits>(1U << k);
+      p.boundary |= narrow<EdgeBits>(1U << k);
     }
     const auto is_on_feature = [&](Index node) { return (node == edit.node ? edit.rank : mesh_.rank(node)) > 0; };
     if ((p.boundary >> k & 1) == 0 && !p.is_creased(k) && is_on_feature(u) && is_on_feature(v)) {
@@ -311,7 +312,7 @@ std::optional<Edit> collapse(const FitMesh& mesh, const FitSamples& samples, Ind
   for (std::size_t i = 0; i < on_edge; ++i) {
     becomes.emplace_back(slot_at(pair[i], gone), slot_at(pair[i], kept));
   }
-  edit.removed.assign(pair.begin(), pair.begin() + static_cast<std::ptrdiff_t>(on_edge));
+  edit.removed.assign(pair.begin(), pair.begin() + on_edge);
   for (const Index node : {kept, gone}) {
     for (const Index t : mesh.around[node]) {
       if (t == pair[0] || t == pair[1]) {
@@ -382,7 +383,7 @@ std::optional<Edit> flip(const FitMesh& mesh, Index u, Index v) {
 
 Edit split(const FitMesh& mesh, Index u, Index v) {
   Edit edit;
-  edit.node = static_cast<Index>(mesh.positions.size());
+  edit.node = narrow<Index>(mesh.positions.size());
   edit.rank = mesh.is_feature(u, v) ? 1 : 0;
   Vec3 place = Vec3::Zero();
   double sides = 0;
@@ -396,7 +397,7 @@ Edit split(const FitMesh& mesh, Index u, Index v) {
     const Vec3 normal = surface.normal(middle_of_edge(k));
     place += surface.point(middle_of_edge(k));
     if (edit.normals.empty() || edit.rank > 0) {
-      edit.normals.emplace_back(static_cast<Index>(mesh.normals.size() + edit.normals.size()), normal);
+      edit.normals.emplace_back(narrow<Index>(mesh.normals.size() + edit.normals.size()), normal);
     } else {
       edit.normals[0].second = (edit.normals[0].second + normal).normalized();
     }

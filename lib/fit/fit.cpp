@@ -2,6 +2,7 @@
 
 #include "tunica/core/clock.hpp"
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/fit/detail/edits.hpp"
 #include "tunica/fit/detail/least_squares.hpp"
 #include "tunica/fit/detail/start.hpp"
@@ -24,12 +25,11 @@ constexpr double margin = 0.97;      // of the tolerance: what the samples may s
 constexpr double surplus = 1.5;      // of triangles at the start of a search for a count
 constexpr double longest_edge = 2;   // of the mean: no region without nodes of its own
 constexpr double fewest_across = 4;  // of the longest edges: along a square of the surface's area, likewise
-constexpr int settling_steps = 4;
-constexpr int passes = 3;                  // of collapses, of mending: the last brings hardly anything
-constexpr int default_rounds = 12;         // of exchanges
-constexpr double fewer_by = 0.92;          // of the shells: the next count to be tried
-constexpr int certificates = 12;           // each followed by splits
-constexpr int patience = 3;                // rounds in a row that bring nothing
+constexpr int passes = 3;            // of collapses, of mending, steps of settling: the last bring hardly anything
+constexpr int default_rounds = 12;   // of exchanges
+constexpr double fewer_by = 0.92;    // of the shells: the next count to be tried
+constexpr int certificates = 12;     // each followed by splits
+constexpr int patience = 3;          // rounds in a row that bring nothing
 constexpr std::size_t fewest_sampled = 8;  // shells: as few want no fewer points of the target
 constexpr double exchanged = 0.05;         // of the shells, in a round; half as many where that brought nothing
 
@@ -62,8 +62,7 @@ public:
     thin = thin_triangles(shell);
     const bool holds = options_.tolerance && distance.upper() <= *options_.tolerance;
     const auto rank = std::array{holds ? 1.0 : 0.0, crossings.empty() ? 1.0 : 0.0,
-                                 holds ? -static_cast<double>(thin.size()) : -distance.upper(),
-                                 -static_cast<double>(shell.triangles.size())};
+                                 holds ? -real(thin.size()) : -distance.upper(), -real(shell.triangles.size())};
     if (result.shell.triangles.empty() || rank > rank_) {
       result.shell = shell;
       result.distance = distance;
@@ -111,7 +110,7 @@ public:
         options_(options),
         like_target_(same_topology(coarse_, target)),
         best_(target, options, like_target_) {
-    limits_.shape.min_angle = options.min_angle;
+    limits_.shape.min_angle = options.min_angle / (1 - std::sqrt(negligible_shortfall));
     most_ = options.max_shells.value_or(options.tolerance ? options.shells.value_or(max_index) : max_index);
     rounds_ = options.max_iterations.value_or(default_rounds);
   }
@@ -129,7 +128,7 @@ public:
 
 private:
   [[nodiscard]] FitSamples samples_for(double shells) const {
-    return {target_, std::max(fewest_sampled, static_cast<std::size_t>(shells)), like_target_};
+    return {target_, std::max(fewest_sampled, truncated<std::size_t>(shells)), like_target_};
   }
 
   enum class Lessened { mean, largest };
@@ -141,7 +140,7 @@ private:
     squares.shape = limits_.shape;
     squares.largest = what == Lessened::largest;
     squares.smooth = what == Lessened::mean;
-    for (int i = 0; i < settling_steps; ++i) {
+    for (int i = 0; i < passes; ++i) {
       const double left = least_squares_step(mesh, samples, squares);
       error = measured(mesh, samples);
       if (left > worth_it) {
@@ -158,7 +157,7 @@ private:
 
   /// As they should be with so many shells; while the fewest are looked for, whatever their mean is.
   void limit_lengths(const FitMesh& mesh, std::size_t shells) {
-    const double mean = mesh.mean_edge() * std::sqrt(static_cast<double>(mesh.alive) / static_cast<double>(shells));
+    const double mean = mesh.mean_edge() * std::sqrt(real(mesh.alive) / real(shells));
     limits_.shape.longest = std::sqrt(mesh.area()) / fewest_across;
     if (!options_.tolerance || options_.refine) {
       limits_.shape.longest = std::min(limits_.shape.longest, longest_edge * mean);
@@ -196,7 +195,7 @@ private:
     limits_.error = margin * tolerance;
     const bool keep_coarse = options_.refine || !like_target_;
     const TriangleMesh start = keep_coarse ? coarse_ : decimation_within(target_, tolerance);
-    FitSamples samples = samples_for(static_cast<double>(start.triangles.size()) / (keep_coarse ? 1 : 3));
+    FitSamples samples = samples_for(real(start.triangles.size()) / (keep_coarse ? 1 : 3));
     FitMesh mesh = started(start, samples);
     settle(mesh, samples, Lessened::mean);
     improve(mesh, samples);
@@ -226,13 +225,13 @@ private:
       collapse_edges(mesh, samples, limits_, 4, options_.progress);
       settle(mesh, samples, Lessened::largest);
       improve(mesh, samples);
-      if (static_cast<double>(mesh.alive) > worth_it * static_cast<double>(before)) {
+      if (real(mesh.alive) > worth_it * real(before)) {
         break;
       }
     }
     while (rounds_ > 0) {
       FitMesh other = mesh;
-      const auto shells = static_cast<std::size_t>(fewer_by * static_cast<double>(mesh.alive));
+      const auto shells = truncated<std::size_t>(fewer_by * real(mesh.alive));
       if (closest(other, samples, shells, limit) > limit || other.alive >= mesh.alive) {
         break;
       }
@@ -331,8 +330,8 @@ private:
       --rounds_;
       FitMesh other = mesh;
       limits_.error = error / 2;
-      const double many = share * static_cast<double>(shells);
-      split_worst(other, samples, limits_, std::max<std::size_t>(1, static_cast<std::size_t>(many)));
+      const double many = share * real(shells);
+      split_worst(other, samples, limits_, std::max<std::size_t>(1, truncated<std::size_t>(many)));
       const double now = reduce(other, samples, shells);
       const bool helped = other.alive <= shells && now < worth_it * error;
       fruitless = helped ? 0 : fruitless + 1;
@@ -347,10 +346,9 @@ private:
   }
 
   void to_count(std::size_t shells) {
-    const FitSamples samples = samples_for(static_cast<double>(shells));
-    FitMesh mesh = started(
-        like_target_ ? decimation(target_, static_cast<std::size_t>(surplus * static_cast<double>(shells))) : coarse_,
-        samples);
+    const FitSamples samples = samples_for(real(shells));
+    FitMesh mesh =
+        started(like_target_ ? decimation(target_, truncated<std::size_t>(surplus * real(shells))) : coarse_, samples);
     settle(mesh, samples, Lessened::mean);
     if (mesh.alive > shells) {
       closest(mesh, samples, shells, 0);
@@ -361,7 +359,7 @@ private:
   }
 
   void split_everywhere() {
-    const FitSamples samples = samples_for(static_cast<double>(coarse_.triangles.size()));
+    const FitSamples samples = samples_for(real(coarse_.triangles.size()));
     FitMesh mesh = started(coarse_, samples);
     limits_.error = settle(mesh, samples, Lessened::mean);
     improve(mesh, samples);

@@ -1,5 +1,6 @@
 #include "tunica/fit/detail/fit_mesh.hpp"
 
+#include "tunica/core/narrow.hpp"
 #include "tunica/surface/mesh/measure.hpp"
 
 #include <Eigen/Geometry>
@@ -51,14 +52,14 @@ FitMesh::FitMesh(const ShellMesh& shell) {
     std::array<Index, 3> slots{};
     for (std::size_t k = 0; k < 3; ++k) {
       const Index node = shell.triangles[t][k];
-      const Vec3& n = shell.normal(t, static_cast<int>(k));
+      const Vec3& n = shell.normal(t, k);
       auto& known = of_node[node];
       const auto same = std::find_if(known.begin(), known.end(), [&](Index s) { return normals[s] == n; });
       if (same != known.end()) {
         slots[k] = *same;
         continue;
       }
-      slots[k] = static_cast<Index>(normals.size());
+      slots[k] = narrow<Index>(normals.size());
       known.push_back(slots[k]);
       normals.push_back(n);
       node_of_slot.push_back(node);
@@ -141,11 +142,11 @@ double FitMesh::area() const {
 }
 
 double FitMesh::mean_edge() const {
-  return std::sqrt(4 / std::sqrt(3.0) * area() / static_cast<double>(std::max<std::size_t>(alive, 1)));
+  return std::sqrt(4 / std::sqrt(3.0) * area() / real(std::max<std::size_t>(alive, 1)));
 }
 
 Index FitMesh::add_patch(const std::array<Index, 3>& nodes, const std::array<Index, 3>& slots) {
-  Index t = static_cast<Index>(patches.size());
+  Index t = narrow<Index>(patches.size());
   if (places.empty()) {
     patches.emplace_back();
   } else {
@@ -180,7 +181,7 @@ void FitMesh::refresh(Index t) {
     const Index other = pair[0] == t ? pair[1] : pair[0];
     p.across[k] = {p.slots[k], p.slots[(k + 1) % 3]};
     if (other == no_index) {
-      p.boundary |= static_cast<EdgeBits>(1U << k);
+      p.boundary |= narrow<EdgeBits>(1U << k);
     } else {
       const FitPatch& q = patches[other];
       p.across[k] = {q.slots[q.corner_of(from)], q.slots[q.corner_of(to)]};
@@ -194,7 +195,7 @@ ShellMesh FitMesh::shell(std::vector<Index>* kept) const {
   std::vector<Index> number(positions.size(), no_index), first_slot(positions.size(), no_index);
   for (std::size_t node = 0; node < positions.size(); ++node) {
     if (!around[node].empty()) {
-      number[node] = static_cast<Index>(out.vertices.size());
+      number[node] = narrow<Index>(out.vertices.size());
       out.vertices.push_back(positions[node]);
     }
   }

@@ -2,6 +2,7 @@
 // unknowns per patch (three nodes, their normals, and across creases the neighbours' normals).
 #include "tunica/fit/detail/least_squares.hpp"
 
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/progress.hpp"
 #include "tunica/core/threads.hpp"
 #include "tunica/surface/mesh/measure.hpp"
@@ -61,7 +62,7 @@ Jacobian jacobian(const FitPiece& piece, const FitPatch& p, const Unknowns& of, 
   };
   const Eigen::Matrix<double, 30, 1> base = control(shape);
   const double step = difference * std::sqrt((shape.corners[1] - shape.corners[0]).squaredNorm() +
-                                       (shape.corners[2] - shape.corners[0]).squaredNorm());
+                                             (shape.corners[2] - shape.corners[0]).squaredNorm());
   Jacobian out(30, most_columns);
   Shape changed = shape;
   for (std::size_t k = 0; k < 3; ++k) {
@@ -95,7 +96,7 @@ Jacobian jacobian(const FitPiece& piece, const FitPatch& p, const Unknowns& of, 
       unknowns.push_back(of.slot[s] + axis);
     }
   }
-  out.conservativeResize(30, static_cast<Eigen::Index>(unknowns.size()));
+  out.conservativeResize(30, unknowns.size());
   return out;
 }
 
@@ -164,7 +165,7 @@ private:
     for (std::size_t s = 0; s < of_.slot.size(); ++s) {
       const Index v = piece_.node_of_slot[s];
       if (piece_.free[v] != 0 && nodes_[v].patches > 0) {
-        nodes_[v].slots.push_back(static_cast<Index>(s));
+        nodes_[v].slots.push_back(narrow<Index>(s));
         of_.slot[s] = of_.size;
         of_.size += 2;
       }
@@ -187,8 +188,8 @@ private:
   Equations equations(const FitPatch& p) const {
     Equations out;
     const Jacobian control = jacobian(piece_, p, of_, out.unknowns);
-    const auto n = static_cast<Eigen::Index>(out.unknowns.size());
-    const auto count = static_cast<Eigen::Index>(p.residuals.size());
+    const Eigen::Index n = out.unknowns.size();
+    const Eigen::Index count = p.residuals.size();
     Eigen::MatrixXd rows(n, count);
     Eigen::VectorXd weighted(count);
     Eigen::Matrix<double, 30, 1> reach;
@@ -265,11 +266,11 @@ private:
     std::vector<Eigen::Triplet<double>> entries;
     for (const Equations& e : equations_) {
       for (std::size_t a = 0; a < e.unknowns.size(); ++a) {
-        const auto i = static_cast<Eigen::Index>(a);
+        const Eigen::Index i = a;
         side[e.unknowns[a]] += e.side[i];
         diagonal[e.unknowns[a]] += e.matrix(i, i);
         for (std::size_t b = 0; b < e.unknowns.size(); ++b) {
-          entries.emplace_back(e.unknowns[a], e.unknowns[b], e.matrix(i, static_cast<Eigen::Index>(b)));
+          entries.emplace_back(e.unknowns[a], e.unknowns[b], e.matrix(i, b));
         }
       }
     }
@@ -330,7 +331,7 @@ private:
         if (!p.is_alive() || (moved[p.nodes[0]] | moved[p.nodes[1]] | moved[p.nodes[2]]) == 0) {
           continue;
         }
-        broken[t] = shape_shortfall(piece_, p, options_.shape) > shortfall_[t] ||
+        broken[t] = shape_shortfall(piece_, p, options_.shape) > shortfall_[t] + negligible_shortfall ||
                     piece_.facing(p).dot(facing_[t]) < options_.shape.agreement;
         if (broken[t] == 0) {
           samples_.measure(piece_, p, options_.search_beyond);

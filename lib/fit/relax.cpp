@@ -2,6 +2,7 @@
 
 #include "tunica/core/clock.hpp"
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/fit/detail/edits.hpp"
 #include "tunica/fit/detail/start.hpp"
 #include "tunica/fit/fit.hpp"
@@ -48,7 +49,7 @@ public:
     double level_best = infinity;
     result_.stopped = "the limit of iterations was reached";
     for (int i = 0; i < most; ++i) {
-      advance(options_.progress, static_cast<double>(i) / most);
+      advance(options_.progress, real(i) / most);
       const auto iterated = iterate();
       if (!iterated) {
         result_.stopped = "the facets fold where no normal suits them";

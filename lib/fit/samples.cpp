@@ -1,5 +1,6 @@
 #include "tunica/fit/detail/samples.hpp"
 
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/threads.hpp"
 #include "tunica/surface/distance/facet_distances.hpp"
 
@@ -12,7 +13,8 @@ namespace tunica {
 namespace {
 
 constexpr std::size_t points_per_shell = 16;  // of the target: a cubic has ten coefficients, seen from two sides
-constexpr int grid_level = 5;                 // pieces per edge of a patch, or of its boundary, between its points: 21 of them, likewise
+constexpr int grid_level =
+    5;  // pieces per edge of a patch, or of its boundary, between its points: 21 of them, likewise
 constexpr int search_level = 3;   // pieces per edge of the flat surface on which points of the target find their patch
 constexpr double other_wall = 4;  // times as far: beyond that a closest point that faces away is one around a rim
 constexpr double beside = 0.99;   // cosine of 8 degrees: farther off the normal a distance counts along itself
@@ -36,7 +38,7 @@ Residual residual_of_curve(const Vec2& at, const Vec3& away, const Vec3& facing)
 double foot_on_curve(const CubicCurve& curve, const Vec3& q) {
   double s = 0, least = infinity;
   for (int i = 0; i <= grid_level; ++i) {
-    const double there = static_cast<double>(i) / grid_level;
+    const double there = real(i) / grid_level;
     if (const double squared = (point_on(curve, there) - q).squaredNorm(); squared < least) {
       least = squared;
       s = there;
@@ -99,7 +101,7 @@ FitSamples::FitSamples(const Target& target, std::size_t shells, bool boundaries
   std::vector<std::uint8_t> used(mesh.vertices.size(), 0);
   const std::size_t wanted = points_per_shell * shells;
   // A boundary is a curve: it gets its share of a square of as many points.
-  const auto per_loop = 16 * static_cast<std::size_t>(std::sqrt(static_cast<double>(shells)) + 4);
+  const auto per_loop = 16 * truncated<std::size_t>(std::sqrt(real(shells)) + 4);
   for (const auto& loop : target.boundary_vertices()) {
     const std::size_t stride = std::max<std::size_t>(1, loop.size() / per_loop);
     for (std::size_t i = 0; i < loop.size(); i += stride) {
@@ -114,9 +116,9 @@ FitSamples::FitSamples(const Target& target, std::size_t shells, bool boundaries
   }
   // Every n-th triangle in the order of space: even over the surface.
   const auto& order = target.tree().spatial_order();
-  const double stride = std::max(1.0, static_cast<double>(order.size()) / static_cast<double>(wanted));
-  for (double i = stride / 2; i < static_cast<double>(order.size()); i += stride) {
-    for (const Index v : mesh.triangles[order[i]]) {
+  const double stride = std::max(1.0, real(order.size()) / real(wanted));
+  for (double i = stride / 2; i < real(order.size()); i += stride) {
+    for (const Index v : mesh.triangles[order[truncated<std::size_t>(i)]]) {
       if (used[v] == 0) {
         points_.push_back({mesh.vertices[v]});
         used[v] = 1;
@@ -126,7 +128,7 @@ FitSamples::FitSamples(const Target& target, std::size_t shells, bool boundaries
   }
   for (int i = 0; i <= grid_level; ++i) {
     for (int j = 0; i + j <= grid_level; ++j) {
-      grid_.emplace_back(static_cast<double>(j) / grid_level, static_cast<double>(i) / grid_level);
+      grid_.emplace_back(real(j) / grid_level, real(i) / grid_level);
     }
   }
 }
@@ -167,7 +169,7 @@ void FitSamples::attach(FitMesh& mesh) const {
     p.attached.clear();
   }
   for (std::size_t i = 0; i < found.size(); ++i) {
-    mesh.patches[found[i]].attached.push_back(static_cast<Index>(i));
+    mesh.patches[found[i]].attached.push_back(narrow<Index>(i));
   }
 }
 
@@ -185,10 +187,10 @@ void FitSamples::attach(FitPiece& piece) const {
         lane_points([&](std::size_t k) -> const Vec3& { return points_[group[std::min(k, count - 1)]].point; });
     NearestFacet nearest;
     for (std::size_t j = 0; j < facets.size(); ++j) {
-      nearest.try_facet(facets[j], at, static_cast<double>(j));
+      nearest.try_facet(facets[j], at, real(j));
     }
     for (std::size_t k = 0; k < count; ++k) {
-      piece.patches[nearest.which[k]].attached.push_back(group[k]);
+      piece.patches[truncated<std::size_t>(nearest.which[k])].attached.push_back(group[k]);
     }
     count = 0;
   };
@@ -317,7 +319,7 @@ void FitSamples::from_boundary(const CubicPatch& surface, const Vec3& facing, Fi
     }
     const CubicCurve curve = edge_curve(surface, k);
     for (int i = 0; i <= grid_level; ++i) {
-      const double s = static_cast<double>(i) / grid_level;
+      const double s = real(i) / grid_level;
       const Vec3 p = point_on(curve, s);
       patch.residuals.push_back(
           residual_of_curve(place_on_edge(k, s), p - target_.boundary_tree()->closest(p).point, facing));

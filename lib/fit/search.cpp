@@ -1,4 +1,5 @@
 // The search: edges collapse in the order of their errors, flip, are mended and split.
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/threads.hpp"
 #include "tunica/fit/detail/edits.hpp"
 #include "tunica/surface/mesh/measure.hpp"
@@ -126,7 +127,7 @@ void collapse_edges(FitMesh& mesh, const FitSamples& samples, const FitLimits& l
   CollapseQueue queue(mesh, samples, limits);
   const std::size_t before = mesh.alive;
   while (mesh.alive > shells && queue.collapse_next()) {
-    tunica::advance(progress, 1 - static_cast<double>(mesh.alive) / static_cast<double>(before));
+    tunica::advance(progress, 1 - real(mesh.alive) / real(before));
   }
 }
 
@@ -176,7 +177,7 @@ std::vector<Edit> mendings(const FitMesh& mesh, const FitSamples& samples, Index
       for (const Index w : ring) {
         sum += mesh.positions[w];
       }
-      const Vec3 centre = sum / static_cast<double>(ring.size());
+      const Vec3 centre = sum / real(ring.size());
       const Vec3 middle = samples.foot(centre, mesh.facing(p)).point;
       out.push_back(move(mesh, v, middle));
       out.push_back(move(mesh, v, (middle + mesh.positions[v]) / 2));

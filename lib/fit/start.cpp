@@ -1,6 +1,7 @@
 #include "tunica/fit/detail/start.hpp"
 
 #include "tunica/core/disjoint_sets.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/fit/detail/fit_mesh.hpp"
 #include "tunica/shell/distance/normals.hpp"
 #include "tunica/surface/decimation/decimate.hpp"
@@ -98,7 +99,7 @@ EdgeFlags sharp_edges(const TriangleMesh& mesh, const ClosestPoint& creases, con
       const double near = close_by * (b - a).norm();
       const auto is_near = [&](const Vec3& p) { return (creases.closest(p).point - p).norm() < near; };
       const auto& w = mesh.triangles[other];
-      const auto l = static_cast<std::size_t>(std::find(w.begin(), w.end(), v) - w.begin());
+      const std::size_t l = std::find(w.begin(), w.end(), v) - w.begin();
       sharp[t][k] = sharp[other][l] = is_near(a) && is_near(b) && is_near((a + b) / 2);
     }
   }
@@ -136,7 +137,7 @@ Vec3 mean_normal(const TriangleMesh& mesh, const std::vector<Vec3>& facets, Inde
   Vec3 sum = Vec3::Zero();
   for (const Index t : triangles) {
     const auto& v = mesh.triangles[t];
-    const auto c = static_cast<std::size_t>(std::find(v.begin(), v.end(), node) - v.begin());
+    const std::size_t c = std::find(v.begin(), v.end(), node) - v.begin();
     const Vec3 a = mesh.vertices[v[(c + 1) % 3]] - mesh.vertices[node];
     const Vec3 b = mesh.vertices[v[(c + 2) % 3]] - mesh.vertices[node];
     sum += std::atan2(a.cross(b).norm(), a.dot(b)) * facets[t];
@@ -152,7 +153,7 @@ void set_corner_normals(ShellMesh& shell, Index node, const std::vector<Index>& 
   }
   for (const Index t : triangles) {
     const auto& corners = shell.triangles[t];
-    const auto k = static_cast<std::size_t>(std::find(corners.begin(), corners.end(), node) - corners.begin());
+    const std::size_t k = std::find(corners.begin(), corners.end(), node) - corners.begin();
     shell.corner_normals[t][k] = normal;
   }
 }
@@ -165,7 +166,7 @@ bool same_topology(const TriangleMesh& mesh, const Target& target) {
   }
   const MeshFacts x = examine(mesh), y = examine(target.mesh());
   const auto agree = [&](std::size_t closed) {
-    return x.boundary_loops + closed == y.boundary_loops && x.euler == y.euler + static_cast<long>(closed);
+    return x.boundary_loops + closed == y.boundary_loops && x.euler == y.euler + narrow<long>(closed);
   };
   return x.components == y.components && (agree(0) || agree(target.point_loops()));
 }
@@ -180,11 +181,11 @@ TriangleMesh decimation(const Target& target, std::size_t triangles) {
 TriangleMesh decimation_within(const Target& target, double error) {
   TriangleMesh mesh = decimation(target, std::min(first_rung, target.mesh().triangles.size()));
   for (int rung = 0; rung < 2; ++rung) {
-    const double wanted = static_cast<double>(mesh.triangles.size()) * sampled_error(mesh, target) / error;
-    if (wanted >= static_cast<double>(target.mesh().triangles.size())) {
+    const double wanted = real(mesh.triangles.size()) * sampled_error(mesh, target) / error;
+    if (wanted >= real(target.mesh().triangles.size())) {
       return target.mesh();
     }
-    mesh = decimation(target, static_cast<std::size_t>(wanted));
+    mesh = decimation(target, truncated<std::size_t>(wanted));
   }
   return mesh;
 }
@@ -204,7 +205,7 @@ ShellMesh shells_on(const Target& target, const TriangleMesh& mesh, Patch patch)
   const auto across = neighbours(mesh, around);
   const EdgeFlags sharp = sharp_edges(mesh, *creases, facets, across);
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
-    const auto node = static_cast<Index>(v);
+    const auto node = narrow<Index>(v);
     const auto sides = sides_around(mesh, sharp, across, node, around.of(node));
     if (sides.size() > 1) {
       for (const auto& side : sides) {
@@ -221,7 +222,7 @@ ShellMesh creased_where_folded(ShellMesh shell) {
   std::vector<Index> folded;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     for (std::size_t k = 0; k < 3; ++k) {
-      if (shell.normal(t, static_cast<int>(k)).dot(facets[t]) < fit_agreement) {
+      if (shell.normal(t, k).dot(facets[t]) < fit_agreement) {
         folded.push_back(mesh.triangles[t][k]);
       }
     }

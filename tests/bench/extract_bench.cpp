@@ -2,7 +2,7 @@
 // so that tests/bench/extract_bench.py can run a peer in turn with it.
 //
 //   bench_extract VOLUME < requests       a request: label|above|below VALUE THREADS
-//   each answer: wall ms, processor ms of all threads and of the calling one, vertices, triangles
+//   each answer: wall ms, processor ms of all threads, triangles
 #include "tunica/core/threads.hpp"
 #include "tunica/io/volume/volume_file.hpp"
 #include "tunica/volume/cubes/marching_cubes.hpp"
@@ -18,9 +18,9 @@
 
 namespace {
 
-double processor_ms(clockid_t clock) {
+double processor_ms() {
   timespec now{};
-  clock_gettime(clock, &now);
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
   return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
 }
 
@@ -40,13 +40,11 @@ int main(int argc, char** argv) {
   std::size_t threads = 1;
   while (std::cin >> rule >> value >> threads) {
     set_thread_count(threads);
-    const double all = processor_ms(CLOCK_PROCESS_CPUTIME_ID);
-    const double calling = processor_ms(CLOCK_THREAD_CPUTIME_ID);
+    const double processor = processor_ms();
     const auto wall = std::chrono::steady_clock::now();
     const TriangleMesh mesh = marching_cubes(volume, {rules.at(rule), value});
     const std::chrono::duration<double, std::milli> elapsed = std::chrono::steady_clock::now() - wall;
-    fmt::print("{:.3f} {:.3f} {:.3f} {} {}\n", elapsed.count(), processor_ms(CLOCK_PROCESS_CPUTIME_ID) - all,
-               processor_ms(CLOCK_THREAD_CPUTIME_ID) - calling, mesh.vertices.size(), mesh.triangles.size());
+    fmt::print("{:.3f} {:.3f} {}\n", elapsed.count(), processor_ms() - processor, mesh.triangles.size());
     std::fflush(stdout);
   }
   return 0;

@@ -1,18 +1,16 @@
 """Extraction against VTK's (discrete) flying edges, in turn in one run: ratios of medians.
 
     cmake --build --preset release --target bench_extract
-    /usr/bin/python3 tests/bench/extract_bench.py build/release [ROUNDS]
+    /usr/bin/python3 tests/bench/extract_bench.py build/release [--rounds N] [--out docs/tables/extraction.md]
 
-On one thread the processor time is compared, which other programs on the machine disturb less than the wall time. The
-gain by a second thread is given twice: by the wall, for a machine that is idle, and by the processor time of the calling
-thread, which takes part in the work and waits for nothing but its end.
+On one thread the processor time is compared, which other programs on the machine disturb less than the wall time.
 
 Both start with the voxels in memory and end with an indexed mesh in memory. VTK's time is that of Update() on a new
 filter; its mesh has float coordinates and no closed ends, tunica's double ones. Debian's python3-vtk9 brings VTK."""
+import argparse
 import os
 import statistics
 import subprocess
-import sys
 import tempfile
 import time
 
@@ -46,8 +44,8 @@ class Tunica:
     def run(self, rule, value, threads):
         self.child.stdin.write(f"{rule} {value} {threads}\n")
         self.child.stdin.flush()
-        wall, cpu, calling, _, triangles = self.child.stdout.readline().split()
-        return float(wall), float(cpu), int(triangles), float(calling)
+        wall, cpu, triangles = self.child.stdout.readline().split()
+        return float(wall), float(cpu), int(triangles)
 
     def close(self):
         self.child.stdin.close()
@@ -75,42 +73,60 @@ def run_vtk(image, rule, value, threads):
     return 1e3 * wall, 1e3 * cpu, peer.GetOutput().GetNumberOfPolys()
 
 
+CASES = (("ball in 128³, label", "sphere", 128, "label", 1), ("ball in 256³, label", "sphere", 256, "label", 1),
+         ("ball in 512³, label", "sphere", 512, "label", 1), ("vessel in 256³, label", "vessel", 256, "label", 1),
+         ("ball in 256³, 16-bit values", "sphere", 256, "above", 1000.5),
+         ("ball in 512³, 16-bit values", "sphere", 512, "above", 1000.5),
+         ("ball in 256³, float", "sphere", 256, "above", 0.25), ("ball in 512³, float", "sphere", 512, "above", 0.25))
+INTRODUCTION = """From voxels in memory to an indexed mesh in memory, in turn in one run, medians. VTK: flying edges for values,
+discrete flying edges for labels. One thread: processor time. Two threads: ratio of wall times, and what the second one gains.
+
+| volume | triangles | tunica, ms | VTK, ms | VTK / tunica | the same with two threads | gain by the second: tunica | VTK |
+|---|---|---|---|---|---|---|---|"""
+
+
+def voxels(kind, n, rule, value):
+    values = distance(n, kind)
+    if rule == "label":
+        return (values > 0).astype(numpy.uint8)
+    return (1000 + 20 * numpy.clip(values, -40, 40)).astype(numpy.int16) if value == 1000.5 else values
+
+
+def row(build, name, kind, n, rule, value, rounds):
+    values = voxels(kind, n, rule, value)
+    with tempfile.TemporaryDirectory() as folder:
+        path = os.path.join(folder, "volume.nii")
+        nibabel.save(nibabel.Nifti1Image(values.transpose(2, 1, 0), numpy.eye(4)), path)
+        tunica = Tunica(build, path)
+        tunica.run(rule, value, 1)  # reads the volume
+    image = vtk_image(values)
+    medians = {}
+    for threads in (1, 2):
+        ours, theirs = [], []
+        for _ in range(rounds):
+            ours.append(tunica.run(rule, value, threads))
+            theirs.append(run_vtk(image, rule, value, threads))
+        medians[threads] = [[statistics.median(run[column] for run in runs) for column in range(3)]
+                            for runs in (ours, theirs)]
+    tunica.close()
+    (one, peer), (two, peer_two) = medians[1], medians[2]
+    return (f"| {name} | {one[2]:,} | {one[1]:.1f} | {peer[1]:.1f} | {peer[1] / one[1]:.1f} | {peer_two[0] / two[0]:.1f} "
+            f"| {one[0] / two[0]:.2f} | {peer[0] / peer_two[0]:.2f} |")
+
+
 def main():
-    build = sys.argv[1]
-    rounds = int(sys.argv[2]) if len(sys.argv) > 2 else 7
-    print(f"{'case':<20}{'triangles':>10}{'tunica ms':>11}{'VTK ms':>9}{'VTK / tunica':>14}"
-          f"{'2 threads: VTK / tunica':>25}{'gain by wall':>14}{'by thread':>11}")
-    for name, kind, n, rule, value in (("sphere 128 labels", "sphere", 128, "label", 1),
-                                       ("sphere 256 labels", "sphere", 256, "label", 1),
-                                       ("sphere 512 labels", "sphere", 512, "label", 1),
-                                       ("vessel 256 labels", "vessel", 256, "label", 1),
-                                       ("sphere 256 grey", "sphere", 256, "above", 1000.5),
-                                       ("sphere 512 grey", "sphere", 512, "above", 1000.5),
-                                       ("sphere 256 float", "sphere", 256, "above", 0.25),
-                                       ("sphere 512 float", "sphere", 512, "above", 0.25)):
-        values = distance(n, kind)
-        if rule == "label":
-            values = (values > 0).astype(numpy.uint8)
-        elif value == 1000.5:
-            values = (1000 + 20 * numpy.clip(values, -40, 40)).astype(numpy.int16)
-        with tempfile.TemporaryDirectory() as folder:
-            path = os.path.join(folder, "volume.nii")
-            nibabel.save(nibabel.Nifti1Image(values.transpose(2, 1, 0), numpy.eye(4)), path)
-            tunica = Tunica(build, path)
-            tunica.run(rule, value, 1)  # reads the volume
-        image = vtk_image(values)
-        medians = {}
-        for threads in (1, 2):
-            ours, theirs = [], []
-            for _ in range(rounds):
-                ours.append(tunica.run(rule, value, threads))
-                theirs.append(run_vtk(image, rule, value, threads))
-            medians[threads] = [[statistics.median(run[column] for run in runs) for column in range(len(runs[0]))]
-                                for runs in (ours, theirs)]
-        (one, peer), (two, peer_two) = medians[1], medians[2]
-        print(f"{name:<20}{one[2]:>10}{one[1]:>11.1f}{peer[1]:>9.1f}{peer[1] / one[1]:>14.1f}"
-              f"{peer_two[0] / two[0]:>25.1f}{one[0] / two[0]:>14.2f}{one[1] / two[3]:>11.2f}", flush=True)
-        tunica.close()
+    parser = argparse.ArgumentParser()
+    parser.add_argument("build")
+    parser.add_argument("--rounds", type=int, default=7)
+    parser.add_argument("--out")
+    options = parser.parse_args()
+    lines = [INTRODUCTION]
+    for case in CASES:
+        lines.append(row(options.build, *case, options.rounds))
+        print(lines[-1], flush=True)
+    if options.out:
+        with open(options.out, "w", encoding="utf-8") as file:
+            file.write("\n".join(lines) + "\n")
 
 
 if __name__ == "__main__":

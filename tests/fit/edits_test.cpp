@@ -78,12 +78,12 @@ TEST(LeastSquares, OnlyWhatIsFreeMoves) {
   }
 }
 
-TEST(LeastSquares, HigherPowersLessenTheLargestErrorFurther) {
+TEST(LeastSquares, WhereTheLargestCountTheLargestErrorGetsSmaller) {
   Ball mean(1), largest(1);
   for (int i = 0; i < 6; ++i) {
     SquaresOptions options;
     least_squares_step(mean.mesh, mean.samples, options);
-    options.power = 8;
+    options.largest = true;
     least_squares_step(largest.mesh, largest.samples, options);
     mean.refresh();
     largest.refresh();

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "tunica/core/narrow.hpp"
 #include "tunica/surface/mesh/triangle_mesh.hpp"
 
 #include <limits>
@@ -34,7 +35,7 @@ struct Raster {
   std::vector<unsigned char> inner;  ///< 1 where the back of a triangle is seen
 
   [[nodiscard]] std::size_t at(int x, int y) const {
-    return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
+    return narrow<std::size_t>(y) * narrow<std::size_t>(width) + narrow<std::size_t>(x);
   }
 };
 

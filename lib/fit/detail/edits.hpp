@@ -10,8 +10,8 @@ namespace tunica {
 /// What shells must keep while they are edited.
 struct FitLimits {
   FacetLimits shape;
-  double error = 0;     ///< mm, of a patch
-  double may_miss = 0;  ///< by which the shapes' shortfall may grow
+  double error = 0;                        ///< mm, of a patch
+  double may_miss = negligible_shortfall;  ///< by which the shapes' shortfall may grow
 };
 
 /// Some patches in place of others, and at most one node that looks for its place. Nodes and slots are the mesh's; new

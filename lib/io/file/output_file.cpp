@@ -1,6 +1,7 @@
 #include "tunica/io/file/output_file.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 
 #include <fmt/format.h>
 #include <openssl/evp.h>
@@ -240,7 +241,7 @@ std::string read_file(const fs::path& path, std::size_t limit) {
   if (error || size > limit) {
     throw InputError(fmt::format("{}: is too large ({} bytes, at most {})", path.string(), size, limit));
   }
-  std::string bytes(static_cast<std::size_t>(size), '\0');
+  std::string bytes(narrow<std::size_t>(size), '\0');
   const std::size_t got = std::fread(bytes.data(), 1, bytes.size(), file.get());
   if (got != bytes.size() || std::ferror(file.get()) != 0) {
     throw InputError(fmt::format("{}: cannot be read to its end: {}", path.string(), reason()));

@@ -60,7 +60,7 @@ void follow_list(const Json& list, std::string_view rest, Search& search) {
   const std::string_view head = rest.substr(0, dot);
   const std::string_view tail = rest.substr(std::min(dot + 1, rest.size()));
   if (const auto number = whole_number(head)) {
-    const auto size = static_cast<long>(list.size());
+    const long size = list.size();
     const long index = *number < 0 ? size + *number : *number;
     if (index >= 0 && index < size) {
       follow(list[index], tail, search);
@@ -140,7 +140,7 @@ struct ProbeHistory {
     if (next == times.end()) {
       return displacements.back();
     }
-    const auto i = static_cast<std::size_t>(next - times.begin());
+    const std::size_t i = next - times.begin();
     const double part = (time - times[i - 1]) / (times[i] - times[i - 1]);
     return displacements[i - 1] + part * (displacements[i] - displacements[i - 1]);
   }

@@ -20,7 +20,7 @@ public:
   /// Goes to the next line that holds anything; @return false at the end of the text.
   bool next_line() {
     while (next_ != end_) {
-      const auto* found = static_cast<const char*>(std::memchr(next_, '\n', static_cast<std::size_t>(end_ - next_)));
+      const auto* found = static_cast<const char*>(std::memchr(next_, '\n', end_ - next_));
       cursor_ = next_;
       line_end_ = found != nullptr ? found : end_;
       next_ = found != nullptr ? found + 1 : end_;
@@ -37,7 +37,7 @@ public:
   [[nodiscard]] std::size_t line() const { return line_; }
 
   /// Bytes after the current line.
-  [[nodiscard]] std::size_t remaining() const { return static_cast<std::size_t>(end_ - next_); }
+  [[nodiscard]] std::size_t remaining() const { return end_ - next_; }
 
   [[nodiscard]] bool at_line_end() { return !skip_blanks(); }
 
@@ -50,7 +50,7 @@ public:
     while (cursor_ != line_end_ && !is_blank(*cursor_)) {
       ++cursor_;
     }
-    return {begin, static_cast<std::size_t>(cursor_ - begin)};
+    return {begin, cursor_};
   }
 
   /// The next token as a number, which may be infinite or not a number; none when it is not written as one.
@@ -62,7 +62,7 @@ public:
   /// What is left of the line.
   [[nodiscard]] std::string_view rest() {
     skip_blanks();
-    return {cursor_, static_cast<std::size_t>(line_end_ - cursor_)};
+    return {cursor_, line_end_};
   }
 
 private:

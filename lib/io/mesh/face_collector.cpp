@@ -75,7 +75,7 @@ void cut_ears(std::span<const Index> corners, std::span<const Vec2> points,
     }
     const std::size_t n = loop.size();
     triangles.push_back({corners[loop[(tip + n - 1) % n]], corners[loop[tip]], corners[loop[(tip + 1) % n]]});
-    loop.erase(loop.begin() + static_cast<std::ptrdiff_t>(tip));
+    loop.erase(loop.begin() + tip);
   }
   for (std::size_t i = 1; i + 1 < loop.size(); ++i) {
     triangles.push_back({corners[loop[0]], corners[loop[i]], corners[loop[i + 1]]});
@@ -163,7 +163,7 @@ void FaceCollector::finish(MeshFile& file) {
   if (result.empty()) {
     result = std::move(triangles_);
   } else {
-    result.insert(result.end(), triangles_.begin() + static_cast<std::ptrdiff_t>(done), triangles_.end());
+    result.insert(result.end(), triangles_.begin() + done, triangles_.end());
   }
   if (faces_are_apart_ && file.normals.empty() && file.vertex_properties.empty()) {
     weld_exactly(file.mesh);

@@ -6,6 +6,7 @@
 // Source: Khronos, glTF 2.0 specification.
 #include "tunica/core/error.hpp"
 #include "tunica/core/json.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/io/mesh/detail/mesh_formats.hpp"
 
 #include <assimp/postprocess.h>
@@ -38,7 +39,7 @@ std::uint32_t word_at(std::string_view bytes, std::size_t at) {
 }
 
 void append_word(std::string& bytes, std::size_t value) {
-  const auto word = static_cast<std::uint32_t>(value);
+  const auto word = narrow<std::uint32_t>(value);
   std::array<char, sizeof word> raw;
   std::memcpy(raw.data(), &word, sizeof word);
   bytes.append(raw.data(), raw.size());
@@ -249,7 +250,7 @@ private:
     for (const auto& [key, length] : {std::pair{"matrix", 16}, {"translation", 3}, {"rotation", 4}, {"scale", 3}}) {
       const auto found = node.find(key);
       if (found != node.end()) {
-        copy[key] = checked_numbers(*found, key, static_cast<std::size_t>(length));
+        copy[key] = checked_numbers(*found, key, narrow<std::size_t>(length));
       }
     }
     if (node.contains("mesh")) {
@@ -440,7 +441,7 @@ void append_mesh(const aiMesh& mesh, const Eigen::Matrix4d& placement, TriangleM
         throw InputError(fmt::format("{}: face {} names vertex {}, but there are only {}", name, f,
                                      face.mIndices[corner], mesh.mNumVertices));
       }
-      triangle[corner] = static_cast<Index>(first + face.mIndices[corner]);
+      triangle[corner] = narrow<Index>(first + face.mIndices[corner]);
     }
     if (mirrored) {
       std::swap(triangle[1], triangle[2]);

@@ -1,5 +1,6 @@
 // Wavefront OBJ: vertices and faces; everything else (texture, normals, groups, materials, lines) is passed over.
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/progress.hpp"
 #include "tunica/io/file/text_scanner.hpp"
 #include "tunica/io/mesh/detail/mesh_formats.hpp"
@@ -66,12 +67,11 @@ private:
       if (error != std::errc() || stop != corner.data() + corner.size() || number == 0) {
         fail("a corner of a face is no index of a vertex, counted from 1");
       }
-      const std::int64_t index =
-          number > 0 ? number - 1 : static_cast<std::int64_t>(file_.mesh.vertices.size()) + number;
-      if (index < 0 || index > static_cast<std::int64_t>(max_index)) {
+      const std::int64_t index = number > 0 ? number - 1 : narrow<std::int64_t>(file_.mesh.vertices.size()) + number;
+      if (index < 0 || index > narrow<std::int64_t>(max_index)) {
         fail(fmt::format("{} is no index of a vertex", number));
       }
-      corners_.push_back(static_cast<Index>(index));
+      corners_.push_back(narrow<Index>(index));
     }
     faces_.add(corners_);
   }

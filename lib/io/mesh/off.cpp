@@ -1,5 +1,6 @@
 // Geomview OFF, ASCII, with or without normals, colours and texture coordinates, which are passed over.
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/progress.hpp"
 #include "tunica/io/file/text_scanner.hpp"
 #include "tunica/io/mesh/detail/mesh_formats.hpp"
@@ -95,16 +96,15 @@ private:
     if (!vertices || !faces || *vertices < 0 || *faces < 0) {
       fail("the numbers of vertices and faces are expected");
     }
-    const double needed =
-        static_cast<double>(*vertices) * least_vertex_bytes + static_cast<double>(*faces) * least_face_bytes;
-    const double left = static_cast<double>(scanner_.remaining()) + 1;  // the last line may lack its end
+    const double needed = real(*vertices) * least_vertex_bytes + real(*faces) * least_face_bytes;
+    const double left = real(scanner_.remaining()) + 1;  // the last line may lack its end
     if (needed > left) {
       throw InputError(
           fmt::format("{}: is truncated: {} vertices and {} faces are promised, at least {:.0f} bytes are "
                       "missing",
                       name_, *vertices, *faces, needed - left));
     }
-    return {static_cast<std::size_t>(*vertices), static_cast<std::size_t>(*faces)};
+    return {narrow<std::size_t>(*vertices), narrow<std::size_t>(*faces)};
   }
 
   void read_face(std::vector<Index>& corners) {
@@ -115,10 +115,10 @@ private:
     corners.clear();
     for (std::int64_t c = 0; c < *count; ++c) {
       const auto index = scanner_.integer();
-      if (!index || *index < 0 || *index > static_cast<std::int64_t>(max_index)) {
+      if (!index || *index < 0 || *index > narrow<std::int64_t>(max_index)) {
         fail("a corner of a face is no index of a vertex, counted from 0");
       }
-      corners.push_back(static_cast<Index>(*index));
+      corners.push_back(narrow<Index>(*index));
     }
   }
 

@@ -1,6 +1,7 @@
 #include "tunica/io/mesh/detail/ply_header.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/io/file/text_scanner.hpp"
 
 #include <fmt/format.h>
@@ -114,7 +115,7 @@ private:
     if (element.name.empty() || !count || *count < 0 || !words.at_line_end()) {
       fail("an element needs a name and a count");
     }
-    element.count = static_cast<std::size_t>(*count);
+    element.count = narrow<std::size_t>(*count);
     if (header_.find(element.name) != nullptr) {
       fail(fmt::format("element {} is declared twice", element.name));
     }

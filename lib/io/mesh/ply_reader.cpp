@@ -2,6 +2,7 @@
 // no count is believed before the bytes that are left could hold it.
 // Format: G. Turk, "The PLY polygon file format", 1994.
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/progress.hpp"
 #include "tunica/io/file/text_scanner.hpp"
 #include "tunica/io/mesh/detail/mesh_formats.hpp"
@@ -101,12 +102,13 @@ public:
     require(size_of(property.count_type));
     const double count = decode<swap>(at_, property.count_type);
     at_ += size_of(property.count_type);
-    if (count < 0) {
+    if (!(count >= 0 && count <= real(max_index))) {
       throw InputError(fmt::format("{}: {} {}: the list {} has the length {}", name_, element_->name, record_ - 1,
                                    property.name, count));
     }
-    require(static_cast<std::size_t>(count) * size_of(property.type));
-    return static_cast<std::size_t>(count);
+    const auto size = truncated<std::size_t>(count);
+    require(size * size_of(property.type));
+    return size;
   }
 
   double entry(const Property& property) {
@@ -131,7 +133,7 @@ public:
 
 private:
   void require(std::size_t size) const {
-    const auto left = static_cast<std::size_t>(end_ - at_);
+    const std::size_t left = end_ - at_;
     if (size <= left) {
       return;
     }
@@ -196,7 +198,7 @@ public:
       if (!value || !fits(property.type, *value)) {
         fail(fmt::format("{}: a whole number of the type declared is expected", property.name));
       }
-      return static_cast<double>(*value);
+      return real(*value);
     }
     const auto value = scanner_.number();
     if (!value) {
@@ -210,7 +212,7 @@ public:
     if (!count || *count < 0 || !fits(property.count_type, *count)) {
       fail(fmt::format("{}: the length of a list is expected", property.name));
     }
-    return static_cast<std::size_t>(*count);
+    return narrow<std::size_t>(*count);
   }
 
   double entry(const Property& property) { return scalar(property); }
@@ -301,10 +303,10 @@ void read_corners(Body& body, const Property& property, const std::string& name,
   corners.resize(count);
   for (Index& corner : corners) {
     const double value = body.entry(property);
-    if (value < 0 || value > static_cast<double>(max_index)) {
+    if (!(value >= 0 && value <= real(max_index))) {
       throw InputError(fmt::format("{}: {}: {:.0f} is no index of a vertex", name, body.place(), value));
     }
-    corner = static_cast<Index>(value);
+    corner = truncated<Index>(value);
   }
 }
 
@@ -386,11 +388,11 @@ void require_bytes(std::string_view bytes, const Header& header, const std::stri
   const std::size_t left = bytes.size() - header.bytes + (ascii ? 1 : 0);  // the last line may lack its end
   double needed = 0;
   for (const Element& element : header.elements) {
-    needed += static_cast<double>(element.count) * static_cast<double>(element.least_bytes(ascii));
+    needed += real(element.count) * real(element.least_bytes(ascii));
   }
-  if (needed > static_cast<double>(left)) {
+  if (needed > real(left)) {
     throw InputError(fmt::format("{}: is truncated: {} bytes follow the header, at least {:.0f} bytes are missing",
-                                 name, bytes.size() - header.bytes, needed - static_cast<double>(left)));
+                                 name, bytes.size() - header.bytes, needed - real(left)));
   }
 }
 

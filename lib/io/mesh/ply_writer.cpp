@@ -1,4 +1,5 @@
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/io/file/output_file.hpp"
 #include "tunica/io/mesh/mesh_file.hpp"
 
@@ -139,7 +140,7 @@ void write(const std::filesystem::path& path, const Content& content, const PlyO
   for (std::size_t t = 0; t < content.triangles.size(); ++t) {
     writer.number(std::uint8_t{3});
     for (const Index corner : content.triangles[t]) {
-      writer.number(static_cast<std::int32_t>(corner));
+      writer.number(narrow<std::int32_t>(corner));
     }
     if (content.corner_normals != nullptr) {
       writer.number(std::uint8_t{9});

@@ -1,5 +1,6 @@
 // STL, binary and ASCII. A binary file may begin with "solid" too, so its length decides: 84 bytes and 50 per triangle.
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/progress.hpp"
 #include "tunica/io/file/text_scanner.hpp"
 #include "tunica/io/mesh/detail/mesh_formats.hpp"
@@ -44,7 +45,7 @@ MeshFile read_binary(std::string_view bytes, const std::string& name) {
   for (std::size_t t = 0; t < count; ++t) {
     std::array<float, 12> values;  // a normal, which the corners' order gives as well, and three corners
     std::memcpy(values.data(), bytes.data() + header_bytes + t * triangle_bytes, sizeof values);
-    const auto first = static_cast<Index>(3 * t);
+    const auto first = narrow<Index>(3 * t);
     for (std::size_t corner = 1; corner <= 3; ++corner) {
       file.mesh.vertices.emplace_back(values[3 * corner], values[3 * corner + 1], values[3 * corner + 2]);
     }
@@ -111,7 +112,7 @@ private:
     if (mesh.triangles.size() >= max_index / 3) {
       fail("more triangles than are understood");
     }
-    const auto first = static_cast<Index>(mesh.vertices.size());
+    const auto first = narrow<Index>(mesh.vertices.size());
     expect_line("outer", "loop");
     for (int corner = 0; corner < 3; ++corner) {
       expect_line("vertex");

@@ -1,3 +1,4 @@
+#include "tunica/core/narrow.hpp"
 #include "tunica/io/mesh/detail/mesh_formats.hpp"
 
 #include <bit>
@@ -37,7 +38,7 @@ void weld_exactly(TriangleMesh& mesh) {
       slot = (slot + 1) & (slots - 1);
     }
     if (table[slot] == none) {
-      table[slot] = static_cast<Index>(v);
+      table[slot] = narrow<Index>(v);
     }
     first_equal[v] = table[slot];
   }
@@ -52,7 +53,7 @@ void weld_exactly(TriangleMesh& mesh) {
   std::vector<Vec3> kept;
   for (std::size_t v = 0; v < vertices.size(); ++v) {
     if (renumbered[v] != none) {
-      renumbered[v] = static_cast<Index>(kept.size());
+      renumbered[v] = narrow<Index>(kept.size());
       kept.push_back(vertices[v]);
     }
   }

@@ -1,6 +1,7 @@
 #include "tunica/io/result/detail/hdf5_file.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 
 #include <fmt/format.h>
 #include <hdf5.h>
@@ -94,7 +95,7 @@ Handle Writer::group(Id parent, const std::string& name) const {
 void Writer::attribute(Id object, const char* name, Id type, const std::vector<Size>& shape, const void* values) const {
   const Handle space = shape.empty()
                            ? own(H5Screate(H5S_SCALAR), "written")
-                           : own(H5Screate_simple(static_cast<int>(shape.size()), shape.data(), nullptr), "written");
+                           : own(H5Screate_simple(narrow<int>(shape.size()), shape.data(), nullptr), "written");
   const Handle attribute = own(H5Acreate2(object, name, type, space.get(), H5P_DEFAULT, H5P_DEFAULT), "written");
   check(H5Awrite(attribute.get(), type, values), "written");
 }
@@ -117,13 +118,13 @@ Handle Writer::dataset(Id parent, const std::string& name, Id type, const std::v
   errno = 0;
   const Handle space = shape.empty()
                            ? own(H5Screate(H5S_SCALAR), "written")
-                           : own(H5Screate_simple(static_cast<int>(shape.size()), shape.data(), nullptr), "written");
+                           : own(H5Screate_simple(narrow<int>(shape.size()), shape.data(), nullptr), "written");
   const Handle creation = own(H5Pcreate(H5P_DATASET_CREATE), "written");
   if (!rewritten && !shape.empty() && count_of(shape) >= 1024) {
     const Size row_bytes = H5Tget_size(type) * count_of({shape.begin() + 1, shape.end()});
     std::vector<Size> chunk = shape;
     chunk[0] = std::clamp<Size>(most_chunk_bytes / row_bytes, 1, shape[0]);
-    check(H5Pset_chunk(creation.get(), static_cast<int>(chunk.size()), chunk.data()), "written");
+    check(H5Pset_chunk(creation.get(), narrow<int>(chunk.size()), chunk.data()), "written");
     check(H5Pset_shuffle(creation.get()), "written");
     check(H5Pset_deflate(creation.get(), gzip_level), "written");
   } else {
@@ -191,7 +192,7 @@ Series::Series(const Writer& writer, Id parent, const std::string& name, Id type
       chunk[axis] = std::max<Size>(1, most_chunk_bytes / rest);
     }
   }
-  const int rank = static_cast<int>(shape_.size());
+  const int rank = narrow<int>(shape_.size());
   const Handle space = writer.own(H5Screate_simple(rank, shape_.data(), most.data()), "written");
   const Handle creation = writer.own(H5Pcreate(H5P_DATASET_CREATE), "written");
   writer.check(H5Pset_chunk(creation.get(), rank, chunk.data()), "written");
@@ -214,7 +215,7 @@ void Series::append(const Writer& writer, Size rows, const void* values) {
   const Handle target = writer.own(H5Dget_space(dataset_.get()), "written");
   writer.check(H5Sselect_hyperslab(target.get(), H5S_SELECT_SET, start.data(), nullptr, count.data(), nullptr),
                "written");
-  const Handle source = writer.own(H5Screate_simple(static_cast<int>(count.size()), count.data(), nullptr), "written");
+  const Handle source = writer.own(H5Screate_simple(narrow<int>(count.size()), count.data(), nullptr), "written");
   writer.check(H5Dwrite(dataset_.get(), type_, source.get(), target.get(), H5P_DEFAULT, values), "written");
 }
 

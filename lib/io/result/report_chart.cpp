@@ -1,6 +1,7 @@
 #include "tunica/io/result/report_chart.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -308,7 +309,7 @@ ReportChart chart_of_reports(const std::vector<Report>& reports, const ReportCha
   made.marks = rows.size();
   const auto front = pareto_front(chart);
   for (const auto& flags : front) {
-    made.on_front += static_cast<std::size_t>(std::ranges::count(flags, true));
+    made.on_front += narrow<std::size_t>(std::ranges::count(flags, true));
   }
   std::vector<std::pair<double, double>> on_front;
   for (std::size_t s = 0; s < front.size(); ++s) {

@@ -1,6 +1,7 @@
 #include "tunica/io/result/result_file.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/version.hpp"
 #include "tunica/io/file/output_file.hpp"
 #include "tunica/io/result/detail/hdf5_file.hpp"
@@ -71,7 +72,7 @@ public:
       writer.rewrite(only_, H5T_NATIVE_FLOAT, values.data());
       return;
     }
-    const auto offset = static_cast<std::int64_t>(values_->rows());
+    const std::int64_t offset = values_->rows();
     values_->append(writer, rows_, values.data());
     offsets_->append(writer, 1, &offset);
   }
@@ -218,11 +219,11 @@ struct ResultFile::Implementation {
     const std::vector<std::int64_t> connectivity(grid.connectivity().begin(), grid.connectivity().end());
     std::vector<std::int64_t> offsets(grid.cells() + 1);
     for (std::size_t i = 0; i < offsets.size(); ++i) {
-      offsets[i] = static_cast<std::int64_t>(3 * i);
+      offsets[i] = narrow<std::int64_t>(3 * i);
     }
     const std::vector<unsigned char> types(grid.cells(), vtk_triangle);
     const auto count = [&](const char* name, std::size_t value) {
-      const auto number = static_cast<std::int64_t>(value);
+      const std::int64_t number = value;
       (void)writer.dataset(vtk.get(), name, H5T_NATIVE_INT64, {1}, &number);
     };
     count("NumberOfPoints", grid.points());
@@ -278,9 +279,9 @@ struct ResultFile::Implementation {
     for (std::size_t b = 0; b < model.shells.size(); ++b) {
       for (const auto& triangle : model.shells[b].mesh.triangles) {
         for (const Index node : triangle) {
-          nodes.push_back(static_cast<std::int64_t>(model.first_node(b) + node));
+          nodes.push_back(narrow<std::int64_t>(model.first_node(b) + node));
         }
-        bodies.push_back(static_cast<std::int32_t>(b));
+        bodies.push_back(narrow<std::int32_t>(b));
       }
     }
     (void)writer.dataset(group, "nodes", H5T_NATIVE_INT64, {grid.elements(), 3}, nodes.data());
@@ -375,8 +376,8 @@ struct ResultFile::Implementation {
     for (std::size_t i = 0; i < numbers.size(); ++i) {
       numbers[i].append(writer, 1, &history[i]);
     }
-    const std::array<std::int64_t, 2> iterations{static_cast<std::int64_t>(state.newton_iterations),
-                                                 static_cast<std::int64_t>(state.cg_iterations)};
+    const std::array<std::int64_t, 2> iterations{narrow<std::int64_t>(state.newton_iterations),
+                                                 narrow<std::int64_t>(state.cg_iterations)};
     for (std::size_t i = 0; i < counts.size(); ++i) {
       counts[i].append(writer, 1, &iterations[i]);
     }
@@ -387,7 +388,7 @@ struct ResultFile::Implementation {
     writer.flush();
     if (series) {
       // Last, so that what NSteps counts is there.
-      const auto count = static_cast<std::int64_t>(values.rows());
+      const std::int64_t count = values.rows();
       writer.check(H5Awrite(step_count.get(), H5T_NATIVE_INT64, &count), "written");
       writer.flush();
     }

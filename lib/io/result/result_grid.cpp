@@ -1,6 +1,7 @@
 #include "tunica/io/result/detail/result_grid.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/mechanics/runs/curved_displacement.hpp"
 
 #include <algorithm>
@@ -56,7 +57,7 @@ Value between(const std::array<Index, 3>& corners, const Vec2& b, const Value* o
 
 int drawing_level(std::size_t shells) {
   int level = finest_level;
-  while (level > 1 && shells * static_cast<std::size_t>(level * level) > most_fine_triangles) {
+  while (level > 1 && shells * narrow<std::size_t>(level * level) > most_fine_triangles) {
     --level;
   }
   return level;
@@ -74,8 +75,8 @@ ResultGrid::Body ResultGrid::make_body(const ShellMesh& mesh, int level) {
   for (std::size_t v = 0; v < body.surface.mesh.vertices.size(); ++v) {
     const Vec2& b = body.surface.barycentric[v];
     const auto& corners = mesh.triangles[body.surface.vertex_shell[v]];
-    const auto second = static_cast<int>(std::lround(level * b.x()));
-    const auto third = static_cast<int>(std::lround(level * b.y()));
+    const auto second = narrow<int>(std::lround(level * b.x()));
+    const auto third = narrow<int>(std::lround(level * b.y()));
     std::vector<std::pair<Index, int>> weights;
     for (const auto& [node, weight] :
          {std::pair{corners[0], level - second - third}, std::pair{corners[1], second}, std::pair{corners[2], third}}) {
@@ -83,7 +84,7 @@ ResultGrid::Body ResultGrid::make_body(const ShellMesh& mesh, int level) {
         weights.emplace_back(node, weight);
       }
     }
-    auto point = static_cast<Index>(shared.size());  // a new one, where no other shares it
+    auto point = narrow<Index>(shared.size());  // a new one, where no other shares it
     if (weights.size() == 1) {
       point = weights[0].first;
     } else if (weights.size() == 2) {
@@ -156,10 +157,10 @@ ResultGrid::ResultGrid(const Model& model, int level) : model_(model) {
         thicknesses);
     for (const auto& triangle : surface.mesh.triangles) {
       for (const Index v : triangle) {
-        connectivity_.push_back(static_cast<std::int32_t>(first + body.point[v]));
+        connectivity_.push_back(narrow<std::int32_t>(first + body.point[v]));
       }
     }
-    body_of_cell_.insert(body_of_cell_.end(), surface.mesh.triangles.size(), static_cast<std::int32_t>(b));
+    body_of_cell_.insert(body_of_cell_.end(), surface.mesh.triangles.size(), narrow<std::int32_t>(b));
     for (const Index element : surface.shell) {
       element_of_cell_.push_back(first_element + element);
     }
@@ -190,8 +191,8 @@ std::vector<std::vector<float>> ResultGrid::values(const State& state, const Ele
     Floats& of_cells = values.emplace_back();
     of_cells.reserve(components * cells());
     for (const std::size_t element : element_of_cell_) {
-      const auto first = of_elements.begin() + static_cast<std::ptrdiff_t>(components * element);
-      of_cells.insert(of_cells.end(), first, first + static_cast<std::ptrdiff_t>(components));
+      const auto first = of_elements.begin() + components * element;
+      of_cells.insert(of_cells.end(), first, first + components);
     }
   }
   TUNICA_ASSERT(values.size() == state_fields.size());

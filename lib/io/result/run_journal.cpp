@@ -2,6 +2,7 @@
 
 #include "tunica/core/clock.hpp"
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/version.hpp"
 #include "tunica/io/file/output_file.hpp"
 
@@ -48,7 +49,7 @@ private:
   void raw(const void* data, std::size_t size) { bytes_.append(static_cast<const char*>(data), size); }
   template <typename T>
   void list(const T* data, std::size_t count) {
-    (*this)(static_cast<std::uint64_t>(count));
+    (*this)(narrow<std::uint64_t>(count));
     raw(data, count * sizeof(T));
   }
   void put(const std::vector<double>& values) { list(values.data(), values.size()); }
@@ -70,7 +71,7 @@ private:
   void put(const std::map<std::string, std::vector<double>, std::less<>>& named) { each(named); }
   template <typename Items>
   void each(const Items& items) {
-    (*this)(static_cast<std::uint64_t>(items.size()));
+    (*this)(narrow<std::uint64_t>(items.size()));
     for (const auto& item : items) {
       (*this)(item);
     }
@@ -115,7 +116,7 @@ private:
     if (number > bytes_.size() / item_bytes) {
       throw Damaged();
     }
-    return static_cast<std::size_t>(number);
+    return narrow<std::size_t>(number);
   }
   template <typename List>
   void list(List& values) {
@@ -189,13 +190,13 @@ void checkpoint_members(Archive& archive, AnyCheckpoint& checkpoint) {
 }
 
 std::uint32_t checksum(std::string_view bytes) {
-  return static_cast<std::uint32_t>(::crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
+  return narrow<std::uint32_t>(::crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
 }
 
 // Length, checksum, bytes.
 std::string record_of(const std::string& bytes) {
   Packer head;
-  head(static_cast<std::uint64_t>(bytes.size()));
+  head(narrow<std::uint64_t>(bytes.size()));
   head(checksum(bytes));
   return head.bytes() + bytes;
 }
@@ -277,8 +278,8 @@ struct RunJournal::Implementation {
       if (written < 0) {
         throw OutputError(fmt::format("{}: cannot be written: {}", states_path.string(), std::strerror(errno)));
       }
-      bytes.remove_prefix(static_cast<std::size_t>(written));
-      size += static_cast<std::uint64_t>(written);
+      bytes.remove_prefix(narrow<std::size_t>(written));
+      size += narrow<std::uint64_t>(written);
     }
   }
 
@@ -297,7 +298,7 @@ struct RunJournal::Implementation {
     if (length > largest_record || length > file_size - size) {
       throw Damaged();
     }
-    std::string bytes(static_cast<std::size_t>(length), '\0');
+    std::string bytes(narrow<std::size_t>(length), '\0');
     if (read(bytes) != bytes.size() || checksum(bytes) != expected) {
       throw Damaged();
     }
@@ -314,7 +315,7 @@ struct RunJournal::Implementation {
       if (more <= 0) {
         break;
       }
-      got += static_cast<std::size_t>(more);
+      got += narrow<std::size_t>(more);
     }
     size += got;
     return got;
@@ -393,7 +394,7 @@ struct RunJournal::Implementation {
   }
 
   void go_to(std::uint64_t place) {
-    if (::lseek(descriptor, static_cast<off_t>(place), SEEK_SET) < 0) {
+    if (::lseek(descriptor, narrow<off_t>(place), SEEK_SET) < 0) {
       throw InputError(fmt::format("{}: cannot be read: {}", states_path.string(), std::strerror(errno)));
     }
     size = place;
@@ -523,7 +524,7 @@ std::optional<Checkpoint> RunJournal::replay(std::size_t nodes, const std::funct
   if (journal.size != end || (journal.checkpoint && journal.states != journal.kept_states)) {
     journal.fail(journal.states_path);
   }
-  if (::ftruncate(journal.descriptor, static_cast<off_t>(end)) != 0) {
+  if (::ftruncate(journal.descriptor, narrow<off_t>(end)) != 0) {
     throw OutputError(fmt::format("{}: cannot be written: {}", journal.states_path.string(), std::strerror(errno)));
   }
   return journal.checkpoint;

@@ -1,6 +1,7 @@
 #include "tunica/io/result/detail/vtu_file.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/io/file/output_file.hpp"
 #include "tunica/io/result/detail/result_grid.hpp"
 
@@ -25,10 +26,9 @@ std::string base64(std::string_view bytes) {
   for (std::size_t start = 0; start < bytes.size(); start += piece) {
     const std::string_view part = bytes.substr(start, piece);
     std::string encoded(4 * ((part.size() + 2) / 3) + 1, '\0');
-    const int length =
-        EVP_EncodeBlock(reinterpret_cast<unsigned char*>(encoded.data()),
-                        reinterpret_cast<const unsigned char*>(part.data()), static_cast<int>(part.size()));
-    text += encoded.substr(0, static_cast<std::size_t>(length));
+    const int length = EVP_EncodeBlock(reinterpret_cast<unsigned char*>(encoded.data()),
+                                       reinterpret_cast<const unsigned char*>(part.data()), narrow<int>(part.size()));
+    text += encoded.substr(0, narrow<std::size_t>(length));
   }
   return text;
 }
@@ -107,7 +107,7 @@ void write_vtu(const std::filesystem::path& path, const VtuTriangles& grid, bool
   const std::size_t cells = grid.connectivity.size() / 3;
   std::vector<std::int32_t> offsets(cells);
   for (std::size_t i = 0; i < cells; ++i) {
-    offsets[i] = static_cast<std::int32_t>(3 * (i + 1));
+    offsets[i] = narrow<std::int32_t>(3 * (i + 1));
   }
   const std::vector<std::uint8_t> types(cells, vtk_triangle);
   Document document;

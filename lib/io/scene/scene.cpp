@@ -1,5 +1,6 @@
 #include "tunica/io/scene/scene.hpp"
 
+#include "tunica/core/narrow.hpp"
 #include "tunica/io/mesh/mesh_file.hpp"
 #include "tunica/surface/mesh/incidence.hpp"
 #include "tunica/surface/mesh/measure.hpp"
@@ -160,7 +161,7 @@ struct Body {
     std::vector<Index> nodes;
     for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
       if (used[v] != 0 && inside(mesh.vertices[v])) {
-        nodes.push_back(static_cast<Index>(v));
+        nodes.push_back(narrow<Index>(v));
       }
     }
     return nodes;
@@ -222,7 +223,7 @@ std::vector<Index> select(const Body& body, const NearestNode& nearest, const Pl
       return (body.mesh.vertices[node] - nearest.point).squaredNorm();
     };
     if (body.used[v] != 0 && (!best || squared_distance(v) < squared_distance(*best))) {
-      best = static_cast<Index>(v);
+      best = narrow<Index>(v);
     }
   }
   return best ? std::vector<Index>{*best} : std::vector<Index>{};
@@ -405,7 +406,7 @@ const Place& Places::of(std::string_view key) const {
 std::vector<double> equal_load_factors(std::size_t steps) {
   std::vector<double> factors;
   for (std::size_t i = 1; i <= steps; ++i) {
-    factors.push_back(static_cast<double>(i) / static_cast<double>(steps));
+    factors.push_back(real(i) / real(steps));
   }
   return factors;
 }
@@ -437,7 +438,7 @@ void settle_until(Scene& scene) {
     scene.run_places.of("until").fail(
         fmt::format("there is no [[probe]] \"{}\": add it, or name another", scene.until_probe));
   }
-  path->until->probe = static_cast<std::size_t>(found - scene.probes.begin());
+  path->until->probe = narrow<std::size_t>(found - scene.probes.begin());
 }
 
 void check_scene(const Scene& scene) {

@@ -1,5 +1,6 @@
 #include "tunica/io/scene/scene_file.hpp"
 
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/quantity.hpp"
 #include "tunica/io/file/output_file.hpp"
 #include "tunica/io/file/suggestion.hpp"
@@ -97,7 +98,7 @@ public:
     if (!value || *value < 1 || *value > most) {
       place(key).fail(fmt::format("{} must be a whole number from 1 to {}", key, most));
     }
-    return static_cast<std::size_t>(*value);
+    return narrow<std::size_t>(*value);
   }
 
   [[nodiscard]] const toml::array& array(std::string_view key, std::string_view like) const {
@@ -245,10 +246,10 @@ Selection read_where(const Table& item) {
     ListedNodes list;
     for (const toml::node& node : where.array(form, "[3, 4]")) {
       const auto index = node.value_exact<std::int64_t>();
-      if (!index || *index < 0 || *index > static_cast<std::int64_t>(max_index)) {
+      if (!index || *index < 0 || *index > narrow<std::int64_t>(max_index)) {
         where.at(node.source()).fail("nodes must be whole numbers from 0, in the order of the mesh file");
       }
-      list.nodes.push_back(static_cast<Index>(*index));
+      list.nodes.push_back(narrow<Index>(*index));
     }
     return list;
   }
@@ -290,7 +291,7 @@ std::array<bool, 3> read_components(const Table& item, std::string_view key) {
   const std::string text = item.text_of(item.required(key, R"( ("xyz" holds all axes, "" none))"), key);
   std::array<bool, 3> held{false, false, false};
   for (const char c : text) {
-    const std::size_t axis = static_cast<std::size_t>(c - 'x');
+    const std::size_t axis = narrow<std::size_t>(c - 'x');
     if (c < 'x' || c > 'z' || held[axis]) {
       item.place(key).fail(
           fmt::format("{} = \"{}\" must name each held axis once: \"xyz\", \"z\", or \"\" for none", key, text));
@@ -342,7 +343,7 @@ void read_arc_length(const Table& run, Scene& scene) {
     run.place("load_factors").fail("arc length finds the load factors: remove load_factors");
   }
   if (run.has("load_steps")) {
-    settings.first_factor = 1 / static_cast<double>(run.count("load_steps", most_load_steps));
+    settings.first_factor = 1 / real(run.count("load_steps", most_load_steps));
   }
   if (run.has("max_steps")) {
     settings.max_steps = run.count("max_steps", most_load_steps);

@@ -150,9 +150,9 @@ void write_path(const ArcLengthRun& run, const std::string& probe, Text& text) {
     text.line("max_factor", number(*run.max_factor));
   }
   if (run.until) {
-    text.line("until", fmt::format("{{probe = {}, axis = \"{}\", reaches = {}}}", toml_string(probe),
-                                   "xyz"[static_cast<std::size_t>(run.until->axis)],
-                                   toml_string(quantity(run.until->reaches, "m", dimension::length))));
+    text.line("until",
+              fmt::format("{{probe = {}, axis = \"{}\", reaches = {}}}", toml_string(probe), "xyz"[run.until->axis],
+                          toml_string(quantity(run.until->reaches, "m", dimension::length))));
   }
 }
 
@@ -231,8 +231,7 @@ std::string text_of(const BoundaryNodes&) { return "boundary = true"; }
 std::string text_of(const RigidMotions&) { return "rigid_motions = true"; }
 std::string text_of(const BoxNodes& box) { return fmt::format("box = [{}, {}]", point(box.lower), point(box.upper)); }
 std::string text_of(const HalfSpaceNodes& half) {
-  return fmt::format("{} = {{axis = \"{}\", at = {}}}", half.below ? "below" : "above",
-                     "xyz"[static_cast<std::size_t>(half.axis)],
+  return fmt::format("{} = {{axis = \"{}\", at = {}}}", half.below ? "below" : "above", "xyz"[half.axis],
                      toml_string(quantity(half.at, "m", dimension::length)));
 }
 std::string text_of(const SphereNodes& sphere) {

@@ -1,6 +1,7 @@
 // PNG (RFC 2083) by libpng 1.6
 
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/progress.hpp"
 #include "tunica/io/volume/detail/slice_file.hpp"
 
@@ -112,7 +113,7 @@ private:
       throw InputError(fmt::format("{}: has a transparent grey value: save it without", path_.string()));
     }
     const SliceHeader header{width, height, bits == 8 ? VoxelType::uint8 : VoxelType::uint16};
-    if (static_cast<double>(header.row_bytes()) * height > expansion * static_cast<double>(size_)) {
+    if (real(header.row_bytes()) * height > expansion * real(size_)) {
       throw InputError(
           fmt::format("{}: has {} x {} pixels, more than its bytes can hold: it is truncated; get it again",
                       path_.string(), width, height));

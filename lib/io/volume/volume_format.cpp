@@ -1,6 +1,7 @@
 #include "tunica/io/volume/detail/volume_format.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/progress.hpp"
 #include "tunica/core/quantity.hpp"
 
@@ -428,7 +429,7 @@ ByteStream::ByteStream(const fs::path& path, std::uint64_t offset, Coding coding
                     "whole file again",
                     path.string(), offset, offset - size));
   }
-  if (::fseeko(file_.get(), static_cast<off_t>(offset), SEEK_SET) != 0) {
+  if (::fseeko(file_.get(), narrow<off_t>(offset), SEEK_SET) != 0) {
     throw InputError(fmt::format("{}: cannot be read: {}", path.string(), std::strerror(errno)));
   }
   most_bytes_ = size - offset;
@@ -460,7 +461,7 @@ std::size_t ByteStream::read_deflated(void* to, std::size_t size) {
   std::size_t got = 0;
   while (got < size && !inflater_->ended) {
     if (stream.avail_in == 0) {
-      stream.avail_in = static_cast<uInt>(read_plain(inflater_->buffer.data(), inflater_->buffer.size()));
+      stream.avail_in = narrow<uInt>(read_plain(inflater_->buffer.data(), inflater_->buffer.size()));
       stream.next_in = inflater_->buffer.data();
       if (stream.avail_in == 0) {
         inflater_->ended = true;
@@ -468,7 +469,7 @@ std::size_t ByteStream::read_deflated(void* to, std::size_t size) {
         break;
       }
     }
-    const auto now = static_cast<uInt>(std::min<std::size_t>(size - got, std::size_t{1} << 30));
+    const auto now = narrow<uInt>(std::min<std::size_t>(size - got, std::size_t{1} << 30));
     stream.next_out = out + got;
     stream.avail_out = now;
     const int code = inflate(&stream, Z_NO_FLUSH);
@@ -490,7 +491,7 @@ std::size_t ByteStream::read_deflated(void* to, std::size_t size) {
 std::uint64_t ByteStream::skip(std::uint64_t size) {
   if (!inflater_) {
     const std::uint64_t now = std::min(size, most_bytes_ - std::min(most_bytes_, position_));
-    if (::fseeko(file_.get(), static_cast<off_t>(now), SEEK_CUR) != 0) {
+    if (::fseeko(file_.get(), narrow<off_t>(now), SEEK_CUR) != 0) {
       throw InputError(fmt::format("{}: cannot be read: {}", path_.string(), std::strerror(errno)));
     }
     position_ += now;
@@ -531,7 +532,7 @@ Volume::Data make_voxels(VoxelType type, std::size_t count) {
 }
 
 std::size_t SlabSink::slices(const std::array<std::size_t, 3>& dims, VoxelType type) const {
-  const std::uint64_t slice = static_cast<std::uint64_t>(dims[0]) * dims[1] * size_of(type);
+  const std::uint64_t slice = narrow<std::uint64_t>(dims[0]) * dims[1] * size_of(type);
   return std::clamp<std::uint64_t>(std::min<std::uint64_t>(size.bytes / slice, size.slices.value_or(dims[2])), 1,
                                    dims[2]);
 }

@@ -140,10 +140,9 @@ void set_geometry(VolumeFile& file, const fs::path& path, const Header& header, 
   Eigen::Matrix<double, 3, 4> affine;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     for (std::size_t row = 0; row < 3; ++row) {
-      affine(static_cast<Eigen::Index>(row), static_cast<Eigen::Index>(axis)) =
-          matrix[axis * dimensions + row] * spacing[axis];
+      affine(row, axis) = matrix[axis * dimensions + row] * spacing[axis];
     }
-    affine(static_cast<Eigen::Index>(axis), 3) = offset[axis];
+    affine(axis, 3) = offset[axis];
   }
   const std::string unit = lower_case(find(header, {"DistanceUnits"}));
   if (unit == "um" || unit == "cm" || unit == "m") {

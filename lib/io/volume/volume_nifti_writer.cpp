@@ -1,4 +1,5 @@
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/progress.hpp"
 #include "tunica/io/file/output_file.hpp"
 #include "tunica/io/volume/volume_file.hpp"
@@ -52,7 +53,7 @@ void put_qform(std::string& header, const Affine& ras, const Vec3& spacing) {
   put(header, 260, static_cast<float>(q.y()));
   put(header, 264, static_cast<float>(q.z()));
   for (std::size_t row = 0; row < 3; ++row) {
-    put(header, 268 + 4 * row, static_cast<float>(ras(static_cast<Eigen::Index>(row), 3)));
+    put(header, 268 + 4 * row, static_cast<float>(ras(row, 3)));
   }
 }
 
@@ -65,13 +66,13 @@ std::string header_of(const fs::path& path, const Volume& volume, std::size_t by
       throw InputError(fmt::format("{}: a volume of {} x {} x {} voxels does not fit NIfTI-1, whose sizes end at 32767",
                                    path.string(), volume.dims[0], volume.dims[1], volume.dims[2]));
     }
-    put(header, 42 + 2 * axis, static_cast<std::int16_t>(volume.dims[axis]));
+    put(header, 42 + 2 * axis, narrow<std::int16_t>(volume.dims[axis]));
   }
   for (std::size_t axis = 3; axis < 7; ++axis) {
     put<std::int16_t>(header, 42 + 2 * axis, 1);
   }
   put(header, 70, datatypes.at(volume.data.index()));
-  put(header, 72, static_cast<std::int16_t>(8 * bytes_per_voxel));
+  put(header, 72, narrow<std::int16_t>(8 * bytes_per_voxel));
   Affine ras = volume.affine;
   ras.topRows<2>() = -ras.topRows<2>();
   const Vec3 spacing = ras.leftCols<3>().colwise().norm();
@@ -86,8 +87,7 @@ std::string header_of(const fs::path& path, const Volume& volume, std::size_t by
   put<std::int16_t>(header, 254, 1);
   for (std::size_t row = 0; row < 3; ++row) {
     for (std::size_t column = 0; column < 4; ++column) {
-      put(header, 280 + 16 * row + 4 * column,
-          static_cast<float>(ras(static_cast<Eigen::Index>(row), static_cast<Eigen::Index>(column))));
+      put(header, 280 + 16 * row + 4 * column, static_cast<float>(ras(row, column)));
     }
   }
   put_qform(header, ras, spacing);
@@ -136,10 +136,10 @@ private:
     }
     std::string in(bytes);  // zlib's pointer to its input is not const
     stream_.next_in = reinterpret_cast<Bytef*>(in.data());
-    stream_.avail_in = static_cast<uInt>(in.size());
+    stream_.avail_in = narrow<uInt>(in.size());
     do {
       stream_.next_out = buffer_.data();
-      stream_.avail_out = static_cast<uInt>(buffer_.size());
+      stream_.avail_out = narrow<uInt>(buffer_.size());
       deflate(&stream_, flush);
       const std::size_t made = buffer_.size() - stream_.avail_out;
       require(std::fwrite(buffer_.data(), 1, made, file_.get()) == made);

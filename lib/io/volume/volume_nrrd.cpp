@@ -2,6 +2,7 @@
 // Segments in .seg.nrrd: https://slicer.readthedocs.io/en/latest/developer_guide/modules/segmentations.html
 
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/quantity.hpp"
 #include "tunica/io/volume/detail/volume_format.hpp"
 
@@ -328,7 +329,7 @@ void set_roles(const fs::path& path, std::vector<AxisInfo>& axes, bool has_direc
   }
   // Without directions an axis of unknown kind after three of space is a time axis.
   for (AxisInfo& axis : axes) {
-    const std::size_t before = static_cast<std::size_t>(&axis - axes.data());
+    const std::size_t before = narrow<std::size_t>(&axis - axes.data());
     if (!has_directions && space > 3 && axis.role == Role::space && before >= 3) {
       axis.role = Role::frame;
       --space;

@@ -65,7 +65,7 @@ void warn_of_gaps(const fs::path& folder, const std::vector<fs::path>& slices, s
   }
   const auto largest = std::max_element(steps.begin(), steps.end());
   if (largest != steps.end() && *largest > *std::min_element(steps.begin(), steps.end())) {
-    const auto before = static_cast<std::size_t>(largest - steps.begin());
+    const std::size_t before = largest - steps.begin();
     warnings.push_back(fmt::format("{}: a slice seems to be missing between {} and {}", folder.string(),
                                    slices[before].filename().string(), slices[before + 1].filename().string()));
   }

@@ -7,7 +7,7 @@
 namespace tunica {
 
 AlgebraicError error_of_iterate(const std::vector<double>& terms, std::size_t iterate) {
-  const auto middle = terms.begin() + static_cast<std::ptrdiff_t>(iterate);
+  const auto middle = terms.begin() + iterate;
   const double after = std::accumulate(middle, terms.end(), 0.0);
   return {std::sqrt(after), std::sqrt(std::accumulate(terms.begin(), middle, 0.0) + after), false};
 }
@@ -18,7 +18,7 @@ bool estimate_is_settled(const std::vector<double>& terms, std::size_t iterate) 
   if (terms.size() < iterate + 2) {
     return false;
   }
-  const double sum = std::accumulate(terms.begin() + static_cast<std::ptrdiff_t>(iterate), terms.end() - 1, 0.0);
+  const double sum = std::accumulate(terms.begin() + iterate, terms.end() - 1, 0.0);
   if (!(sum > 0)) {
     return true;  // nothing is left of the error
   }

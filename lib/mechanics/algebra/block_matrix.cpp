@@ -1,6 +1,7 @@
 #include "tunica/mechanics/algebra/block_matrix.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/threads.hpp"
 
 #include <algorithm>
@@ -9,11 +10,11 @@
 namespace tunica {
 
 std::size_t BlockMatrix::find(Index row, Index wanted) const {
-  const auto begin = column.begin() + static_cast<std::ptrdiff_t>(row_start[row]);
-  const auto end = column.begin() + static_cast<std::ptrdiff_t>(row_start[row + 1]);
+  const auto begin = column.begin() + row_start[row];
+  const auto end = column.begin() + row_start[row + 1];
   const auto place = std::lower_bound(begin, end, wanted);
   TUNICA_ASSERT(place != end && *place == wanted);
-  return static_cast<std::size_t>(place - column.begin());
+  return place - column.begin();
 }
 
 BlockMatrix make_block_matrix(std::size_t nodes, const std::vector<std::array<Index, 3>>& triangles) {
@@ -21,7 +22,7 @@ BlockMatrix make_block_matrix(std::size_t nodes, const std::vector<std::array<In
   pairs.reserve(nodes + 6 * triangles.size());
   const auto pair = [](Index row, Index column) { return (std::uint64_t{row} << 32) | column; };
   for (std::size_t i = 0; i < nodes; ++i) {
-    pairs.push_back(pair(static_cast<Index>(i), static_cast<Index>(i)));
+    pairs.push_back(pair(narrow<Index>(i), narrow<Index>(i)));
   }
   for (const auto& t : triangles) {
     for (const Index i : t) {
@@ -40,7 +41,7 @@ BlockMatrix make_block_matrix(std::size_t nodes, const std::vector<std::array<In
   matrix.column.reserve(pairs.size());
   for (const std::uint64_t p : pairs) {
     ++matrix.row_start[(p >> 32) + 1];
-    matrix.column.push_back(static_cast<Index>(p));
+    matrix.column.push_back(narrow<Index>(p));
   }
   for (std::size_t i = 0; i < nodes; ++i) {
     matrix.row_start[i + 1] += matrix.row_start[i];
@@ -48,7 +49,7 @@ BlockMatrix make_block_matrix(std::size_t nodes, const std::vector<std::array<In
   matrix.transposed.resize(pairs.size());
   for (std::size_t i = 0; i < nodes; ++i) {
     for (std::size_t k = matrix.row_start[i]; k < matrix.row_start[i + 1]; ++k) {
-      matrix.transposed[k] = matrix.find(matrix.column[k], static_cast<Index>(i));
+      matrix.transposed[k] = matrix.find(matrix.column[k], narrow<Index>(i));
     }
   }
   matrix.values.assign(36 * pairs.size(), 0);

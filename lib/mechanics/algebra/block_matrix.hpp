@@ -15,7 +15,7 @@ using VectorX = Eigen::VectorXd;
 constexpr std::size_t freedom(std::size_t node, std::size_t component) { return 6 * node + component; }
 
 /// Where the six of a node begin in a vector; of #nodes, its size.
-constexpr Eigen::Index first_freedom(std::size_t node) { return static_cast<Eigen::Index>(freedom(node, 0)); }
+constexpr Eigen::Index first_freedom(std::size_t node) { return freedom(node, 0); }
 
 /// A square sparse matrix of 6x6 blocks (one row of blocks per node), with a symmetric pattern, rows in order.
 /// A block is stored by columns.

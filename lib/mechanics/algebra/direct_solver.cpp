@@ -2,6 +2,7 @@
 
 #include "tunica/core/error.hpp"
 #include "tunica/core/fresh_memory.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/progress.hpp"
 #include "tunica/core/threads.hpp"
 
@@ -113,10 +114,10 @@ struct Elimination {
     const auto* const order = static_cast<const int*>(symbolic.Perm);
     for (std::size_t k = 0; k < nodes.size(); ++k) {
       node[k] = nodes[order[k]];
-      place[node[k]] = static_cast<std::int32_t>(k);
+      place[node[k]] = narrow<std::int32_t>(k);
     }
     for (std::size_t s = 0; s < symbolic.nsuper; ++s) {
-      std::fill(front_of.begin() + super[s], front_of.begin() + super[s + 1], static_cast<std::int32_t>(s));
+      std::fill(front_of.begin() + super[s], front_of.begin() + super[s + 1], narrow<std::int32_t>(s));
     }
   }
 
@@ -130,7 +131,7 @@ struct Elimination {
     std::int32_t row = 0;
     for (int r = row_starts[s]; r < row_starts[s + 1]; ++r) {
       row_in_front[rows[r]] = row;
-      row += size_of(static_cast<std::size_t>(rows[r]));
+      row += size_of(narrow<std::size_t>(rows[r]));
     }
     return row;
   }
@@ -183,12 +184,12 @@ void DirectSolver::Implementation::analyse(const BlockMatrix& pattern, const Fre
   for (std::size_t i = 0; i < pattern.node_count(); ++i) {
     for (std::size_t c = 0; c < 6; ++c) {
       if (free[6 * i + c]) {
-        components[i].push_back(static_cast<int>(c));
+        components[i].push_back(narrow<int>(c));
       }
     }
     if (!components[i].empty()) {
-      number[i] = static_cast<int>(nodes.size());
-      nodes.push_back(static_cast<Index>(i));
+      number[i] = narrow<int>(nodes.size());
+      nodes.push_back(narrow<Index>(i));
     }
   }
   if (nodes.empty()) {
@@ -213,7 +214,7 @@ void DirectSolver::Implementation::analyse(const BlockMatrix& pattern, const Fre
         rows.push_back(number[pattern.column[k]]);
       }
     }
-    starts.push_back(static_cast<int>(rows.size()));
+    starts.push_back(narrow<int>(rows.size()));
   }
   cholmod_sparse* graph =
       cholmod_allocate_sparse(nodes.size(), nodes.size(), rows.size(), 1, 1, 1, CHOLMOD_PATTERN, &common);
@@ -243,7 +244,7 @@ void DirectSolver::Implementation::make_fronts(const cholmod_factor& symbolic, c
     for (const int c : components[order.node[k]]) {
       freedoms.push_back(first_freedom(order.node[k]) + c);
     }
-    order.first_row[k + 1] = static_cast<std::int32_t>(freedoms.size());
+    order.first_row[k + 1] = narrow<std::int32_t>(freedoms.size());
   }
   fronts.resize(symbolic.nsuper);
   children.resize(symbolic.nsuper);
@@ -251,7 +252,7 @@ void DirectSolver::Implementation::make_fronts(const cholmod_factor& symbolic, c
   for (std::size_t s = 0; s < fronts.size(); ++s) {
     fronts[s].panel = storage;
     make_front(s, order, pattern);
-    storage += static_cast<std::size_t>(fronts[s].rows * fronts[s].columns);
+    storage += narrow<std::size_t>(fronts[s].rows * fronts[s].columns);
   }
   for (std::size_t s = 0; s < fronts.size(); ++s) {
     order.number_rows(s);
@@ -261,7 +262,7 @@ void DirectSolver::Implementation::make_fronts(const cholmod_factor& symbolic, c
   }
   factor.reset(new double[storage]);
   map_now(factor.get(), storage);
-  signs = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(freedoms.size()));
+  signs = Eigen::VectorXd::Ones(freedoms.size());
   negative.resize(fronts.size());
 }
 
@@ -269,12 +270,12 @@ void DirectSolver::Implementation::make_fronts(const cholmod_factor& symbolic, c
 void DirectSolver::Implementation::make_front(std::size_t s, Elimination& order, const BlockMatrix& pattern) {
   Front& f = fronts[s];
   f.rows = order.number_rows(s);
-  f.first = static_cast<std::size_t>(order.first_row[order.super[s]]);
-  f.columns = order.first_row[order.super[s + 1]] - static_cast<std::int32_t>(f.first);
+  f.first = narrow<std::size_t>(order.first_row[order.super[s]]);
+  f.columns = order.first_row[order.super[s + 1]] - narrow<std::int32_t>(f.first);
   f.below = below.size();
   const int first_below = order.first_below(s);
   for (int r = first_below; r < order.row_starts[s + 1]; ++r) {
-    const auto k = static_cast<std::size_t>(order.rows[r]);
+    const std::size_t k = order.rows[r];
     for (std::int32_t d = order.first_row[k]; d < order.first_row[k + 1]; ++d) {
       below.push_back(d);
     }
@@ -290,17 +291,17 @@ void DirectSolver::Implementation::make_front(std::size_t s, Elimination& order,
     for (std::size_t b = pattern.row_start[j]; b < pattern.row_start[j + 1]; ++b) {
       const std::int32_t other = order.place[pattern.column[b]];
       if (other >= k) {
-        entries.push_back({static_cast<std::uint32_t>(pattern.transposed[b]), static_cast<std::uint32_t>(b),
+        entries.push_back({narrow<std::uint32_t>(pattern.transposed[b]), narrow<std::uint32_t>(b),
                            order.row_in_front[other], order.row_in_front[k], pattern.column[b], j});
       }
     }
   }
   f.entries[1] = entries.size();
-  const auto n = static_cast<double>(f.columns);
-  const auto m = static_cast<double>(f.left());
+  const auto n = real(f.columns);
+  const auto m = real(f.left());
   f.work = n * n * n / 6 + n * n * m / 2 + n * m * m / 2;
   factor_work += f.work;
-  solve_work += 2 * static_cast<double>(f.rows * f.columns);
+  solve_work += 2 * real(f.rows * f.columns);
 }
 
 /// Where the rows that a front leaves lie in its parent, whose rows are numbered.
@@ -309,7 +310,7 @@ void DirectSolver::Implementation::find_runs(std::size_t s, const Elimination& o
   child.runs[0] = runs.size();
   std::int32_t row = 0;
   for (int r = order.first_below(s); r < order.row_starts[s + 1]; ++r) {
-    const auto k = static_cast<std::size_t>(order.rows[r]);
+    const std::size_t k = order.rows[r];
     if (runs.size() > child.runs[0] && runs.back().parent + runs.back().length == order.row_in_front[k]) {
       runs.back().length += order.size_of(k);
     } else {
@@ -355,7 +356,7 @@ void DirectSolver::Implementation::make_arenas() {
     for (const std::size_t s : arenas[a].fronts) {
       Front& f = fronts[s];
       f.arena = a;
-      const auto size = static_cast<std::size_t>(f.left() * f.left());
+      const std::size_t size = f.left() * f.left();
       f.update = top;
       arenas[a].size = std::max(arenas[a].size, top + size);
       // Children in this arena are the last on its stack.
@@ -413,8 +414,7 @@ int DirectSolver::Implementation::eliminate(std::size_t index, const BlockMatrix
     const std::vector<int>& c = components[entry.column_node];
     for (std::size_t j = 0; j < c.size(); ++j) {
       for (std::size_t i = 0; i < r.size(); ++i) {
-        l(entry.row + static_cast<Eigen::Index>(i), entry.column + static_cast<Eigen::Index>(j)) =
-            0.5 * (block(r[i], c[j]) + transposed(c[j], r[i]));
+        l(entry.row + i, entry.column + j) = 0.5 * (block(r[i], c[j]) + transposed(c[j], r[i]));
       }
     }
   }
@@ -422,7 +422,7 @@ int DirectSolver::Implementation::eliminate(std::size_t index, const BlockMatrix
 
   auto own = l.topRows(n);
   auto other = l.bottomRows(m);
-  auto sign = signs.segment(static_cast<Eigen::Index>(f.first), n);
+  auto sign = signs.segment(f.first, n);
   sign.setOnes();
   int negative_pivots = 0;
   const MatrixXd kept = own;
@@ -438,9 +438,8 @@ int DirectSolver::Implementation::eliminate(std::size_t index, const BlockMatrix
   }
   const auto in_rows = [&](const auto& work) {
     if (in_slices) {
-      parallel_for_blocks(static_cast<std::size_t>(m), slice, [&](std::size_t begin, std::size_t end) {
-        work(static_cast<Eigen::Index>(begin), static_cast<Eigen::Index>(end - begin));
-      });
+      parallel_for_blocks(narrow<std::size_t>(m), slice,
+                          [&](std::size_t begin, std::size_t end) { work(begin, end - begin); });
     } else if (m > 0) {
       work(0, m);
     }
@@ -468,7 +467,7 @@ int DirectSolver::Implementation::eliminate(std::size_t index, const BlockMatrix
   }
   if (f.settled != f.update) {
     double* const memory = arenas[f.arena].memory.get();
-    std::copy_n(memory + f.update, static_cast<std::size_t>(m * m), memory + f.settled);
+    std::copy_n(memory + f.update, narrow<std::size_t>(m * m), memory + f.settled);
   }
   return negative_pivots;
 }
@@ -507,25 +506,25 @@ DirectSolver::Factored DirectSolver::factor(const BlockMatrix& matrix) {
   Factored result;
   result.regular = regular;
   for (std::size_t front = 0; regular && front < s.fronts.size(); ++front) {
-    result.negative_pivots += static_cast<std::size_t>(s.negative[front]);
+    result.negative_pivots += narrow<std::size_t>(s.negative[front]);
   }
   return result;
 }
 
 void DirectSolver::solve(const VectorX& b, VectorX& x) const {
   const Implementation& s = *implementation_;
-  Eigen::VectorXd y(static_cast<Eigen::Index>(s.freedoms.size()));
+  Eigen::VectorXd y(s.freedoms.size());
   for (std::size_t k = 0; k < s.freedoms.size(); ++k) {
     y[k] = b[s.freedoms[k]];
   }
   Eigen::VectorXd others;
   for (const Front& f : s.fronts) {
     const ConstantPanel l = s.panel(f);
-    auto own = y.segment(static_cast<Eigen::Index>(f.first), f.columns);
+    auto own = y.segment(f.first, f.columns);
     l.topRows(f.columns).template triangularView<Eigen::Lower>().solveInPlace(own);
     others.noalias() = l.bottomRows(f.left()) * own;
     for (Eigen::Index i = 0; i < f.left(); ++i) {
-      y[s.below[f.below + static_cast<std::size_t>(i)]] -= others[i];
+      y[s.below[f.below + narrow<std::size_t>(i)]] -= others[i];
     }
   }
   y.array() *= s.signs.array();
@@ -533,9 +532,9 @@ void DirectSolver::solve(const VectorX& b, VectorX& x) const {
     const ConstantPanel l = s.panel(*f);
     others.resize(f->left());
     for (Eigen::Index i = 0; i < f->left(); ++i) {
-      others[i] = y[s.below[f->below + static_cast<std::size_t>(i)]];
+      others[i] = y[s.below[f->below + narrow<std::size_t>(i)]];
     }
-    auto own = y.segment(static_cast<Eigen::Index>(f->first), f->columns);
+    auto own = y.segment(f->first, f->columns);
     own.noalias() -= l.bottomRows(f->left()).transpose() * others;
     l.topRows(f->columns).template triangularView<Eigen::Lower>().transpose().solveInPlace(own);
   }

@@ -1,5 +1,6 @@
 #include "tunica/mechanics/algebra/lanczos.hpp"
 
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/progress.hpp"
 
 #include <Eigen/Dense>
@@ -22,13 +23,13 @@ class BlockLanczos {
 public:
   BlockLanczos(const SymmetricPencil& pencil, const std::vector<bool>& start, const std::vector<VectorX>& deflated,
                const LanczosOptions& options)
-      : pencil_(pencil), start_(start), options_(options), size_(static_cast<Eigen::Index>(start.size())) {
-    const auto count = static_cast<Eigen::Index>(options.count);
-    const auto block = static_cast<Eigen::Index>(options.block);
-    dimension_ = static_cast<Eigen::Index>(std::count(start.begin(), start.end(), true));
+      : pencil_(pencil), start_(start), options_(options), size_(start.size()) {
+    const Eigen::Index count = options.count;
+    const Eigen::Index block = options.block;
+    dimension_ = std::count(start.begin(), start.end(), true);
     // A small space is spanned whole, without restarts.
     most_ = std::min(std::max(2 * count + 4 * block, count + 8 * block), dimension_ + 1);
-    const Eigen::Index columns = static_cast<Eigen::Index>(deflated.size()) + most_ + block;
+    const Eigen::Index columns = narrow<Eigen::Index>(deflated.size()) + most_ + block;
     basis_.resize(size_, columns);
     image_.resize(size_, columns);
     for (const VectorX& vector : deflated) {
@@ -107,7 +108,7 @@ private:
   void append_random() {
     std::normal_distribution<double> normal;
     VectorX x, ax;
-    for (std::size_t k = 0; k < options_.block && used_ < most_ + static_cast<Eigen::Index>(options_.block); ++k) {
+    for (std::size_t k = 0; k < options_.block && used_ < most_ + narrow<Eigen::Index>(options_.block); ++k) {
       VectorX random = VectorX::Zero(size_);
       for (Eigen::Index i = 0; i < size_; ++i) {
         random[i] = start_[i] ? normal(engine_) : 0;
@@ -127,7 +128,7 @@ private:
     MatrixX grown = MatrixX::Zero(columns, columns);
     grown.topLeftCorner(projected_.rows(), projected_.cols()) = projected_;
     projected_ = std::move(grown);
-    MatrixX coupling = MatrixX::Zero(static_cast<Eigen::Index>(options_.block), last - first);
+    MatrixX coupling = MatrixX::Zero(options_.block, last - first);
     VectorX product, next, coefficients;
     for (Eigen::Index j = first; j < last; ++j) {
       pencil_.multiply_b(basis_.col(j), product);
@@ -156,7 +157,7 @@ private:
   [[nodiscard]] double largest_magnitude() const { return values_.cwiseAbs().maxCoeff(); }
 
   [[nodiscard]] bool wanted_converged() const {
-    const auto wanted = static_cast<Eigen::Index>(options_.count);
+    const Eigen::Index wanted = options_.count;
     if (found() < wanted) {
       return false;
     }
@@ -171,11 +172,11 @@ private:
 
   /// Keeps the best Ritz vectors and what leaves the basis (columns from `last` on). @return the first column of that.
   Eigen::Index restart(Eigen::Index last) {
-    const auto count = static_cast<Eigen::Index>(options_.count);
+    const Eigen::Index count = options_.count;
     const Eigen::Index fresh = used_ - last;
     const Eigen::Index room = most_ - locked_;
     const Eigen::Index kept =
-        std::min({found(), count + (room - count) / 2, room - static_cast<Eigen::Index>(options_.block)});
+        std::min({found(), count + (room - count) / 2, room - narrow<Eigen::Index>(options_.block)});
     const auto turn = [&](MatrixX& columns) {
       const MatrixX ritz = columns.middleCols(locked_, last - locked_) * coordinates_.leftCols(kept);
       const MatrixX rest = columns.middleCols(last, fresh);
@@ -192,7 +193,7 @@ private:
   EigenPairs result(bool complete) {
     EigenPairs pairs;
     pairs.largest_magnitude = found() > 0 ? largest_magnitude() : 0;
-    const Eigen::Index count = std::min(found(), static_cast<Eigen::Index>(options_.count));
+    const Eigen::Index count = std::min(found(), narrow<Eigen::Index>(options_.count));
     pairs.converged = complete || wanted_converged();
     VectorX ax, bx, correction;
     for (Eigen::Index i = 0; i < count; ++i) {

@@ -1,6 +1,7 @@
 #include "tunica/mechanics/algebra/linear_solver.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/progress.hpp"
 #include "tunica/core/threads.hpp"
 
@@ -30,9 +31,9 @@ struct BlockJacobi {
     std::vector<char> good(matrix.node_count(), 1);
     parallel_for_blocks(matrix.node_count(), 256, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
-        Matrix6 block = matrix.block(matrix.find(static_cast<Index>(i), static_cast<Index>(i)));
+        Matrix6 block = matrix.block(matrix.find(narrow<Index>(i), narrow<Index>(i)));
         for (int c = 0; c < 6; ++c) {
-          if (!free[freedom(i, static_cast<std::size_t>(c))]) {
+          if (!free[freedom(i, narrow<std::size_t>(c))]) {
             block.row(c).setZero();
             block.col(c).setZero();
             block(c, c) = 1;
@@ -64,7 +65,7 @@ CgResult conjugate_gradients(const BlockMatrix& matrix, const FreeMask& free, co
   std::vector<Eigen::Index> held;
   for (std::size_t i = 0; i < free.size(); ++i) {
     if (!free[i]) {
-      held.push_back(static_cast<Eigen::Index>(i));
+      held.push_back(i);
     }
   }
   CgResult result;
@@ -167,8 +168,7 @@ double gmres(const BlockMatrix& matrix, const FreeMask& free, const DirectSolver
   // Right preconditioning: the residual that is made small is the true one.
   std::vector<VectorX> basis{r / beta};
   std::vector<VectorX> directions;
-  Eigen::MatrixXd hessenberg =
-      Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(most) + 1, static_cast<Eigen::Index>(most));
+  Eigen::MatrixXd hessenberg = Eigen::MatrixXd::Zero(most + 1, most);
   Eigen::VectorXd coefficients;
   for (std::size_t j = 0; j < most; ++j) {
     VectorX direction;
@@ -176,10 +176,10 @@ double gmres(const BlockMatrix& matrix, const FreeMask& free, const DirectSolver
     multiply(matrix, direction, product);
     mask(free, product);
     directions.push_back(direction);
-    const auto column = static_cast<Eigen::Index>(j);
+    const Eigen::Index column = j;
     for (std::size_t i = 0; i <= j; ++i) {
       const double h = dot(basis[i], product);
-      hessenberg(static_cast<Eigen::Index>(i), column) = h;
+      hessenberg(i, column) = h;
       product -= h * basis[i];
     }
     const double length = std::sqrt(dot(product, product));

@@ -43,7 +43,7 @@ LaneVec3 curved_strain(const ElementLanes& element, const std::array<LaneMat3, 3
     edge.direction << along / edge.length, Lanes(0);
     LaneVec2 turn;
     for (int end = 0; end < 2; ++end) {
-      const auto e = static_cast<std::size_t>(end);
+      const std::size_t e = end;
       const LaneMat3& carrier = relative[corner_at(k, end)];
       edge.normal[e] = carrier * element.edge_normals.col(k);
       edge.side[e] = carrier * element.edge_sides.col(k);
@@ -103,7 +103,7 @@ LaneMask find_kinematics(const ElementLanes& element, const MotionLanes& motion,
   const LaneMask valid = find_frame(current_from_centroid(element, motion), element.gradients, now.frame);
   std::array<LaneMat3, 3> relative;
   for (int k = 0; k < 3; ++k) {
-    const auto s = static_cast<std::size_t>(k);
+    const std::size_t s = k;
     relative[s] = now.frame.axes * motion.rotation[s] * element.axes.transpose();
     now.state.segment<3>(3 + 3 * k) = rotation_vectors(relative[s]);
   }

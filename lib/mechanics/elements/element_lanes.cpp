@@ -201,7 +201,7 @@ void add_corotational_stiffness(const ElementLanes& element, const Kinematics& n
   // The derivative of H, where spins of the frame count against those of the corners.
   LaneMat3 all = LaneMat3::Zero();
   for (int k = 0; k < 3; ++k) {
-    const auto s = static_cast<std::size_t>(k);
+    const std::size_t s = k;
     const LaneMat3 change = spin_to_rate_derivative(now.rotation(k), local_moment[s], spin[s]) * h[s];
     all += change;
     t.block<3, 3>(6 * k + 3, 6 * k + 3) += change;
@@ -218,12 +218,12 @@ void add_corotational_stiffness(const ElementLanes& element, const Kinematics& n
   const LaneVec2 swapped(-total.y(), total.x());
   const Lanes in_plane = total.z() / (frame.trace * frame.trace);
   for (int i = 0; i < 3; ++i) {
-    const auto si = static_cast<std::size_t>(i);
+    const std::size_t si = i;
     const LaneVec2 gi = current_gradients.col(i);
     const LaneMat3 spun_force = skew(force[si]);
     const LaneMat3 spun_moment = skew(moment[si]);
     for (int j = 0; j < 3; ++j) {
-      const auto sj = static_cast<std::size_t>(j);
+      const std::size_t sj = j;
       auto block = t.block<3, 3>(6 * i, 6 * j);
       block += g[si].transpose() * (skew(n[sj]) + levers * g[sj]) - spun_force * g[sj];
       block.block<1, 2>(2, 0) += swapped.dot(current_gradients.col(j)) * gi.transpose();
@@ -262,7 +262,7 @@ void add_edge_forces(const Kinematics& now, const LaneVector6& on_slopes, const 
   for (int k = 0; k < 3; ++k) {
     const EdgeNow& edge = now.edges[k];
     for (int end = 0; end < 2; ++end) {
-      const auto e = static_cast<std::size_t>(end);
+      const std::size_t e = end;
       LaneVec3& v = carried[k][e];
       v = -on_slopes[2 * k + end] * edge.normal[e] - (end == 0 ? -on_bows[k] : on_bows[k]) * edge.side[e];
       const LaneVec3 p = (v - edge.direction * edge.direction.dot(v)) / edge.length;
@@ -466,7 +466,7 @@ LaneMask corotational_response(const ElementLanes& element, const MotionLanes& m
   std::array<LaneMat3, 3> h;
   LaneVec3 total = LaneVec3::Zero();
   for (int k = 0; k < 3; ++k) {
-    const auto s = static_cast<std::size_t>(k);
+    const std::size_t s = k;
     const LaneVec2 gk = element.gradients.col(k);
     n[s] << stress[0] * gk.x() + stress[2] * gk.y(), stress[1] * gk.y() + stress[2] * gk.x(), 0;
     local_moment[s] = stress.segment<3>(3 + 3 * k);
@@ -477,7 +477,7 @@ LaneMask corotational_response(const ElementLanes& element, const MotionLanes& m
   }
   LaneVector18 result;
   for (int k = 0; k < 3; ++k) {
-    const auto s = static_cast<std::size_t>(k);
+    const std::size_t s = k;
     force[s] = n[s] - g[s].transpose() * total;
     result.segment<3>(6 * k) = force[s];
     result.segment<3>(6 * k + 3) = moment[s];

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "tunica/core/lanes.hpp"
+#include "tunica/core/narrow.hpp"
 
 #include <array>
 #if defined(__AVX__) && defined(TUNICA_STANDARD_SIMD)
@@ -43,7 +44,7 @@ inline void transpose(std::array<Lanes, lane_count>& vectors) {
 #else
   const std::array<Lanes, lane_count> from = vectors;
   for (std::size_t k = 0; k < lane_count; ++k) {
-    vectors[k] = Lanes([&](auto i) { return from[i][static_cast<std::size_t>(k)]; });
+    vectors[k] = Lanes([&](auto i) { return from[i][k]; });
   }
 #endif
 }
@@ -52,18 +53,18 @@ inline void transpose(std::array<Lanes, lane_count>& vectors) {
 template <typename To, typename Get>
 void set_lanes(To& result, const Get& matrix) {
   Eigen::Index i = 0;
-  for (; i + static_cast<Eigen::Index>(lane_count) <= result.size(); i += lane_count) {
+  for (; i + narrow<Eigen::Index>(lane_count) <= result.size(); i += lane_count) {
     std::array<Lanes, lane_count> part;
     for (std::size_t k = 0; k < lane_count; ++k) {
       part[k].copy_from(matrix(k).data() + i, simd::element_aligned);
     }
     transpose(part);
     for (std::size_t k = 0; k < lane_count; ++k) {
-      result.coeffRef(i + static_cast<Eigen::Index>(k)) = part[k];
+      result.coeffRef(i + k) = part[k];
     }
   }
   for (; i < result.size(); ++i) {
-    result.coeffRef(i) = Lanes([&](auto k) { return matrix(static_cast<std::size_t>(k)).coeff(i); });
+    result.coeffRef(i) = Lanes([&](auto k) { return matrix(std::size_t{k}).coeff(i); });
   }
 }
 

@@ -170,7 +170,7 @@ void unit_pressure(const ElementLanes& element, const MotionLanes& motion, LaneV
   LaneMatrix18& t = *stiffness;
   t.setZero();
   for (int k = 0; k < 3; ++k) {
-    const auto s = static_cast<std::size_t>(k);
+    const std::size_t s = k;
     add_edge(x.col((k + 1) % 3) - x.col(k), area, of_length[s], k, ends[s], t);
   }
   // height x d2A/dx_i dx_j + d(2A n / 6)/dx_j + what the gradients of area and height make together.

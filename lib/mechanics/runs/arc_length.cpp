@@ -1,4 +1,5 @@
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/mechanics/runs/detail/stepped_run.hpp"
 #include "tunica/mechanics/runs/detail/supports.hpp"
 
@@ -47,16 +48,14 @@ public:
         solver_(system.pattern, free_),
         prescribed_(prescribed_positions(system, model, 1)),
         weights_(VectorX::Zero(first_freedom(system.node_count()))) {
-    const double share = 1 / static_cast<double>(system.node_count());
+    const double share = 1 / real(system.node_count());
     for (std::size_t i = 0; i < system.node_count(); ++i) {
       weights_.segment<3>(first_freedom(i)).setConstant(share);
       weights_.segment<3>(first_freedom(i) + 3).setConstant(share * system.length * system.length);
     }
   }
 
-  [[nodiscard]] std::size_t freedom_count() const {
-    return static_cast<std::size_t>(std::count(free_.begin(), free_.end(), true));
-  }
+  [[nodiscard]] std::size_t freedom_count() const { return std::count(free_.begin(), free_.end(), true); }
 
   /// Fills the tangent of the path at `state`, on the side of `before` (empty: the factor grows).
   /// @return false where the stiffness is singular to the last digit.
@@ -264,8 +263,7 @@ private:
 
   /// By which the next step is longer than one that departs from its chord so far, in so many iterations.
   static double growth(double depart, std::size_t iterations) {
-    const double by_iterations =
-        static_cast<double>(wanted_iterations) / static_cast<double>(std::max<std::size_t>(1, iterations));
+    const double by_iterations = real(wanted_iterations) / real(std::max<std::size_t>(1, iterations));
     return std::clamp(std::min(std::sqrt(1 / std::max(depart, 1e-300)), std::sqrt(by_iterations)), 0.5, 2.0);
   }
 
@@ -349,14 +347,14 @@ private:
     if (limit) {
       summary_.limit_factors.push_back(limit_factor(a, b, step));
     }
-    const auto change = static_cast<long>(b.negative_pivots) - static_cast<long>(a.negative_pivots);
+    const auto change = narrow<long>(b.negative_pivots) - narrow<long>(a.negative_pivots);
     if (std::abs(change) > (limit ? 1 : 0)) {
       summary_.branch_factors.push_back((a.factor + b.factor) / 2);
     }
   }
 
   [[nodiscard]] State state_now(std::size_t step) const {
-    State state = make_state(system_, model_, now_.configuration, static_cast<double>(step));
+    State state = make_state(system_, model_, now_.configuration, real(step));
     state.load_factor = now_.factor;
     state.residual = now_.residual;
     state.newton_iterations = now_.iterations;
@@ -372,7 +370,7 @@ private:
           "{}: "
           "it is at {:.6g} mm",
           summary_.steps, now_.factor, by_steps ? "max_steps" : "max_factor", model_.probes[run_.until->probe].name,
-          run_.until->reaches, "xyz"[static_cast<std::size_t>(run_.until->axis)], goal_of(now_.configuration)));
+          run_.until->reaches, "xyz"[run_.until->axis], goal_of(now_.configuration)));
     }
   }
 

@@ -80,7 +80,7 @@ ShellMesh moved_mesh(const ShellMesh& mesh, std::size_t first, const State& stat
       const auto motion = moves ? motion_of(mesh, t, first, state) : std::nullopt;
       collapsed[t] = moves && !motion ? 1 : 0;
       for (std::size_t k = 0; k < 3; ++k) {
-        const Vec3& normal = mesh.normal(t, static_cast<int>(k));
+        const Vec3& normal = mesh.normal(t, k);
         if (motion) {
           const Vec3 slope =
               motion->normal - normal / normal.dot(motion->normal) + motion->normal.cross(motion->bending[k]);
@@ -209,7 +209,7 @@ double largest_displacement(const Model& model, const State& state) {
         samples[t] = best_of_grid(patches, t);
       }
     });
-    const auto kept = samples.begin() + static_cast<std::ptrdiff_t>(std::min(climbed, samples.size()));
+    const auto kept = samples.begin() + std::min(climbed, samples.size());
     std::partial_sort(samples.begin(), kept, samples.end(),
                       [](const Sample& a, const Sample& b) { return a.length > b.length; });
     for (auto sample = samples.begin(); sample != kept; ++sample) {

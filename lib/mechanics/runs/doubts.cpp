@@ -220,7 +220,7 @@ std::vector<double> largest_curvatures(const ShellMesh& mesh, bool curved) {
   curvatures.reserve(mesh.triangles.size());
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     const auto& v = mesh.triangles[t];
-    const auto normal = [&](std::size_t k) { return own ? mesh.normal(t, static_cast<int>(k)) : of_vertices[v[k]]; };
+    const auto normal = [&](std::size_t k) { return own ? mesh.normal(t, k) : of_vertices[v[k]]; };
     const Vec3 along = mesh.vertices[v[1]] - mesh.vertices[v[0]];
     const Vec3 across = along.cross(mesh.vertices[v[2]] - mesh.vertices[v[0]]);
     if (!(across.norm() > 0)) {

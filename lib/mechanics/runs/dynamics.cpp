@@ -1,4 +1,5 @@
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/mechanics/elements/rotation.hpp"
 #include "tunica/mechanics/runs/detail/settle.hpp"
 #include "tunica/mechanics/runs/detail/stepped_run.hpp"
@@ -210,7 +211,7 @@ public:
          {std::pair{"velocity", &motion.rates.velocity}, std::pair{"acceleration", &motion.rates.acceleration},
           std::pair{"auxiliary", &motion.rates.auxiliary}, std::pair{"acting", &acting_}}) {
       const std::vector<double>& values = memory.at(name);
-      TUNICA_ASSERT(values.size() == static_cast<std::size_t>(mass_.size()));
+      TUNICA_ASSERT(values.size() == narrow<std::size_t>(mass_.size()));
       vector->resize(mass_.size());
       std::copy(values.begin(), values.end(), vector->begin());
     }
@@ -220,12 +221,10 @@ public:
     part_ = memory.at("part").at(0);
     at_rest_ = memory.at("at_rest").at(0) != 0;
     if (const auto found = memory.find("deformation_before"); found != memory.end()) {
-      TUNICA_ASSERT(found->second.size() ==
-                    static_cast<std::size_t>(ElementState::SizeAtCompileTime) * system_.elements.size());
+      TUNICA_ASSERT(found->second.size() == ElementState::SizeAtCompileTime * system_.elements.size());
       before_.resize(system_.elements.size());
       for (std::size_t e = 0; e < before_.size(); ++e) {
-        before_[e] = Eigen::Map<const ElementState>(found->second.data() +
-                                                    ElementState::SizeAtCompileTime * static_cast<std::ptrdiff_t>(e));
+        before_[e] = Eigen::Map<const ElementState>(found->second.data() + ElementState::SizeAtCompileTime * e);
       }
       length_before_ = memory.at("length_before").at(0);
     }
@@ -348,7 +347,7 @@ private:
     acting_ = forces_.external;
     for (std::size_t i = 0; i < system_.held.size(); ++i) {
       if (system_.held[i]) {
-        const auto k = static_cast<Eigen::Index>(i);
+        const Eigen::Index k = i;
         acting_[k] = forces_.internal[k] +
                      mass_[k] * (motion.rates.acceleration[k] + run_.damping.mass * motion.rates.velocity[k]);
       }
@@ -450,7 +449,7 @@ private:
   void add_inertia(const VectorX& change, double length, BlockMatrix& tangent) const {
     const double factor = scheme_.acceleration_factor(length) + run_.damping.mass * scheme_.velocity_factor(length);
     for (std::size_t i = 0; i < system_.node_count(); ++i) {
-      auto block = tangent.block(tangent.find(static_cast<Index>(i), static_cast<Index>(i)));
+      auto block = tangent.block(tangent.find(narrow<Index>(i), narrow<Index>(i)));
       block.diagonal().head<3>() += factor * mass_.segment<3>(first_freedom(i));
       const Vec3 turn = change.segment<3>(first_freedom(i) + 3);
       block.block<3, 3>(3, 3) +=
@@ -496,7 +495,7 @@ public:
 
 private:
   static std::size_t step_count(const DynamicRun& run) {
-    return static_cast<std::size_t>(std::max(1.0, std::ceil(run.duration / run.step - 1e-9)));
+    return truncated<std::size_t>(std::max(1.0, std::ceil(run.duration / run.step - 1e-9)));
   }
 
   State begin() override {
@@ -520,7 +519,7 @@ private:
     // Not of the first step, which is the longest without.
     stepper_.tell_direct_error(summary_.steps == 1 || is_last());
     // The last step may be shorter: the run ends at its duration.
-    const double end = is_last() ? run_.duration : static_cast<double>(summary_.steps + 1) * run_.step;
+    const double end = is_last() ? run_.duration : real(summary_.steps + 1) * run_.step;
     const Motion before = motion_;
     const TimeStepper::StepResult step = advance_stiffening(end);
     const NewtonResult& result = step.newton;

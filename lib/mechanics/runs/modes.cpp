@@ -1,5 +1,6 @@
 #include "tunica/core/clock.hpp"
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/mechanics/algebra/lanczos.hpp"
 #include "tunica/mechanics/elements/rotation.hpp"
 #include "tunica/mechanics/runs/detail/run.hpp"
@@ -88,7 +89,7 @@ BlockMatrix tangent_change(const ShellSystem& system, const Model& model, const 
 
 void add(BlockMatrix& matrix, double factor, const VectorX& diagonal) {
   for (std::size_t i = 0; i < matrix.node_count(); ++i) {
-    auto block = matrix.block(matrix.find(static_cast<Index>(i), static_cast<Index>(i)));
+    auto block = matrix.block(matrix.find(narrow<Index>(i), narrow<Index>(i)));
     block.diagonal() += factor * diagonal.segment<6>(first_freedom(i));
   }
 }
@@ -202,8 +203,7 @@ public:
       }
       if (pairs.converged) {
         const double below_last = values.back() - 1e-5 * std::abs(values.back() - near);
-        const auto found = static_cast<std::size_t>(
-            std::count_if(values.begin(), values.end(), [&](double v) { return v < below_last; }));
+        const std::size_t found = std::count_if(values.begin(), values.end(), [&](double v) { return v < below_last; });
         const std::size_t there = move_to(below_last).negative_pivots;
         (void)move_to(near);
         if (there <= found + deflated.size()) {
@@ -259,13 +259,13 @@ std::vector<VectorX> idle_rigid_modes(const ShellSystem& system, const Configura
     if (modes.empty()) {
       continue;
     }
-    const auto count = static_cast<Eigen::Index>(modes.size());
+    const Eigen::Index count = modes.size();
     Eigen::MatrixXd work(count, count);
     Eigen::MatrixXd terms(count, count);
     VectorX diagonal(first_freedom(system.node_count()));
     for (std::size_t i = 0; i < system.node_count(); ++i) {
       diagonal.segment<6>(first_freedom(i)) =
-          stiffness.block(stiffness.find(static_cast<Index>(i), static_cast<Index>(i))).diagonal().cwiseAbs();
+          stiffness.block(stiffness.find(narrow<Index>(i), narrow<Index>(i))).diagonal().cwiseAbs();
     }
     VectorX product;
     for (Eigen::Index a = 0; a < count; ++a) {
@@ -332,7 +332,7 @@ Summary run_frequencies(ShellSystem& system, const Model& model, const RunSettin
   advance(progress, 0.3);
   release_rigid_motion_supports(system, model);
   const FreeMask free = free_freedoms(system);
-  summary.dof = static_cast<std::size_t>(std::count(free.begin(), free.end(), true));
+  summary.dof = narrow<std::size_t>(std::count(free.begin(), free.end(), true));
 
   const std::vector<VectorX> rigid = idle_rigid_modes(system, configuration, stiffness);
   require_freedoms(run.count, summary.dof - rigid.size());
@@ -379,7 +379,7 @@ Summary run_buckling(ShellSystem& system, const Model& model, const RunSettings&
   Summary summary;
   on_state(reference_state(system, model, summary));
   const FreeMask free = free_freedoms(system);
-  summary.dof = static_cast<std::size_t>(std::count(free.begin(), free.end(), true));
+  summary.dof = narrow<std::size_t>(std::count(free.begin(), free.end(), true));
   require_freedoms(run.count, summary.dof);
 
   const VectorX solution = linear_solution(system, model, settings);

@@ -1,5 +1,6 @@
 #include "tunica/mechanics/runs/detail/newton.hpp"
 
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/progress.hpp"
 
 #include <algorithm>
@@ -28,9 +29,7 @@ TangentSolver::TangentSolver(const ShellSystem& system, const RunSettings& setti
   }
 }
 
-std::size_t TangentSolver::freedom_count() const {
-  return static_cast<std::size_t>(std::count(free_.begin(), free_.end(), true));
-}
+std::size_t TangentSolver::freedom_count() const { return std::count(free_.begin(), free_.end(), true); }
 
 TangentSolver::Result TangentSolver::solve(BlockMatrix& matrix, const VectorX& b, VectorX& x, bool same_matrix) {
   Result result;
@@ -76,7 +75,7 @@ double increment_size(const ShellSystem& system, const VectorX& increment) {
     sum += increment.segment<3>(i).squaredNorm() +
            system.length * system.length * increment.segment<3>(i + 3).squaredNorm();
   }
-  return std::sqrt(sum / (static_cast<double>(increment.size()) / 6));
+  return std::sqrt(sum / (real(increment.size()) / 6));
 }
 
 namespace {

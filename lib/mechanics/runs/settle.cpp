@@ -1,5 +1,6 @@
 #include "tunica/mechanics/runs/detail/settle.hpp"
 
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/progress.hpp"
 
 #include <algorithm>
@@ -22,7 +23,7 @@ VectorX viscous_diagonal(const ShellSystem& system) {
   linear_stiffness(system, stiffness);
   VectorX diagonal(first_freedom(system.node_count()));
   for (std::size_t i = 0; i < system.node_count(); ++i) {
-    const auto block = stiffness.block(stiffness.find(static_cast<Index>(i), static_cast<Index>(i)));
+    const auto block = stiffness.block(stiffness.find(narrow<Index>(i), narrow<Index>(i)));
     diagonal.segment<3>(first_freedom(i)).setConstant(block.diagonal().head<3>().mean());
     diagonal.segment<3>(first_freedom(i) + 3).setConstant(block.diagonal().tail<3>().mean());
   }
@@ -31,7 +32,7 @@ VectorX viscous_diagonal(const ShellSystem& system) {
 
 void add_diagonal(double factor, const VectorX& diagonal, BlockMatrix& matrix) {
   for (std::size_t i = 0; i < matrix.node_count(); ++i) {
-    auto block = matrix.block(matrix.find(static_cast<Index>(i), static_cast<Index>(i)));
+    auto block = matrix.block(matrix.find(narrow<Index>(i), narrow<Index>(i)));
     block.diagonal() += factor * diagonal.segment<6>(first_freedom(i));
   }
 }
@@ -170,7 +171,7 @@ VectorX weakest_direction(const ShellSystem& system, TangentSolver& solver, cons
   const VectorX diagonal = viscous_diagonal(system);
   VectorX x(diagonal.size());
   for (Eigen::Index i = 0; i < x.size(); ++i) {
-    x[i] = std::sin(1.0 + 0.7 * static_cast<double>(i));  // anything that has a part along every direction
+    x[i] = std::sin(1.0 + 0.7 * real(i));  // anything that has a part along every direction
   }
   VectorX product;
   for (int k = 0; k < iterations; ++k) {

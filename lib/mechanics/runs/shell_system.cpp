@@ -2,6 +2,7 @@
 
 #include "tunica/core/disjoint_sets.hpp"
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/threads.hpp"
 #include "tunica/mechanics/elements/element_lanes.hpp"
 #include "tunica/mechanics/elements/pressure.hpp"
@@ -71,9 +72,9 @@ void colour_elements(ShellSystem& system) {
     if (batches.empty() || batches.back().count == lane_count ||
         system.elements[batches.back().elements[0]].curved != system.elements[e].curved) {
       batches.emplace_back();
-      batches.back().elements.fill(static_cast<Index>(e));
+      batches.back().elements.fill(narrow<Index>(e));
     }
-    batches.back().elements[batches.back().count++] = static_cast<Index>(e);
+    batches.back().elements[batches.back().count++] = narrow<Index>(e);
   }
 }
 
@@ -89,12 +90,12 @@ void find_pieces(ShellSystem& system, const Model& model) {
       if (system.used[i] == 0) {
         continue;
       }
-      std::size_t& piece = piece_of[joined.root(static_cast<Index>(i))];
+      std::size_t& piece = piece_of[joined.root(narrow<Index>(i))];
       if (piece == SIZE_MAX) {
         piece = system.pieces.size();
         system.pieces.push_back({body, {}});
       }
-      system.pieces[piece].nodes.push_back(static_cast<Index>(i));
+      system.pieces[piece].nodes.push_back(narrow<Index>(i));
     }
   }
 }
@@ -133,7 +134,7 @@ Index used_node(const ShellSystem& system, const Model& model, std::size_t body,
   if (node >= model.shells[body].mesh.vertices.size() || system.used[global] == 0) {
     throw InputError(fmt::format("{}: a load acts on node {}, which no triangle uses", model.shells[body].name, node));
   }
-  return static_cast<Index>(global);
+  return narrow<Index>(global);
 }
 
 void add_edge_load(const ShellSystem& system, const Model& model, std::size_t body, const EdgeLoad& edge_load,
@@ -173,12 +174,12 @@ void make_loads(ShellSystem& system, const Model& model) {
     } else if (const auto* force = std::get_if<ForceLoad>(&load.kind)) {
       for (const Index node : force->nodes) {
         dead.force.segment<3>(first_freedom(used_node(system, model, load.body, node))) +=
-            force->total / static_cast<double>(force->nodes.size());
+            force->total / real(force->nodes.size());
       }
     } else if (const auto* moment = std::get_if<MomentLoad>(&load.kind)) {
       for (const Index node : moment->nodes) {
         dead.force.segment<3>(first_freedom(used_node(system, model, load.body, node)) + 3) +=
-            moment->total / static_cast<double>(moment->nodes.size());
+            moment->total / real(moment->nodes.size());
       }
     } else if (const auto* edge = std::get_if<EdgeLoad>(&load.kind)) {
       add_edge_load(system, model, load.body, *edge, dead);
@@ -249,10 +250,10 @@ void push_facets(const ShellSystem& system, const Batch& batch, const MotionLane
 }
 
 void scatter(const ShellSystem& system, const Batch& batch, const LaneMatrix18& matrices, BlockMatrix& target) {
-  constexpr int width = static_cast<int>(lane_count);
+  constexpr int width = narrow<int>(lane_count);
   for (int j = 0; j < 3; ++j) {
     for (int i = 0; i < 3; ++i) {
-      const auto place = static_cast<std::size_t>(3 * i + j);
+      const std::size_t place = 3 * i + j;
       for (int first = 0; first < 36; first += width) {
         std::array<Lanes, lane_count> part;
         for (int k = 0; k < width; ++k) {
@@ -282,7 +283,7 @@ void add_dead_loads(const ShellSystem& system, const Configuration& configuratio
       const Mat3 m = factor * (configuration.rotation[i] * load.director[i]);
       external.segment<3>(first_freedom(i) + 3) += Vec3(m(1, 2) - m(2, 1), m(2, 0) - m(0, 2), m(0, 1) - m(1, 0));
       if (tangent != nullptr) {
-        auto block = tangent->block(tangent->find(static_cast<Index>(i), static_cast<Index>(i)));
+        auto block = tangent->block(tangent->find(narrow<Index>(i), narrow<Index>(i)));
         block.block<3, 3>(3, 3) += m.trace() * Mat3::Identity() - m;
       }
     }
@@ -329,7 +330,7 @@ ShellSystem make_system(const Model& model) {
   double edges = 0;
   for (std::size_t b = 0; b < model.shells.size(); ++b) {
     const ShellBody& body = model.shells[b];
-    const auto offset = static_cast<Index>(model.first_node(b));
+    const auto offset = narrow<Index>(model.first_node(b));
     system.reference.insert(system.reference.end(), body.mesh.vertices.begin(), body.mesh.vertices.end());
     const std::vector<Vec3> at_vertices = facet_normals_at_vertices(body.mesh);
     const bool curved = body.curved && body.rest == Rest::curved;
@@ -342,7 +343,7 @@ ShellSystem make_system(const Model& model) {
       surface.curved = curved && body.membrane == Membrane::adapt;
       std::array<Vec3, 3> bulge;  // the normals that tell how far the shell bulges over an edge
       for (std::size_t k = 0; k < 3; ++k) {
-        surface.normals[k] = curved ? body.mesh.normal(t, static_cast<int>(k)) : facet;
+        surface.normals[k] = curved ? body.mesh.normal(t, k) : facet;
         bulge[k] = curved ? surface.normals[k] : at_vertices[v[k]];
       }
       const double scale = body.membrane == Membrane::adapt ? adapted_scale(corners, bulge, thickness) : 1;
@@ -360,7 +361,7 @@ ShellSystem make_system(const Model& model) {
     }
     system.first_element.push_back(system.elements.size());
   }
-  system.length = edges / (3 * static_cast<double>(std::max<std::size_t>(1, system.elements.size())));
+  system.length = edges / (3 * real(std::max<std::size_t>(1, system.elements.size())));
   add_stiffness_norms(system);
 
   std::vector<std::array<Index, 3>> triangles;
@@ -380,7 +381,7 @@ ShellSystem make_system(const Model& model) {
   colour_elements(system);
   find_pieces(system, model);
 
-  system.area = VectorX::Zero(static_cast<Eigen::Index>(nodes));
+  system.area = VectorX::Zero(nodes);
   system.mass = system.area;
   system.inertia = system.area;
   for (const ShellElement& e : system.elements) {
@@ -524,7 +525,7 @@ void linear_forces(const ShellSystem& system, const VectorX& displacement, Vecto
         const ElementGroup group = members(system, colour[b]);
         gather(group, elements);
         for (int k = 0; k < 3; ++k) {
-          const auto corner = static_cast<std::size_t>(k);
+          const std::size_t corner = k;
           LaneVector6 moved;
           set_lanes(moved,
                     [&](std::size_t l) { return displacement.segment<6>(first_freedom(group[l]->nodes[corner])); });

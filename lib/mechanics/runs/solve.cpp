@@ -1,6 +1,7 @@
 #include "tunica/mechanics/runs/solve.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/mechanics/elements/rotation.hpp"
 #include "tunica/mechanics/model/wall.hpp"
 #include "tunica/mechanics/runs/curved_displacement.hpp"
@@ -128,7 +129,7 @@ void find_wall(const Model& model, ElementFields& fields) {
   // The first of equal ones, so that on a symmetric body it is not round-off that chooses.
   const auto highest = std::ranges::find_if(
       fields.von_mises, [&](double stress) { return stress >= (1 - equal_stress) * wall.stress_max; });
-  auto node = static_cast<std::size_t>(highest - fields.von_mises.begin());
+  auto node = narrow<std::size_t>(highest - fields.von_mises.begin());
   wall.stress_p99 = area_quantile(model, fields.von_mises, above);
   for (const ShellBody& body : model.shells) {
     if (node < body.mesh.vertices.size()) {

@@ -1,4 +1,5 @@
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/mechanics/elements/rotation.hpp"
 #include "tunica/mechanics/runs/detail/settle.hpp"
 #include "tunica/mechanics/runs/detail/stepped_run.hpp"
@@ -156,7 +157,7 @@ double distance(const Configuration& a, const Configuration& b) {
   for (std::size_t i = 0; i < a.displacement.size(); ++i) {
     sum += (a.displacement[i] - b.displacement[i]).squaredNorm();
   }
-  return std::sqrt(sum / static_cast<double>(a.displacement.size()));
+  return std::sqrt(sum / real(a.displacement.size()));
 }
 
 double largest_distance(const Configuration& a, const Configuration& b) {

@@ -1,6 +1,7 @@
 #include "tunica/mechanics/runs/detail/stepped_run.hpp"
 
 #include "tunica/core/clock.hpp"
+#include "tunica/core/narrow.hpp"
 
 namespace tunica {
 
@@ -36,7 +37,7 @@ Summary SteppedRun::follow(const Progress& progress, const Resumption& resumptio
   return summary_;
 }
 
-double SteppedRun::part_done() const { return static_cast<double>(summary_.steps) / static_cast<double>(most_steps_); }
+double SteppedRun::part_done() const { return real(summary_.steps) / real(most_steps_); }
 
 State SteppedRun::reference_state() const {
   State state = make_state(system_, model_, reference_configuration(system_), 0);

@@ -1,6 +1,7 @@
 #include "tunica/mechanics/runs/detail/supports.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 
 #include <fmt/format.h>
 
@@ -19,7 +20,7 @@ Vec3 centre_of(const ShellSystem& system, const Piece& piece) {
   for (const Index i : piece.nodes) {
     centre += system.reference[i];
   }
-  return centre / static_cast<double>(piece.nodes.size());
+  return centre / real(piece.nodes.size());
 }
 
 double size_of(const ShellSystem& system, const Piece& piece, const Vec3& centre) {
@@ -67,7 +68,7 @@ std::vector<std::size_t> determinate_supports(const ShellSystem& system, const P
   std::vector<std::size_t> freedoms;
   for (int k = 0; k < 6; ++k) {
     const int chosen = qr.colsPermutation().indices()[k];
-    freedoms.push_back(freedom(nodes[chosen / 3], static_cast<std::size_t>(chosen % 3)));
+    freedoms.push_back(freedom(nodes[chosen / 3], narrow<std::size_t>(chosen % 3)));
   }
   return freedoms;
 }
@@ -136,7 +137,7 @@ void release_rigid_motion_supports(ShellSystem& system, const Model& model) {
 }
 
 int free_rigid_motions(const ShellSystem& system, const Piece& piece) {
-  return static_cast<int>(free_rigid_modes(system, piece, reference_configuration(system)).size());
+  return narrow<int>(free_rigid_modes(system, piece, reference_configuration(system)).size());
 }
 
 std::vector<VectorX> free_rigid_modes(const ShellSystem& system, const Piece& piece,
@@ -149,7 +150,7 @@ std::vector<VectorX> free_rigid_modes(const ShellSystem& system, const Piece& pi
   Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
   for (const Index i : piece.nodes) {
     for (int c = 0; c < 6; ++c) {
-      if (system.held[freedom(i, static_cast<std::size_t>(c))]) {
+      if (system.held[freedom(i, narrow<std::size_t>(c))]) {
         const Row6 row = row_of(i, c);
         normal += row.transpose() * row;
       }

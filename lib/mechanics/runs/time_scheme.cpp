@@ -35,7 +35,7 @@ void TimeScheme::end_rates(double length, const std::vector<bool>& held, const R
   end.velocity = start.velocity + h * ((1 - gamma_) * start.auxiliary + gamma_ * end.auxiliary);
   for (std::size_t i = 0; i < held.size(); ++i) {
     if (held[i]) {
-      const auto k = static_cast<Eigen::Index>(i);
+      const Eigen::Index k = i;
       end.velocity[k] = change[k] / h;
       end.acceleration[k] = end.auxiliary[k] = (end.velocity[k] - start.velocity[k]) / h;
     }

@@ -1,5 +1,6 @@
 #include "tunica/shell/distance/boundary_distance.hpp"
 
+#include "tunica/core/narrow.hpp"
 #include "tunica/surface/distance/boundary_curves.hpp"
 #include "tunica/surface/distance/hausdorff.hpp"
 #include "tunica/surface/mesh/incidence.hpp"
@@ -49,11 +50,11 @@ std::vector<CubicCurve> boundary_curves(const ShellMesh& shell) {
 
 Chords chords_of(std::span<const CubicCurve> curves, int pieces) {
   std::vector<std::array<Vec3, 2>> segments;
-  segments.reserve(curves.size() * static_cast<std::size_t>(pieces));
+  segments.reserve(curves.size() * narrow<std::size_t>(pieces));
   for (const CubicCurve& curve : curves) {
     Vec3 last = curve[0];
     for (int i = 1; i <= pieces; ++i) {
-      const Vec3 next = i == pieces ? curve[3] : point_on(curve, static_cast<double>(i) / pieces);
+      const Vec3 next = i == pieces ? curve[3] : point_on(curve, real(i) / pieces);
       segments.push_back({last, next});
       last = next;
     }
@@ -71,7 +72,7 @@ std::optional<BoundaryDistance> boundary_distance(std::span<const CubicCurve> cu
     largest = std::max(largest, bulge(curve));
   }
   const double needed = std::ceil(std::sqrt(largest / (part_for_chords * width)));
-  const Chords chords = chords_of(curves, static_cast<int>(std::clamp(needed, 1.0, static_cast<double>(most_pieces))));
+  const Chords chords = chords_of(curves, truncated<int>(std::clamp(needed, 1.0, real(most_pieces))));
   HausdorffOptions measuring;
   measuring.samples = 0;
   measuring.limit = limit;

@@ -1,5 +1,6 @@
 #include "tunica/shell/distance/normals.hpp"
 
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/threads.hpp"
 #include "tunica/shell/patch/curved_surface.hpp"
 #include "tunica/surface/mesh/incidence.hpp"
@@ -118,7 +119,7 @@ std::vector<Index> take_normals_from(const Target& target, ShellMesh& shell) {
     std::vector<Vec3> fan;
     for (std::size_t v = begin; v < end; ++v) {
       fan.clear();
-      for (const Index t : around.of(static_cast<Index>(v))) {
+      for (const Index t : around.of(narrow<Index>(v))) {
         fan.push_back(facets[t]);
       }
       if (fan.empty()) {
@@ -141,7 +142,7 @@ std::vector<Index> take_normals_from(const Target& target, ShellMesh& shell) {
   std::vector<Index> out;
   for (std::size_t v = 0; v < folded.size(); ++v) {
     if (folded[v] != 0) {
-      out.push_back(static_cast<Index>(v));
+      out.push_back(narrow<Index>(v));
     }
   }
   return out;

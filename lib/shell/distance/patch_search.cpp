@@ -128,7 +128,7 @@ double PatchSearch::bulge(Index patch, const Vec2& a, const Vec2& b, const Vec2&
 
 std::size_t PatchSearch::edge_towards(Index patch, Index other) const {
   const auto& across = across_[patch];
-  return static_cast<std::size_t>(std::find(across.begin(), across.end(), other) - across.begin());
+  return std::find(across.begin(), across.end(), other) - across.begin();
 }
 
 double PatchSearch::nearest(const Vec3& p, double tolerance, SurfaceFoot& foot) const {

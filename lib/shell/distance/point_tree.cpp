@@ -2,6 +2,7 @@
 #include "tunica/shell/distance/point_tree.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 
 #include <algorithm>
 
@@ -49,7 +50,7 @@ struct PointTree::Search {
 PointTree::PointTree(const std::vector<Vec3>& points) : items_(points.size()), axis_(points.size(), 0) {
   for (std::size_t i = 0; i < points.size(); ++i) {
     TUNICA_ASSERT(points[i].allFinite());
-    items_[i] = {points[i], static_cast<Index>(i)};
+    items_[i] = {points[i], narrow<Index>(i)};
   }
   build(0, items_.size());
 }
@@ -66,10 +67,10 @@ void PointTree::build(std::size_t begin, std::size_t end) {
   Eigen::Index axis = 0;
   (upper - lower).maxCoeff(&axis);
   const std::size_t middle = begin + (end - begin) / 2;
-  const auto at = [&](std::size_t i) { return items_.begin() + static_cast<std::ptrdiff_t>(i); };
+  const auto at = [&](std::size_t i) { return items_.begin() + i; };
   std::nth_element(at(begin), at(middle), at(end),
                    [axis](const Item& a, const Item& b) { return a.point[axis] < b.point[axis]; });
-  axis_[middle] = static_cast<std::uint8_t>(axis);
+  axis_[middle] = narrow<std::uint8_t>(axis);
   build(begin, middle);
   build(middle + 1, end);
 }

@@ -1,5 +1,6 @@
 #include "tunica/shell/distance/shell_distance.hpp"
 
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/threads.hpp"
 #include "tunica/shell/distance/curved_hausdorff.hpp"
 #include "tunica/shell/distance/detail/certificate.hpp"
@@ -19,7 +20,7 @@ constexpr std::size_t mean_samples = 20'000;
 constexpr std::size_t most_fine_triangles = 4'000'000;
 
 Tessellation affordable_tessellation(const ShellMesh& shell, double deviation) {
-  while (tessellation_size(shell, deviation) > static_cast<double>(most_fine_triangles)) {
+  while (tessellation_size(shell, deviation) > real(most_fine_triangles)) {
     deviation *= 2;
   }
   return tessellate(shell, deviation);
@@ -42,7 +43,7 @@ std::vector<Vec3> points_between_patches(const ShellMesh& shell) {
       }
       const Index end = shell.triangles[t][(k + 1) % 3];
       const auto& v = shell.triangles[other];
-      const auto l = static_cast<std::size_t>(std::find(v.begin(), v.end(), end) - v.begin());
+      const std::size_t l = std::find(v.begin(), v.end(), end) - v.begin();
       for (const double s : {0.25, 0.5, 0.75}) {
         points.emplace_back((on_edge(t, k, s) + on_edge(other, l, 1 - s)) / 2);
       }
@@ -63,8 +64,8 @@ std::pair<double, double> mean_distance(const ShellMesh& shell, const Target& ta
   struct Sum {
     double area = 0, distance = 0, squared = 0;
   };
-  const double per_patch = static_cast<double>(mean_samples) / static_cast<double>(patches.size());
-  const int level = std::clamp(static_cast<int>(std::sqrt(per_patch)), 2, 40);
+  const double per_patch = real(mean_samples) / real(patches.size());
+  const int level = std::clamp(truncated<int>(std::sqrt(per_patch)), 2, 40);
   std::vector<Sum> sums((patches.size() + items_per_block - 1) / items_per_block);
   parallel_for_blocks(patches.size(), items_per_block, [&](std::size_t begin, std::size_t end) {
     Sum& sum = sums[begin / items_per_block];

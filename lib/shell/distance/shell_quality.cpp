@@ -1,5 +1,6 @@
 #include "tunica/shell/distance/shell_quality.hpp"
 
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/threads.hpp"
 #include "tunica/shell/distance/boundary_distance.hpp"
 #include "tunica/shell/distance/shell_distance.hpp"
@@ -36,8 +37,7 @@ void add_normal_errors(const std::vector<CubicPatch>& patches, const Target& tar
     double area = 0, angle = 0, largest = 0;
   };
   const auto creased = creased_triangles(target);
-  const int level = std::clamp(
-      static_cast<int>(std::sqrt(static_cast<double>(samples) / static_cast<double>(patches.size()))), 2, 12);
+  const int level = std::clamp(truncated<int>(std::sqrt(real(samples) / real(patches.size()))), 2, 12);
   std::vector<Sum> sums((patches.size() + shells_per_block - 1) / shells_per_block);
   parallel_for_blocks(patches.size(), shells_per_block, [&](std::size_t begin, std::size_t end) {
     Sum& sum = sums[begin / shells_per_block];
@@ -78,14 +78,13 @@ void add_neighbours(const ShellMesh& shell, const std::vector<CubicPatch>& patch
       if (other == no_neighbour || other < t) {
         continue;
       }
-      const double a = longest_edge(flat, static_cast<Index>(t)), b = longest_edge(flat, other);
+      const double a = longest_edge(flat, narrow<Index>(t)), b = longest_edge(flat, other);
       quality.size_ratio = std::max({quality.size_ratio, a / b, b / a});
       const auto& v = shell.triangles[other];
-      const auto l =
-          static_cast<std::size_t>(std::find(v.begin(), v.end(), shell.triangles[t][(k + 1) % 3]) - v.begin());
+      const auto l = narrow<std::size_t>(std::find(v.begin(), v.end(), shell.triangles[t][(k + 1) % 3]) - v.begin());
       const CubicCurve here = edge_curve(patches[t], k), there = edge_curve(patches[other], l);
       for (int i = 1; i < pieces_of_an_edge; ++i) {
-        const double s = static_cast<double>(i) / pieces_of_an_edge;
+        const double s = real(i) / pieces_of_an_edge;
         quality.gap = std::max(quality.gap, (point_on(here, s) - point_on(there, 1 - s)).norm());
       }
     }
@@ -94,9 +93,7 @@ void add_neighbours(const ShellMesh& shell, const std::vector<CubicPatch>& patch
 
 /// Mean distance from the target's facets, by their centroids, to the curved surface, mm.
 double mean_from_target(const ShellMesh& shell, const Target& target) {
-  const int level = std::clamp(
-      static_cast<int>(std::sqrt(10.0 * static_cast<double>(samples) / static_cast<double>(shell.triangles.size()))), 4,
-      24);
+  const int level = std::clamp(truncated<int>(std::sqrt(10.0 * real(samples) / real(shell.triangles.size()))), 4, 24);
   const ClosestPoint tree(tessellate_uniformly(shell, level).mesh);
   const TriangleMesh& mesh = target.mesh();
   TriangleMesh centroids;

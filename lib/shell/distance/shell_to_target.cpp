@@ -2,6 +2,7 @@
 // give lower bounds.
 #include "tunica/shell/distance/detail/certificate.hpp"
 
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/progress.hpp"
 #include "tunica/core/threads.hpp"
 #include "tunica/surface/distance/closest_point.hpp"
@@ -121,7 +122,7 @@ private:
     parallel_for_blocks(patches_.size(), items_per_block, [&](std::size_t begin, std::size_t end) {
       check_interrupt();
       for (std::size_t t = begin; t < end; ++t) {
-        cut_first(static_cast<Index>(t), bulge, blocks[begin / items_per_block]);
+        cut_first(narrow<Index>(t), bulge, blocks[begin / items_per_block]);
       }
     });
     return collected(blocks, aim_, lower_, settled_, farthest_, beyond_);
@@ -129,7 +130,7 @@ private:
 
   void cut_first(Index t, double bulge, Block& block) const {
     const double wanted = std::ceil(std::sqrt(flatness(patches_[t], 1) / bulge));
-    const int m = static_cast<int>(std::clamp(wanted, 2.0, static_cast<double>(most_level)));
+    const int m = truncated<int>(std::clamp(wanted, 2.0, real(most_level)));
     struct Point {
       Vec3 at;
       double distance;
@@ -139,7 +140,7 @@ private:
     std::optional<Index> guess;
     for (int r = 0; r <= m; ++r) {
       for (int c = 0; c <= m - r; ++c) {
-        const Vec3 p = patches_[t].point(Vec2(static_cast<double>(c) / m, static_cast<double>(r) / m));
+        const Vec3 p = patches_[t].point(Vec2(real(c) / m, real(r) / m));
         const auto hit = guess ? tree_.closest(p, *guess) : tree_.closest(p);
         guess = hit.triangle;
         points.push_back({p, std::sqrt(hit.squared_distance), hit.triangle});
@@ -151,7 +152,7 @@ private:
       for (std::size_t i = 0; i < 3; ++i) {
         const auto [c, r] = corners[i];
         const Point& p = points[r * (2 * m + 3 - r) / 2 + c];
-        piece.at[i] = Vec2(static_cast<double>(c) / m, static_cast<double>(r) / m);
+        piece.at[i] = Vec2(real(c) / m, real(r) / m);
         piece.corners.point[i] = p.at;
         piece.corners.distance[i] = p.distance;
         piece.corners.nearest[i] = p.nearest;
@@ -171,8 +172,7 @@ private:
   /// Settles the piece, keeps or lists it.
   void bound(Piece& piece, Block& block) const {
     const CornerFeet& c = piece.corners;
-    const auto far =
-        static_cast<std::size_t>(std::max_element(c.distance.begin(), c.distance.end()) - c.distance.begin());
+    const auto far = narrow<std::size_t>(std::max_element(c.distance.begin(), c.distance.end()) - c.distance.begin());
     if (aim_.is_listed(c.distance[far])) {
       block.beyond.push_back({c.point[far], piece.patch, piece.at[far], c.distance[far]});
     }

@@ -3,6 +3,7 @@
 #include "tunica/shell/patch/curved_surface.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/threads.hpp"
 #include "tunica/shell/patch/shape_function.hpp"
 #include "tunica/surface/mesh/incidence.hpp"
@@ -87,7 +88,7 @@ Tessellation tessellate_by(const ShellMesh& shell, const std::vector<CubicPatch>
   const std::size_t count = patches.size();
   std::vector<std::size_t> first_vertex(count + 1, 0), first_triangle(count + 1, 0);
   for (std::size_t t = 0; t < count; ++t) {
-    const auto m = static_cast<std::size_t>(levels[t]);
+    const std::size_t m = levels[t];
     first_vertex[t + 1] = first_vertex[t] + (m + 1) * (m + 2) / 2;
     first_triangle[t + 1] = first_triangle[t] + m * m;
   }
@@ -104,22 +105,22 @@ Tessellation tessellate_by(const ShellMesh& shell, const std::vector<CubicPatch>
     for (std::size_t t = begin; t < end; ++t) {
       const int m = levels[t];
       // Row r holds the points with b3 = r / m; its first vertex stands at row_start(r).
-      const auto row_start = [&](int r) { return first_vertex[t] + static_cast<std::size_t>(r * (2 * m + 3 - r) / 2); };
+      const auto row_start = [&](int r) { return first_vertex[t] + narrow<std::size_t>(r * (2 * m + 3 - r) / 2); };
       std::size_t triangle = first_triangle[t];
       for (int r = 0; r <= m; ++r) {
         for (int c = 0; c <= m - r; ++c) {
-          const std::size_t v = row_start(r) + static_cast<std::size_t>(c);
-          const Vec2 b(static_cast<double>(c) / m, static_cast<double>(r) / m);
+          const std::size_t v = row_start(r) + narrow<std::size_t>(c);
+          const Vec2 b(real(c) / m, real(r) / m);
           out.barycentric[v] = b;
-          out.vertex_shell[v] = static_cast<Index>(t);
+          out.vertex_shell[v] = narrow<Index>(t);
           out.mesh.vertices[v] = patches[t].point(b);
           if (c < m - r) {
-            const auto here = static_cast<Index>(v);
-            const auto above = static_cast<Index>(row_start(r + 1) + static_cast<std::size_t>(c));
-            out.shell[triangle] = static_cast<Index>(t);
+            const auto here = narrow<Index>(v);
+            const auto above = narrow<Index>(row_start(r + 1) + narrow<std::size_t>(c));
+            out.shell[triangle] = narrow<Index>(t);
             out.mesh.triangles[triangle++] = {here, here + 1, above};
             if (c + 1 < m - r) {
-              out.shell[triangle] = static_cast<Index>(t);
+              out.shell[triangle] = narrow<Index>(t);
               out.mesh.triangles[triangle++] = {here + 1, above + 1, above};
             }
           }
@@ -128,7 +129,7 @@ Tessellation tessellate_by(const ShellMesh& shell, const std::vector<CubicPatch>
       // The corners are the nodes themselves, to the bit.
       const auto corners = corners_of(shell, t);
       out.mesh.vertices[row_start(0)] = corners[0];
-      out.mesh.vertices[row_start(0) + static_cast<std::size_t>(m)] = corners[1];
+      out.mesh.vertices[row_start(0) + narrow<std::size_t>(m)] = corners[1];
       out.mesh.vertices[row_start(m)] = corners[2];
     }
   });
@@ -305,9 +306,9 @@ std::vector<CubicPatch> curved_patches(const ShellMesh& shell) {
         for (std::size_t l = 0; other != no_neighbour && l < 3; ++l) {
           const Index v = shell.triangles[other][l];
           if (v == shell.triangles[t][k]) {
-            across[k][0] = shell.normal(other, static_cast<int>(l));
+            across[k][0] = shell.normal(other, l);
           } else if (v == shell.triangles[t][(k + 1) % 3]) {
-            across[k][1] = shell.normal(other, static_cast<int>(l));
+            across[k][1] = shell.normal(other, l);
           }
         }
       }
@@ -384,9 +385,7 @@ void require_fit(const ShellMesh& shell, const std::string& name) {
   }
 }
 
-double flatness(const CubicPatch& patch, int level) {
-  return coarsest_flatness(patch) / (static_cast<double>(level) * static_cast<double>(level));
-}
+double flatness(const CubicPatch& patch, int level) { return coarsest_flatness(patch) / (real(level) * real(level)); }
 
 double tessellation_size(const ShellMesh& shell, double deviation) {
   double total = 0;
@@ -404,13 +403,13 @@ Tessellation tessellate(const ShellMesh& shell, double deviation, std::size_t mo
   for (std::size_t t = 0; t < patches.size(); ++t) {
     const double level = level_for(patches[t], deviation);
     total += level * level;
-    if (!(total <= static_cast<double>(most_triangles))) {
+    if (!(total <= real(most_triangles))) {
       throw RequirementError(
           fmt::format("the curved surface within {:.3g} mm would need more than {} fine triangles; "
                       "allow a larger deviation",
                       deviation, most_triangles));
     }
-    levels[t] = static_cast<int>(level);
+    levels[t] = truncated<int>(level);
   }
   return tessellate_by(shell, patches, levels);
 }
@@ -461,8 +460,8 @@ double curved_volume(const ShellMesh& shell) {
     }
   }
   for (const auto& [edge, a] : half_edges) {
-    const auto from = static_cast<Index>(edge >> 32);
-    const auto to = static_cast<Index>(edge);
+    const auto from = narrow<Index>(edge >> 32);
+    const auto to = narrow<Index>(edge);
     const auto opposite = half_edges.find(key(to, from));
     if (opposite == half_edges.end()) {
       throw InputError("the surface is open: it encloses no volume");

@@ -1,5 +1,6 @@
 #include "tunica/shell/patch/refine.hpp"
 
+#include "tunica/core/narrow.hpp"
 #include "tunica/shell/patch/curved_surface.hpp"
 #include "tunica/surface/mesh/measure.hpp"
 
@@ -31,12 +32,12 @@ Edges edges_of(const ShellMesh& shell) {
     for (std::size_t k = 0; k < 3; ++k) {
       const Index a = shell.triangles[t][k], b = shell.triangles[t][(k + 1) % 3];
       const auto key = (std::uint64_t{std::min(a, b)} << 32) | std::max(a, b);
-      const auto [at, is_new] = number.try_emplace(key, static_cast<Index>(edges.ends.size()));
+      const auto [at, is_new] = number.try_emplace(key, narrow<Index>(edges.ends.size()));
       if (is_new) {
         edges.ends.push_back({std::min(a, b), std::max(a, b)});
-        edges.triangles.push_back({static_cast<Index>(t), none});
+        edges.triangles.push_back({narrow<Index>(t), none});
       } else {
-        edges.triangles[at->second][1] = static_cast<Index>(t);
+        edges.triangles[at->second][1] = narrow<Index>(t);
       }
       edges.of_triangle[t][k] = at->second;
     }
@@ -61,7 +62,7 @@ std::size_t longest(const ShellMesh& shell, const Edges& edges, std::size_t t) {
 
 std::size_t place_of(const Edges& edges, std::size_t t, Index edge) {
   const auto& own = edges.of_triangle[t];
-  return static_cast<std::size_t>(std::find(own.begin(), own.end(), edge) - own.begin());
+  return std::find(own.begin(), own.end(), edge) - own.begin();
 }
 
 /// Whether the normals at an end of an edge differ from one side to the other.
@@ -146,7 +147,7 @@ std::vector<Middle> add_middles(const ShellMesh& shell, const Edges& edges, cons
     for (std::size_t side = 0; side < 2; ++side) {
       const Index t = edges.triangles[e][side];
       if (t != none) {
-        const std::size_t k = place_of(edges, t, static_cast<Index>(e));
+        const std::size_t k = place_of(edges, t, narrow<Index>(e));
         const Vec2 at(halfway[k][0], halfway[k][1]);
         point += patches[t].point(at);
         normals[side] = patches[t].normal(at);
@@ -157,10 +158,10 @@ std::vector<Middle> add_middles(const ShellMesh& shell, const Edges& edges, cons
       normals[1] = normals[0];
     }
     const Vec3 mean = (normals[0] + normals[1]).stableNormalized();
-    if (!is_crease(shell, edges, static_cast<Index>(e))) {
+    if (!is_crease(shell, edges, narrow<Index>(e))) {
       normals = {mean, mean};
     }
-    node = static_cast<Index>(out.vertices.size());
+    node = narrow<Index>(out.vertices.size());
     out.vertices.emplace_back(point / sides);
     out.normals.push_back(mean);
   }

@@ -21,9 +21,8 @@ struct ShellMesh {
   std::vector<std::array<Vec3, 3>> corner_normals;  ///< empty, or #F: unit normals at each triangle's corners
   Patch patch = Patch::comas;
 
-  [[nodiscard]] const Vec3& normal(std::size_t triangle, int corner) const {
-    return corner_normals.empty() ? normals[triangles[triangle][static_cast<std::size_t>(corner)]]
-                                  : corner_normals[triangle][static_cast<std::size_t>(corner)];
+  [[nodiscard]] const Vec3& normal(std::size_t triangle, std::size_t corner) const {
+    return corner_normals.empty() ? normals[triangles[triangle][corner]] : corner_normals[triangle][corner];
   }
 };
 

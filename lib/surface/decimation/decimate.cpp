@@ -1,6 +1,7 @@
 #include "tunica/surface/decimation/decimate.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/surface/decimation/degenerate.hpp"
 #include "tunica/surface/decimation/detail/edge_collapse.hpp"
 #include "tunica/surface/decimation/detail/levelling.hpp"
@@ -18,12 +19,12 @@
 namespace tunica {
 namespace {
 
-/// The greedy order's next collapses, of the triangles: from them comes what is spent where the error is largest.
 constexpr std::size_t hopeless_count = 4;  // times the triangles that the error alone takes
 /// A well-shaped mesh whose error is below this share of the one allowed says that fewer triangles can do, whatever
 /// became of a mesh with fewer: errors of single counts scatter by a tenth.
 constexpr double much_below = 0.8;
-constexpr int most_attempts = 14, attempts_below = 7;
+constexpr int most_attempts = 14, attempts_below = 7;  // counts; their bisection ends at 4 %
+/// The greedy order's next collapses, of the triangles: from them comes what is spent where the error is largest.
 constexpr double more_collapses = 0.1;
 /// Where more than this share of the triangles stays there is no levelling: finding the places that it should mend
 /// would take longer than all collapses.
@@ -66,7 +67,7 @@ TriangleMesh replay(const TriangleMesh& mesh, const std::vector<Collapse>& histo
     }
     for (Index& v : corners) {
       if (renumbered[v] == unused) {
-        renumbered[v] = static_cast<Index>(result.vertices.size());
+        renumbered[v] = narrow<Index>(result.vertices.size());
         result.vertices.push_back(position[v]);
       }
       v = renumbered[v];
@@ -94,7 +95,7 @@ TriangleMesh level(const TriangleMesh& mesh, const EdgeCollapse& collapse, std::
   options.triangles = coarse.triangles.size();
   options.thorough = thorough;
   options.closed = !collapse.has_boundary();
-  const auto end = static_cast<std::size_t>((1 - more_collapses) * static_cast<double>(options.triangles));
+  const auto end = truncated<std::size_t>((1 - more_collapses) * real(options.triangles));
   for (std::size_t i = steps; i < history.size() && history[i].triangles_left >= end; ++i) {
     const Collapse& further = history[i];
     options.collapses.push_back(
@@ -131,13 +132,13 @@ public:
     const double width = std::log(remaining(holds) / remaining(fails));
     while (fails - holds > 1 && remaining(holds) - remaining(fails) > 1e-3 * remaining(fails)) {
       const double middle = std::sqrt(remaining(holds) * remaining(fails));
-      const auto steps = std::clamp(static_cast<std::size_t>(remaining(0) - middle), holds + 1, fails - 1);
+      const auto steps = std::clamp(truncated<std::size_t>(remaining(0) - middle), holds + 1, fails - 1);
       (try_steps(steps) ? holds : fails) = steps;
       advance(progress, 1 - std::log(remaining(holds) / remaining(fails)) / width);
     }
     // The error need not grow at every step: somewhat later it may hold again.
     for (const double further : {0.99, 0.97, 0.95, 0.92, 0.88}) {
-      const auto steps = static_cast<std::size_t>(remaining(0) - further * remaining(holds));
+      const auto steps = truncated<std::size_t>(remaining(0) - further * remaining(holds));
       if (steps < history_.size() && steps > holds) {
         try_steps(steps);
       }
@@ -149,21 +150,20 @@ public:
   }
 
 private:
-  [[nodiscard]] double remaining(std::size_t steps) const { return static_cast<double>(history_.size() + 4 - steps); }
+  [[nodiscard]] double remaining(std::size_t steps) const { return real(history_.size() + 4 - steps); }
 
   // Fewer triangles, their largest error lessened.
   void level_further() {
-    double holds = static_cast<double>(best_.triangles.size());
+    double holds = real(best_.triangles.size());
     double fails = least_levelled * holds;
     for (int step = 0; step < level_steps && fails + 1 < holds; ++step) {
       const double middle = std::sqrt(holds * fails);
-      const auto found = std::find_if(history_.begin(), history_.end(), [&](const Collapse& c) {
-        return static_cast<double>(c.triangles_left) <= middle;
-      });
+      const auto found = std::find_if(history_.begin(), history_.end(),
+                                      [&](const Collapse& c) { return real(c.triangles_left) <= middle; });
       if (found == history_.end()) {
         return;
       }
-      const auto steps = static_cast<std::size_t>(found + 1 - history_.begin());
+      const std::size_t steps = found + 1 - history_.begin();
       (accept(level(mesh_, collapse_, steps, true)) ? holds : fails) = middle;
     }
   }
@@ -235,7 +235,7 @@ private:
   // The error falls as one over the count, or slower: the step is bounded both ways.
   [[nodiscard]] std::size_t grown(std::size_t count, const Interval& error) const {
     const double factor = std::clamp(1.02 * error.upper / *options_.max_error, 0.25, 4.0);
-    return static_cast<std::size_t>(factor * static_cast<double>(count));
+    return truncated<std::size_t>(factor * real(count));
   }
 
   // The fewest triangles that keep the error and the angle, to some percent; where none of those looked at keep both,
@@ -268,7 +268,7 @@ private:
         break;
       }
       count = grown(count, *found.error);
-      const bool done = static_cast<double>(holds) < 1.04 * static_cast<double>(fails);
+      const bool done = real(holds) < 1.04 * real(fails);
       if (done && best && best->error->upper < much_below * *options_.max_error && holds < looked_below) {
         looked_below = holds;
         attempts = step + 1 + attempts_below;
@@ -277,7 +277,7 @@ private:
       } else if (done || fails >= mesh_.triangles.size()) {
         break;
       } else if (fails > 0 && (count <= fails || count >= holds)) {
-        count = static_cast<std::size_t>(std::sqrt(static_cast<double>(fails) * static_cast<double>(holds)));
+        count = truncated<std::size_t>(std::sqrt(real(fails) * real(holds)));
       }
     }
     if (best) {
@@ -297,7 +297,7 @@ private:
     const auto& history = collapse_.history();
     const auto enough =
         std::find_if(history.begin(), history.end(), [&](const Collapse& c) { return c.triangles_left <= count; });
-    const auto steps = static_cast<std::size_t>(std::min(enough + 1, history.end()) - history.begin());
+    const std::size_t steps = std::min(enough + 1, history.end()) - history.begin();
     const bool all_of_it = count >= mesh_.triangles.size();
     ShapingOptions shape;
     shape.min_angle = *options_.min_angle;
@@ -340,7 +340,7 @@ private:
 
 /// @param mesh  without degenerate triangles, but where they cannot go
 DecimateResult decimate_sound(const TriangleMesh& mesh, const DecimateOptions& options) {
-  const double share = static_cast<double>(options.triangles.value_or(0)) / static_cast<double>(mesh.triangles.size());
+  const double share = real(options.triangles.value_or(0)) / real(mesh.triangles.size());
   const bool to_count = options.levelled && !options.max_error && !options.min_angle;
   EdgeCollapse collapse(mesh, options.min_angle          ? EdgeCollapse::Aim::good_shape
                               : to_count && share > much ? EdgeCollapse::Aim::few_collapses
@@ -365,7 +365,7 @@ DecimateResult decimate_sound(const TriangleMesh& mesh, const DecimateOptions& o
   } else {
     const std::size_t steps = collapse.history().size();
     if (to_count && share <= much && steps > 0 && collapse.history().back().triangles_left <= *options.triangles) {
-      collapse.run(static_cast<std::size_t>((1 - more_collapses) * static_cast<double>(*options.triangles)), {});
+      collapse.run(truncated<std::size_t>((1 - more_collapses) * real(*options.triangles)), {});
       result.mesh = level(mesh, collapse, steps, false);
     } else {
       result.mesh = replay(mesh, collapse.history(), steps);

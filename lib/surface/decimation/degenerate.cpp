@@ -295,9 +295,9 @@ bool is_degenerate(const Vec3& a, const Vec3& b, const Vec3& c) {
 }
 
 std::size_t count_degenerate(const TriangleMesh& mesh) {
-  return static_cast<std::size_t>(std::count_if(mesh.triangles.begin(), mesh.triangles.end(), [&](const auto& c) {
+  return std::count_if(mesh.triangles.begin(), mesh.triangles.end(), [&](const auto& c) {
     return is_degenerate(mesh.vertices[c[0]], mesh.vertices[c[1]], mesh.vertices[c[2]]);
-  }));
+  });
 }
 
 WithoutDegenerate without_degenerate_triangles(const TriangleMesh& mesh, double longest_spike) {

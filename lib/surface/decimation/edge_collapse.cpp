@@ -1,6 +1,7 @@
 #include "tunica/surface/decimation/detail/edge_collapse.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/surface/decimation/degenerate.hpp"
 #include "tunica/surface/distance/facet_distances.hpp"
 #include "tunica/surface/mesh/measure.hpp"
@@ -69,10 +70,10 @@ double height_over_longest(double doubled_area, const Vec3& p, const Vec3& a, co
 }  // namespace
 
 Vec3 EdgeCollapse::Curve::at(double place) const {
-  const auto n = static_cast<double>(points.size());
+  const auto n = real(points.size());
   const double wrapped = place >= n ? place - n : place;
-  const auto i = std::min(points.size() - 1, static_cast<std::size_t>(wrapped));
-  const double fraction = wrapped - static_cast<double>(i);
+  const auto i = std::min(points.size() - 1, truncated<std::size_t>(wrapped));
+  const double fraction = wrapped - real(i);
   return fraction == 0 ? points[i] : Vec3(points[i] + fraction * (points[(i + 1) % points.size()] - points[i]));
 }
 
@@ -98,7 +99,7 @@ bool EdgeCollapse::number_vertices(const TriangleMesh& mesh) {
   for (const auto& triangle : mesh.triangles) {
     for (const Index v : triangle) {
       if (number_[v] == none) {
-        number_[v] = static_cast<Index>(vertex_.size());
+        number_[v] = narrow<Index>(vertex_.size());
         given_.push_back(v);
         vertex_.push_back({});
         vertex_.back().position = (mesh.vertices[v] - centre_) / scale_;
@@ -144,7 +145,7 @@ bool EdgeCollapse::connect(const TriangleMesh& mesh) {
       edge = known[edge].before;
     }
     if (edge == none) {
-      half_[h].edge = static_cast<Index>(known.size());
+      half_[h].edge = narrow<Index>(known.size());
       known.push_back({far, last[near]});
       last[near] = half_[h].edge;
       half_of_.push_back(h);
@@ -187,8 +188,8 @@ void EdgeCollapse::find_boundary() {
     }
     Curve curve;
     for (Index v = first; vertex_[v].curve == none; v = to(vertex_[v].outgoing)) {
-      vertex_[v].curve = static_cast<Index>(curves_.size());
-      curve_place_[v] = static_cast<double>(curve.points.size());
+      vertex_[v].curve = narrow<Index>(curves_.size());
+      curve_place_[v] = real(curve.points.size());
       curve.points.push_back(vertex_[v].position);
     }
     curves_.push_back(std::move(curve));
@@ -276,8 +277,8 @@ void EdgeCollapse::fill_heap() {
 
 std::size_t EdgeCollapse::run(std::size_t triangles, const Progress& progress, bool in_order) {
   const std::size_t start = triangles_;
-  const double work = static_cast<double>(start - std::min(start, triangles));
-  const Progress part = [&](double) { tunica::advance(progress, static_cast<double>(start - triangles_) / work); };
+  const double work = real(start - std::min(start, triangles));
+  const Progress part = [&](double) { tunica::advance(progress, real(start - triangles_) / work); };
   const auto& all_limits = aim_ == Aim::good_shape ? good_shape_limits : shape_limits;
   if (!in_order && aim_ == Aim::least_error && triangles > 0 && triangles_ > sweep_factor * triangles) {
     limits_ = all_limits[0];
@@ -476,7 +477,7 @@ std::optional<EdgeCollapse::Target> EdgeCollapse::target(HalfEdge h, Placement p
 /// The place on the boundary curve between the ends of a boundary edge where the quadric is least.
 EdgeCollapse::Target EdgeCollapse::best_on_curve(HalfEdge h, const Quadric& q) const {
   const Curve& curve = curves_[vertex_[from(h)].curve];
-  const auto n = static_cast<double>(curve.points.size());
+  const auto n = real(curve.points.size());
   const double begin = curve_place_[from(h)];
   double end = curve_place_[to(h)];
   if (end <= begin) {
@@ -669,7 +670,7 @@ void EdgeCollapse::collapse(HalfEdge h, const Target& chosen) {
   if (b != none) {
     keep_outgoing(b, o, next(o));
   }
-  history_.push_back({given_[u], given_[v], static_cast<Index>(triangles_), centre_ + scale_ * chosen.position});
+  history_.push_back({given_[u], given_[v], narrow<Index>(triangles_), centre_ + scale_ * chosen.position});
 }
 
 }  // namespace tunica

@@ -1,4 +1,5 @@
 // The early part of a decimation: many collapses at once, in the order of memory.
+#include "tunica/core/narrow.hpp"
 #include "tunica/surface/decimation/detail/edge_collapse.hpp"
 
 #include <algorithm>
@@ -107,7 +108,7 @@ double EdgeCollapse::cost_quantile(double fraction) const {
       costs.push_back(sweep_cost_[edge]);
     }
   }
-  const auto at = costs.begin() + static_cast<std::ptrdiff_t>(fraction * static_cast<double>(costs.size() - 1));
+  const auto at = costs.begin() + truncated<std::size_t>(fraction * real(costs.size() - 1));
   std::nth_element(costs.begin(), at, costs.end());
   return std::min(*at, std::numeric_limits<double>::max());
 }
@@ -132,7 +133,7 @@ void EdgeCollapse::compact() {
   std::vector<Quadric> wall;
   std::vector<Index> given;
   for (std::size_t t = 0; t < alive.size(); ++t) {
-    for (HalfEdge h = static_cast<HalfEdge>(3 * t); alive[t] != 0 && h < 3 * t + 3; ++h) {
+    for (HalfEdge h = narrow<HalfEdge>(3 * t); alive[t] != 0 && h < 3 * t + 3; ++h) {
       new_half[h] = halves++;
       const Index v = from(h);
       if (new_vertex[v] == none) {

@@ -1,4 +1,5 @@
 #include "tunica/surface/decimation/detail/edit_mesh.hpp"
+#include "tunica/core/narrow.hpp"
 
 namespace tunica {
 namespace {
@@ -28,7 +29,7 @@ EditMesh::EditMesh(const TriangleMesh& mesh)
   for (std::size_t t = 0; t < triangles.size(); ++t) {
     for (std::size_t k = 0; k < 3; ++k) {
       const Index v = triangles[t][k];
-      around[v].push_back(static_cast<Index>(t));
+      around[v].push_back(narrow<Index>(t));
       following[v] += triangles[t][(k + 1) % 3];
       preceding[v] += triangles[t][(k + 2) % 3];
     }
@@ -101,7 +102,7 @@ bool EditMesh::may_flip(Index u, Index v) const {
 Index EditMesh::add_triangle(const std::array<Index, 3>& corners) {
   Index t = 0;
   if (free_triangles.empty()) {
-    t = static_cast<Index>(triangles.size());
+    t = narrow<Index>(triangles.size());
     triangles.push_back(corners);
   } else {
     t = free_triangles.back();
@@ -128,7 +129,7 @@ Index EditMesh::add_vertex(const Vec3& position, bool boundary) {
   positions.push_back(position);
   around.emplace_back();
   on_boundary.push_back(boundary ? 1 : 0);
-  return static_cast<Index>(positions.size() - 1);
+  return narrow<Index>(positions.size() - 1);
 }
 
 std::vector<std::array<Index, 2>> EditMesh::edges() const {
@@ -156,7 +157,7 @@ TriangleMesh EditMesh::mesh() const {
     auto corners = c;
     for (Index& v : corners) {
       if (renumbered[v] == none) {
-        renumbered[v] = static_cast<Index>(result.vertices.size());
+        renumbered[v] = narrow<Index>(result.vertices.size());
         result.vertices.push_back(positions[v]);
       }
       v = renumbered[v];

@@ -1,5 +1,6 @@
 #include "tunica/surface/decimation/detail/levelling.hpp"
 
+#include "tunica/core/narrow.hpp"
 #include "tunica/surface/decimation/detail/shape_patch.hpp"
 #include "tunica/surface/distance/facet_distances.hpp"
 #include "tunica/surface/distance/surface_walk.hpp"
@@ -42,9 +43,9 @@ constexpr std::size_t shaped_work_per_triangle = 20'000;  // of the mesh, where 
 std::size_t levelling_work(std::size_t given, std::size_t left, bool thorough) {
   const std::size_t collapsed = given - std::min(given, left);
   const std::size_t work = std::max({least_work, work_per_collapsed * collapsed, work_per_triangle * given});
-  const double share = static_cast<double>(left) / static_cast<double>(given);
+  const double share = real(left) / real(given);
   const double much = thorough ? 0 : std::clamp((share - much_stays[0]) / (much_stays[1] - much_stays[0]), 0.0, 1.0);
-  return static_cast<std::size_t>((1 - 0.5 * much) * static_cast<double>(work));
+  return truncated<std::size_t>((1 - 0.5 * much) * real(work));
 }
 constexpr double good_shape_weight = 0.3;  // of the lack of radius ratio, where shape counts
 constexpr double hard_angle_weight = 1e6;  // so that no angle gets too small
@@ -87,22 +88,20 @@ private:
 
   // Target triangles that are as large as the mesh's need points within. The mesh's mean edge is 1.5 steps long.
   void add_within() {
-    const double step = std::sqrt(area(mesh_) / static_cast<double>(mesh_.triangles.size()));
+    const double step = std::sqrt(area(mesh_) / real(mesh_.triangles.size()));
     const std::vector<int> parts_of = parts_for_points(
         target_,
         [&](double longest) {
           return longest > large_triangle * step ? std::min(std::ceil(longest / step), most_parts) : 0;
         },
-        static_cast<double>(many_vertices * mesh_.triangles.size()));
+        real(many_vertices * mesh_.triangles.size()));
     for (Index t = 0; t < target_.triangles.size(); ++t) {
       const auto& c = target_.triangles[t];
       const std::array<Vec3, 3> p{target_.vertices[c[0]], target_.vertices[c[1]], target_.vertices[c[2]]};
       const int parts = parts_of[t];
       for (int i = 0; i <= parts; ++i) {
         for (int j = i == 0 ? 1 : 0; i + j <= parts && i < parts && j < parts; ++j) {
-          given_.push_back(
-              {p[0] + (static_cast<double>(i) * (p[1] - p[0]) + static_cast<double>(j) * (p[2] - p[0])) / parts,
-               stands_for_[c[0]]});
+          given_.push_back({p[0] + (real(i) * (p[1] - p[0]) + real(j) * (p[2] - p[0])) / parts, stands_for_[c[0]]});
         }
       }
     }
@@ -143,7 +142,7 @@ private:
           nearest.try_facet(facets[t], p, t);
         }
         for (std::size_t s = first; s < std::min(first + lane_count, end); ++s) {
-          samples_.owner[s] = static_cast<Index>(nearest.which[s - first]);
+          samples_.owner[s] = truncated<Index>(nearest.which[s - first]);
           samples_.squared[s] = nearest.squared[s - first];
         }
       }

@@ -1,5 +1,6 @@
 #include "tunica/surface/decimation/detail/shape_patch.hpp"
 
+#include "tunica/core/narrow.hpp"
 #include "tunica/surface/distance/facet_distances.hpp"
 #include "tunica/surface/distance/surface_walk.hpp"
 #include "tunica/surface/mesh/incidence.hpp"
@@ -44,7 +45,7 @@ TargetSamples sample_target(const TriangleMesh& mesh, const TriangleMesh& target
   TargetSamples samples;
   // The target's vertices, every n-th in the order of its tree; with few of them the triangles' centres as well.
   const std::size_t wanted = samples_per_triangle * mesh.triangles.size();
-  const double per_triangle = static_cast<double>(wanted) / static_cast<double>(target.triangles.size());
+  const double per_triangle = real(wanted) / real(target.triangles.size());
   std::vector<bool> taken(target.vertices.size(), false);
   double due = 0;
   for (const Index t : tree.spatial_order()) {
@@ -80,9 +81,8 @@ ShapedMesh::ShapedMesh(const TriangleMesh& mesh, const TriangleMesh& target, Nea
       target_(target),
       nearest_(std::move(nearest)),
       curves_(curves),
-      parts_(static_cast<int>(std::clamp(
-          std::sqrt(static_cast<double>(target.triangles.size()) / static_cast<double>(mesh.triangles.size())), 4.0,
-          8.0))),
+      parts_(
+          truncated<int>(std::clamp(std::sqrt(real(target.triangles.size()) / real(mesh.triangles.size())), 4.0, 8.0))),
       sample_(std::move(samples.points)),
       on_target_(std::move(samples.on_target)),
       states_(mesh.triangles.size()),
@@ -101,7 +101,7 @@ ShapedMesh::ShapedMesh(const TriangleMesh& mesh, const TriangleMesh& target, Nea
   }
   for (std::size_t s = 0; s < sample_.size(); ++s) {
     State& state = states_[samples.owner[s]];
-    state.samples.push_back(static_cast<Index>(s));
+    state.samples.push_back(narrow<Index>(s));
     state.error = std::max(state.error, samples.squared[s]);
   }
   for (State& state : states_) {
@@ -252,7 +252,7 @@ void ShapedMesh::measure_corners(const NearestPoint& nearest) {
 void ShapedMesh::measure_all() {
   measure_corners(nearest_);
   for (std::size_t t = 0; t < states_.size(); ++t) {
-    measure_middle(static_cast<Index>(t), nearest_);
+    measure_middle(narrow<Index>(t), nearest_);
   }
 }
 
@@ -286,7 +286,7 @@ double ShapedMesh::squared_within(const std::array<Vec3, 3>& c, Index guess, dou
     for (int j = 0; i + j <= parts; ++j) {
       const bool corner = i == parts || j == parts || i + j == 0;
       if (!corner) {
-        try_point(c[0] + (static_cast<double>(i) * (c[1] - c[0]) + static_cast<double>(j) * (c[2] - c[0])) / parts);
+        try_point(c[0] + (real(i) * (c[1] - c[0]) + real(j) * (c[2] - c[0])) / parts);
       }
     }
   }
@@ -377,7 +377,7 @@ bool ShapedMesh::make_collapse(Index u, Index v, PatchTrial& trial) const {
 void ShapedMesh::make_split(Index u, Index v, PatchTrial& trial) const {
   trial.removed.clear();
   trial.corners.clear();
-  trial.moved = static_cast<Index>(mesh_.positions.size());
+  trial.moved = narrow<Index>(mesh_.positions.size());
   trial.position = middle(u, v);
   for (const Index t : mesh_.on_edge(u, v)) {
     if (t != EditMesh::none) {
@@ -394,7 +394,7 @@ void ShapedMesh::make_split(Index u, Index v, PatchTrial& trial) const {
 void ShapedMesh::make_centre_split(Index t, PatchTrial& trial) const {
   const auto& c = mesh_.triangles[t];
   trial.removed = {t};
-  trial.moved = static_cast<Index>(mesh_.positions.size());
+  trial.moved = narrow<Index>(mesh_.positions.size());
   const Vec3 centre = (mesh_.positions[c[0]] + mesh_.positions[c[1]] + mesh_.positions[c[2]]) / 3;
   trial.position = nearest_(centre, states_[t].guess, exact).point;
   trial.corners = {{c[0], c[1], trial.moved}, {c[1], c[2], trial.moved}, {c[2], c[0], trial.moved}};
@@ -546,12 +546,12 @@ bool ShapedMesh::assign_samples(PatchTrial& trial, const std::array<Vec3, 3>* c,
         [&](std::size_t lane) -> const Vec3& { return sample_[trial.samples[std::min(first + lane, end - 1)]]; });
     NearestFacet nearest;
     for (std::size_t i = 0; i < facets.size(); ++i) {
-      nearest.try_facet(facets[i], p, static_cast<double>(i));
+      nearest.try_facet(facets[i], p, real(i));
     }
     for (std::size_t s = first; s < std::min(first + lane_count, end); ++s) {
       const double squared = nearest.squared[s - first];
-      const auto owner = static_cast<std::size_t>(nearest.which[s - first]);
-      trial.owner[s] = static_cast<Index>(owner);
+      const auto owner = truncated<std::size_t>(nearest.which[s - first]);
+      trial.owner[s] = narrow<Index>(owner);
       if (squared > squared_error[owner]) {
         squared_error[owner] = squared;
         double& error = trial.error[owner];

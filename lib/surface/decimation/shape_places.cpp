@@ -74,7 +74,7 @@ Vec3 ShapedMesh::proposal(const PatchTrial& trial, double pull) const {
   LeastSquares fit;
   const auto corner = [&](std::size_t i) {
     const auto& c = trial.corners[i];
-    return static_cast<std::size_t>(std::find(c.begin(), c.end(), trial.moved) - c.begin());
+    return std::find(c.begin(), c.end(), trial.moved) - c.begin();
   };
   for (const auto& triangle : trial.corners) {
     fit.add_triangle(corners(triangle, trial));

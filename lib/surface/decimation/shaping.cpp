@@ -1,5 +1,6 @@
 #include "tunica/surface/decimation/detail/shaping.hpp"
 
+#include "tunica/core/narrow.hpp"
 #include "tunica/surface/decimation/detail/levelling.hpp"
 #include "tunica/surface/decimation/detail/shape_patch.hpp"
 #include "tunica/surface/mesh/incidence.hpp"
@@ -14,8 +15,8 @@
 namespace tunica {
 namespace {
 
-constexpr int rounds = 8;
-constexpr int mending_rounds = 24;
+constexpr int rounds = 8;             // over all triangles: the last gain less than 1 %
+constexpr int mending_rounds = 24;    // over those that miss the angle, which are few
 constexpr double large_error = 0.85;  // quantile of the triangles' errors that counts as large
 constexpr double safe_angle = 1.04;   // of the angle asked for: what is worked towards
 /// Of these, what a change may leave: as much as an edge of twice the length sags, which shape may ask for.
@@ -23,9 +24,9 @@ constexpr double most_large_errors = 4;
 constexpr double least_shaping_gain = 1e-4;  // smaller ones are not worth another look at the neighbours
 constexpr double good_quality = 0.875;       // mean radius ratio that is worked towards
 constexpr double least_quality = 0.86;       // below it there are further rounds
-constexpr int further_rounds = 6;
-constexpr double most_loss = 4;  // that a collapse may cost so that a split elsewhere may win more
-constexpr double crease_cosine = 0.5;
+constexpr int further_rounds = 6;            // each weighs shape twice as much at most
+constexpr double most_loss = 4;              // that a collapse may cost so that a split elsewhere may win more
+constexpr double crease_cosine = 0.5;        // of 60 degrees, as in lib/fit: the angle there is the input's own
 
 // Whether the surface around a vertex has a sector between boundary or crease edges that is narrower than `limit`.
 bool has_sharp_sector(const TriangleMesh& mesh, Index v, std::span<const Index> triangles,
@@ -37,7 +38,7 @@ bool has_sharp_sector(const TriangleMesh& mesh, Index v, std::span<const Index> 
   };
   const auto corner = [&](Index t) {
     const auto& c = mesh.triangles[t];
-    return static_cast<std::size_t>(std::find(c.begin(), c.end(), v) - c.begin());
+    return std::find(c.begin(), c.end(), v) - c.begin();
   };
   const auto is_feature = [&](Index t, Index other) {
     return other == no_neighbour || normal(t).dot(normal(other)) < crease_cosine;
@@ -162,7 +163,7 @@ public:
         fill();
         trade();
       }
-      advance(options_.progress, static_cast<double>(round + 1) / (rounds + 1));
+      advance(options_.progress, real(round + 1) / (rounds + 1));
     }
     for (int round = 0; round < further_rounds && mean_quality(mesh().mesh()) < least_quality; ++round) {
       improve();
@@ -188,7 +189,7 @@ private:
   void adapt() {
     std::vector<double> errors;
     for_each_triangle(mesh(), [&](Index t) { errors.push_back(state_.error(t)); });
-    const auto at = errors.begin() + static_cast<std::ptrdiff_t>(large_error * static_cast<double>(errors.size() - 1));
+    const auto at = errors.begin() + truncated<std::size_t>(large_error * real(errors.size() - 1));
     std::nth_element(errors.begin(), at, errors.end());
     weights_.error = std::max(*at, 1e-9 * weights_.error);
     weights_.most_error = most_large_errors * weights_.error;

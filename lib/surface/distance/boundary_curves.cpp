@@ -1,5 +1,6 @@
 #include "tunica/surface/distance/boundary_curves.hpp"
 
+#include "tunica/core/narrow.hpp"
 #include "tunica/surface/mesh/incidence.hpp"
 
 #include <algorithm>
@@ -12,7 +13,7 @@ TriangleMesh segments_as_triangles(const std::vector<std::array<Vec3, 2>>& segme
   out.vertices.reserve(2 * segments.size());
   out.triangles.reserve(segments.size());
   for (const auto& [a, b] : segments) {
-    const auto first = static_cast<Index>(out.vertices.size());
+    const auto first = narrow<Index>(out.vertices.size());
     out.vertices.push_back(a);
     out.vertices.push_back(b);
     out.triangles.push_back({first, first + 1, first + 1});
@@ -40,14 +41,14 @@ Index BoundaryCurves::curve_of(const std::vector<Vec3>& loop) const {
   for (std::size_t c = 0; c < curves_.size(); ++c) {
     double farthest = 0;
     for (const Vec3& p : loop) {
-      farthest = std::max(farthest, (p - point(nearest(p, static_cast<Index>(c)))).norm());
+      farthest = std::max(farthest, (p - point(nearest(p, narrow<Index>(c)))).norm());
       if (farthest >= least) {
         break;
       }
     }
     if (farthest < least) {
       least = farthest;
-      best = static_cast<Index>(c);
+      best = narrow<Index>(c);
     }
   }
   return best;
@@ -74,7 +75,7 @@ BoundaryCurves::Place BoundaryCurves::nearest(const Vec3& p, Index index) const 
 Vec3 BoundaryCurves::point(const Place& place) const {
   const Curve& curve = curves_[place.curve];
   const auto after = std::upper_bound(curve.at.begin(), curve.at.end() - 1, place.at);
-  const auto i = static_cast<std::size_t>(std::max<std::ptrdiff_t>(after - curve.at.begin() - 1, 0));
+  const std::size_t i = std::max<std::ptrdiff_t>(after - curve.at.begin() - 1, 0);
   const Vec3& a = curve.points[i];
   const double length = curve.at[i + 1] - curve.at[i];
   const double t = length > 0 ? std::clamp((place.at - curve.at[i]) / length, 0.0, 1.0) : 0;

@@ -1,6 +1,7 @@
 #include "tunica/surface/distance/closest_point.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/threads.hpp"
 #include "tunica/surface/mesh/measure.hpp"
 
@@ -158,8 +159,8 @@ struct ClosestPoint::Builder {
     int best_axis = -1;
     std::size_t best_bin = 0;
     const auto bin_of = [&](const Primitive& p, int axis) {
-      const double scaled = (p.centre(axis) - centres.lower[axis]) / extent[axis] * static_cast<double>(bins);
-      return std::min(bins - 1, static_cast<std::size_t>(scaled));
+      const double scaled = (p.centre(axis) - centres.lower[axis]) / extent[axis] * real(bins);
+      return std::min(bins - 1, truncated<std::size_t>(scaled));
     };
     for (int axis = 0; axis < 3; ++axis) {
       if (!(extent[axis] > 0)) {
@@ -178,7 +179,7 @@ struct ClosestPoint::Builder {
       for (std::size_t bin = 0; bin + 1 < bins; ++bin) {
         below.add(bounds[bin].lower, bounds[bin].upper);
         count += counts[bin];
-        cost_below[bin] = count > 0 ? below.half_area() * static_cast<double>(count) : 0;
+        cost_below[bin] = count > 0 ? below.half_area() * real(count) : 0;
       }
       Bounds above;
       count = 0;
@@ -188,7 +189,7 @@ struct ClosestPoint::Builder {
         if (count == 0 || count == whole.size()) {
           continue;
         }
-        const double cost = cost_below[bin - 1] + above.half_area() * static_cast<double>(count);
+        const double cost = cost_below[bin - 1] + above.half_area() * real(count);
         if (cost < best_cost) {
           best_cost = cost;
           best_axis = axis;
@@ -196,14 +197,14 @@ struct ClosestPoint::Builder {
         }
       }
     }
-    const auto first = primitives.begin() + static_cast<std::ptrdiff_t>(whole.begin);
-    const auto last = primitives.begin() + static_cast<std::ptrdiff_t>(whole.end);
+    const auto first = primitives.begin() + whole.begin;
+    const auto last = primitives.begin() + whole.end;
     if (best_axis < 0) {  // all centres coincide
       return whole.begin + whole.size() / 2;
     }
     const auto middle =
         std::partition(first, last, [&](const Primitive& p) { return bin_of(p, best_axis) < best_bin; });
-    return static_cast<std::size_t>(middle - primitives.begin());
+    return middle - primitives.begin();
   }
 
   std::int32_t make_leaf(const Range& content, Part& part) const {
@@ -214,7 +215,7 @@ struct ClosestPoint::Builder {
       const Index t = primitives[std::min(content.begin + lane, content.end - 1)].triangle;
       const auto [a, b, c] = tree.corners(t);
       for (std::size_t axis = 0; axis < 3; ++axis) {
-        const auto i = static_cast<Eigen::Index>(axis);
+        const Eigen::Index i = axis;
         leaf.origin[axis][lane] = a[i];
         leaf.edge1[axis][lane] = b[i] - a[i];
         leaf.edge2[axis][lane] = c[i] - a[i];
@@ -224,7 +225,7 @@ struct ClosestPoint::Builder {
     for (std::size_t i = content.begin; i < content.end; ++i) {
       part.order.push_back(primitives[i].triangle);
     }
-    return ~static_cast<std::int32_t>(index);
+    return ~narrow<std::int32_t>(index);
   }
 
   // Up to four parts of a range.
@@ -236,7 +237,7 @@ struct ClosestPoint::Builder {
       std::size_t widest = count;
       double cost = -1;
       for (std::size_t i = 0; i < count; ++i) {
-        const double own = parts[i].bounds.half_area() * static_cast<double>(parts[i].size());
+        const double own = parts[i].bounds.half_area() * real(parts[i].size());
         if (parts[i].size() > leaf_size && own > cost) {
           cost = own;
           widest = i;
@@ -248,9 +249,7 @@ struct ClosestPoint::Builder {
       const std::size_t middle = split(parts[widest]);
       const std::size_t end = parts[widest].end;
       parts[widest] = range(parts[widest].begin, middle);
-      std::move_backward(parts.begin() + static_cast<std::ptrdiff_t>(widest) + 1,
-                         parts.begin() + static_cast<std::ptrdiff_t>(count),
-                         parts.begin() + static_cast<std::ptrdiff_t>(count) + 1);
+      std::move_backward(parts.begin() + widest + 1, parts.begin() + count, parts.begin() + count + 1);
       parts[widest + 1] = range(middle, end);
       ++count;
     }
@@ -260,7 +259,7 @@ struct ClosestPoint::Builder {
   static void set_child(Node& node, std::size_t lane, const Range* content, std::int32_t child) {
     node.child[lane] = child;
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const auto i = static_cast<Eigen::Index>(axis);
+      const Eigen::Index i = axis;
       node.lower[axis][lane] = content != nullptr ? content->bounds.lower[i] : infinity;
       node.upper[axis][lane] = content != nullptr ? content->bounds.upper[i] : -infinity;
     }
@@ -272,7 +271,7 @@ struct ClosestPoint::Builder {
     }
     std::array<Range, 4> parts;
     const std::size_t count = divide(whole, parts);
-    const auto index = static_cast<std::int32_t>(part.nodes.size());
+    const auto index = narrow<std::int32_t>(part.nodes.size());
     part.nodes.emplace_back();
     for (std::size_t lane = 0; lane < 4; ++lane) {
       const std::int32_t child = lane < count ? make_node(parts[lane], part) : 0;
@@ -283,8 +282,8 @@ struct ClosestPoint::Builder {
 
   // Appends a part and numbers its nodes and leaves on. @return the number of its root
   std::int32_t append(Part& part, std::int32_t root) {
-    const auto first_node = static_cast<std::int32_t>(tree.nodes_.size());
-    const auto first_leaf = static_cast<std::int32_t>(tree.leaves_.size());
+    const auto first_node = narrow<std::int32_t>(tree.nodes_.size());
+    const auto first_leaf = narrow<std::int32_t>(tree.leaves_.size());
     const auto moved = [&](std::int32_t child) { return child < 0 ? child - first_leaf : child + first_node; };
     for (Node& node : part.nodes) {
       for (std::size_t lane = 0; lane < 4; ++lane) {
@@ -325,7 +324,7 @@ struct ClosestPoint::Builder {
         continue;
       }
       const std::size_t index = tree.nodes_.size();
-      tree.nodes_[0].child[i] = static_cast<std::int32_t>(index);
+      tree.nodes_[0].child[i] = narrow<std::int32_t>(index);
       tree.nodes_.emplace_back();
       for (std::size_t j = 0; j < 4; ++j) {
         const std::int32_t child = j < counts[i] ? append(parts[4 * i + j], roots[4 * i + j]) : 0;
@@ -341,15 +340,15 @@ ClosestPoint::ClosestPoint(const TriangleMesh& mesh) : vertices_(mesh.vertices),
   Builder builder{*this, {}};
   builder.primitives.reserve(triangles_.size());
   for (std::size_t t = 0; t < triangles_.size(); ++t) {
-    const auto [a, b, c] = corners(static_cast<Index>(t));
-    builder.primitives.push_back({a.cwiseMin(b).cwiseMin(c), a.cwiseMax(b).cwiseMax(c), static_cast<Index>(t)});
+    const auto [a, b, c] = corners(narrow<Index>(t));
+    builder.primitives.push_back({a.cwiseMin(b).cwiseMin(c), a.cwiseMax(b).cwiseMax(c), narrow<Index>(t)});
     largest_coordinate_ =
         std::max({largest_coordinate_, a.cwiseAbs().maxCoeff(), b.cwiseAbs().maxCoeff(), c.cwiseAbs().maxCoeff()});
     const double longest = std::max({(b - a).norm(), (c - b).norm(), (a - c).norm()});
     const double height = longest > 0 ? 2 * triangle_area(a, b, c) / longest : 0;
     if (height * 100 < longest) {
       const double aspect = height > 0 ? longest / height : 1e16;
-      const auto decade = static_cast<std::size_t>(std::clamp(std::ceil(std::log10(aspect)), 0.0, 16.0));
+      const auto decade = truncated<std::size_t>(std::clamp(std::ceil(std::log10(aspect)), 0.0, 16.0));
       inradius_of_aspect_[decade] = std::max(inradius_of_aspect_[decade], 0.5 * height);
     }
   }
@@ -399,7 +398,7 @@ double ClosestPoint::rounding(double reach) const {
   double thin = 0;
   for (std::size_t decade = 0; decade < inradius_of_aspect_.size(); ++decade) {
     // The foot inside a thin triangle is off by the error of its normal; the edges are never farther than the inradius.
-    const double foot = 16 * epsilon * std::pow(10.0, static_cast<double>(decade)) * (reach + largest_coordinate_);
+    const double foot = 16 * epsilon * std::pow(10.0, real(decade)) * (reach + largest_coordinate_);
     thin = std::max(thin, std::min(inradius_of_aspect_[decade], foot));
   }
   return 16 * epsilon * (largest_coordinate_ + reach) + thin;

@@ -1,6 +1,7 @@
 #include "tunica/surface/distance/hausdorff.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/threads.hpp"
 #include "tunica/surface/distance/cover_bound.hpp"
 #include "tunica/surface/mesh/measure.hpp"
@@ -92,7 +93,7 @@ public:
       const auto [p, q, r] = a_.corners(order[i]);
       cumulative[i + 1] = cumulative[i] + triangle_area(p, q, r);
     }
-    const double step = cumulative.back() / static_cast<double>(count);
+    const double step = cumulative.back() / real(count);
     if (!(step > 0)) {
       constexpr double undefined = std::numeric_limits<double>::quiet_NaN();
       return {undefined, undefined};
@@ -108,10 +109,10 @@ public:
       std::optional<Index> guess;
       auto it = cumulative.begin() + 1;
       for (std::size_t k = begin; k < end; ++k) {
-        const double at = (static_cast<double>(k) + 0.5) * step;
+        const double at = (real(k) + 0.5) * step;
         it = k == begin ? std::upper_bound(it, cumulative.end(), at)
                         : std::find_if(it, cumulative.end(), [&](double c) { return c > at; });
-        const auto i = static_cast<std::size_t>(std::min(it, cumulative.end() - 1) - cumulative.begin()) - 1;
+        const auto i = narrow<std::size_t>(std::min(it, cumulative.end() - 1) - cumulative.begin()) - 1;
         const Vec3 x = point_in(order[i], k);
         const auto hit = guess ? b_.closest(x, *guess) : b_.closest(x);
         guess = hit.triangle;
@@ -129,7 +130,7 @@ public:
       total.squared_distance += sum.squared_distance;
       raise(sum.farthest);
     }
-    const auto n = static_cast<double>(count);
+    const auto n = real(count);
     return {total.distance / n, std::sqrt(total.squared_distance / n)};
   }
 
@@ -183,7 +184,7 @@ private:
 
   // A point of the triangle, from the k-th element of the R2 sequence (Roberts 2018) folded into the triangle.
   [[nodiscard]] Vec3 point_in(Index triangle, std::size_t k) const {
-    const auto index = static_cast<double>(k);
+    const auto index = real(k);
     double u = std::fmod(0.5 + index * 0.7548776662466927, 1.0);
     double v = std::fmod(0.5 + index * 0.5698402909980532, 1.0);
     if (u + v > 1) {
@@ -218,8 +219,7 @@ private:
   void bound(Piece& piece, Block& block) const {
     double squared = infinity;
     for (std::size_t i = 0; i < 3; ++i) {
-      if (std::find(piece.nearest.begin(), piece.nearest.begin() + static_cast<std::ptrdiff_t>(i), piece.nearest[i]) ==
-          piece.nearest.begin() + static_cast<std::ptrdiff_t>(i)) {
+      if (std::find(piece.nearest.begin(), piece.nearest.begin() + i, piece.nearest[i]) == piece.nearest.begin() + i) {
         squared = std::min(squared, b_.max_squared_distance_to(piece.corner, piece.nearest[i]));
       }
     }
@@ -293,9 +293,9 @@ private:
   // Takes the pieces with the largest upper bounds out of `live`: a quarter of them, at least two thousand.
   [[nodiscard]] std::vector<Piece> take_worst(std::vector<Piece>& live) const {
     const std::size_t count = std::min(live.size(), std::max<std::size_t>(grain, live.size() / 4));
-    std::nth_element(live.begin(), live.end() - static_cast<std::ptrdiff_t>(count), live.end(),
+    std::nth_element(live.begin(), live.end() - count, live.end(),
                      [](const Piece& l, const Piece& r) { return l.upper < r.upper; });
-    std::vector<Piece> chosen(live.end() - static_cast<std::ptrdiff_t>(count), live.end());
+    std::vector<Piece> chosen(live.end() - count, live.end());
     live.resize(live.size() - count);
     return chosen;
   }

@@ -1,5 +1,6 @@
 #include "tunica/surface/distance/surface_walk.hpp"
 
+#include "tunica/core/narrow.hpp"
 #include "tunica/surface/mesh/measure.hpp"
 #include "tunica/surface/mesh/subdivide.hpp"
 
@@ -54,9 +55,9 @@ SurfaceWalk::SurfaceWalk(const TriangleMesh& mesh) : mesh_(mesh), around_(incide
   const Vec3 size = box.upper - box.lower;
   const double least = 1e-3 * size.maxCoeff();
   const double volume = std::max(size.x(), least) * std::max(size.y(), least) * std::max(size.z(), least);
-  cells_per_mm_ = std::cbrt(static_cast<double>(mesh.vertices.size()) / volume);
+  cells_per_mm_ = std::cbrt(real(mesh.vertices.size()) / volume);
   for (int axis = 0; axis < 3; ++axis) {
-    cells_[axis] = static_cast<std::size_t>(size[axis] * cells_per_mm_) + 1;
+    cells_[axis] = truncated<std::size_t>(size[axis] * cells_per_mm_) + 1;
   }
   std::vector<std::uint64_t> following(mesh.vertices.size(), 0), preceding(mesh.vertices.size(), 0);
   for (const auto& c : mesh.triangles) {
@@ -84,7 +85,7 @@ void SurfaceWalk::place_points() {
   }
   const std::vector<int> parts_of = parts_for_points(
       mesh_, [&](double longest) { return std::min(longest * cells_per_mm_, most_parts); },
-      most_points * static_cast<double>(mesh_.triangles.size()));
+      most_points * real(mesh_.triangles.size()));
   for (Index t = 0; t < mesh_.triangles.size(); ++t) {
     const auto& [i, j, k] = mesh_.triangles[t];
     const Vec3& a = mesh_.vertices[i];
@@ -115,12 +116,12 @@ void SurfaceWalk::place_points() {
 }
 
 Index SurfaceWalk::cube_of(const Vec3& p) const {
-  return static_cast<Index>((cell(p.x(), 0) * cells_[1] + cell(p.y(), 1)) * cells_[2] + cell(p.z(), 2));
+  return narrow<Index>((cell(p.x(), 0) * cells_[1] + cell(p.y(), 1)) * cells_[2] + cell(p.z(), 2));
 }
 
 std::size_t SurfaceWalk::cell(double x, int axis) const {
   const double place = (x - origin_[axis]) * cells_per_mm_;
-  return static_cast<std::size_t>(std::clamp(place, 0.0, static_cast<double>(cells_[axis] - 1)));
+  return truncated<std::size_t>(std::clamp(place, 0.0, real(cells_[axis] - 1)));
 }
 
 /// A vertex nearer than its neighbours.

@@ -1,6 +1,7 @@
 #include "tunica/surface/mesh/checks.hpp"
 
 #include "tunica/core/disjoint_sets.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/surface/mesh/incidence.hpp"
 
 #include <fmt/format.h>
@@ -39,14 +40,13 @@ public:
 
   MeshFacts run() {
     for (std::size_t v = 0; v < mesh_.vertices.size(); ++v) {
-      look_at_vertex(static_cast<Index>(v));
+      look_at_vertex(narrow<Index>(v));
     }
     look_at_triangles();
     facts_.triangles = mesh_.triangles.size();
     facts_.components = facts_.triangles - joined_pieces_;
     facts_.boundary_loops = rim_vertices_ - joined_rims_;
-    facts_.euler =
-        static_cast<long>(facts_.vertices) - static_cast<long>(facts_.edges) + static_cast<long>(facts_.triangles);
+    facts_.euler = narrow<long>(facts_.vertices) - narrow<long>(facts_.edges) + narrow<long>(facts_.triangles);
     facts_.closed = facts_.boundary_edges == 0;
     facts_.oriented = facts_.inconsistent_edges == 0;
     facts_.manifold = facts_.non_manifold_edges == 0 && facts_.non_manifold_vertices == 0 &&
@@ -71,7 +71,7 @@ private:
       if (has_repeated_corner(corners)) {
         continue;
       }
-      const auto k = static_cast<std::size_t>(std::find(corners.begin(), corners.end(), v) - corners.begin());
+      const std::size_t k = std::find(corners.begin(), corners.end(), v) - corners.begin();
       spokes_.push_back({corners[(k + 1) % 3], t, true});
       spokes_.push_back({corners[(k + 2) % 3], t, false});
     }
@@ -85,7 +85,7 @@ private:
     std::size_t fans = spokes_.size() / 2;
     for (auto begin = spokes_.begin(); begin != spokes_.end();) {
       const auto end = std::find_if(begin, spokes_.end(), [&](const Spoke& s) { return s.other != begin->other; });
-      const auto count = static_cast<std::size_t>(end - begin);
+      const std::size_t count = end - begin;
       edges_are_manifold = edges_are_manifold && count <= 2;
       on_rim = on_rim || count == 1;
       fans -= join_fan(triangles, begin->triangle, (end - 1)->triangle);
@@ -103,7 +103,7 @@ private:
   // Joins the fans of two triangles around one vertex. @return 1 when they were apart, else 0.
   std::size_t join_fan(std::span<const Index> triangles, Index one, Index other) {
     const auto local = [&](Index t) {
-      auto i = static_cast<Index>(std::lower_bound(triangles.begin(), triangles.end(), t) - triangles.begin());
+      auto i = narrow<Index>(std::lower_bound(triangles.begin(), triangles.end(), t) - triangles.begin());
       while (fan_[i] != i) {
         fan_[i] = fan_[fan_[i]];
         i = fan_[i];

@@ -1,5 +1,6 @@
 #include "tunica/surface/mesh/incidence.hpp"
 
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/threads.hpp"
 
 #include <algorithm>
@@ -21,7 +22,7 @@ Incidence incidence(std::size_t vertices, std::span<const std::array<Index, 3>> 
   std::vector<std::size_t> next(result.offsets.begin(), result.offsets.end() - 1);
   for (std::size_t t = 0; t < triangles.size(); ++t) {
     for (const Index v : triangles[t]) {
-      result.triangles[next[v]++] = static_cast<Index>(t);
+      result.triangles[next[v]++] = narrow<Index>(t);
     }
   }
   return result;
@@ -75,8 +76,7 @@ std::vector<std::vector<Index>> loops_of(std::vector<DirectedEdge> edges) {
       continue;
     }
     std::vector<Index> loop;
-    for (auto it = edges.begin() + static_cast<std::ptrdiff_t>(start); it != edges.end();
-         it = next_unused(it->second)) {
+    for (auto it = edges.begin() + start; it != edges.end(); it = next_unused(it->second)) {
       used[it - edges.begin()] = true;
       loop.push_back(it->first);
     }
@@ -126,7 +126,7 @@ std::vector<std::vector<Index>> boundary_loops(const TriangleMesh& mesh) {
         edge = edges[edge].before;
       }
       if (edge == none) {
-        edge = static_cast<Index>(edges.size());
+        edge = narrow<Index>(edges.size());
         edges.push_back({far, last[near], 0});
         last[near] = edge;
       }

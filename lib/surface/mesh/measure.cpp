@@ -1,4 +1,5 @@
 #include "tunica/surface/mesh/measure.hpp"
+#include "tunica/core/narrow.hpp"
 
 #include <Eigen/Geometry>
 
@@ -95,7 +96,7 @@ double mean_quality(const TriangleMesh& mesh) {
   for (const auto& [i, j, k] : mesh.triangles) {
     sum += radius_ratio(mesh.vertices[i], mesh.vertices[j], mesh.vertices[k]);
   }
-  return sum / static_cast<double>(mesh.triangles.size());
+  return sum / real(mesh.triangles.size());
 }
 
 }  // namespace tunica

@@ -1,6 +1,7 @@
 #include "tunica/surface/mesh/self_intersections.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/progress.hpp"
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
@@ -70,7 +71,7 @@ struct Bodies {
       const auto& [i, j, k] = mesh.triangles[t];
       triangles.push_back(exact({mesh.vertices[i], mesh.vertices[j], mesh.vertices[k]}));
       if (!triangles.back().is_degenerate()) {
-        boxes.emplace_back(triangles.back().bbox(), static_cast<Index>(t));
+        boxes.emplace_back(triangles.back().bbox(), narrow<Index>(t));
       }
     }
   }
@@ -104,7 +105,7 @@ std::vector<std::array<Index, 2>> crossing_patches(Bodies& bodies, const std::ve
   std::vector<TriangleBox> hulls;
   for (std::size_t i = 0; i < hull.size(); ++i) {
     if (!boxes_of[i].empty()) {
-      hulls.emplace_back(hull[i], static_cast<Index>(i));
+      hulls.emplace_back(hull[i], narrow<Index>(i));
     }
   }
   std::vector<std::array<Index, 2>> found;
@@ -152,7 +153,7 @@ std::vector<std::array<Index, 2>> overlapping_boxes(const std::vector<Vec3>& low
   boxes.reserve(lower.size());
   for (std::size_t i = 0; i < lower.size(); ++i) {
     const Vec3 &l = lower[i], &u = upper[i];
-    boxes.emplace_back(CGAL::Bbox_3(l.x(), l.y(), l.z(), u.x(), u.y(), u.z()), static_cast<Index>(i));
+    boxes.emplace_back(CGAL::Bbox_3(l.x(), l.y(), l.z(), u.x(), u.y(), u.z()), narrow<Index>(i));
   }
   std::vector<std::array<Index, 2>> found;
   overlapping(boxes, [&](Index i, Index j) { found.push_back({std::min(i, j), std::max(i, j)}); });

@@ -1,6 +1,7 @@
 #include "tunica/surface/mesh/subdivide.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/surface/mesh/measure.hpp"
 
 #include <algorithm>
@@ -10,7 +11,7 @@ namespace tunica {
 namespace {
 
 std::size_t pieces_per_edge(double length, double longest_edge) {
-  return static_cast<std::size_t>(std::clamp(std::ceil(length / longest_edge), 1.0, 1000.0));
+  return truncated<std::size_t>(std::clamp(std::ceil(length / longest_edge), 1.0, 1000.0));
 }
 
 std::size_t count(const TriangleMesh& mesh, double longest_edge) {
@@ -38,8 +39,8 @@ TriangleMesh subdivided(const TriangleMesh& mesh, double longest_edge, std::size
       continue;
     }
     const Vec3 origin = mesh.vertices[triangle[0]];
-    const Vec3 right = (mesh.vertices[triangle[1]] - origin) / static_cast<double>(k);
-    const Vec3 up = (mesh.vertices[triangle[2]] - origin) / static_cast<double>(k);
+    const Vec3 right = (mesh.vertices[triangle[1]] - origin) / real(k);
+    const Vec3 up = (mesh.vertices[triangle[2]] - origin) / real(k);
     // Row j holds the points i = 0 .. k - j; its corners are given vertices.
     std::vector<Index> below;
     for (std::size_t j = 0; j <= k; ++j) {
@@ -48,8 +49,8 @@ TriangleMesh subdivided(const TriangleMesh& mesh, double longest_edge, std::size
         if ((i == 0 || i == k) && (j == 0 || j == k)) {
           row.push_back(triangle[i == k ? 1 : j == k ? 2 : 0]);
         } else {
-          row.push_back(static_cast<Index>(fine.vertices.size()));
-          fine.vertices.push_back(origin + static_cast<double>(i) * right + static_cast<double>(j) * up);
+          row.push_back(narrow<Index>(fine.vertices.size()));
+          fine.vertices.push_back(origin + real(i) * right + real(j) * up);
         }
       }
       for (std::size_t i = 0; j > 0 && i + 1 < below.size(); ++i) {
@@ -73,7 +74,7 @@ std::vector<int> parts_for_points(const TriangleMesh& mesh, const std::function<
   }
   const double share = points > most ? std::sqrt(most / points) : 1;
   std::vector<int> out(wanted.size());
-  std::transform(wanted.begin(), wanted.end(), out.begin(), [&](double p) { return static_cast<int>(share * p); });
+  std::transform(wanted.begin(), wanted.end(), out.begin(), [&](double p) { return truncated<int>(share * p); });
   return out;
 }
 

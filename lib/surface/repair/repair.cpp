@@ -1,6 +1,7 @@
 #include "tunica/surface/repair/repair.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/surface/decimation/degenerate.hpp"
 
 #include <Eigen/Geometry>
@@ -125,7 +126,7 @@ private:
               [&](Side l, Side r) { return std::pair(ends(l), l) < std::pair(ends(r), r); });
     ParityUnion faces(mesh_.triangles.size());
     const auto pair_up = [&](Side a, Side b) {
-      if (faces.join(static_cast<Index>(a / 3), static_cast<Index>(b / 3), from(a) == from(b))) {
+      if (faces.join(narrow<Index>(a / 3), narrow<Index>(b / 3), from(a) == from(b))) {
         other_[a] = b;
         other_[b] = a;
       } else {
@@ -157,14 +158,14 @@ private:
     });
     for (const Pair& p : crowded) {
       if (other_[p.a] == sides && other_[p.b] == sides &&
-          faces.join(static_cast<Index>(p.a / 3), static_cast<Index>(p.b / 3), from(p.a) == from(p.b))) {
+          faces.join(narrow<Index>(p.a / 3), narrow<Index>(p.b / 3), from(p.a) == from(p.b))) {
         other_[p.a] = p.b;
         other_[p.b] = p.a;
       }
     }
     facing_.resize(mesh_.triangles.size());
     for (std::size_t t = 0; t < facing_.size(); ++t) {
-      facing_[t] = faces.find(static_cast<Index>(t));
+      facing_[t] = faces.find(narrow<Index>(t));
     }
   }
 
@@ -207,7 +208,7 @@ private:
       const Index vertex = given[corner / 3][corner % 3];
       Index own = vertex;
       if (taken[vertex]) {
-        own = static_cast<Index>(mesh_.vertices.size());
+        own = narrow<Index>(mesh_.vertices.size());
         const Vec3 position = mesh_.vertices[vertex];
         mesh_.vertices.push_back(position);
         ++repairs_.split_vertices;
@@ -241,7 +242,7 @@ private:
       if (other_[s] < s || edges_between[ends(s)]++ == 0) {
         continue;
       }
-      const auto m = static_cast<Index>(mesh_.vertices.size());
+      const auto m = narrow<Index>(mesh_.vertices.size());
       const Vec3 position = 0.5 * (mesh_.vertices[from(s)] + mesh_.vertices[to(s)]);
       mesh_.vertices.push_back(position);
       ++repairs_.cut_edges;
@@ -307,7 +308,7 @@ private:
     }
     const auto kept = std::remove_if(mesh_.triangles.begin(), mesh_.triangles.end(),
                                      [&](const auto& t) { return has_area[root(t[0])] == 0; });
-    repairs_.dropped_triangles += static_cast<std::size_t>(mesh_.triangles.end() - kept);
+    repairs_.dropped_triangles += narrow<std::size_t>(mesh_.triangles.end() - kept);
     mesh_.triangles.erase(kept, mesh_.triangles.end());
     if (mesh_.triangles.empty()) {
       throw InputError("no triangle is left when pieces without area are dropped");
@@ -324,7 +325,7 @@ private:
     }
     for (std::size_t v = 0; v < renumbered.size(); ++v) {
       if (renumbered[v] != none) {
-        renumbered[v] = static_cast<Index>(result.vertices.size());
+        renumbered[v] = narrow<Index>(result.vertices.size());
         result.vertices.push_back(mesh_.vertices[v]);
       }
     }

@@ -1,5 +1,6 @@
 #include "tunica/volume/cubes/cell_crossings.hpp"
 
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/progress.hpp"
 #include "tunica/core/threads.hpp"
 #include "tunica/surface/mesh/self_intersections.hpp"
@@ -52,7 +53,7 @@ CellCrossings::CellCrossings(const std::vector<std::array<Index, 3>>& triangles,
     const auto& [a, b, c] = triangles[t];
     const Vec3 middle = (start[a] + start[b] + start[c]) / 3;
     // No cell is below -1, so that these are 1 or more and their neighbours none below 0.
-    const auto at = [&](int axis) { return static_cast<std::uint64_t>(std::floor(middle[axis]) + 2); };
+    const auto at = [&](int axis) { return truncated<std::uint64_t>(std::floor(middle[axis]) + 2); };
     cell[t] = at(0) + step_y * at(1) + step_z * at(2);
   }
   std::iota(in_cell_.begin(), in_cell_.end(), Index{0});
@@ -78,8 +79,8 @@ std::vector<std::array<Index, 2>> CellCrossings::find(const std::vector<Vec3>& p
     check_interrupt();
     std::array<std::size_t, rows.size()> first;
     for (std::size_t r = 0; r < rows.size(); ++r) {
-      first[r] = static_cast<std::size_t>(std::lower_bound(cell_.begin(), cell_.end(), cell_[begin] + rows[r] - 1) -
-                                          cell_.begin());
+      first[r] =
+          narrow<std::size_t>(std::lower_bound(cell_.begin(), cell_.end(), cell_[begin] + rows[r] - 1) - cell_.begin());
     }
     for (std::size_t i = begin; i < end; ++i) {
       for (std::size_t r = 0; r < rows.size(); ++r) {

@@ -3,6 +3,7 @@
 #include "tunica/volume/cubes/detail/cell_layers.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/volume/cubes/detail/cube_cases.hpp"
 
 #include <Eigen/LU>
@@ -26,8 +27,8 @@ constexpr double at_sample = 1e-6;
 /// between them have an area.
 constexpr double beside_sample = 1e-3;
 
-std::size_t ones(Word word) { return static_cast<std::size_t>(std::popcount(word)); }
-Index bits_of(Word word) { return static_cast<Index>(std::popcount(word)); }
+std::size_t ones(Word word) { return std::popcount(word); }
+Index bits_of(Word word) { return std::popcount(word); }
 Word shifted(const Word* word) { return word[0] >> 1 | word[1] << (word_bits - 1); }
 
 /// A running number for each of these edges of a cell: that of the next vertex on it when the walk along the rows comes
@@ -71,14 +72,14 @@ PackedCases pack_cases(bool mirrored) {
     PackedCase& cell = packed[which];
     for (std::size_t i = 0; i < running_edges.size(); ++i) {
       const auto [first, second] = cube_edges[running_edges[i]];
-      cell.crossed[i] = static_cast<std::uint8_t>((which >> first ^ which >> second) & 1);
+      cell.crossed[i] = narrow<std::uint8_t>((which >> first ^ which >> second) & 1);
     }
     packed[which + no_cell].crossed = cell.crossed;
-    cell.count = static_cast<std::uint32_t>(cube.count);
+    cell.count = narrow<std::uint32_t>(cube.count);
     for (std::size_t t = 0; t < cube.count; ++t) {
       for (std::size_t corner = 0; corner < 3; ++corner) {
         const auto [running, right] = edge_numbers[cube.triangles[t][mirrored ? (3 - corner) % 3 : corner]];
-        cell.corners[3 * t + corner] = static_cast<std::uint8_t>(running | (right ? cell.crossed[running] << 3 : 0));
+        cell.corners[3 * t + corner] = narrow<std::uint8_t>(running | (right ? cell.crossed[running] << 3 : 0));
       }
     }
   }
@@ -272,7 +273,7 @@ private:
     const Word* places = places_.data();
     for (std::size_t row = begin; row < end; ++row) {
       for (std::size_t w = 0; w < grid_.words(); ++w, ++places) {
-        *out = {static_cast<std::uint32_t>(row), static_cast<std::uint32_t>(w), *places & grid_.samples(w)};
+        *out = {narrow<std::uint32_t>(row), narrow<std::uint32_t>(w), *places & grid_.samples(w)};
         out += out->places != 0 ? 1 : 0;
       }
     }
@@ -289,7 +290,7 @@ private:
 class Cases {
 public:
   Cases(const Plane& a, const Plane& b)
-      : a_(bytes(a.row(0))), b_(bytes(b.row(0))), row_(static_cast<std::size_t>(bytes(a.row(1)) - a_)) {}
+      : a_(bytes(a.row(0))), b_(bytes(b.row(0))), row_(narrow<std::size_t>(bytes(a.row(1)) - a_)) {}
 
   [[nodiscard]] std::size_t operator()(const CrossedEdge& first) const {
     static_assert(std::endian::native == std::endian::little, "eight columns in a byte");
@@ -298,7 +299,7 @@ public:
     const auto pair = [bit](const char* from) {
       std::uint16_t bits = 0;
       std::memcpy(&bits, from, sizeof bits);
-      return static_cast<std::size_t>(bits >> bit & 3);
+      return narrow<std::size_t>(bits >> bit & 3);
     };
     return pair(a_ + at) | pair(a_ + at + row_) << 2 | pair(b_ + at) << 4 | pair(b_ + at + row_) << 6;
   }
@@ -313,9 +314,9 @@ private:
 
 /// Triangles of a case beyond those of a single loop around its crossed edges.
 std::ptrdiff_t beyond_one_loop(std::size_t which) {
-  std::ptrdiff_t triangles = static_cast<std::ptrdiff_t>(packed_cases(false)[which].count) + 2;
+  std::ptrdiff_t triangles = narrow<std::ptrdiff_t>(packed_cases(false)[which].count) + 2;
   for (const auto& [first, second] : cube_edges) {
-    triangles -= static_cast<std::ptrdiff_t>((which >> first ^ which >> second) & 1);
+    triangles -= narrow<std::ptrdiff_t>((which >> first ^ which >> second) & 1);
   }
   return triangles;
 }
@@ -331,11 +332,11 @@ LayerCounts count_missing(const PaddedGrid& grid, const Plane& a, const Plane& b
     const bool last_row = row + 1 == grid.size(1);
     if (row == 0 || last_row) {
       missing.in_slice += ones(e.x0 & places);
-      missing.in_layer += static_cast<std::ptrdiff_t>(2 * ones(e.z0 & places) - ones(e.z0 & ends));
+      missing.in_layer += narrow<std::ptrdiff_t>(2 * ones(e.z0 & places) - ones(e.z0 & ends));
     }
     missing.in_slice += ones(e.y0 & ends);
-    missing.in_layer += static_cast<std::ptrdiff_t>(2 * ones(e.z0 & ends));
-    missing.in_layer -= static_cast<std::ptrdiff_t>(2 * ones(places & ~grid.cells(slice, row, w)));
+    missing.in_layer += narrow<std::ptrdiff_t>(2 * ones(e.z0 & ends));
+    missing.in_layer -= narrow<std::ptrdiff_t>(2 * ones(places & ~grid.cells(slice, row, w)));
   }
   return missing;
 }
@@ -355,7 +356,7 @@ LayerCounts count_layer(const PaddedGrid& grid, const Plane& a, const Plane& b, 
     cells += ones(places);
   }
   sum.in_slice = 2 * (sum.along_x + sum.along_y);
-  sum.in_layer = static_cast<std::ptrdiff_t>(4 * sum.along_z) - static_cast<std::ptrdiff_t>(2 * cells);
+  sum.in_layer = narrow<std::ptrdiff_t>(4 * sum.along_z) - narrow<std::ptrdiff_t>(2 * cells);
   if (grid.is_open()) {
     const LayerCounts missing = count_missing(grid, a, b, found, slice);
     sum.in_slice -= missing.in_slice;
@@ -366,8 +367,7 @@ LayerCounts count_layer(const PaddedGrid& grid, const Plane& a, const Plane& b, 
     for (const auto& [row, w, places] : found) {
       Word several = several_loops(CellEdges(CellWord(a, b, row, w))) & places & grid.cells(slice, row, w);
       for (; several != 0; several &= several - 1) {
-        const auto column =
-            static_cast<std::uint32_t>(w * word_bits) + static_cast<std::uint32_t>(std::countr_zero(several));
+        const auto column = narrow<std::uint32_t>(w * word_bits) + std::countr_zero(several);
         sum.in_layer += beyond_one_loop(case_at({row, column}));
       }
     }
@@ -379,11 +379,11 @@ LayerCounts count_layer(const PaddedGrid& grid, const Plane& a, const Plane& b, 
 /// @return one past the last one; up to four places beyond it are overwritten
 CrossedEdge* append(CrossedEdge* out, const ActiveWord& active) {
   Word places = active.places;
-  const auto column = static_cast<std::uint32_t>(active.word * word_bits);
+  const auto column = narrow<std::uint32_t>(active.word * word_bits);
   CrossedEdge* const end = out + ones(places);
   do {
     for (int i = 0; i < 4; ++i) {
-      out[i] = {active.row, column + static_cast<std::uint32_t>(std::countr_zero(places))};
+      out[i] = {active.row, column + std::countr_zero(places)};
       places &= places - 1;
     }
     out += 4;
@@ -442,7 +442,7 @@ public:
         pinched_(pinched),
         vertices_(out.vertices),
         triangles_(out.triangles),
-        first_(static_cast<Index>(out.first_vertex)),
+        first_(narrow<Index>(out.first_vertex)),
         in_(workspace) {}
 
   void write(std::size_t begin, std::size_t end, const LayerCounts* counts) {
@@ -456,7 +456,7 @@ public:
       vertices_ += counts->vertices();
       triangles_ += counts->triangles;
       triangles_left_ -= counts->triangles;
-      first_ += static_cast<Index>(counts->vertices());
+      first_ += narrow<Index>(counts->vertices());
     }
   }
 
@@ -502,10 +502,10 @@ private:
       y_end += cube.crossed[4];
       z_end += cube.crossed[6];
     }
-    TUNICA_ASSERT(x_end - x == static_cast<std::ptrdiff_t>(counts->along_x) &&
-                  y_end - y == static_cast<std::ptrdiff_t>(counts->along_y) &&
-                  z_end - z == static_cast<std::ptrdiff_t>(counts->along_z) &&
-                  corner - corners == static_cast<std::ptrdiff_t>(3 * counts->triangles));
+    TUNICA_ASSERT(x_end - x == narrow<std::ptrdiff_t>(counts->along_x) &&
+                  y_end - y == narrow<std::ptrdiff_t>(counts->along_y) &&
+                  z_end - z == narrow<std::ptrdiff_t>(counts->along_z) &&
+                  corner - corners == narrow<std::ptrdiff_t>(3 * counts->triangles));
     if (!in_place) {
       std::copy_n(in_.triangles.begin(), counts->triangles, triangles_);
     }
@@ -527,7 +527,7 @@ private:
     for (const ActiveWord& active : in_.active.find(in_.a, b, false)) {
       grow(in_.places, found + word_bits + spare_edges);
       CrossedEdge* const out = in_.places.data() + found;
-      found += static_cast<std::size_t>(append(out, active) - out);
+      found += narrow<std::size_t>(append(out, active) - out);
     }
     return {in_.places.data(), found};
   }
@@ -543,10 +543,10 @@ private:
       x_b += bits_of((b.row(0)[w] ^ shifted(b.row(0) + w)) & grid_.samples(w));
       z += bits_of((in_.a.row(0)[w] ^ b.row(0)[w]) & grid_.samples(w));
     }
-    const Index first_b = first_ + static_cast<Index>(counts.vertices());
-    const Index y_a = first_ + static_cast<Index>(counts.along_x);
-    const Index y_b = first_b + static_cast<Index>(counts_b.along_x);
-    const Index along_z = y_a + static_cast<Index>(counts.along_y);
+    const Index first_b = first_ + narrow<Index>(counts.vertices());
+    const Index y_a = first_ + narrow<Index>(counts.along_x);
+    const Index y_b = first_b + narrow<Index>(counts_b.along_x);
+    const Index along_z = y_a + narrow<Index>(counts.along_y);
     return RunningNumbers({first_, first_ + x_a, first_b, first_b + x_b, y_a, y_b, along_z, along_z + z});
   }
 
@@ -598,7 +598,7 @@ private:
     const bool low = t < 0.5;
     vertex = start + (low ? at_sample : 1 - at_sample) * along;
     // Numbered with the padding: with an open border a sample there has the same value as the border's.
-    pinched_.push_back({static_cast<Index>(number), grid_.number(low ? first : second),
+    pinched_.push_back({narrow<Index>(number), grid_.number(low ? first : second),
                         start + (low ? beside_sample : 1 - beside_sample) * along});
   }
 
@@ -648,7 +648,7 @@ void Layers::write(std::size_t begin, std::size_t end, const LayerCounts* counts
 void count_triangles(std::span<LayerCounts> counts) {
   for (std::size_t slice = 0; slice + 1 < counts.size(); ++slice) {
     LayerCounts& layer = counts[slice];
-    layer.triangles = layer.in_slice + counts[slice + 1].in_slice + static_cast<std::size_t>(layer.in_layer);
+    layer.triangles = layer.in_slice + counts[slice + 1].in_slice + narrow<std::size_t>(layer.in_layer);
   }
 }
 

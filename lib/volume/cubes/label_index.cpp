@@ -1,6 +1,7 @@
 #include "tunica/volume/cubes/label_index.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/threads.hpp"
 #include "tunica/volume/labels/pack_bits.hpp"
 
@@ -81,8 +82,8 @@ void LabelIndex::add_values(const Volume& slab, const std::vector<T>& values, st
       const T* const row = values.data() + dims_[0] * (j + dims_[1] * k);
       const std::size_t first_word = words * (j + dims_[1] * (first_slice + k));
       for (std::size_t w = 0; w < words; ++w) {
-        split_word(row + 64 * w, std::min<std::size_t>(64, dims_[0] - 64 * w),
-                   static_cast<std::uint32_t>(first_word + w), slab.intercept == 0, slices[k]);
+        split_word(row + 64 * w, std::min<std::size_t>(64, dims_[0] - 64 * w), narrow<std::uint32_t>(first_word + w),
+                   slab.intercept == 0, slices[k]);
       }
     }
   });
@@ -111,7 +112,7 @@ void LabelIndex::add_values(const Volume& slab, const std::vector<T>& values, st
       }
       entry.bounds.rows = {std::min(entry.bounds.rows[0], j), std::max(entry.bounds.rows[1], j + 1)};
       entry.bounds.slices[1] = k + 1;
-      entry.voxels += static_cast<std::size_t>(std::popcount(bits));
+      entry.voxels += std::popcount(bits);
       entry.at.push_back(at);
       entry.bits.push_back(bits);
     }
@@ -126,8 +127,8 @@ std::optional<std::vector<Label>> LabelIndex::labels(const std::vector<std::pair
   std::vector<Label> labels;
   for (const auto& [value, entry] : entries_) {
     const auto name = std::ranges::find(names, value, [](const auto& named) { return named.first; });
-    labels.push_back({value, entry.voxels, static_cast<double>(entry.voxels) * voxel_volume,
-                      name == names.end() ? std::string{} : name->second});
+    labels.push_back(
+        {value, entry.voxels, real(entry.voxels) * voxel_volume, name == names.end() ? std::string{} : name->second});
   }
   return labels;
 }

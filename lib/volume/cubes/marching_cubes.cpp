@@ -2,6 +2,7 @@
 
 #include "tunica/core/error.hpp"
 #include "tunica/core/fresh_memory.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/threads.hpp"
 #include "tunica/volume/cubes/detail/cell_layers.hpp"
 #include "tunica/volume/cubes/detail/pinched_vertices.hpp"
@@ -123,7 +124,7 @@ public:
     for (const auto& block : pinched) {
       pinched_.insert(pinched_.end(), block.begin(), block.end());
     }
-    tunica::advance(options_.progress, 0.3 + 0.6 * static_cast<double>(end) / static_cast<double>(slices()));
+    tunica::advance(options_.progress, 0.3 + 0.6 * real(end) / real(slices()));
   }
 
   TriangleMesh finish() {
@@ -183,7 +184,7 @@ void SlabMarchingCubes::add(const Volume& slab, std::size_t first_slice) {
         writer_->write(first_slice == 0 ? 0 : first_slice, last ? writer_->slices() : next_slice_, &crossings,
                        first_slice - carried);
         if (!last) {
-          carry_ = Values(values.end() - static_cast<std::ptrdiff_t>(slice_voxels), values.end());
+          carry_ = Values(values.end() - slice_voxels, values.end());
         }
       },
       slab.data);

@@ -1,6 +1,7 @@
 #include "tunica/volume/cubes/outward.hpp"
 
 #include "tunica/core/disjoint_sets.hpp"
+#include "tunica/core/narrow.hpp"
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
@@ -15,11 +16,11 @@ namespace {
 bool inside(const Mask& mask, bool open_border, const Vec3& index) {
   std::array<std::size_t, 3> voxel{};
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
-    const auto last = static_cast<double>(mask.dims()[axis] - 1);
+    const auto last = real(mask.dims()[axis] - 1);
     if (!open_border && !(index[axis] >= 0 && index[axis] <= last)) {
       return false;
     }
-    voxel[axis] = static_cast<std::size_t>(std::clamp(index[axis], 0.0, last));
+    voxel[axis] = truncated<std::size_t>(std::clamp(index[axis], 0.0, last));
   }
   return mask(voxel[0], voxel[1], voxel[2]);
 }
@@ -38,8 +39,7 @@ Vec3 outward_step(const Mask& mask, bool open_border, const Vec3& point) {
     Vec3 above = nearest;
     below[axis] = centre ? nearest[axis] - 1 : std::floor(point[axis]);
     above[axis] = centre ? nearest[axis] + 1 : std::floor(point[axis]) + 1;
-    step[axis] =
-        static_cast<int>(inside(mask, open_border, below)) - static_cast<int>(inside(mask, open_border, above));
+    step[axis] = int{inside(mask, open_border, below)} - int{inside(mask, open_border, above)};
   }
   return step;
 }

@@ -1,4 +1,5 @@
 #include "tunica/volume/cubes/detail/pinched_vertices.hpp"
+#include "tunica/core/narrow.hpp"
 
 #include <Eigen/Geometry>
 
@@ -20,12 +21,12 @@ public:
   Joiner(TriangleMesh& mesh, const std::vector<PinchedVertex>& pinched)
       : mesh_(mesh), pinched_(pinched), slot_(mesh.vertices.size(), none), around_(pinched.size()) {
     for (std::size_t s = 0; s < pinched.size(); ++s) {
-      slot_[pinched[s].vertex] = static_cast<Index>(s);
+      slot_[pinched[s].vertex] = narrow<Index>(s);
     }
     for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
       for (const Index v : mesh.triangles[t]) {
         if (slot_[v] != none) {
-          around_[slot_[v]].push_back(static_cast<Index>(t));
+          around_[slot_[v]].push_back(narrow<Index>(t));
         }
       }
     }
@@ -85,13 +86,13 @@ private:
     std::vector<std::array<Index, 2>> edges;
     for (const Index t : around(u)) {
       const auto& corner = mesh_.triangles[t];
-      const auto i = static_cast<std::size_t>(std::ranges::find(corner, u) - corner.begin());
+      const std::size_t i = std::ranges::find(corner, u) - corner.begin();
       edges.push_back({corner[(i + 1) % 3], corner[(i + 2) % 3]});
     }
     const std::size_t given = edges.size();
     for (std::size_t e = 0; e < given; ++e) {
       const auto [from, to] = edges[e];
-      const auto end = edges.begin() + static_cast<std::ptrdiff_t>(given);
+      const auto end = edges.begin() + given;
       const bool has_previous =
           std::any_of(edges.begin(), end, [from = from](const auto& edge) { return edge[1] == from; });
       const bool has_next = std::any_of(edges.begin(), end, [to = to](const auto& edge) { return edge[0] == to; });
@@ -175,7 +176,7 @@ private:
     std::vector<Index> number(mesh_.vertices.size(), none);
     for (std::size_t v = 0; v < mesh_.vertices.size(); ++v) {
       if (slot_[v] == none || !around_[slot_[v]].empty()) {
-        number[v] = static_cast<Index>(kept);
+        number[v] = narrow<Index>(kept);
         mesh_.vertices[kept++] = mesh_.vertices[v];
       }
     }

@@ -1,6 +1,7 @@
 #include "tunica/volume/labels/components.hpp"
 
 #include "tunica/core/disjoint_sets.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/progress.hpp"
 
 #include <algorithm>
@@ -84,7 +85,7 @@ private:
     while (from < end) {
       const std::uint64_t word = (value ? words[from / 64] : ~words[from / 64]) >> (from % 64);
       if (word != 0) {
-        return std::min(end, from + static_cast<std::size_t>(std::countr_zero(word)));
+        return std::min(end, from + std::countr_zero(word));
       }
       from = (from / 64 + 1) * 64;
     }
@@ -141,13 +142,13 @@ std::size_t keep_largest_piece(Mask& mask) {
   if (sizes.empty()) {
     return 0;
   }
-  const auto largest = static_cast<std::size_t>(std::ranges::max_element(sizes) - sizes.begin());
+  const std::size_t largest = std::ranges::max_element(sizes) - sizes.begin();
   runs.for_each([&](std::size_t run, std::size_t j, std::size_t k) {
     if (runs.root(run) != largest) {
       set_run(mask, runs[run], j, k, false);
     }
   });
-  return static_cast<std::size_t>(std::ranges::count_if(sizes, [](std::size_t size) { return size > 0; })) - 1;
+  return narrow<std::size_t>(std::ranges::count_if(sizes, [](std::size_t size) { return size > 0; })) - 1;
 }
 
 std::size_t fill_cavities(Mask& mask) {

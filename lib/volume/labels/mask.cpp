@@ -125,7 +125,7 @@ void select_row(const T* values, std::size_t count, const Range<T>& range, std::
     std::uint64_t word = 0;
     for (std::size_t bit = 0; i + bit < count; ++bit) {
       const T value = values[i + bit];
-      word |= static_cast<std::uint64_t>(value >= range.first && value <= range.last) << bit;
+      word |= std::uint64_t(value >= range.first && value <= range.last) << bit;
     }
     words[i / 64] = word;
   }
@@ -204,7 +204,7 @@ std::size_t count_voxels(const Mask& mask) {
   const std::size_t words = mask.words_per_row() * mask.dims()[1] * mask.dims()[2];
   std::size_t count = 0;
   for (std::size_t word = 0; word < words; ++word) {
-    count += static_cast<std::size_t>(std::popcount(mask.row(0, 0)[word]));
+    count += std::popcount(mask.row(0, 0)[word]);
   }
   return count;
 }

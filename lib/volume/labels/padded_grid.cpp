@@ -1,6 +1,7 @@
 #include "tunica/volume/labels/padded_grid.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 
 namespace tunica::cell_layers {
 
@@ -93,9 +94,9 @@ double PaddedGrid::coordinate(std::size_t padded, int axis) const {
     return -0.5;
   }
   if (padded == size_[axis] - 1 && open_[axis][1]) {
-    return static_cast<double>(mask_.dims()[axis]) - 0.5;
+    return real(mask_.dims()[axis]) - 0.5;
   }
-  return static_cast<double>(window_.first[axis]) - 1 + static_cast<double>(padded);
+  return real(window_.first[axis]) - 1 + real(padded);
 }
 
 }  // namespace tunica::cell_layers

@@ -1,6 +1,7 @@
 #include "tunica/volume/phantom/phantom.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/threads.hpp"
 #include "tunica/volume/cubes/marching_cubes.hpp"
 
@@ -143,13 +144,12 @@ Scene make_scene(const PhantomOptions& options) {
   const Vec3 size = scene.solid.upper - scene.solid.lower;
   const auto margin = [&](int axis) { return axis == 2 && scene.solid.open_along_z ? 0.0 : 4.0; };
   for (int axis = 0; axis < 3; ++axis) {
-    scene.scale =
-        std::min(scene.scale, (static_cast<double>(options.size) - margin(axis)) * options.spacing[axis] / size[axis]);
+    scene.scale = std::min(scene.scale, (real(options.size) - margin(axis)) * options.spacing[axis] / size[axis]);
   }
   for (int axis = 0; axis < 3; ++axis) {
     const double voxels = std::ceil(size[axis] * scene.scale / options.spacing[axis] - 1e-9) + margin(axis);
-    scene.dims[axis] = static_cast<std::size_t>(std::max(voxels, 1.0));
-    scene.extent[axis] = static_cast<double>(scene.dims[axis]) * options.spacing[axis];
+    scene.dims[axis] = truncated<std::size_t>(std::max(voxels, 1.0));
+    scene.extent[axis] = real(scene.dims[axis]) * options.spacing[axis];
   }
   scene.centre = 0.5 * (scene.solid.lower + scene.solid.upper);
   return scene;
@@ -159,7 +159,7 @@ Eigen::Matrix<double, 3, 4> centred_affine(const std::array<std::size_t, 3>& dim
   Eigen::Matrix<double, 3, 4> affine = Eigen::Matrix<double, 3, 4>::Zero();
   for (int axis = 0; axis < 3; ++axis) {
     affine(axis, axis) = spacing[axis];
-    affine(axis, 3) = -0.5 * (static_cast<double>(dims[axis]) - 1) * spacing[axis];
+    affine(axis, 3) = -0.5 * (real(dims[axis]) - 1) * spacing[axis];
   }
   return affine;
 }
@@ -167,17 +167,15 @@ Eigen::Matrix<double, 3, 4> centred_affine(const std::array<std::size_t, 3>& dim
 void refuse_what_memory_cannot_hold(const std::array<std::size_t, 3>& dims, const PhantomOptions& options) {
   constexpr double gib = 1024.0 * 1024 * 1024;
   const double copies = options.noise > 0 ? 2 : 1;
-  const double wanted =
-      copies * static_cast<double>(dims[0]) * static_cast<double>(dims[1]) * static_cast<double>(dims[2]) / gib;
-  const double present =
-      static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE)) / gib;
+  const double wanted = copies * real(dims[0]) * real(dims[1]) * real(dims[2]) / gib;
+  const double present = real(sysconf(_SC_PHYS_PAGES)) * real(sysconf(_SC_PAGESIZE)) / gib;
   if (wanted > present) {
     throw UsageError(
         fmt::format("a phantom of {} x {} x {} voxels takes {:.1f} GiB, and this machine has {:.1f} GiB of memory: "
                     "choose a smaller "
                     "--size, at most {} here",
                     dims[0], dims[1], dims[2], wanted, present,
-                    static_cast<std::size_t>(static_cast<double>(options.size) * std::cbrt(0.9 * present / wanted))));
+                    truncated<std::size_t>(real(options.size) * std::cbrt(0.9 * present / wanted))));
   }
 }
 
@@ -193,11 +191,11 @@ void walk_rows(const Scene& scene, const std::array<std::size_t, 3>& dims, const
     for (std::size_t j = 0; j < dims[1]; ++j) {
       const std::size_t row = j + dims[1] * k;
       for (std::size_t i = 0; i < dims[0];) {
-        const Vec3 voxel(static_cast<double>(i), static_cast<double>(j), static_cast<double>(k));
+        const Vec3 voxel(real(i), real(j), real(k));
         const double distance = scene.distance(affine.leftCols<3>() * voxel + affine.col(3));
         const double clear = std::floor((std::abs(distance) * (1 - 1e-9) - clearance) / spacing[0]);
         const std::size_t count =
-            std::min(dims[0] - i, clear > 0 ? static_cast<std::size_t>(std::min(clear, 1e9)) : std::size_t{1});
+            std::min(dims[0] - i, clear > 0 ? truncated<std::size_t>(std::min(clear, 1e9)) : std::size_t{1});
         visit(row, i, distance, count);
         i += count;
       }
@@ -211,7 +209,7 @@ double random_at(std::uint64_t seed, std::uint64_t place) {
   std::uint64_t z = seed * 0xd1342543de82ef95U + (place + 1) * 0x9e3779b97f4a7c15U;
   z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9U;
   z = (z ^ (z >> 27)) * 0x94d049bb133111ebU;
-  return static_cast<double>((z ^ (z >> 31)) >> 11) * 0x1p-53;
+  return real((z ^ (z >> 31)) >> 11) * 0x1p-53;
 }
 
 std::size_t add_noise(const std::array<std::size_t, 3>& dims, double probability, std::uint64_t seed,
@@ -275,7 +273,7 @@ Phantom make_phantom(const PhantomOptions& options) {
   if (options.noise > 0) {
     phantom.flipped = add_noise(scene.dims, options.noise, options.seed, values);
   }
-  phantom.inside = static_cast<std::size_t>(std::ranges::count(values, std::uint8_t{1}));
+  phantom.inside = narrow<std::size_t>(std::ranges::count(values, std::uint8_t{1}));
   phantom.volume.data = std::move(values);
   return phantom;
 }
@@ -287,8 +285,8 @@ TriangleMesh phantom_surface(const PhantomOptions& options) {
   Volume field;
   Vec3 spacing;
   for (int axis = 0; axis < 3; ++axis) {
-    field.dims[axis] = static_cast<std::size_t>(std::ceil(scene.extent[axis] / edge - 1e-9));
-    spacing[axis] = scene.extent[axis] / static_cast<double>(field.dims[axis]);
+    field.dims[axis] = truncated<std::size_t>(std::ceil(scene.extent[axis] / edge - 1e-9));
+    spacing[axis] = scene.extent[axis] / real(field.dims[axis]);
   }
   field.affine = centred_affine(field.dims, spacing);
   std::vector<float> values(field.voxels());

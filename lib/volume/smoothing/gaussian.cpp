@@ -1,4 +1,5 @@
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/threads.hpp"
 #include "tunica/surface/mesh/measure.hpp"
 #include "tunica/volume/cubes/marching_cubes.hpp"
@@ -19,9 +20,9 @@ struct Kernel {
   std::vector<float> weights;
 
   Kernel(double sigma, std::size_t size) {
-    const double reach = std::min(std::ceil(4 * sigma), static_cast<double>(size));
-    for (std::size_t i = 0; i <= static_cast<std::size_t>(reach); ++i) {
-      const double x = static_cast<double>(i) / sigma;
+    const double reach = std::min(std::ceil(4 * sigma), real(size));
+    for (std::size_t i = 0; i <= truncated<std::size_t>(reach); ++i) {
+      const double x = real(i) / sigma;
       weights.push_back(static_cast<float>(std::exp(-0.5 * x * x)));
     }
   }
@@ -132,7 +133,7 @@ float level_above_which(const std::vector<float>& values, std::size_t count) {
   // A histogram first: the whole need not be sorted.
   constexpr std::size_t bins = 65536;
   const auto bin_of = [](float v) {
-    return static_cast<std::size_t>(std::clamp(v, 0.0F, 1.0F) * static_cast<float>(bins - 1));
+    return truncated<std::size_t>(std::clamp(v, 0.0F, 1.0F) * static_cast<float>(bins - 1));
   };
   std::vector<std::size_t> histogram(bins, 0);
   for (const float v : values) {
@@ -149,7 +150,7 @@ float level_above_which(const std::vector<float>& values, std::size_t count) {
     std::vector<float> inside_bin;
     std::ranges::copy_if(values, std::back_inserter(inside_bin), [&](float v) { return bin_of(v) == bin; });
     const std::size_t place = rank - (above - histogram[bin]) - 1;
-    std::ranges::nth_element(inside_bin, inside_bin.begin() + static_cast<std::ptrdiff_t>(place), std::greater{});
+    std::ranges::nth_element(inside_bin, inside_bin.begin() + place, std::greater{});
     return inside_bin[place];
   };
   if (count == 0 || count >= values.size()) {
@@ -218,7 +219,7 @@ SmoothedField smooth_mask(const Mask& mask, double sigma, const Progress& progre
   result.field = smooth(mask.dims(), mask.affine(), sigma, fill, progress);
   const std::size_t voxels = count_voxels(mask);
   const float guess = level_above_which(std::get<std::vector<float>>(result.field.data), voxels);
-  const double volume = static_cast<double>(voxels) * mask.voxel_volume();
+  const double volume = real(voxels) * mask.voxel_volume();
   result.rule = {Inside::Rule::above, voxels == 0 ? 0.5 : level_of_volume(result.field, volume, guess)};
   advance(progress, 1.0);
   return result;

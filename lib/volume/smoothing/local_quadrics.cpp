@@ -3,6 +3,7 @@
 // estimates with applications to classification. Ann. Stat. 35 (2007).
 #include "tunica/volume/smoothing/detail/local_quadrics.hpp"
 
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/progress.hpp"
 #include "tunica/core/threads.hpp"
 
@@ -77,8 +78,7 @@ public:
     for (auto& column : columns_) {
       column.resize(std::max(whole, column.size()));
     }
-    std::fill(columns_[zero].begin() + static_cast<std::ptrdiff_t>(size),
-              columns_[zero].begin() + static_cast<std::ptrdiff_t>(whole), 0.0F);
+    std::fill(columns_[zero].begin() + size, columns_[zero].begin() + whole, 0.0F);
   }
   [[nodiscard]] Several get(std::size_t column, std::size_t row) const {
     return {columns_[column].data() + row, simd::element_aligned};
@@ -233,7 +233,7 @@ private:
 
   /// Shells up to where something is near some crossing of the group.
   static std::size_t shell_of(double distance) {
-    return static_cast<std::size_t>(distance / (radii.back() + reach_of_group) * shells);
+    return truncated<std::size_t>(distance / (radii.back() + reach_of_group) * shells);
   }
 
   /// Takes the rows [begin, end) of what is around the group to the plane at a crossing, and what belongs to the last

@@ -2,6 +2,7 @@
 // 1998. B. O'Donoghue, E. Candes: Adaptive restart for accelerated gradient schemes. Found. Comput. Math. 15 (2015).
 #include "tunica/core/disjoint_sets.hpp"
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/threads.hpp"
 #include "tunica/volume/cubes/cell_crossings.hpp"
 #include "tunica/volume/smoothing/detail/local_quadrics.hpp"
@@ -64,7 +65,7 @@ std::pair<std::vector<Index>, std::size_t> label_components(const TriangleMesh& 
   std::vector<Index> number(mesh.vertices.size());
   std::size_t count = 0;
   for (Index v = 0; v < number.size(); ++v) {
-    number[v] = pieces.root(v) == v ? static_cast<Index>(count++) : number[pieces.root(v)];
+    number[v] = pieces.root(v) == v ? narrow<Index>(count++) : number[pieces.root(v)];
   }
   return {number, count};
 }
@@ -87,7 +88,7 @@ public:
       low_[v] = start_[v].array() - reach;
       high_[v] = start_[v].array() + reach;
       for (int axis = 0; open_border && axis < 3; ++axis) {
-        const double last = static_cast<double>(grid.dims()[axis]) - 0.5;
+        const double last = real(grid.dims()[axis]) - 0.5;
         const double plane = start_[v][axis] < 0.5 * last ? -0.5 : last;
         if (std::abs(start_[v][axis] - plane) < 1e-6) {
           boundary_[v] = true;
@@ -167,7 +168,7 @@ private:
     std::vector<Vec3> next = now_;
     double momentum = 1;
     for (int iteration = 0; iteration < iterations; ++iteration) {
-      advance(progress, static_cast<double>(iteration) / iterations);
+      advance(progress, real(iteration) / iterations);
       for_all(size, [&](std::size_t v) {
         if (active[v] && !neighbours.alone(v)) {
           bend[v] = neighbours.laplacian(ahead, v);
@@ -181,8 +182,7 @@ private:
       const double uphill =
           sum_blocks(size, [&](std::size_t v) { return (ahead[v] - next[v]).dot(next[v] - now_[v]); });
       const double moved =
-          std::sqrt(sum_blocks(size, [&](std::size_t v) { return (next[v] - now_[v]).squaredNorm(); }) /
-                    static_cast<double>(size));
+          std::sqrt(sum_blocks(size, [&](std::size_t v) { return (next[v] - now_[v]).squaredNorm(); }) / real(size));
       const double faster = uphill > 0 ? 1 : 0.5 * (1 + std::sqrt(1 + 4 * momentum * momentum));
       const double carry = uphill > 0 ? 0 : (momentum - 1) / faster;
       for_all(size, [&](std::size_t v) {

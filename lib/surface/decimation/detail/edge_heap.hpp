@@ -1,5 +1,6 @@
 #pragma once
 
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/types.hpp"
 
 #include <utility>
@@ -20,7 +21,7 @@ public:
 
   /// Appends without order; call order() before anything else.
   void append(Index item, double key) {
-    place_[item] = static_cast<Index>(heap_.size());
+    place_[item] = narrow<Index>(heap_.size());
     heap_.push_back({key, item});
   }
 
@@ -79,7 +80,7 @@ private:
 
   void put(std::size_t i, const Entry& entry) {
     heap_[i] = entry;
-    place_[entry.item] = static_cast<Index>(i);
+    place_[entry.item] = narrow<Index>(i);
   }
 
   void rise(std::size_t i) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "tunica/core/narrow.hpp"
 #include "tunica/surface/mesh/triangle_mesh.hpp"
 
 #include <cstddef>
@@ -28,7 +29,7 @@ public:
     for (std::size_t i = 1; i < around.size(); ++i) {
       sum += x[around[i]];
     }
-    return x[vertex] - sum / static_cast<double>(around.size());
+    return x[vertex] - sum / real(around.size());
   }
   /// Mean square of the lengths of the edges to its neighbours.
   [[nodiscard]] double squared_edge(const std::vector<Vec3>& x, std::size_t vertex) const {
@@ -36,7 +37,7 @@ public:
     for (const Index other : of(vertex)) {
       sum += (x[other] - x[vertex]).squaredNorm();
     }
-    return sum / static_cast<double>(of(vertex).size());
+    return sum / real(of(vertex).size());
   }
 
 private:

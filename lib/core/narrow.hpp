@@ -1,0 +1,31 @@
+#pragma once
+
+#include "tunica/core/error.hpp"
+
+#include <concepts>
+#include <limits>
+#include <utility>
+
+namespace tunica {
+
+/// An integer as another type of integer. Errors: InternalError when it does not hold the value.
+template <std::integral To, std::integral From>
+constexpr To narrow(From value) {
+  TUNICA_ASSERT(std::in_range<To>(value));
+  return static_cast<To>(value);
+}
+
+/// A number without its fraction. Errors: InternalError when the integer does not hold it, as for nan.
+template <std::integral To>
+constexpr To truncated(double value) {
+  // The limits of 64 bits are no doubles: the upper one is the next power of two, which is.
+  constexpr double end = 2.0 * static_cast<double>(std::numeric_limits<To>::max() / 2 + 1);
+  constexpr double least = static_cast<double>(std::numeric_limits<To>::min());
+  TUNICA_ASSERT(value > least - 1 && value < end);
+  return static_cast<To>(value);
+}
+
+/// A count or a place as a number: exact up to 2^53.
+constexpr double real(std::integral auto count) { return static_cast<double>(count); }
+
+}  // namespace tunica
