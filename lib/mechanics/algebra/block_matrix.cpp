@@ -41,7 +41,7 @@ BlockMatrix make_block_matrix(std::size_t nodes, const std::vector<std::array<In
   matrix.column.reserve(pairs.size());
   for (const std::uint64_t p : pairs) {
     ++matrix.row_start[(p >> 32) + 1];
-    matrix.column.push_back(narrow<Index>(p));
+    matrix.column.push_back(static_cast<Index>(p));
   }
   for (std::size_t i = 0; i < nodes; ++i) {
     matrix.row_start[i + 1] += matrix.row_start[i];

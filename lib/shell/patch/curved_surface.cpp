@@ -461,7 +461,7 @@ double curved_volume(const ShellMesh& shell) {
   }
   for (const auto& [edge, a] : half_edges) {
     const auto from = narrow<Index>(edge >> 32);
-    const auto to = narrow<Index>(edge);
+    const auto to = static_cast<Index>(edge);
     const auto opposite = half_edges.find(key(to, from));
     if (opposite == half_edges.end()) {
       throw InputError("the surface is open: it encloses no volume");

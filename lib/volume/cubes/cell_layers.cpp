@@ -648,7 +648,7 @@ void Layers::write(std::size_t begin, std::size_t end, const LayerCounts* counts
 void count_triangles(std::span<LayerCounts> counts) {
   for (std::size_t slice = 0; slice + 1 < counts.size(); ++slice) {
     LayerCounts& layer = counts[slice];
-    layer.triangles = layer.in_slice + counts[slice + 1].in_slice + narrow<std::size_t>(layer.in_layer);
+    layer.triangles = layer.in_slice + counts[slice + 1].in_slice + layer.in_layer;
   }
 }
 
