@@ -1,7 +1,7 @@
 # What find_package(tunica) finds: the libraries as tunica::ROOM, and their headers, but for those in detail/.
 include(CMakePackageConfigHelpers)
 set(package lib/cmake/tunica)
-set(rooms core volume surface shell fit mechanics draw io)
+set(rooms core volume surface shell fit mechanics accuracy draw io)
 foreach(room ${rooms})
   list(APPEND libraries tunica_${room})
   set_target_properties(tunica_${room} PROPERTIES EXPORT_NAME ${room})

@@ -1,7 +1,10 @@
+#include "tunica/accuracy/accuracy.hpp"
 #include "tunica/cli/tool.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/core/version.hpp"
 #include "tunica/io/file/output_file.hpp"
+#include "tunica/io/mesh/mesh_file.hpp"
+#include "tunica/io/mesh/mesh_pair.hpp"
 #include "tunica/io/result/result_export.hpp"
 #include "tunica/io/result/result_file.hpp"
 #include "tunica/io/result/run_journal.hpp"
@@ -11,8 +14,10 @@
 #include "tunica/mechanics/runs/curved_displacement.hpp"
 #include "tunica/mechanics/runs/doubts.hpp"
 #include "tunica/mechanics/runs/solve.hpp"
+#include "tunica/surface/mesh/checks.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -29,7 +34,8 @@ struct Arguments {
   std::optional<double> young, thickness, density, pressure, duration, step, ramp;
   std::optional<std::string> poisson, mesh_unit, membrane, bending, solver, cg_tolerance, converge;
   std::optional<std::string> load_steps, cg_iterations, every;
-  std::optional<std::string> tessellation;
+  std::optional<std::string> tessellation, accuracy, quantity, max_shells;
+  std::optional<fs::path> target, shell_out;
   std::vector<std::string> fixes, exports;
   bool is_static = false;
   bool check = false;
@@ -37,6 +43,7 @@ struct Arguments {
 
 constexpr const char* scene_flag = "--scene";
 constexpr const char* resume_flag = "--resume";
+constexpr const char* accuracy_flag = "--accuracy";
 
 // What --scene contradicts: all that a scene file says itself.
 constexpr std::array scene_says{"--young",         "--poisson",  "--thickness",  "--density",  "--pressure",
@@ -75,6 +82,16 @@ void declare(cli::Tool& tool, Arguments& a) {
   tool.quantity("--step", a.step, dimension::time, "dynamic: time step, e.g. 40ms");
   tool.quantity("--ramp", a.ramp, dimension::time,
                 "dynamic: the load grows from zero over this time (default: at once)");
+  tool.group("Accuracy");
+  app.add_option(accuracy_flag, a.accuracy,
+                 "choose mesh and model: finer shells, until the error of the answer is credibly below this, e.g. 2%")
+      ->type_name("PERCENT");
+  app.add_option("--of", a.quantity, "the answer: displacement | energy | volume | stress (default displacement)")
+      ->type_name("NAME");
+  app.add_option("--target", a.target, "the surface that SHELL.ply was fitted to: finer shells are fitted to it too")
+      ->type_name("SURFACE");
+  app.add_option("--max-shells", a.max_shells, "no more shells than this (default 50,000)")->type_name("N");
+  app.add_option("--shell-out", a.shell_out, "the shells that it ended with")->type_name("OUT.ply");
   tool.group("Elements");
   app.add_option("--membrane", a.membrane, "membrane element: cst | opt | adapt (default adapt)")->type_name("NAME");
   app.add_option("--bending", a.bending,
@@ -284,6 +301,49 @@ Scene scene_of_flags(const Arguments& a) {
   return scene;
 }
 
+// What --accuracy asks for; nothing without it.
+std::optional<AccuracyRequest> accuracy_asked(const CLI::App& app, const Arguments& a) {
+  if (!a.accuracy) {
+    for (const char* flag : {"--of", "--target", "--max-shells", "--shell-out"}) {
+      if (app.count(flag) > 0) {
+        throw UsageError(fmt::format("{} belongs to {}: give that too", flag, accuracy_flag));
+      }
+    }
+    return std::nullopt;
+  }
+  if (!a.resume.empty()) {
+    throw UsageError(fmt::format("{} and {} contradict each other: begin again", accuracy_flag, resume_flag));
+  }
+  AccuracyRequest request;
+  request.within = parse_percent(*a.accuracy);
+  if (!(request.within > 0 && request.within <= 0.5)) {
+    throw UsageError(fmt::format("{}: '{}' is not above 0 and at most 50%", accuracy_flag, *a.accuracy));
+  }
+  choose<Quantity>(a.quantity, "--of", request.of,
+                   {{"displacement", Quantity::displacement},
+                    {"energy", Quantity::energy},
+                    {"volume", Quantity::volume},
+                    {"stress", Quantity::stress}});
+  request.max_shells = count(a.max_shells, "--max-shells", real(max_index)).value_or(request.max_shells);
+  return request;
+}
+
+// What an accuracy can be found for so far.
+void require_simple(const Scene& scene, const Arguments& a) {
+  const auto* run = std::get_if<StaticRun>(&scene.run.kind);
+  if (run == nullptr) {
+    throw UsageError(fmt::format("{} is for static runs: not available yet for others", accuracy_flag));
+  }
+  if (run->load_factors.size() > 1) {
+    throw UsageError(fmt::format("{} finds one answer: leave out {}", accuracy_flag,
+                                 a.scene.empty() ? "--load-steps" : "load_steps"));
+  }
+  if (scene.shells.size() > 1) {
+    throw UsageError(
+        fmt::format("{}: the scene has {} shells, one is understood so far", accuracy_flag, scene.shells.size()));
+  }
+}
+
 // Mechanics knows bodies, and where some of them were said: says which file a refused or unsolved model came from.
 template <typename Work>
 auto naming(const fs::path& file, const Work& work) {
@@ -440,9 +500,16 @@ public:
       tool_.print(scene_text(scene_));
       return;
     }
+    if (request_) {
+      choose_model();
+    }
     begin();
-    const Summary summary = solved();
+    const Summary summary = accuracy_ ? recorded() : solved();
     stage("write");
+    if (accuracy_ && given_.shell_out) {
+      write_shells(!accuracy_->reasons.empty());
+    }
+    require_accuracy();
     // A fixed count of iterations asks for no convergence, so none is claimed.
     const bool converged = summary.converged && !scene_.run.cg_fixed_count;
     const auto* dynamic = kind<DynamicRun>();
@@ -499,9 +566,86 @@ private:
         tool_.output(path);
       }
     }
+    request_ = accuracy_asked(tool_.arguments(), given_);
+    if (request_) {
+      require_simple(scene_, given_);
+      if (given_.shell_out) {
+        tool_.output(*given_.shell_out, {".ply"});
+      }
+    }
     loaded_.emplace(load_scene(scene_));
+    read_target();
     for (const std::string& note : loaded_->notes) {
       tool_.note(note);
+    }
+  }
+
+  void read_target() {
+    if (!given_.target) {
+      return;
+    }
+    const SceneShell& shell = scene_.shells.front();
+    MeshFile file = read_mesh(tool_.input(*given_.target), shell.unit_mm, true);
+    if (const auto why = why_unfit(examine(file.mesh))) {
+      throw InputError(fmt::format("{}: {}", given_.target->string(), *why));
+    }
+    const MeshFile own = read_mesh(shell.mesh, shell.unit_mm);
+    require_same_scale(own, shell.mesh, file, *given_.target, shell.unit_mm);
+    require_near(own, shell.mesh, file, *given_.target);
+    space_ = common_space(own, shell.mesh, file, *given_.target);
+    for (Vec3& vertex : file.mesh.vertices) {
+      vertex *= shell.scale;
+    }
+    target_.emplace(std::move(file.mesh));
+  }
+
+  /// Goes from level to level; the model is then the last one's.
+  void choose_model() {
+    stage("solve");
+    accuracy_ = naming(subject(), [&] {
+      return solve_within(
+          model().shells.front(), target_ ? &*target_ : nullptr, *request_, scene_.run,
+          [&](ShellBody body) { return resolve_scene(scene_, {std::move(body)}); },
+          [&](const AccuracyLevel& level) {
+            tool_.detail(fmt::format("{} shells: {} {:.5g}", level.shells, name_of(request_->of), level.value));
+          });
+    });
+    loaded_->model = std::move(accuracy_->model);
+    scene_.run = accuracy_->settings;
+    prepare_result(tool_.result(), model());
+    tool_.result()["accuracy"] = accuracy_report(*accuracy_, *request_, target_.has_value());
+  }
+
+  /// What choose_model() has solved, as solved() hands it over.
+  Summary recorded() {
+    stage("write");
+    for (const State& state : accuracy_->states) {
+      journal_->append(state);
+      record(state);
+    }
+    return accuracy_->summary;
+  }
+
+  void write_shells(bool partial) const {
+    PlyOptions options;
+    options.comments = {"made by " + tool_.command()};
+    options.space = space_;
+    options.overwrite = tool_.force();
+    options.partial = partial;
+    write_ply(*given_.shell_out, model().shells.front().mesh, options);
+  }
+
+  void require_accuracy() {
+    if (!accuracy_) {
+      return;
+    }
+    for (const std::string& line : accuracy_notes(*accuracy_, *request_, target_.has_value())) {
+      tool_.note(line);
+    }
+    if (!accuracy_->reasons.empty()) {
+      journal_->remove();
+      throw RequirementError(fmt::format("{}: {} of {} is not credible: {}", subject().string(), *given_.accuracy,
+                                         name_of(request_->of), fmt::join(accuracy_->reasons, "; ")));
     }
   }
 
@@ -517,7 +661,8 @@ private:
     stage("write");
     const char* const time_units = kind<DynamicRun>() != nullptr ? "s" : kind<FrequencyRun>() != nullptr ? "Hz" : "1";
     file_.emplace(out_, model(),
-                  ResultOptions{is_series(), time_units, origin.command, origin.scene, origin.inputs, drawing_.level(),
+                  ResultOptions{is_series(), time_units, origin.command, origin.scene,
+                                accuracy_ ? tool_.result()["accuracy"].dump(1) : "", origin.inputs, drawing_.level(),
                                 tool_.force()});
     if (drawing_.pvd || drawing_.xmf) {
       exported_.emplace(out_, model(), exports());
@@ -596,6 +741,10 @@ private:
   std::vector<fs::path> inputs_;
   Scene scene_;
   std::optional<LoadedScene> loaded_;
+  std::optional<AccuracyRequest> request_;
+  std::optional<Target> target_;
+  std::string space_ = "LPS";  // of the target, for the shells that are written
+  std::optional<Accuracy> accuracy_;
   Drawing drawing_;
   std::optional<RunJournal> journal_;
   std::optional<ResultFile> file_;

@@ -9,7 +9,8 @@
 
 namespace tunica {
 
-/// An integer as another type of integer. Errors: InternalError with the caller's place when it does not hold the value.
+/// An integer as another type of integer. Errors: InternalError with the caller's place when it does not hold the
+/// value.
 template <std::integral To, std::integral From>
 constexpr To narrow(From value, std::source_location at = std::source_location::current()) {
   if (!std::in_range<To>(value)) {

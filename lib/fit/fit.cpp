@@ -84,10 +84,11 @@ public:
 
 private:
   [[nodiscard]] std::vector<Index> thin_triangles(const ShellMesh& shell) const {
+    const double least = (1 - std::sqrt(negligible_shortfall)) * options_.min_angle;
     std::vector<Index> out;
     for (Index t = 0; t < shell.triangles.size(); ++t) {
       const auto& [a, b, c] = shell.triangles[t];
-      if (smallest_angle_degrees(shell.vertices[a], shell.vertices[b], shell.vertices[c]) < options_.min_angle) {
+      if (smallest_angle_degrees(shell.vertices[a], shell.vertices[b], shell.vertices[c]) < least) {
         out.push_back(t);
       }
     }
@@ -110,7 +111,7 @@ public:
         options_(options),
         like_target_(same_topology(coarse_, target)),
         best_(target, options, like_target_) {
-    limits_.shape.min_angle = options.min_angle / (1 - std::sqrt(negligible_shortfall));
+    limits_.shape.min_angle = options.min_angle;
     most_ = options.max_shells.value_or(options.tolerance ? options.shells.value_or(max_index) : max_index);
     rounds_ = options.max_iterations.value_or(default_rounds);
   }
@@ -396,8 +397,9 @@ RelaxResult fit(const TriangleMesh& coarse, const Target& target, const FitOptio
   return Fitting(coarse, target, options).run();
 }
 
-ShellMesh refit(const ShellMesh& shell, const Target& target, double min_angle) {
-  FitMesh mesh(split_shells(shell, std::vector<Split>(shell.triangles.size(), Split::all_edges)));
+ShellMesh refit(const ShellMesh& shell, const Target& target, double min_angle,
+                std::vector<std::array<Index, 2>>* halved) {
+  FitMesh mesh(split_shells(shell, std::vector<Split>(shell.triangles.size(), Split::all_edges), halved));
   const FitSamples samples(target, mesh.alive, true);
   SquaresOptions squares;
   squares.shape.min_angle = min_angle;

@@ -31,7 +31,9 @@ RelaxResult fit(const TriangleMesh& coarse, const Target& target, const FitOptio
 
 /// One level of a hierarchy of meshes for mechanics: every shell is split in four, and the nodes and normals are fitted
 /// to the target by least squares. Creases, boundaries and normals per side stay. Cost: about 0.2 ms per new shell.
-ShellMesh refit(const ShellMesh& shell, const Target& target, double min_angle = 20);
+/// @param halved  as split_shells()
+ShellMesh refit(const ShellMesh& shell, const Target& target, double min_angle = 20,
+                std::vector<std::array<Index, 2>>* halved = nullptr);
 
 /// Turns the normals, and only these, so that the curved surface comes closer to the target.
 /// @param shell  without corner normals; the others agree with their facets, see take_normals_from()

@@ -11,9 +11,10 @@ ROOMS = {
     "shell": {"core", "surface", "shell"},
     "fit": {"core", "surface", "shell", "fit"},
     "mechanics": {"core", "surface", "shell", "mechanics"},
+    "accuracy": {"core", "surface", "shell", "fit", "mechanics", "accuracy"},
     "draw": {"core", "surface", "draw"},
-    "io": {"core", "volume", "surface", "shell", "fit", "mechanics", "draw", "io"},
-    "cli": {"core", "volume", "surface", "shell", "fit", "mechanics", "draw", "io", "cli"},
+    "io": {"core", "volume", "surface", "shell", "fit", "mechanics", "accuracy", "draw", "io"},
+    "cli": {"core", "volume", "surface", "shell", "fit", "mechanics", "accuracy", "draw", "io", "cli"},
 }
 
 # Rooms of the second level, and which of their own floor they may include.

@@ -195,6 +195,10 @@ struct ResultFile::Implementation {
   void write_about(const ResultOptions& options) {
     tunica_group = writer.group(writer.root(), "tunica");
     writer.text(tunica_group.get(), "scene", options.scene);
+    if (!options.accuracy.empty()) {
+      writer.text(tunica_group.get(), "accuracy", options.accuracy);
+      writer.describe("tunica/accuracy", "1", "JSON: what --accuracy claims, as in the report");
+    }
     writer.text(tunica_group.get(), "command", options.command);
     writer.text(tunica_group.get(), "version", version);
     const Handle inputs = writer.group(tunica_group.get(), "inputs");

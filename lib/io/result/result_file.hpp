@@ -18,6 +18,7 @@ struct ResultOptions {
   std::string time_units = "1";  ///< of the states' `time`
   std::string command;
   std::string scene;                                        ///< resolved, SI
+  std::string accuracy;                                     ///< what is claimed, JSON; empty: nothing
   std::vector<std::pair<std::string, std::string>> inputs;  ///< path, sha256
   int tessellation = 0;  ///< pieces per edge into which a shell is cut for drawing; 0: drawing_level()
   bool overwrite = false;

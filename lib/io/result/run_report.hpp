@@ -1,5 +1,6 @@
 #pragma once
 
+#include "tunica/accuracy/accuracy.hpp"
 #include "tunica/core/json.hpp"
 #include "tunica/mechanics/runs/solve.hpp"
 
@@ -19,6 +20,15 @@ void report_summary(Json& result, const Summary& summary, bool converged, std::o
 /// Of a run for modes, after report_summary(): they have shapes, but no size, so nothing of a deformed state is
 /// claimed.
 void report_modes(Json& result, const Summary& summary);
+
+/// What a run for an accuracy claims, and how it got there.
+Json accuracy_report(const Accuracy& accuracy, const AccuracyRequest& request, bool with_target);
+
+/// The same as a table of lines for a terminal.
+std::vector<std::string> accuracy_notes(const Accuracy& accuracy, const AccuracyRequest& request, bool with_target);
+
+/// "displacement" and so on, as flags and reports name them.
+std::string_view name_of(Quantity quantity);
 
 /// A line on the modes found.
 std::string modes_note(const Summary& summary, std::size_t asked);

@@ -486,10 +486,17 @@ LoadedScene load_scene(const Scene& scene) {
   require_load(scene);
   LoadedScene loaded;
   loaded.notes = scene.notes;
-  Model& model = loaded.model;
+  std::vector<ShellBody> bodies;
   for (const SceneShell& shell : scene.shells) {
-    model.shells.push_back(load_body(shell, loaded.notes));
+    bodies.push_back(load_body(shell, loaded.notes));
   }
+  loaded.model = resolve_scene(scene, std::move(bodies));
+  return loaded;
+}
+
+Model resolve_scene(const Scene& scene, std::vector<ShellBody> shells) {
+  Model model;
+  model.shells = std::move(shells);
   std::vector<Body> bodies;
   for (const ShellBody& shell : model.shells) {
     bodies.emplace_back(shell.mesh);
@@ -512,7 +519,7 @@ LoadedScene load_scene(const Scene& scene) {
     const std::size_t b = body_index(scene, probe.body, probe.places);
     model.probes.push_back({probe.name, b, nodes_of(bodies[b], NearestNode{probe.nearest}, probe.places).front()});
   }
-  return loaded;
+  return model;
 }
 
 }  // namespace tunica

@@ -136,6 +136,9 @@ struct LoadedScene {
 /// Errors: InputError: as read_mesh; a selection that is empty, a node that does not exist.
 LoadedScene load_scene(const Scene& scene);
 
+/// The same on bodies that are at hand, one for each shell of the scene, such as finer meshes of the same.
+Model resolve_scene(const Scene& scene, std::vector<ShellBody> shells);
+
 /// The scene as a scene file with everything resolved: SI units, absolute mesh paths, defaults written out. Reading it
 /// gives the same scene.
 std::string scene_text(const Scene& scene);

@@ -291,8 +291,8 @@ std::array<bool, 3> read_components(const Table& item, std::string_view key) {
   const std::string text = item.text_of(item.required(key, R"( ("xyz" holds all axes, "" none))"), key);
   std::array<bool, 3> held{false, false, false};
   for (const char c : text) {
-    const std::size_t axis = narrow<std::size_t>(c - 'x');
-    if (c < 'x' || c > 'z' || held[axis]) {
+    const std::size_t axis = std::string_view("xyz").find(c);
+    if (axis == std::string_view::npos || held[axis]) {
       item.place(key).fail(
           fmt::format("{} = \"{}\" must name each held axis once: \"xyz\", \"z\", or \"\" for none", key, text));
     }

@@ -195,9 +195,10 @@ Failure why(const NewtonResult& result, const SettleResult& let_go, bool prescri
 class LoadControl final : public SteppedRun {
 public:
   LoadControl(ShellSystem& system, const Model& model, const RunSettings& settings, const StaticRun& run,
-              const StateCallback& on_state)
+              const StateCallback& on_state, const std::optional<Checkpoint>& near)
       : SteppedRun(system, model, settings, on_state, run.load_factors.size()),
         run_(run),
+        near_(near),
         step_(system, model, settings),
         thickness_(least_thickness(model)),
         configuration_(reference_configuration(system)) {}
@@ -216,11 +217,42 @@ private:
 
   State take_step() override {
     step_.tell_direct_error(summary_.steps == 0 || is_last());
-    return state_of(reach(run_.load_factors[summary_.steps]));
+    const double target = run_.load_factors[summary_.steps];
+    if (near_ && summary_.steps == 0) {
+      if (const auto found = from_near(target)) {
+        return state_of(*found);
+      }
+    }
+    return state_of(reach(target));
   }
 
   [[nodiscard]] Checkpoint checkpoint() const override {
     return {{}, factor_, configuration_.displacement, configuration_.rotation, {{"increment", {increment_}}}};
+  }
+
+  /// Equilibrium from the configuration that is said to be near, supports and prescribed displacements put right.
+  std::optional<NewtonResult> from_near(double target) {
+    Configuration attempt{near_->displacement, near_->rotation};
+    VectorX positions = prescribed_positions(system_, model_, target);
+    for (std::size_t i = 0; i < system_.node_count(); ++i) {
+      Vec3 turned = logarithm(attempt.rotation[i]);
+      for (int axis = 0; axis < 3; ++axis) {
+        if (system_.held[freedom(i, axis)]) {
+          attempt.displacement[i][axis] = positions[first_freedom(i) + axis];
+        }
+        if (system_.held[freedom(i, axis + 3)]) {
+          turned[axis] = 0;
+        }
+      }
+      attempt.rotation[i] = exponential(turned);
+    }
+    NewtonResult result = step_.run(target, target, attempt);
+    if (!result.converged || !may_stand(result)) {
+      return std::nullopt;
+    }
+    configuration_ = std::move(attempt);
+    factor_ = target;
+    return result;
   }
 
   /// Equilibrium at a load factor. Errors: RequirementError: there is none.
@@ -317,6 +349,7 @@ private:
   }
 
   const StaticRun& run_;
+  const std::optional<Checkpoint>& near_;
   LoadStep step_;
   const double thickness_;
   Configuration configuration_;
@@ -328,7 +361,7 @@ private:
 
 Summary run_static(ShellSystem& system, const Model& model, const RunSettings& settings, const StaticRun& run,
                    const StateCallback& on_state, const Progress& progress, const Resumption& resumption) {
-  return LoadControl(system, model, settings, run, on_state).follow(progress, resumption);
+  return LoadControl(system, model, settings, run, on_state, resumption.near).follow(progress, resumption);
 }
 
 }  // namespace tunica

@@ -195,10 +195,16 @@ Triangles pieces_of(const ShellMesh& shell, const Edges& edges, const std::vecto
 
 }  // namespace
 
-ShellMesh split_shells(const ShellMesh& shell, const std::vector<Split>& wanted) {
+ShellMesh split_shells(const ShellMesh& shell, const std::vector<Split>& wanted,
+                       std::vector<std::array<Index, 2>>* halved) {
   const Edges edges = edges_of(shell);
   ShellMesh out{shell.vertices, {}, shell.normals, {}, shell.patch};
   const std::vector<Middle> middles = add_middles(shell, edges, edges_to_cut(shell, edges, wanted), out);
+  for (std::size_t e = 0; e < middles.size() && halved != nullptr; ++e) {
+    if (middles[e].node != none) {
+      halved->push_back(edges.ends[e]);
+    }
+  }
   for (std::size_t t = 0; t < shell.triangles.size(); ++t) {
     const Triangles pieces = pieces_of(shell, edges, middles, t, out.vertices);
     out.triangles.insert(out.triangles.end(), pieces.begin(), pieces.end());

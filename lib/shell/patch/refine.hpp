@@ -16,8 +16,10 @@ enum class Split : std::uint8_t {
 /// cuts the one with the better worst triangle is taken. New nodes lie on the curved patches (the mean of two
 /// neighbours' edge curves), with their normals: one for each side along creases.
 /// @param wanted  #F; neighbours may get split as well
+/// @param halved  gets the ends of the edge that each new node halves; the others keep their numbers
 /// Source: Rivara, "Algorithms for refining triangular grids", IJNME 20, 1984. Cost: linear.
-ShellMesh split_shells(const ShellMesh& shell, const std::vector<Split>& wanted);
+ShellMesh split_shells(const ShellMesh& shell, const std::vector<Split>& wanted,
+                       std::vector<std::array<Index, 2>>* halved = nullptr);
 
 /// Splits those shells whose error is above `tolerance`, worst first as far as `most` shells allow: above 3 tolerances
 /// 1:4, else 1:2.

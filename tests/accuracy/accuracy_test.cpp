@@ -1,0 +1,205 @@
+// Claims against analytic answers; what must not be believed is not.
+#include "tunica/accuracy/accuracy.hpp"
+
+#include "mechanics/benchmarks.hpp"
+#include "tunica/accuracy/detail/levels.hpp"
+#include "tunica/core/error.hpp"
+#include "tunica/mechanics/elements/rotation.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+namespace tunica {
+namespace {
+
+constexpr double radius = 10, thickness = 0.5, young = 1000, poisson = 0.3;
+
+RunSettings at_rest() {
+  RunSettings settings;
+  settings.kind = StaticRun{false, {1}};
+  return settings;
+}
+
+/// A sphere under pressure, which the membrane theory knows.
+struct Sphere {
+  Target target{flat_facets(testing::make_sphere(radius, 5))};
+  Model model = testing::pressurised_sphere(1, thickness, 0.01);
+  std::map<std::size_t, double> factors;  // of the pressure, by shells
+
+  [[nodiscard]] double exact(Quantity of) const {
+    const double u = 0.01 * radius * radius * (1 - poisson) / (2 * young * thickness);
+    const double area = 4 * std::numbers::pi * radius * radius;
+    return of == Quantity::displacement ? u
+           : of == Quantity::energy     ? area * 0.01 * u / 2
+           : of == Quantity::volume     ? area * u
+                                        : 0.01 * radius / (2 * thickness);
+  }
+
+  [[nodiscard]] Accuracy solved(const AccuracyRequest& request) const {
+    return solve_within(model.shells.front(), &target, request, at_rest(), [&](ShellBody body) {
+      Model finer = model;
+      const auto factor = factors.find(body.mesh.triangles.size());
+      std::get<PressureLoad>(finer.loads.front().kind).value *= factor == factors.end() ? 1 : factor->second;
+      finer.shells = {std::move(body)};
+      return finer;
+    });
+  }
+};
+
+TEST(Accuracy, ASphereUnderPressureIsWithinWhatIsClaimed) {
+  const Sphere sphere;
+  for (const Quantity of : {Quantity::displacement, Quantity::energy, Quantity::volume, Quantity::stress}) {
+    const Accuracy found = sphere.solved({0.02, of});
+    ASSERT_TRUE(found.reasons.empty()) << found.reasons.front();
+    const double error = std::abs(found.levels.back().value / sphere.exact(of) - 1);
+    EXPECT_LT(error, *found.estimate);
+    EXPECT_LT(*found.estimate, 0.02);
+    EXPECT_GE(found.levels.size(), 3U);
+    EXPECT_EQ(found.model.shells.front().mesh.triangles.size(), found.levels.back().shells);
+    EXPECT_EQ(found.states.size(), 2U);
+    EXPECT_TRUE(found.summary.converged);
+  }
+}
+
+TEST(Accuracy, WhereDisplacementsAreSmallTheLinearModelIsTaken) {
+  Sphere sphere;
+  EXPECT_TRUE(std::get<StaticRun>(sphere.solved({0.02}).settings.kind).linear);
+  std::get<PressureLoad>(sphere.model.loads.front().kind).value = 10;  // strains of a tenth
+  const Accuracy large = sphere.solved({0.02});
+  EXPECT_FALSE(std::get<StaticRun>(large.settings.kind).linear);
+  EXPECT_EQ(large.choices.back().instead, "linear");
+}
+
+TEST(Accuracy, NewtonsMethodGoesOnFromTheCoarserLevel) {
+  Sphere sphere;
+  std::get<PressureLoad>(sphere.model.loads.front().kind).value = 10;
+  const Accuracy found = sphere.solved({0.02});
+  for (std::size_t level = 1; level < found.levels.size(); ++level) {
+    EXPECT_LE(found.levels[level].newton_iterations, 4U);
+  }
+}
+
+TEST(Accuracy, TwoLevelsThatAgreeByChanceAreNotBelieved) {
+  Sphere sphere;
+  const double first = sphere.solved({0.02}).levels[0].value, second = sphere.solved({0.02}).levels[1].value;
+  sphere.factors = {{320, first / second}, {1280, 1.3}, {5120, 1.3}, {20480, 1.3}};
+  const Accuracy found = sphere.solved({0.02, Quantity::displacement, 1280});
+  EXPECT_NEAR(found.levels[1].value / found.levels[0].value, 1, 1e-3);
+  EXPECT_GT(*found.estimate, 0.2);
+  EXPECT_FALSE(found.reasons.empty());
+  // And where the last two agree, the change before them counts.
+  sphere.factors = {{80, 1.3}};
+  EXPECT_GT(*sphere.solved({0.02, Quantity::displacement, 1280}).estimate, 0.05);
+}
+
+/// A thin tube clamped at its ends.
+Model clamped_tube(ShellBody body) {
+  Model model;
+  body.thickness = {0.05};
+  Fix fix;
+  for (Index v = 0; v < body.mesh.vertices.size(); ++v) {
+    if (std::abs(std::abs(body.mesh.vertices[v].z()) - 20) < 1e-9) {
+      fix.nodes.push_back(v);
+    }
+  }
+  model.fixes.push_back(fix);
+  model.loads.push_back({0, PressureLoad{0.001, true}, {}});
+  model.shells.push_back(std::move(body));
+  return model;
+}
+
+ShellBody tube_body() {
+  ShellBody body = testing::flat_body({}, young, poisson, 0.05);
+  constexpr Index around = 12, along = 8;
+  for (Index j = 0; j <= along; ++j) {
+    for (Index i = 0; i < around; ++i) {
+      const double angle = 2 * std::numbers::pi * i / around;
+      body.mesh.normals.emplace_back(std::cos(angle), std::sin(angle), 0);
+      body.mesh.vertices.emplace_back(radius * body.mesh.normals.back() + Vec3(0, 0, 40.0 * j / along - 20));
+    }
+  }
+  for (Index j = 0; j < along; ++j) {
+    for (Index i = 0; i < around; ++i) {
+      const Index a = j * around + i, b = j * around + (i + 1) % around;
+      body.mesh.triangles.push_back({a, b, b + around});
+      body.mesh.triangles.push_back({a, b + around, a + around});
+    }
+  }
+  body.mesh.patch = Patch::watertight;
+  body.curved = true;
+  body.rest = Rest::curved;
+  return body;
+}
+
+TEST(Accuracy, ABendingLayerThatNoLevelResolvesIsNamed) {
+  const Accuracy found = solve_within(tube_body(), nullptr, {0.5, Quantity::stress, 12'288}, at_rest(), clamped_tube);
+  ASSERT_FALSE(found.reasons.empty());
+  EXPECT_THAT(found.reasons.front(), ::testing::HasSubstr("bending layer"));
+  EXPECT_LT(edges_per_layer(found.model), 2);
+  EXPECT_EQ(edges_per_layer(testing::pressurised_sphere(1, 0.5, 1)), infinity);
+}
+
+TEST(Accuracy, TooFewShellsForAnEstimateAreSaid) {
+  const Accuracy found = Sphere().solved({0.02, Quantity::displacement, 500});
+  EXPECT_FALSE(found.estimate);
+  EXPECT_EQ(found.levels.size(), 2U);
+  EXPECT_THAT(found.reasons.front(), ::testing::HasSubstr("takes 3 levels"));
+}
+
+TEST(Accuracy, WhatHasNoAnswerIsRefused) {
+  EXPECT_THROW(solve_within(tube_body(), nullptr, {0.02, Quantity::volume}, at_rest(), clamped_tube), InputError);
+  Sphere sphere;
+  std::get<PressureLoad>(sphere.model.loads.front().kind).value = 0;
+  EXPECT_THROW(sphere.solved({0.02}), InputError);
+}
+
+TEST(Levels, ARigidMotionStaysOne) {
+  const ShellBody coarse = testing::pressurised_sphere(1, thickness, 1).shells.front();
+  const Target target(flat_facets(testing::make_sphere(radius, 4)));
+  const Eigen::Quaterniond turn = exponential(Vec3(0.3, -1.1, 0.7));
+  const auto moved = [&](const Vec3& x) { return Vec3(turn * x + Vec3(5, 6, 7) - x); };
+  State state;
+  for (const Vec3& x : coarse.mesh.vertices) {
+    state.displacement.push_back(moved(x));
+    state.rotation.push_back(logarithm(turn));
+  }
+  for (const Target* fitted : {static_cast<const Target*>(nullptr), &target}) {
+    std::vector<std::array<Index, 2>> parents;
+    const ShellBody fine = finer_level(coarse, fitted, parents);
+    ASSERT_EQ(fine.mesh.triangles.size(), 4 * coarse.mesh.triangles.size());
+    const State finer = interpolated(state, coarse, fine, parents);
+    ASSERT_EQ(finer.displacement.size(), fine.mesh.vertices.size());
+    for (std::size_t v = coarse.mesh.vertices.size(); v < fine.mesh.vertices.size(); ++v) {
+      EXPECT_LT((finer.displacement[v] - moved(fine.mesh.vertices[v])).norm(), 1e-12 * radius);
+      EXPECT_LT((finer.rotation[v] - logarithm(turn)).norm(), 1e-12);
+    }
+  }
+}
+
+TEST(Levels, ThicknessPerVertexIsInterpolated) {
+  ShellBody body = testing::pressurised_sphere(1, thickness, 1).shells.front();
+  body.thickness.clear();
+  for (const Vec3& x : body.mesh.vertices) {
+    body.thickness.push_back(1 + 0.01 * x.z());
+  }
+  std::vector<std::array<Index, 2>> parents;
+  const ShellBody fine = finer_level(body, nullptr, parents);
+  ASSERT_EQ(fine.thickness.size(), fine.mesh.vertices.size());
+  for (std::size_t i = 0; i < parents.size(); ++i) {
+    EXPECT_DOUBLE_EQ(fine.thickness[body.mesh.vertices.size() + i],
+                     (body.thickness[parents[i][0]] + body.thickness[parents[i][1]]) / 2);
+  }
+}
+
+TEST(Levels, TheFieldTellsWhatTheLargestDoesNot) {
+  State coarse, fine;
+  coarse.displacement = {Vec3(1, 0, 0), Vec3(0, 0, 0)};
+  fine.displacement = {Vec3(1, 0, 0), Vec3(0, 0.5, 0), Vec3(0, 0, 0)};
+  EXPECT_DOUBLE_EQ(field_change(coarse, fine), 0.5);
+}
+
+}  // namespace
+}  // namespace tunica
