@@ -155,16 +155,21 @@ def stage_flags(label):
     extract += flag_if("--smooth", "SMOOTH")
     for name, word in (("LARGEST", "--largest"), ("FILL", "--fill-cavities"), ("OPEN", "--open-border")):
         extract += [word] if switched_on(name) else []
+    decimate = flag_if("--triangles", "SHELLS")
     relax = flag("--tolerance", setting("TOLERANCE")) + ["--refine"] if setting("TOLERANCE") else []
+    if setting("ACCURACY"):
+        # The coarsest of the levels: well shaped, and near enough to be refitted.
+        decimate += ["--min-angle", "20"]
+        relax = ["--tolerance", "5%", "--refine"]
     relax += flag_if("--method", "METHOD")
-    simulate = flag_if("--fix", "FIX")
+    simulate = flag_if("--fix", "FIX") + flag_if("--accuracy", "ACCURACY") + flag_if("--of", "OF")
     for name in ("pressure", "young", "poisson", "thickness", "density"):
         simulate += flag_if("--" + name, name.upper())
     if setting("KIND") == "static":
         simulate += ["--static", *flag_if("--load-steps", "LOAD_STEPS")]
     else:
         simulate += flag_if("--duration", "DURATION") + flag_if("--step", "STEP")
-    words = {"extract": extract, "decimate": flag_if("--triangles", "SHELLS"), "relax": relax, "simulate": simulate}
+    words = {"extract": extract, "decimate": decimate, "relax": relax, "simulate": simulate}
     return {stage: " ".join([shlex.join(words[stage]), setting(stage.upper())]).strip() for stage in words}
 
 
@@ -174,7 +179,7 @@ def stage_commands(case, binaries, flags):
         os.path.join(case.folder, name)
         for name in ("surface.ply", "coarse.ply", "shell.ply", "map.png", "result.hdf", "extract.json"))
     words = {"extract": [path_word(case.volume), surface], "decimate": [surface, coarse],
-             "relax": [coarse, surface, shell, "--picture", picture], "simulate": [shell, result]}
+             "relax": [coarse, surface, shell, "--picture", picture], "simulate": [shell, result, *(["--target", surface] if setting("ACCURACY") else [])]}
     # Whether there is a boundary to hold is known once the surface is.
     is_closed = f"grep -q '\"closed\": *true' {shlex.quote(facts)}"
     chosen_fix = "" if setting("FIX") else f' --fix "$(if {is_closed}; then echo rigid-motions; else echo boundary; fi)"'

@@ -1,4 +1,5 @@
 #include "tunica/accuracy/accuracy.hpp"
+#include "tunica/cli/scene_flags.hpp"
 #include "tunica/cli/tool.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/core/version.hpp"
@@ -31,25 +32,16 @@ namespace fs = std::filesystem;
 struct Arguments {
   std::vector<fs::path> files;
   fs::path scene, resume;
-  std::optional<double> young, thickness, density, pressure, duration, step, ramp;
-  std::optional<std::string> poisson, mesh_unit, membrane, bending, solver, cg_tolerance, converge;
-  std::optional<std::string> load_steps, cg_iterations, every;
+  cli::SceneFlags flags;
   std::optional<std::string> tessellation, accuracy, quantity, max_shells;
   std::optional<fs::path> target, shell_out;
-  std::vector<std::string> fixes, exports;
-  bool is_static = false;
+  std::vector<std::string> exports;
   bool check = false;
 };
 
 constexpr const char* scene_flag = "--scene";
 constexpr const char* resume_flag = "--resume";
 constexpr const char* accuracy_flag = "--accuracy";
-
-// What --scene contradicts: all that a scene file says itself.
-constexpr std::array scene_says{"--young",         "--poisson",  "--thickness",  "--density",  "--pressure",
-                                "--fix",           "--static",   "--load-steps", "--duration", "--step",
-                                "--ramp",          "--membrane", "--bending",    "--solver",   "--cg-tolerance",
-                                "--cg-iterations", "--converge", "--every",      "--mesh-unit"};
 
 void declare(cli::Tool& tool, Arguments& a) {
   CLI::App& app = tool.arguments();
@@ -58,30 +50,7 @@ void declare(cli::Tool& tool, Arguments& a) {
       ->type_name("FILE");
   tool.group("Scene");
   app.add_option(scene_flag, a.scene, "read everything from a scene file (TOML)")->type_name("SCENE.toml");
-  tool.group("Wall");
-  tool.quantity("--young", a.young, dimension::pressure, "Young's modulus, e.g. 1MPa");
-  app.add_option("--poisson", a.poisson, "Poisson's ratio, in (-1, 0.5)")->type_name("NUMBER");
-  tool.quantity("--thickness", a.thickness, dimension::length, "thickness of the shell, e.g. 1.5mm");
-  tool.quantity("--density", a.density, dimension::density, "mass density, e.g. 1100kg/m3 (dynamic runs need it)");
-  tool.group("Load and supports");
-  tool.quantity("--pressure", a.pressure, dimension::pressure,
-                "pressure that follows the surface; positive pushes along the normals, outward");
-  app.add_option("--fix", a.fixes,
-                 "what is held, may repeat: boundary | 'below z=-10mm' | 'above x=3cm' | rigid-motions (a closed organ "
-                 "under its own pressure)")
-      ->type_name("WHERE")
-      ->expected(1)
-      ->allow_extra_args(false)  // the next word is a file
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-  tool.group("Run");
-  app.add_flag("--static", a.is_static, "solve for the state of rest");
-  app.add_option("--load-steps", a.load_steps,
-                 "static: steps in which the load grows, each written (default: all at once)")
-      ->type_name("N");
-  tool.quantity("--duration", a.duration, dimension::time, "dynamic: time simulated, e.g. 2s");
-  tool.quantity("--step", a.step, dimension::time, "dynamic: time step, e.g. 40ms");
-  tool.quantity("--ramp", a.ramp, dimension::time,
-                "dynamic: the load grows from zero over this time (default: at once)");
+  a.flags.declare(tool);
   tool.group("Accuracy");
   app.add_option(accuracy_flag, a.accuracy,
                  "choose mesh and model: finer shells, until the error of the answer is credibly below this, e.g. 2%")
@@ -92,26 +61,6 @@ void declare(cli::Tool& tool, Arguments& a) {
       ->type_name("SURFACE");
   app.add_option("--max-shells", a.max_shells, "no more shells than this (default 50,000)")->type_name("N");
   app.add_option("--shell-out", a.shell_out, "the shells that it ended with")->type_name("OUT.ply");
-  tool.group("Elements");
-  app.add_option("--membrane", a.membrane, "membrane element: cst | opt | adapt (default adapt)")->type_name("NAME");
-  app.add_option("--bending", a.bending,
-                 "bending element: comas (the paper's) | comas-consistent | dkt | dkt-comas (default dkt-comas)")
-      ->type_name("NAME");
-  tool.group("Solver");
-  app.add_option("--solver", a.solver, "cg | direct | auto (default auto)")->type_name("NAME");
-  app.add_option("--cg-tolerance", a.cg_tolerance, "relative residual at which CG stops, e.g. 5% (the paper's)")
-      ->type_name("PERCENT");
-  app.add_option("--cg-iterations", a.cg_iterations,
-                 "at most N CG iterations; without --cg-tolerance a fixed count that asks for no convergence")
-      ->type_name("N");
-  app.add_option("--converge", a.converge, "relative residual at which a step counts as solved (default 1e-8)")
-      ->type_name("NUMBER");
-  tool.group("Output");
-  app.add_option("--every", a.every, "write every N-th state (default 1); the first and the last always")
-      ->type_name("N");
-  tool.group("Scene");
-  app.add_option("--mesh-unit", a.mesh_unit, "unit of length of a mesh in a format that carries none: mm | cm | m | um")
-      ->type_name("mm|cm|m|um");
   tool.group("Run");
   app.add_flag("--check", a.check, "validate, print the resolved scene in SI units, and stop");
   app.add_option(resume_flag, a.resume,
@@ -127,178 +76,6 @@ void declare(cli::Tool& tool, Arguments& a) {
       ->expected(1)
       ->allow_extra_args(false)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-}
-
-template <typename Value>
-Value required(const std::optional<Value>& value, const char* flag, const char* example) {
-  if (!value) {
-    throw UsageError(fmt::format("{0} is missing: give it, for example {0} {1}", flag, example));
-  }
-  return *value;
-}
-
-double number(const std::optional<std::string>& text, const char* flag, double otherwise) {
-  if (!text) {
-    return otherwise;
-  }
-  const auto value = parse_number(*text);
-  if (!value) {
-    throw UsageError(fmt::format("{}: '{}' is not a number", flag, *text));
-  }
-  return *value;
-}
-
-std::optional<std::size_t> count(const std::optional<std::string>& text, const char* flag, double most) {
-  if (!text) {
-    return std::nullopt;
-  }
-  const auto value = parse_number(*text);
-  if (!value || *value < 1 || *value > most || *value != std::floor(*value)) {
-    throw UsageError(fmt::format("{}: '{}' is not a whole number from 1 to {:.0f}", flag, *text, most));
-  }
-  return truncated<std::size_t>(*value);
-}
-
-template <typename Value>
-void choose(const std::optional<std::string>& word, const char* flag, Value& value,
-            std::initializer_list<std::pair<std::string_view, Value>> choices) {
-  if (!word) {
-    return;
-  }
-  std::string known;
-  for (const auto& [name, meaning] : choices) {
-    if (*word == name) {
-      value = meaning;
-      return;
-    }
-    known += fmt::format("{}{}", known.empty() ? "" : ", ", name);
-  }
-  throw UsageError(fmt::format("{}: '{}' is not one of {}", flag, *word, known));
-}
-
-Places flags_as_places(std::initializer_list<const char*> keys) {
-  Places places{{"command line", true}, {}};
-  for (const char* key : keys) {
-    places.keys[key] = {std::string("--") + key, true};
-  }
-  return places;
-}
-
-// "boundary", "rigid-motions", "below z=-10mm", "above x = 3cm".
-Selection parse_fix(const std::string& text) {
-  if (text == "boundary") {
-    return BoundaryNodes{};
-  }
-  if (text == "rigid-motions") {
-    return RigidMotions{};
-  }
-  const auto unknown = [&] {
-    throw UsageError(fmt::format(
-        "--fix: '{}' is not understood: write boundary, rigid-motions, 'below z=-10mm' or 'above x=3cm'", text));
-  };
-  HalfSpaceNodes half;
-  half.below = text.starts_with("below ");
-  if (!half.below && !text.starts_with("above ")) {
-    unknown();
-  }
-  const std::size_t axis = text.find_first_not_of(' ', 6);
-  const std::size_t equals = text.find('=');
-  if (axis == std::string::npos || text[axis] < 'x' || text[axis] > 'z' || equals == std::string::npos ||
-      text.find_first_not_of(' ', axis + 1) != equals) {
-    unknown();
-  }
-  half.axis = text[axis] - 'x';
-  try {
-    half.at = parse_quantity(text.substr(equals + 1), dimension::length);
-  } catch (const UsageError& error) {
-    throw UsageError(fmt::format("--fix '{}': {}", text, error.what()));
-  }
-  return half;
-}
-
-void set_kind(const Arguments& a, Scene& scene, Ramp& load_ramp) {
-  if (a.is_static) {
-    for (const auto& [given, flag] :
-         {std::pair{a.duration.has_value(), "--duration"}, std::pair{a.step.has_value(), "--step"},
-          std::pair{a.ramp.has_value(), "--ramp"}}) {
-      if (given) {
-        throw UsageError(fmt::format("--static and {} contradict each other: give one", flag));
-      }
-    }
-    scene.run.kind = StaticRun{false, equal_load_factors(count(a.load_steps, "--load-steps", 1e6).value_or(1))};
-    return;
-  }
-  if (!a.duration && !a.step) {
-    throw UsageError("--static is missing: give it, or --duration and --step for a dynamic run");
-  }
-  if (a.load_steps) {
-    throw UsageError("--load-steps belongs to --static: in a dynamic run give --ramp");
-  }
-  DynamicRun& dynamic = scene.run.kind.emplace<DynamicRun>();
-  dynamic.duration = required(a.duration, "--duration", "2s");
-  dynamic.step = required(a.step, "--step", "40ms");
-  if (a.ramp) {
-    if (!(*a.ramp > 0)) {
-      throw UsageError("--ramp: must be greater than zero");
-    }
-    load_ramp.points = {{0, 0}, {*a.ramp, 1}};
-  }
-}
-
-// The scene that the flags describe: one shell under pressure.
-Scene scene_of_flags(const Arguments& a) {
-  Scene scene;
-  SceneLoad load{"shell", std::nullopt, PressureLoad{}, {}, flags_as_places({})};
-  scene.run_places = flags_as_places({"duration", "step", "solver", "converge", "every"});
-  scene.run_places.keys["cg_tolerance"] = {"--cg-tolerance", true};
-  scene.run_places.keys["cg_iterations"] = {"--cg-iterations", true};
-  set_kind(a, scene, load.ramp);
-  choose<Solver>(a.solver, "--solver", scene.run.solver,
-                 {{"auto", Solver::automatic}, {"cg", Solver::cg}, {"direct", Solver::direct}});
-  if (a.cg_tolerance) {
-    scene.run.cg_tolerance = parse_percent(*a.cg_tolerance);
-    scene.cg_tolerance_stated = true;
-  }
-  scene.run.cg_iterations = count(a.cg_iterations, "--cg-iterations", 1e9);
-  scene.run.converge = number(a.converge, "--converge", scene.run.converge);
-  scene.run.every = count(a.every, "--every", 1e9).value_or(1);
-
-  SceneShell shell;
-  shell.name = load.body;
-  shell.places = flags_as_places({"thickness", "young", "poisson", "density"});
-  shell.mesh = a.files.front();
-  if (a.mesh_unit) {
-    shell.unit_mm = parse_length_unit(*a.mesh_unit);
-  }
-  shell.material.young = required(a.young, "--young", "1MPa");
-  (void)required(a.poisson, "--poisson", "0.45");
-  shell.material.poisson = number(a.poisson, "--poisson", 0);
-  shell.thickness = required(a.thickness, "--thickness", "1.5mm");
-  if (!a.is_static) {
-    (void)required(a.density, "--density", "1100kg/m3");
-  }
-  shell.material.density = a.density;
-  choose<Membrane>(a.membrane, "--membrane", shell.membrane,
-                   {{"cst", Membrane::cst}, {"opt", Membrane::opt}, {"adapt", Membrane::adapt}});
-  choose<Bending>(a.bending, "--bending", shell.bending,
-                  {{"comas", Bending::comas},
-                   {"comas-consistent", Bending::comas_consistent},
-                   {"dkt", Bending::dkt},
-                   {"dkt-comas", Bending::dkt_comas}});
-  scene.shells.push_back(shell);
-
-  load.kind = PressureLoad{required(a.pressure, "--pressure", "100mmHg"), true};
-  scene.loads.push_back(load);
-  for (const std::string& text : a.fixes) {
-    SceneFix fix;
-    fix.body = shell.name;
-    fix.where = parse_fix(text);
-    fix.places = {{fmt::format("{}: --fix '{}'", shell.mesh.string(), text), true}, {}};
-    scene.fixes.push_back(fix);
-  }
-  settle_solver(scene);
-  check_scene(scene);
-  return scene;
 }
 
 // What --accuracy asks for; nothing without it.
@@ -319,12 +96,12 @@ std::optional<AccuracyRequest> accuracy_asked(const CLI::App& app, const Argumen
   if (!(request.within > 0 && request.within <= 0.5)) {
     throw UsageError(fmt::format("{}: '{}' is not above 0 and at most 50%", accuracy_flag, *a.accuracy));
   }
-  choose<Quantity>(a.quantity, "--of", request.of,
-                   {{"displacement", Quantity::displacement},
-                    {"energy", Quantity::energy},
-                    {"volume", Quantity::volume},
-                    {"stress", Quantity::stress}});
-  request.max_shells = count(a.max_shells, "--max-shells", real(max_index)).value_or(request.max_shells);
+  cli::choose<Quantity>(a.quantity, "--of", request.of,
+                        {{"displacement", Quantity::displacement},
+                         {"energy", Quantity::energy},
+                         {"volume", Quantity::volume},
+                         {"stress", Quantity::stress}});
+  request.max_shells = cli::count_of(a.max_shells, "--max-shells", real(max_index)).value_or(request.max_shells);
   return request;
 }
 
@@ -377,7 +154,7 @@ fs::path output_path(const CLI::App& app, const Arguments& a) {
   const bool resumed = !a.resume.empty();
   // A run that goes on knows its scene and its output, and may be told them again.
   const bool alone = resumed && !from_scene && a.files.size() < 2;
-  for (const char* flag : scene_says) {
+  for (const char* flag : cli::SceneFlags::names) {
     if ((from_scene || alone) && app.count(flag) > 0) {
       throw UsageError(
           from_scene
@@ -416,7 +193,7 @@ Scene read_scene_of_run(cli::Tool& tool, const Arguments& a, const std::optional
   } else if (before && a.files.size() < 2) {
     scene = parse_scene(before->identity().scene, a.resume);
   } else {
-    scene = scene_of_flags(a);
+    scene = a.flags.scene(a.files.front());
   }
   for (const SceneShell& shell : scene.shells) {
     if (std::find(inputs.begin(), inputs.end(), shell.mesh) == inputs.end()) {
@@ -444,7 +221,7 @@ struct Drawing {
 Drawing drawing_of_flags(const Arguments& a) {
   Drawing drawing;
   constexpr double finest = 64;
-  if (const auto pieces = count(a.tessellation, "--tessellation", finest)) {
+  if (const auto pieces = cli::count_of(a.tessellation, "--tessellation", finest)) {
     drawing.tessellation = std::to_string(*pieces);
   }
   for (const std::string& format : a.exports) {

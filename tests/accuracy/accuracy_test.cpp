@@ -25,8 +25,8 @@ RunSettings at_rest() {
 
 /// A sphere under pressure, which the membrane theory knows.
 struct Sphere {
-  Target target{flat_facets(testing::make_sphere(radius, 5))};
-  Model model = testing::pressurised_sphere(1, thickness, 0.01);
+  Target target{flat_facets(benchmarks::make_sphere(radius, 5))};
+  Model model = benchmarks::pressurised_sphere(1, thickness, 0.01);
   std::map<std::size_t, double> factors;  // of the pressure, by shells
 
   [[nodiscard]] double exact(Quantity of) const {
@@ -67,7 +67,7 @@ TEST(Accuracy, ASphereUnderPressureIsWithinWhatIsClaimed) {
 TEST(Accuracy, WhereDisplacementsAreSmallTheLinearModelIsTaken) {
   Sphere sphere;
   EXPECT_TRUE(std::get<StaticRun>(sphere.solved({0.02}).settings.kind).linear);
-  std::get<PressureLoad>(sphere.model.loads.front().kind).value = 10;  // strains of a tenth
+  std::get<PressureLoad>(sphere.model.loads.front().kind).value = 3;  // strains of some per cent
   const Accuracy large = sphere.solved({0.02});
   EXPECT_FALSE(std::get<StaticRun>(large.settings.kind).linear);
   EXPECT_EQ(large.choices.back().instead, "linear");
@@ -75,7 +75,7 @@ TEST(Accuracy, WhereDisplacementsAreSmallTheLinearModelIsTaken) {
 
 TEST(Accuracy, NewtonsMethodGoesOnFromTheCoarserLevel) {
   Sphere sphere;
-  std::get<PressureLoad>(sphere.model.loads.front().kind).value = 10;
+  std::get<PressureLoad>(sphere.model.loads.front().kind).value = 1;
   const Accuracy found = sphere.solved({0.02});
   for (std::size_t level = 1; level < found.levels.size(); ++level) {
     EXPECT_LE(found.levels[level].newton_iterations, 4U);
@@ -106,13 +106,15 @@ Model clamped_tube(ShellBody body) {
     }
   }
   model.fixes.push_back(fix);
-  model.loads.push_back({0, PressureLoad{0.001, true}, {}});
+  Load load;
+  load.kind = PressureLoad{0.001, true};
+  model.loads.push_back(load);
   model.shells.push_back(std::move(body));
   return model;
 }
 
 ShellBody tube_body() {
-  ShellBody body = testing::flat_body({}, young, poisson, 0.05);
+  ShellBody body = benchmarks::flat_body({}, young, poisson, 0.05);
   constexpr Index around = 12, along = 8;
   for (Index j = 0; j <= along; ++j) {
     for (Index i = 0; i < around; ++i) {
@@ -139,7 +141,7 @@ TEST(Accuracy, ABendingLayerThatNoLevelResolvesIsNamed) {
   ASSERT_FALSE(found.reasons.empty());
   EXPECT_THAT(found.reasons.front(), ::testing::HasSubstr("bending layer"));
   EXPECT_LT(edges_per_layer(found.model), 2);
-  EXPECT_EQ(edges_per_layer(testing::pressurised_sphere(1, 0.5, 1)), infinity);
+  EXPECT_EQ(edges_per_layer(benchmarks::pressurised_sphere(1, 0.5, 1)), infinity);
 }
 
 TEST(Accuracy, TooFewShellsForAnEstimateAreSaid) {
@@ -157,8 +159,8 @@ TEST(Accuracy, WhatHasNoAnswerIsRefused) {
 }
 
 TEST(Levels, ARigidMotionStaysOne) {
-  const ShellBody coarse = testing::pressurised_sphere(1, thickness, 1).shells.front();
-  const Target target(flat_facets(testing::make_sphere(radius, 4)));
+  const ShellBody coarse = benchmarks::pressurised_sphere(1, thickness, 1).shells.front();
+  const Target target(flat_facets(benchmarks::make_sphere(radius, 4)));
   const Eigen::Quaterniond turn = exponential(Vec3(0.3, -1.1, 0.7));
   const auto moved = [&](const Vec3& x) { return Vec3(turn * x + Vec3(5, 6, 7) - x); };
   State state;
@@ -180,7 +182,7 @@ TEST(Levels, ARigidMotionStaysOne) {
 }
 
 TEST(Levels, ThicknessPerVertexIsInterpolated) {
-  ShellBody body = testing::pressurised_sphere(1, thickness, 1).shells.front();
+  ShellBody body = benchmarks::pressurised_sphere(1, thickness, 1).shells.front();
   body.thickness.clear();
   for (const Vec3& x : body.mesh.vertices) {
     body.thickness.push_back(1 + 0.01 * x.z());

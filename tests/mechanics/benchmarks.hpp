@@ -199,7 +199,9 @@ inline Model pressurised_sphere(int level, double thickness, double pressure) {
   body.rest = Rest::curved;
   model.shells.push_back(body);
   model.rigid_motions.push_back({0});
-  model.loads.push_back({0, PressureLoad{pressure, true}, {}});
+  Load load;
+  load.kind = PressureLoad{pressure, true};
+  model.loads.push_back(load);
   return model;
 }
 

@@ -17,7 +17,7 @@ class AccuracyTest(SimulateTest):
         super().setUp()
         vertices, triangles, normals = sphere(1, 10)
         write_ply(self.path("ball.ply"), vertices, triangles, normals)
-        write_ply(self.path("target.ply"), *sphere(4, 10)[:2])
+        write_ply(self.path("target.ply"), *sphere(5, 10)[:2])
 
     def test_the_answer_is_within_what_was_asked_for(self):
         report = self.run_tool("ball.ply", "out.hdf", *HELD, "--accuracy", "2%", "--target", "target.ply", "--shell-out",

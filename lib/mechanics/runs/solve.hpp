@@ -123,12 +123,12 @@ struct Checkpoint {
 /// How a run is made to outlive its process.
 struct Resumption {
   std::optional<Checkpoint> from;  ///< goes on here; the reference state is then not handed over again
-  /// Of a nonlinear static run: a configuration near that of the first load step, such as a coarser mesh's. Newton's
-  /// method begins there; where it does not converge, at the reference.
-  std::optional<Checkpoint> near;
   /// Called after every step, when what `on_state` got is complete up to it; `make` builds the checkpoint, so that none
   /// is built that nobody wants.
   std::function<void(const std::function<Checkpoint()>& make)> on_step;
+  /// Of a nonlinear static run: a configuration near that of the first load step, such as a coarser mesh's. Newton's
+  /// method begins there; where it does not converge, at the reference.
+  std::optional<Checkpoint> near{};
 
   void offer(const std::function<Checkpoint()>& make) const {
     if (on_step) {

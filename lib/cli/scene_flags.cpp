@@ -1,0 +1,217 @@
+#include "tunica/cli/scene_flags.hpp"
+
+#include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
+#include "tunica/core/quantity.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+namespace tunica::cli {
+
+std::optional<std::size_t> count_of(const std::optional<std::string>& text, const char* flag, double most) {
+  if (!text) {
+    return std::nullopt;
+  }
+  const auto value = parse_number(*text);
+  if (!value || *value < 1 || *value > most || *value != std::floor(*value)) {
+    throw UsageError(fmt::format("{}: '{}' is not a whole number from 1 to {:.0f}", flag, *text, most));
+  }
+  return truncated<std::size_t>(*value);
+}
+
+namespace {
+
+template <typename Value>
+Value required(const std::optional<Value>& value, const char* flag, const char* example) {
+  if (!value) {
+    throw UsageError(fmt::format("{0} is missing: give it, for example {0} {1}", flag, example));
+  }
+  return *value;
+}
+
+double number(const std::optional<std::string>& text, const char* flag, double otherwise) {
+  if (!text) {
+    return otherwise;
+  }
+  const auto value = parse_number(*text);
+  if (!value) {
+    throw UsageError(fmt::format("{}: '{}' is not a number", flag, *text));
+  }
+  return *value;
+}
+
+Places flags_as_places(std::initializer_list<const char*> keys) {
+  Places places{{"command line", true}, {}};
+  for (const char* key : keys) {
+    places.keys[key] = {std::string("--") + key, true};
+  }
+  return places;
+}
+
+// "boundary", "rigid-motions", "below z=-10mm", "above x = 3cm".
+Selection parse_fix(const std::string& text) {
+  if (text == "boundary") {
+    return BoundaryNodes{};
+  }
+  if (text == "rigid-motions") {
+    return RigidMotions{};
+  }
+  const auto unknown = [&] {
+    throw UsageError(fmt::format(
+        "--fix: '{}' is not understood: write boundary, rigid-motions, 'below z=-10mm' or 'above x=3cm'", text));
+  };
+  HalfSpaceNodes half;
+  half.below = text.starts_with("below ");
+  if (!half.below && !text.starts_with("above ")) {
+    unknown();
+  }
+  const std::size_t axis = text.find_first_not_of(' ', 6);
+  const std::size_t equals = text.find('=');
+  if (axis == std::string::npos || text[axis] < 'x' || text[axis] > 'z' || equals == std::string::npos ||
+      text.find_first_not_of(' ', axis + 1) != equals) {
+    unknown();
+  }
+  half.axis = text[axis] - 'x';
+  try {
+    half.at = parse_quantity(text.substr(equals + 1), dimension::length);
+  } catch (const UsageError& error) {
+    throw UsageError(fmt::format("--fix '{}': {}", text, error.what()));
+  }
+  return half;
+}
+
+void set_kind(const SceneFlags& a, Scene& scene, Ramp& load_ramp) {
+  if (a.is_static) {
+    for (const auto& [given, flag] :
+         {std::pair{a.duration.has_value(), "--duration"}, std::pair{a.step.has_value(), "--step"},
+          std::pair{a.ramp.has_value(), "--ramp"}}) {
+      if (given) {
+        throw UsageError(fmt::format("--static and {} contradict each other: give one", flag));
+      }
+    }
+    scene.run.kind = StaticRun{false, equal_load_factors(count_of(a.load_steps, "--load-steps", 1e6).value_or(1))};
+    return;
+  }
+  if (!a.duration && !a.step) {
+    throw UsageError("--static is missing: give it, or --duration and --step for a dynamic run");
+  }
+  if (a.load_steps) {
+    throw UsageError("--load-steps belongs to --static: in a dynamic run give --ramp");
+  }
+  DynamicRun& dynamic = scene.run.kind.emplace<DynamicRun>();
+  dynamic.duration = required(a.duration, "--duration", "2s");
+  dynamic.step = required(a.step, "--step", "40ms");
+  if (a.ramp) {
+    if (!(*a.ramp > 0)) {
+      throw UsageError("--ramp: must be greater than zero");
+    }
+    load_ramp.points = {{0, 0}, {*a.ramp, 1}};
+  }
+}
+
+}  // namespace
+
+void SceneFlags::declare(Tool& tool) {
+  CLI::App& app = tool.arguments();
+  tool.group("Wall");
+  tool.quantity("--young", young, dimension::pressure, "Young's modulus, e.g. 1MPa");
+  app.add_option("--poisson", poisson, "Poisson's ratio, in (-1, 0.5)")->type_name("NUMBER");
+  tool.quantity("--thickness", thickness, dimension::length, "thickness of the shell, e.g. 1.5mm");
+  tool.quantity("--density", density, dimension::density, "mass density, e.g. 1100kg/m3 (dynamic runs need it)");
+  tool.group("Load and supports");
+  tool.quantity("--pressure", pressure, dimension::pressure,
+                "pressure that follows the surface; positive pushes along the normals, outward");
+  app.add_option("--fix", fixes,
+                 "what is held, may repeat: boundary | 'below z=-10mm' | 'above x=3cm' | rigid-motions (a closed organ "
+                 "under its own pressure)")
+      ->type_name("WHERE")
+      ->expected(1)
+      ->allow_extra_args(false)  // the next word is a file
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  tool.group("Run");
+  app.add_flag("--static", is_static, "solve for the state of rest");
+  app.add_option("--load-steps", load_steps,
+                 "static: steps in which the load grows, each written (default: all at once)")
+      ->type_name("N");
+  tool.quantity("--duration", duration, dimension::time, "dynamic: time simulated, e.g. 2s");
+  tool.quantity("--step", step, dimension::time, "dynamic: time step, e.g. 40ms");
+  tool.quantity("--ramp", ramp, dimension::time, "dynamic: the load grows from zero over this time (default: at once)");
+  tool.group("Elements");
+  app.add_option("--membrane", membrane, "membrane element: cst | opt | adapt (default adapt)")->type_name("NAME");
+  app.add_option("--bending", bending,
+                 "bending element: comas (the paper's) | comas-consistent | dkt | dkt-comas (default dkt-comas)")
+      ->type_name("NAME");
+  tool.group("Solver");
+  app.add_option("--solver", solver, "cg | direct | auto (default auto)")->type_name("NAME");
+  app.add_option("--cg-tolerance", cg_tolerance, "relative residual at which CG stops, e.g. 5% (the paper's)")
+      ->type_name("PERCENT");
+  app.add_option("--cg-iterations", cg_iterations,
+                 "at most N CG iterations; without --cg-tolerance a fixed count that asks for no convergence")
+      ->type_name("N");
+  app.add_option("--converge", converge, "relative residual at which a step counts as solved (default 1e-8)")
+      ->type_name("NUMBER");
+  tool.group("Output");
+  app.add_option("--every", every, "write every N-th state (default 1); the first and the last always")->type_name("N");
+  tool.group("Scene");
+  app.add_option("--mesh-unit", mesh_unit, "unit of length of a mesh in a format that carries none: mm | cm | m | um")
+      ->type_name("mm|cm|m|um");
+}
+
+Scene SceneFlags::scene(const std::filesystem::path& mesh) const {
+  Scene scene;
+  SceneLoad load{"shell", std::nullopt, PressureLoad{}, {}, flags_as_places({})};
+  scene.run_places = flags_as_places({"duration", "step", "solver", "converge", "every"});
+  scene.run_places.keys["cg_tolerance"] = {"--cg-tolerance", true};
+  scene.run_places.keys["cg_iterations"] = {"--cg-iterations", true};
+  set_kind(*this, scene, load.ramp);
+  choose<Solver>(solver, "--solver", scene.run.solver,
+                 {{"auto", Solver::automatic}, {"cg", Solver::cg}, {"direct", Solver::direct}});
+  if (cg_tolerance) {
+    scene.run.cg_tolerance = parse_percent(*cg_tolerance);
+    scene.cg_tolerance_stated = true;
+  }
+  scene.run.cg_iterations = count_of(cg_iterations, "--cg-iterations", 1e9);
+  scene.run.converge = number(converge, "--converge", scene.run.converge);
+  scene.run.every = count_of(every, "--every", 1e9).value_or(1);
+
+  SceneShell shell;
+  shell.name = load.body;
+  shell.places = flags_as_places({"thickness", "young", "poisson", "density"});
+  shell.mesh = mesh;
+  if (mesh_unit) {
+    shell.unit_mm = parse_length_unit(*mesh_unit);
+  }
+  shell.material.young = required(young, "--young", "1MPa");
+  (void)required(poisson, "--poisson", "0.45");
+  shell.material.poisson = number(poisson, "--poisson", 0);
+  shell.thickness = required(thickness, "--thickness", "1.5mm");
+  if (!is_static) {
+    (void)required(density, "--density", "1100kg/m3");
+  }
+  shell.material.density = density;
+  choose<Membrane>(membrane, "--membrane", shell.membrane,
+                   {{"cst", Membrane::cst}, {"opt", Membrane::opt}, {"adapt", Membrane::adapt}});
+  choose<Bending>(bending, "--bending", shell.bending,
+                  {{"comas", Bending::comas},
+                   {"comas-consistent", Bending::comas_consistent},
+                   {"dkt", Bending::dkt},
+                   {"dkt-comas", Bending::dkt_comas}});
+  scene.shells.push_back(shell);
+
+  load.kind = PressureLoad{required(pressure, "--pressure", "100mmHg"), true};
+  scene.loads.push_back(load);
+  for (const std::string& text : fixes) {
+    SceneFix fix;
+    fix.body = shell.name;
+    fix.where = parse_fix(text);
+    fix.places = {{fmt::format("{}: --fix '{}'", shell.mesh.string(), text), true}, {}};
+    scene.fixes.push_back(fix);
+  }
+  settle_solver(scene);
+  check_scene(scene);
+  return scene;
+}
+
+}  // namespace tunica::cli

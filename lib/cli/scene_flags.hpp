@@ -1,0 +1,52 @@
+#pragma once
+
+#include "tunica/cli/tool.hpp"
+#include "tunica/core/error.hpp"
+#include "tunica/io/scene/scene.hpp"
+
+#include <initializer_list>
+
+namespace tunica::cli {
+
+/// What tunica-simulate can be told of a scene without a file: one shell under pressure.
+struct SceneFlags {
+  std::optional<double> young, thickness, density, pressure, duration, step, ramp;
+  std::optional<std::string> poisson, mesh_unit, membrane, bending, solver, cg_tolerance, converge;
+  std::optional<std::string> load_steps, cg_iterations, every;
+  std::vector<std::string> fixes;
+  bool is_static = false;
+
+  /// All of them: what a scene file says itself.
+  static constexpr std::array names{"--young",         "--poisson",  "--thickness",  "--density",  "--pressure",
+                                    "--fix",           "--static",   "--load-steps", "--duration", "--step",
+                                    "--ramp",          "--membrane", "--bending",    "--solver",   "--cg-tolerance",
+                                    "--cg-iterations", "--converge", "--every",      "--mesh-unit"};
+
+  void declare(Tool& tool);
+
+  /// The scene that they describe. Errors: UsageError.
+  [[nodiscard]] Scene scene(const std::filesystem::path& mesh) const;
+};
+
+/// A whole number from 1 to `most`; none where the flag was not given. Errors: UsageError.
+std::optional<std::size_t> count_of(const std::optional<std::string>& text, const char* flag, double most);
+
+/// The choice that a word names. Errors: UsageError with all of them.
+template <typename Value>
+void choose(const std::optional<std::string>& word, const char* flag, Value& value,
+            std::initializer_list<std::pair<std::string_view, Value>> choices) {
+  if (!word) {
+    return;
+  }
+  std::string known;
+  for (const auto& [name, meaning] : choices) {
+    if (*word == name) {
+      value = meaning;
+      return;
+    }
+    known += (known.empty() ? "" : ", ") + std::string(name);
+  }
+  throw UsageError(flag + (": '" + *word) + "' is not one of " + known);
+}
+
+}  // namespace tunica::cli
