@@ -31,7 +31,7 @@ if(TUNICA_X86_64_V3 AND CMAKE_SYSTEM_PROCESSOR STREQUAL "x86_64")
   endif()
 endif()
 
-# Command lines and tests compute little themselves, and more takes longer to compile.
+# Command lines compute nothing, and more takes longer to compile.
 set(TUNICA_RECIPE $<$<CONFIG:Release>:-O1>)
 
 # Headers are included as tunica/ROOM/name.hpp, here as where they are installed.
@@ -63,7 +63,6 @@ function(tunica_test name)
   add_executable(test_${name} ${sources})
   target_link_libraries(test_${name} PRIVATE tunica_flags ${arg_LINKS} GTest::gtest_main GTest::gmock)
   target_include_directories(test_${name} PRIVATE ${PROJECT_SOURCE_DIR}/tests)
-  target_compile_options(test_${name} PRIVATE ${TUNICA_RECIPE})
   gtest_discover_tests(test_${name} TEST_PREFIX ${name}. DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 600)
 endfunction()
 

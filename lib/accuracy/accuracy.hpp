@@ -1,3 +1,4 @@
+// accuracy: the mesh and the model that an accuracy takes.
 #pragma once
 
 #include "tunica/core/progress.hpp"
