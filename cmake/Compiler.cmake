@@ -14,11 +14,13 @@ endif()
 if(TUNICA_WERROR)
   target_compile_options(tunica_flags INTERFACE -Werror)
 endif()
+# -O1: at -O0 Eigen is so slow that the sanitizer run would need an hour.
+add_library(tunica_sanitizers INTERFACE)
+target_compile_options(tunica_sanitizers INTERFACE -O1 -UNDEBUG -fsanitize=address,undefined
+                       -fno-sanitize-recover=undefined -fno-omit-frame-pointer)
+target_link_options(tunica_sanitizers INTERFACE -fsanitize=address,undefined)
 if(TUNICA_SANITIZE)
-  # -O1: at -O0 Eigen is so slow that the sanitizer run would need an hour.
-  target_compile_options(tunica_flags INTERFACE -O1 -fsanitize=address,undefined -fno-sanitize-recover=undefined
-                         -fno-omit-frame-pointer)
-  target_link_options(tunica_flags INTERFACE -fsanitize=address,undefined)
+  target_link_libraries(tunica_flags INTERFACE tunica_sanitizers)
 endif()
 
 if(TUNICA_X86_64_V3 AND CMAKE_SYSTEM_PROCESSOR STREQUAL "x86_64")

@@ -158,14 +158,7 @@ void take_spikes(const cli::Tool& tool, const fs::path& path, Surface& surface) 
 
 Surface read_surface(const cli::Tool& tool, const fs::path& path, const std::optional<double>& unit_mm) {
   Surface surface{read_mesh(path, unit_mm, true), {}, {}, 0};
-  surface.facts = examine(surface.file.mesh);
-  if (const auto why = why_unfit(surface.facts)) {
-    throw InputError(path.string() + ": " + *why +
-                     "; mend it with tunica-decimate --repair, --triangles as many as it has to keep all");
-  }
-  if (!(diagonal(surface.file.mesh) > 0)) {
-    throw InputError(path.string() + ": the mesh has no extent");
-  }
+  surface.facts = require_surface(surface.file, path);
   take_spikes(tool, path, surface);
   return surface;
 }

@@ -15,7 +15,6 @@
 #include "tunica/mechanics/runs/curved_displacement.hpp"
 #include "tunica/mechanics/runs/doubts.hpp"
 #include "tunica/mechanics/runs/solve.hpp"
-#include "tunica/surface/mesh/checks.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -114,6 +113,9 @@ void require_simple(const Scene& scene, const Arguments& a) {
   if (run->load_factors.size() > 1) {
     throw UsageError(fmt::format("{} finds one answer: leave out {}", accuracy_flag,
                                  a.scene.empty() ? "--load-steps" : "load_steps"));
+  }
+  if (scene.run.cg_fixed_count) {
+    throw UsageError(fmt::format("{} asks for convergence, a fixed count of CG iterations for none", accuracy_flag));
   }
   if (scene.shells.size() > 1) {
     throw UsageError(
@@ -362,10 +364,9 @@ private:
       return;
     }
     const SceneShell& shell = scene_.shells.front();
-    MeshFile file = read_mesh(tool_.input(*given_.target), shell.unit_mm, true);
-    if (const auto why = why_unfit(examine(file.mesh))) {
-      throw InputError(fmt::format("{}: {}", given_.target->string(), *why));
-    }
+    inputs_.push_back(tool_.input(*given_.target));
+    MeshFile file = read_mesh(*given_.target, shell.unit_mm, true);
+    require_surface(file, *given_.target);
     const MeshFile own = read_mesh(shell.mesh, shell.unit_mm);
     require_same_scale(own, shell.mesh, file, *given_.target, shell.unit_mm);
     require_near(own, shell.mesh, file, *given_.target);
@@ -390,7 +391,7 @@ private:
     loaded_->model = std::move(accuracy_->model);
     scene_.run = accuracy_->settings;
     prepare_result(tool_.result(), model());
-    tool_.result()["accuracy"] = accuracy_report(*accuracy_, *request_, target_.has_value());
+    tool_.result()["accuracy"] = accuracy_report(*accuracy_);
   }
 
   /// What choose_model() has solved, as solved() hands it over.
@@ -416,13 +417,13 @@ private:
     if (!accuracy_) {
       return;
     }
-    for (const std::string& line : accuracy_notes(*accuracy_, *request_, target_.has_value())) {
+    for (const std::string& line : accuracy_notes(*accuracy_)) {
       tool_.note(line);
     }
     if (!accuracy_->reasons.empty()) {
       journal_->remove();
       throw RequirementError(fmt::format("{}: {} of {} is not credible: {}", subject().string(), *given_.accuracy,
-                                         name_of(request_->of), fmt::join(accuracy_->reasons, "; ")));
+                                         name_of(accuracy_->request.of), fmt::join(accuracy_->reasons, "; ")));
     }
   }
 

@@ -4,7 +4,6 @@
 #include "tunica/core/clock.hpp"
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
-#include "tunica/mechanics/elements/rotation.hpp"
 #include "tunica/mechanics/runs/curved_displacement.hpp"
 #include "tunica/shell/distance/shell_distance.hpp"
 
@@ -19,8 +18,12 @@ namespace {
 constexpr std::size_t fewest_levels = 3;       // two changes: one may be small by chance
 constexpr double left_by_second_order = 0.25;  // of the change before
 constexpr double linear_share = 0.25;          // of the request: what the linear model may be off by
+constexpr double solver_share = 0.01;          // of the request: where a looser solver ends
 constexpr double fewest_edges_per_layer = 2;   // below, stresses in it are a tenth off and more
 constexpr double largest_field_change = 4;     // estimates: the field's error is the scalar's, within that
+
+constexpr std::array<std::pair<std::string_view, std::string_view>, 4> names{
+    {{"displacement", "mm"}, {"energy", "mJ"}, {"volume", "mm^3"}, {"stress", "MPa"}}};
 
 double value_of(const Model& model, const State& state, const Summary& summary, Quantity of) {
   switch (of) {
@@ -59,7 +62,14 @@ public:
         settings_(settings),
         model_of_(model_of),
         on_level_(on_level),
-        may_be_linear_(!std::get<StaticRun>(settings.kind).linear) {}
+        may_be_linear_(!std::get<StaticRun>(settings.kind).linear) {
+    settings_.converge = std::min(settings_.converge, solver_share * request.within);
+    out_.request = request;
+    out_.not_included = {"segmentation", "material", "thickness"};
+    if (target == nullptr) {
+      out_.not_included.insert(out_.not_included.begin(), "geometry");
+    }
+  }
 
   Accuracy run() {
     auto start = Clock::now();
@@ -78,7 +88,7 @@ public:
       start = Clock::now();
       ShellBody fine = finer_level(body_, target_, parents_);
       if (last_) {
-        near_ = checkpoint(interpolated(last_->states.back(), body_, fine, parents_));
+        near_ = interpolated(last_->states.back(), body_, fine, parents_);
       }
       body_ = std::move(fine);
     }
@@ -91,15 +101,6 @@ public:
   }
 
 private:
-  static Checkpoint checkpoint(const State& state) {
-    Checkpoint at;
-    at.displacement = state.displacement;
-    for (const Vec3& vector : state.rotation) {
-      at.rotation.push_back(exponential(vector));
-    }
-    return at;
-  }
-
   Answer solved(const RunSettings& settings) const {
     Answer answer;
     answer.model = model_of_(body_);
@@ -126,6 +127,7 @@ private:
         throw;
       }
       out_.levels.clear();
+      out_.estimate.reset();
       last_.reset();
       near_.reset();
       return std::nullopt;
@@ -178,7 +180,7 @@ private:
       return std::abs(out_.levels[level].value - out_.levels[level - 1].value) / std::abs(out_.levels[n - 1].value);
     };
     out_.estimate = std::max(change(n - 1), left_by_second_order * change(n - 2)) +
-                    (may_be_linear_ && is_linear() ? linear_error_ : 0);
+                    (may_be_linear_ && is_linear() ? linear_error_ : 0) + last_->summary.algebraic_error.value_or(0);
     doubt();
     return *out_.estimate < request_.within && out_.reasons.empty();
   }
@@ -253,6 +255,9 @@ private:
 };
 
 }  // namespace
+
+std::string_view name_of(Quantity quantity) { return names.at(static_cast<std::size_t>(quantity)).first; }
+std::string_view unit_of(Quantity quantity) { return names.at(static_cast<std::size_t>(quantity)).second; }
 
 Accuracy solve_within(ShellBody body, const Target* target, const AccuracyRequest& request, const RunSettings& settings,
                       const ModelOf& model_of, const std::function<void(const AccuracyLevel&)>& on_level) {

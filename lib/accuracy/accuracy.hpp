@@ -6,7 +6,10 @@
 #include "tunica/shell/distance/target.hpp"
 
 #include <functional>
+#include <optional>
 #include <string>
+#include <string_view>
+#include <vector>
 
 /// lib/accuracy: the cheapest model whose error in one quantity is credibly below what is asked.
 namespace tunica {
@@ -17,6 +20,10 @@ enum class Quantity {
   volume,        ///< change of the enclosed volume
   stress,        ///< von Mises stress that 1 % of the area passes (Wall::stress_p99)
 };
+
+/// "displacement" and so on, as flags and reports name them; mm, mJ, mm^3 or MPa.
+std::string_view name_of(Quantity quantity);
+std::string_view unit_of(Quantity quantity);
 
 struct AccuracyRequest {
   double within = 0;  ///< of the quantity, relative
@@ -42,10 +49,12 @@ struct AccuracyChoice {
 
 /// What a run for an accuracy ended with.
 struct Accuracy {
+  AccuracyRequest request;
   std::optional<double> estimate;    ///< of the error, relative; none with fewer than three levels
   std::vector<std::string> reasons;  ///< why that is not credible, or not enough; empty: accepted
   std::vector<AccuracyLevel> levels;
   std::vector<AccuracyChoice> choices;
+  std::vector<std::string> not_included;  ///< other errors of the answer
   RunSettings settings;  ///< of the last level
   Model model;           ///< its model
   Summary summary;
@@ -59,7 +68,8 @@ using ModelOf = std::function<Model(ShellBody)>;
 /// hand, until the estimate is below the request and nothing makes it doubtful. With D_k the change of the quantity
 /// from level k - 1 to k the error of level k is taken as max(|D_k|, |D_(k-1)| / 4): the two-grid convergence index,
 /// and what second order leaves of the step before; two levels may agree by chance. The linear model is taken from the
-/// third level on where it is off by less than a quarter of the request on the second; its error is added.
+/// third level on where it is off by less than a quarter of the request on the second; its error is added, as is that
+/// of the solver. Newton's method ends where its residual is a hundredth of the request.
 /// Doubtful are: a small change beside a large one of the displacement field; for stresses a bending layer at supports
 /// and rims, sqrt(R t) / 1.24 wide, with less than two edges; short waves that had to be made stiff; snaps.
 /// @param body    the coarsest level; the only one of the model

@@ -36,14 +36,16 @@ ShellBody finer_level(const ShellBody& body, const Target* target, std::vector<s
   return fine;
 }
 
-State interpolated(const State& state, const ShellBody& coarse, const ShellBody& fine,
+Checkpoint interpolated(const State& state, const ShellBody& coarse, const ShellBody& fine,
                    const std::vector<std::array<Index, 2>>& parents) {
-  State out;
+  Checkpoint out;
   out.displacement = state.displacement;
-  out.rotation = state.rotation;
+  for (const Vec3& vector : state.rotation) {
+    out.rotation.push_back(exponential(vector));
+  }
   for (std::size_t i = 0; i < parents.size(); ++i) {
     const auto [a, b] = parents[i];
-    const Eigen::Quaterniond at_a = exponential(state.rotation[a]), at_b = exponential(state.rotation[b]);
+    const Eigen::Quaterniond at_a = out.rotation[a], at_b = out.rotation[b];
     const Vec3 along = coarse.mesh.vertices[b] - coarse.mesh.vertices[a];
     const Vec3 sag =
         fine.mesh.vertices[coarse.mesh.vertices.size() + i] - (coarse.mesh.vertices[a] + coarse.mesh.vertices[b]) / 2;
@@ -51,7 +53,7 @@ State interpolated(const State& state, const ShellBody& coarse, const ShellBody&
     const Vec3 from_a = along + 4 * sag, to_b = along - 4 * sag;
     out.displacement.emplace_back((state.displacement[a] + state.displacement[b]) / 2 +
                                   ((at_a * from_a - from_a) - (at_b * to_b - to_b)) / 8);
-    out.rotation.emplace_back(logarithm(at_a.slerp(0.5, at_b)));
+    out.rotation.push_back(at_a.slerp(0.5, at_b));
   }
   return out;
 }

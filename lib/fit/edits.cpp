@@ -199,7 +199,7 @@ Trial tried(const FitMesh& mesh, const FitSamples& samples, const FitLimits& lim
   builder.build();
   const auto keeps_shape = [&] {
     trial.shortfall = builder.shortfall();
-    return trial.shortfall <= trial.shortfall_before + limits.may_miss;
+    return trial.shortfall <= std::max(trial.shortfall_before, limits.may_miss);
   };
   bool sound = keeps_shape();
   for (std::size_t i = 1; i < trial.edit.starts.size() && !sound; ++i) {
@@ -222,7 +222,7 @@ Trial tried(const FitMesh& mesh, const FitSamples& samples, const FitLimits& lim
   for (int step = 0; step < steps; ++step) {
     squares.smooth = wide && step < steps - 1;
     squares.largest = step > 0 && !squares.smooth;
-    if (least_squares_step(piece, samples, squares) >= 1 || largest_error(piece) > hopeless * limits.error) {
+    if (least_squares_step(piece, samples, squares) >= 1 || largest_error(piece) > out_of_reach * limits.error) {
       break;
     }
   }

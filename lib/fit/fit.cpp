@@ -181,11 +181,12 @@ private:
     return FitMesh(creased_where_folded(mesh.shell()));
   }
 
-  void improve(FitMesh& mesh, const FitSamples& samples) {
+  /// Flips and mends, with at most so many shells.
+  void improve(FitMesh& mesh, const FitSamples& samples, std::size_t most) {
     limit_lengths(mesh, mesh.alive);
     flip_edges(mesh, samples, limits_);
     for (int pass = 0; pass < passes; ++pass) {
-      mend_shapes(mesh, samples, limits_, most_);
+      mend_shapes(mesh, samples, limits_, most);
     }
   }
 
@@ -199,7 +200,7 @@ private:
     FitSamples samples = samples_for(real(start.triangles.size()) / (keep_coarse ? 1 : 3));
     FitMesh mesh = started(start, samples);
     settle(mesh, samples, Lessened::mean);
-    improve(mesh, samples);
+    improve(mesh, samples, most_);
     if (options_.refine) {
       settle(mesh, samples, Lessened::mean);
       make_certain(mesh, samples, tolerance);
@@ -225,7 +226,7 @@ private:
       const std::size_t before = mesh.alive;
       collapse_edges(mesh, samples, limits_, 4, options_.progress);
       settle(mesh, samples, Lessened::largest);
-      improve(mesh, samples);
+      improve(mesh, samples, most_);
       if (real(mesh.alive) > worth_it * real(before)) {
         break;
       }
@@ -253,14 +254,15 @@ private:
       if (distance.upper() <= tolerance) {
         result_.stopped = "the tolerance holds";
         const std::size_t faults = best_.crossings.size() + best_.thin.size();
-        if (faults == 0 || faults >= fewest_faults) {
+        if (faults == 0) {
           return;
         }
-        fewest_faults = faults;
+        fruitless = faults < fewest_faults ? 0 : fruitless + 1;
+        fewest_faults = std::min(fewest_faults, faults);
       } else {
         best_.crossings.clear();  // first things first
         best_.thin.clear();
-        if (i >= patience && distance.both.lower > hopeless * tolerance) {
+        if (i >= patience && distance.both.lower > out_of_reach * tolerance) {
           return;
         }
         fruitless = distance.upper() < worth_it * closest ? 0 : fruitless + 1;
@@ -301,7 +303,7 @@ private:
       }
       split_worst(mesh, samples, limits_, std::min((most_ - mesh.alive) / 2, mesh.alive / 4 + fewest_sampled));
       settle(mesh, samples, Lessened::largest);
-      improve(mesh, samples);
+      improve(mesh, samples, most_);
     }
   }
 
@@ -316,8 +318,7 @@ private:
       collapse_edges(mesh, samples, any, shells, options_.progress);
     }
     limits_.error = settle(mesh, samples, Lessened::largest);
-    flip_edges(mesh, samples, limits_);
-    mend_shapes(mesh, samples, limits_, shells);
+    improve(mesh, samples, shells);
     return settle(mesh, samples, Lessened::largest);
   }
 
@@ -363,7 +364,7 @@ private:
     const FitSamples samples = samples_for(real(coarse_.triangles.size()));
     FitMesh mesh = started(coarse_, samples);
     limits_.error = settle(mesh, samples, Lessened::mean);
-    improve(mesh, samples);
+    improve(mesh, samples, most_);
     settle(mesh, samples, Lessened::mean);
     ShellMesh shell = mesh.shell();
     certified(shell);

@@ -172,11 +172,11 @@ TEST(Levels, ARigidMotionStaysOne) {
     std::vector<std::array<Index, 2>> parents;
     const ShellBody fine = finer_level(coarse, fitted, parents);
     ASSERT_EQ(fine.mesh.triangles.size(), 4 * coarse.mesh.triangles.size());
-    const State finer = interpolated(state, coarse, fine, parents);
+    const Checkpoint finer = interpolated(state, coarse, fine, parents);
     ASSERT_EQ(finer.displacement.size(), fine.mesh.vertices.size());
     for (std::size_t v = coarse.mesh.vertices.size(); v < fine.mesh.vertices.size(); ++v) {
       EXPECT_LT((finer.displacement[v] - moved(fine.mesh.vertices[v])).norm(), 1e-12 * radius);
-      EXPECT_LT((finer.rotation[v] - logarithm(turn)).norm(), 1e-12);
+      EXPECT_LT(finer.rotation[v].angularDistance(turn), 1e-12);
     }
   }
 }

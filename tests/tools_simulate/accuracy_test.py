@@ -38,6 +38,12 @@ class AccuracyTest(SimulateTest):
         again = self.run_tool("fine.ply", "again.hdf", *HELD)["result"]
         self.assertAlmostEqual(again["max_displacement_mm"] / claim["value"], 1, places=2)
         self.assertEqual(report["outputs"], ["out.hdf", "fine.ply"])
+        self.assertEqual([entry["path"] for entry in report["inputs"]], ["ball.ply", "target.ply"])
+
+    def test_a_loose_solver_is_part_of_the_claim(self):
+        claim = self.run_tool("ball.ply", "out.hdf", *HELD, "--accuracy", "2%", "--target", "target.ply", "--solver", "cg",
+                              "--cg-tolerance", "5%", "--converge", "0.5")["result"]["accuracy"]
+        self.assertLess(abs(claim["value"] / EXACT - 1), claim["estimate_percent"] / 100)
 
     def test_without_a_target_the_geometry_is_not_included(self):
         claim = self.run_tool("ball.ply", "out.hdf", *HELD, "--accuracy", "5%", "--of", "energy")["result"]["accuracy"]
@@ -66,6 +72,8 @@ class AccuracyTest(SimulateTest):
                 ([*HELD, "--accuracy", "60%"], "at most 50%"),
                 ([*HELD, "--accuracy", "2%", "--of", "weight"], "not one of displacement, energy, volume, stress"),
                 ([*HELD, "--accuracy", "2%", "--load-steps", "3"], "leave out --load-steps"),
+                ([*HELD, "--accuracy", "2%", "--cg-iterations", "5"], "asks for convergence"),
+                ([*HELD, "--accuracy", "2%", "--max-shells", "0"], "--max-shells"),
                 ([*WALL, "--density", "1g/cm3", "--duration", "1s", "--step", "0.1s", "--fix", "rigid-motions",
                   "--accuracy", "2%"], "not available yet")):
             self.run_tool("ball.ply", "out.hdf", *arguments, expect=2)
@@ -74,7 +82,9 @@ class AccuracyTest(SimulateTest):
 
     def test_bad_input(self):
         write_ply(self.path("far.ply"), sphere(2, 10)[0] + 1e4, sphere(2, 10)[1])
-        for target in ("nothing.ply", "far.ply"):
+        vertices, triangles = sphere(2, 10)[:2]
+        write_ply(self.path("torn.ply"), vertices, [*triangles, triangles[0][::-1]])
+        for target in ("nothing.ply", "far.ply", "torn.ply"):
             self.run_tool("ball.ply", "out.hdf", *HELD, "--accuracy", "2%", "--target", target, expect=3)
             self.assertIn(target, self.done.stderr)
         write_ply(self.path("plate.ply"), *grid(4, 4, 10, 10))

@@ -12,7 +12,7 @@ ShellBody finer_level(const ShellBody& body, const Target* target, std::vector<s
 
 /// A state of the coarser level at the finer one's nodes: along each edge the cubic that the ends' displacements and
 /// rotations say, so that rigid motions stay what they are.
-State interpolated(const State& state, const ShellBody& coarse, const ShellBody& fine,
+Checkpoint interpolated(const State& state, const ShellBody& coarse, const ShellBody& fine,
                    const std::vector<std::array<Index, 2>>& parents);
 
 /// Largest difference of the displacements at the coarser level's nodes, of the finer's largest.

@@ -11,7 +11,7 @@ namespace tunica {
 struct FitLimits {
   FacetLimits shape;
   double error = 0;                        ///< mm, of a patch
-  double may_miss = negligible_shortfall;  ///< by which the shapes' shortfall may grow
+  double may_miss = negligible_shortfall;  ///< shortfall that shapes may have; more only where they had it before
 };
 
 /// Some patches in place of others, and at most one node that looks for its place. Nodes and slots are the mesh's; new
@@ -55,7 +55,7 @@ struct Trial {
 };
 
 /// Times a limit: what is as far off does not come within it.
-inline constexpr double hopeless = 8;
+inline constexpr double out_of_reach = 8;
 
 /// Places the node by some steps of least squares; an error that stays far above `limits.error` ends them.
 /// Cost: some 0.1 ms per step.

@@ -64,6 +64,19 @@ std::optional<std::string> likely_unit(const MeshFile& file, std::optional<doubl
 
 }  // namespace
 
+MeshFacts require_surface(const MeshFile& file, const std::filesystem::path& path) {
+  MeshFacts facts = examine(file.mesh);
+  if (const auto why = why_unfit(facts)) {
+    throw InputError(
+        fmt::format("{}: {}; mend it with tunica-decimate --repair, --triangles as many as it has to keep all",
+                    path.string(), *why));
+  }
+  if (!(bounding_box(file.mesh).diagonal() > 0)) {
+    throw InputError(fmt::format("{}: the mesh has no extent", path.string()));
+  }
+  return facts;
+}
+
 void require_same_scale(const MeshFile& a, const std::filesystem::path& path_a, const MeshFile& b,
                         const std::filesystem::path& path_b, std::optional<double> unit_mm) {
   const Box box_a = bounding_box(a.mesh);

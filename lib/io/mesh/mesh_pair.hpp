@@ -1,11 +1,16 @@
 #pragma once
 
 #include "tunica/io/mesh/mesh_file.hpp"
+#include "tunica/surface/mesh/checks.hpp"
 
 #include <filesystem>
 #include <optional>
 
 namespace tunica {
+
+/// What a surface that shells are fitted to must be: an oriented manifold with an extent.
+/// Errors: InputError that names the file and what to do. Cost: linear.
+MeshFacts require_surface(const MeshFile& file, const std::filesystem::path& path);
 
 /// Two meshes of one thing, as they were read. Refuses, from their boxes alone, what only a wrong unit explains: sizes
 /// in the ratio of two units of length, along every axis to a quarter, or 500 times and more apart.

@@ -138,24 +138,7 @@ void report_modes(Json& result, const Summary& summary) {
   result["buckling_factors"] = summary.buckling_factors;
 }
 
-std::string_view name_of(Quantity quantity) {
-  constexpr std::array<std::string_view, 4> names{"displacement", "energy", "volume", "stress"};
-  return names.at(static_cast<std::size_t>(quantity));
-}
-
-namespace {
-
-std::vector<std::string> not_included(bool with_target) {
-  std::vector<std::string> parts{"segmentation", "material", "thickness"};
-  if (!with_target) {
-    parts.insert(parts.begin(), "geometry");
-  }
-  return parts;
-}
-
-}  // namespace
-
-Json accuracy_report(const Accuracy& accuracy, const AccuracyRequest& request, bool with_target) {
+Json accuracy_report(const Accuracy& accuracy) {
   Json levels = Json::array(), choices = Json::array();
   for (const AccuracyLevel& level : accuracy.levels) {
     levels.push_back({{"shells", level.shells},
@@ -171,36 +154,33 @@ Json accuracy_report(const Accuracy& accuracy, const AccuracyRequest& request, b
                        {"instead", choice.instead},
                        {"would_cost", choice.would_cost}});
   }
-  return {{"requested_percent", 100 * request.within},
-          {"of", name_of(request.of)},
+  return {{"requested_percent", 100 * accuracy.request.within},
+          {"of", name_of(accuracy.request.of)},
           {"value", accuracy.levels.back().value},
           {"estimate_percent", accuracy.estimate ? Json(100 * *accuracy.estimate) : Json()},
           {"credible", accuracy.reasons.empty()},
           {"reasons", accuracy.reasons},
           {"levels", levels},
           {"choices", choices},
-          {"not_included", not_included(with_target)}};
+          {"not_included", accuracy.not_included}};
 }
 
-std::vector<std::string> accuracy_notes(const Accuracy& accuracy, const AccuracyRequest& request, bool with_target) {
-  constexpr std::array<std::string_view, 4> units{"mm", "mJ", "mm^3", "MPa"};
+std::vector<std::string> accuracy_notes(const Accuracy& accuracy) {
+  const AccuracyRequest& request = accuracy.request;
   std::vector<std::string> lines;
   for (const AccuracyLevel& level : accuracy.levels) {
     lines.push_back(fmt::format("{:>7} shells: {} {:.5g} {}, {:.2g} s", level.shells, name_of(request.of), level.value,
-                                units.at(static_cast<std::size_t>(request.of)), level.seconds));
+                                unit_of(request.of), level.seconds));
   }
-  if (accuracy.estimate) {
+  if (accuracy.estimate && accuracy.reasons.empty()) {
     lines.push_back(fmt::format("the error of the {} is credibly below {:.2g} % of it ({:.2g} % asked for)",
                                 name_of(request.of), 100 * *accuracy.estimate, 100 * request.within));
-    if (!accuracy.reasons.empty()) {
-      lines.pop_back();
-    }
   }
   for (const AccuracyChoice& choice : accuracy.choices) {
     lines.push_back(
         fmt::format("{}: {}; {} instead: {}", choice.part, choice.chosen, choice.instead, choice.would_cost));
   }
-  lines.push_back(fmt::format("not included: {}", fmt::join(not_included(with_target), ", ")));
+  lines.push_back(fmt::format("not included: {}", fmt::join(accuracy.not_included, ", ")));
   return lines;
 }
 

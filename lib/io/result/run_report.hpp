@@ -22,13 +22,10 @@ void report_summary(Json& result, const Summary& summary, bool converged, std::o
 void report_modes(Json& result, const Summary& summary);
 
 /// What a run for an accuracy claims, and how it got there.
-Json accuracy_report(const Accuracy& accuracy, const AccuracyRequest& request, bool with_target);
+Json accuracy_report(const Accuracy& accuracy);
 
 /// The same as a table of lines for a terminal.
-std::vector<std::string> accuracy_notes(const Accuracy& accuracy, const AccuracyRequest& request, bool with_target);
-
-/// "displacement" and so on, as flags and reports name them.
-std::string_view name_of(Quantity quantity);
+std::vector<std::string> accuracy_notes(const Accuracy& accuracy);
 
 /// A line on the modes found.
 std::string modes_note(const Summary& summary, std::size_t asked);
