@@ -93,9 +93,11 @@ Checkpoint interpolated(const State& state, const std::vector<ShellBody>& coarse
   for (std::size_t b = 0; b < coarse.size(); ++b) {
     const auto& vertices = coarse[b].mesh.vertices;
     const std::size_t count = vertices.size();
-    for (std::size_t i = first; i < first + count; ++i) {
-      out.displacement.push_back(state.displacement[i]);
-      out.rotation.push_back(exponential(state.rotation[i]));
+    for (std::size_t i = 0; i < count; ++i) {
+      const Eigen::Quaterniond turn = exponential(state.rotation[first + i]);
+      const Vec3 shift = fine.bodies[b].mesh.vertices[i] - vertices[i];  // of the refit
+      out.displacement.emplace_back(state.displacement[first + i] + (turn * shift - shift));
+      out.rotation.push_back(turn);
     }
     for (std::size_t i = 0; i < fine.parents[b].size(); ++i) {
       const auto [a, c] = fine.parents[b][i];
