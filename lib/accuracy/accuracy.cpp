@@ -42,6 +42,7 @@ public:
         settings_(settings),
         model_of_(model_of),
         on_level_(on_level) {
+    model_ = model_of_(level_.bodies);
     settings_.converge = std::min(settings_.converge, residual_share * request.within);
     out_.request = request;
     out_.not_included = {"segmentation", "material", "thickness"};
@@ -72,7 +73,10 @@ public:
       if (last_) {
         near_ = interpolated(last_->at, level_.bodies, fine);
       }
+      const Model coarse = std::move(model_);
       level_ = std::move(fine);
+      model_ = model_of_(level_.bodies);
+      carry_selections(coarse, level_, model_);
     }
     tell_choices();
     out_.settings = settings_;
@@ -86,7 +90,7 @@ private:
   [[nodiscard]] const StaticRun* statics() const { return std::get_if<StaticRun>(&settings_.kind); }
 
   [[nodiscard]] Answer solved(const RunSettings& settings) const {
-    Model model = model_of_(level_.bodies);
+    Model model = model_;
     const bool is_static = std::holds_alternative<StaticRun>(settings.kind);
     if (is_static && motion_) {
       model = *at_its_end(model, motion_->duration);
@@ -120,7 +124,7 @@ private:
     try {
       MotionChoice choice =
           choose_motion(settings_, model_share * request_.within,
-                        at_its_end(model_of_(level_.bodies), motion_->duration).has_value(),
+                        at_its_end(model_, motion_->duration).has_value(),
                         [&](const RunSettings& settings) { return solved(settings); });
       settings_ = choice.settings;
       model_error_ = choice.error;
@@ -250,6 +254,7 @@ private:
   RunSettings settings_;
   const ModelOf& model_of_;
   const std::function<void(const AccuracyLevel&)>& on_level_;
+  Model model_;  // of the level
   Accuracy out_;
   std::optional<DynamicRun> motion_;  // that was asked for, once it was decided how it is followed
   std::vector<AccuracyChoice> choices_;

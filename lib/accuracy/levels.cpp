@@ -1,5 +1,6 @@
 #include "tunica/accuracy/detail/levels.hpp"
 
+#include "tunica/core/narrow.hpp"
 #include "tunica/fit/fit.hpp"
 #include "tunica/mechanics/elements/rotation.hpp"
 #include "tunica/mechanics/runs/doubts.hpp"
@@ -8,6 +9,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <set>
 
 namespace tunica {
 namespace {
@@ -114,6 +117,87 @@ Checkpoint interpolated(const State& state, const std::vector<ShellBody>& coarse
     first += count;
   }
   return out;
+}
+
+namespace {
+
+using Edge = std::array<Index, 2>;
+
+Edge sorted(Index a, Index b) { return {std::min(a, b), std::max(a, b)}; }
+
+/// Selections of one body, from a level to the finer one.
+class Carrier {
+public:
+  Carrier(const ShellMesh& coarse, const std::vector<Edge>& parents) : coarse_(coarse) {
+    for (std::size_t i = 0; i < parents.size(); ++i) {
+      between_[sorted(parents[i][0], parents[i][1])] = narrow<Index>(coarse.vertices.size() + i);
+    }
+    const TriangleMesh facets = flat_facets(coarse);
+    for (const auto& [t, k] : boundary_edges(neighbours(facets, incidence(facets)))) {
+      rim_.insert(sorted(facets.triangles[t][k], facets.triangles[t][(k + 1) % 3]));
+    }
+  }
+
+  void carry(const std::vector<Index>& from, std::vector<Index>& to) const {
+    if (from.size() == 1 && to.size() == 1) {
+      return;
+    }
+    std::vector<std::uint8_t> selected(coarse_.vertices.size(), 0);
+    for (const Index node : from) {
+      selected[node] = 1;
+    }
+    std::set<Edge> across;
+    for (const auto& t : coarse_.triangles) {
+      for (std::size_t k = 0; k < 3 && selected[t[0]] + selected[t[1]] + selected[t[2]] == 3; ++k) {
+        across.insert(sorted(t[k], t[(k + 1) % 3]));
+      }
+    }
+    to.insert(to.end(), from.begin(), from.end());
+    for (const auto& [edge, node] : between_) {
+      if (selected[edge[0]] != 0 && selected[edge[1]] != 0 && (rim_.contains(edge) || !across.contains(edge))) {
+        to.push_back(node);
+      }
+    }
+    std::sort(to.begin(), to.end());
+    to.erase(std::unique(to.begin(), to.end()), to.end());
+  }
+
+  void carry(const std::vector<Edge>& from, std::vector<Edge>& to) const {
+    to.clear();
+    for (const auto& [a, b] : from) {
+      const Index middle = between_.at(sorted(a, b));
+      to.insert(to.end(), {{a, middle}, {middle, b}});
+    }
+  }
+
+private:
+  const ShellMesh& coarse_;
+  std::map<Edge, Index> between_;  // the node that halves an edge
+  std::set<Edge> rim_;
+};
+
+}  // namespace
+
+void carry_selections(const Model& coarse, const Level& level, Model& fine) {
+  std::vector<Carrier> carriers;
+  for (std::size_t b = 0; b < level.bodies.size(); ++b) {
+    carriers.emplace_back(coarse.shells[b].mesh, level.parents[b]);
+  }
+  for (std::size_t i = 0; i < coarse.fixes.size(); ++i) {
+    carriers[coarse.fixes[i].body].carry(coarse.fixes[i].nodes, fine.fixes[i].nodes);
+  }
+  for (std::size_t i = 0; i < coarse.loads.size(); ++i) {
+    const Carrier& carrier = carriers[coarse.loads[i].body];
+    const auto& from = coarse.loads[i].kind;
+    auto& to = fine.loads[i].kind;
+    if (const auto* force = std::get_if<ForceLoad>(&from)) {
+      carrier.carry(force->nodes, std::get<ForceLoad>(to).nodes);
+    } else if (const auto* moment = std::get_if<MomentLoad>(&from)) {
+      carrier.carry(moment->nodes, std::get<MomentLoad>(to).nodes);
+    } else if (const auto* edge = std::get_if<EdgeLoad>(&from)) {
+      carrier.carry(edge->edges, std::get<EdgeLoad>(to).edges);
+    }
+  }
 }
 
 double field_change(const State& coarse, const State& fine, const Level& level) {

@@ -232,6 +232,43 @@ TEST(Levels, PointLoadsAndJumpsOfTheThicknessBendTheWall) {
   EXPECT_LT(edges_per_layer(model), 2);
 }
 
+TEST(Levels, WhatIsSelectedStaysSelected) {
+  // A rim of five nodes with a corner at the second one, whose shell has two edges on the rim.
+  Model coarse;
+  ShellBody body;
+  body.mesh.vertices = {Vec3(0, 0, 0), Vec3(1, -1, 0), Vec3(2, 0, 0), Vec3(3, 0, 0), Vec3(2, 2, 0), Vec3(0, 2, 0)};
+  body.mesh.triangles = {{0, 1, 2}, {0, 2, 5}, {2, 4, 5}, {2, 3, 4}};
+  body.mesh.normals.assign(6, Vec3(0, 0, 1));
+  body.mesh.patch = Patch::watertight;
+  coarse.shells = {body};
+  Fix rim, single;
+  rim.nodes = {0, 1, 2, 3};
+  single.nodes = {5};
+  coarse.fixes = {rim, single};
+  Load edge;
+  edge.kind = EdgeLoad{{{2, 3}}, Vec3(0, 0, 1)};
+  coarse.loads = {edge};
+  const Level level = finer_level(coarse.shells, {nullptr});
+  Model fine = coarse;
+  fine.shells = level.bodies;
+  fine.fixes[0].nodes = {0};  // what the place finds of the rim after a refit has moved it
+  fine.fixes[1].nodes = {4};
+  carry_selections(coarse, level, fine);
+  const auto halved = [&](Index a, Index b) {
+    const auto& parents = level.parents.front();
+    const auto found = std::find_if(parents.begin(), parents.end(), [&](const auto& pair) {
+      return std::minmax(pair[0], pair[1]) == std::minmax(a, b);
+    });
+    return static_cast<Index>(6 + (found - parents.begin()));
+  };
+  EXPECT_THAT(fine.fixes[0].nodes,
+              ::testing::UnorderedElementsAre(0, 1, 2, 3, halved(0, 1), halved(1, 2), halved(2, 3)));
+  EXPECT_THAT(fine.fixes[1].nodes, ::testing::ElementsAre(4));
+  const Index middle = halved(2, 3);
+  const std::vector<std::array<Index, 2>> halves{{2, middle}, {middle, 3}};
+  EXPECT_EQ(std::get<EdgeLoad>(fine.loads[0].kind).edges, halves);
+}
+
 /// A sphere under a pressure that grows over `ramp` seconds; it breathes with a period that is known.
 struct Breathing : Sphere {
   static constexpr double density = 1e-9;

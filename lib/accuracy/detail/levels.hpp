@@ -21,6 +21,12 @@ Level finer_level(const std::vector<ShellBody>& bodies, const std::vector<const 
 /// rotations say, so that rigid motions stay what they are.
 Checkpoint interpolated(const State& state, const std::vector<ShellBody>& coarse, const Level& fine);
 
+/// Nodes and edges that supports and loads of the coarser model select stay selected, and with two of them the one
+/// between: a refit moves rims out of the planes in which a scene finds them. Not across a corner, where all of a shell
+/// is selected but for the rim: there the place decides, as it does for a single node.
+/// @param fine  the model that its own places make; its nodes are added to
+void carry_selections(const Model& coarse, const Level& level, Model& fine);
+
 /// Largest difference of the displacements at the coarser level's nodes, of the finer's largest.
 double field_change(const State& coarse, const State& fine, const Level& level);
 
