@@ -297,6 +297,13 @@ private:
     for (const std::string& note : loaded_->notes) {
       tool_.note(note);
     }
+    for (std::size_t b = 0; scene_.accuracy && b < targets_.size(); ++b) {
+      if (!targets_[b] && model().shells[b].curved) {
+        tool_.warn(fmt::format("{}: has no target: finer shells lie on its own patches, and the error of its geometry is not "
+                               "seen (--target, or target in [accuracy])",
+                               scene_.shells[b].mesh.string()));
+      }
+    }
   }
 
   /// An accuracy begins again with each run: its meshes are not in the partial result.

@@ -49,6 +49,7 @@ class AccuracyTest(SimulateTest):
         claim = self.run_tool("ball.ply", "out.hdf", *HELD, "--accuracy", "5%", "--of", "energy")["result"]["accuracy"]
         self.assertEqual(claim["not_included"][0], "geometry")
         self.assertIsNone(claim["levels"][0]["mean_distance_mm"])
+        self.assertIn("ball.ply: has no target", self.done.stderr)
 
     def test_the_choice_does_not_depend_on_threads(self):
         claims = [self.run_tool("ball.ply", "out.hdf", *HELD, "--accuracy", "2%", "--target", "target.ply", "--force",
