@@ -299,9 +299,10 @@ private:
     }
     for (std::size_t b = 0; scene_.accuracy && b < targets_.size(); ++b) {
       if (!targets_[b] && model().shells[b].curved) {
-        tool_.warn(fmt::format("{}: has no target: finer shells lie on its own patches, and the error of its geometry is not "
-                               "seen (--target, or target in [accuracy])",
-                               scene_.shells[b].mesh.string()));
+        tool_.warn(
+            fmt::format("{}: has no target: finer shells lie on its own patches, and the error of its geometry is not "
+                        "seen (--target, or target in [accuracy])",
+                        scene_.shells[b].mesh.string()));
       }
     }
   }
@@ -502,10 +503,10 @@ private:
   std::vector<fs::path> inputs_;
   Scene scene_;
   std::optional<LoadedScene> loaded_;
-  std::string asked_;  // the scene as a text, before an accuracy chose of it
+  std::string asked_;                             // the scene as a text, before an accuracy chose of it
   std::vector<std::unique_ptr<Target>> targets_;  // of each body, or none
   std::optional<double> voxel_;                   // mm, longest edge, of the image behind them
-  std::string space_ = "LPS";  // of the target, for the shells that are written
+  std::string space_ = "LPS";                     // of the target, for the shells that are written
   std::optional<Accuracy> accuracy_;
   Drawing drawing_;
   std::optional<RunJournal> journal_;

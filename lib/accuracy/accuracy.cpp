@@ -17,13 +17,13 @@
 namespace tunica {
 namespace {
 
-constexpr std::size_t fewest_levels = 3;       // two changes: one may be small by chance
-constexpr double left_by_second_order = 0.25;  // of the change before
-constexpr double model_share = 0.25;           // of the request: what a cheaper model may be off by
-constexpr double settled_share = 0.1;          // of the request: the last increment of Newton's method
-constexpr double residual_share = 0.01;        // of the request: where a looser one was asked for
-constexpr double fewest_edges_per_layer = 2;   // below, stresses in it are a tenth off and more
-constexpr double largest_field_change = 4;     // estimates: the field's error is the scalar's, within that
+constexpr std::size_t fewest_levels = 3;               // two changes: one may be small by chance
+constexpr double left_by_second_order = 0.25;          // of the change before
+constexpr double model_share = 0.25;                   // of the request: what a cheaper model may be off by
+constexpr double settled_share = 0.1;                  // of the request: the last increment of Newton's method
+constexpr double residual_share = 0.01;                // of the request: where a looser one was asked for
+constexpr double fewest_edges_per_layer = 2;           // below, stresses in it are a tenth off and more
+constexpr double largest_field_change = 4;             // estimates: the field's error is the scalar's, within that
 constexpr double largest_bend = std::numbers::pi / 6;  // of a shell: strains within it are small below
 /// Mean distance of an extracted surface to the true one, in voxels (docs/tables/staircase.md).
 constexpr double voxels_off = 0.1;
@@ -123,8 +123,7 @@ private:
     motion_ = std::get<DynamicRun>(settings_.kind);
     try {
       MotionChoice choice =
-          choose_motion(settings_, model_share * request_.within,
-                        at_its_end(model_, motion_->duration).has_value(),
+          choose_motion(settings_, model_share * request_.within, at_its_end(model_, motion_->duration).has_value(),
                         [&](const RunSettings& settings) { return solved(settings); });
       settings_ = choice.settings;
       model_error_ = choice.error;

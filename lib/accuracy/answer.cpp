@@ -155,7 +155,8 @@ MotionChoice choose_motion(const RunSettings& settings, double share, bool may_r
     if (n < fewest_runs) {
       continue;
     }
-    left = std::max(off(values[n - 2]), left_by_order * std::abs(values[n - 2] - values[n - 3]) / std::abs(values[n - 1]));
+    left =
+        std::max(off(values[n - 2]), left_by_order * std::abs(values[n - 2] - values[n - 3]) / std::abs(values[n - 1]));
     for (chosen = 0; chosen + 1 < n && error_of(chosen) >= share; ++chosen) {
     }
     if (error_of(chosen) < share || n > most_halvings) {

@@ -139,7 +139,8 @@ ShellBody tube_body() {
 }
 
 TEST(Accuracy, ABendingLayerThatNoLevelResolvesIsNamed) {
-  const Accuracy found = solve_within({tube_body()}, {nullptr}, {0.5, Quantity::stress, 12'288}, at_rest(), clamped_tube);
+  const Accuracy found =
+      solve_within({tube_body()}, {nullptr}, {0.5, Quantity::stress, 12'288}, at_rest(), clamped_tube);
   ASSERT_FALSE(found.reasons.empty());
   EXPECT_THAT(found.reasons.front(), ::testing::HasSubstr("bending layer"));
   EXPECT_LT(edges_per_layer(found.model), 2);

@@ -13,8 +13,8 @@ struct Level {
   [[nodiscard]] std::size_t shell_count() const;
 };
 
-/// Every shell split in four, the nodes of each body first; a thickness per vertex is interpolated. Fitted to its target
-/// where a body has one (not null).
+/// Every shell split in four, the nodes of each body first; a thickness per vertex is interpolated. Fitted to its
+/// target where a body has one (not null).
 Level finer_level(const std::vector<ShellBody>& bodies, const std::vector<const Target*>& targets);
 
 /// A state of the coarser level at the finer one's nodes: along each edge the cubic that the ends' displacements and

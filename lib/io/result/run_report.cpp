@@ -186,9 +186,9 @@ std::vector<std::string> accuracy_notes(const Accuracy& accuracy) {
   }
   lines.push_back(fmt::format("not included: {}", fmt::join(accuracy.not_included, ", ")));
   if (accuracy.surface_error) {
-    lines.push_back(
-        fmt::format("this is of this surface: at voxels of {:.3g} mm the surface itself is uncertain by about {:.2g} mm",
-                    *accuracy.request.voxel, *accuracy.surface_error));
+    lines.push_back(fmt::format(
+        "this is of this surface: at voxels of {:.3g} mm the surface itself is uncertain by about {:.2g} mm",
+        *accuracy.request.voxel, *accuracy.surface_error));
   }
   return lines;
 }

@@ -405,8 +405,9 @@ void check_accuracy(const Scene& scene) {
   for (const auto& [name, path] : asked.targets) {
     const auto body = std::find_if(scene.shells.begin(), scene.shells.end(),
                                    [&, &wanted = name](const SceneShell& shell) { return shell.name == wanted; });
-    require(body != scene.shells.end(), places.of("target"),
-            fmt::format("there is no body \"{}\": the bodies are \"{}\"", name, fmt::join(body_names(scene), "\", \"")));
+    require(
+        body != scene.shells.end(), places.of("target"),
+        fmt::format("there is no body \"{}\": the bodies are \"{}\"", name, fmt::join(body_names(scene), "\", \"")));
   }
   const bool known = std::any_of(scene.probes.begin(), scene.probes.end(),
                                  [&](const SceneProbe& probe) { return probe.name == asked.probe; });
@@ -414,9 +415,10 @@ void check_accuracy(const Scene& scene) {
           fmt::format("there is no [[probe]] \"{}\": add it, or name another", asked.probe));
   // A finer mesh has nodes between those of a list, of which the list says nothing.
   const auto refuse_list = [](const std::optional<Selection>& where, const Places& of) {
-    require(!where || !std::holds_alternative<ListedNodes>(*where), of.of("where"),
-            "a list of nodes holds for one mesh, and an accuracy takes finer ones: select by place (box, below, sphere, "
-            "nearest …)");
+    require(
+        !where || !std::holds_alternative<ListedNodes>(*where), of.of("where"),
+        "a list of nodes holds for one mesh, and an accuracy takes finer ones: select by place (box, below, sphere, "
+        "nearest …)");
   };
   for (const SceneFix& fix : scene.fixes) {
     refuse_list(fix.where, fix.places);

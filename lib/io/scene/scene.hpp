@@ -105,8 +105,8 @@ struct SceneProbe {
 struct SceneAccuracy {
   double within = 0;  ///< of the quantity, relative
   Quantity of = Quantity::displacement;
-  std::string probe;  ///< of Quantity::probe
-  int axis = 0;       ///< of its displacement
+  std::string probe;                                     ///< of Quantity::probe
+  int axis = 0;                                          ///< of its displacement
   std::map<std::string, std::filesystem::path> targets;  ///< by body: the surface that its mesh was fitted to
   Places places;
 };

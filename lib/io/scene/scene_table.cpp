@@ -1,6 +1,6 @@
+#include "tunica/io/scene/detail/scene_table.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/io/file/suggestion.hpp"
-#include "tunica/io/scene/detail/scene_table.hpp"
 
 #include <fmt/format.h>
 

@@ -192,8 +192,8 @@ struct RunSettings {
   double converge = 1e-8;                    ///< relative, scale-aware residual at which Newton's method stops
   /// Newton's method also ends with an increment that is this part of the whole displacement; 0: only by the residual.
   double settled = 0;
-  std::size_t newton_max = 20;               ///< 1 is the paper's: one linearisation per step
-  std::size_t every = 1;                     ///< hand over every n-th state
+  std::size_t newton_max = 20;  ///< 1 is the paper's: one linearisation per step
+  std::size_t every = 1;        ///< hand over every n-th state
 };
 
 }  // namespace tunica
