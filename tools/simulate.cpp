@@ -405,9 +405,10 @@ private:
     }
     if (!accuracy_->reasons.empty()) {
       journal_->remove();
-      throw RequirementError(fmt::format("{}: {:g}% of {} is not credible: {}", subject().string(),
-                                         100 * accuracy_->request.within, name_of(accuracy_->request.of),
-                                         fmt::join(accuracy_->reasons, "; ")));
+      throw RequirementError(fmt::format("{}: {:g}% of {} is not credible: {}; what there is stays in {}.part",
+                                         subject().string(), 100 * accuracy_->request.within,
+                                         name_of(accuracy_->request.of), fmt::join(accuracy_->reasons, "; "),
+                                         out_.string()));
     }
   }
 
@@ -440,6 +441,7 @@ private:
     if (const auto written = exported_ ? exported_->append(state, of_state) : std::nullopt) {
       tool_.wrote(*written);
     }
+    wall_ = of_state.wall;
     unresolved_ = count_unresolved(model(), state, most_bending);
   }
 
@@ -469,9 +471,9 @@ private:
     } catch (const InputError&) {
       journal_->remove();
       throw;
-    } catch (const RequirementError&) {
+    } catch (const RequirementError& error) {
       journal_->remove();  // it would end at the same step again
-      throw;
+      throw RequirementError(fmt::format("{}; what there is stays in {}.part", error.what(), out_.string()));
     }
   }
 
@@ -491,7 +493,7 @@ private:
     tool_.note(fmt::format("{} nodes in {} steps, {}: largest displacement {:.4g} mm", model().node_count(),
                            summary.steps, converged ? "converged" : "not asked to converge",
                            tool_.result()["max_displacement_mm"].get<double>()));
-    for (const std::string& text : run_warnings(scene_.run, summary, unresolved_)) {
+    for (const std::string& text : run_warnings(scene_.run, summary, wall_, unresolved_)) {
       tool_.warn(fmt::format("{}: {}", subject().string(), text));
     }
   }
@@ -513,6 +515,7 @@ private:
   std::optional<ResultFile> file_;
   std::optional<ResultExport> exported_;
   std::optional<ElementFieldEvaluator> fields_;
+  Wall wall_;                   // of the last state
   std::size_t unresolved_ = 0;  // elements that bend more than the mesh can show
 };
 

@@ -205,8 +205,16 @@ std::string modes_note(const Summary& summary, std::size_t asked) {
                      values.size() < asked ? fmt::format(", of {} asked for: there are no more", asked) : "");
 }
 
-std::vector<std::string> run_warnings(const RunSettings& run, const Summary& summary, std::size_t unresolved) {
+std::vector<std::string> run_warnings(const RunSettings& run, const Summary& summary, const Wall& wall,
+                                      std::size_t unresolved) {
   std::vector<std::string> warnings;
+  constexpr double small_strain = 0.1;
+  if (wall.strain_p99 > small_strain) {
+    warnings.push_back(fmt::format(
+        "1 % of the wall is strained by more than {:.3g} %: linear elasticity is meant for strains of up to "
+        "about 10 %",
+        1e2 * wall.strain_p99));
+  }
   for (const Snap& snap : summary.snaps) {
     warnings.push_back(
         fmt::format("at load factor {:.6g} the path of equilibria breaks off (limit load): the shell snaps, by up "
