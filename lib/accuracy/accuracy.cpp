@@ -17,19 +17,29 @@
 namespace tunica {
 namespace {
 
-constexpr std::size_t fewest_levels = 3;               // two changes: one may be small by chance
-constexpr double left_by_second_order = 0.25;          // of the change before
-constexpr double model_share = 0.25;                   // of the request: what a cheaper model may be off by
-constexpr double settled_share = 0.1;                  // of the request: the last increment of Newton's method
-constexpr double residual_share = 0.01;                // of the request: where a looser one was asked for
-constexpr double fewest_edges_per_layer = 2;           // below, stresses in it are a tenth off and more
-constexpr double largest_field_change = 4;             // estimates: the field's error is the scalar's, within that
+constexpr std::size_t fewest_levels = 3;       // two changes: one may be small by chance
+constexpr double left_by_second_order = 0.25;  // of the change before
+constexpr double model_share = 0.25;           // of the request: what a cheaper model may be off by
+constexpr double slowest_fall = 1.0 / 3;       // of changes, minus 1: slower is counted as this
+constexpr double error_by_distance = 3;        // of the answer, by the mean distance over the thickness, at most
+constexpr double settled_share = 0.1;          // of the request: the last increment of Newton's method
+constexpr double residual_share = 0.01;        // of the request: where a looser one was asked for
+constexpr double fewest_edges_per_layer = 2;   // below, stresses in it are a tenth off and more
+constexpr double largest_field_change = 4;     // estimates: the field's error is the scalar's, within that
 constexpr double largest_bend = std::numbers::pi / 6;  // of a shell: strains within it are small below
 /// Mean distance of an extracted surface to the true one, in voxels (docs/tables/staircase.md).
 constexpr double voxels_off = 0.1;
 
 constexpr std::array<std::pair<std::string_view, std::string_view>, 5> names{
     {{"displacement", "mm"}, {"energy", "mJ"}, {"volume", "mm^3"}, {"stress", "MPa"}, {"probe", "mm"}}};
+
+double thinnest_wall(const Model& model) {
+  double least = infinity;
+  for (const ShellBody& body : model.shells) {
+    least = std::min(least, *std::min_element(body.thickness.begin(), body.thickness.end()));
+  }
+  return least;
+}
 
 class Ladder {
 public:
@@ -146,10 +156,23 @@ private:
     field_change_ = last_ ? field_change(last_->at, answer.at, level_) : infinity;
     last_ = std::move(answer);
     if (statics() != nullptr && !statics()->linear && out_.levels.size() == fewest_levels - 1) {
+      look_for_other_states();
       compare_linear();
     }
     if (on_level_) {
       on_level_(out_.levels.back());
+    }
+  }
+
+  /// Whether the whole load, put on this mesh at once, leads where the coarser level led.
+  void look_for_other_states() {
+    near_.reset();
+    try {
+      Answer anew = solved(settings_);
+      other_state_ = std::abs(anew.value / last_->value - 1);
+      out_.levels.back().value = anew.value;
+      last_ = std::move(anew);
+    } catch (const RequirementError&) {  // found only from a state near it
     }
   }
 
@@ -189,7 +212,10 @@ private:
     const auto change = [&](std::size_t level) {
       return std::abs(out_.levels[level].value - out_.levels[level - 1].value) / std::abs(out_.levels[n - 1].value);
     };
-    out_.estimate = std::max(change(n - 1), left_by_second_order * change(n - 2)) + model_error_ +
+    // Where changes fall more slowly than by two, all that are to come add up to more than the last.
+    const double fall = change(n - 2) / change(n - 1);
+    const double to_come = fall < 2 ? change(n - 1) / std::max(fall - 1, slowest_fall) : change(n - 1);
+    out_.estimate = std::max(to_come, left_by_second_order * change(n - 2)) + model_error_ +
                     last_->summary.algebraic_error.value_or(0);
     doubt();
     return *out_.estimate < request_.within && out_.reasons.empty();
@@ -211,6 +237,20 @@ private:
                         "edges wide at its coarsest place, {:g} are needed",
                         edges, fewest_edges_per_layer));
       }
+    }
+    const double thinnest = thinnest_wall(last_->model);
+    const double off = out_.levels.back().mean_distance.value_or(0) / thinnest;
+    if (error_by_distance * off >= request_.within) {
+      out_.reasons.push_back(
+          fmt::format("the shells are {:.2g} % of the wall from the surface in the mean, which may "
+                      "cost {:.2g} % of the answer",
+                      100 * off, 100 * error_by_distance * off));
+    }
+    if (other_state_ >= model_share * request_.within) {
+      out_.reasons.push_back(
+          fmt::format("there are several states of rest, {:.2g} % apart: which one the shell comes to "
+                      "depends on what no mesh knows",
+                      100 * other_state_));
     }
     if (const std::size_t bent = count_unresolved(last_->model, last_->at, largest_bend); bent > 0) {
       out_.reasons.push_back(fmt::format("{} shell(s) bend by more than 30 degrees", bent));
@@ -261,6 +301,7 @@ private:
   std::optional<Checkpoint> near_;
   std::optional<Answer> last_;
   double field_change_ = infinity;
+  double other_state_ = 0;  // relative distance of another answer of the second level
 };
 
 }  // namespace

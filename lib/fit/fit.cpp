@@ -407,7 +407,7 @@ ShellMesh refit(const ShellMesh& shell, const Target& target, double min_angle,
   FitMesh mesh(split_shells(shell, std::vector<Split>(shell.triangles.size(), Split::all_edges), halved));
   const FitSamples samples(target, mesh.alive, true);
   SquaresOptions squares;
-  squares.shape.min_angle = min_angle;
+  squares.shape.min_angle = min_angle / 2;  // quarters have the angles of the whole: without room they cannot follow
   for (int step = 0; step < 2; ++step) {
     samples.attach(mesh);
     samples.measure(mesh);
