@@ -211,7 +211,6 @@ private:
     fewer(mesh, samples);
     most_ = allowed;
     if (mesh.alive <= allowed) {
-      improve(mesh, samples, most_);
       make_certain(mesh, samples, tolerance);
     } else {
       closest(mesh, samples, allowed, 0);

@@ -117,7 +117,7 @@ class Rules(WithStubs):
     def test_an_accuracy_chooses_the_shells(self):
         self.make(VOLUMES="a.nii.gz", LABEL=3, ACCURACY="2%", OF="energy", **LOAD)
         _, decimate, relax, simulate = self.calls()
-        self.assertIn("--triangles 200 --min-angle 20", decimate)
+        self.assertIn("--triangles 190 --min-angle 20", decimate)
         self.assertIn("--tolerance 5% --refine", relax)
         self.assertIn("--accuracy 2% --of energy", simulate)
         self.assertIn(f"--target {self.out / 'a' / '3' / 'surface.ply'}", simulate)

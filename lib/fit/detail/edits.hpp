@@ -11,7 +11,7 @@ namespace tunica {
 struct FitLimits {
   FacetLimits shape;
   double error = 0;                        ///< mm, of a patch
-  double may_miss = negligible_shortfall;  ///< shortfall that shapes may have; more only where they had it before
+  double may_miss = negligible_shortfall;  ///< by which the shapes' shortfall may grow
 };
 
 /// Some patches in place of others, and at most one node that looks for its place. Nodes and slots are the mesh's; new
