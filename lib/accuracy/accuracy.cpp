@@ -22,6 +22,7 @@ constexpr double left_by_second_order = 0.25;  // of the change before
 constexpr double model_share = 0.25;           // of the request: what a cheaper model may be off by
 constexpr double slowest_fall = 1.0 / 3;       // of changes, minus 1: slower is counted as this
 constexpr double error_by_distance = 3;        // of the answer, by the mean distance over the thickness, at most
+constexpr double largest_distance = 0.5;       // of the wall, of any place: above, it is another shape there
 constexpr double settled_share = 0.1;          // of the request: the last increment of Newton's method
 constexpr double residual_share = 0.01;        // of the request: where a looser one was asked for
 constexpr double fewest_edges_per_layer = 2;   // below, stresses in it are a tenth off and more
@@ -246,6 +247,9 @@ private:
                       "cost {:.2g} % of the answer",
                       100 * off, 100 * error_by_distance * off));
     }
+    if (out_.reasons.empty() && *out_.estimate < request_.within) {
+      doubt_far_places(thinnest);
+    }
     if (other_state_ >= model_share * request_.within) {
       out_.reasons.push_back(
           fmt::format("there are several states of rest, {:.2g} % apart: which one the shell comes to "
@@ -260,6 +264,25 @@ private:
     }
     if (!last_->summary.snaps.empty()) {
       out_.reasons.emplace_back("the shell snaps through on its way: where it rests then may depend on the mesh");
+    }
+  }
+
+  /// A place that no level comes close to shows in no difference of levels.
+  void doubt_far_places(double thinnest) {
+    for (std::size_t b = 0; b < level_.bodies.size(); ++b) {
+      if (targets_[b] == nullptr) {
+        continue;
+      }
+      ShellDistanceOptions measuring;
+      measuring.width = 0.1 * largest_distance * thinnest;
+      measuring.limit = largest_distance * thinnest;
+      const double farthest = shell_distance(level_.bodies[b].mesh, *targets_[b], measuring).both.lower;
+      if (farthest > largest_distance * thinnest) {
+        out_.reasons.push_back(
+            fmt::format("a place of the surface lies {:.2g} mm from the shells, {:.2g} of the wall: "
+                        "start from more shells, or a better fit of few",
+                        farthest, farthest / thinnest));
+      }
     }
   }
 

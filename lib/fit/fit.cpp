@@ -407,10 +407,14 @@ ShellMesh refit(const ShellMesh& shell, const Target& target, double min_angle,
   const FitSamples samples(target, mesh.alive, true);
   SquaresOptions squares;
   squares.shape.min_angle = min_angle / 2;  // quarters have the angles of the whole: without room they cannot follow
+  FitLimits limits;
+  limits.shape = squares.shape;
+  limits.error = infinity;
   for (int step = 0; step < 2; ++step) {
     samples.attach(mesh);
     samples.measure(mesh);
     least_squares_step(mesh, samples, squares);
+    mend_shapes(mesh, samples, limits, mesh.alive, no_shell / 2, false);  // what the splits have folded
   }
   return mesh.shell();
 }

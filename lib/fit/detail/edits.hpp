@@ -78,7 +78,9 @@ void flip_edges(FitMesh& mesh, const FitSamples& samples, const FitLimits& limit
 /// Flips, moves, collapses and splits where shapes fall short, within the error's limit (or what it is).
 /// @param most  shells
 /// @param above  the shortfall from which patches are mended
-void mend_shapes(FitMesh& mesh, const FitSamples& samples, const FitLimits& limits, std::size_t most, double above = 0);
+/// @param may_collapse  else nodes only move, and edges flip
+void mend_shapes(FitMesh& mesh, const FitSamples& samples, const FitLimits& limits, std::size_t most, double above = 0,
+                 bool may_collapse = true);
 
 /// Splits the longest edge of patches whose error is above the limit, the worst first, at most `count` of them.
 /// @return how many
