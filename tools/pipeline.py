@@ -160,7 +160,7 @@ def stage_flags(label):
     if setting("ACCURACY"):
         # The coarsest of the levels: well shaped, and near enough to be refitted.
         decimate += ["--min-angle", "20"]
-        relax = ["--tolerance", "5%", "--refine"]
+        relax = ["--shells", setting("SHELLS"), "--max-iterations", "1"]
     relax += flag_if("--method", "METHOD")
     simulate = flag_if("--fix", "FIX") + flag_if("--accuracy", "ACCURACY") + flag_if("--of", "OF")
     for name in ("pressure", "young", "poisson", "thickness", "density"):

@@ -22,6 +22,7 @@ constexpr double left_by_second_order = 0.25;  // of the change before
 constexpr double model_share = 0.25;           // of the request: what a cheaper model may be off by
 constexpr double slowest_fall = 1.0 / 3;       // of changes, minus 1: slower is counted as this
 constexpr double error_by_distance = 3;        // of the answer, by the mean distance over the thickness, at most
+constexpr std::size_t most_from_near = 5;      // iterations; more, and the start was none
 constexpr double largest_distance = 0.5;       // of the wall, of any place: above, it is another shape there
 constexpr double settled_share = 0.1;          // of the request: the last increment of Newton's method
 constexpr double residual_share = 0.01;        // of the request: where a looser one was asked for
@@ -81,7 +82,8 @@ public:
       }
       start = Clock::now();
       Level fine = finer_level(level_.bodies, targets_);
-      if (last_) {
+      near_.reset();
+      if (last_ && near_serves_) {
         near_ = interpolated(last_->at, level_.bodies, fine);
       }
       const Model coarse = std::move(model_);
@@ -154,6 +156,7 @@ private:
       }
     }
     out_.levels.push_back(level);
+    near_serves_ = near_serves_ && (!near_ || answer.summary.newton_iterations <= most_from_near);
     field_change_ = last_ ? field_change(last_->at, answer.at, level_) : infinity;
     last_ = std::move(answer);
     if (statics() != nullptr && !statics()->linear && out_.levels.size() == fewest_levels - 1) {
@@ -167,6 +170,9 @@ private:
 
   /// Whether the whole load, put on this mesh at once, leads where the coarser level led.
   void look_for_other_states() {
+    if (!near_serves_) {
+      return;  // the answer at hand comes from zero load
+    }
     near_.reset();
     try {
       Answer anew = solved(settings_);
@@ -322,6 +328,7 @@ private:
   std::vector<AccuracyChoice> choices_;
   double model_error_ = 0;  // of the cheaper models that were chosen
   std::optional<Checkpoint> near_;
+  bool near_serves_ = true;  // as a start of Newton's method
   std::optional<Answer> last_;
   double field_change_ = infinity;
   double other_state_ = 0;  // relative distance of another answer of the second level

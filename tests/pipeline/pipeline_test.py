@@ -118,7 +118,7 @@ class Rules(WithStubs):
         self.make(VOLUMES="a.nii.gz", LABEL=3, ACCURACY="2%", OF="energy", **LOAD)
         _, decimate, relax, simulate = self.calls()
         self.assertIn("--triangles 190 --min-angle 20", decimate)
-        self.assertIn("--tolerance 5% --refine", relax)
+        self.assertIn("--shells 190 --max-iterations 1", relax)
         self.assertIn("--accuracy 2% --of energy", simulate)
         self.assertIn(f"--target {self.out / 'a' / '3' / 'surface.ply'}", simulate)
         done = self.make(VOLUMES="a.nii.gz", LABEL=3, ACCURACY="2%", SHELLS=300, **LOAD)
