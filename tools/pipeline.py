@@ -179,7 +179,8 @@ def stage_commands(case, binaries, flags):
         os.path.join(case.folder, name)
         for name in ("surface.ply", "coarse.ply", "shell.ply", "map.png", "result.hdf", "extract.json"))
     words = {"extract": [path_word(case.volume), surface], "decimate": [surface, coarse],
-             "relax": [coarse, surface, shell, "--picture", picture], "simulate": [shell, result, *(["--target", surface] if setting("ACCURACY") else [])]}
+             "relax": [coarse, surface, shell, "--picture", picture],
+             "simulate": [shell, result, *(["--target", surface] if setting("ACCURACY") else [])]}
     # Whether there is a boundary to hold is known once the surface is.
     is_closed = f"grep -q '\"closed\": *true' {shlex.quote(facts)}"
     chosen_fix = "" if setting("FIX") else f' --fix "$(if {is_closed}; then echo rigid-motions; else echo boundary; fi)"'
