@@ -539,6 +539,7 @@ void note_file(cli::Tool& tool, const VolumeFile& file) {
 // Extracts one surface, writes it and returns what the report says of it.
 Json extract_to_file(cli::Tool& tool, Selection selection, const Arguments& arguments, const Smoothing& smoothing) {
   const Target target = selection.target;
+  const Vec3 voxel = selection.mask.affine().leftCols<3>().colwise().norm();
   Surface surface = extract(tool, std::move(selection), arguments, smoothing);
   Json result = measured(surface, arguments.open_border);
   const fs::path out = output_path(arguments.out, target);
@@ -546,7 +547,8 @@ Json extract_to_file(cli::Tool& tool, Selection selection, const Arguments& argu
     const auto stage = tool.stage("write");
     PlyOptions options;
     options.comments = {fmt::format("tunica-extract {}", version),
-                        comment("source " + arguments.volume.filename().string()), comment(target.name)};
+                        comment("source " + arguments.volume.filename().string()), comment(target.name),
+                        fmt::format("voxel {:.6g} {:.6g} {:.6g} mm", voxel.x(), voxel.y(), voxel.z())};
     options.space = arguments.space == "ras" ? "RAS" : "LPS";
     options.overwrite = tool.force();
     to_space(surface.mesh, arguments.space);

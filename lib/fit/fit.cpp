@@ -211,6 +211,7 @@ private:
     fewer(mesh, samples);
     most_ = allowed;
     if (mesh.alive <= allowed) {
+      improve(mesh, samples, most_);
       make_certain(mesh, samples, tolerance);
     } else {
       closest(mesh, samples, allowed, 0);
@@ -318,7 +319,8 @@ private:
       collapse_edges(mesh, samples, any, shells, options_.progress);
     }
     limits_.error = settle(mesh, samples, Lessened::largest);
-    improve(mesh, samples, shells);
+    flip_edges(mesh, samples, limits_);
+    mend_shapes(mesh, samples, limits_, shells);
     return settle(mesh, samples, Lessened::largest);
   }
 
@@ -353,7 +355,9 @@ private:
         started(like_target_ ? decimation(target_, truncated<std::size_t>(surplus * real(shells))) : coarse_, samples);
     settle(mesh, samples, Lessened::mean);
     if (mesh.alive > shells) {
-      closest(mesh, samples, shells, 0);
+      limits_.error = closest(mesh, samples, shells, 0);
+      improve(mesh, samples, shells);
+      settle(mesh, samples, Lessened::largest);
     } else {
       result_.stopped = "the surface has no more triangles than shells are allowed";
     }

@@ -111,6 +111,9 @@ class Rules(WithStubs):
         self.assertIn("--fix below z=-10mm --pressure 1kPa --young 1MPa --poisson 0.45 --thickness 1.5mm "
                       "--density 1100kg/m3 --static", simulate)
 
+    def test_a_misspelt_variable_is_refused(self):
+        self.assertIn("no such variable: PRESURE", self.refusal(VOLUMES="a.nii.gz", LABEL=1, PRESURE="1kPa", **LOAD))
+
     def test_an_accuracy_chooses_the_shells(self):
         self.make(VOLUMES="a.nii.gz", LABEL=3, ACCURACY="2%", OF="energy", **LOAD)
         _, decimate, relax, simulate = self.calls()
