@@ -21,8 +21,8 @@ constexpr double most_of_it = 0.5;
 constexpr double thickest = 0.05;
 // Of the radius of curvature. Pressure on the inner face of a thicker sphere moves it 10 % less than a thin one (Lamé).
 constexpr double thickest_curved = 0.125;
-// Of bow_share(), from where bending is some 10 % too stiff.
-constexpr double largest_bow = 1.0 / 3;
+// Of bow_share(), from where bending is some 20 % too stiff: h^2 = 4 R t on a cylinder.
+constexpr double largest_bow = 0.5;
 
 std::string at(const std::string& said_at, const std::string& otherwise) {
   return said_at.empty() ? otherwise : said_at + ": " + otherwise;
@@ -115,7 +115,7 @@ void doubt_coarseness(const ShellBody& body, std::vector<std::string>& found) {
   }
   if (coarse > most_of_it * whole) {
     found.push_back(
-        fmt::format("{}: over {:.0f} % of its area the shells are too long for so thin a curved wall (h^2 > 3 R t), or "
+        fmt::format("{}: over {:.0f} % of its area the shells are too long for so thin a curved wall (h^2 > 4 R t), or "
                     "too narrow: they bend too little, and uneven pressure moves single nodes too far: refine the mesh",
                     at(body.said_at, body.name), 100 * coarse / whole));
   }
