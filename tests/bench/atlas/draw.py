@@ -44,26 +44,28 @@ def svg(chart, method, verdicts, page):
     bottom = top + rows * CELL
     borders = [wrapped(border.label, int(width / 8.4)) for border in chart.borders]
     height = bottom + BELOW + 18 * sum(map(len, borders)) - (0 if borders else 20)
-    out = [f"<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" "
+    out = [f"<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" "
+           f"viewBox=\"0 0 {width} {height}\" "
            "font-family=\"Helvetica, Arial, 'Liberation Sans', 'DejaVu Sans', sans-serif\">",
            f"<title>{escape(chart.title)}: {escape(method.title)}</title>",
            "<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>"]
     out += [text(16, 28 + 22 * k, 17, line, "start", " font-weight=\"bold\"") for k, line in enumerate(title)]
+    letters = []  # over the borders
     for (i, j), verdict in sorted(verdicts.items()):
-        x, y = LEFT + i * CELL, top + (rows - 1 - j) * CELL
+        x, y, colour = LEFT + i * CELL, top + (rows - 1 - j) * CELL, COLOURS[verdict.letter]
         tip = f"{WORDS[verdict.letter]}; exit code {verdict.code}" + (f"; {verdict.message}" if verdict.message else "")
-        out.append(f"<a href=\"{page}#cell-{i}-{j}\"><title>{escape(tip)}</title>"
-                   f"<rect x=\"{x + 1}\" y=\"{y + 1}\" width=\"{CELL - 2}\" height=\"{CELL - 2}\" "
-                   f"fill=\"{COLOURS[verdict.letter]}\"/>" +
-                   text(x + CELL / 2, y + 34, 24, verdict.letter, more=" font-weight=\"bold\"") +
-                   text(x + CELL / 2, y + 58, 14.5, error_text(verdict.error)) + "</a>")
+        out.append(f"<a href=\"{page}#cell-{i}-{j}\"><title>{escape(tip)}</title><rect x=\"{x + 1}\" y=\"{y + 1}\" "
+                   f"width=\"{CELL - 2}\" height=\"{CELL - 2}\" fill=\"{colour}\"/></a>")
+        halo = f" stroke=\"{colour}\" stroke-width=\"5\" paint-order=\"stroke\" pointer-events=\"none\""
+        letters += [text(x + CELL / 2, y + 34, 24, verdict.letter, more=halo + " font-weight=\"bold\""),
+                    text(x + CELL / 2, y + 58, 14.5, error_text(verdict.error), more=halo)]
     out += [text(LEFT + (i + 0.5) * CELL, bottom + 20, 15, chart.x.name(i)) for i in range(columns)]
     out += [text(LEFT - 8, top + (rows - 0.5 - j) * CELL + 5, 15, chart.y.name(j), "end") for j in range(rows)]
     out.append(text(LEFT + columns * CELL / 2, bottom + 44, 15.5, chart.x.label))
     out.append(f"<g transform=\"translate(22 {top + rows * CELL / 2:.1f}) rotate(-90)\">" +
                text(0, 0, 15.5, chart.y.label) + "</g>")
-    out.append(f"<clipPath id=\"plot\"><rect x=\"{LEFT}\" y=\"{top}\" width=\"{columns * CELL}\" height=\"{rows * CELL}\"/>"
-               "</clipPath>")
+    out.append(f"<clipPath id=\"plot\"><rect x=\"{LEFT}\" y=\"{top}\" width=\"{columns * CELL}\" "
+               f"height=\"{rows * CELL}\"/></clipPath>")
     y = bottom + 122
     for number, border in enumerate(chart.borders):
         dash = ("", " stroke-dasharray=\"9 6\"")[number % 2]
@@ -75,6 +77,7 @@ def svg(chart, method, verdicts, page):
         for words in borders[number]:
             out.append(text(60, y, 14, words, "start"))
             y += 18
+    out += letters
     for k, letter in enumerate((RIGHT, DOUBTFUL, REFUSED, WRONG)):
         x, y = 16 + k % 2 * width / 2, bottom + 62 + k // 2 * 24
         out.append(f"<rect x=\"{x:.1f}\" y=\"{y}\" width=\"20\" height=\"20\" fill=\"{COLOURS[letter]}\"/>" +

@@ -7,7 +7,7 @@ from atlas import meshes
 from atlas.charted import Axis, Border, Map
 from atlas.judge import DEFAULT, PAPER, RIGID, Method
 from atlas.statics import POISSON, RADIUS, YOUNG, body, inflation
-from published import load, run_lines
+from published import load, probe, run_lines
 
 DENSITY, SLENDERNESS, LOAD = 1e-9, 10, 1e-3  # t/mm3, R / t, p R / (E t)
 OMEGA = math.sqrt(2 * YOUNG / ((1 - POISSON) * DENSITY * RADIUS**2))  # of the breathing sphere
@@ -39,7 +39,7 @@ def loaded_oscillator(runner, method, step, ramp, seed):
              load("pressure", f"{LOAD * YOUNG / SLENDERNESS!r}MPa", more=rising))
     mesh = meshes.sphere(3, RADIUS, np.random.default_rng(seed))
     point = [float(x) for x in mesh[0][0]]
-    runner.simulate(scene + f"[[probe]]\nname = \"point\"\nbody = \"s\"\nnearest = {[f'{x!r}mm' for x in point]}\n", mesh)
+    runner.simulate(scene + probe("point", point), mesh)
     moved = np.array(runner.reports[-1][2]["result"]["probes"]["point"]["displacement_mm"]) @ mesh[2][0]
     return moved.max() / RADIUS / inflation(LOAD) / peak(ramp, steps * step) - 1
 

@@ -62,7 +62,7 @@ def disc(rings, radius, rng):
 
 
 def lattice(columns, rows, rng, closed=False):
-    """Cells of the unit square, each cut by a diagonal chosen at random, inner nodes shifted; `closed` joins u = 0 and 1.
+    """Cells of the unit square, each cut by a diagonal chosen at random, inner nodes shifted; `closed`: u = 0 is u = 1.
     @return u and v of the nodes, triangles"""
     across = columns if closed else columns + 1
     u, v = np.meshgrid(np.arange(across) / columns, np.arange(rows + 1) / rows, indexing="ij")

@@ -92,10 +92,8 @@ def concentric_spheres(runner, method, gap, frequency, seed):
         if name == "target":
             sag = radii[1] - np.linalg.norm(parts[1][0][parts[1][1]].mean(axis=1), axis=1).min()
     result, points, triangles = relaxed(runner, method, "--max-iterations", "1")
-    outwards = np.einsum("ij,ij->i", np.cross(points[triangles[:, 1]] - points[triangles[:, 0]],
-                                              points[triangles[:, 2]] - points[triangles[:, 0]]), points[triangles[:, 0]])
     outer = np.zeros(len(points), bool)
-    outer[triangles[outwards > 0]] = True
+    outer[triangles[np.linalg.det(points[triangles]) > 0]] = True
     if result["self_intersections"] == 0 and crosses(points[~outer], points[outer]):
         return math.inf
     farthest = np.abs(np.linalg.norm(points, axis=1)[:, None] - np.array(radii)).min(axis=1).max()
@@ -123,9 +121,9 @@ SPHERES = Map(
     Axis("gap over radius", (1e-4, 1e-3, 3e-3, 1e-2, 3e-2, 0.1)),
     Axis("shells on each sphere", (1, 2, 3, 4), ("20", "80", "180", "320")),
     concentric_spheres,
-    "The spheres: vertices of the curved surface must lie within the certified distance of the nearer one, and a crossing "
-    "must be told.",
-    (Border("gap = what the chords of equal facets leave out, h^2 / 6 R: flat facets on the outer sphere cut the inner one",
+    "The spheres: vertices of the curved surface must lie within the certified distance of the nearer one, and a "
+    "crossing must be told.",
+    (Border("gap = what the chords of equal facets leave out, h^2 / 6 R: flat facets of the outer cut the inner",
             tuple((4 * math.pi * 4 / math.sqrt(3) / (20 * f**2) / 6, f) for f in np.linspace(0.5, 5, 30))),),
     (DEFAULT, BARYCENTRE))
 
