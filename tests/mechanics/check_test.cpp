@@ -249,6 +249,17 @@ TEST(Doubts, BodiesThatCannotMoveAndLoadsThatMoveNothing) {
   EXPECT_THAT(doubts_of(model), IsEmpty());
 }
 
+TEST(Doubts, RampsThatJumpWithinAStep) {
+  Model model = plate();
+  model.shells[0].material.density = 1e-9;
+  model.loads[0].ramp.points = {{0, 0}, {0.3, 1}, {2, 1}};
+  RunSettings settings = linear_run();
+  settings.kind = DynamicRun{4, 1, {}, Integrator::backward_euler};
+  EXPECT_THAT(doubts_of(model, settings), ElementsAre(HasSubstr("within less than a step")));
+  settings.kind = DynamicRun{4, 0.3, {}, Integrator::backward_euler};
+  EXPECT_THAT(doubts_of(model, settings), IsEmpty());
+}
+
 TEST(Doubts, LoadsThatAreZeroAndNoneAtAll) {
   Model model = plate();
   model.loads[0].ramp.points = {{0, 0}, {2, 0}, {3, 1}};  // over the load factor, which ends at 1

@@ -215,6 +215,27 @@ bool stays_zero(const Ramp& ramp, const RunSettings& settings) {
          std::all_of(times.begin(), times.end(), [&](double time) { return ramp.at(time) == 0; });
 }
 
+// Whether a ramp changes by more than a tenth of its largest factor in less time than one step of a motion.
+bool jumps_within_a_step(const Ramp& ramp, const RunSettings& settings) {
+  const auto* dynamic = std::get_if<DynamicRun>(&settings.kind);
+  if (dynamic == nullptr || dynamic->adaptive) {
+    return false;
+  }
+  constexpr double notable = 0.1;
+  double largest = 0;
+  for (const auto& [time, factor] : ramp.points) {
+    largest = std::max(largest, std::abs(factor));
+  }
+  for (std::size_t i = 0; i + 1 < ramp.points.size(); ++i) {
+    const auto& [begin, from] = ramp.points[i];
+    const auto& [end, to] = ramp.points[i + 1];
+    if (end - begin < dynamic->step && std::abs(to - from) > notable * largest) {
+      return true;
+    }
+  }
+  return false;
+}
+
 void doubt_loads(const Model& model, const RunSettings& settings,
                  const std::vector<std::vector<std::array<bool, 6>>>& held, std::vector<std::string>& found) {
   for (const Load& load : model.loads) {
@@ -225,6 +246,11 @@ void doubt_loads(const Model& model, const RunSettings& settings,
       found.push_back(where + ": the ramp of this load is zero during the whole run, so it never acts");
     } else if (const auto on = shared(load); on && only_held_nodes_bear(*on, held[load.body])) {
       found.push_back(fmt::format("{}: this {} acts on held nodes only, so it moves nothing", where, on->name));
+    }
+    if (jumps_within_a_step(load.ramp, settings)) {
+      found.push_back(where +
+                      ": the ramp of this load changes within less than a step, so what it sets swinging is lost: "
+                      "take shorter steps");
     }
   }
   for (const Fix& fix : model.fixes) {
