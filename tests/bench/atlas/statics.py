@@ -35,10 +35,11 @@ POISSON = 0.3
 LIMIT = 1 / (2 * (1 - POISSON))  # of p R / (E t): beyond, a sphere of this material has no equilibrium
 
 
-def thick_over_thin(slenderness):
-    """Lamé's sphere under pressure on its inner face: displacement of the middle surface, relative to thin shells."""
-    inner, outer = 1 - 0.5 / slenderness, 1 + 0.5 / slenderness
-    thick = inner**3 / (outer**3 - inner**3) * (1 - 2 * POISSON + (1 + POISSON) / 2 * outer**3)
+def thick_over_thin(slenderness, outside=False):
+    """Lamé's sphere under pressure on one face: displacement of the middle surface, relative to thin shells."""
+    inner, outer = (1 - 0.5 / slenderness)**3, (1 + 0.5 / slenderness)**3
+    pressed, free = (outer, inner) if outside else (inner, outer)
+    thick = pressed / (outer - inner) * (1 - 2 * POISSON + (1 + POISSON) / 2 * free)
     return thick / ((1 - POISSON) / 2 * slenderness)
 
 
@@ -88,7 +89,7 @@ def shrunken_sphere(runner, method, mesh_number, load_factor, seed):
     found = sphere_of(runner, method, frequency, slenderness, -load_factor * critical, seed)
     if load_factor > 1:
         return math.inf
-    expected = inflation(-load_factor * critical * thick_over_thin(slenderness))
+    expected = inflation(-load_factor * critical * thick_over_thin(slenderness, outside=True))
     return worse(*(strain / expected for strain in found))
 
 
@@ -97,8 +98,8 @@ SHRUNKEN = Map(
     Axis("h / sqrt(R t)", (0.7, 1.0, 1.5, 2.5, 5.0)),
     Axis("p / p_cr", (0.1, 0.4, 0.7, 0.95, 1.2)),
     shrunken_sphere,
-    "Thin sphere, p_cr = 2 E / sqrt(3 (1 - nu^2)) (t / R)^2 (Zoelly). Above it the sphere collapses, and an answer "
-    "without a word of that is wrong.",
+    "Thin sphere, by Lamé's solution for the outer face where it is thick; p_cr = 2 E / sqrt(3 (1 - nu^2)) (t / R)^2 "
+    "(Zoelly). Above it the sphere collapses, and an answer without a word of that is wrong.",
     (Border("p = p_cr, the classical buckling pressure of the perfect sphere", ((1e-3, 1), (1e3, 1))),
      Border("h^2 = 3 R t: waves as short as the elements have no membrane strain", ((3**0.5, 1e-3), (3**0.5, 1e2)))),
     (DEFAULT, PAPER))

@@ -167,7 +167,7 @@ SHEETS = Map(
     Axis("angle between the sheets, degrees", (5, 15, 45, 90, 150)),
     angled_sheets,
     "The sheets: points of the curved surface must lie within the tolerance of them.",
-    (Border("gap = tolerance: below, one sheet may lie within the tolerance of the other", ((1, -100), (1, 300))),),
+    (Border("gap = tolerance: below, one sheet may lie within the tolerance of the other", ((1, 1e-3), (1, 1e5))),),
     (DEFAULT, BARYCENTRE))
 
 MAPS = [BALL, SPHERES, SHEETS]
