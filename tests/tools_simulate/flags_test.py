@@ -234,7 +234,7 @@ class Flags(SimulateTest):
             return [thickness if word == "0.5mm" else word for word in words]
 
         self.assertEqual(self.run_tool("ball.ply", "out.hdf", *HELD)["warnings"], [])
-        told("ball.ply: shell: its thickness, 5 mm, is more than a tenth", "ball.ply", *thick(HELD, "5mm"))
+        told("ball.ply: shell: its thickness, 5 mm, is more than a twentieth", "ball.ply", *thick(HELD, "5mm"))
         told("all its nodes are held", "ball.ply", *PRESSED, "--static", "--fix", "below x=1m")
         nothing = [word if word != "100Pa" else "0Pa" for word in HELD]
         told("this load is zero", "ball.ply", *nothing, many=2)

@@ -229,6 +229,13 @@ std::vector<std::string> run_warnings(const RunSettings& run, const Summary& sum
                     "spectral_radius",
                     1e2 * summary.energy->gained, summary.energy->gaining_step, summary.energy->gaining_time));
   }
+  constexpr double notable_loss = 0.1;
+  if (summary.energy && summary.energy->lost > notable_loss * summary.energy->largest) {
+    warnings.push_back(
+        fmt::format("time integration took {:.3g} % of the energy: what swings is smaller than it should be, the state "
+                    "of rest is not: for the motion take shorter steps, or integrator = \"generalised-alpha\"",
+                    1e2 * summary.energy->lost / summary.energy->largest));
+  }
   if (summary.stiffened_from) {
     warnings.push_back(
         fmt::format("the mesh is coarse for so thin a curved shell (h^2 > 3 R t): from {} {:.4g} on, where it "

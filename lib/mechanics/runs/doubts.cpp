@@ -16,8 +16,13 @@ namespace {
 
 // Of the body's area: one crease, rim or branch says nothing of the whole wall.
 constexpr double most_of_it = 0.5;
-// Of the diagonal of the body's box, beyond which theories of thin shells do not claim to hold.
-constexpr double thickest = 0.1;
+// Of the diagonal of the body's box. Thin shells leave out the shear through the wall: of a clamped disc of radius a
+// 3.2 / (1 - nu) (t / a)^2 of its deflection, 10 % where t is .15 a (nu = .3), a twentieth of the diagonal.
+constexpr double thickest = 0.05;
+// Of the radius of curvature. Pressure on the inner face of a thicker sphere moves it 10 % less than a thin one (Lamé).
+constexpr double thickest_curved = 0.125;
+// Of bow_share(), from where bending is some 20 % too stiff: h^2 = 4 R t on a cylinder.
+constexpr double largest_bow = 0.5;
 
 std::string at(const std::string& said_at, const std::string& otherwise) {
   return said_at.empty() ? otherwise : said_at + ": " + otherwise;
@@ -37,8 +42,8 @@ void doubt_thickness(const ShellBody& body, std::vector<std::string>& found) {
   const double most = *std::max_element(body.thickness.begin(), body.thickness.end());
   if (most > thickest * diagonal_mm) {
     found.push_back(
-        fmt::format("{}: its thickness, {:.4g} mm, is more than a tenth of the body's diagonal, {:.4g} mm: "
-                    "this is no thin shell; is the unit right?",
+        fmt::format("{}: its thickness, {:.4g} mm, is more than a twentieth of the body's diagonal, {:.4g} mm: "
+                    "this is no thin shell, whose wall does not shear; is the unit right?",
                     at(body.said_at, body.name), most, diagonal_mm));
     return;
   }
@@ -51,15 +56,68 @@ void doubt_thickness(const ShellBody& body, std::vector<std::string>& found) {
     by_share.emplace_back(thickness_of(body, t) * curvatures[t], triangle_area(x[v[0]], x[v[1]], x[v[2]]));
     whole += by_share.back().second;
   }
-  double thick = 0;
-  for (const auto& [share, area] : by_share) {
-    thick += share > 1 ? area : 0;
-  }
-  if (thick > most_of_it * whole) {
+  const auto thicker_than = [&](double limit) {
+    double thick = 0;
+    for (const auto& [share, area] : by_share) {
+      thick += share > limit ? area : 0;
+    }
+    return thick / whole;
+  };
+  if (const double part = thicker_than(1); part > most_of_it) {
     found.push_back(
         fmt::format("{}: its thickness, {:.4g} mm, is more than the radius of curvature over {:.0f} % of its "
                     "area: the wall would pass through itself; is the unit right?",
-                    at(body.said_at, body.name), most, 100 * thick / whole));
+                    at(body.said_at, body.name), most, 100 * part));
+  } else if (const double eighth = thicker_than(thickest_curved); eighth > most_of_it) {
+    found.push_back(
+        fmt::format("{}: its thickness, {:.4g} mm, is more than an eighth of the radius of curvature over {:.0f} % of "
+                    "its area: this is no thin shell, for which inner and outer face are alike; is the unit right?",
+                    at(body.said_at, body.name), most, 100 * eighth));
+  }
+}
+
+/// How much of a triangle's bending stretches it, as it does not stretch the surface, relative to the strain by bending
+/// at the faces: the ends of an edge of length l whose normals lean by b against the facet, across the edge, turn in
+/// its plane where the shell bends; the bow of the edge that follows strains the triangle, of area A, by l^3 b / (8 A)
+/// per curvature. On a cylinder it is h^2 / (8 R t), on a sphere two thirds of that.
+double bow_share(const ShellBody& body, const std::vector<Vec3>& of_vertices, std::size_t triangle) {
+  const auto& v = body.mesh.triangles[triangle];
+  const auto& x = body.mesh.vertices;
+  const Vec3 across = (x[v[1]] - x[v[0]]).cross(x[v[2]] - x[v[0]]);
+  if (!(across.norm() > 0)) {
+    return 0;
+  }
+  const auto normal = [&](std::size_t k) {
+    return of_vertices.empty() ? body.mesh.normal(triangle, k) : of_vertices[v[k]];
+  };
+  double largest = 0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const std::size_t next = (k + 1) % 3;
+    const Vec3 edge = x[v[next]] - x[v[k]];
+    const double lean = std::abs((normal(k) + normal(next)).dot(edge.cross(across).normalized())) / 2;
+    largest = std::max(largest, std::pow(edge.norm(), 3) * lean);
+  }
+  return largest / (4 * across.norm() * thickness_of(body, triangle));
+}
+
+void doubt_coarseness(const ShellBody& body, std::vector<std::string>& found) {
+  const bool own =
+      body.curved && (!body.mesh.corner_normals.empty() || body.mesh.normals.size() == body.mesh.vertices.size());
+  const std::vector<Vec3> of_vertices = own ? std::vector<Vec3>() : vertex_normals(flat_facets(body.mesh));
+  double coarse = 0;
+  double whole = 0;
+  for (std::size_t t = 0; t < body.mesh.triangles.size(); ++t) {
+    const auto& v = body.mesh.triangles[t];
+    const auto& x = body.mesh.vertices;
+    const double area = triangle_area(x[v[0]], x[v[1]], x[v[2]]);
+    coarse += bow_share(body, of_vertices, t) > largest_bow ? area : 0;
+    whole += area;
+  }
+  if (coarse > most_of_it * whole) {
+    found.push_back(
+        fmt::format("{}: over {:.0f} % of its area the shells are too long for so thin a curved wall (h^2 > 4 R t), or "
+                    "too narrow: they bend too little, and uneven pressure moves single nodes too far: refine the mesh",
+                    at(body.said_at, body.name), 100 * coarse / whole));
   }
 }
 
@@ -157,6 +215,27 @@ bool stays_zero(const Ramp& ramp, const RunSettings& settings) {
          std::all_of(times.begin(), times.end(), [&](double time) { return ramp.at(time) == 0; });
 }
 
+// Whether a ramp changes by more than a tenth of its largest factor in less time than one step of a motion.
+bool jumps_within_a_step(const Ramp& ramp, const RunSettings& settings) {
+  const auto* dynamic = std::get_if<DynamicRun>(&settings.kind);
+  if (dynamic == nullptr || dynamic->adaptive) {
+    return false;
+  }
+  constexpr double notable = 0.1;
+  double largest = 0;
+  for (const auto& [time, factor] : ramp.points) {
+    largest = std::max(largest, std::abs(factor));
+  }
+  for (std::size_t i = 0; i + 1 < ramp.points.size(); ++i) {
+    const auto& [begin, from] = ramp.points[i];
+    const auto& [end, to] = ramp.points[i + 1];
+    if (end - begin < dynamic->step && std::abs(to - from) > notable * largest) {
+      return true;
+    }
+  }
+  return false;
+}
+
 void doubt_loads(const Model& model, const RunSettings& settings,
                  const std::vector<std::vector<std::array<bool, 6>>>& held, std::vector<std::string>& found) {
   for (const Load& load : model.loads) {
@@ -167,6 +246,11 @@ void doubt_loads(const Model& model, const RunSettings& settings,
       found.push_back(where + ": the ramp of this load is zero during the whole run, so it never acts");
     } else if (const auto on = shared(load); on && only_held_nodes_bear(*on, held[load.body])) {
       found.push_back(fmt::format("{}: this {} acts on held nodes only, so it moves nothing", where, on->name));
+    }
+    if (jumps_within_a_step(load.ramp, settings)) {
+      found.push_back(where +
+                      ": the ramp of this load changes within less than a step, so what it sets swinging is lost: "
+                      "take shorter steps");
     }
   }
   for (const Fix& fix : model.fixes) {
@@ -199,6 +283,7 @@ std::vector<std::string> doubts(const Model& model, const RunSettings& settings)
   for (std::size_t b = 0; b < model.shells.size(); ++b) {
     const ShellBody& body = model.shells[b];
     doubt_thickness(body, found);
+    doubt_coarseness(body, found);
     held.push_back(held_freedoms(model, b));
     if (cannot_move(model, b, held.back())) {
       found.push_back(at(body.said_at, body.name) + ": all its nodes are held, so nothing of it can move");

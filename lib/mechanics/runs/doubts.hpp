@@ -14,10 +14,10 @@ bool prescribes(const Fix& fix);
 bool is_loaded(const Model& model);
 
 /// What of a model can be solved but hardly be meant, a sentence each that begins with where it was said: walls thicker
-/// than the radius of curvature over most of a body, or than a tenth of its diagonal; bodies that cannot move; forces
-/// and moments that only held nodes bear; loads that are zero or stay so during the run; nothing that loads at all
-/// (static and dynamic runs).
-/// The model must have passed check_model(). Cost: linear.
+/// than an eighth of the radius of curvature over most of a body, or than a twentieth of its diagonal; shells too long
+/// or too narrow for a curved wall so thin; bodies that cannot move; forces and moments that only held nodes bear;
+/// loads that are zero or stay so during the run, or jump within a step; nothing that loads at all (static and dynamic
+/// runs). The model must have passed check_model(). Cost: linear.
 std::vector<std::string> doubts(const Model& model, const RunSettings& settings);
 
 /// The larger principal curvature of the shells (1/mm, #F): of each the symmetric shape operator that fits best how the
