@@ -216,15 +216,15 @@ public:
     stage("setup");
     prepare_result(tool_.result(), model());
     naming(subject(), [&] { check_model(model(), scene_.run); });
+    if (scene_.accuracy && !given_.check) {
+      choose_model();
+    }
     for (const std::string& doubt : doubts(model(), scene_.run)) {
       tool_.warn(doubt);
     }
     if (given_.check) {
       tool_.print(scene_text(scene_));
       return;
-    }
-    if (scene_.accuracy) {
-      choose_model();
     }
     begin();
     const Summary summary = accuracy_ ? recorded() : solved();

@@ -221,14 +221,16 @@ double edges_per_layer(const Model& model) {
   double least = infinity;
   for (std::size_t b = 0; b < model.shells.size(); ++b) {
     const ShellBody& body = model.shells[b];
-    const auto curvatures = largest_curvatures(body.mesh, body.curved);
+    const auto curvatures = curvatures_of(body.mesh, body.curved);
     const auto disturbed = disturbed_nodes(model, b);
     const double share = 1 / std::pow(3 * (1 - std::pow(body.material.poisson, 2)), 0.25);
     for (std::size_t t = 0; t < body.mesh.triangles.size(); ++t) {
       const auto& triangle = body.mesh.triangles[t];
-      if (curvatures[t] > 0 && (disturbed[triangle[0]] | disturbed[triangle[1]] | disturbed[triangle[2]]) != 0) {
+      if (curvatures[t].largest > 0 &&
+          (disturbed[triangle[0]] | disturbed[triangle[1]] | disturbed[triangle[2]]) != 0) {
         const double thickness = body.thickness.size() == 1 ? body.thickness[0] : body.thickness[triangle[0]];
-        least = std::min(least, share * std::sqrt(thickness / curvatures[t]) / largest_edge(body.mesh, triangle));
+        least =
+            std::min(least, share * std::sqrt(thickness / curvatures[t].largest) / largest_edge(body.mesh, triangle));
       }
     }
   }

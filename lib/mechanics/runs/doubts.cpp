@@ -19,8 +19,9 @@ constexpr double most_of_it = 0.5;
 // Of the diagonal of the body's box. Thin shells leave out the shear through the wall: of a clamped disc of radius a
 // 3.2 / (1 - nu) (t / a)^2 of its deflection, 10 % where t is .15 a (nu = .3), a twentieth of the diagonal.
 constexpr double thickest = 0.05;
-// Of the radius of curvature. Pressure on the inner face of a thicker sphere moves it 10 % less than a thin one (Lamé).
-constexpr double thickest_curved = 0.125;
+// Times the sum of the principal curvatures. Pressure on the inner face of a thicker wall moves it 10 % less than a
+// thin one (Lamé), for that face is smaller by half of this.
+constexpr double thickest_curved = 0.25;
 // Of bow_share(), from where bending is some 20 % too stiff: h^2 = 4 R t on a cylinder.
 constexpr double largest_bow = 0.5;
 
@@ -47,32 +48,27 @@ void doubt_thickness(const ShellBody& body, std::vector<std::string>& found) {
                     at(body.said_at, body.name), most, diagonal_mm));
     return;
   }
-  const std::vector<double> curvatures = largest_curvatures(body.mesh, body.curved);
-  std::vector<std::pair<double, double>> by_share;  // thickness over radius of curvature, area
-  double whole = 0;
+  const std::vector<Curvature> curvatures = curvatures_of(body.mesh, body.curved);
+  double whole = 0, through_itself = 0, thick = 0;
   for (std::size_t t = 0; t < curvatures.size(); ++t) {
     const auto& v = body.mesh.triangles[t];
     const auto& x = body.mesh.vertices;
-    by_share.emplace_back(thickness_of(body, t) * curvatures[t], triangle_area(x[v[0]], x[v[1]], x[v[2]]));
-    whole += by_share.back().second;
+    const double area = triangle_area(x[v[0]], x[v[1]], x[v[2]]);
+    whole += area;
+    through_itself += thickness_of(body, t) * curvatures[t].largest > 1 ? area : 0;
+    thick += thickness_of(body, t) * curvatures[t].sum > thickest_curved ? area : 0;
   }
-  const auto thicker_than = [&](double limit) {
-    double thick = 0;
-    for (const auto& [share, area] : by_share) {
-      thick += share > limit ? area : 0;
-    }
-    return thick / whole;
-  };
-  if (const double part = thicker_than(1); part > most_of_it) {
+  if (through_itself > most_of_it * whole) {
     found.push_back(
         fmt::format("{}: its thickness, {:.4g} mm, is more than the radius of curvature over {:.0f} % of its "
                     "area: the wall would pass through itself; is the unit right?",
-                    at(body.said_at, body.name), most, 100 * part));
-  } else if (const double eighth = thicker_than(thickest_curved); eighth > most_of_it) {
-    found.push_back(
-        fmt::format("{}: its thickness, {:.4g} mm, is more than an eighth of the radius of curvature over {:.0f} % of "
-                    "its area: this is no thin shell, for which inner and outer face are alike; is the unit right?",
-                    at(body.said_at, body.name), most, 100 * eighth));
+                    at(body.said_at, body.name), most, 100 * through_itself / whole));
+  } else if (thick > most_of_it * whole) {
+    found.push_back(fmt::format(
+        "{}: its thickness, {:.4g} mm, is more than a quarter of a vessel's radius, or an eighth of a "
+        "ball's, over {:.0f} % of its area: pressure on the inner face moves so thick a wall some 10 % less "
+        "than this thin one",
+        at(body.said_at, body.name), most, 100 * thick / whole));
   }
 }
 
@@ -298,10 +294,10 @@ std::vector<std::string> doubts(const Model& model, const RunSettings& settings)
   return found;
 }
 
-std::vector<double> largest_curvatures(const ShellMesh& mesh, bool curved) {
+std::vector<Curvature> curvatures_of(const ShellMesh& mesh, bool curved) {
   const bool own = curved && (!mesh.corner_normals.empty() || mesh.normals.size() == mesh.vertices.size());
   const std::vector<Vec3> of_vertices = own ? std::vector<Vec3>() : vertex_normals(flat_facets(mesh));
-  std::vector<double> curvatures;
+  std::vector<Curvature> curvatures;
   curvatures.reserve(mesh.triangles.size());
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     const auto& v = mesh.triangles[t];
@@ -309,7 +305,7 @@ std::vector<double> largest_curvatures(const ShellMesh& mesh, bool curved) {
     const Vec3 along = mesh.vertices[v[1]] - mesh.vertices[v[0]];
     const Vec3 across = along.cross(mesh.vertices[v[2]] - mesh.vertices[v[0]]);
     if (!(across.norm() > 0)) {
-      curvatures.push_back(0);
+      curvatures.emplace_back();
       continue;
     }
     const Vec3 x = along.normalized();
@@ -327,7 +323,8 @@ std::vector<double> largest_curvatures(const ShellMesh& mesh, bool curved) {
       right += rows.transpose() * Vec2(turn.dot(x), turn.dot(y));
     }
     const Vec3 shape = left.ldlt().solve(right);  // xx, xy, yy
-    curvatures.push_back(std::abs(shape[0] + shape[2]) / 2 + std::hypot((shape[0] - shape[2]) / 2, shape[1]));
+    const double sum = std::abs(shape[0] + shape[2]);
+    curvatures.push_back({sum / 2 + std::hypot((shape[0] - shape[2]) / 2, shape[1]), sum});
   }
   return curvatures;
 }
