@@ -225,10 +225,10 @@ TEST(Doubts, AWallThickerThanTheRadiusOfCurvatureOfMostOfTheBodyButNotOfACrease)
 
 TEST(Doubts, TheCurvatureOfSphereAndCylinderIsTheirOwn) {
   const ShellMesh sphere = make_sphere(10, 3);
-  for (const double curvature : largest_curvatures(sphere, true)) {
+  for (const auto& [curvature, sum] : curvatures_of(sphere, true)) {
     EXPECT_NEAR(curvature, 0.1, 0.002);
   }
-  for (const double curvature : largest_curvatures(sphere, false)) {
+  for (const auto& [curvature, sum] : curvatures_of(sphere, false)) {
     EXPECT_NEAR(curvature, 0.1, 0.02);
   }
 }
