@@ -249,6 +249,24 @@ TEST(Doubts, BodiesThatCannotMoveAndLoadsThatMoveNothing) {
   EXPECT_THAT(doubts_of(model), IsEmpty());
 }
 
+TEST(Doubts, NormalsThatDoNotFitTheNodes) {
+  const auto ball = [](double lean) {
+    Model model = pressurised_sphere(3, 0.5, 1);
+    ShellMesh& mesh = model.shells[0].mesh;
+    for (std::size_t v = 0; v < mesh.normals.size(); ++v) {
+      const double angle = 2.4 * static_cast<double>(v);
+      const Vec3 across = mesh.normals[v].unitOrthogonal();
+      mesh.normals[v] =
+          (mesh.normals[v] + lean * (std::cos(angle) * across + std::sin(angle) * mesh.normals[v].cross(across)))
+              .normalized();
+    }
+    return model;
+  };
+  EXPECT_THAT(doubts_of(ball(0)), IsEmpty());
+  EXPECT_THAT(doubts_of(ball(0.03)), IsEmpty());
+  EXPECT_THAT(doubts_of(ball(0.5)), ElementsAre(HasSubstr("its normals do not fit its nodes")));
+}
+
 TEST(Doubts, RampsThatJumpWithinAStep) {
   Model model = plate();
   model.shells[0].material.density = 1e-9;

@@ -22,6 +22,8 @@ constexpr double thickest = 0.05;
 // Times the sum of the principal curvatures. Pressure on the inner face of a thicker wall moves it 10 % less than a
 // thin one (Lamé), for that face is smaller by half of this.
 constexpr double thickest_curved = 0.25;
+// Of the wall: the error of the answer is one to three times that.
+constexpr double highest_waves = 0.05;
 // Of bow_share(), from where bending is some 20 % too stiff: h^2 = 4 R t on a cylinder.
 constexpr double largest_bow = 0.5;
 
@@ -94,6 +96,34 @@ double bow_share(const ShellBody& body, const std::vector<Vec3>& of_vertices, st
     largest = std::max(largest, std::pow(edge.norm(), 3) * lean);
   }
   return largest / (4 * across.norm() * thickness_of(body, triangle));
+}
+
+/// An edge whose ends lean alike against it, by a, is an S: its mean height is a sixteenth of a times its length. On a
+/// smooth surface normals lean against each other, so that an S is what noise of normals leaves.
+void doubt_waves(const ShellBody& body, std::vector<std::string>& found) {
+  if (!body.curved || body.mesh.normals.size() != body.mesh.vertices.size()) {
+    return;
+  }
+  constexpr double mean_height = 1.0 / 16;
+  double waves = 0;
+  double whole = 0;
+  for (std::size_t t = 0; t < body.mesh.triangles.size(); ++t) {
+    const auto& v = body.mesh.triangles[t];
+    const auto& x = body.mesh.vertices;
+    const double area = triangle_area(x[v[0]], x[v[1]], x[v[2]]);
+    whole += area;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::size_t next = (k + 1) % 3;
+      const double lean = (body.mesh.normal(t, k) + body.mesh.normal(t, next)).dot(x[v[next]] - x[v[k]]) / 2;
+      waves += area / 3 * mean_height * std::abs(lean) / thickness_of(body, t);
+    }
+  }
+  if (waves > highest_waves * whole) {
+    found.push_back(
+        fmt::format("{}: its normals do not fit its nodes: the shells between them wave by {:.2g} % of the wall in the "
+                    "mean, which may cost three times as much of the answer: fit it again (tunica-relax)",
+                    at(body.said_at, body.name), 100 * waves / whole));
+  }
 }
 
 void doubt_coarseness(const ShellBody& body, std::vector<std::string>& found) {
@@ -280,6 +310,7 @@ std::vector<std::string> doubts(const Model& model, const RunSettings& settings)
     const ShellBody& body = model.shells[b];
     doubt_thickness(body, found);
     doubt_coarseness(body, found);
+    doubt_waves(body, found);
     held.push_back(held_freedoms(model, b));
     if (cannot_move(model, b, held.back())) {
       found.push_back(at(body.said_at, body.name) + ": all its nodes are held, so nothing of it can move");
