@@ -163,7 +163,7 @@ class Body:
         self.is_open = fits[-1]["result"]["boundary_percent"] is not None
         coarse, self.truth = (answers(self.solved(f"truth{count}", f"other{count}", repeats=1))
                               for count in (TRUTH // 4, TRUTH))
-        self.known = {of: off(coarse[of], self.truth[of]) / 3 for of in self.truth}
+        self.known = {of: off(coarse[of], self.truth[of]) for of in self.truth}  # by second order a third of that
         self.ways = {}  # (way, size) to (report's name, report, seconds with the making of the shells)
         self.claims = {}
 
@@ -241,7 +241,8 @@ def bodies(study, data):
             print("organs: left out, DATA names no folder")
         swept = [one.result() for one in made]
     for body in swept:
-        print(body.name, "truth known to, %:", {of: float(f"{x:.2g}") for of, x in body.known.items()}, flush=True)
+        changes = ", ".join(f"{of} {change:.2g}" for of, change in body.known.items())
+        print(f"{body.name}: last change of the truth, %: {changes}", flush=True)
     return swept
 
 
@@ -278,7 +279,7 @@ def estimates(study, swept):
                 value, before = levels[k]["value"], change
                 change = off(levels[k - 1]["value"], value)
                 error = off(value, body.truth[of])
-                if error < 2 * body.known[of]:
+                if error < body.known[of]:
                     dropped += 1
                     continue
                 ratios.append(max(change, before / 4) / error)
@@ -289,7 +290,7 @@ def estimates(study, swept):
                "--y-label", "estimate / true error", "--y-scale", "log", "--guide", "1", "--guide-label",
                "estimate = true error", "--label", "study.organ")
     print(f"estimates: {len(marks)} levels, {sum(ratio < 1 for ratio in ratios)} below 1; {dropped} left out, whose "
-          "error is less than twice what the truth is known to", flush=True)
+          "error is below the last change of the truth", flush=True)
 
 
 def profiles(study, swept):
