@@ -536,17 +536,37 @@ void note_file(cli::Tool& tool, const VolumeFile& file) {
   tool.result()["warnings"] = file.warnings;
 }
 
+// A surface runs halfway between the middles of voxels and is rounded off there: what is a few voxels thick loses
+// volume.
+void warn_of_few_voxels(const cli::Tool& tool, const Surface& surface, const Json& result, const std::string& name) {
+  constexpr double notable = 0.05;
+  if (result["volume_mm3"].is_null()) {
+    return;
+  }
+  const double voxels = real(count_voxels(surface.mask)) * surface.mask.voxel_volume();
+  const double change = result["volume_mm3"].get<double>() / voxels - 1;
+  if (std::abs(change) > notable) {
+    tool.warn(fmt::format(
+        "{}: the surface encloses {:.3g} % {} than its voxels: it is few voxels thick, and neither volume need "
+        "be right within that; take finer voxels",
+        name, 1e2 * std::abs(change), change < 0 ? "less" : "more"));
+  }
+}
+
 // Extracts one surface, writes it and returns what the report says of it.
 Json extract_to_file(cli::Tool& tool, Selection selection, const Arguments& arguments, const Smoothing& smoothing) {
   const Target target = selection.target;
+  const Vec3 voxel = selection.mask.affine().leftCols<3>().colwise().norm();
   Surface surface = extract(tool, std::move(selection), arguments, smoothing);
   Json result = measured(surface, arguments.open_border);
+  warn_of_few_voxels(tool, surface, result, target.name);
   const fs::path out = output_path(arguments.out, target);
   {
     const auto stage = tool.stage("write");
     PlyOptions options;
     options.comments = {fmt::format("tunica-extract {}", version),
-                        comment("source " + arguments.volume.filename().string()), comment(target.name)};
+                        comment("source " + arguments.volume.filename().string()), comment(target.name),
+                        fmt::format("voxel {:.6g} {:.6g} {:.6g} mm", voxel.x(), voxel.y(), voxel.z())};
     options.space = arguments.space == "ras" ? "RAS" : "LPS";
     options.overwrite = tool.force();
     to_space(surface.mesh, arguments.space);

@@ -160,7 +160,7 @@ def stage_flags(label):
     if setting("ACCURACY"):
         # The coarsest of the levels: well shaped, and near enough to be refitted.
         decimate += ["--min-angle", "20"]
-        relax = ["--tolerance", "5%", "--refine"]
+        relax = ["--shells", setting("SHELLS"), "--max-iterations", "1"]
     relax += flag_if("--method", "METHOD")
     simulate = flag_if("--fix", "FIX") + flag_if("--accuracy", "ACCURACY") + flag_if("--of", "OF")
     for name in ("pressure", "young", "poisson", "thickness", "density"):
@@ -179,7 +179,8 @@ def stage_commands(case, binaries, flags):
         os.path.join(case.folder, name)
         for name in ("surface.ply", "coarse.ply", "shell.ply", "map.png", "result.hdf", "extract.json"))
     words = {"extract": [path_word(case.volume), surface], "decimate": [surface, coarse],
-             "relax": [coarse, surface, shell, "--picture", picture], "simulate": [shell, result, *(["--target", surface] if setting("ACCURACY") else [])]}
+             "relax": [coarse, surface, shell, "--picture", picture],
+             "simulate": [shell, result, *(["--target", surface] if setting("ACCURACY") else [])]}
     # Whether there is a boundary to hold is known once the surface is.
     is_closed = f"grep -q '\"closed\": *true' {shlex.quote(facts)}"
     chosen_fix = "" if setting("FIX") else f' --fix "$(if {is_closed}; then echo rigid-motions; else echo boundary; fi)"'

@@ -32,15 +32,14 @@ struct Arguments {
   std::vector<fs::path> files;
   fs::path scene, resume;
   cli::SceneFlags flags;
-  std::optional<std::string> tessellation, accuracy, quantity, max_shells;
-  std::optional<fs::path> target, shell_out;
+  cli::AccuracyFlags accuracy;
+  std::optional<std::string> tessellation;
   std::vector<std::string> exports;
   bool check = false;
 };
 
 constexpr const char* scene_flag = "--scene";
 constexpr const char* resume_flag = "--resume";
-constexpr const char* accuracy_flag = "--accuracy";
 
 void declare(cli::Tool& tool, Arguments& a) {
   CLI::App& app = tool.arguments();
@@ -50,16 +49,7 @@ void declare(cli::Tool& tool, Arguments& a) {
   tool.group("Scene");
   app.add_option(scene_flag, a.scene, "read everything from a scene file (TOML)")->type_name("SCENE.toml");
   a.flags.declare(tool);
-  tool.group("Accuracy");
-  app.add_option(accuracy_flag, a.accuracy,
-                 "choose mesh and model: finer shells, until the error of the answer is credibly below this, e.g. 2%")
-      ->type_name("PERCENT");
-  app.add_option("--of", a.quantity, "the answer: displacement | energy | volume | stress (default displacement)")
-      ->type_name("NAME");
-  app.add_option("--target", a.target, "the surface that SHELL.ply was fitted to: finer shells are fitted to it too")
-      ->type_name("SURFACE");
-  app.add_option("--max-shells", a.max_shells, "no more shells than this (default 50,000)")->type_name("N");
-  app.add_option("--shell-out", a.shell_out, "the shells that it ended with")->type_name("OUT.ply");
+  a.accuracy.declare(tool);
   tool.group("Run");
   app.add_flag("--check", a.check, "validate, print the resolved scene in SI units, and stop");
   app.add_option(resume_flag, a.resume,
@@ -75,52 +65,6 @@ void declare(cli::Tool& tool, Arguments& a) {
       ->expected(1)
       ->allow_extra_args(false)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-}
-
-// What --accuracy asks for; nothing without it.
-std::optional<AccuracyRequest> accuracy_asked(const CLI::App& app, const Arguments& a) {
-  if (!a.accuracy) {
-    for (const char* flag : {"--of", "--target", "--max-shells", "--shell-out"}) {
-      if (app.count(flag) > 0) {
-        throw UsageError(fmt::format("{} belongs to {}: give that too", flag, accuracy_flag));
-      }
-    }
-    return std::nullopt;
-  }
-  if (!a.resume.empty()) {
-    throw UsageError(fmt::format("{} and {} contradict each other: begin again", accuracy_flag, resume_flag));
-  }
-  AccuracyRequest request;
-  request.within = parse_percent(*a.accuracy);
-  if (!(request.within > 0 && request.within <= 0.5)) {
-    throw UsageError(fmt::format("{}: '{}' is not above 0 and at most 50%", accuracy_flag, *a.accuracy));
-  }
-  cli::choose<Quantity>(a.quantity, "--of", request.of,
-                        {{"displacement", Quantity::displacement},
-                         {"energy", Quantity::energy},
-                         {"volume", Quantity::volume},
-                         {"stress", Quantity::stress}});
-  request.max_shells = cli::count_of(a.max_shells, "--max-shells", real(max_index)).value_or(request.max_shells);
-  return request;
-}
-
-// What an accuracy can be found for so far.
-void require_simple(const Scene& scene, const Arguments& a) {
-  const auto* run = std::get_if<StaticRun>(&scene.run.kind);
-  if (run == nullptr) {
-    throw UsageError(fmt::format("{} is for static runs: not available yet for others", accuracy_flag));
-  }
-  if (run->load_factors.size() > 1) {
-    throw UsageError(fmt::format("{} finds one answer: leave out {}", accuracy_flag,
-                                 a.scene.empty() ? "--load-steps" : "load_steps"));
-  }
-  if (scene.run.cg_fixed_count) {
-    throw UsageError(fmt::format("{} asks for convergence, a fixed count of CG iterations for none", accuracy_flag));
-  }
-  if (scene.shells.size() > 1) {
-    throw UsageError(
-        fmt::format("{}: the scene has {} shells, one is understood so far", accuracy_flag, scene.shells.size()));
-  }
 }
 
 // Mechanics knows bodies, and where some of them were said: says which file a refused or unsolved model came from.
@@ -250,9 +194,9 @@ Drawing drawing_of_run(const Arguments& a, const RunIdentity& before) {
   return drawing;
 }
 
-RunIdentity identity_of_run(const cli::Tool& tool, const Scene& scene, const std::vector<fs::path>& inputs,
-                            const Drawing& drawing) {
-  RunIdentity identity{version, scene_text(scene), tool.command(), {}, {}, drawing.as_options()};
+RunIdentity identity_of_run(const cli::Tool& tool, const Scene& scene, const std::string& asked,
+                            const std::vector<fs::path>& inputs, const Drawing& drawing) {
+  RunIdentity identity{version, asked, tool.command(), {}, {}, drawing.as_options()};
   for (const fs::path& path : inputs) {
     identity.inputs.emplace_back(path.string(), sha256_of_file(path));
   }
@@ -272,6 +216,9 @@ public:
     stage("setup");
     prepare_result(tool_.result(), model());
     naming(subject(), [&] { check_model(model(), scene_.run); });
+    if (scene_.accuracy && !given_.check) {
+      choose_model();
+    }
     for (const std::string& doubt : doubts(model(), scene_.run)) {
       tool_.warn(doubt);
     }
@@ -279,13 +226,10 @@ public:
       tool_.print(scene_text(scene_));
       return;
     }
-    if (request_) {
-      choose_model();
-    }
     begin();
     const Summary summary = accuracy_ ? recorded() : solved();
     stage("write");
-    if (accuracy_ && given_.shell_out) {
+    if (given_.accuracy.shell_out) {
       write_shells(!accuracy_->reasons.empty());
     }
     require_accuracy();
@@ -345,47 +289,86 @@ private:
         tool_.output(path);
       }
     }
-    request_ = accuracy_asked(tool_.arguments(), given_);
-    if (request_) {
-      require_simple(scene_, given_);
-      if (given_.shell_out) {
-        tool_.output(*given_.shell_out, {".ply"});
-      }
-    }
+    given_.accuracy.ask(tool_.arguments(), scene_);
+    require_fresh();
+    asked_ = scene_text(scene_);
     loaded_.emplace(load_scene(scene_));
-    read_target();
+    read_targets();
     for (const std::string& note : loaded_->notes) {
       tool_.note(note);
     }
+    for (std::size_t b = 0; scene_.accuracy && b < targets_.size(); ++b) {
+      if (!targets_[b] && model().shells[b].curved) {
+        tool_.warn(
+            fmt::format("{}: has no target: finer shells lie on its own patches, and the error of its geometry is not "
+                        "seen (--target, or target in [accuracy])",
+                        scene_.shells[b].mesh.string()));
+      }
+    }
   }
 
-  void read_target() {
-    if (!given_.target) {
+  /// An accuracy begins again with each run: its meshes are not in the partial result.
+  void require_fresh() {
+    if (!scene_.accuracy) {
       return;
     }
-    const SceneShell& shell = scene_.shells.front();
-    inputs_.push_back(tool_.input(*given_.target));
-    MeshFile file = read_mesh(*given_.target, shell.unit_mm, true);
-    require_surface(file, *given_.target);
-    const MeshFile own = read_mesh(shell.mesh, shell.unit_mm);
-    require_same_scale(own, shell.mesh, file, *given_.target, shell.unit_mm);
-    require_near(own, shell.mesh, file, *given_.target);
-    space_ = common_space(own, shell.mesh, file, *given_.target);
-    for (Vec3& vertex : file.mesh.vertices) {
-      vertex *= shell.scale;
+    if (journal_) {
+      throw UsageError(fmt::format("{}: a run for an accuracy does not go on: begin again", resume_flag));
     }
-    target_.emplace(std::move(file.mesh));
+    if (given_.accuracy.shell_out) {
+      if (scene_.shells.size() > 1) {
+        throw UsageError("--shell-out: the scene has more than one body, one can be written");
+      }
+      tool_.output(*given_.accuracy.shell_out, {".ply"});
+    }
+  }
+
+  void read_targets() {
+    targets_.resize(scene_.shells.size());
+    for (std::size_t b = 0; scene_.accuracy && b < scene_.shells.size(); ++b) {
+      const SceneShell& shell = scene_.shells[b];
+      const auto found = scene_.accuracy->targets.find(shell.name);
+      if (found == scene_.accuracy->targets.end()) {
+        continue;
+      }
+      const fs::path& path = found->second;
+      inputs_.push_back(tool_.input(path));
+      MeshFile file = read_mesh(path, shell.unit_mm, true);
+      require_surface(file, path);
+      const MeshFile own = read_mesh(shell.mesh, shell.unit_mm);
+      require_same_scale(own, shell.mesh, file, path, shell.unit_mm);
+      require_near(own, shell.mesh, file, path);
+      space_ = common_space(own, shell.mesh, file, path);
+      if (file.voxel) {
+        voxel_ = std::max(voxel_.value_or(0), shell.scale * *file.voxel);
+      }
+      for (Vec3& vertex : file.mesh.vertices) {
+        vertex *= shell.scale;
+      }
+      targets_[b] = std::make_unique<Target>(std::move(file.mesh));
+    }
+  }
+
+  [[nodiscard]] AccuracyRequest request() const {
+    const SceneAccuracy& asked = *scene_.accuracy;
+    const auto most = cli::count_of(given_.accuracy.max_shells, "--max-shells", real(max_index));
+    return {asked.within, asked.of, most.value_or(AccuracyRequest().max_shells), asked.probe, asked.axis, voxel_};
   }
 
   /// Goes from level to level; the model is then the last one's.
   void choose_model() {
+    const AccuracyRequest request = this->request();
     stage("solve");
+    std::vector<const Target*> targets;
+    for (const auto& target : targets_) {
+      targets.push_back(target.get());
+    }
     accuracy_ = naming(subject(), [&] {
       return solve_within(
-          model().shells.front(), target_ ? &*target_ : nullptr, *request_, scene_.run,
-          [&](ShellBody body) { return resolve_scene(scene_, {std::move(body)}); },
+          model().shells, targets, request, scene_.run,
+          [&](std::vector<ShellBody> bodies) { return resolve_scene(scene_, std::move(bodies)); },
           [&](const AccuracyLevel& level) {
-            tool_.detail(fmt::format("{} shells: {} {:.5g}", level.shells, name_of(request_->of), level.value));
+            tool_.detail(fmt::format("{} shells: {} {:.5g}", level.shells, name_of(request.of), level.value));
           });
     });
     loaded_->model = std::move(accuracy_->model);
@@ -410,7 +393,7 @@ private:
     options.space = space_;
     options.overwrite = tool_.force();
     options.partial = partial;
-    write_ply(*given_.shell_out, model().shells.front().mesh, options);
+    write_ply(*given_.accuracy.shell_out, model().shells.front().mesh, options);
   }
 
   void require_accuracy() {
@@ -422,14 +405,16 @@ private:
     }
     if (!accuracy_->reasons.empty()) {
       journal_->remove();
-      throw RequirementError(fmt::format("{}: {} of {} is not credible: {}", subject().string(), *given_.accuracy,
-                                         name_of(accuracy_->request.of), fmt::join(accuracy_->reasons, "; ")));
+      throw RequirementError(fmt::format("{}: {:g}% of {} is not credible: {}; what there is stays in {}.part",
+                                         subject().string(), 100 * accuracy_->request.within,
+                                         name_of(accuracy_->request.of), fmt::join(accuracy_->reasons, "; "),
+                                         out_.string()));
     }
   }
 
   /// Opens what the run writes: its journal, the result, what other programs draw.
   void begin() {
-    const RunIdentity identity = identity_of_run(tool_, scene_, inputs_, drawing_);
+    const RunIdentity identity = identity_of_run(tool_, scene_, asked_, inputs_, drawing_);
     if (!journal_) {
       journal_.emplace(RunJournal::create(part_of(out_), identity));
     } else if (const std::string differs = difference(journal_->identity(), identity); !differs.empty()) {
@@ -456,6 +441,7 @@ private:
     if (const auto written = exported_ ? exported_->append(state, of_state) : std::nullopt) {
       tool_.wrote(*written);
     }
+    wall_ = of_state.wall;
     unresolved_ = count_unresolved(model(), state, most_bending);
   }
 
@@ -485,9 +471,9 @@ private:
     } catch (const InputError&) {
       journal_->remove();
       throw;
-    } catch (const RequirementError&) {
+    } catch (const RequirementError& error) {
       journal_->remove();  // it would end at the same step again
-      throw;
+      throw RequirementError(fmt::format("{}; what there is stays in {}.part", error.what(), out_.string()));
     }
   }
 
@@ -507,7 +493,7 @@ private:
     tool_.note(fmt::format("{} nodes in {} steps, {}: largest displacement {:.4g} mm", model().node_count(),
                            summary.steps, converged ? "converged" : "not asked to converge",
                            tool_.result()["max_displacement_mm"].get<double>()));
-    for (const std::string& text : run_warnings(scene_.run, summary, unresolved_)) {
+    for (const std::string& text : run_warnings(scene_.run, summary, wall_, unresolved_)) {
       tool_.warn(fmt::format("{}: {}", subject().string(), text));
     }
   }
@@ -519,15 +505,17 @@ private:
   std::vector<fs::path> inputs_;
   Scene scene_;
   std::optional<LoadedScene> loaded_;
-  std::optional<AccuracyRequest> request_;
-  std::optional<Target> target_;
-  std::string space_ = "LPS";  // of the target, for the shells that are written
+  std::string asked_;                             // the scene as a text, before an accuracy chose of it
+  std::vector<std::unique_ptr<Target>> targets_;  // of each body, or none
+  std::optional<double> voxel_;                   // mm, longest edge, of the image behind them
+  std::string space_ = "LPS";                     // of the target, for the shells that are written
   std::optional<Accuracy> accuracy_;
   Drawing drawing_;
   std::optional<RunJournal> journal_;
   std::optional<ResultFile> file_;
   std::optional<ResultExport> exported_;
   std::optional<ElementFieldEvaluator> fields_;
+  Wall wall_;                   // of the last state
   std::size_t unresolved_ = 0;  // elements that bend more than the mesh can show
 };
 

@@ -1,5 +1,6 @@
 #include "tunica/accuracy/accuracy.hpp"
 
+#include "tunica/accuracy/detail/answer.hpp"
 #include "tunica/accuracy/detail/levels.hpp"
 #include "tunica/core/clock.hpp"
 #include "tunica/core/error.hpp"
@@ -11,63 +12,56 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace tunica {
 namespace {
 
-constexpr std::size_t fewest_levels = 3;       // two changes: one may be small by chance
-constexpr double left_by_second_order = 0.25;  // of the change before
-constexpr double linear_share = 0.25;          // of the request: what the linear model may be off by
-constexpr double solver_share = 0.01;          // of the request: where a looser solver ends
-constexpr double fewest_edges_per_layer = 2;   // below, stresses in it are a tenth off and more
-constexpr double largest_field_change = 4;     // estimates: the field's error is the scalar's, within that
+constexpr std::size_t fewest_levels = 3;               // two changes: one may be small by chance
+constexpr double left_by_second_order = 0.25;          // of the change before
+constexpr double model_share = 0.25;                   // of the request: what a cheaper model may be off by
+constexpr double slowest_fall = 1.0 / 3;               // of changes, minus 1: slower is counted as this
+constexpr std::size_t most_from_near = 5;              // iterations; more, and the start was none
+constexpr double largest_distance = 0.5;               // of the wall, of any place: above, it is another shape there
+constexpr double settled_share = 0.1;                  // of the request: the last increment of Newton's method
+constexpr double residual_share = 0.01;                // of the request: where a looser one was asked for
+constexpr double fewest_edges_per_layer = 2;           // below, stresses in it are a tenth off and more
+constexpr double largest_field_change = 4;             // estimates: the field's error is the scalar's, within that
+constexpr double largest_bend = std::numbers::pi / 6;  // of a shell: strains within it are small below
+/// Mean distance of an extracted surface to the true one, in voxels (docs/tables/staircase.md).
+constexpr double voxels_off = 0.1;
 
-constexpr std::array<std::pair<std::string_view, std::string_view>, 4> names{
-    {{"displacement", "mm"}, {"energy", "mJ"}, {"volume", "mm^3"}, {"stress", "MPa"}}};
+constexpr std::array<std::pair<std::string_view, std::string_view>, 5> names{
+    {{"displacement", "mm"}, {"energy", "mJ"}, {"volume", "mm^3"}, {"stress", "MPa"}, {"probe", "mm"}}};
 
-double value_of(const Model& model, const State& state, const Summary& summary, Quantity of) {
-  switch (of) {
-    case Quantity::displacement:
-      return largest_displacement(model, state);
-    case Quantity::energy:
-      return state.strain_energy;
-    case Quantity::volume:
-      if (!state.volume || !summary.volume_before) {
-        throw InputError(
-            fmt::format("{}: is open and encloses no volume: ask for another quantity", model.shells.front().name));
-      }
-      return *state.volume - *summary.volume_before;
-    case Quantity::stress:
-      return element_fields(model, state).wall.stress_p99;
+double thinnest_wall(const Model& model) {
+  double least = infinity;
+  for (const ShellBody& body : model.shells) {
+    least = std::min(least, *std::min_element(body.thickness.begin(), body.thickness.end()));
   }
-  throw InternalError("a quantity without a rule");
+  return least;
 }
-
-/// The answer of one mesh by one model.
-struct Answer {
-  Model model;
-  Summary summary;
-  std::vector<State> states;
-  double value = 0;
-  double seconds = 0;  // of the solve
-};
 
 class Ladder {
 public:
-  Ladder(ShellBody body, const Target* target, const AccuracyRequest& request, const RunSettings& settings,
-         const ModelOf& model_of, const std::function<void(const AccuracyLevel&)>& on_level)
-      : body_(std::move(body)),
-        target_(target),
+  Ladder(std::vector<ShellBody> bodies, const std::vector<const Target*>& targets, const AccuracyRequest& request,
+         const RunSettings& settings, const ModelOf& model_of,
+         const std::function<void(const AccuracyLevel&)>& on_level)
+      : level_{std::move(bodies), {}},
+        targets_(targets),
         request_(request),
         settings_(settings),
         model_of_(model_of),
-        on_level_(on_level),
-        may_be_linear_(!std::get<StaticRun>(settings.kind).linear) {
-    settings_.converge = std::min(settings_.converge, solver_share * request.within);
+        on_level_(on_level) {
+    model_ = model_of_(level_.bodies);
+    settings_.converge = std::min(settings_.converge, residual_share * request.within);
     out_.request = request;
     out_.not_included = {"segmentation", "material", "thickness"};
-    if (target == nullptr) {
+    if (std::find(targets.begin(), targets.end(), nullptr) != targets.end()) {
       out_.not_included.insert(out_.not_included.begin(), "geometry");
+    }
+    if (request.voxel) {
+      out_.surface_error = voxels_off * *request.voxel;
     }
   }
 
@@ -77,20 +71,24 @@ public:
       std::optional<Answer> answer = tried();
       if (answer) {
         take(*std::move(answer), seconds_since(start));
-        if (judged()) {
+        if (judged() || model_error_ >= request_.within) {
           break;
         }
       }
-      if (4 * body_.mesh.triangles.size() > request_.max_shells) {
+      if (4 * level_.shell_count() > request_.max_shells) {
         give_up();
         break;
       }
       start = Clock::now();
-      ShellBody fine = finer_level(body_, target_, parents_);
-      if (last_) {
-        near_ = interpolated(last_->states.back(), body_, fine, parents_);
+      Level fine = finer_level(level_.bodies, targets_);
+      near_.reset();
+      if (last_ && near_serves_) {
+        near_ = interpolated(last_->at, level_.bodies, fine);
       }
-      body_ = std::move(fine);
+      const Model coarse = std::move(model_);
+      level_ = std::move(fine);
+      model_ = model_of_(level_.bodies);
+      carry_selections(coarse, level_, model_);
     }
     tell_choices();
     out_.settings = settings_;
@@ -101,29 +99,28 @@ public:
   }
 
 private:
-  Answer solved(const RunSettings& settings) const {
-    Answer answer;
-    answer.model = model_of_(body_);
-    const auto start = Clock::now();
-    Resumption resumption;
-    resumption.near = near_;
-    answer.summary = solve(
-        answer.model, settings, [&](const State& state) { answer.states.push_back(state); }, {}, resumption);
-    answer.seconds = seconds_since(start);
-    answer.value = value_of(answer.model, answer.states.back(), answer.summary, request_.of);
-    if (!(std::abs(answer.value) > 0)) {
-      throw InputError(fmt::format("{}: the quantity asked for is zero: no part of it can be kept within",
-                                   answer.model.shells.front().name));
+  [[nodiscard]] const StaticRun* statics() const { return std::get_if<StaticRun>(&settings_.kind); }
+
+  [[nodiscard]] Answer solved(const RunSettings& settings) const {
+    Model model = model_;
+    const bool is_static = std::holds_alternative<StaticRun>(settings.kind);
+    if (is_static && motion_) {
+      model = *at_its_end(model, motion_->duration);
     }
-    return answer;
+    RunSettings run = settings;
+    run.settled = is_static ? settled_share * request_.within : 0;
+    return answer_of(std::move(model), run, request_, is_static ? near_ : std::nullopt);
   }
 
   /// A mesh may be too coarse for any state; the next finer one begins anew.
   std::optional<Answer> tried() {
     try {
+      if (std::holds_alternative<DynamicRun>(settings_.kind) && !motion_) {
+        choose_run();
+      }
       return solved(settings_);
     } catch (const RequirementError&) {
-      if (4 * body_.mesh.triangles.size() > request_.max_shells) {
+      if (4 * level_.shell_count() > request_.max_shells) {
         throw;
       }
       out_.levels.clear();
@@ -134,15 +131,35 @@ private:
     }
   }
 
+  void choose_run() {
+    motion_ = std::get<DynamicRun>(settings_.kind);
+    try {
+      MotionChoice choice =
+          choose_motion(settings_, model_share * request_.within, at_its_end(model_, motion_->duration).has_value(),
+                        [&](const RunSettings& settings) { return solved(settings); });
+      settings_ = choice.settings;
+      model_error_ = choice.error;
+      choices_ = std::move(choice.choices);
+    } catch (...) {
+      motion_.reset();
+      throw;
+    }
+  }
+
   void take(Answer&& answer, double seconds) {
-    AccuracyLevel level{body_.mesh.triangles.size(), answer.value, seconds, {}, answer.summary.newton_iterations};
-    if (target_ != nullptr) {
-      level.mean_distance = mean_distance(body_.mesh, *target_).first;
+    AccuracyLevel level{level_.shell_count(), answer.value, seconds, {}, answer.summary.newton_iterations};
+    for (std::size_t b = 0; b < level_.bodies.size(); ++b) {
+      if (targets_[b] != nullptr) {
+        level.mean_distance =
+            std::max(level.mean_distance.value_or(0), mean_distance(level_.bodies[b].mesh, *targets_[b]).first);
+      }
     }
     out_.levels.push_back(level);
-    field_change_ = last_ ? field_change(last_->states.back(), answer.states.back()) : infinity;
+    near_serves_ = near_serves_ && (!near_ || answer.summary.newton_iterations <= most_from_near);
+    field_change_ = last_ ? field_change(last_->at, answer.at, level_) : infinity;
     last_ = std::move(answer);
-    if (may_be_linear_ && out_.levels.size() == fewest_levels - 1) {
+    if (statics() != nullptr && !statics()->linear && out_.levels.size() == fewest_levels - 1) {
+      look_for_other_states();
       compare_linear();
     }
     if (on_level_) {
@@ -150,37 +167,62 @@ private:
     }
   }
 
-  void compare_linear() {
-    RunSettings linear = settings_;
-    std::get<StaticRun>(linear.kind).linear = true;
+  /// Whether the whole load, put on this mesh at once, leads where the coarser level led.
+  void look_for_other_states() {
+    if (!near_serves_) {
+      return;  // the answer at hand comes from zero load
+    }
+    near_.reset();
     try {
-      Answer other = solved(linear);
-      linear_error_ = std::abs(other.value / last_->value - 1);
-      seconds_linear_ = other.seconds;
-      seconds_nonlinear_ = last_->seconds;
-      if (linear_error_ < linear_share * request_.within) {
-        settings_ = linear;
-        out_.levels.back().value = other.value;
-        last_ = std::move(other);
-      }
-    } catch (const RequirementError&) {
-      linear_error_ = infinity;
+      Answer anew = solved(settings_);
+      other_state_ = std::abs(anew.value / last_->value - 1);
+      out_.levels.back().value = anew.value;
+      last_ = std::move(anew);
+    } catch (const RequirementError&) {  // found only from a state near it
     }
   }
 
-  [[nodiscard]] bool is_linear() const { return std::get<StaticRun>(settings_.kind).linear; }
+  void compare_linear() {
+    RunSettings linear = settings_;
+    std::get<StaticRun>(linear.kind).linear = true;
+    double error = infinity;
+    try {
+      Answer other = solved(linear);
+      error = std::abs(other.value / last_->value - 1);
+      if (error < model_share * request_.within) {
+        choices_.push_back({"model", "linear", error, "nonlinear",
+                            fmt::format("{:.2g} times the time", last_->seconds / other.seconds)});
+        settings_ = linear;
+        model_error_ += error;
+        out_.levels.back().value = other.value;
+        last_ = std::move(other);
+        return;
+      }
+    } catch (const RequirementError&) {  // no linear answer
+    }
+    choices_.push_back({"model", "nonlinear", 0, "linear",
+                        std::isfinite(error) ? fmt::format("an error of {:.2g} %", 100 * error) : "no answer"});
+  }
 
   /// Whether the last level is accepted.
   bool judged() {
     const std::size_t n = out_.levels.size();
+    if (model_error_ >= request_.within) {
+      out_.reasons = {fmt::format("the shortest time step tried, {:.4g} ms, still changes the answer by {:.2g} %",
+                                  1e3 * std::get<DynamicRun>(settings_.kind).step, 100 * model_error_)};
+      return false;
+    }
     if (n < fewest_levels) {
       return false;
     }
     const auto change = [&](std::size_t level) {
       return std::abs(out_.levels[level].value - out_.levels[level - 1].value) / std::abs(out_.levels[n - 1].value);
     };
-    out_.estimate = std::max(change(n - 1), left_by_second_order * change(n - 2)) +
-                    (may_be_linear_ && is_linear() ? linear_error_ : 0) + last_->summary.algebraic_error.value_or(0);
+    // Where changes fall more slowly than by two, all that are to come add up to more than the last.
+    const double fall = change(n - 2) / change(n - 1);
+    const double to_come = fall < 2 ? change(n - 1) / std::max(fall - 1, slowest_fall) : change(n - 1);
+    out_.estimate = std::max(to_come, left_by_second_order * change(n - 2)) + model_error_ +
+                    last_->summary.algebraic_error.value_or(0);
     doubt();
     return *out_.estimate < request_.within && out_.reasons.empty();
   }
@@ -188,18 +230,38 @@ private:
   void doubt() {
     out_.reasons.clear();
     const double allowed = largest_field_change * std::max(*out_.estimate, request_.within);
-    if (request_.of == Quantity::displacement && field_change_ > allowed) {
-      out_.reasons.push_back(fmt::format(
-          "the largest displacement changed little, but displacements elsewhere by {:.2g} %", 100 * field_change_));
+    if ((request_.of == Quantity::displacement || request_.of == Quantity::probe) && field_change_ > allowed) {
+      out_.reasons.push_back(fmt::format("the {} changed little, but displacements elsewhere by {:.2g} %",
+                                         request_.of == Quantity::probe ? "probe" : "largest displacement",
+                                         100 * field_change_));
     }
     if (request_.of == Quantity::stress) {
       const double edges = edges_per_layer(last_->model);
       if (edges < fewest_edges_per_layer) {
         out_.reasons.push_back(
-            fmt::format("the bending layer at supports and rims, sqrt(R t) / 1.24 wide, is {:.2g} "
+            fmt::format("the bending layer at supports, rims and loads, sqrt(R t) / 1.24 wide, is {:.2g} "
                         "edges wide at its coarsest place, {:g} are needed",
                         edges, fewest_edges_per_layer));
       }
+    }
+    const double thinnest = thinnest_wall(last_->model);
+    const double off = out_.levels.back().mean_distance.value_or(0) / thinnest;
+    if (off >= request_.within) {  // the error of an answer is one to three times that
+      out_.reasons.push_back(fmt::format(
+          "the shells are {:.2g} % of the wall from the surface in the mean, which costs as much of the answer",
+          100 * off));
+    }
+    if (out_.reasons.empty() && *out_.estimate < request_.within) {
+      doubt_far_places(thinnest);
+    }
+    if (other_state_ >= model_share * request_.within) {
+      out_.reasons.push_back(
+          fmt::format("there are several states of rest, {:.2g} % apart: which one the shell comes to "
+                      "depends on what no mesh knows",
+                      100 * other_state_));
+    }
+    if (const std::size_t bent = count_unresolved(last_->model, last_->at, largest_bend); bent > 0) {
+      out_.reasons.push_back(fmt::format("{} shell(s) bend by more than 30 degrees", bent));
     }
     if (last_->summary.stiffened_from) {
       out_.reasons.emplace_back("waves as short as the shells were made stiff: the mesh is coarse for so thin a wall");
@@ -209,8 +271,27 @@ private:
     }
   }
 
+  /// A place that no level comes close to shows in no difference of levels.
+  void doubt_far_places(double thinnest) {
+    for (std::size_t b = 0; b < level_.bodies.size(); ++b) {
+      if (targets_[b] == nullptr) {
+        continue;
+      }
+      ShellDistanceOptions measuring;
+      measuring.width = 0.1 * largest_distance * thinnest;
+      measuring.limit = largest_distance * thinnest;
+      const double farthest = shell_distance(level_.bodies[b].mesh, *targets_[b], measuring).both.lower;
+      if (farthest > largest_distance * thinnest) {
+        out_.reasons.push_back(
+            fmt::format("a place of the surface lies {:.2g} mm from the shells, {:.2g} of the wall: "
+                        "start from more shells, or a better fit of few",
+                        farthest, farthest / thinnest));
+      }
+    }
+  }
+
   void give_up() {
-    const std::size_t shells = body_.mesh.triangles.size();
+    const std::size_t shells = level_.shell_count();
     out_.reasons.push_back(
         out_.estimate ? fmt::format("the error is estimated at {:.2g} % with {} shells, and the next level would have "
                                     "{}, more than {}",
@@ -222,36 +303,33 @@ private:
   void tell_choices() {
     const std::size_t n = out_.levels.size();
     const AccuracyLevel& last = out_.levels.back();
-    const std::optional<double>& estimate = out_.estimate;
-    out_.choices.push_back({"shells", std::to_string(last.shells), estimate, fmt::format("{} shells", 4 * last.shells),
+    const std::string chosen = std::to_string(last.shells);
+    out_.choices.push_back({"shells", chosen, out_.estimate, fmt::format("{} shells", 4 * last.shells),
                             fmt::format("about {:.2g} s more", 4 * last.seconds)});
     if (n > 1) {
-      out_.choices.push_back(
-          {"shells", std::to_string(last.shells), estimate, fmt::format("{} shells", out_.levels[n - 2].shells),
-           fmt::format("an error of {:.2g} %", 100 * std::abs(out_.levels[n - 2].value / last.value - 1))});
+      const AccuracyLevel& before = out_.levels[n - 2];
+      out_.choices.push_back({"shells", chosen, out_.estimate, fmt::format("{} shells", before.shells),
+                              fmt::format("an error of {:.2g} %", 100 * std::abs(before.value / last.value - 1))});
     }
-    if (may_be_linear_ && seconds_nonlinear_ > 0) {
-      out_.choices.push_back(
-          is_linear() ? AccuracyChoice{"model", "linear", linear_error_, "nonlinear",
-                                       fmt::format("{:.2g} times the time", seconds_nonlinear_ / seconds_linear_)}
-                      : AccuracyChoice{"model", "nonlinear", 0, "linear",
-                                       fmt::format("an error of {:.2g} %", 100 * linear_error_)});
-    }
+    out_.choices.insert(out_.choices.end(), choices_.begin(), choices_.end());
   }
 
-  ShellBody body_;
-  const Target* target_;
+  Level level_;
+  const std::vector<const Target*>& targets_;
   const AccuracyRequest& request_;
   RunSettings settings_;
   const ModelOf& model_of_;
   const std::function<void(const AccuracyLevel&)>& on_level_;
-  const bool may_be_linear_;  // the scene leaves the choice
+  Model model_;  // of the level
   Accuracy out_;
-  std::vector<std::array<Index, 2>> parents_;
+  std::optional<DynamicRun> motion_;  // that was asked for, once it was decided how it is followed
+  std::vector<AccuracyChoice> choices_;
+  double model_error_ = 0;  // of the cheaper models that were chosen
   std::optional<Checkpoint> near_;
+  bool near_serves_ = true;  // as a start of Newton's method
   std::optional<Answer> last_;
   double field_change_ = infinity;
-  double linear_error_ = infinity, seconds_linear_ = 0, seconds_nonlinear_ = 0;
+  double other_state_ = 0;  // relative distance of another answer of the second level
 };
 
 }  // namespace
@@ -259,9 +337,10 @@ private:
 std::string_view name_of(Quantity quantity) { return names.at(static_cast<std::size_t>(quantity)).first; }
 std::string_view unit_of(Quantity quantity) { return names.at(static_cast<std::size_t>(quantity)).second; }
 
-Accuracy solve_within(ShellBody body, const Target* target, const AccuracyRequest& request, const RunSettings& settings,
-                      const ModelOf& model_of, const std::function<void(const AccuracyLevel&)>& on_level) {
-  return Ladder(std::move(body), target, request, settings, model_of, on_level).run();
+Accuracy solve_within(std::vector<ShellBody> bodies, const std::vector<const Target*>& targets,
+                      const AccuracyRequest& request, const RunSettings& settings, const ModelOf& model_of,
+                      const std::function<void(const AccuracyLevel&)>& on_level) {
+  return Ladder(std::move(bodies), targets, request, settings, model_of, on_level).run();
 }
 
 }  // namespace tunica

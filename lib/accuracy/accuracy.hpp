@@ -1,7 +1,6 @@
 // accuracy: the mesh and the model that an accuracy takes.
 #pragma once
 
-#include "tunica/core/progress.hpp"
 #include "tunica/mechanics/runs/solve.hpp"
 #include "tunica/shell/distance/target.hpp"
 
@@ -14,11 +13,13 @@
 /// lib/accuracy: the cheapest model whose error in one quantity is credibly below what is asked.
 namespace tunica {
 
+/// Of the state of rest; of a motion the largest that it comes to.
 enum class Quantity {
-  displacement,  ///< the largest, of the curved surface
+  displacement,  ///< the largest, of the curved surfaces
   energy,        ///< strain energy
   volume,        ///< change of the enclosed volume
   stress,        ///< von Mises stress that 1 % of the area passes (Wall::stress_p99)
+  probe,         ///< displacement of a node along an axis
 };
 
 /// "displacement" and so on, as flags and reports name them; mm, mJ, mm^3 or MPa.
@@ -29,6 +30,9 @@ struct AccuracyRequest {
   double within = 0;  ///< of the quantity, relative
   Quantity of = Quantity::displacement;
   std::size_t max_shells = 50'000;
+  std::string probe{};            ///< the name of a probe of the model
+  int axis = 0;                   ///< of its displacement
+  std::optional<double> voxel{};  ///< mm, longest edge, of the image that the targets come from
 };
 
 /// One mesh of the hierarchy and what it says.
@@ -36,7 +40,7 @@ struct AccuracyLevel {
   std::size_t shells = 0;
   double value = 0;                     ///< mm, mJ, mm^3 or MPa
   double seconds = 0;                   ///< of splits, fit and solve
-  std::optional<double> mean_distance;  ///< mm, to the target
+  std::optional<double> mean_distance;  ///< mm, to the targets, the largest of all bodies
   std::size_t newton_iterations = 0;
 };
 
@@ -55,31 +59,40 @@ struct Accuracy {
   std::vector<AccuracyLevel> levels;
   std::vector<AccuracyChoice> choices;
   std::vector<std::string> not_included;  ///< other errors of the answer
+  /// mm, by which the surface itself is uncertain, where the image's voxels are known.
+  std::optional<double> surface_error;
   RunSettings settings;  ///< of the last level
   Model model;           ///< its model
   Summary summary;
-  std::vector<State> states;  ///< its reference and its answer
+  std::vector<State> states;  ///< as solve() hands them over
 };
 
-/// Resolves everything but the mesh: supports and loads on a body whose shells were split.
-using ModelOf = std::function<Model(ShellBody)>;
+/// Resolves everything but the meshes: supports, loads and probes on bodies whose shells were split.
+using ModelOf = std::function<Model(std::vector<ShellBody>)>;
 
-/// Solves on a body's mesh, splits every shell in four and refits them to the target, solves again from the state at
-/// hand, until the estimate is below the request and nothing makes it doubtful. With D_k the change of the quantity
+/// Solves on the bodies' meshes, splits every shell in four and refits them to the targets, solves again from the state
+/// at hand, until the estimate is below the request and nothing makes it doubtful. With D_k the change of the quantity
 /// from level k - 1 to k the error of level k is taken as max(|D_k|, |D_(k-1)| / 4): the two-grid convergence index,
-/// and what second order leaves of the step before; two levels may agree by chance. The linear model is taken from the
-/// third level on where it is off by less than a quarter of the request on the second; its error is added, as is that
-/// of the solver. Newton's method ends where its residual is a hundredth of the request.
-/// Doubtful are: a small change beside a large one of the displacement field; for stresses a bending layer at supports
-/// and rims, sqrt(R t) / 1.24 wide, with less than two edges; short waves that had to be made stiff; snaps.
-/// @param body    the coarsest level; the only one of the model
-/// @param target  none: splits lie on the body's own patches, and the error of its geometry is not seen
-/// @param settings  a static run in one load step
+/// and what second order leaves of the step before; two levels may agree by chance.
+///
+/// A cheaper model is taken where a coarse level shows that it is off by less than a quarter of the request, and its
+/// error is added: linear instead of nonlinear statics (second level); rest under the final loads instead of a motion,
+/// else the longest step, of those that halve the one given (first level). The solver's error is added too; Newton's
+/// method ends with an increment of a tenth of the request.
+///
+/// Doubtful are: a small change beside a large one of the displacement field; for stresses a bending layer at supports,
+/// rims, point and edge loads and thickness jumps, sqrt(R t) / 1.24 wide, with less than two edges; shells that bend by
+/// more than 30 degrees; short waves that had to be made stiff; snaps. Every state is one of a positive definite
+/// tangent: others are not equilibria that solve() accepts.
+/// @param bodies   the coarsest level; all of the model
+/// @param targets  one for each body; null: splits lie on the body's own patches, and its geometry's error is not seen
+/// @param settings  a static run in one load step, or a dynamic run without error control
 /// Errors: InputError: no volume is enclosed, the quantity is zero; RequirementError: no level could be solved.
 /// Source: Roache, "Perspective: a method for uniform reporting of grid refinement studies", 1994 (convergence index
 /// with a factor of 3 for two grids). Cost: the last level's, times about 1.4. Limits: no difference of levels sees
-/// what no level resolves, beyond the doubts above.
-Accuracy solve_within(ShellBody body, const Target* target, const AccuracyRequest& request, const RunSettings& settings,
-                      const ModelOf& model_of, const std::function<void(const AccuracyLevel&)>& on_level = {});
+/// what no level resolves, beyond the doubts above. All states of a motion are kept in memory.
+Accuracy solve_within(std::vector<ShellBody> bodies, const std::vector<const Target*>& targets,
+                      const AccuracyRequest& request, const RunSettings& settings, const ModelOf& model_of,
+                      const std::function<void(const AccuracyLevel&)>& on_level = {});
 
 }  // namespace tunica

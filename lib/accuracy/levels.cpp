@@ -1,5 +1,6 @@
 #include "tunica/accuracy/detail/levels.hpp"
 
+#include "tunica/core/narrow.hpp"
 #include "tunica/fit/fit.hpp"
 #include "tunica/mechanics/elements/rotation.hpp"
 #include "tunica/mechanics/runs/doubts.hpp"
@@ -8,9 +9,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <set>
 
 namespace tunica {
 namespace {
+
+constexpr double refit_angle = 20;  // degrees
+constexpr double jump = 1.25;       // of the thickness within a shell, from which on it bends the wall
 
 double largest_edge(const ShellMesh& mesh, const std::array<Index, 3>& t) {
   double largest = 0;
@@ -20,48 +26,190 @@ double largest_edge(const ShellMesh& mesh, const std::array<Index, 3>& t) {
   return largest;
 }
 
+/// Nodes of a body at which its wall bends over a short length.
+std::vector<std::uint8_t> disturbed_nodes(const Model& model, std::size_t b) {
+  const ShellBody& body = model.shells[b];
+  std::vector<std::uint8_t> disturbed(body.mesh.vertices.size(), 0);
+  const auto mark = [&](const std::vector<Index>& nodes) {
+    for (const Index node : nodes) {
+      disturbed[node] = 1;
+    }
+  };
+  for (const Fix& fix : model.fixes) {
+    if (fix.body == b) {
+      mark(fix.nodes);
+    }
+  }
+  for (const Load& load : model.loads) {
+    if (load.body != b) {
+      continue;
+    }
+    if (const auto* force = std::get_if<ForceLoad>(&load.kind)) {
+      mark(force->nodes);
+    } else if (const auto* moment = std::get_if<MomentLoad>(&load.kind)) {
+      mark(moment->nodes);
+    }
+  }
+  const TriangleMesh facets = flat_facets(body.mesh);
+  for (const auto& [t, k] : boundary_edges(neighbours(facets, incidence(facets)))) {  // edge loads act there too
+    mark({facets.triangles[t][k], facets.triangles[t][(k + 1) % 3]});
+  }
+  for (const auto& t : body.thickness.size() > 1 ? body.mesh.triangles : decltype(body.mesh.triangles){}) {
+    const auto [least, most] = std::minmax({body.thickness[t[0]], body.thickness[t[1]], body.thickness[t[2]]});
+    if (most > jump * least) {
+      mark({t[0], t[1], t[2]});
+    }
+  }
+  return disturbed;
+}
+
 }  // namespace
 
-ShellBody finer_level(const ShellBody& body, const Target* target, std::vector<std::array<Index, 2>>& parents) {
-  ShellBody fine = body;
-  parents.clear();
-  fine.mesh = target != nullptr
-                  ? refit(body.mesh, *target, 20, &parents)
-                  : split_shells(body.mesh, std::vector<Split>(body.mesh.triangles.size(), Split::all_edges), &parents);
-  if (body.thickness.size() > 1) {
-    for (const auto& [a, b] : parents) {
-      fine.thickness.push_back((body.thickness[a] + body.thickness[b]) / 2);
+std::size_t Level::shell_count() const {
+  std::size_t count = 0;
+  for (const ShellBody& body : bodies) {
+    count += body.mesh.triangles.size();
+  }
+  return count;
+}
+
+Level finer_level(const std::vector<ShellBody>& bodies, const std::vector<const Target*>& targets) {
+  Level fine{bodies, std::vector<std::vector<std::array<Index, 2>>>(bodies.size())};
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    ShellBody& body = fine.bodies[b];
+    auto& parents = fine.parents[b];
+    const std::vector<Split> all(body.mesh.triangles.size(), Split::all_edges);
+    body.mesh = targets[b] != nullptr ? refit(body.mesh, *targets[b], refit_angle, &parents)
+                                      : split_shells(body.mesh, all, &parents);
+    if (body.thickness.size() > 1) {
+      for (const auto& [a, c] : parents) {
+        body.thickness.push_back((body.thickness[a] + body.thickness[c]) / 2);
+      }
     }
   }
   return fine;
 }
 
-Checkpoint interpolated(const State& state, const ShellBody& coarse, const ShellBody& fine,
-                   const std::vector<std::array<Index, 2>>& parents) {
+Checkpoint interpolated(const State& state, const std::vector<ShellBody>& coarse, const Level& fine) {
   Checkpoint out;
-  out.displacement = state.displacement;
-  for (const Vec3& vector : state.rotation) {
-    out.rotation.push_back(exponential(vector));
-  }
-  for (std::size_t i = 0; i < parents.size(); ++i) {
-    const auto [a, b] = parents[i];
-    const Eigen::Quaterniond at_a = out.rotation[a], at_b = out.rotation[b];
-    const Vec3 along = coarse.mesh.vertices[b] - coarse.mesh.vertices[a];
-    const Vec3 sag =
-        fine.mesh.vertices[coarse.mesh.vertices.size() + i] - (coarse.mesh.vertices[a] + coarse.mesh.vertices[b]) / 2;
-    // The edge leaves a towards along + 4 sag and comes to b from along - 4 sag; both turn with their nodes.
-    const Vec3 from_a = along + 4 * sag, to_b = along - 4 * sag;
-    out.displacement.emplace_back((state.displacement[a] + state.displacement[b]) / 2 +
-                                  ((at_a * from_a - from_a) - (at_b * to_b - to_b)) / 8);
-    out.rotation.push_back(at_a.slerp(0.5, at_b));
+  std::size_t first = 0;
+  for (std::size_t b = 0; b < coarse.size(); ++b) {
+    const auto& vertices = coarse[b].mesh.vertices;
+    const std::size_t count = vertices.size();
+    for (std::size_t i = 0; i < count; ++i) {
+      const Eigen::Quaterniond turn = exponential(state.rotation[first + i]);
+      const Vec3 shift = fine.bodies[b].mesh.vertices[i] - vertices[i];  // of the refit
+      out.displacement.emplace_back(state.displacement[first + i] + (turn * shift - shift));
+      out.rotation.push_back(turn);
+    }
+    for (std::size_t i = 0; i < fine.parents[b].size(); ++i) {
+      const auto [a, c] = fine.parents[b][i];
+      const Eigen::Quaterniond at_a = exponential(state.rotation[first + a]),
+                               at_c = exponential(state.rotation[first + c]);
+      const Vec3 along = vertices[c] - vertices[a];
+      const Vec3 sag = fine.bodies[b].mesh.vertices[count + i] - (vertices[a] + vertices[c]) / 2;
+      // The edge leaves a towards along + 4 sag and comes to c from along - 4 sag; both turn with their nodes.
+      const Vec3 from_a = along + 4 * sag, to_c = along - 4 * sag;
+      out.displacement.emplace_back((state.displacement[first + a] + state.displacement[first + c]) / 2 +
+                                    ((at_a * from_a - from_a) - (at_c * to_c - to_c)) / 8);
+      out.rotation.push_back(at_a.slerp(0.5, at_c));
+    }
+    first += count;
   }
   return out;
 }
 
-double field_change(const State& coarse, const State& fine) {
+namespace {
+
+using Edge = std::array<Index, 2>;
+
+Edge sorted(Index a, Index b) { return {std::min(a, b), std::max(a, b)}; }
+
+/// Selections of one body, from a level to the finer one.
+class Carrier {
+public:
+  Carrier(const ShellMesh& coarse, const std::vector<Edge>& parents) : coarse_(coarse) {
+    for (std::size_t i = 0; i < parents.size(); ++i) {
+      between_[sorted(parents[i][0], parents[i][1])] = narrow<Index>(coarse.vertices.size() + i);
+    }
+    const TriangleMesh facets = flat_facets(coarse);
+    for (const auto& [t, k] : boundary_edges(neighbours(facets, incidence(facets)))) {
+      rim_.insert(sorted(facets.triangles[t][k], facets.triangles[t][(k + 1) % 3]));
+    }
+  }
+
+  void carry(const std::vector<Index>& from, std::vector<Index>& to) const {
+    if (from.size() == 1 && to.size() == 1) {
+      return;
+    }
+    std::vector<std::uint8_t> selected(coarse_.vertices.size(), 0);
+    for (const Index node : from) {
+      selected[node] = 1;
+    }
+    std::set<Edge> across;
+    for (const auto& t : coarse_.triangles) {
+      for (std::size_t k = 0; k < 3 && selected[t[0]] + selected[t[1]] + selected[t[2]] == 3; ++k) {
+        across.insert(sorted(t[k], t[(k + 1) % 3]));
+      }
+    }
+    to.insert(to.end(), from.begin(), from.end());
+    for (const auto& [edge, node] : between_) {
+      if (selected[edge[0]] != 0 && selected[edge[1]] != 0 && (rim_.contains(edge) || !across.contains(edge))) {
+        to.push_back(node);
+      }
+    }
+    std::sort(to.begin(), to.end());
+    to.erase(std::unique(to.begin(), to.end()), to.end());
+  }
+
+  void carry(const std::vector<Edge>& from, std::vector<Edge>& to) const {
+    to.clear();
+    for (const auto& [a, b] : from) {
+      const Index middle = between_.at(sorted(a, b));
+      to.insert(to.end(), {{a, middle}, {middle, b}});
+    }
+  }
+
+private:
+  const ShellMesh& coarse_;
+  std::map<Edge, Index> between_;  // the node that halves an edge
+  std::set<Edge> rim_;
+};
+
+}  // namespace
+
+void carry_selections(const Model& coarse, const Level& level, Model& fine) {
+  std::vector<Carrier> carriers;
+  for (std::size_t b = 0; b < level.bodies.size(); ++b) {
+    carriers.emplace_back(coarse.shells[b].mesh, level.parents[b]);
+  }
+  for (std::size_t i = 0; i < coarse.fixes.size(); ++i) {
+    carriers[coarse.fixes[i].body].carry(coarse.fixes[i].nodes, fine.fixes[i].nodes);
+  }
+  for (std::size_t i = 0; i < coarse.loads.size(); ++i) {
+    const Carrier& carrier = carriers[coarse.loads[i].body];
+    const auto& from = coarse.loads[i].kind;
+    auto& to = fine.loads[i].kind;
+    if (const auto* force = std::get_if<ForceLoad>(&from)) {
+      carrier.carry(force->nodes, std::get<ForceLoad>(to).nodes);
+    } else if (const auto* moment = std::get_if<MomentLoad>(&from)) {
+      carrier.carry(moment->nodes, std::get<MomentLoad>(to).nodes);
+    } else if (const auto* edge = std::get_if<EdgeLoad>(&from)) {
+      carrier.carry(edge->edges, std::get<EdgeLoad>(to).edges);
+    }
+  }
+}
+
+double field_change(const State& coarse, const State& fine, const Level& level) {
   double change = 0, largest = 0;
-  for (std::size_t i = 0; i < coarse.displacement.size(); ++i) {
-    change = std::max(change, (fine.displacement[i] - coarse.displacement[i]).norm());
+  std::size_t of_coarse = 0, of_fine = 0;
+  for (std::size_t b = 0; b < level.bodies.size(); ++b) {
+    const std::size_t count = level.bodies[b].mesh.vertices.size(), before = count - level.parents[b].size();
+    for (std::size_t i = 0; i < before; ++i) {
+      change = std::max(change, (fine.displacement[of_fine + i] - coarse.displacement[of_coarse + i]).norm());
+    }
+    of_coarse += before;
+    of_fine += count;
   }
   for (const Vec3& u : fine.displacement) {
     largest = std::max(largest, u.norm());
@@ -73,23 +221,16 @@ double edges_per_layer(const Model& model) {
   double least = infinity;
   for (std::size_t b = 0; b < model.shells.size(); ++b) {
     const ShellBody& body = model.shells[b];
-    const auto curvatures = largest_curvatures(body.mesh, body.curved);
-    std::vector<std::uint8_t> disturbed(body.mesh.vertices.size(), 0);
-    for (const Fix& fix : model.fixes) {
-      for (const Index node : fix.body == b ? fix.nodes : std::vector<Index>{}) {
-        disturbed[node] = 1;
-      }
-    }
-    const TriangleMesh facets = flat_facets(body.mesh);
-    for (const auto& [t, k] : boundary_edges(neighbours(facets, incidence(facets)))) {
-      disturbed[facets.triangles[t][k]] = disturbed[facets.triangles[t][(k + 1) % 3]] = 1;
-    }
+    const auto curvatures = curvatures_of(body.mesh, body.curved);
+    const auto disturbed = disturbed_nodes(model, b);
     const double share = 1 / std::pow(3 * (1 - std::pow(body.material.poisson, 2)), 0.25);
     for (std::size_t t = 0; t < body.mesh.triangles.size(); ++t) {
       const auto& triangle = body.mesh.triangles[t];
-      if (curvatures[t] > 0 && (disturbed[triangle[0]] | disturbed[triangle[1]] | disturbed[triangle[2]]) != 0) {
+      if (curvatures[t].largest > 0 &&
+          (disturbed[triangle[0]] | disturbed[triangle[1]] | disturbed[triangle[2]]) != 0) {
         const double thickness = body.thickness.size() == 1 ? body.thickness[0] : body.thickness[triangle[0]];
-        least = std::min(least, share * std::sqrt(thickness / curvatures[t]) / largest_edge(body.mesh, triangle));
+        least =
+            std::min(least, share * std::sqrt(thickness / curvatures[t].largest) / largest_edge(body.mesh, triangle));
       }
     }
   }

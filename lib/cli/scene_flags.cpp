@@ -214,4 +214,53 @@ Scene SceneFlags::scene(const std::filesystem::path& mesh) const {
   return scene;
 }
 
+void AccuracyFlags::declare(Tool& tool) {
+  CLI::App& app = tool.arguments();
+  tool.group("Accuracy");
+  app.add_option("--accuracy", within,
+                 "choose mesh and model: finer shells, until the error of the answer is credibly below this, e.g. 2%")
+      ->type_name("PERCENT");
+  app.add_option("--of", of, "the answer: displacement | energy | volume | stress (default displacement)")
+      ->type_name("NAME");
+  app.add_option("--target", target, "the surface that SHELL.ply was fitted to: finer shells are fitted to it too")
+      ->type_name("SURFACE");
+  app.add_option("--max-shells", max_shells, "no more shells than this (default 50,000)")->type_name("N");
+  app.add_option("--shell-out", shell_out, "the shells that it ended with")->type_name("OUT.ply");
+}
+
+void AccuracyFlags::ask(const CLI::App& app, Scene& scene) const {
+  if (!within) {
+    for (const char* flag : {"--of", "--target"}) {
+      if (app.count(flag) > 0) {
+        throw UsageError(fmt::format("{} belongs to --accuracy: give that too", flag));
+      }
+    }
+    for (const char* flag : {"--max-shells", "--shell-out"}) {
+      if (app.count(flag) > 0 && !scene.accuracy) {
+        throw UsageError(fmt::format("{} belongs to --accuracy, or [accuracy] in a scene: give that too", flag));
+      }
+    }
+    return;
+  }
+  if (scene.accuracy) {
+    scene.accuracy->places.item.fail("[accuracy] and --accuracy contradict each other: give one");
+  }
+  SceneAccuracy& asked = scene.accuracy.emplace();
+  asked.places = flags_as_places({"of", "target"});
+  asked.places.item.text = "--accuracy";
+  asked.within = parse_percent(*within);
+  choose<Quantity>(of, "--of", asked.of,
+                   {{"displacement", Quantity::displacement},
+                    {"energy", Quantity::energy},
+                    {"volume", Quantity::volume},
+                    {"stress", Quantity::stress}});
+  if (target) {
+    if (scene.shells.size() > 1) {
+      throw UsageError("--target: the scene has more than one body: name each one's in [accuracy]");
+    }
+    asked.targets[scene.shells.front().name] = *target;
+  }
+  check_scene(scene);
+}
+
 }  // namespace tunica::cli

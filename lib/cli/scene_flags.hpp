@@ -29,6 +29,17 @@ struct SceneFlags {
   [[nodiscard]] Scene scene(const std::filesystem::path& mesh) const;
 };
 
+/// How accurate the answer is to be.
+struct AccuracyFlags {
+  std::optional<std::string> within, of, max_shells;
+  std::optional<std::filesystem::path> target, shell_out;
+
+  void declare(Tool& tool);
+
+  /// Puts what they ask for into the scene. Errors: UsageError: flags without --accuracy, a scene that asks already.
+  void ask(const CLI::App& app, Scene& scene) const;
+};
+
 /// A whole number from 1 to `most`; none where the flag was not given. Errors: UsageError.
 std::optional<std::size_t> count_of(const std::optional<std::string>& text, const char* flag, double most);
 

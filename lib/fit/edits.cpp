@@ -199,7 +199,7 @@ Trial tried(const FitMesh& mesh, const FitSamples& samples, const FitLimits& lim
   builder.build();
   const auto keeps_shape = [&] {
     trial.shortfall = builder.shortfall();
-    return trial.shortfall <= std::max(trial.shortfall_before, limits.may_miss);
+    return trial.shortfall <= trial.shortfall_before + limits.may_miss;
   };
   bool sound = keeps_shape();
   for (std::size_t i = 1; i < trial.edit.starts.size() && !sound; ++i) {

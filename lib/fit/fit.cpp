@@ -318,7 +318,8 @@ private:
       collapse_edges(mesh, samples, any, shells, options_.progress);
     }
     limits_.error = settle(mesh, samples, Lessened::largest);
-    improve(mesh, samples, shells);
+    flip_edges(mesh, samples, limits_);
+    mend_shapes(mesh, samples, limits_, shells);
     return settle(mesh, samples, Lessened::largest);
   }
 
@@ -353,7 +354,9 @@ private:
         started(like_target_ ? decimation(target_, truncated<std::size_t>(surplus * real(shells))) : coarse_, samples);
     settle(mesh, samples, Lessened::mean);
     if (mesh.alive > shells) {
-      closest(mesh, samples, shells, 0);
+      limits_.error = closest(mesh, samples, shells, 0);
+      improve(mesh, samples, shells);
+      settle(mesh, samples, Lessened::largest);
     } else {
       result_.stopped = "the surface has no more triangles than shells are allowed";
     }
@@ -403,11 +406,15 @@ ShellMesh refit(const ShellMesh& shell, const Target& target, double min_angle,
   FitMesh mesh(split_shells(shell, std::vector<Split>(shell.triangles.size(), Split::all_edges), halved));
   const FitSamples samples(target, mesh.alive, true);
   SquaresOptions squares;
-  squares.shape.min_angle = min_angle;
+  squares.shape.min_angle = min_angle / 2;  // quarters have the angles of the whole: without room they cannot follow
+  FitLimits limits;
+  limits.shape = squares.shape;
+  limits.error = infinity;
   for (int step = 0; step < 2; ++step) {
     samples.attach(mesh);
     samples.measure(mesh);
     least_squares_step(mesh, samples, squares);
+    mend_shapes(mesh, samples, limits, mesh.alive, no_shell / 2, false);  // what the splits have folded
   }
   return mesh.shell();
 }

@@ -331,7 +331,7 @@ private:
         if (!p.is_alive() || (moved[p.nodes[0]] | moved[p.nodes[1]] | moved[p.nodes[2]]) == 0) {
           continue;
         }
-        broken[t] = shape_shortfall(piece_, p, options_.shape) > std::max(shortfall_[t], negligible_shortfall) ||
+        broken[t] = shape_shortfall(piece_, p, options_.shape) > shortfall_[t] + negligible_shortfall ||
                     piece_.facing(p).dot(facing_[t]) < options_.shape.agreement;
         if (broken[t] == 0) {
           samples_.measure(piece_, p, options_.search_beyond);

@@ -161,7 +161,7 @@ void flip_edges(FitMesh& mesh, const FitSamples& samples, const FitLimits& limit
 namespace {
 
 /// The edits that may mend a patch, the gentlest first.
-std::vector<Edit> mendings(const FitMesh& mesh, const FitSamples& samples, Index t, bool may_split) {
+std::vector<Edit> mendings(const FitMesh& mesh, const FitSamples& samples, Index t, bool may_split, bool may_collapse) {
   std::vector<Edit> out;
   const FitPatch& p = mesh.patches[t];
   const bool is_folded = normal_agreement(mesh.corners(p), mesh.corner_normals(p)) < fit_agreement;
@@ -192,7 +192,7 @@ std::vector<Edit> mendings(const FitMesh& mesh, const FitSamples& samples, Index
   double length = 0;
   for (std::size_t k = 0; k < 3; ++k) {
     const Index u = p.nodes[k], v = p.nodes[(k + 1) % 3];
-    if (auto edit = collapse(mesh, samples, u, v)) {
+    if (auto edit = may_collapse ? collapse(mesh, samples, u, v) : std::nullopt) {
       out.push_back(*std::move(edit));
     }
     if (const double its = (mesh.positions[u] - mesh.positions[v]).norm(); its > length) {
@@ -208,7 +208,8 @@ std::vector<Edit> mendings(const FitMesh& mesh, const FitSamples& samples, Index
 
 }  // namespace
 
-void mend_shapes(FitMesh& mesh, const FitSamples& samples, const FitLimits& limits, std::size_t most, double above) {
+void mend_shapes(FitMesh& mesh, const FitSamples& samples, const FitLimits& limits, std::size_t most, double above,
+                 bool may_collapse) {
   std::vector<std::pair<double, Index>> wanting;
   for (Index t = 0; t < mesh.patches.size(); ++t) {
     if (mesh.patches[t].is_alive()) {
@@ -235,7 +236,7 @@ void mend_shapes(FitMesh& mesh, const FitSamples& samples, const FitLimits& limi
         best = std::move(trial);
       }
     };
-    auto edits = mendings(mesh, samples, t, mesh.alive + 2 <= most);
+    auto edits = mendings(mesh, samples, t, mesh.alive + 2 <= most, may_collapse);
     for (const Edit& edit : edits) {
       consider(edit);
     }

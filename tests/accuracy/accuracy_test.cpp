@@ -28,6 +28,7 @@ struct Sphere {
   Target target{flat_facets(benchmarks::make_sphere(radius, 5))};
   Model model = benchmarks::pressurised_sphere(1, thickness, 0.01);
   std::map<std::size_t, double> factors;  // of the pressure, by shells
+  RunSettings settings = at_rest();
 
   [[nodiscard]] double exact(Quantity of) const {
     const double u = 0.01 * radius * radius * (1 - poisson) / (2 * young * thickness);
@@ -39,11 +40,11 @@ struct Sphere {
   }
 
   [[nodiscard]] Accuracy solved(const AccuracyRequest& request) const {
-    return solve_within(model.shells.front(), &target, request, at_rest(), [&](ShellBody body) {
+    return solve_within(model.shells, {&target}, request, settings, [&](std::vector<ShellBody> bodies) {
       Model finer = model;
-      const auto factor = factors.find(body.mesh.triangles.size());
+      const auto factor = factors.find(bodies.front().mesh.triangles.size());
       std::get<PressureLoad>(finer.loads.front().kind).value *= factor == factors.end() ? 1 : factor->second;
-      finer.shells = {std::move(body)};
+      finer.shells = std::move(bodies);
       return finer;
     });
   }
@@ -96,8 +97,9 @@ TEST(Accuracy, TwoLevelsThatAgreeByChanceAreNotBelieved) {
 }
 
 /// A thin tube clamped at its ends.
-Model clamped_tube(ShellBody body) {
+Model clamped_tube(std::vector<ShellBody> bodies) {
   Model model;
+  ShellBody& body = bodies.front();
   body.thickness = {0.05};
   Fix fix;
   for (Index v = 0; v < body.mesh.vertices.size(); ++v) {
@@ -109,7 +111,7 @@ Model clamped_tube(ShellBody body) {
   Load load;
   load.kind = PressureLoad{0.001, true};
   model.loads.push_back(load);
-  model.shells.push_back(std::move(body));
+  model.shells = std::move(bodies);
   return model;
 }
 
@@ -137,7 +139,8 @@ ShellBody tube_body() {
 }
 
 TEST(Accuracy, ABendingLayerThatNoLevelResolvesIsNamed) {
-  const Accuracy found = solve_within(tube_body(), nullptr, {0.5, Quantity::stress, 12'288}, at_rest(), clamped_tube);
+  const Accuracy found =
+      solve_within({tube_body()}, {nullptr}, {0.5, Quantity::stress, 12'288}, at_rest(), clamped_tube);
   ASSERT_FALSE(found.reasons.empty());
   EXPECT_THAT(found.reasons.front(), ::testing::HasSubstr("bending layer"));
   EXPECT_LT(edges_per_layer(found.model), 2);
@@ -152,33 +155,42 @@ TEST(Accuracy, TooFewShellsForAnEstimateAreSaid) {
 }
 
 TEST(Accuracy, WhatHasNoAnswerIsRefused) {
-  EXPECT_THROW(solve_within(tube_body(), nullptr, {0.02, Quantity::volume}, at_rest(), clamped_tube), InputError);
+  EXPECT_THROW(solve_within({tube_body()}, {nullptr}, {0.02, Quantity::volume}, at_rest(), clamped_tube), InputError);
   Sphere sphere;
   std::get<PressureLoad>(sphere.model.loads.front().kind).value = 0;
   EXPECT_THROW(sphere.solved({0.02}), InputError);
 }
 
 TEST(Levels, ARigidMotionStaysOne) {
-  const ShellBody coarse = benchmarks::pressurised_sphere(1, thickness, 1).shells.front();
+  const ShellBody body = benchmarks::pressurised_sphere(1, thickness, 1).shells.front();
+  const std::vector<ShellBody> coarse{body, body};
   const Target target(flat_facets(benchmarks::make_sphere(radius, 4)));
   const Eigen::Quaterniond turn = exponential(Vec3(0.3, -1.1, 0.7));
   const auto moved = [&](const Vec3& x) { return Vec3(turn * x + Vec3(5, 6, 7) - x); };
   State state;
-  for (const Vec3& x : coarse.mesh.vertices) {
-    state.displacement.push_back(moved(x));
-    state.rotation.push_back(logarithm(turn));
-  }
-  for (const Target* fitted : {static_cast<const Target*>(nullptr), &target}) {
-    std::vector<std::array<Index, 2>> parents;
-    const ShellBody fine = finer_level(coarse, fitted, parents);
-    ASSERT_EQ(fine.mesh.triangles.size(), 4 * coarse.mesh.triangles.size());
-    const Checkpoint finer = interpolated(state, coarse, fine, parents);
-    ASSERT_EQ(finer.displacement.size(), fine.mesh.vertices.size());
-    for (std::size_t v = coarse.mesh.vertices.size(); v < fine.mesh.vertices.size(); ++v) {
-      EXPECT_LT((finer.displacement[v] - moved(fine.mesh.vertices[v])).norm(), 1e-12 * radius);
-      EXPECT_LT(finer.rotation[v].angularDistance(turn), 1e-12);
+  for (int copy = 0; copy < 2; ++copy) {
+    for (const Vec3& x : body.mesh.vertices) {
+      state.displacement.push_back(moved(x));
+      state.rotation.push_back(logarithm(turn));
     }
   }
+  const Level fine = finer_level(coarse, {nullptr, &target});
+  ASSERT_EQ(fine.shell_count(), 8 * body.mesh.triangles.size());
+  const Checkpoint finer = interpolated(state, coarse, fine);
+  std::size_t v = 0;
+  State after;
+  for (const ShellBody& of : fine.bodies) {
+    for (const Vec3& x : of.mesh.vertices) {
+      ASSERT_LT(v, finer.displacement.size());
+      EXPECT_LT((finer.displacement[v] - moved(x)).norm(), 1e-12 * radius);
+      EXPECT_LT(finer.rotation[v].angularDistance(turn), 1e-12);
+      after.displacement.push_back(moved(x));
+      ++v;
+    }
+  }
+  EXPECT_EQ(v, finer.displacement.size());
+  // The nodes of the coarser level move a little in the refit, and with them what moves them.
+  EXPECT_LT(field_change(state, after, fine), 0.05);
 }
 
 TEST(Levels, ThicknessPerVertexIsInterpolated) {
@@ -187,20 +199,130 @@ TEST(Levels, ThicknessPerVertexIsInterpolated) {
   for (const Vec3& x : body.mesh.vertices) {
     body.thickness.push_back(1 + 0.01 * x.z());
   }
-  std::vector<std::array<Index, 2>> parents;
-  const ShellBody fine = finer_level(body, nullptr, parents);
-  ASSERT_EQ(fine.thickness.size(), fine.mesh.vertices.size());
-  for (std::size_t i = 0; i < parents.size(); ++i) {
-    EXPECT_DOUBLE_EQ(fine.thickness[body.mesh.vertices.size() + i],
-                     (body.thickness[parents[i][0]] + body.thickness[parents[i][1]]) / 2);
+  const Level fine = finer_level({body}, {nullptr});
+  const auto& got = fine.bodies.front().thickness;
+  ASSERT_EQ(got.size(), fine.bodies.front().mesh.vertices.size());
+  for (std::size_t i = 0; i < fine.parents.front().size(); ++i) {
+    const auto [a, b] = fine.parents.front()[i];
+    EXPECT_DOUBLE_EQ(got[body.mesh.vertices.size() + i], (body.thickness[a] + body.thickness[b]) / 2);
   }
 }
 
 TEST(Levels, TheFieldTellsWhatTheLargestDoesNot) {
+  ShellBody coarse_body, fine_body;
+  coarse_body.mesh.vertices.resize(2);
+  fine_body.mesh.vertices.resize(3);
   State coarse, fine;
   coarse.displacement = {Vec3(1, 0, 0), Vec3(0, 0, 0)};
   fine.displacement = {Vec3(1, 0, 0), Vec3(0, 0.5, 0), Vec3(0, 0, 0)};
-  EXPECT_DOUBLE_EQ(field_change(coarse, fine), 0.5);
+  EXPECT_DOUBLE_EQ(field_change(coarse, fine, {{fine_body}, {{{0, 1}}}}), 0.5);
+}
+
+TEST(Levels, PointLoadsAndJumpsOfTheThicknessBendTheWall) {
+  Model model = benchmarks::pressurised_sphere(1, thickness, 1);
+  EXPECT_EQ(edges_per_layer(model), infinity);
+  Model loaded = model;
+  Load load;
+  load.kind = ForceLoad{{0}, Vec3(0, 0, 1)};
+  loaded.loads.push_back(load);
+  EXPECT_LT(edges_per_layer(loaded), 2);
+  ShellBody& body = model.shells.front();
+  body.thickness.assign(body.mesh.vertices.size(), thickness);
+  EXPECT_EQ(edges_per_layer(model), infinity);
+  body.thickness[0] = 2 * thickness;
+  EXPECT_LT(edges_per_layer(model), 2);
+}
+
+TEST(Levels, WhatIsSelectedStaysSelected) {
+  // A rim of five nodes with a corner at the second one, whose shell has two edges on the rim.
+  Model coarse;
+  ShellBody body;
+  body.mesh.vertices = {Vec3(0, 0, 0), Vec3(1, -1, 0), Vec3(2, 0, 0), Vec3(3, 0, 0), Vec3(2, 2, 0), Vec3(0, 2, 0)};
+  body.mesh.triangles = {{0, 1, 2}, {0, 2, 5}, {2, 4, 5}, {2, 3, 4}};
+  body.mesh.normals.assign(6, Vec3(0, 0, 1));
+  body.mesh.patch = Patch::watertight;
+  coarse.shells = {body};
+  Fix rim, single;
+  rim.nodes = {0, 1, 2, 3};
+  single.nodes = {5};
+  coarse.fixes = {rim, single};
+  Load edge;
+  edge.kind = EdgeLoad{{{2, 3}}, Vec3(0, 0, 1)};
+  coarse.loads = {edge};
+  const Level level = finer_level(coarse.shells, {nullptr});
+  Model fine = coarse;
+  fine.shells = level.bodies;
+  fine.fixes[0].nodes = {0};  // what the place finds of the rim after a refit has moved it
+  fine.fixes[1].nodes = {4};
+  carry_selections(coarse, level, fine);
+  const auto halved = [&](Index a, Index b) {
+    const auto& parents = level.parents.front();
+    const auto found = std::find_if(parents.begin(), parents.end(), [&](const auto& pair) {
+      return std::minmax(pair[0], pair[1]) == std::minmax(a, b);
+    });
+    return static_cast<Index>(6 + (found - parents.begin()));
+  };
+  EXPECT_THAT(fine.fixes[0].nodes,
+              ::testing::UnorderedElementsAre(0, 1, 2, 3, halved(0, 1), halved(1, 2), halved(2, 3)));
+  EXPECT_THAT(fine.fixes[1].nodes, ::testing::ElementsAre(4));
+  const Index middle = halved(2, 3);
+  const std::vector<std::array<Index, 2>> halves{{2, middle}, {middle, 3}};
+  EXPECT_EQ(std::get<EdgeLoad>(fine.loads[0].kind).edges, halves);
+}
+
+/// A sphere under a pressure that grows over `ramp` seconds; it breathes with a period that is known.
+struct Breathing : Sphere {
+  static constexpr double density = 1e-9;
+
+  explicit Breathing(double periods_of_ramp, double periods_of_run, double steps_per_period) {
+    // Source: a thin closed shell's breathing mode, omega^2 = 2 E / (rho R^2 (1 - nu)).
+    const double omega = std::sqrt(2 * young / (density * radius * radius * (1 - poisson)));
+    const double period = 2 * std::numbers::pi / omega;
+    model.shells.front().material.density = density;
+    model.loads.front().ramp.points = {{0, 0}, {periods_of_ramp * period, 1}};
+    DynamicRun motion;
+    motion.duration = periods_of_run * period;
+    motion.step = period / steps_per_period;
+    motion.integrator = Integrator::generalised_alpha;
+    motion.spectral_radius = 1;
+    settings.kind = motion;
+    // After a ramp of length T the rest oscillates by |sin(pi T / T1)| / (pi T / T1) of the answer at rest.
+    const double x = std::numbers::pi * periods_of_ramp;
+    peak = exact(Quantity::displacement) * (1 + std::abs(std::sin(x)) / x);
+  }
+  double peak = 0;
+};
+
+TEST(Accuracy, ALongRampIsTakenAsRest) {
+  const Breathing slow(20.5, 21, 8);
+  const Accuracy found = slow.solved({0.1});
+  ASSERT_TRUE(found.reasons.empty()) << found.reasons.front();
+  EXPECT_TRUE(std::holds_alternative<StaticRun>(found.settings.kind));
+  EXPECT_LT(std::abs(found.levels.back().value / slow.peak - 1), *found.estimate);
+  const auto& choice = found.choices.at(2);
+  EXPECT_EQ(choice.chosen, "static");
+  EXPECT_NEAR(*choice.error, 1 / (std::numbers::pi * 20.5), 0.01);
+}
+
+TEST(Accuracy, AShortRampKeepsTheMotionAndItsStepIsHalved) {
+  const Breathing fast(1.5, 3, 4);
+  const Accuracy found = fast.solved({0.1});
+  ASSERT_TRUE(found.reasons.empty()) << found.reasons.front();
+  const auto* motion = std::get_if<DynamicRun>(&found.settings.kind);
+  ASSERT_NE(motion, nullptr);
+  EXPECT_LT(motion->step, 0.6 * std::get<DynamicRun>(fast.settings.kind).step);
+  EXPECT_LT(std::abs(found.levels.back().value / fast.peak - 1), *found.estimate);
+  EXPECT_EQ(found.choices.back().chosen, "dynamic");
+  EXPECT_EQ(found.choices.back().instead, "static");
+  EXPECT_GT(found.states.size(), 10U);
+}
+
+TEST(Accuracy, AStepThatDoesNotConvergeIsSaid) {
+  Breathing fast(1.5, 400, 0.01);  // 100 periods a step: eight halvings do not get to one
+  const Accuracy found = fast.solved({0.01});
+  ASSERT_FALSE(found.reasons.empty());
+  EXPECT_THAT(found.reasons.front(), ::testing::HasSubstr("time step"));
+  EXPECT_EQ(found.levels.size(), 1U);
 }
 
 }  // namespace

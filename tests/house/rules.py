@@ -39,7 +39,7 @@ OWNERS = [
     (r"assimp/", "assimp", r"lib/io/.*\.cpp"),
     (r"opencv2/", "OpenCV", r"lib/draw/.*\.cpp"),
     (r"(hdf5\.h|hdf5_hl\.h|H5\w*\.h|hdf5/)", "HDF5", r"lib/io/.*\.cpp"),
-    (r"toml", "toml++", r"lib/io/.*\.cpp"),
+    (r"toml", "toml++", r"lib/io/(.*\.cpp|scene/detail/.*)"),
     (r"tiffio\.h", "libtiff", r"lib/io/.*\.cpp"),
     (r"png\.h", "libpng", r"lib/(draw|io)/.*\.cpp"),
     (r"zlib\.h", "zlib", r"lib/io/.*\.cpp"),

@@ -111,11 +111,14 @@ class Rules(WithStubs):
         self.assertIn("--fix below z=-10mm --pressure 1kPa --young 1MPa --poisson 0.45 --thickness 1.5mm "
                       "--density 1100kg/m3 --static", simulate)
 
+    def test_a_misspelt_variable_is_refused(self):
+        self.assertIn("no such variable: PRESURE", self.refusal(VOLUMES="a.nii.gz", LABEL=1, PRESURE="1kPa", **LOAD))
+
     def test_an_accuracy_chooses_the_shells(self):
         self.make(VOLUMES="a.nii.gz", LABEL=3, ACCURACY="2%", OF="energy", **LOAD)
         _, decimate, relax, simulate = self.calls()
-        self.assertIn("--triangles 200 --min-angle 20", decimate)
-        self.assertIn("--tolerance 5% --refine", relax)
+        self.assertIn("--triangles 190 --min-angle 20", decimate)
+        self.assertIn("--shells 190 --max-iterations 1", relax)
         self.assertIn("--accuracy 2% --of energy", simulate)
         self.assertIn(f"--target {self.out / 'a' / '3' / 'surface.ply'}", simulate)
         done = self.make(VOLUMES="a.nii.gz", LABEL=3, ACCURACY="2%", SHELLS=300, **LOAD)

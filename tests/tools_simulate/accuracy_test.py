@@ -49,6 +49,7 @@ class AccuracyTest(SimulateTest):
         claim = self.run_tool("ball.ply", "out.hdf", *HELD, "--accuracy", "5%", "--of", "energy")["result"]["accuracy"]
         self.assertEqual(claim["not_included"][0], "geometry")
         self.assertIsNone(claim["levels"][0]["mean_distance_mm"])
+        self.assertIn("ball.ply: has no target", self.done.stderr)
 
     def test_the_choice_does_not_depend_on_threads(self):
         claims = [self.run_tool("ball.ply", "out.hdf", *HELD, "--accuracy", "2%", "--target", "target.ply", "--force",
@@ -68,17 +69,121 @@ class AccuracyTest(SimulateTest):
         for arguments, says in (
                 ([*HELD, "--of", "energy"], "--of belongs to --accuracy"),
                 ([*HELD, "--accuracy", "2"], "2"),
-                ([*HELD, "--accuracy", "0%"], "not above 0"),
+                ([*HELD, "--accuracy", "0%"], "must be above 0"),
                 ([*HELD, "--accuracy", "60%"], "at most 50%"),
                 ([*HELD, "--accuracy", "2%", "--of", "weight"], "not one of displacement, energy, volume, stress"),
                 ([*HELD, "--accuracy", "2%", "--load-steps", "3"], "leave out --load-steps"),
                 ([*HELD, "--accuracy", "2%", "--cg-iterations", "5"], "asks for convergence"),
                 ([*HELD, "--accuracy", "2%", "--max-shells", "0"], "--max-shells"),
-                ([*WALL, "--density", "1g/cm3", "--duration", "1s", "--step", "0.1s", "--fix", "rigid-motions",
-                  "--accuracy", "2%"], "not available yet")):
+                ([*HELD, "--max-shells", "500"], "--max-shells belongs to --accuracy")):
             self.run_tool("ball.ply", "out.hdf", *arguments, expect=2)
             self.assertIn(says, self.done.stderr)
             self.assertFalse(os.path.exists(self.path("out.hdf")))
+
+    SCENE = """[run]
+kind = "static"
+[[shell]]
+name = "ball"
+mesh = "ball.ply"
+thickness = "0.5mm"
+young = "1MPa"
+poisson = 0.3
+density = "1g/cm3"
+[[shell]]
+name = "far ball"
+mesh = "far.ply"
+thickness = "0.5mm"
+young = "1MPa"
+poisson = 0.3
+density = "1g/cm3"
+[[fix]]
+body = "ball"
+where = {rigid_motions = true}
+[[fix]]
+body = "far ball"
+where = {rigid_motions = true}
+[[load]]
+body = "ball"
+kind = "pressure"
+value = "100Pa"
+[[load]]
+body = "far ball"
+kind = "pressure"
+value = "200Pa"
+[[probe]]
+name = "top"
+body = "far ball"
+nearest = ["100mm", "0mm", "10mm"]
+[accuracy]
+within = "2%"
+"""
+
+    def scene(self, more, text=None):
+        with open(self.path("scene.toml"), "w", encoding="utf-8") as file:
+            file.write((text or self.SCENE) + more)
+        return "--scene", "scene.toml"
+
+    def test_a_scene_asks_for_an_accuracy_of_all_its_bodies(self):
+        vertices, triangles, normals = sphere(1, 10)
+        write_ply(self.path("far.ply"), vertices + [100, 0, 0], triangles, normals)
+        vertices, triangles = sphere(5, 10)[:2]
+        write_ply(self.path("far target.ply"), vertices + [100, 0, 0], triangles)
+        more = 'target = {ball = "target.ply", "far ball" = "far target.ply"}\n'
+        for of, exact, said in (('of = "displacement"\n', 2 * EXACT, "displacement"),
+                                ('of = {probe = "top", axis = "z"}\n', 2 * EXACT, {"probe": "top", "axis": "z"})):
+            report = self.run_tool(*self.scene(more + of), "out.hdf", "--force")
+            claim = report["result"]["accuracy"]
+            self.assertEqual((claim["of"], claim["credible"]), (said, True))
+            self.assertLess(abs(claim["value"] / exact - 1), claim["estimate_percent"] / 100)
+            self.assertEqual([level["shells"] for level in claim["levels"]][:2], [160, 640])
+            self.assertEqual([entry["path"] for entry in report["inputs"]],
+                             ["scene.toml", "ball.ply", "far.ply", "target.ply", "far target.ply"])
+        with h5py.File(self.path("out.hdf")) as file:
+            self.assertIn("[accuracy]", file["tunica/scene"][()].decode())
+        part = self.run_tool(*self.scene('target = {ball = "target.ply"}\n'), "out.hdf", "--force")
+        self.assertEqual(part["result"]["accuracy"]["not_included"][0], "geometry")
+
+    def test_errors_of_a_scene(self):
+        vertices, triangles, normals = sphere(1, 10)
+        write_ply(self.path("far.ply"), vertices + [100, 0, 0], triangles, normals)
+        for more, says in (('target = {brain = "target.ply"}\n', 'no body "brain"'),
+                           ('of = {probe = "tip", axis = "z"}\n', 'no [[probe]] "tip"'),
+                           ('of = "weight"\n', "weight"), ('target = "target.ply"\n', "must be a table"),
+                           ('of = {probe = "top"}\n', "no 'axis'"), ("beyond = 3\n", "unknown key 'beyond'")):
+            self.run_tool(*self.scene(more), "out.hdf", expect=3)
+            self.assertIn(says, self.done.stderr)
+            self.assertIn("scene.toml:", self.done.stderr)
+        for found, replaced, says in (('kind = "static"', 'kind = "buckling"', "no single answer"),
+                                      ('within = "2%"', 'within = "60%"', "at most 50%"),
+                                      ('kind = "static"', 'kind = "static"\nload_steps = 3', "leave out the load steps"),
+                                      ('where = {rigid_motions = true}',
+                                       'where = {nodes = [0]}\ntranslation = "xyz"\nrotation = ""', "a list of nodes")):
+            self.run_tool(*self.scene("", self.SCENE.replace(found, replaced, 1)), "out.hdf", expect=3)
+            self.assertIn(says, self.done.stderr)
+        scene = self.scene('target = {ball = "target.ply"}\n')
+        for flags, says in ((["--accuracy", "2%"], "contradict each other"), (["--shell-out", "fine.ply"], "more than one body")):
+            self.run_tool(*scene, "out.hdf", *flags, expect=3 if "2%" in flags else 2)
+            self.assertIn(says, self.done.stderr)
+        self.run_tool(*self.scene("", self.SCENE.split("[accuracy]")[0]), "out.hdf", "--accuracy", "2%", "--target",
+                      "target.ply", expect=2)
+        self.assertIn("name each one's in [accuracy]", self.done.stderr)
+
+    def test_a_slow_ramp_is_taken_as_rest(self):
+        motion = [*WALL, "--density", "1g/cm3", "--duration", "100ms", "--step", "10ms", "--ramp", "80ms", "--fix",
+                  "rigid-motions", "--accuracy", "5%", "--target", "target.ply"]
+        claim = self.run_tool("ball.ply", "out.hdf", *motion)["result"]["accuracy"]
+        chosen = {choice["part"]: choice["chosen"] for choice in claim["choices"]}
+        self.assertEqual(chosen["run"], "static")
+        self.assertLess(abs(claim["value"] / EXACT - 1), claim["estimate_percent"] / 100)
+
+    def test_voxels_of_the_image_are_told(self):
+        with open(self.path("target.ply"), "rb") as file:
+            data = file.read()
+        with open(self.path("target.ply"), "wb") as file:
+            file.write(data.replace(b"element vertex", b"comment voxel 0.8 0.8 1.5 mm\nelement vertex", 1))
+        claim = self.run_tool("ball.ply", "out.hdf", *HELD, "--accuracy", "5%", "--target", "target.ply")["result"]["accuracy"]
+        self.assertAlmostEqual(claim["surface_uncertainty_mm"], 0.15)
+        self.assertIn("at voxels of 1.5 mm the surface itself is uncertain by about 0.15 mm", self.done.stderr)
 
     def test_bad_input(self):
         write_ply(self.path("far.ply"), sphere(2, 10)[0] + 1e4, sphere(2, 10)[1])

@@ -214,7 +214,7 @@ class Flags(SimulateTest):
                 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
                 resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
 
-            self.done = subprocess.run([SIMULATE, "ball.ply", "full.hdf", *DYNAMIC], cwd=self.folder, text=True,
+            self.done = subprocess.run([SIMULATE, "ball.ply", "full.hdf", *DYNAMIC, "--quiet"], cwd=self.folder, text=True,
                                        capture_output=True, check=False, preexec_fn=limit, restore_signals=False)
             self.assertEqual(self.done.returncode, 5, self.done.stderr)
             self.assertEqual(len(self.done.stderr.strip().splitlines()), 1, self.done.stderr)
@@ -233,8 +233,9 @@ class Flags(SimulateTest):
         def thick(words, thickness):
             return [thickness if word == "0.5mm" else word for word in words]
 
+        write_ply(self.path("ball.ply"), *sphere(2, 10))
         self.assertEqual(self.run_tool("ball.ply", "out.hdf", *HELD)["warnings"], [])
-        told("ball.ply: shell: its thickness, 5 mm, is more than a tenth", "ball.ply", *thick(HELD, "5mm"))
+        told("ball.ply: shell: its thickness, 5 mm, is more than a twentieth", "ball.ply", *thick(HELD, "5mm"))
         told("all its nodes are held", "ball.ply", *PRESSED, "--static", "--fix", "below x=1m")
         nothing = [word if word != "100Pa" else "0Pa" for word in HELD]
         told("this load is zero", "ball.ply", *nothing, many=2)

@@ -11,7 +11,7 @@ namespace tunica {
 struct FitLimits {
   FacetLimits shape;
   double error = 0;                        ///< mm, of a patch
-  double may_miss = negligible_shortfall;  ///< shortfall that shapes may have; more only where they had it before
+  double may_miss = negligible_shortfall;  ///< by which the shapes' shortfall may grow
 };
 
 /// Some patches in place of others, and at most one node that looks for its place. Nodes and slots are the mesh's; new
@@ -78,7 +78,9 @@ void flip_edges(FitMesh& mesh, const FitSamples& samples, const FitLimits& limit
 /// Flips, moves, collapses and splits where shapes fall short, within the error's limit (or what it is).
 /// @param most  shells
 /// @param above  the shortfall from which patches are mended
-void mend_shapes(FitMesh& mesh, const FitSamples& samples, const FitLimits& limits, std::size_t most, double above = 0);
+/// @param may_collapse  else nodes only move, and edges flip
+void mend_shapes(FitMesh& mesh, const FitSamples& samples, const FitLimits& limits, std::size_t most, double above = 0,
+                 bool may_collapse = true);
 
 /// Splits the longest edge of patches whose error is above the limit, the worst first, at most `count` of them.
 /// @return how many

@@ -82,7 +82,7 @@ inline constexpr double no_shell = 1e9;
 /// Part of an error, a shortfall or a count above which what is left is no progress.
 inline constexpr double worth_it = 0.985;
 
-/// Shortfall that every shape may have: a thousandth of an angle.
+/// Shortfall by which a step may worsen a shape: a thousandth of an angle.
 inline constexpr double negligible_shortfall = 1e-6;
 
 /// Sum of squares of the parts by which a patch's facet misses its smallest angle, its agreement, its longest edge; 0

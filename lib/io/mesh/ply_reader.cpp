@@ -4,6 +4,7 @@
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/core/progress.hpp"
+#include "tunica/core/quantity.hpp"
 #include "tunica/io/file/text_scanner.hpp"
 #include "tunica/io/mesh/detail/mesh_formats.hpp"
 #include "tunica/io/mesh/detail/ply_header.hpp"
@@ -412,6 +413,13 @@ void understand_comments(MeshFile& file, const std::string& name) {
     } else if (first.starts_with("surface=")) {
       throw InputError(fmt::format("{}: \"{}\" is not understood, surface=comas or surface=watertight are", name,
                                    first.substr(0, 60)));
+    } else if (first == "voxel") {
+      for (int axis = 0; axis < 3; ++axis) {
+        const auto edge = parse_number(words.token());
+        if (edge && *edge > 0) {
+          file.voxel = std::max(file.voxel.value_or(0), *edge);
+        }
+      }
     } else if (first == "units") {
       const std::string_view unit = words.token();
       if (words.at_line_end() && !unit.empty()) {

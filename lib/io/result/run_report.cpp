@@ -154,14 +154,18 @@ Json accuracy_report(const Accuracy& accuracy) {
                        {"instead", choice.instead},
                        {"would_cost", choice.would_cost}});
   }
-  return {{"requested_percent", 100 * accuracy.request.within},
-          {"of", name_of(accuracy.request.of)},
+  const AccuracyRequest& request = accuracy.request;
+  const bool probed = request.of == Quantity::probe;
+  return {{"requested_percent", 100 * request.within},
+          {"of", probed ? Json{{"probe", request.probe}, {"axis", std::string(1, "xyz"[request.axis])}}
+                        : Json(name_of(request.of))},
           {"value", accuracy.levels.back().value},
           {"estimate_percent", accuracy.estimate ? Json(100 * *accuracy.estimate) : Json()},
           {"credible", accuracy.reasons.empty()},
           {"reasons", accuracy.reasons},
           {"levels", levels},
           {"choices", choices},
+          {"surface_uncertainty_mm", or_null(accuracy.surface_error)},
           {"not_included", accuracy.not_included}};
 }
 
@@ -181,6 +185,11 @@ std::vector<std::string> accuracy_notes(const Accuracy& accuracy) {
         fmt::format("{}: {}; {} instead: {}", choice.part, choice.chosen, choice.instead, choice.would_cost));
   }
   lines.push_back(fmt::format("not included: {}", fmt::join(accuracy.not_included, ", ")));
+  if (accuracy.surface_error) {
+    lines.push_back(fmt::format(
+        "this is of this surface: at voxels of {:.3g} mm the surface itself is uncertain by about {:.2g} mm",
+        *accuracy.request.voxel, *accuracy.surface_error));
+  }
   return lines;
 }
 
@@ -196,8 +205,16 @@ std::string modes_note(const Summary& summary, std::size_t asked) {
                      values.size() < asked ? fmt::format(", of {} asked for: there are no more", asked) : "");
 }
 
-std::vector<std::string> run_warnings(const RunSettings& run, const Summary& summary, std::size_t unresolved) {
+std::vector<std::string> run_warnings(const RunSettings& run, const Summary& summary, const Wall& wall,
+                                      std::size_t unresolved) {
   std::vector<std::string> warnings;
+  constexpr double small_strain = 0.1;
+  if (wall.strain_p99 > small_strain) {
+    warnings.push_back(fmt::format(
+        "1 % of the wall is strained by more than {:.3g} %: linear elasticity is meant for strains of up to "
+        "about 10 %",
+        1e2 * wall.strain_p99));
+  }
   for (const Snap& snap : summary.snaps) {
     warnings.push_back(
         fmt::format("at load factor {:.6g} the path of equilibria breaks off (limit load): the shell snaps, by up "
@@ -211,6 +228,13 @@ std::vector<std::string> run_warnings(const RunSettings& run, const Summary& sum
                     "({:.6g} s) on: the steps are too coarse for the motion: take shorter ones, or a smaller "
                     "spectral_radius",
                     1e2 * summary.energy->gained, summary.energy->gaining_step, summary.energy->gaining_time));
+  }
+  constexpr double notable_loss = 0.1;
+  if (summary.energy && summary.energy->lost > notable_loss * summary.energy->largest) {
+    warnings.push_back(
+        fmt::format("time integration took {:.3g} % of the energy: what swings is smaller than it should be, the state "
+                    "of rest is not: for the motion take shorter steps, or integrator = \"generalised-alpha\"",
+                    1e2 * summary.energy->lost / summary.energy->largest));
   }
   if (summary.stiffened_from) {
     warnings.push_back(

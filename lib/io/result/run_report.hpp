@@ -31,7 +31,8 @@ std::vector<std::string> accuracy_notes(const Accuracy& accuracy);
 std::string modes_note(const Summary& summary, std::size_t asked);
 
 /// What a user should know of a run that has ended well.
-/// @param unresolved  count_unresolved() of the last state
-std::vector<std::string> run_warnings(const RunSettings& run, const Summary& summary, std::size_t unresolved);
+/// @param wall  of the last state, as `unresolved`: count_unresolved()
+std::vector<std::string> run_warnings(const RunSettings& run, const Summary& summary, const Wall& wall,
+                                      std::size_t unresolved);
 
 }  // namespace tunica

@@ -388,6 +388,46 @@ Load resolve_load(const SceneLoad& load, const SceneShell& shell, std::size_t bo
   return result;
 }
 
+// What --accuracy, or [accuracy], can be found for.
+void check_accuracy(const Scene& scene) {
+  const SceneAccuracy& asked = *scene.accuracy;
+  const Places& places = asked.places;
+  require(asked.within > 0 && asked.within <= 0.5, places.of("within"), "must be above 0 and at most 50%");
+  const auto* statics = std::get_if<StaticRun>(&scene.run.kind);
+  const auto* dynamics = std::get_if<DynamicRun>(&scene.run.kind);
+  require(statics != nullptr || dynamics != nullptr, places.item,
+          "is for states of rest and motions: frequencies, buckling and paths by arc length have no single answer");
+  require(statics == nullptr || statics->load_factors.size() == 1, places.item,
+          fmt::format("finds one answer: leave out {}", places.item.flag ? "--load-steps" : "the load steps"));
+  require(dynamics == nullptr || !dynamics->adaptive, scene.run_places.of("adaptive"),
+          "an accuracy finds the step itself: leave out adaptive");
+  require(!scene.run.cg_fixed_count, places.item, "asks for convergence, a fixed count of CG iterations for none");
+  for (const auto& [name, path] : asked.targets) {
+    const auto body = std::find_if(scene.shells.begin(), scene.shells.end(),
+                                   [&, &wanted = name](const SceneShell& shell) { return shell.name == wanted; });
+    require(
+        body != scene.shells.end(), places.of("target"),
+        fmt::format("there is no body \"{}\": the bodies are \"{}\"", name, fmt::join(body_names(scene), "\", \"")));
+  }
+  const bool known = std::any_of(scene.probes.begin(), scene.probes.end(),
+                                 [&](const SceneProbe& probe) { return probe.name == asked.probe; });
+  require(asked.of != Quantity::probe || known, places.of("of"),
+          fmt::format("there is no [[probe]] \"{}\": add it, or name another", asked.probe));
+  // A finer mesh has nodes between those of a list, of which the list says nothing.
+  const auto refuse_list = [](const std::optional<Selection>& where, const Places& of) {
+    require(
+        !where || !std::holds_alternative<ListedNodes>(*where), of.of("where"),
+        "a list of nodes holds for one mesh, and an accuracy takes finer ones: select by place (box, below, sphere, "
+        "nearest …)");
+  };
+  for (const SceneFix& fix : scene.fixes) {
+    refuse_list(fix.where, fix.places);
+  }
+  for (const SceneLoad& load : scene.loads) {
+    refuse_list(load.where, load.places);
+  }
+}
+
 }  // namespace
 
 void Place::fail(const std::string& what) const {
@@ -479,6 +519,9 @@ void check_scene(const Scene& scene) {
     (void)body_index(scene, probe.body, probe.places);
     require(names.insert(probe.name).second, probe.places.of("name"),
             fmt::format("there are two probes named \"{}\"", probe.name));
+  }
+  if (scene.accuracy) {
+    check_accuracy(scene);
   }
 }
 

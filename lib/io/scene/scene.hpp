@@ -1,6 +1,7 @@
 // io/scene: scene files.
 #pragma once
 
+#include "tunica/accuracy/accuracy.hpp"
 #include "tunica/core/error.hpp"
 #include "tunica/mechanics/model/model.hpp"
 
@@ -100,8 +101,19 @@ struct SceneProbe {
   Places places;
 };
 
+/// Meshes and model are then chosen.
+struct SceneAccuracy {
+  double within = 0;  ///< of the quantity, relative
+  Quantity of = Quantity::displacement;
+  std::string probe;                                     ///< of Quantity::probe
+  int axis = 0;                                          ///< of its displacement
+  std::map<std::string, std::filesystem::path> targets;  ///< by body: the surface that its mesh was fitted to
+  Places places;
+};
+
 struct Scene {
   RunSettings run;
+  std::optional<SceneAccuracy> accuracy;
   bool cg_tolerance_stated = false;
   std::string until_probe;  ///< of an arc-length run, whose `until` names it; empty where it has none
   Places run_places;

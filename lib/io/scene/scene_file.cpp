@@ -1,187 +1,23 @@
 #include "tunica/io/scene/scene_file.hpp"
 
 #include "tunica/core/narrow.hpp"
-#include "tunica/core/quantity.hpp"
 #include "tunica/io/file/output_file.hpp"
-#include "tunica/io/file/suggestion.hpp"
+#include "tunica/io/scene/detail/scene_table.hpp"
 #include "tunica/io/scene/detail/toml_depth.hpp"
 
 #include <fmt/format.h>
-#include <toml++/toml.h>
 
 #include <algorithm>
-#include <cmath>
-#include <span>
 
 namespace tunica {
 namespace fs = std::filesystem;
 namespace {
 
+using Table = SceneTable;
+
 constexpr std::size_t most_bytes = std::size_t{64} << 20;
-constexpr std::int64_t most_counted = 1'000'000'000;
 constexpr std::int64_t most_load_steps = 1'000'000;
 constexpr std::int64_t most_modes = 10'000;
-
-using Keys = std::span<const std::string_view>;
-
-// One table of the file, and what it may hold.
-class Table {
-public:
-  // @param known  keys of this table; `later`: keys that a later version brings
-  Table(const toml::table& table, const std::string& file, std::string name, Keys known, Keys later = {})
-      : table_(table), file_(file), name_(std::move(name)) {
-    for (const auto& [key, value] : table) {
-      const Place place = at(key.source());
-      places_.keys.emplace(std::string(key.str()), at(value.source()));
-      if (std::find(later.begin(), later.end(), key.str()) != later.end()) {
-        throw UsageError(fmt::format("{}: {} in {}: not available yet", place.text, key.str(), name_));
-      }
-      if (std::find(known.begin(), known.end(), key.str()) == known.end()) {
-        place.fail(fmt::format("unknown key '{}' in {}: {}", key.str(), name_, suggestion(key.str(), known)));
-      }
-    }
-    places_.item = at(table.source());
-  }
-
-  [[nodiscard]] const Places& places() const { return places_; }
-  [[nodiscard]] const Place& place(std::string_view key) const { return places_.of(key); }
-  [[nodiscard]] bool has(std::string_view key) const { return table_.contains(key); }
-
-  [[nodiscard]] const toml::node& required(std::string_view key, std::string_view why = {}) const {
-    const toml::node* node = table_.get(key);
-    if (node == nullptr) {
-      places_.item.fail(fmt::format("{} has no '{}'{}: add it", name_, key, why));
-    }
-    return *node;
-  }
-
-  [[nodiscard]] std::string text(std::string_view key) const { return text_of(required(key), key); }
-  [[nodiscard]] std::optional<std::string> optional_text(std::string_view key) const {
-    return has(key) ? std::optional(text(key)) : std::nullopt;
-  }
-
-  template <typename Value>
-  void choice(std::string_view key, Value& value,
-              std::initializer_list<std::pair<std::string_view, Value>> choices) const {
-    if (!has(key)) {
-      return;
-    }
-    const std::string word = text(key);
-    std::vector<std::string_view> words;
-    for (const auto& [name, meaning] : choices) {
-      if (word == name) {
-        value = meaning;
-        return;
-      }
-      words.push_back(name);
-    }
-    place(key).fail(fmt::format("{} = \"{}\" in {} is not known: {}", key, word, name_, suggestion(word, words)));
-  }
-
-  [[nodiscard]] double quantity(std::string_view key, Dimension dimension, std::string_view why = {}) const {
-    return quantity_of(required(key, why), key, dimension);
-  }
-
-  [[nodiscard]] double number(std::string_view key) const { return number_of(required(key), key); }
-
-  [[nodiscard]] bool flag(std::string_view key) const {
-    const auto value = required(key).value_exact<bool>();
-    if (!value) {
-      place(key).fail(fmt::format("{} must be true or false", key));
-    }
-    return *value;
-  }
-
-  // A whole number from 1 to `most`.
-  [[nodiscard]] std::size_t count(std::string_view key, std::int64_t most = most_counted) const {
-    const auto value = required(key).value_exact<std::int64_t>();
-    if (!value || *value < 1 || *value > most) {
-      place(key).fail(fmt::format("{} must be a whole number from 1 to {}", key, most));
-    }
-    return narrow<std::size_t>(*value);
-  }
-
-  [[nodiscard]] const toml::array& array(std::string_view key, std::string_view like) const {
-    const toml::array* values = required(key).as_array();
-    if (values == nullptr) {
-      place(key).fail(fmt::format("{} must be a list, for example {}", key, like));
-    }
-    return *values;
-  }
-
-  [[nodiscard]] Vec3 vector(std::string_view key, Dimension dimension, std::string_view like) const {
-    return vector_of(required(key), key, dimension, like);
-  }
-
-  [[nodiscard]] Vec3 vector_of(const toml::node& node, std::string_view key, Dimension dimension,
-                               std::string_view like) const {
-    const toml::array* values = node.as_array();
-    if (values == nullptr || values->size() != 3) {
-      at(node.source()).fail(fmt::format("{} must be a list of three quantities, for example {}", key, like));
-    }
-    Vec3 result;
-    for (std::size_t i = 0; i < 3; ++i) {
-      result[i] = quantity_of((*values)[i], key, dimension);
-    }
-    return result;
-  }
-
-  [[nodiscard]] double quantity_of(const toml::node& node, std::string_view key, Dimension dimension) const {
-    const auto text = node.value_exact<std::string>();
-    try {
-      if (!text && (node.is_integer() || node.is_floating_point())) {
-        // The message of a bare number, which shows the right spelling.
-        return parse_quantity(fmt::format("{}", node.value<double>().value_or(0)), dimension);
-      }
-      if (!text) {
-        at(node.source()).fail(fmt::format("{} must be a text with a number and a unit", key));
-      }
-      return parse_quantity(*text, dimension);
-    } catch (const UsageError& error) {
-      at(node.source()).fail(fmt::format("{}: {}", key, error.what()));
-    }
-  }
-
-  [[nodiscard]] double number_of(const toml::node& node, std::string_view key) const {
-    const auto value = node.value<double>();
-    if (!value || !(node.is_integer() || node.is_floating_point()) || !std::isfinite(*value)) {
-      at(node.source()).fail(fmt::format("{} must be a finite number without a unit", key));
-    }
-    return *value;
-  }
-
-  [[nodiscard]] std::string text_of(const toml::node& node, std::string_view key) const {
-    const auto value = node.value_exact<std::string>();
-    if (!value) {
-      at(node.source()).fail(fmt::format("{} must be a text in quotes", key));
-    }
-    if (value->find('\0') != std::string::npos) {
-      at(node.source()).fail(fmt::format("{} holds a zero byte", key));
-    }
-    return *value;
-  }
-
-  [[nodiscard]] const toml::table& table(std::string_view key, std::string_view like) const {
-    const toml::table* inner = required(key).as_table();
-    if (inner == nullptr) {
-      place(key).fail(fmt::format("{} must be a table, for example {}", key, like));
-    }
-    return *inner;
-  }
-
-  [[nodiscard]] Place at(const toml::source_region& region) const {
-    return {fmt::format("{}:{}:{}", file_, region.begin.line, region.begin.column)};
-  }
-
-  [[nodiscard]] const std::string& file() const { return file_; }
-  [[nodiscard]] const std::string& name() const { return name_; }
-
-private:
-  const toml::table& table_;
-  const std::string& file_;
-  std::string name_;
-  Places places_;
-};
 
 constexpr std::string_view like_point = R"(["0mm", "0mm", "10mm"])";
 
@@ -404,18 +240,6 @@ void read_dynamic(const Table& run, DynamicRun& settings) {
   }
 }
 
-double read_cg_tolerance(const Table& run) {
-  const toml::node& node = run.required("cg_tolerance");
-  if (!node.is_string()) {
-    return run.number_of(node, "cg_tolerance");
-  }
-  try {
-    return parse_percent(run.text("cg_tolerance"));
-  } catch (const UsageError& error) {
-    run.place("cg_tolerance").fail(fmt::format("cg_tolerance: {}", error.what()));
-  }
-}
-
 void read_run(const toml::table& table, const std::string& file, Scene& scene) {
   constexpr std::array<std::string_view, 21> keys{
       "kind",    "geometry",   "load_steps",      "load_factors", "control",       "duration",   "step",
@@ -480,7 +304,7 @@ void read_run(const toml::table& table, const std::string& file, Scene& scene) {
   run.choice<Solver>("solver", scene.run.solver,
                      {{"auto", Solver::automatic}, {"cg", Solver::cg}, {"direct", Solver::direct}});
   if (run.has("cg_tolerance")) {
-    scene.run.cg_tolerance = read_cg_tolerance(run);
+    scene.run.cg_tolerance = run.part("cg_tolerance");
     scene.cg_tolerance_stated = true;
   }
   if (run.has("cg_iterations")) {
@@ -494,6 +318,33 @@ void read_run(const toml::table& table, const std::string& file, Scene& scene) {
   }
   if (run.has("every")) {
     scene.run.every = run.count("every");
+  }
+}
+
+void read_accuracy(const toml::table& node, const std::string& file, const fs::path& folder, Scene& scene) {
+  constexpr std::array<std::string_view, 3> keys{"within", "of", "target"};
+  const Table table(node, file, "[accuracy]", keys);
+  SceneAccuracy& accuracy = scene.accuracy.emplace();
+  accuracy.places = table.places();
+  accuracy.within = table.part("within");
+  if (table.has("of") && table.required("of").is_table()) {
+    constexpr std::array<std::string_view, 2> of_probe{"probe", "axis"};
+    const Table of(table.table("of", ""), file, "of", of_probe);
+    accuracy.of = Quantity::probe;
+    accuracy.probe = of.text("probe");
+    (void)of.required("axis");
+    of.choice<int>("axis", accuracy.axis, {{"x", 0}, {"y", 1}, {"z", 2}});
+  } else {
+    table.choice<Quantity>("of", accuracy.of,
+                           {{"displacement", Quantity::displacement},
+                            {"energy", Quantity::energy},
+                            {"volume", Quantity::volume},
+                            {"stress", Quantity::stress}});
+  }
+  if (table.has("target")) {
+    for (const auto& [name, path] : table.table("target", R"({vessel = "surface.ply"})")) {
+      accuracy.targets[std::string(name.str())] = folder / table.text_of(path, "target");
+    }
   }
 }
 
@@ -655,7 +506,7 @@ Scene read_scene(const fs::path& path) { return parse_scene(read_file(path, most
 Scene parse_scene(const std::string& text, const fs::path& name) {
   const std::string file = name.string();
   const toml::table root = parse_toml(text, file);
-  constexpr std::array<std::string_view, 5> sections{"run", "shell", "fix", "load", "probe"};
+  constexpr std::array<std::string_view, 6> sections{"run", "shell", "fix", "load", "probe", "accuracy"};
   constexpr std::array<std::string_view, 4> later{"solid", "rigid", "attach", "contact"};
   const Table top(root, file, "the scene", sections, later);
 
@@ -686,6 +537,12 @@ Scene parse_scene(const std::string& text, const fs::path& name) {
     const Table table(*node, file, "[[probe]]", probe_keys);
     scene.probes.push_back({table.text("name"), table.text("body"),
                             table.vector("nearest", dimension::length, like_point), table.places()});
+  }
+  if (const toml::node* node = root.get("accuracy")) {
+    if (!node->is_table()) {
+      top.place("accuracy").fail("accuracy must be written as [accuracy], once");
+    }
+    read_accuracy(*node->as_table(), file, name.parent_path(), scene);
   }
   settle_until(scene);
   settle_solver(scene);

@@ -296,6 +296,22 @@ void write_kind(const GravityLoad& load, Text& text) {
   text.line("value", vector(load.acceleration, "m/s2", dimension::acceleration));
 }
 
+void write_accuracy(const SceneAccuracy& accuracy, Text& text) {
+  text.section("[accuracy]");
+  text.line("within", number(accuracy.within));
+  if (accuracy.of == Quantity::probe) {
+    text.line("of", fmt::format("{{probe = {}, axis = \"{}\"}}", toml_string(accuracy.probe), "xyz"[accuracy.axis]));
+  } else {
+    text.word("of", name_of(accuracy.of));
+  }
+  std::vector<std::string> targets;
+  for (const auto& [body, path] : accuracy.targets) {
+    targets.push_back(fmt::format("{} = {}", toml_string(body),
+                                  toml_string(std::filesystem::absolute(path).lexically_normal().string())));
+  }
+  text.line("target", fmt::format("{{{}}}", fmt::join(targets, ", ")));
+}
+
 }  // namespace
 
 std::string scene_text(const Scene& scene) {
@@ -322,6 +338,9 @@ std::string scene_text(const Scene& scene) {
     text.word("name", probe.name);
     text.word("body", probe.body);
     text.line("nearest", point(probe.nearest));
+  }
+  if (scene.accuracy) {
+    write_accuracy(*scene.accuracy, text);
   }
   return text.str();
 }

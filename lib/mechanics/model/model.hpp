@@ -190,8 +190,10 @@ struct RunSettings {
   std::optional<std::size_t> cg_iterations;  ///< at most this many CG iterations in a solve
   bool cg_fixed_count = false;               ///< run exactly cg_iterations and ask for no tolerance (the paper's)
   double converge = 1e-8;                    ///< relative, scale-aware residual at which Newton's method stops
-  std::size_t newton_max = 20;               ///< 1 is the paper's: one linearisation per step
-  std::size_t every = 1;                     ///< hand over every n-th state
+  /// Newton's method also ends with an increment that is this part of the whole displacement; 0: only by the residual.
+  double settled = 0;
+  std::size_t newton_max = 20;  ///< 1 is the paper's: one linearisation per step
+  std::size_t every = 1;        ///< hand over every n-th state
 };
 
 }  // namespace tunica

@@ -16,8 +16,16 @@ namespace {
 
 // Of the body's area: one crease, rim or branch says nothing of the whole wall.
 constexpr double most_of_it = 0.5;
-// Of the diagonal of the body's box, beyond which theories of thin shells do not claim to hold.
-constexpr double thickest = 0.1;
+// Of the diagonal of the body's box. Thin shells leave out the shear through the wall: of a clamped disc of radius a
+// 3.2 / (1 - nu) (t / a)^2 of its deflection, 10 % where t is .15 a (nu = .3), a twentieth of the diagonal.
+constexpr double thickest = 0.05;
+// Times the sum of the principal curvatures. Pressure on the inner face of a thicker wall moves it 10 % less than a
+// thin one (Lamé), for that face is smaller by half of this.
+constexpr double thickest_curved = 0.25;
+// Of the wall: the error of the answer is one to three times that.
+constexpr double highest_waves = 0.05;
+// Of bow_share(), from where bending is some 20 % too stiff: h^2 = 4 R t on a cylinder.
+constexpr double largest_bow = 0.5;
 
 std::string at(const std::string& said_at, const std::string& otherwise) {
   return said_at.empty() ? otherwise : said_at + ": " + otherwise;
@@ -37,29 +45,105 @@ void doubt_thickness(const ShellBody& body, std::vector<std::string>& found) {
   const double most = *std::max_element(body.thickness.begin(), body.thickness.end());
   if (most > thickest * diagonal_mm) {
     found.push_back(
-        fmt::format("{}: its thickness, {:.4g} mm, is more than a tenth of the body's diagonal, {:.4g} mm: "
-                    "this is no thin shell; is the unit right?",
+        fmt::format("{}: its thickness, {:.4g} mm, is more than a twentieth of the body's diagonal, {:.4g} mm: "
+                    "this is no thin shell, whose wall does not shear; is the unit right?",
                     at(body.said_at, body.name), most, diagonal_mm));
     return;
   }
-  const std::vector<double> curvatures = largest_curvatures(body.mesh, body.curved);
-  std::vector<std::pair<double, double>> by_share;  // thickness over radius of curvature, area
-  double whole = 0;
+  const std::vector<Curvature> curvatures = curvatures_of(body.mesh, body.curved);
+  double whole = 0, through_itself = 0, thick = 0;
   for (std::size_t t = 0; t < curvatures.size(); ++t) {
     const auto& v = body.mesh.triangles[t];
     const auto& x = body.mesh.vertices;
-    by_share.emplace_back(thickness_of(body, t) * curvatures[t], triangle_area(x[v[0]], x[v[1]], x[v[2]]));
-    whole += by_share.back().second;
+    const double area = triangle_area(x[v[0]], x[v[1]], x[v[2]]);
+    whole += area;
+    through_itself += thickness_of(body, t) * curvatures[t].largest > 1 ? area : 0;
+    thick += thickness_of(body, t) * curvatures[t].sum > thickest_curved ? area : 0;
   }
-  double thick = 0;
-  for (const auto& [share, area] : by_share) {
-    thick += share > 1 ? area : 0;
-  }
-  if (thick > most_of_it * whole) {
+  if (through_itself > most_of_it * whole) {
     found.push_back(
         fmt::format("{}: its thickness, {:.4g} mm, is more than the radius of curvature over {:.0f} % of its "
                     "area: the wall would pass through itself; is the unit right?",
-                    at(body.said_at, body.name), most, 100 * thick / whole));
+                    at(body.said_at, body.name), most, 100 * through_itself / whole));
+  } else if (thick > most_of_it * whole) {
+    found.push_back(fmt::format(
+        "{}: its thickness, {:.4g} mm, is more than a quarter of a vessel's radius, or an eighth of a "
+        "ball's, over {:.0f} % of its area: pressure on the inner face moves so thick a wall some 10 % less "
+        "than this thin one",
+        at(body.said_at, body.name), most, 100 * thick / whole));
+  }
+}
+
+/// How much of a triangle's bending stretches it, as it does not stretch the surface, relative to the strain by bending
+/// at the faces: the ends of an edge of length l whose normals lean by b against the facet, across the edge, turn in
+/// its plane where the shell bends; the bow of the edge that follows strains the triangle, of area A, by l^3 b / (8 A)
+/// per curvature. On a cylinder it is h^2 / (8 R t), on a sphere two thirds of that.
+double bow_share(const ShellBody& body, const std::vector<Vec3>& of_vertices, std::size_t triangle) {
+  const auto& v = body.mesh.triangles[triangle];
+  const auto& x = body.mesh.vertices;
+  const Vec3 across = (x[v[1]] - x[v[0]]).cross(x[v[2]] - x[v[0]]);
+  if (!(across.norm() > 0)) {
+    return 0;
+  }
+  const auto normal = [&](std::size_t k) {
+    return of_vertices.empty() ? body.mesh.normal(triangle, k) : of_vertices[v[k]];
+  };
+  double largest = 0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const std::size_t next = (k + 1) % 3;
+    const Vec3 edge = x[v[next]] - x[v[k]];
+    const double lean = std::abs((normal(k) + normal(next)).dot(edge.cross(across).normalized())) / 2;
+    largest = std::max(largest, std::pow(edge.norm(), 3) * lean);
+  }
+  return largest / (4 * across.norm() * thickness_of(body, triangle));
+}
+
+/// An edge whose ends lean alike against it, by a, is an S: its mean height is a sixteenth of a times its length. On a
+/// smooth surface normals lean against each other, so that an S is what noise of normals leaves.
+void doubt_waves(const ShellBody& body, std::vector<std::string>& found) {
+  if (!body.curved || body.mesh.normals.size() != body.mesh.vertices.size()) {
+    return;
+  }
+  constexpr double mean_height = 1.0 / 16;
+  double waves = 0;
+  double whole = 0;
+  for (std::size_t t = 0; t < body.mesh.triangles.size(); ++t) {
+    const auto& v = body.mesh.triangles[t];
+    const auto& x = body.mesh.vertices;
+    const double area = triangle_area(x[v[0]], x[v[1]], x[v[2]]);
+    whole += area;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::size_t next = (k + 1) % 3;
+      const double lean = (body.mesh.normal(t, k) + body.mesh.normal(t, next)).dot(x[v[next]] - x[v[k]]) / 2;
+      waves += area / 3 * mean_height * std::abs(lean) / thickness_of(body, t);
+    }
+  }
+  if (waves > highest_waves * whole) {
+    found.push_back(
+        fmt::format("{}: its normals do not fit its nodes: the shells between them wave by {:.2g} % of the wall in the "
+                    "mean, which may cost three times as much of the answer: fit it again (tunica-relax)",
+                    at(body.said_at, body.name), 100 * waves / whole));
+  }
+}
+
+void doubt_coarseness(const ShellBody& body, std::vector<std::string>& found) {
+  const bool own =
+      body.curved && (!body.mesh.corner_normals.empty() || body.mesh.normals.size() == body.mesh.vertices.size());
+  const std::vector<Vec3> of_vertices = own ? std::vector<Vec3>() : vertex_normals(flat_facets(body.mesh));
+  double coarse = 0;
+  double whole = 0;
+  for (std::size_t t = 0; t < body.mesh.triangles.size(); ++t) {
+    const auto& v = body.mesh.triangles[t];
+    const auto& x = body.mesh.vertices;
+    const double area = triangle_area(x[v[0]], x[v[1]], x[v[2]]);
+    coarse += bow_share(body, of_vertices, t) > largest_bow ? area : 0;
+    whole += area;
+  }
+  if (coarse > most_of_it * whole) {
+    found.push_back(
+        fmt::format("{}: over {:.0f} % of its area the shells are too long for so thin a curved wall (h^2 > 4 R t), or "
+                    "too narrow: they bend too little, and uneven pressure moves single nodes too far: refine the mesh",
+                    at(body.said_at, body.name), 100 * coarse / whole));
   }
 }
 
@@ -157,6 +241,27 @@ bool stays_zero(const Ramp& ramp, const RunSettings& settings) {
          std::all_of(times.begin(), times.end(), [&](double time) { return ramp.at(time) == 0; });
 }
 
+// Whether a ramp changes by more than a tenth of its largest factor in less time than one step of a motion.
+bool jumps_within_a_step(const Ramp& ramp, const RunSettings& settings) {
+  const auto* dynamic = std::get_if<DynamicRun>(&settings.kind);
+  if (dynamic == nullptr || dynamic->adaptive) {
+    return false;
+  }
+  constexpr double notable = 0.1;
+  double largest = 0;
+  for (const auto& [time, factor] : ramp.points) {
+    largest = std::max(largest, std::abs(factor));
+  }
+  for (std::size_t i = 0; i + 1 < ramp.points.size(); ++i) {
+    const auto& [begin, from] = ramp.points[i];
+    const auto& [end, to] = ramp.points[i + 1];
+    if (end - begin < dynamic->step && std::abs(to - from) > notable * largest) {
+      return true;
+    }
+  }
+  return false;
+}
+
 void doubt_loads(const Model& model, const RunSettings& settings,
                  const std::vector<std::vector<std::array<bool, 6>>>& held, std::vector<std::string>& found) {
   for (const Load& load : model.loads) {
@@ -167,6 +272,11 @@ void doubt_loads(const Model& model, const RunSettings& settings,
       found.push_back(where + ": the ramp of this load is zero during the whole run, so it never acts");
     } else if (const auto on = shared(load); on && only_held_nodes_bear(*on, held[load.body])) {
       found.push_back(fmt::format("{}: this {} acts on held nodes only, so it moves nothing", where, on->name));
+    }
+    if (jumps_within_a_step(load.ramp, settings)) {
+      found.push_back(where +
+                      ": the ramp of this load changes within less than a step, so what it sets swinging is lost: "
+                      "take shorter steps");
     }
   }
   for (const Fix& fix : model.fixes) {
@@ -199,6 +309,8 @@ std::vector<std::string> doubts(const Model& model, const RunSettings& settings)
   for (std::size_t b = 0; b < model.shells.size(); ++b) {
     const ShellBody& body = model.shells[b];
     doubt_thickness(body, found);
+    doubt_coarseness(body, found);
+    doubt_waves(body, found);
     held.push_back(held_freedoms(model, b));
     if (cannot_move(model, b, held.back())) {
       found.push_back(at(body.said_at, body.name) + ": all its nodes are held, so nothing of it can move");
@@ -213,10 +325,10 @@ std::vector<std::string> doubts(const Model& model, const RunSettings& settings)
   return found;
 }
 
-std::vector<double> largest_curvatures(const ShellMesh& mesh, bool curved) {
+std::vector<Curvature> curvatures_of(const ShellMesh& mesh, bool curved) {
   const bool own = curved && (!mesh.corner_normals.empty() || mesh.normals.size() == mesh.vertices.size());
   const std::vector<Vec3> of_vertices = own ? std::vector<Vec3>() : vertex_normals(flat_facets(mesh));
-  std::vector<double> curvatures;
+  std::vector<Curvature> curvatures;
   curvatures.reserve(mesh.triangles.size());
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     const auto& v = mesh.triangles[t];
@@ -224,7 +336,7 @@ std::vector<double> largest_curvatures(const ShellMesh& mesh, bool curved) {
     const Vec3 along = mesh.vertices[v[1]] - mesh.vertices[v[0]];
     const Vec3 across = along.cross(mesh.vertices[v[2]] - mesh.vertices[v[0]]);
     if (!(across.norm() > 0)) {
-      curvatures.push_back(0);
+      curvatures.emplace_back();
       continue;
     }
     const Vec3 x = along.normalized();
@@ -242,7 +354,8 @@ std::vector<double> largest_curvatures(const ShellMesh& mesh, bool curved) {
       right += rows.transpose() * Vec2(turn.dot(x), turn.dot(y));
     }
     const Vec3 shape = left.ldlt().solve(right);  // xx, xy, yy
-    curvatures.push_back(std::abs(shape[0] + shape[2]) / 2 + std::hypot((shape[0] - shape[2]) / 2, shape[1]));
+    const double sum = std::abs(shape[0] + shape[2]);
+    curvatures.push_back({sum / 2 + std::hypot((shape[0] - shape[2]) / 2, shape[1]), sum});
   }
   return curvatures;
 }

@@ -14,16 +14,22 @@ bool prescribes(const Fix& fix);
 bool is_loaded(const Model& model);
 
 /// What of a model can be solved but hardly be meant, a sentence each that begins with where it was said: walls thicker
-/// than the radius of curvature over most of a body, or than a tenth of its diagonal; bodies that cannot move; forces
-/// and moments that only held nodes bear; loads that are zero or stay so during the run; nothing that loads at all
-/// (static and dynamic runs).
-/// The model must have passed check_model(). Cost: linear.
+/// than a quarter of a vessel's radius or an eighth of a ball's over most of a body, or than a twentieth of its
+/// diagonal; normals that do not fit the nodes; shells too long
+/// or too narrow for a curved wall so thin; bodies that cannot move; forces and moments that only held nodes bear;
+/// loads that are zero or stay so during the run, or jump within a step; nothing that loads at all (static and dynamic
+/// runs). The model must have passed check_model(). Cost: linear.
 std::vector<std::string> doubts(const Model& model, const RunSettings& settings);
 
-/// The larger principal curvature of the shells (1/mm, #F): of each the symmetric shape operator that fits best how the
+struct Curvature {
+  double largest = 0;  ///< 1/mm, of the principal ones
+  double sum = 0;      ///< of both, without its sign
+};
+
+/// Curvatures of the shells (#F): of each those of the symmetric shape operator that fits best how the
 /// normals turn along its edges; the corners' normals, or those of the vertices where `mesh` has none of its own
 /// (`curved` false: flat facets). Zero where a facet has no area.
 /// Source: Rusinkiewicz, "Estimating curvatures and their derivatives on triangle meshes", 3DPVT 2004, section 3.
-std::vector<double> largest_curvatures(const ShellMesh& mesh, bool curved);
+std::vector<Curvature> curvatures_of(const ShellMesh& mesh, bool curved);
 
 }  // namespace tunica

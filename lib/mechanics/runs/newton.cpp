@@ -133,7 +133,20 @@ private:
   /// At the floor of round-off a residual says nothing about the error any more; the increments still do.
   [[nodiscard]] bool at_rest() const {
     return result_.residual <= settings_.converge ||
-           (is_at_floor() && last_size_ <= largest_round_off * result_.reached);
+           (is_at_floor() && last_size_ <= largest_round_off * result_.reached) || is_settled();
+  }
+
+  /// What is left after an increment this small is smaller still: its square, or by the tolerance of the linear solver.
+  [[nodiscard]] bool is_settled() const {
+    if (!(settings_.settled > 0 && result_.stable && result_.linear_converged)) {
+      return false;
+    }
+    double sum = 0;
+    for (std::size_t i = 0; i < configuration_.displacement.size(); ++i) {
+      sum += configuration_.displacement[i].squaredNorm() +
+             system_.length * system_.length * logarithm(configuration_.rotation[i]).squaredNorm();
+    }
+    return last_size_ <= settings_.settled * std::sqrt(sum / real(configuration_.displacement.size()));
   }
 
   /// By the tangent; prescribed displacements move in the first. @return false where there is no solution.

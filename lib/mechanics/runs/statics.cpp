@@ -47,6 +47,8 @@ constexpr double largest_departure = 3;
 /// A shell that gives way by less than this part of its thickness (root mean square) has branched off its path; more is
 /// a snap.
 constexpr double largest_branch = 0.25;
+/// A configuration is near where Newton's method needs no more from there.
+constexpr std::size_t near_iterations = 5;
 /// Part of the thickness by which a shell is pushed off a path that it may leave.
 constexpr double nudge = 0.01;
 
@@ -246,7 +248,11 @@ private:
       }
       attempt.rotation[i] = exponential(turned);
     }
-    NewtonResult result = step_.run(target, target, attempt);
+    RunSettings few = settings_;
+    few.newton_max = std::min(settings_.newton_max, near_iterations);
+    LoadStep step(system_, model_, few);
+    step.tell_direct_error(true);
+    NewtonResult result = step.run(target, target, attempt);
     if (!result.converged || !may_stand(result)) {
       return std::nullopt;
     }

@@ -1,0 +1,40 @@
+#pragma once
+
+#include "tunica/accuracy/accuracy.hpp"
+
+namespace tunica {
+
+/// What one mesh says by one model.
+struct Answer {
+  Model model;
+  Summary summary;
+  std::vector<State> states;  ///< as solve() hands them over
+  State at;                   ///< where the quantity is largest: the last state of a static run
+  double value = 0;
+  double seconds = 0;
+};
+
+/// Errors: as solve(); InputError: no volume is enclosed, the quantity is zero.
+Answer answer_of(Model model, const RunSettings& settings, const AccuracyRequest& request,
+                 const std::optional<Checkpoint>& near = {});
+
+/// The model whose loads and prescribed displacements stay as a motion's end has them, for a static run. None where one
+/// of them is larger on the way.
+std::optional<Model> at_its_end(const Model& model, double duration);
+
+/// How a motion is followed.
+struct MotionChoice {
+  RunSettings settings;
+  bool at_rest = false;  ///< by the state of rest under the final loads
+  double error = 0;      ///< relative, that this leaves
+  std::vector<AccuracyChoice> choices;
+};
+
+/// By runs on one mesh: the step is halved until max(|D_k|, |D_(k-1)| / 2^order) is below `share`; then the longest one
+/// serves whose answer differs from the shortest one's by no more, or rest.
+/// @param answered  solves with these settings; a static run on at_its_end()
+/// @param may_rest  at_its_end() exists
+MotionChoice choose_motion(const RunSettings& settings, double share, bool may_rest,
+                           const std::function<Answer(const RunSettings&)>& answered);
+
+}  // namespace tunica
