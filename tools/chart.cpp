@@ -2,6 +2,9 @@
 #include "tunica/io/file/output_file.hpp"
 #include "tunica/io/result/report_chart.hpp"
 
+#include <charconv>
+#include <cmath>
+
 namespace {
 
 using namespace tunica;
@@ -12,22 +15,41 @@ Scale scale_of(const std::string& name) {
   return name == "log" ? Scale::logarithmic : name == "linear" ? Scale::linear : Scale::automatic;
 }
 
-std::vector<Report> read_good_reports(cli::Tool& tool, const std::vector<std::filesystem::path>& paths, Json& skipped) {
-  std::vector<Report> reports;
+struct Runs {
+  std::vector<Report> good;
+  std::vector<Report> failed;  ///< those to draw
+};
+
+Runs read_reports(cli::Tool& tool, const std::vector<std::filesystem::path>& paths, bool draws_failed, Json& skipped) {
+  Runs runs;
   for (const auto& path : paths) {
     Report report = read_report(tool.input(path));
     if (report.ok()) {
-      reports.push_back(std::move(report));
+      runs.good.push_back(std::move(report));
+    } else if (draws_failed) {
+      runs.failed.push_back(std::move(report));
     } else {
       tool.warn(path.string() + ": the run failed, its report is skipped");
       skipped.push_back(path.string());
     }
   }
-  if (reports.empty()) {
+  if (runs.good.empty()) {
     throw InputError(paths.front().string() + ": nothing to draw: every run failed; see the reports' key 'error'");
   }
-  name_apart(reports);
-  return reports;
+  name_apart(runs.good);
+  return runs;
+}
+
+ChartGuide guide_of(const std::string& line, const std::string& label) {
+  if (line == "diagonal") {
+    return {{}, label.empty() ? "y = x" : label};
+  }
+  double level = 0;
+  const auto [end, error] = std::from_chars(line.data(), line.data() + line.size(), level);
+  if (error != std::errc() || end != line.data() + line.size() || !std::isfinite(level)) {
+    throw UsageError("--guide " + line + ": 'diagonal' or a value of y");
+  }
+  return {level, label.empty() ? "y = " + line : label};
 }
 
 struct Arguments {
@@ -36,6 +58,8 @@ struct Arguments {
   std::filesystem::path csv;
   std::filesystem::path reference;
   ReportChartOptions options;
+  std::string guide;
+  std::string guide_label;
   std::string x_scale = "auto";
   std::string y_scale = "auto";
 };
@@ -59,6 +83,13 @@ void declare(cli::Tool& tool, Arguments& given) {
       .add_option("--reference", given.reference,
                   "a finer run: errors are taken against its probes, largest displacement or distance")
       ->type_name("REPORT");
+  arguments
+      .add_option("--failed", given.options.failed,
+                  "draw failed runs on the rim, too, the value of KEY (e.g. an exit code) beside them")
+      ->type_name("KEY");
+  arguments.add_option("--guide", given.guide, "a line to read marks by: 'diagonal' (y = x) or a value of y")
+      ->type_name("LINE");
+  arguments.add_option("--guide-label", given.guide_label, "what that line is, for the legend")->type_name("TEXT");
   tool.group("Output");
   arguments.add_option("--csv", given.csv, "write the numbers behind the picture")->type_name("OUT.csv");
   tool.group("Look");
@@ -82,10 +113,13 @@ void run(cli::Tool& tool, Arguments& given) {
     tool.output(given.csv, {".csv"});
   }
   Json skipped = Json::array();
-  std::vector<Report> reports;
+  Runs runs;
+  if (!given.guide.empty()) {
+    given.options.guide = guide_of(given.guide, given.guide_label);
+  }
   {
     const auto stage = tool.stage("read");
-    reports = read_good_reports(tool, given.paths, skipped);
+    runs = read_reports(tool, given.paths, given.options.failed.has_value(), skipped);
     if (!given.reference.empty()) {
       given.options.reference = read_report(tool.input(given.reference));
       if (!given.options.reference->ok()) {
@@ -99,7 +133,7 @@ void run(cli::Tool& tool, Arguments& given) {
     const auto stage = tool.stage("draw");
     given.options.x_scale = scale_of(given.x_scale);
     given.options.y_scale = scale_of(given.y_scale);
-    made = chart_of_reports(reports, given.options);
+    made = chart_of_reports(runs.good, runs.failed, given.options);
     svg = chart_svg(made.chart);
   }
   for (const std::string& warning : made.warnings) {
@@ -112,8 +146,8 @@ void run(cli::Tool& tool, Arguments& given) {
       write_file(given.csv, made.csv, tool.force());
     }
   }
-  tool.result() = {
-      {"x", made.x_key}, {"y", made.y_key}, {"marks", made.marks}, {"on_front", made.on_front}, {"skipped", skipped}};
+  tool.result() = {{"x", made.x_key},           {"y", made.y_key},           {"marks", made.marks},
+                   {"failures", made.failures}, {"on_front", made.on_front}, {"skipped", skipped}};
 }
 
 }  // namespace

@@ -16,11 +16,13 @@
 namespace tunica {
 namespace {
 
-constexpr double chart_height = 600;
-constexpr double plot_width = 720;
-constexpr double tick_size = 13;
-constexpr double label_size = 14.5;
-constexpr double mark_radius = 5.2;
+// Drawn at 380 pixels, the width of a phone, the ticks still have 9.
+constexpr double chart_width = 640;
+constexpr double plot_height = 400;
+constexpr double tick_size = 15.5;
+constexpr double label_size = 16;
+constexpr double title_size = 18;
+constexpr double mark_radius = 5.6;
 
 // Okabe and Ito's palette without its yellow, which is too pale for a mark on white.
 constexpr std::array<const char*, 7> palette{"#0072B2", "#D55E00", "#009E73", "#CC79A7",
@@ -119,6 +121,35 @@ std::string shortened(const std::string& text, std::size_t most) {
     out += characters[i];
   }
   return out;
+}
+
+// Shortens a text until it is no wider than this, in pixels.
+std::string fitted(const std::string& text, double width, double size) {
+  std::string out = shortened(text, 200);
+  for (std::size_t most = 200; most > 3 && text_width(out, size) > width; --most) {
+    out = shortened(text, most);
+  }
+  return out;
+}
+
+// Breaks a text between words into lines of this width, at most three.
+std::vector<std::string> wrapped(const std::string& text, double width, double size) {
+  std::vector<std::string> lines;
+  for (std::size_t start = 0; start < text.size();) {
+    const std::size_t end = std::min(text.find(' ', start), text.size());
+    const std::string word = text.substr(start, end - start);
+    const bool full = lines.empty() || text_width(lines.back() + " " + word, size) > width;
+    if (full && lines.size() < 3) {
+      lines.push_back(word);
+    } else {
+      lines.back() += " " + word;
+    }
+    start = end + 1;
+  }
+  for (std::string& line : lines) {
+    line = fitted(line, width, size);
+  }
+  return lines;
 }
 
 // -------------------------------------------------------------------------------------------------------------- axes
@@ -272,6 +303,63 @@ struct Point {
   double x = 0, y = 0;
 };
 
+// -------------------------------------------------------------------------------------------------------------- marks
+
+std::string colour(std::size_t series) { return palette[series % palette.size()]; }
+int shape(std::size_t series) { return narrow<int>(series % shapes); }
+
+std::string mark_shape(const Point& p, std::size_t series) {
+  const double r = mark_radius;
+  const auto polygon = [&](const std::vector<Point>& corners) {
+    std::string text = "<polygon points=\"";
+    for (const Point& c : corners) {
+      text += fmt::format("{:.2f},{:.2f} ", p.x + r * c.x, p.y + r * c.y);
+    }
+    text.back() = '"';
+    return text;
+  };
+  switch (shape(series)) {
+    case 0:
+      return fmt::format("<circle cx=\"{:.2f}\" cy=\"{:.2f}\" r=\"{}\"", p.x, p.y, r);
+    case 1:
+      return polygon({{-0.9, -0.9}, {0.9, -0.9}, {0.9, 0.9}, {-0.9, 0.9}});
+    case 2:
+      return polygon({{0, -1.2}, {1.1, 0.85}, {-1.1, 0.85}});
+    case 3:
+      return polygon({{0, -1.25}, {1.25, 0}, {0, 1.25}, {-1.25, 0}});
+    case 4:
+      return polygon({{0, 1.2}, {1.1, -0.85}, {-1.1, -0.85}});
+    case 5:  // plus
+      return polygon({{-.4, -1.2},
+                      {.4, -1.2},
+                      {.4, -.4},
+                      {1.2, -.4},
+                      {1.2, .4},
+                      {.4, .4},
+                      {.4, 1.2},
+                      {-.4, 1.2},
+                      {-.4, .4},
+                      {-1.2, .4},
+                      {-1.2, -.4},
+                      {-.4, -.4}});
+    case 6:  // cross
+      return polygon({{0, -.55},
+                      {.6, -1.15},
+                      {1.15, -.6},
+                      {.55, 0},
+                      {1.15, .6},
+                      {.6, 1.15},
+                      {0, .55},
+                      {-.6, 1.15},
+                      {-1.15, .6},
+                      {-.55, 0},
+                      {-1.15, -.6},
+                      {-.6, -1.15}});
+    default:  // hexagon
+      return polygon({{1.1, 0}, {.55, .95}, {-.55, .95}, {-1.1, 0}, {-.55, -.95}, {.55, -.95}});
+  }
+}
+
 class Drawing {
 public:
   explicit Drawing(const Chart& chart) : chart_(chart), front_(pareto_front(chart)) {
@@ -283,22 +371,32 @@ public:
         xs.push_back(mark.x);
         ys.push_back(mark.y);
       }
+      for (const ChartFailure& failure : series.failures) {
+        if (failure.x) {
+          xs.push_back(*failure.x);
+        }
+      }
     }
+    if (chart.guide && chart.guide->y) {
+      ys.push_back(*chart.guide->y);
+    }
+    title_ = wrapped(chart.title, chart_width - 40, title_size);
     x_ = make_axis(chart.x.scale, xs);
     y_ = make_axis(chart.y.scale, ys);
     double widest = 0;
     for (const Tick& tick : y_.ticks) {
       widest = std::max(widest, tick_width(tick));
     }
-    plot_.left = 24 + label_size + 12 + widest + 10;
-    plot_.right = plot_.left + plot_width;
-    plot_.top = chart.title.empty() ? 44 : 68;
-    plot_.bottom = chart_height - 66;
+    plot_.left = 12 + label_size + 10 + widest + 10;
+    plot_.right = chart_width - 26;
+    plot_.top = 36 + title_line * real(title_.size());
+    plot_.bottom = plot_.top + plot_height;
   }
 
   std::string svg() {
-    const std::string legend = draw_legend();
-    const double width = std::ceil(legend_right_);
+    const double bottom = draw_legend();
+    std::string legend;
+    std::swap(legend, out_);
     out_ = fmt::format(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n"
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0:.0f}\" height=\"{1:.0f}\" viewBox=\"0 0 {0:.0f} "
@@ -306,18 +404,18 @@ public:
         "font-family=\"Helvetica, Arial, 'Liberation Sans', 'DejaVu Sans', sans-serif\">\n"
         "<title>{2}</title>\n"
         "<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n",
-        width, chart_height, safe(chart_.title.empty() ? chart_.y.label + " against " + chart_.x.label : chart_.title));
-    if (!chart_.title.empty()) {
-      const double size = std::clamp(18 * (width - 48) / std::max(1.0, text_width(chart_.title, 18)), 11.0, 18.0);
-      const auto fits = truncated<std::size_t>(std::max(10.0, (width - 48) / (0.55 * size)));
-      write(24, 34, shortened(chart_.title, fits), size, "fill=\"#1a1a1a\" font-weight=\"bold\"");
+        chart_width, std::ceil(bottom),
+        safe(chart_.title.empty() ? chart_.y.label + " against " + chart_.x.label : chart_.title));
+    for (std::size_t i = 0; i < title_.size(); ++i) {
+      write(20, 30 + title_line * real(i), title_[i], title_size, "fill=\"#1a1a1a\" font-weight=\"bold\"");
     }
     draw_axes();
+    draw_guide();
     draw_front();
     draw_marks();
+    draw_failures();
     draw_labels();
-    out_ += legend;
-    return out_ + "</svg>\n";
+    return out_ + legend + "</svg>\n";
   }
 
 private:
@@ -360,7 +458,7 @@ private:
       }
       line(x, plot_.top, x, plot_.bottom, grid);
       line(x, plot_.bottom, x, plot_.bottom + 6, small);
-      write_tick(x, plot_.bottom + 21, tick, "middle");
+      write_tick(x, plot_.bottom + 23, tick, "middle");
     }
     for (const Tick& tick : y_.ticks) {
       const double y = plot_.bottom - *y_.place(tick.value) * (plot_.bottom - plot_.top);
@@ -376,11 +474,11 @@ private:
     line(plot_.left, plot_.top, plot_.left, plot_.bottom, frame);
     line(plot_.left, plot_.bottom, plot_.right, plot_.bottom, frame);
     draw_breaks();
-    write((plot_.left + plot_.right) / 2, plot_.bottom + 50, shortened(chart_.x.label, 90), label_size,
+    write(chart_width / 2, plot_.bottom + 52, fitted(chart_.x.label, chart_width - 24, label_size), label_size,
           "fill=\"#1a1a1a\" text-anchor=\"middle\"");
-    const double x = 24 + 0.5 * label_size;
+    const double x = 12 + 0.7 * label_size;
     const double y = (plot_.top + plot_.bottom) / 2;
-    write(x, y, shortened(chart_.y.label, 64), label_size,
+    write(x, y, fitted(chart_.y.label, plot_height + 60, label_size), label_size,
           fmt::format("fill=\"#1a1a1a\" text-anchor=\"middle\" transform=\"rotate(-90 {:.1f} {:.1f})\"", x, y));
   }
 
@@ -433,58 +531,17 @@ private:
     out_ += fmt::format("<path class=\"front\" d=\"{}\" {}/>\n", path, front_style);
   }
 
-  static std::string colour(std::size_t series) { return palette[series % palette.size()]; }
-  static int shape(std::size_t series) { return narrow<int>(series % shapes); }
-
-  static std::string mark_shape(const Point& p, std::size_t series) {
-    const double r = mark_radius;
-    const auto polygon = [&](const std::vector<Point>& corners) {
-      std::string text = "<polygon points=\"";
-      for (const Point& c : corners) {
-        text += fmt::format("{:.2f},{:.2f} ", p.x + r * c.x, p.y + r * c.y);
-      }
-      text.back() = '"';
-      return text;
-    };
-    switch (shape(series)) {
-      case 0:
-        return fmt::format("<circle cx=\"{:.2f}\" cy=\"{:.2f}\" r=\"{}\"", p.x, p.y, r);
-      case 1:
-        return polygon({{-0.9, -0.9}, {0.9, -0.9}, {0.9, 0.9}, {-0.9, 0.9}});
-      case 2:
-        return polygon({{0, -1.2}, {1.1, 0.85}, {-1.1, 0.85}});
-      case 3:
-        return polygon({{0, -1.25}, {1.25, 0}, {0, 1.25}, {-1.25, 0}});
-      case 4:
-        return polygon({{0, 1.2}, {1.1, -0.85}, {-1.1, -0.85}});
-      case 5:  // plus
-        return polygon({{-.4, -1.2},
-                        {.4, -1.2},
-                        {.4, -.4},
-                        {1.2, -.4},
-                        {1.2, .4},
-                        {.4, .4},
-                        {.4, 1.2},
-                        {-.4, 1.2},
-                        {-.4, .4},
-                        {-1.2, .4},
-                        {-1.2, -.4},
-                        {-.4, -.4}});
-      case 6:  // cross
-        return polygon({{0, -.55},
-                        {.6, -1.15},
-                        {1.15, -.6},
-                        {.55, 0},
-                        {1.15, .6},
-                        {.6, 1.15},
-                        {0, .55},
-                        {-.6, 1.15},
-                        {-1.15, .6},
-                        {-.55, 0},
-                        {-1.15, -.6},
-                        {-.6, -1.15}});
-      default:  // hexagon
-        return polygon({{1.1, 0}, {.55, .95}, {-.55, .95}, {-1.1, 0}, {-.55, -.95}, {.55, -.95}});
+  void draw_guide() {
+    if (!chart_.guide) {
+      return;
+    }
+    const auto level = chart_.guide->y;
+    const double low = std::max(x_.low, y_.low);
+    const double high = std::min(x_.high, y_.high);
+    const auto from = point({level ? x_.low : low, level.value_or(low), "", ""});
+    const auto to = point({level ? x_.high : high, level.value_or(high), "", ""});
+    if (from && to && (level || low < high)) {
+      line(from->x, from->y, to->x, to->y, guide_style);
     }
   }
 
@@ -518,36 +575,83 @@ private:
     }
   }
 
-  // Each label at the first of eight places beside its mark that is free; none where all are taken.
+  void draw_failures() {
+    if (has_failures()) {
+      const double rim = rim_y();
+      line(plot_.left, rim, plot_.right, rim, "stroke=\"#555555\" stroke-width=\"0.8\" stroke-dasharray=\"1 3\"");
+    }
+    for (std::size_t s = 0; s < chart_.series.size(); ++s) {
+      for (const ChartFailure& failure : chart_.series[s].failures) {
+        const Point p = rim_point(failure);
+        out_ += fmt::format("{} class=\"failure\" {}><title>{}</title></{}>\n", mark_shape(p, s), hollow(colour(s)),
+                            safe(fmt::format("{}{}{}: {}", chart_.series[s].name,
+                                             chart_.series[s].name.empty() ? "" : ", ", failure.name, failure.label)),
+                            shape(s) == 0 ? "circle" : "polygon");
+        taken_.push_back({p.x - mark_radius, p.y - mark_radius, p.x + mark_radius, p.y + mark_radius});
+      }
+    }
+  }
+
+  [[nodiscard]] bool has_failures() const {
+    return std::ranges::any_of(chart_.series, [](const ChartSeries& series) { return !series.failures.empty(); });
+  }
+
+  [[nodiscard]] double rim_y() const { return chart_.y.more_is_better ? plot_.bottom : plot_.top; }
+
+  [[nodiscard]] Point rim_point(const ChartFailure& failure) const {
+    const auto x = failure.x ? x_.place(*failure.x) : std::nullopt;
+    return {plot_.left + x.value_or(chart_.x.more_is_better ? 0 : 1) * (plot_.right - plot_.left), rim_y()};
+  }
+
+  static std::string hollow(const std::string& stroke) {
+    return fmt::format("fill=\"#ffffff\" stroke=\"{}\" stroke-width=\"2\"", stroke);
+  }
+
   void draw_labels() {
-    constexpr double size = 11.5;
     for (const ChartSeries& series : chart_.series) {
+      for (const ChartFailure& failure : series.failures) {
+        draw_label(rim_point(failure), failure.label);
+      }
       for (const ChartMark& mark : series.marks) {
-        const auto p = point(mark);
-        if (!p || mark.label.empty()) {
-          continue;
-        }
-        const std::string text = shortened(mark.label, 28);
-        const double width = text_width(text, size);
-        constexpr double near = mark_radius + 3;
-        for (const Point& side : {Point{1, -1}, {1, 0}, {1, 1}, {0, -1}, {0, 1}, {-1, -1}, {-1, 0}, {-1, 1}}) {
-          const double left = p->x + side.x * (side.y == 0 ? near + 2 : near - 2) + (side.x - 1) / 2 * width;
-          const double middle = p->y + side.y * (side.x == 0 ? near + 6 : near + 1);
-          const Rectangle box{left, middle - 0.5 * size, left + width, middle + 0.5 * size};
-          const bool free =
-              plot_.holds(box) && std::ranges::none_of(taken_, [&](const Rectangle& r) { return r.meets(box); });
-          if (free) {
-            write(left, middle + 0.36 * size, text, size, "fill=\"#444444\"");
-            taken_.push_back(box);
-            break;
-          }
+        if (const auto p = point(mark)) {
+          draw_label(*p, mark.label);
         }
       }
     }
   }
 
-  // @return the elements; sets legend_right_, which decides the width of the picture.
-  std::string draw_legend() {
+  // At the first of eight places beside the mark that is free; not at all where every one is taken.
+  void draw_label(const Point& p, const std::string& label) {
+    if (label.empty()) {
+      return;
+    }
+    constexpr double size = 13;
+    constexpr double near = mark_radius + 3;
+    const std::string text = shortened(label, 28);
+    const double width = text_width(text, size);
+    const Rectangle region{plot_.left, plot_.top - 20, chart_width - 4, plot_.bottom};
+    for (const Point& side : {Point{1, -1}, {1, 0}, {1, 1}, {0, -1}, {0, 1}, {-1, -1}, {-1, 0}, {-1, 1}}) {
+      const double left = p.x + side.x * (side.y == 0 ? near + 2 : near - 2) + (side.x - 1) / 2 * width;
+      const double middle = p.y + side.y * (side.x == 0 ? near + 6 : near + 1);
+      const Rectangle box{left, middle - 0.5 * size, left + width, middle + 0.5 * size};
+      if (region.holds(box) && std::ranges::none_of(taken_, [&](const Rectangle& r) { return r.meets(box); })) {
+        write(left, middle + 0.36 * size, text, size, "fill=\"#444444\"");
+        taken_.push_back(box);
+        return;
+      }
+    }
+  }
+
+  struct LegendEntry {
+    std::string line;  ///< style of a line, empty: none
+    std::optional<std::size_t> series;
+    std::string mark;  ///< how that of the series is filled
+    std::string text;
+  };
+
+  [[nodiscard]] std::vector<LegendEntry> legend_entries() const {
+    constexpr std::size_t most_names = 40;
+    std::vector<LegendEntry> entries;
     std::vector<std::size_t> named;
     bool any = false;
     for (std::size_t s = 0; s < chart_.series.size(); ++s) {
@@ -556,80 +660,81 @@ private:
         named.push_back(s);
       }
     }
-    legend_right_ = plot_.right + 30;
-    if (!any) {
-      return {};
-    }
-    std::swap(out_, held_);
-    if (!named.empty()) {
-      draw_legend_column(named);
-    } else if (has_front()) {
-      line(plot_.right - 130, plot_.top - 14, plot_.right - 96, plot_.top - 14, front_style);
-      write(plot_.right - 88, plot_.top - 9.5, "Pareto front", tick_size, "fill=\"#333333\"");
-    }
-    std::swap(out_, held_);
-    return held_;
-  }
-
-  void draw_legend_column(const std::vector<std::size_t>& named) {
-    constexpr double row = 21;
-    constexpr std::size_t most_rows = 20;
-    constexpr std::size_t most_names = 2 * most_rows;
-    const double top = plot_.top + 6;
-    double left = plot_.right + 34;
-    double widest = 0;
-    double y = top;
-    const auto entry = [&](const std::string& text, double indent) {
-      const std::string name = shortened(text, 34);
-      write(left + indent, y + 0.36 * tick_size, name, tick_size, "fill=\"#333333\"");
-      widest = std::max(widest, indent + text_width(name, tick_size));
-    };
-    if (!chart_.series_title.empty()) {
-      const std::string title = shortened(chart_.series_title, 40);
-      write(left - 6, y + 0.36 * tick_size, title, tick_size, "fill=\"#1a1a1a\" font-weight=\"bold\"");
-      widest = text_width(title, 1.08 * tick_size);
-      y += row;
-    }
-    if (has_front()) {
-      line(left - 8, y, left + 22, y, front_style);
-      entry("Pareto front", 30);
-      y += row;
-    }
-    const double first = y;
     const std::size_t shown = named.size() > most_names ? most_names - 1 : named.size();
     for (std::size_t i = 0; i < shown; ++i) {
-      if (i == most_rows) {
-        left += widest + 28;
-        widest = 0;
-        y = first;
-      }
       const std::size_t s = named[i];
-      if (chart_.series[s].joined) {
-        line(left - 8, y, left + 22, y, fmt::format("stroke=\"{}\" stroke-width=\"1.8\"", colour(s)));
-      }
-      out_ += fmt::format("{} fill=\"{}\" stroke=\"#ffffff\" stroke-width=\"1\"/>\n", mark_shape({left + 7, y}, s),
-                          colour(s));
-      entry(chart_.series[s].name, 30);
-      y += row;
+      entries.push_back(
+          {chart_.series[s].joined ? fmt::format("fill=\"none\" stroke=\"{}\" stroke-width=\"1.8\"", colour(s)) : "", s,
+           fmt::format("fill=\"{}\" stroke=\"#ffffff\" stroke-width=\"1\"", colour(s)), chart_.series[s].name});
     }
     if (shown < named.size()) {
-      entry(fmt::format("… and {} more", named.size() - shown), 30);
+      entries.push_back({"", {}, "", fmt::format("… and {} more", named.size() - shown)});
     }
-    legend_right_ = left + widest + 24;
+    if (any && has_front()) {
+      entries.push_back({front_style, {}, "", "Pareto front"});
+    }
+    if (chart_.guide) {
+      entries.push_back({guide_style, {}, "", chart_.guide->label});
+    }
+    if (has_failures()) {
+      entries.push_back({"", 0, hollow("#555555"), "hollow, on the rim: failed"});
+    }
+    return entries;
+  }
+
+  // The way in which a chart with a front gets better.
+  [[nodiscard]] std::string better() const {
+    return fmt::format("{} {} is better", chart_.y.more_is_better ? "Upper" : "Lower",
+                       chart_.x.more_is_better ? "right" : "left");
+  }
+
+  // In as many columns as fit. @return the bottom of the picture
+  double draw_legend() {
+    constexpr double row = 24;
+    double y = plot_.bottom + 84;
+    std::string head = chart_.series_title;
+    if (has_front()) {
+      head += (head.empty() ? "" : ". ") + better();
+    }
+    if (!head.empty()) {
+      write(20, y, fitted(head, chart_width - 40, tick_size), tick_size, "fill=\"#1a1a1a\" font-weight=\"bold\"");
+      y += row;
+    }
+    std::vector<LegendEntry> entries = legend_entries();
+    double widest = 1;
+    for (LegendEntry& entry : entries) {
+      entry.text = fitted(entry.text, chart_width - 70, tick_size);
+      widest = std::max(widest, 42 + text_width(entry.text, tick_size) + 14);
+    }
+    const auto columns = std::max<std::size_t>(1, truncated<std::size_t>((chart_width - 30) / widest));
+    const std::size_t rows = (entries.size() + columns - 1) / columns;
+    for (std::size_t i = 0; i < entries.size(); ++i) {
+      const double left = 20 + widest * real(i / rows);
+      const double middle = y + row * real(i % rows) - 0.36 * tick_size;
+      if (!entries[i].line.empty()) {
+        line(left, middle, left + 32, middle, entries[i].line);
+      }
+      if (entries[i].series) {
+        out_ += mark_shape({left + 16, middle}, *entries[i].series) + " " + entries[i].mark + "/>\n";
+      }
+      write(left + 42, y + row * real(i % rows), entries[i].text, tick_size, "fill=\"#333333\"");
+    }
+    return y + row * real(rows) - 4;
   }
 
   static constexpr const char* front_style =
       "fill=\"none\" stroke=\"#8a8a8a\" stroke-width=\"1.4\" stroke-dasharray=\"6 4\"";
+  static constexpr const char* guide_style = "fill=\"none\" stroke=\"#555555\" stroke-width=\"1.2\"";
+  static constexpr double title_line = 24;
 
   const Chart& chart_;
   std::vector<std::vector<bool>> front_;
   Axis x_;
   Axis y_;
   Rectangle plot_;
-  double legend_right_ = 0;
+  std::vector<std::string> title_;
   std::vector<Rectangle> taken_;
   std::string out_;
-  std::string held_;
 };
 
 }  // namespace

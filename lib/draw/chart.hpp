@@ -1,6 +1,7 @@
 // draw: charts and pictures, as text and bytes; no file is touched.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -26,10 +27,24 @@ struct ChartMark {
   std::string label;  ///< empty, or drawn beside the mark where there is room
 };
 
+/// A run without an answer: a hollow mark on the rim, at the worse end of y, and of x too where it has no x.
+struct ChartFailure {
+  std::optional<double> x;
+  std::string name;   ///< shown when the pointer rests on the mark
+  std::string label;  ///< drawn beside the mark where there is room: its exit code
+};
+
 struct ChartSeries {
   std::string name;  ///< empty: not in the legend
   std::vector<ChartMark> marks;
   bool joined = false;  ///< a line joins the marks in their order
+  std::vector<ChartFailure> failures = {};
+};
+
+/// A grey line to read the marks by.
+struct ChartGuide {
+  std::optional<double> y;  ///< a level of y; none: the diagonal y = x
+  std::string label;        ///< in the legend
 };
 
 struct Chart {
@@ -38,6 +53,7 @@ struct Chart {
   ChartAxis y;
   std::string series_title;  ///< heading of the legend
   std::vector<ChartSeries> series;
+  std::optional<ChartGuide> guide;
 };
 
 /// For each mark of each series whether it is on the Pareto front: no other mark is better in one coordinate and at
@@ -48,8 +64,8 @@ std::vector<std::vector<bool>> pareto_front(const Chart& chart);
 Scale resolved_scale(Scale wanted, const std::vector<double>& values);
 
 /// Draws a chart as SVG: round ticks, light grid, marks that differ in colour and shape (colour-blind-safe), the Pareto
-/// front, where both axes are ranked, as a dashed staircase, a legend at the right. Plain text in the reader's own
-/// sans-serif font; UTF-8.
+/// front, where both axes are ranked, as a dashed staircase, a legend below. As wide as a column of text: readable at
+/// 380 pixels, too. Plain text in the reader's own sans-serif font; UTF-8.
 /// @param chart  finite values; a chart without marks gives empty axes
 /// Limits: beyond 40 series the legend ends with "and … more".
 std::string chart_svg(const Chart& chart);

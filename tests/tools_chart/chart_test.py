@@ -230,6 +230,46 @@ class WhatIsDrawn(ChartCase):
                 self.assertGreaterEqual(left, 0)
                 self.assertLessEqual(left + length, width)
 
+    def test_failed_runs_stand_on_the_rim_with_their_code(self):
+        good = [self.write(f"{i}.json", relax(1, 1.0 / i, float(i), way="a")) for i in (1, 100)]
+        late = self.write("late.json", {**report(ok=False, seconds={"relax": 10.0}, way="a"), "exit": "exit 4"})
+        lost = self.write("lost.json", {**report(ok=False, way="b"), "exit": "exit 3"})
+        root, head, rows = self.draw(*good, late, lost, "--failed", "exit", "--series", "result.way")
+        failures = [e for e in root.iter() if e.get("class") == "failure"]
+        self.assertEqual(len(failures), 2)
+        self.assertEqual(len(marks(root)), 2)
+        self.assertTrue({"exit 4", "exit 3", "a", "b"} <= set(texts(root)))
+        (first, top), (last, _) = marks(root)
+        self.assertAlmostEqual(float(failures[0].get("cx")), (first + last) / 2, delta=0.1)
+        self.assertLess(float(failures[0].get("cy")), top)
+        self.assertEqual([row[3:6] + row[7:8] for row in rows[2:]], [["a", "10", "", "exit 4"], ["b", "", "", "exit 3"]])
+        self.assertEqual([row[6] for row in rows], ["1", "1", "0", "0"])
+        self.out.unlink()
+        self.refused(3, lost, "--failed", "exit", says=["every run failed"])
+        self.refused(3, good[0], late, "--failed", "nothing", says=["late.json", "nothing"])
+
+    def test_guides_to_read_marks_by(self):
+        run = self.write("a.json", relax(1, 0.5, 1.0))
+        root, _, _ = self.draw(run, "--guide", "diagonal", "--guide-label", "as asked for")
+        self.assertIn("as asked for", texts(root))
+        root, _, _ = self.draw(run, self.write("b.json", relax(1, 100.0, 2.0)), "--guide", "1000")
+        self.assertIn("y = 1000", texts(root))
+        self.assertIn("1000", texts(root), "the axis does not reach the guide")
+        for line in ("steep", "1e999", "nan"):
+            refused = self.run_chart(run, "-o", self.folder / "none.svg", "--guide", line)
+            self.assertEqual(refused.returncode, 2, line)
+
+    def test_commands_stand_in_the_table(self):
+        _, head, rows = self.draw(self.write("a.json", {**relax(1, 0.5, 1.0), "command": "tunica-relax a 'b c'"}))
+        self.assertEqual(rows[0][head.index("command")], "tunica-relax a 'b c'")
+
+    def test_a_title_breaks_between_words(self):
+        title = "one two three four five six seven eight nine ten " * 2
+        root, _, _ = self.draw(self.write("a.json", relax(1, 0.5, 1.0)), "--title", title.strip())
+        lines = [text for text in texts(root) if "three" in text or "nine" in text]
+        self.assertGreater(len(lines), 1)
+        self.assertEqual(" ".join(lines), title.strip())
+
     def test_report_of_the_run(self):
         runs = [self.write("a.json", relax(1, 1.0, 1.0)), self.write("b.json", report(ok=False))]
         self.draw(*runs, "--report", self.folder / "r.json", warnings=1)

@@ -249,21 +249,53 @@ void drop_negative(std::vector<Row>& rows, const ReportChartOptions& options, st
   }
 }
 
-std::string csv_of(const std::vector<std::pair<Row, bool>>& rows, const Coordinate& x, const Coordinate& y,
-                   const ReportChartOptions& options) {
-  std::string csv = fmt::format("report,tool,index,{},{},{},pareto_front\n",
+struct Failure {
+  const Report* report = nullptr;
+  std::string series;
+  ChartFailure mark;
+};
+
+std::vector<Failure> failures_of(const std::vector<Report>& failed, const std::string& x,
+                                 const ReportChartOptions& options) {
+  std::vector<Failure> failures;
+  for (const Report& report : failed) {
+    const auto number = has_number(report, x) ? numbers_at(report, x).back() : std::nullopt;
+    const bool shown = number && !(options.x_scale == Scale::logarithmic && *number < 0);
+    failures.push_back({&report,
+                        options.series ? texts_at(report, *options.series).front() : "",
+                        {shown ? number : std::nullopt, report.name,
+                         options.failed ? texts_at(report, *options.failed).front() : ""}});
+  }
+  return failures;
+}
+
+std::string csv_of(const std::vector<std::pair<Row, bool>>& rows, const std::vector<Failure>& failures,
+                   const Coordinate& x, const Coordinate& y, const ReportChartOptions& options) {
+  std::string csv = fmt::format("report,tool,index,{},{},{},pareto_front,failed,command\n",
                                 csv_field(options.series ? "series " + *options.series : "series"), csv_field(x.key),
                                 csv_field(y.key));
+  const auto command = [](const Report& report) {
+    const auto found = report.json.find("command");
+    return csv_field(found != report.json.end() ? shown(*found) : "");
+  };
   for (const auto& [row, front] : rows) {
-    csv += fmt::format("{},{},{},{},{},{},{}\n", csv_field(row.report->path.string()), csv_field(row.report->tool()),
-                       row.index, csv_field(row.series), row.mark.x, row.mark.y, front ? 1 : 0);
+    csv +=
+        fmt::format("{},{},{},{},{},{},{},,{}\n", csv_field(row.report->path.string()), csv_field(row.report->tool()),
+                    row.index, csv_field(row.series), row.mark.x, row.mark.y, front ? 1 : 0, command(*row.report));
+  }
+  for (const Failure& failure : failures) {
+    csv += fmt::format("{},{},0,{},{},,0,{},{}\n", csv_field(failure.report->path.string()),
+                       csv_field(failure.report->tool()), csv_field(failure.series),
+                       failure.mark.x ? fmt::format("{}", *failure.mark.x) : "", csv_field(failure.mark.label),
+                       command(*failure.report));
   }
   return csv;
 }
 
 }  // namespace
 
-ReportChart chart_of_reports(const std::vector<Report>& reports, const ReportChartOptions& options) {
+ReportChart chart_of_reports(const std::vector<Report>& reports, const std::vector<Report>& failed,
+                             const ReportChartOptions& options) {
   TUNICA_ASSERT(!reports.empty());
   const Coordinate x = options.x ? by_key(reports, *options.x) : time_of(reports);
   const Coordinate y = options.y && options.reference ? key_against_reference(reports, *options.y, *options.reference)
@@ -288,6 +320,7 @@ ReportChart chart_of_reports(const std::vector<Report>& reports, const ReportCha
   // Marks of a list belong together: without --series each report is a line of its own.
   const bool lists = std::ranges::any_of(rows, [](const Row& row) { return row.index > 0; });
   const bool named = options.series.has_value();
+  const std::vector<Failure> failures = failures_of(failed, x.key, options);
   chart.series_title = named ? (*options.series == "file" ? "File" : describe_key(*options.series)) : "";
   std::map<std::string, std::size_t> place;
   std::map<const Report*, std::size_t> line_of;
@@ -299,6 +332,13 @@ ReportChart chart_of_reports(const std::vector<Report>& reports, const ReportCha
     }
     chart.series[entry->second].marks.push_back(row.mark);
   }
+  for (const Failure& failure : failures) {
+    const auto [entry, added] = place.try_emplace(failure.series, chart.series.size());
+    if (added) {
+      chart.series.push_back({failure.series, {}, options.joined});
+    }
+    chart.series[entry->second].failures.push_back(failure.mark);
+  }
   sort_series(chart.series);
   if (options.joined) {
     for (ChartSeries& series : chart.series) {
@@ -306,7 +346,9 @@ ReportChart chart_of_reports(const std::vector<Report>& reports, const ReportCha
     }
   }
 
+  chart.guide = options.guide;
   made.marks = rows.size();
+  made.failures = failures.size();
   const auto front = pareto_front(chart);
   for (const auto& flags : front) {
     made.on_front += narrow<std::size_t>(std::ranges::count(flags, true));
@@ -325,7 +367,7 @@ ReportChart chart_of_reports(const std::vector<Report>& reports, const ReportCha
     const bool best = std::ranges::binary_search(on_front, std::pair(row.mark.x, row.mark.y));
     flagged.emplace_back(std::move(row), best);
   }
-  made.csv = csv_of(flagged, x, y, options);
+  made.csv = csv_of(flagged, failures, x, y, options);
   return made;
 }
 

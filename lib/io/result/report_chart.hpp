@@ -13,6 +13,8 @@ struct ReportChartOptions {
   std::optional<std::string> series;  ///< marks of one value share colour, shape and legend entry; `file`: its name
   std::optional<std::string> label;   ///< drawn beside each mark; `file`: the report's file name
   std::optional<Report> reference;    ///< errors are taken against this finer run
+  std::optional<std::string> failed;  ///< draw failed runs on the rim, the value of this key beside them
+  std::optional<ChartGuide> guide;
   std::string title;
   std::optional<std::string> x_label;  ///< none: from the key
   std::optional<std::string> y_label;
@@ -27,6 +29,7 @@ struct ReportChart {
   std::string x_key;  ///< what was drawn, also where it was chosen here
   std::string y_key;
   std::size_t marks = 0;
+  std::size_t failures = 0;  ///< on the rim
   std::size_t on_front = 0;
   std::vector<std::string> warnings;  ///< what was left out, and why
 };
@@ -35,9 +38,12 @@ struct ReportChart {
 /// Time is `result.ms_per_step.median` where all runs are simulations that have it, else the seconds of each tool's
 /// algorithm alone. Error is the upper bound of the distance for decimate, relax and compare, the difference between
 /// the volumes of mesh and voxels for extract, the algebraic error or else the residual for simulate, or what
-/// error_against() finds. With `y` and `reference` the error is the relative difference of that key, in percent.
-/// Errors: InputError naming the file where a key is missing or not a number, or when nothing is left to draw.
-ReportChart chart_of_reports(const std::vector<Report>& reports, const ReportChartOptions& options);
+/// error_against() finds. Reports of failed runs give marks on the rim: at their x where they have one, else in the
+/// corner; their y is left out of the table. With `y` and `reference` the error is the relative difference of that key,
+/// in percent. Errors: InputError naming the file where a key is missing or not a number, or when nothing is left to
+/// draw.
+ReportChart chart_of_reports(const std::vector<Report>& reports, const std::vector<Report>& failed,
+                             const ReportChartOptions& options);
 
 /// A label for an axis from a dotted key: "result.hausdorff_percent.upper" gives
 /// "Hausdorff distance, upper bound (% of the diagonal)".
