@@ -22,8 +22,8 @@ constexpr double thickest = 0.05;
 // Times the sum of the principal curvatures. Pressure on the inner face of a thicker wall moves it 10 % less than a
 // thin one (Lamé), for that face is smaller by half of this.
 constexpr double thickest_curved = 0.25;
-// Of the wall: the error of the answer is one to three times that.
-constexpr double highest_waves = 0.05;
+// Of the wall, in the mean: where they are no features of the surface a displacement is off by up to thirty times that.
+constexpr double highest_waves = 0.003;
 // Of bow_share(), from where bending is some 20 % too stiff: h^2 = 4 R t on a cylinder.
 constexpr double largest_bow = 0.5;
 
@@ -119,10 +119,11 @@ void doubt_waves(const ShellBody& body, std::vector<std::string>& found) {
     }
   }
   if (waves > highest_waves * whole) {
-    found.push_back(
-        fmt::format("{}: its normals do not fit its nodes: the shells between them wave by {:.2g} % of the wall in the "
-                    "mean, which may cost three times as much of the answer: fit it again (tunica-relax)",
-                    at(body.said_at, body.name), 100 * waves / whole));
+    found.push_back(fmt::format(
+        "{}: its normals do not fit its nodes: the shells between them wave by {:.2g} % of the wall in the "
+        "mean; where these are no features of the surface the answer is off by up to thirty times that: refine "
+        "or fit it again (tunica-relax)",
+        at(body.said_at, body.name), 100 * waves / whole));
   }
 }
 
