@@ -8,6 +8,7 @@
 #include "tunica/io/mesh/mesh_file.hpp"
 #include "tunica/io/mesh/mesh_pair.hpp"
 #include "tunica/shell/distance/boundary_distance.hpp"
+#include "tunica/shell/distance/mean_bound.hpp"
 #include "tunica/shell/distance/shell_crossings.hpp"
 #include "tunica/shell/distance/shell_quality.hpp"
 #include "tunica/shell/patch/curved_surface.hpp"
@@ -35,12 +36,16 @@ constexpr double most_for_spikes = 0.9;             // of the tolerance
 constexpr double usual_angle = 20;                  // degrees
 constexpr double rounded_up = 0.9975;               // of it: what prints as less
 constexpr double least_angle = 1, most_angle = 30;  // degrees
+constexpr double farthest_by_mean = 8;  // what a largest distance is tried first for a mean; then half of it, and so on
+constexpr double mean_slack = 0.02;     // of the mean asked for: how far above it its bound may lie
 constexpr std::size_t map_triangles = 200'000;
 
 struct Arguments {
   fs::path coarse, target, out;
   std::optional<fs::path> map, picture, curved;
+  std::optional<std::string> tolerance_text;
   std::optional<LengthTolerance> tolerance;
+  std::optional<double> thickness, mean;  ///< mm; of the distance, where it is asked for as a part of the wall
   std::string method = "fit";
   std::optional<std::string> surface;
   std::optional<std::string> mesh_unit;
@@ -56,9 +61,12 @@ void declare(cli::Tool& tool, Arguments& given) {
   app.add_option("TARGET", given.target, "surface that the shells are to become")->required();
   app.add_option("OUT.ply", given.out, "shell mesh: positions and unit normals")->required();
   tool.group("How close, with how many");
-  tool.tolerance("--tolerance", given.tolerance,
-                 "stop when the two-sided distance is certainly below it, e.g. 0.5% of the target's diagonal or 0.2mm; "
-                 "exit code 4 when it cannot be reached");
+  app.add_option(
+         "--tolerance", given.tolerance_text,
+         "stop when the two-sided distance is certainly below it, e.g. 0.5% of the target's diagonal or 0.2mm, or "
+         "when its mean is certainly below a part of the wall, e.g. 5%t; exit code 4 when it cannot be reached")
+      ->type_name("TOLERANCE");
+  tool.quantity("--thickness", given.thickness, dimension::length, "of the wall, for a --tolerance such as 5%t");
   tool.group("Method");
   app.add_option(
          "--method", given.method,
@@ -97,6 +105,36 @@ void declare(cli::Tool& tool, Arguments& given) {
   tool.group("Input");
   app.add_option("--mesh-unit", given.mesh_unit, "unit of mesh files that do not state one: mm, cm, m or um")
       ->type_name("mm|cm|m|um");
+}
+
+/// The error of a load's answer goes with the mean distance over the thickness of the wall.
+void understand_tolerance(Arguments& given) {
+  std::string_view text = given.tolerance_text ? std::string_view(*given.tolerance_text) : std::string_view();
+  const bool of_wall = text.ends_with('t');
+  if (given.thickness && !of_wall) {
+    throw UsageError("--thickness belongs to a --tolerance in parts of the wall, for example 5%t");
+  }
+  if (!given.tolerance_text) {
+    return;
+  }
+  try {
+    if (!of_wall) {
+      given.tolerance = parse_length_tolerance(text);
+      return;
+    }
+    text.remove_suffix(1);
+    const double part = parse_percent(text);
+    if (!given.thickness) {
+      throw UsageError("it is a part of the wall: give --thickness too, for example --thickness 1.5mm");
+    }
+    if (!(part > 0 && *given.thickness > 0)) {
+      throw UsageError("tolerance and thickness must be greater than zero");
+    }
+    given.mean = part * *given.thickness;
+    given.tolerance = LengthTolerance{farthest_by_mean * *given.mean, false};
+  } catch (const UsageError& error) {
+    throw UsageError(fmt::format("--tolerance: {}", error.what()));
+  }
 }
 
 void refuse_contradictions(const Arguments& given) {
@@ -343,10 +381,15 @@ private:
   }
 
   void relax() {
-    const FitOptions how = options();
+    FitOptions how = options();
     const auto stage = tool_.stage("relax");
     try {
       relaxed_ = fits_ ? fit(coarse_, *target_, how) : relax_by_barycentre(coarse_, *target_, how);
+      // A largest distance of the mean asked for serves for certain.
+      while (given_.mean && !is_near_in_the_mean() && *how.tolerance > *given_.mean) {
+        how.tolerance = *how.tolerance / 2;
+        relaxed_ = fits_ ? fit(coarse_, *target_, how) : relax_by_barycentre(coarse_, *target_, how);
+      }
     } catch (const Interrupted&) {
       if (!best_.triangles.empty()) {
         keep_partial(best_);
@@ -357,6 +400,12 @@ private:
     } catch (const InputError& error) {
       throw InputError(given_.coarse.string() + ": " + error.what());
     }
+  }
+
+  bool is_near_in_the_mean() {
+    mean_bound_ = moved_ + mean_distance_bound(relaxed_.shell, *target_, mean_slack * *given_.mean);
+    relaxed_.reached = *mean_bound_ <= *given_.mean;
+    return *relaxed_.reached;
   }
 
   void measure() {
@@ -370,7 +419,7 @@ private:
     measuring.progress = tool_.progress("measure");
     distance_ = certified_distance(relaxed_, whole(), moved_, measuring);
     const double farthest = relaxed_.distance.boundary ? distance_.upper() : distance_.both.upper;
-    if (moved_ > 0 && relaxed_.reached && farthest > *tolerance_) {
+    if (moved_ > 0 && !given_.mean && relaxed_.reached && farthest > *tolerance_) {
       relaxed_.reached = false;
       relaxed_.stopped = "no shells reach the target's spikes without area";
     }
@@ -393,6 +442,7 @@ private:
     result["reached"] = relaxed_.reached ? Json(*relaxed_.reached) : Json();
     result["stopped"] = relaxed_.stopped;
     result["diagonal_mm"] = whole().diagonal();
+    result["mean_distance_bound_mm"] = mean_bound_ ? Json(*mean_bound_) : Json();
     measure_shapes();
     tool_.note(fmt::format("{} shells, two-sided distance {:.4f} to {:.4f} % of the diagonal: {}",
                            relaxed_.shell.triangles.size(), percent() * distance_.both.lower,
@@ -445,7 +495,13 @@ private:
                       "are allowed; the best mesh is in {}.part",
                       given_.target.string(), relaxed_.shell.triangles.size(), *most, out));
     }
-    if (tolerance_ && !*relaxed_.reached) {
+    if (given_.mean && !*relaxed_.reached) {
+      fail(fmt::format(
+          "{}: a mean distance of {:.4g} mm is not reached: {:.4g} mm with {} shells ({}); the best mesh is "
+          "{}.part. Allow more shells or iterations, or a wider tolerance",
+          out, *given_.mean, *mean_bound_, relaxed_.shell.triangles.size(), relaxed_.stopped, out));
+    }
+    if (tolerance_ && !given_.mean && !*relaxed_.reached) {
       fail(fmt::format(
           "{}: the tolerance of {:.4g} % is not reached: {:.4g} %{} with {} shells ({}); the best mesh is {}.part. {}",
           out, percent() * *tolerance_, percent() * distance_.both.upper,
@@ -498,7 +554,8 @@ private:
   std::optional<Target> target_, with_spikes_;
   double moved_ = 0;  // of the target, mm: by taking its spikes
   PlyOptions ply_;
-  std::optional<double> tolerance_;  // mm
+  std::optional<double> tolerance_;   // mm
+  std::optional<double> mean_bound_;  // mm, of the mean distance
   ShellMesh best_;
   RelaxResult relaxed_;
   ShellDistance distance_;
@@ -517,5 +574,8 @@ int main(int argc, char** argv) {
   Arguments given;
   declare(tool, given);
   tool.stages({"read", "relax", "measure", "write"});
-  return tool.run(argc, argv, [&] { Run(tool, given)(); });
+  return tool.run(argc, argv, [&] {
+    understand_tolerance(given);
+    Run(tool, given)();
+  });
 }

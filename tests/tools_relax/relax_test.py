@@ -552,6 +552,30 @@ class Fit(Case):
             shells[angle] = record["result"]["shells"]
         self.assertLess(shells[8], 1.1 * shells[25])  # a greedy search: a few shells more or fewer
 
+    def test_a_mean_distance_in_parts_of_the_wall(self):
+        bumpy = self.path("bumpy.ply")
+        vertices, triangles = sphere(4)
+        write_ply(bumpy, vertices * (1 + 0.05 * np.sin(vertices[:, :1] / 4) * np.cos(vertices[:, 1:2] / 5)), triangles)
+        counts = {}
+        for thickness in ("1mm", "4mm"):
+            record, _ = self.relax(bumpy, bumpy, self.out, "--tolerance", "2%t", "--thickness", thickness, "--force")
+            result, wanted = record["result"], 0.02 * float(thickness[:-2])
+            self.assertTrue(result["reached"])
+            self.assertLessEqual(result["mean_distance_bound_mm"], wanted)
+            self.assertLessEqual(result["mean_distance_mm"], result["mean_distance_bound_mm"])
+            counts[thickness] = result["shells"]
+        self.assertLess(counts["4mm"], counts["1mm"])
+        record, error = self.relax(bumpy, bumpy, self.out, "--tolerance", "0.001%t", "--thickness", "1mm", "--max-shells", 30,
+                                   "--max-iterations", 1, "--force", expect=4)
+        self.assertIs(record["result"]["reached"], False)
+        self.assertIn("a mean distance of", error)
+        for arguments, says in ((("--tolerance", "2%t"), "give --thickness too"), (("--thickness", "1mm"), "belongs to"),
+                                (("--tolerance", "2t", "--thickness", "1mm"), "percentage"),
+                                (("--tolerance", "1%", "--thickness", "1mm"), "belongs to"),
+                                (("--tolerance", "0%t", "--thickness", "1mm"), "greater than zero")):
+            _, error = self.relax(bumpy, bumpy, self.out, *arguments, "--force", expect=2)
+            self.assertIn(says, error)
+
     def test_an_angle_that_cannot_be_kept_is_told(self):
         corners = np.array([[0, 0, 0], [40, 0, 0], [40, 4, 0], [20, 6, 0]], float)
         wedge = self.path("wedge.ply")
