@@ -21,9 +21,9 @@ struct Corner {
 };
 
 /// One way.
-class OneSided {
+class MeanOneWay {
 public:
-  OneSided(const ClosestPoint& other, double slack) : other_(other), slack_(slack) {}
+  MeanOneWay(const ClosestPoint& other, double slack) : other_(other), slack_(slack) {}
 
   [[nodiscard]] double mean(const TriangleMesh& from) const {
     std::vector<double> integrals(from.triangles.size()), areas(from.triangles.size());
@@ -85,7 +85,7 @@ double mean_distance_bound(const ShellMesh& shell, const Target& target, double 
   const TriangleMesh drawn = tessellate(shell, deviation).mesh;
   const ClosestPoint tree(drawn);
   const double part = (1 - deviation_share) * slack;
-  return deviation + std::max(OneSided(target.tree(), part).mean(drawn), OneSided(tree, part).mean(target.mesh()));
+  return deviation + std::max(MeanOneWay(target.tree(), part).mean(drawn), MeanOneWay(tree, part).mean(target.mesh()));
 }
 
 }  // namespace tunica
