@@ -23,11 +23,13 @@ struct Corner {
 /// One way.
 class MeanOneWay {
 public:
-  MeanOneWay(const ClosestPoint& other, double slack) : other_(other), slack_(slack) {}
+  MeanOneWay(const ClosestPoint& other, const CoverBound& cover, double slack)
+      : other_(other), cover_(cover), slack_(slack) {}
 
   [[nodiscard]] double mean(const TriangleMesh& from) const {
     std::vector<double> integrals(from.triangles.size()), areas(from.triangles.size());
     parallel_for_blocks(from.triangles.size(), triangles_per_block, [&](std::size_t begin, std::size_t end) {
+      CoverBound::Visited visited;
       for (std::size_t t = begin; t < end; ++t) {
         const auto& v = from.triangles[t];
         areas[t] = triangle_area(from.vertices[v[0]], from.vertices[v[1]], from.vertices[v[2]]);
@@ -51,15 +53,20 @@ private:
   }
 
   /// Of the mean over a triangle.
-  [[nodiscard]] double bound(const std::array<Corner, 3>& corners, int cuts) const {
-    double least = infinity, own = 0;
-    for (const Corner& with : corners) {
+  [[nodiscard]] double bound(const std::array<Corner, 3>& corners, int cuts, CoverBound::Visited& visited) const {
+    const double own = (corners[0].distance + corners[1].distance + corners[2].distance) / 3;
+    double least = infinity;
+    for (std::size_t i = 0; i < 3 && least - own > slack_; ++i) {
+      const Index with = corners[i].triangle;
       double sum = 0;
       for (const Corner& c : corners) {
-        sum += c.triangle == with.triangle ? c.distance : std::sqrt(other_.squared_distance_to(c.at, with.triangle));
+        sum += c.triangle == with ? c.distance : std::sqrt(other_.squared_distance_to(c.at, with));
       }
       least = std::min(least, sum / 3);
-      own += with.distance / 3;
+    }
+    if (least - own > slack_) {
+      const std::array<Vec3, 3> points{corners[0].at, corners[1].at, corners[2].at};
+      least = std::min(least, cover_(points, corners[0].triangle, own + slack_, visited));
     }
     if (least - own <= slack_ || cuts == most_cuts) {
       return least;
@@ -68,13 +75,14 @@ private:
     for (std::size_t k = 0; k < 3; ++k) {
       middles[k] = corner((corners[k].at + corners[(k + 1) % 3].at) / 2);
     }
-    return (bound({corners[0], middles[0], middles[2]}, cuts + 1) +
-            bound({middles[0], corners[1], middles[1]}, cuts + 1) +
-            bound({middles[2], middles[1], corners[2]}, cuts + 1) + bound(middles, cuts + 1)) /
+    return (bound({corners[0], middles[0], middles[2]}, cuts + 1, visited) +
+            bound({middles[0], corners[1], middles[1]}, cuts + 1, visited) +
+            bound({middles[2], middles[1], corners[2]}, cuts + 1, visited) + bound(middles, cuts + 1, visited)) /
            4;
   }
 
   const ClosestPoint& other_;
+  const CoverBound& cover_;
   double slack_;
 };
 
@@ -84,8 +92,10 @@ double mean_distance_bound(const ShellMesh& shell, const Target& target, double 
   const double deviation = deviation_share * slack;
   const TriangleMesh drawn = tessellate(shell, deviation).mesh;
   const ClosestPoint tree(drawn);
+  const CoverBound cover(tree);
   const double part = (1 - deviation_share) * slack;
-  return deviation + std::max(MeanOneWay(target.tree(), part).mean(drawn), MeanOneWay(tree, part).mean(target.mesh()));
+  return deviation + std::max(MeanOneWay(target.tree(), target.cover(), part).mean(drawn),
+                              MeanOneWay(tree, cover, part).mean(target.mesh()));
 }
 
 }  // namespace tunica
