@@ -35,7 +35,7 @@ public:
         areas[t] = triangle_area(from.vertices[v[0]], from.vertices[v[1]], from.vertices[v[2]]);
         integrals[t] =
             areas[t] *
-            bound({corner(from.vertices[v[0]]), corner(from.vertices[v[1]]), corner(from.vertices[v[2]])}, 0);
+            bound({corner(from.vertices[v[0]]), corner(from.vertices[v[1]]), corner(from.vertices[v[2]])}, 0, visited);
       }
     });
     double integral = 0, area = 0;
