@@ -37,7 +37,7 @@ constexpr double usual_angle = 20;                  // degrees
 constexpr double rounded_up = 0.9975;               // of it: what prints as less
 constexpr double least_angle = 1, most_angle = 30;  // degrees
 constexpr double farthest_by_mean = 8;  // what a largest distance is tried first for a mean; then half of it, and so on
-constexpr double mean_slack = 0.1;      // of the mean asked for: about how far above it its bound may lie
+constexpr double mean_slack = 0.2;      // of the mean asked for: about how far above it its bound may lie
 constexpr std::size_t map_triangles = 200'000;
 
 struct Arguments {
