@@ -557,16 +557,18 @@ class Fit(Case):
         vertices, triangles = sphere(4)
         write_ply(bumpy, vertices * (1 + 0.05 * np.sin(vertices[:, :1] / 4) * np.cos(vertices[:, 1:2] / 5)), triangles)
         counts = {}
-        for thickness in ("1mm", "4mm"):
+        for thickness in ("4mm", "16mm"):
             record, _ = self.relax(bumpy, bumpy, self.out, "--tolerance", "2%t", "--thickness", thickness, "--force")
             result, wanted = record["result"], 0.02 * float(thickness[:-2])
             self.assertTrue(result["reached"])
             self.assertLessEqual(result["mean_distance_bound_mm"], wanted)
             self.assertLessEqual(result["mean_distance_mm"], result["mean_distance_bound_mm"])
             counts[thickness] = result["shells"]
-        self.assertLess(counts["4mm"], counts["1mm"])
-        record, error = self.relax(bumpy, bumpy, self.out, "--tolerance", "0.001%t", "--thickness", "1mm", "--max-shells", 30,
-                                   "--max-iterations", 1, "--force", expect=4)
+        self.assertLess(counts["16mm"], counts["4mm"])
+        coarse = self.path("coarse.ply")
+        write_ply(coarse, *sphere(1))
+        record, error = self.relax(coarse, bumpy, self.out, "--refine", "--tolerance", "0.1%t", "--thickness", "1mm",
+                                   "--max-shells", 100, "--force", expect=4)
         self.assertIs(record["result"]["reached"], False)
         self.assertIn("a mean distance of", error)
         for arguments, says in ((("--tolerance", "2%t"), "give --thickness too"), (("--thickness", "1mm"), "belongs to"),
