@@ -448,6 +448,10 @@ private:
     result["diagonal_mm"] = whole().diagonal();
     result["mean_distance_bound_mm"] = mean_bound_ ? Json(*mean_bound_) : Json();
     measure_shapes();
+    if (mean_bound_) {
+      tool_.note(fmt::format("mean distance certainly below {:.4g} mm, {:.3g} % of the wall", *mean_bound_,
+                             100 * *mean_bound_ / *given_.thickness));
+    }
     tool_.note(fmt::format("{} shells, two-sided distance {:.4f} to {:.4f} % of the diagonal: {}",
                            relaxed_.shell.triangles.size(), percent() * distance_.both.lower,
                            percent() * distance_.both.upper, relaxed_.stopped));

@@ -15,6 +15,7 @@
 #include "tunica/mechanics/runs/curved_displacement.hpp"
 #include "tunica/mechanics/runs/doubts.hpp"
 #include "tunica/mechanics/runs/solve.hpp"
+#include "tunica/shell/distance/shell_distance.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -346,6 +347,24 @@ private:
         vertex *= shell.scale;
       }
       targets_[b] = std::make_unique<Target>(std::move(file.mesh));
+      require_own_target(model().shells[b].mesh, *targets_[b], path);
+    }
+  }
+
+  /// A target that cannot be what the shells were fitted to: no finer than they are, or somewhere else.
+  static void require_own_target(const ShellMesh& shell, const Target& target, const fs::path& path) {
+    constexpr std::size_t facets_per_shell = 2;
+    constexpr double farthest_mean = 0.02;  // of the diagonal
+    if (target.mesh().triangles.size() < facets_per_shell * shell.triangles.size()) {
+      throw InputError(
+          fmt::format("{}: has {} triangles, and the shells are {}: name the fine surface that they were fitted to",
+                      path.string(), target.mesh().triangles.size(), shell.triangles.size()));
+    }
+    if (const double mean = mean_distance(shell, target).first; mean > farthest_mean * target.diagonal()) {
+      throw InputError(
+          fmt::format("{}: lies {:.3g} mm from the shells in the mean, {:.2g} % of its diagonal: it is not the "
+                      "surface that they were fitted to",
+                      path.string(), mean, 100 * mean / target.diagonal()));
     }
   }
 
@@ -367,11 +386,12 @@ private:
       return solve_within(
           model().shells, targets, request, scene_.run,
           [&](std::vector<ShellBody> bodies) { return resolve_scene(scene_, std::move(bodies)); },
-          [&](const AccuracyLevel& level) {
-            tool_.detail(fmt::format("{} shells: {} {:.5g}", level.shells, name_of(request.of), level.value));
-          });
+          [&](const AccuracyLevel& level) { tool_.note(level_note(level, request)); });
     });
     loaded_->model = std::move(accuracy_->model);
+    if (kind<DynamicRun>() != nullptr && std::holds_alternative<StaticRun>(accuracy_->settings.kind)) {
+      tool_.note("the loads rise so slowly that rest under them serves: the result holds that state, not the motion");
+    }
     scene_.run = accuracy_->settings;
     prepare_result(tool_.result(), model());
     tool_.result()["accuracy"] = accuracy_report(*accuracy_);

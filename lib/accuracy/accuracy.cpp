@@ -309,7 +309,7 @@ private:
     if (n > 1) {
       const AccuracyLevel& before = out_.levels[n - 2];
       out_.choices.push_back({"shells", chosen, out_.estimate, fmt::format("{} shells", before.shells),
-                              fmt::format("an error of {:.2g} %", 100 * std::abs(before.value / last.value - 1))});
+                              fmt::format("an answer {:.2g} % away", 100 * std::abs(before.value / last.value - 1))});
     }
     out_.choices.insert(out_.choices.end(), choices_.begin(), choices_.end());
   }

@@ -189,7 +189,9 @@ within = "2%"
         write_ply(self.path("far.ply"), sphere(2, 10)[0] + 1e4, sphere(2, 10)[1])
         vertices, triangles = sphere(2, 10)[:2]
         write_ply(self.path("torn.ply"), vertices, [*triangles, triangles[0][::-1]])
-        for target in ("nothing.ply", "far.ply", "torn.ply"):
+        write_ply(self.path("other.ply"), sphere(4, 10)[0] * [1, 1, 0.3], sphere(4, 10)[1])
+        write_ply(self.path("coarse.ply"), *sphere(1, 10)[:2])
+        for target in ("nothing.ply", "far.ply", "torn.ply", "other.ply", "coarse.ply"):
             self.run_tool("ball.ply", "out.hdf", *HELD, "--accuracy", "2%", "--target", target, expect=3)
             self.assertIn(target, self.done.stderr)
         write_ply(self.path("plate.ply"), *grid(4, 4, 10, 10))

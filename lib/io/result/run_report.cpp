@@ -169,13 +169,14 @@ Json accuracy_report(const Accuracy& accuracy) {
           {"not_included", accuracy.not_included}};
 }
 
+std::string level_note(const AccuracyLevel& level, const AccuracyRequest& request) {
+  return fmt::format("{:>7} shells: {} {:.5g} {}, {:.2g} s", level.shells, name_of(request.of), level.value,
+                     unit_of(request.of), level.seconds);
+}
+
 std::vector<std::string> accuracy_notes(const Accuracy& accuracy) {
   const AccuracyRequest& request = accuracy.request;
   std::vector<std::string> lines;
-  for (const AccuracyLevel& level : accuracy.levels) {
-    lines.push_back(fmt::format("{:>7} shells: {} {:.5g} {}, {:.2g} s", level.shells, name_of(request.of), level.value,
-                                unit_of(request.of), level.seconds));
-  }
   if (accuracy.estimate && accuracy.reasons.empty()) {
     lines.push_back(fmt::format("the error of the {} is credibly below {:.2g} % of it ({:.2g} % asked for)",
                                 name_of(request.of), 100 * *accuracy.estimate, 100 * request.within));

@@ -24,7 +24,10 @@ void report_modes(Json& result, const Summary& summary);
 /// What a run for an accuracy claims, and how it got there.
 Json accuracy_report(const Accuracy& accuracy);
 
-/// The same as a table of lines for a terminal.
+/// A level on a line.
+std::string level_note(const AccuracyLevel& level, const AccuracyRequest& request);
+
+/// Claim and choices as lines for a terminal.
 std::vector<std::string> accuracy_notes(const Accuracy& accuracy);
 
 /// A line on the modes found.
