@@ -2,6 +2,7 @@
 
 #include "tunica/core/narrow.hpp"
 #include "tunica/core/progress.hpp"
+#include "tunica/mechanics/elements/rotation.hpp"
 
 #include <algorithm>
 #include <cmath>
