@@ -74,9 +74,10 @@ def describe(case):
         report = read_report(os.path.join(case.folder, f"{reached}.json"))
         total = value_of(report, "seconds", "total")
         seconds += total if isinstance(total, (int, float)) else 0
-        if reached == "relax":
+        if reached in ("relax", "simulate"):  # an accuracy may have taken finer ones
             shells = value_of(report, "result", "shells")
-            row["shells"] = "" if shells is None else shells
+            row["shells"] = row["shells"] if shells is None else shells
+        if reached == "relax":
             upper = value_of(report, "result", "hausdorff_percent", "upper")
             row["error_percent"] = f"{upper:.4g}" if isinstance(upper, (int, float)) else ""
     row["seconds"] = f"{seconds:.2f}"

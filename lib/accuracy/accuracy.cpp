@@ -4,7 +4,7 @@
 #include "tunica/accuracy/detail/levels.hpp"
 #include "tunica/core/clock.hpp"
 #include "tunica/core/error.hpp"
-#include "tunica/core/narrow.hpp"
+#include "tunica/mechanics/model/wall.hpp"
 #include "tunica/mechanics/runs/curved_displacement.hpp"
 #include "tunica/shell/distance/shell_distance.hpp"
 
@@ -33,14 +33,6 @@ constexpr double voxels_off = 0.1;
 
 constexpr std::array<std::pair<std::string_view, std::string_view>, 5> names{
     {{"displacement", "mm"}, {"energy", "mJ"}, {"volume", "mm^3"}, {"stress", "MPa"}, {"probe", "mm"}}};
-
-double thinnest_wall(const Model& model) {
-  double least = infinity;
-  for (const ShellBody& body : model.shells) {
-    least = std::min(least, *std::min_element(body.thickness.begin(), body.thickness.end()));
-  }
-  return least;
-}
 
 class Ladder {
 public:
@@ -244,7 +236,7 @@ private:
                         edges, fewest_edges_per_layer));
       }
     }
-    const double thinnest = thinnest_wall(last_->model);
+    const double thinnest = least_thickness(last_->model);
     const double off = out_.levels.back().mean_distance.value_or(0) / thinnest;
     if (off >= request_.within) {  // the error of an answer is one to three times that
       out_.reasons.push_back(fmt::format(

@@ -166,7 +166,7 @@ MotionChoice choose_motion(const RunSettings& settings, double share, bool may_r
   const auto milliseconds = [&](std::size_t run) {
     return fmt::format("{:.4g} ms", 1e3 * std::get<DynamicRun>(tried[run].kind).step);
   };
-  MotionChoice choice{tried[chosen], false, error_of(chosen), {}};
+  MotionChoice choice{tried[chosen], error_of(chosen), {}};
   const std::size_t other = chosen > 0 ? chosen - 1 : 1;
   choice.choices.push_back({"step", milliseconds(chosen), choice.error, milliseconds(other),
                             chosen > 0 ? fmt::format("an error of {:.2g} %", 100 * error_of(other))
@@ -181,7 +181,7 @@ MotionChoice choose_motion(const RunSettings& settings, double share, bool may_r
     const double error = off(answer.value) + left;
     if (error < share) {
       const std::string cost = fmt::format("{:.2g} times the time", seconds[chosen] / answer.seconds);
-      return {rest, true, error, {{"run", "static", error, "dynamic", cost}}};
+      return {rest, error, {{"run", "static", error, "dynamic", cost}}};
     }
     choice.choices.push_back({"run", "dynamic", 0, "static", fmt::format("an error of {:.2g} %", 100 * error)});
   } catch (const InputError&) {  // what can move freely has no state of rest

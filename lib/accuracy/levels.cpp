@@ -6,6 +6,7 @@
 #include "tunica/mechanics/runs/doubts.hpp"
 #include "tunica/shell/patch/refine.hpp"
 #include "tunica/surface/mesh/incidence.hpp"
+#include "tunica/surface/mesh/measure.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -17,14 +18,6 @@ namespace {
 
 constexpr double refit_angle = 20;  // degrees
 constexpr double jump = 1.25;       // of the thickness within a shell, from which on it bends the wall
-
-double largest_edge(const ShellMesh& mesh, const std::array<Index, 3>& t) {
-  double largest = 0;
-  for (std::size_t k = 0; k < 3; ++k) {
-    largest = std::max(largest, (mesh.vertices[t[k]] - mesh.vertices[t[(k + 1) % 3]]).norm());
-  }
-  return largest;
-}
 
 /// Nodes of a body at which its wall bends over a short length.
 std::vector<std::uint8_t> disturbed_nodes(const Model& model, std::size_t b) {
@@ -223,14 +216,15 @@ double edges_per_layer(const Model& model) {
     const ShellBody& body = model.shells[b];
     const auto curvatures = curvatures_of(body.mesh, body.curved);
     const auto disturbed = disturbed_nodes(model, b);
+    const TriangleMesh facets = flat_facets(body.mesh);
     const double share = 1 / std::pow(3 * (1 - std::pow(body.material.poisson, 2)), 0.25);
     for (std::size_t t = 0; t < body.mesh.triangles.size(); ++t) {
       const auto& triangle = body.mesh.triangles[t];
       if (curvatures[t].largest > 0 &&
           (disturbed[triangle[0]] | disturbed[triangle[1]] | disturbed[triangle[2]]) != 0) {
         const double thickness = body.thickness.size() == 1 ? body.thickness[0] : body.thickness[triangle[0]];
-        least =
-            std::min(least, share * std::sqrt(thickness / curvatures[t].largest) / largest_edge(body.mesh, triangle));
+        least = std::min(least,
+                         share * std::sqrt(thickness / curvatures[t].largest) / longest_edge(facets, narrow<Index>(t)));
       }
     }
   }

@@ -51,6 +51,16 @@ def shortened(value):
     return [shortened(part) for part in value] if isinstance(value, list) else value
 
 
+def by_lines(report):
+    """JSON with a line for every key of the report and of its result."""
+    def listed(values, indent, deeper):
+        lines = [f'{indent} {json.dumps(key)}: ' +
+                 (listed(value, indent + " ", False) if deeper and isinstance(value, dict)
+                  else json.dumps(value, ensure_ascii=False)) for key, value in values.items()]
+        return "{\n" + ",\n".join(lines) + "\n" + indent + "}"
+    return listed(report, "", True)
+
+
 def record(runner):
     """Scene, commands and reports of a cell as text."""
     parts = []
@@ -60,8 +70,7 @@ def record(runner):
         parts.append("```toml\n" + "\n".join(lines[:60] + (["…"] if len(lines) > 60 else [])) + "\n```")
     for _, command, report in runner.reports:
         kept = {key: shortened(report[key]) for key in ("ok", "error", "warnings", "result") if report.get(key)}
-        parts.append("```\ntunica-" + " ".join(command) + "\n" +
-                     json.dumps(kept, ensure_ascii=False).replace(runner.folder + "/", "") + "\n```")
+        parts.append("```\ntunica-" + " ".join(command) + "\n" + by_lines(kept).replace(runner.folder + "/", "") + "\n```")
     return "\n".join(parts)
 
 

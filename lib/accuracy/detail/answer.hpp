@@ -22,11 +22,10 @@ Answer answer_of(Model model, const RunSettings& settings, const AccuracyRequest
 /// of them is larger on the way.
 std::optional<Model> at_its_end(const Model& model, double duration);
 
-/// How a motion is followed.
+/// How a motion is followed; a static run: by the state of rest under the final loads.
 struct MotionChoice {
   RunSettings settings;
-  bool at_rest = false;  ///< by the state of rest under the final loads
-  double error = 0;      ///< relative, that this leaves
+  double error = 0;  ///< relative, that this leaves
   std::vector<AccuracyChoice> choices;
 };
 

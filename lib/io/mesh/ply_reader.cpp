@@ -13,6 +13,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <limits>
@@ -416,7 +417,7 @@ void understand_comments(MeshFile& file, const std::string& name) {
     } else if (first == "voxel") {
       for (int axis = 0; axis < 3; ++axis) {
         const auto edge = parse_number(words.token());
-        if (edge && *edge > 0) {
+        if (edge && *edge > 0 && std::isfinite(*edge)) {
           file.voxel = std::max(file.voxel.value_or(0), *edge);
         }
       }

@@ -39,6 +39,14 @@ double part_above(std::array<double, 3> corners, double level) {
 
 }  // namespace
 
+double least_thickness(const Model& model) {
+  double least = infinity;
+  for (const ShellBody& body : model.shells) {
+    least = std::min(least, *std::min_element(body.thickness.begin(), body.thickness.end()));
+  }
+  return least;
+}
+
 std::vector<double> averaged_at_nodes(const Model& model, std::span<const double> of_triangles) {
   std::vector<double> sum(model.node_count(), 0);
   std::vector<double> weight(model.node_count(), 0);

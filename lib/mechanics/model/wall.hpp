@@ -7,6 +7,9 @@
 /// Fields that shells hold constant, made continuous: what their neighbours say at the nodes, and what of it is large.
 namespace tunica {
 
+/// The thinnest place of all bodies, mm.
+double least_thickness(const Model& model);
+
 /// Means at the nodes, within each body, of the triangles around, weighted by their area.
 /// @param of_triangles  of all bodies in order
 /// @return #nodes of all bodies; 0 at nodes without triangles

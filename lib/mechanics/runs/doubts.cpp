@@ -40,6 +40,29 @@ double thickness_of(const ShellBody& body, std::size_t triangle) {
   return (body.thickness[v[0]] + body.thickness[v[1]] + body.thickness[v[2]]) / 3;
 }
 
+double area_of(const ShellMesh& mesh, std::size_t triangle) {
+  const auto& v = mesh.triangles[triangle];
+  return triangle_area(mesh.vertices[v[0]], mesh.vertices[v[1]], mesh.vertices[v[2]]);
+}
+
+/// The corners' own normals, or those of the vertices where a mesh has none (`curved` false: flat facets).
+class CornerNormals {
+public:
+  CornerNormals(const ShellMesh& mesh, bool curved) : mesh_(mesh) {
+    if (!curved || (mesh.corner_normals.empty() && mesh.normals.size() != mesh.vertices.size())) {
+      of_vertices_ = vertex_normals(flat_facets(mesh));
+    }
+  }
+
+  [[nodiscard]] Vec3 operator()(std::size_t triangle, std::size_t corner) const {
+    return of_vertices_.empty() ? mesh_.normal(triangle, corner) : of_vertices_[mesh_.triangles[triangle][corner]];
+  }
+
+private:
+  const ShellMesh& mesh_;
+  std::vector<Vec3> of_vertices_;
+};
+
 void doubt_thickness(const ShellBody& body, std::vector<std::string>& found) {
   const double diagonal_mm = diagonal(flat_facets(body.mesh));
   const double most = *std::max_element(body.thickness.begin(), body.thickness.end());
@@ -53,9 +76,7 @@ void doubt_thickness(const ShellBody& body, std::vector<std::string>& found) {
   const std::vector<Curvature> curvatures = curvatures_of(body.mesh, body.curved);
   double whole = 0, through_itself = 0, thick = 0;
   for (std::size_t t = 0; t < curvatures.size(); ++t) {
-    const auto& v = body.mesh.triangles[t];
-    const auto& x = body.mesh.vertices;
-    const double area = triangle_area(x[v[0]], x[v[1]], x[v[2]]);
+    const double area = area_of(body.mesh, t);
     whole += area;
     through_itself += thickness_of(body, t) * curvatures[t].largest > 1 ? area : 0;
     thick += thickness_of(body, t) * curvatures[t].sum > thickest_curved ? area : 0;
@@ -78,21 +99,19 @@ void doubt_thickness(const ShellBody& body, std::vector<std::string>& found) {
 /// at the faces: the ends of an edge of length l whose normals lean by b against the facet, across the edge, turn in
 /// its plane where the shell bends; the bow of the edge that follows strains the triangle, of area A, by l^3 b / (8 A)
 /// per curvature. On a cylinder it is h^2 / (8 R t), on a sphere two thirds of that.
-double bow_share(const ShellBody& body, const std::vector<Vec3>& of_vertices, std::size_t triangle) {
+double bow_share(const ShellBody& body, const CornerNormals& normal, std::size_t triangle) {
   const auto& v = body.mesh.triangles[triangle];
   const auto& x = body.mesh.vertices;
   const Vec3 across = (x[v[1]] - x[v[0]]).cross(x[v[2]] - x[v[0]]);
   if (!(across.norm() > 0)) {
     return 0;
   }
-  const auto normal = [&](std::size_t k) {
-    return of_vertices.empty() ? body.mesh.normal(triangle, k) : of_vertices[v[k]];
-  };
   double largest = 0;
   for (std::size_t k = 0; k < 3; ++k) {
     const std::size_t next = (k + 1) % 3;
     const Vec3 edge = x[v[next]] - x[v[k]];
-    const double lean = std::abs((normal(k) + normal(next)).dot(edge.cross(across).normalized())) / 2;
+    const double lean =
+        std::abs((normal(triangle, k) + normal(triangle, next)).dot(edge.cross(across).normalized())) / 2;
     largest = std::max(largest, std::pow(edge.norm(), 3) * lean);
   }
   return largest / (4 * across.norm() * thickness_of(body, triangle));
@@ -110,7 +129,7 @@ void doubt_waves(const ShellBody& body, std::vector<std::string>& found) {
   for (std::size_t t = 0; t < body.mesh.triangles.size(); ++t) {
     const auto& v = body.mesh.triangles[t];
     const auto& x = body.mesh.vertices;
-    const double area = triangle_area(x[v[0]], x[v[1]], x[v[2]]);
+    const double area = area_of(body.mesh, t);
     whole += area;
     for (std::size_t k = 0; k < 3; ++k) {
       const std::size_t next = (k + 1) % 3;
@@ -128,16 +147,12 @@ void doubt_waves(const ShellBody& body, std::vector<std::string>& found) {
 }
 
 void doubt_coarseness(const ShellBody& body, std::vector<std::string>& found) {
-  const bool own =
-      body.curved && (!body.mesh.corner_normals.empty() || body.mesh.normals.size() == body.mesh.vertices.size());
-  const std::vector<Vec3> of_vertices = own ? std::vector<Vec3>() : vertex_normals(flat_facets(body.mesh));
+  const CornerNormals normals(body.mesh, body.curved);
   double coarse = 0;
   double whole = 0;
   for (std::size_t t = 0; t < body.mesh.triangles.size(); ++t) {
-    const auto& v = body.mesh.triangles[t];
-    const auto& x = body.mesh.vertices;
-    const double area = triangle_area(x[v[0]], x[v[1]], x[v[2]]);
-    coarse += bow_share(body, of_vertices, t) > largest_bow ? area : 0;
+    const double area = area_of(body.mesh, t);
+    coarse += bow_share(body, normals, t) > largest_bow ? area : 0;
     whole += area;
   }
   if (coarse > most_of_it * whole) {
@@ -327,13 +342,11 @@ std::vector<std::string> doubts(const Model& model, const RunSettings& settings)
 }
 
 std::vector<Curvature> curvatures_of(const ShellMesh& mesh, bool curved) {
-  const bool own = curved && (!mesh.corner_normals.empty() || mesh.normals.size() == mesh.vertices.size());
-  const std::vector<Vec3> of_vertices = own ? std::vector<Vec3>() : vertex_normals(flat_facets(mesh));
+  const CornerNormals normal(mesh, curved);
   std::vector<Curvature> curvatures;
   curvatures.reserve(mesh.triangles.size());
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     const auto& v = mesh.triangles[t];
-    const auto normal = [&](std::size_t k) { return own ? mesh.normal(t, k) : of_vertices[v[k]]; };
     const Vec3 along = mesh.vertices[v[1]] - mesh.vertices[v[0]];
     const Vec3 across = along.cross(mesh.vertices[v[2]] - mesh.vertices[v[0]]);
     if (!(across.norm() > 0)) {
@@ -346,7 +359,7 @@ std::vector<Curvature> curvatures_of(const ShellMesh& mesh, bool curved) {
     Vec3 right = Vec3::Zero();
     for (std::size_t k = 0; k < 3; ++k) {
       const Vec3 edge = mesh.vertices[v[(k + 1) % 3]] - mesh.vertices[v[k]];
-      const Vec3 turn = normal((k + 1) % 3) - normal(k);
+      const Vec3 turn = normal(t, (k + 1) % 3) - normal(t, k);
       const double u = edge.dot(x);
       const double w = edge.dot(y);
       Eigen::Matrix<double, 2, 3> rows;

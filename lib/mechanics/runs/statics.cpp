@@ -1,6 +1,7 @@
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/mechanics/elements/rotation.hpp"
+#include "tunica/mechanics/model/wall.hpp"
 #include "tunica/mechanics/runs/detail/settle.hpp"
 #include "tunica/mechanics/runs/detail/stepped_run.hpp"
 #include "tunica/mechanics/runs/detail/supports.hpp"
@@ -144,14 +145,6 @@ private:
   BlockMatrix matrix_;
   Forces forces_;
 };
-
-double least_thickness(const Model& model) {
-  double least = infinity;
-  for (const ShellBody& body : model.shells) {
-    least = std::min(least, *std::min_element(body.thickness.begin(), body.thickness.end()));
-  }
-  return least;
-}
 
 /// Root mean square over the nodes.
 double distance(const Configuration& a, const Configuration& b) {

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+/// Texts in SVG files: what XML allows, and how much room they take. Texts may hold any bytes.
+namespace tunica {
+
+/// Valid UTF-8 with the signs of XML escaped.
+std::string safe(const std::string& text);
+
+/// Pixels, from the widths of a sans-serif font; a little generous, the reader's font is unknown.
+double text_width(const std::string& text, double size);
+
+/// Cuts the middle out of a text that is longer than `most` characters.
+std::string shortened(const std::string& text, std::size_t most);
+
+/// Shortens a text until it is no wider than this, in pixels.
+std::string fitted(const std::string& text, double width, double size);
+
+/// Breaks a text between words into lines of this width, at most three.
+std::vector<std::string> wrapped(const std::string& text, double width, double size);
+
+}  // namespace tunica
