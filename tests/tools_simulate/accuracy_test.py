@@ -184,6 +184,11 @@ within = "2%"
         claim = self.run_tool("ball.ply", "out.hdf", *HELD, "--accuracy", "5%", "--target", "target.ply")["result"]["accuracy"]
         self.assertAlmostEqual(claim["surface_uncertainty_mm"], 0.15)
         self.assertIn("at voxels of 1.5 mm the surface itself is uncertain by about 0.15 mm", self.done.stderr)
+        with open(self.path("target.ply"), "wb") as file:
+            file.write(data.replace(b"element vertex", b"comment voxel nan inf -3 mm\nelement vertex", 1))
+        claim = self.run_tool("ball.ply", "out.hdf", *HELD, "--accuracy", "5%", "--target", "target.ply",
+                              "--force")["result"]["accuracy"]
+        self.assertIsNone(claim["surface_uncertainty_mm"])
 
     def test_bad_input(self):
         write_ply(self.path("far.ply"), sphere(2, 10)[0] + 1e4, sphere(2, 10)[1])
