@@ -190,19 +190,34 @@ void add_material(const ElementLanes& element, double factor, const std::array<L
   }
 }
 
+/// What the first derivatives of frame and rotation vectors are made of.
+struct Linearisation {
+  LaneMat23 current_gradients;
+  std::array<LaneMat3, 3> g;
+  std::array<SpinCoefficients<Lanes>, 3> spin;
+  std::array<LaneMat3, 3> h;
+};
+
+/// What stresses do on slopes, rotations and corners, in the frame's axes.
+struct Resultants {
+  LaneMatrix6 slope_stiffness;
+  LaneVec3 on_sides;
+  std::array<LaneVec3, 3> n, local_moment, moment, force;  ///< of chord strain and rotation vectors
+  LaneVec3 total;
+  std::array<std::array<LaneVec3, 2>, 3> carried;
+  LaneVector18 all;
+};
+
 /// What chord strain and rotation vectors add to the geometric stiffness: n are the corners' forces, m their moments.
-void add_corotational_stiffness(const ElementLanes& element, const Kinematics& now, const std::array<LaneVec3, 3>& n,
-                                const std::array<LaneVec3, 3>& local_moment,
-                                const std::array<SpinCoefficients<Lanes>, 3>& spin, const std::array<LaneMat3, 3>& h,
-                                const std::array<LaneMat3, 3>& g, const LaneMat23& current_gradients,
-                                const LaneVec3& total, const std::array<LaneVec3, 3>& force,
-                                const std::array<LaneVec3, 3>& moment, LaneMatrix18& t) {
+void add_corotational_stiffness(const ElementLanes& element, const Kinematics& now, const Linearisation& at,
+                                const Resultants& of, LaneMatrix18& t) {
+  const auto& [current_gradients, g, spin, h] = at;
   const Frame& frame = now.frame;
   // The derivative of H, where spins of the frame count against those of the corners.
   LaneMat3 all = LaneMat3::Zero();
   for (int k = 0; k < 3; ++k) {
     const std::size_t s = k;
-    const LaneMat3 change = spin_to_rate_derivative(now.rotation(k), local_moment[s], spin[s]) * h[s];
+    const LaneMat3 change = spin_to_rate_derivative(now.rotation(k), of.local_moment[s], spin[s]) * h[s];
     all += change;
     t.block<3, 3>(6 * k + 3, 6 * k + 3) += change;
     for (int j = 0; j < 3; ++j) {
@@ -213,19 +228,19 @@ void add_corotational_stiffness(const ElementLanes& element, const Kinematics& n
   // Of the levers q, of G, and of the frame in which the force is expressed.
   LaneMat3 levers = all;
   for (int k = 0; k < 3; ++k) {
-    levers += skew(n[k]) * skew(LaneVec3(frame.plane(0, k), frame.plane(1, k), 0));
+    levers += skew(of.n[k]) * skew(LaneVec3(frame.plane(0, k), frame.plane(1, k), 0));
   }
-  const LaneVec2 swapped(-total.y(), total.x());
-  const Lanes in_plane = total.z() / (frame.trace * frame.trace);
+  const LaneVec2 swapped(-of.total.y(), of.total.x());
+  const Lanes in_plane = of.total.z() / (frame.trace * frame.trace);
   for (int i = 0; i < 3; ++i) {
     const std::size_t si = i;
     const LaneVec2 gi = current_gradients.col(i);
-    const LaneMat3 spun_force = skew(force[si]);
-    const LaneMat3 spun_moment = skew(moment[si]);
+    const LaneMat3 spun_force = skew(of.force[si]);
+    const LaneMat3 spun_moment = skew(of.moment[si]);
     for (int j = 0; j < 3; ++j) {
       const std::size_t sj = j;
       auto block = t.block<3, 3>(6 * i, 6 * j);
-      block += g[si].transpose() * (skew(n[sj]) + levers * g[sj]) - spun_force * g[sj];
+      block += g[si].transpose() * (skew(of.n[sj]) + levers * g[sj]) - spun_force * g[sj];
       block.block<1, 2>(2, 0) += swapped.dot(current_gradients.col(j)) * gi.transpose();
       block.row(2) += (gi.x() * swapped.y() - gi.y() * swapped.x()) * g[sj].row(2);
       block.block<2, 2>(0, 0) +=
@@ -273,19 +288,86 @@ void add_edge_forces(const Kinematics& now, const LaneVector6& on_slopes, const 
   }
 }
 
-void add_curved_stiffness(const Kinematics& now, const Derivatives& d, const LaneMatrix6& slope_stiffness,
-                          const LaneVec3& on_sides, const std::array<std::array<LaneVec3, 2>, 3>& carried,
-                          LaneMatrix18& t) {
-  const LaneMatrix6x18 on_slope_changes = slope_stiffness.lazyProduct(d.slopes);
+void find_resultants(const ElementLanes& element, const Kinematics& now, const Linearisation& at, LaneState stress,
+                     Resultants& of) {
+  LaneVector6 on_slopes = LaneVector6::Zero();
+  of.slope_stiffness.setZero();
+  const LaneVec3 on_bows = element.bow.transpose() * stress.head<3>();
+  of.on_sides = element.curved ? LaneVec3(element.sideways.transpose() * stress.head<3>()) : LaneVec3(LaneVec3::Zero());
+  if (element.curved) {
+    for (int i = 0; i < 3; ++i) {
+      of.slope_stiffness += stress[i] * element.bulging[i];
+    }
+    on_slopes = of.slope_stiffness.lazyProduct(now.slopes);
+    for (int k = 0; k < 3; ++k) {
+      on_slopes[2 * k] += of.on_sides[k] * now.tilts[k] + 0.5 * stress[12 + k];
+      on_slopes[2 * k + 1] += -of.on_sides[k] * now.tilts[k] + 0.5 * stress[12 + k];
+      const LaneVec2 on_bending = 0.5 * of.on_sides[k] * now.bulges[k] * element.edge_directions.col(k);
+      stress.segment<2>(3 + 3 * k) += on_bending;
+      stress.segment<2>(3 + 3 * next_corner(k)) += on_bending;
+    }
+  } else {
+    for (int k = 0; k < 3; ++k) {
+      stress[5 + 3 * k] += on_bows[(k + 2) % 3] - on_bows[k];
+    }
+  }
+  of.total.setZero();
+  for (int k = 0; k < 3; ++k) {
+    const std::size_t s = k;
+    const LaneVec2 gk = element.gradients.col(k);
+    of.n[s] << stress[0] * gk.x() + stress[2] * gk.y(), stress[1] * gk.y() + stress[2] * gk.x(), 0;
+    of.local_moment[s] = stress.segment<3>(3 + 3 * k);
+    of.moment[s] = at.h[s].transpose() * of.local_moment[s];
+    of.total +=
+        LaneVec3(0, 0, now.frame.plane(0, k) * of.n[s].y() - now.frame.plane(1, k) * of.n[s].x()) + of.moment[s];
+  }
+  for (int k = 0; k < 3; ++k) {
+    const std::size_t s = k;
+    of.force[s] = of.n[s] - at.g[s].transpose() * of.total;
+    of.all.segment<3>(6 * k) = of.force[s];
+    of.all.segment<3>(6 * k + 3) = of.moment[s];
+  }
+  if (element.curved) {
+    add_edge_forces(now, on_slopes, on_bows, of.carried, of.all);
+  }
+}
+
+void add_curved_stiffness(const Kinematics& now, const Derivatives& d, const Resultants& of, LaneMatrix18& t) {
+  const LaneMatrix6x18 on_slope_changes = of.slope_stiffness.lazyProduct(d.slopes);
   add_symmetric_product(d.slopes, on_slope_changes, t);
-  const LaneMatrix3x18 on_bulge_changes = on_sides.asDiagonal() * d.tilts;
+  const LaneMatrix3x18 on_bulge_changes = of.on_sides.asDiagonal() * d.tilts;
   const LaneMatrix18 coupling = d.bulges.transpose().lazyProduct(on_bulge_changes);
   t += coupling + coupling.transpose();
   for (int k = 0; k < 3; ++k) {
     for (int end = 0; end < 2; ++end) {
-      add_edge_stiffness(now.edges[k], k, corner_at(k, end), carried[k][end], t);
+      add_edge_stiffness(now.edges[k], k, corner_at(k, end), of.carried[k][end], t);
     }
   }
+}
+
+/// Of the state, to first order in displacements and spins (world axes).
+LaneState change(const ElementLanes& element, const LaneMat3& axes, const Derivatives& derivatives,
+                 const std::array<LaneMat3, 3>& h, const std::array<LaneMat3, 3>& g, const LaneVector18& motion) {
+  LaneVector18 local;
+  for (int k = 0; k < 6; ++k) {
+    local.segment<3>(3 * k) = axes * motion.segment<3>(3 * k);
+  }
+  LaneVec3 spin = LaneVec3::Zero();
+  for (int k = 0; k < 3; ++k) {
+    spin += g[k] * local.segment<3>(6 * k);
+  }
+  LaneState state = LaneState::Zero();
+  state.head<3>() = derivatives.strain.lazyProduct(local);
+  if (element.curved) {
+    const LaneVector6 slopes = derivatives.slopes.lazyProduct(local);
+    for (int k = 0; k < 3; ++k) {
+      state[12 + k] = 0.5 * (slopes[2 * k] + slopes[2 * k + 1]);
+    }
+  }
+  for (int k = 0; k < 3; ++k) {
+    state.segment<3>(3 + 3 * k) = h[k] * (local.segment<3>(6 * k + 3) - spin);
+  }
+  return state;
 }
 
 /// What the derivatives need at the reference.
@@ -367,26 +449,7 @@ LaneMask deformation(const ElementLanes& element, const MotionLanes& motion, Lan
 
 LaneState linear_deformation(const ElementLanes& element, const LaneVector18& motion) {
   const Reference reference = find_reference(element);
-  LaneVector18 local;
-  for (int k = 0; k < 6; ++k) {
-    local.segment<3>(3 * k) = element.axes * motion.segment<3>(3 * k);
-  }
-  LaneVec3 spin = LaneVec3::Zero();
-  for (int k = 0; k < 3; ++k) {
-    spin += reference.g[k] * local.segment<3>(6 * k);
-  }
-  LaneState state = LaneState::Zero();
-  state.head<3>() = reference.derivatives.strain.lazyProduct(local);
-  if (element.curved) {
-    const LaneVector6 slopes = reference.derivatives.slopes.lazyProduct(local);
-    for (int k = 0; k < 3; ++k) {
-      state[12 + k] = 0.5 * (slopes[2 * k] + slopes[2 * k + 1]);
-    }
-  }
-  for (int k = 0; k < 3; ++k) {
-    state.segment<3>(3 + 3 * k) = local.segment<3>(6 * k + 3) - spin;
-  }
-  return state;
+  return change(element, element.axes, reference.derivatives, reference.h, reference.g, motion);
 }
 
 LaneVector18 linear_force(const ElementLanes& element, const LaneVector18& motion) {
@@ -424,83 +487,59 @@ LaneMatrix18 linear_stiffness(const ElementLanes& element) {
   return stiffness;
 }
 
+LaneState predicted_deformation(const ElementLanes& element, const MotionLanes& motion, const LaneVector18& increment) {
+  Kinematics now;
+  find_kinematics(element, motion, now);
+  LaneMat23 unused;
+  const std::array<LaneMat3, 3> g = frame_spin(element, now.frame, unused);
+  std::array<LaneMat3, 3> h;
+  for (int k = 0; k < 3; ++k) {
+    h[k] = spin_to_rate(now.rotation(k), spin_coefficients(now.rotation(k)).eta);
+  }
+  Derivatives derivatives;
+  find_derivatives(element, now, h, g, derivatives);
+  return now.state + change(element, now.frame.axes, derivatives, h, g, increment);
+}
+
 LaneMask corotational_response(const ElementLanes& element, const MotionLanes& motion, const ViscousLanes& viscous,
-                               ResponseLanes& response, LaneMatrix18* tangent) {
+                               ResponseLanes& response, LaneMatrix18* tangent, const LaneState* predicted) {
   Kinematics now;
   const LaneMask valid = find_kinematics(element, motion, now);
   response.deformation = now.state;
-  LaneState stress = element_force(element, now.state);
-  response.energy = 0.5 * now.state.dot(stress);
-  if (viscous.factor > 0) {
-    stress += viscous.factor * element_force(element, now.state - viscous.previous);
-  }
-  // What the membrane force does on slopes and rotations.
-  LaneVector6 on_slopes = LaneVector6::Zero();
-  LaneMatrix6 slope_stiffness = LaneMatrix6::Zero();
-  const LaneVec3 on_bows = element.bow.transpose() * stress.head<3>();
-  const LaneVec3 on_sides =
-      element.curved ? LaneVec3(element.sideways.transpose() * stress.head<3>()) : LaneVec3(LaneVec3::Zero());
-  if (element.curved) {
-    for (int i = 0; i < 3; ++i) {
-      slope_stiffness += stress[i] * element.bulging[i];
+  const auto stress_of = [&](const LaneState& state) {
+    LaneState stress = element_force(element, state);
+    if (viscous.factor > 0) {
+      stress += viscous.factor * element_force(element, state - viscous.previous);
     }
-    on_slopes = slope_stiffness.lazyProduct(now.slopes);
-    for (int k = 0; k < 3; ++k) {
-      on_slopes[2 * k] += on_sides[k] * now.tilts[k] + 0.5 * stress[12 + k];
-      on_slopes[2 * k + 1] += -on_sides[k] * now.tilts[k] + 0.5 * stress[12 + k];
-      const LaneVec2 on_bending = 0.5 * on_sides[k] * now.bulges[k] * element.edge_directions.col(k);
-      stress.segment<2>(3 + 3 * k) += on_bending;
-      stress.segment<2>(3 + 3 * next_corner(k)) += on_bending;
-    }
-  } else {
-    for (int k = 0; k < 3; ++k) {
-      stress[5 + 3 * k] += on_bows[(k + 2) % 3] - on_bows[k];
-    }
-  }
-
-  LaneMat23 current_gradients;
-  const std::array<LaneMat3, 3> g = frame_spin(element, now.frame, current_gradients);
-  // Chord strain and rotation vectors: forces n and moments in the frame, and what keeps them in balance.
-  std::array<LaneVec3, 3> n, local_moment, moment, force;
-  std::array<SpinCoefficients<Lanes>, 3> spin;
-  std::array<LaneMat3, 3> h;
-  LaneVec3 total = LaneVec3::Zero();
+    return stress;
+  };
+  response.energy = 0.5 * now.state.dot(element_force(element, now.state));
+  Linearisation at;
+  at.g = frame_spin(element, now.frame, at.current_gradients);
   for (int k = 0; k < 3; ++k) {
     const std::size_t s = k;
-    const LaneVec2 gk = element.gradients.col(k);
-    n[s] << stress[0] * gk.x() + stress[2] * gk.y(), stress[1] * gk.y() + stress[2] * gk.x(), 0;
-    local_moment[s] = stress.segment<3>(3 + 3 * k);
-    spin[s] = spin_coefficients(now.rotation(k));
-    h[s] = spin_to_rate(now.rotation(k), spin[s].eta);
-    moment[s] = h[s].transpose() * local_moment[s];
-    total += LaneVec3(0, 0, now.frame.plane(0, k) * n[s].y() - now.frame.plane(1, k) * n[s].x()) + moment[s];
+    at.spin[s] = spin_coefficients(now.rotation(k));
+    at.h[s] = spin_to_rate(now.rotation(k), at.spin[s].eta);
   }
-  LaneVector18 result;
-  for (int k = 0; k < 3; ++k) {
-    const std::size_t s = k;
-    force[s] = n[s] - g[s].transpose() * total;
-    result.segment<3>(6 * k) = force[s];
-    result.segment<3>(6 * k + 3) = moment[s];
-  }
-  std::array<std::array<LaneVec3, 2>, 3> carried;
-  if (element.curved) {
-    add_edge_forces(now, on_slopes, on_bows, carried, result);
-  }
+  Resultants resultants;
+  find_resultants(element, now, at, stress_of(now.state), resultants);
   for (int k = 0; k < 6; ++k) {
-    response.force.segment<3>(3 * k) = now.frame.axes.transpose() * result.segment<3>(3 * k);
+    response.force.segment<3>(3 * k) = now.frame.axes.transpose() * resultants.all.segment<3>(3 * k);
   }
   if (tangent == nullptr) {
     return valid;
   }
-
+  if (predicted != nullptr) {
+    find_resultants(element, now, at, stress_of(*predicted), resultants);
+  }
   Derivatives d;
-  find_derivatives(element, now, h, g, d);
+  find_derivatives(element, now, at.h, at.g, d);
   LaneMatrix18& t = *tangent;
   t.setZero();
-  add_material(element, 1 + viscous.factor, h, g, d, t);
-  add_corotational_stiffness(element, now, n, local_moment, spin, h, g, current_gradients, total, force, moment, t);
+  add_material(element, 1 + viscous.factor, at.h, at.g, d, t);
+  add_corotational_stiffness(element, now, at, resultants, t);
   if (element.curved) {
-    add_curved_stiffness(now, d, slope_stiffness, on_sides, carried, t);
+    add_curved_stiffness(now, d, resultants, t);
   }
   rotate_to_world(now.frame.axes, t);
   return valid;

@@ -65,9 +65,15 @@ struct ResponseLanes {
 /// deformation() of each. @return where it would be true; the other lanes hold nothing of use.
 LaneMask deformation(const ElementLanes& element, const MotionLanes& motion, LaneState& result);
 
+/// The state after an increment of displacements and spins (world axes), to first order: what the tangent at `motion`
+/// expects. Valid where deformation() is.
+LaneState predicted_deformation(const ElementLanes& element, const MotionLanes& motion, const LaneVector18& increment);
+
 /// corotational_response() of each. @return as above. No allocation.
+/// @param predicted  where given, the geometric stiffness takes its stresses from this deformation instead of the
+///                   current one (predicted_deformation() of the last increment). The forces do not.
 LaneMask corotational_response(const ElementLanes& element, const MotionLanes& motion, const ViscousLanes& viscous,
-                               ResponseLanes& response, LaneMatrix18* tangent);
+                               ResponseLanes& response, LaneMatrix18* tangent, const LaneState* predicted = nullptr);
 
 /// unit_pressure() on each (pressure.hpp).
 void unit_pressure(const ElementLanes& element, const MotionLanes& motion, LaneVector18& force, LaneMatrix18* stiffness,

@@ -357,13 +357,14 @@ private:
   static bool acceptable(const NewtonResult& result) { return result.converged && result.valid && result.stable; }
 
   /// Balance of the step with a part of its change; 1: the equation of the step itself.
-  Balance balance(Step& s, double part, const Configuration& c, BlockMatrix* tangent) {
+  Balance balance(Step& s, double part, const Configuration& c, BlockMatrix* tangent,
+                  const std::vector<ElementState>& predicted) {
     const ViscousState viscous{s.viscosity, s.viscosity > 0 ? &viscous_zero_ : nullptr};
     std::vector<double> factors = s.factors;
     for (std::size_t l = 0; part < 1 && l < factors.size(); ++l) {
       factors[l] = s.factors_before[l] + part * (s.factors[l] - s.factors_before[l]);
     }
-    evaluate(system_, model_, c, factors, viscous, forces_, tangent);
+    evaluate(system_, model_, c, factors, viscous, forces_, tangent, predicted);
     find_change(s.start, c, s.change);
     scheme_.end_rates(s.length, system_.held, s.rates_before, s.change, s.rates);
     const VectorX inertia = mass_.cwiseProduct(s.rates.acceleration + run_.damping.mass * s.rates.velocity);
@@ -385,7 +386,10 @@ private:
   }
 
   NewtonResult run(Step& s, double from, double to, Configuration& configuration) {
-    const auto function = [&](const Configuration& c, BlockMatrix* tangent) { return balance(s, to, c, tangent); };
+    const auto function = [&](const Configuration& c, BlockMatrix* tangent,
+                              const std::vector<ElementState>& predicted) {
+      return balance(s, to, c, tangent, predicted);
+    };
     const NewtonResult result =
         newton(system_, settings_, solver_, function, (to - from) * s.held, matrix_, configuration, at_rest_);
     at_rest_ = result.iterations == 0;
@@ -394,7 +398,7 @@ private:
 
   void follow(Step& s, StepResult& result, Configuration& configuration) {
     configuration = s.start;
-    s.left_at_start = balance(s, 0, configuration, nullptr).unbalanced;
+    s.left_at_start = balance(s, 0, configuration, nullptr, {}).unbalanced;
     double done = 0;
     double part = 0.5;
     NewtonResult attempted;
@@ -426,7 +430,9 @@ private:
     if (s.held.squaredNorm() > 0) {
       return;
     }
-    const auto whole = [&](const Configuration& c, BlockMatrix* tangent) { return balance(s, 1, c, tangent); };
+    const auto whole = [&](const Configuration& c, BlockMatrix* tangent, const std::vector<ElementState>& predicted) {
+      return balance(s, 1, c, tangent, predicted);
+    };
     const SettleResult settled = settle(system_, settings_, solver_, whole, matrix_, configuration);
     result.ran_away = settled.ran_away;
     result.newton.converged = settled.settled;

@@ -98,7 +98,7 @@ public:
         whole_(VectorX::Zero(held_increment.size())) {}
 
   NewtonResult run(bool likely_at_rest) {
-    now_ = balance_(configuration_, likely_at_rest ? nullptr : &matrix_);
+    now_ = balance_(configuration_, likely_at_rest ? nullptr : &matrix_, {});
     tangent_is_current_ = !likely_at_rest;
     if (!now_.valid) {
       return result_;
@@ -150,10 +150,16 @@ private:
     return last_size_ <= settings_.settled * std::sqrt(sum / real(configuration_.displacement.size()));
   }
 
+  /// Forces and tangent at the configuration.
+  Balance linearised() {
+    return balance_(configuration_, &matrix_,
+                    last_.size() > 0 ? predicted_deformations(system_, before_, last_) : std::vector<ElementState>{});
+  }
+
   /// By the tangent; prescribed displacements move in the first. @return false where there is no solution.
   bool find_increment() {
     if (!tangent_is_current_) {
-      now_ = balance_(configuration_, &matrix_);
+      now_ = linearised();
     }
     VectorX right = now_.unbalanced;
     if (moving_) {
@@ -194,13 +200,14 @@ private:
         result_.iterations > 1 ? std::pow(result_.residual, 3) / (previous_residual_ * previous_residual_) : 1;
     const bool more = result_.iterations < settings_.newton_max && expected > settings_.converge;
     previous_residual_ = result_.residual;
-    const Configuration before = configuration_;
+    before_ = configuration_;
     double length = 1;
     for (int trial = 0;; ++trial) {
-      configuration_ = before;
-      advance_configuration(configuration_, length * increment_);
+      configuration_ = before_;
+      last_ = length * increment_;
+      advance_configuration(configuration_, last_);
       tangent_is_current_ = more && trial == 0;
-      now_ = balance_(configuration_, tangent_is_current_ ? &matrix_ : nullptr);
+      now_ = tangent_is_current_ ? linearised() : balance_(configuration_, nullptr, {});
       if (moving_ || trial == 6) {
         break;
       }
@@ -220,8 +227,8 @@ private:
       length = std::clamp(length * work_ / (work_ - left), 0.2 * length, 0.7 * length);
     }
     moving_ = false;
-    whole_ += length * increment_;
-    last_size_ = length * increment_size(system_, increment_);
+    whole_ += last_;
+    last_size_ = increment_size(system_, last_);
     result_.reached = increment_size(system_, whole_);
     if (now_.valid) {
       result_.residual = residual_of(now_);
@@ -241,6 +248,8 @@ private:
   bool moving_;  ///< prescribed displacements are still to be moved
   bool tangent_is_current_ = false;
   VectorX increment_;
+  Configuration before_;  ///< the last increment went from here
+  VectorX last_;          ///< the last increment, as far as it was followed
   VectorX whole_;         ///< the sum of all increments
   double work_ = 0;       ///< of the unbalanced forces along the increment
   double last_size_ = 0;  ///< of the last increment

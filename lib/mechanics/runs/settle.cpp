@@ -73,7 +73,7 @@ public:
         matrix_(matrix),
         configuration_(configuration),
         diagonal_(viscous_diagonal(system)),
-        now_(balance(configuration, &matrix)),
+        now_(balance(configuration, &matrix, {})),
         norm_(now_.valid ? norm_of(now_) : 0) {}
 
   SettleResult run() {
@@ -128,7 +128,7 @@ private:
     Configuration next = configuration_;
     advance_configuration(next, increment);
     BlockMatrix next_matrix = std::move(shifted);
-    const Balance then = balance_(next, &next_matrix);
+    const Balance then = balance_(next, &next_matrix, {});
     // Beyond the bottom of a valley the forces push back.
     if (!then.valid || then.unbalanced.dot(increment) < -largest_push_back * right.dot(increment)) {
       return false;
@@ -167,7 +167,7 @@ SettleResult settle(const ShellSystem& system, const RunSettings& settings, Tang
 VectorX weakest_direction(const ShellSystem& system, TangentSolver& solver, const BalanceFunction& balance,
                           BlockMatrix& matrix, const Configuration& configuration) {
   constexpr int iterations = 6;
-  (void)balance(configuration, &matrix);
+  (void)balance(configuration, &matrix, {});
   const VectorX diagonal = viscous_diagonal(system);
   VectorX x(diagonal.size());
   for (Eigen::Index i = 0; i < x.size(); ++i) {

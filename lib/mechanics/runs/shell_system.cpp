@@ -216,6 +216,17 @@ MotionLanes corner_motion(const ElementGroup& elements, const Configuration& con
   return motion;
 }
 
+LaneVector18 corner_freedoms(const ElementGroup& elements, const VectorX& freedoms) {
+  LaneVector18 of_corners;
+  for (int k = 0; k < 3; ++k) {
+    const std::size_t corner = k;
+    LaneVector6 of_corner;
+    set_lanes(of_corner, [&](std::size_t l) { return freedoms.segment<6>(first_freedom(elements[l]->nodes[corner])); });
+    of_corners.segment<6>(6 * k) = of_corner;
+  }
+  return of_corners;
+}
+
 /// Unit pressure on elements whose slopes do not count: on the facet and its patch's frozen height.
 void push_facets(const ShellSystem& system, const Batch& batch, const MotionLanes& motion, LaneVector18& force,
                  LaneMatrix18* stiffness) {
@@ -424,8 +435,29 @@ std::vector<double> load_factors(const Model& model, bool is_static, double time
   return factors;
 }
 
+std::vector<ElementState> predicted_deformations(const ShellSystem& system, const Configuration& configuration,
+                                                 const VectorX& increment) {
+  std::vector<ElementState> predicted(system.elements.size());
+  for (const std::vector<Batch>& colour : system.colours) {
+    parallel_for_blocks(colour.size(), grain, [&](std::size_t begin, std::size_t end) {
+      ElementLanes elements;
+      for (std::size_t b = begin; b < end; ++b) {
+        const ElementGroup group = members(system, colour[b]);
+        gather(group, elements);
+        const LaneState state =
+            predicted_deformation(elements, corner_motion(group, configuration), corner_freedoms(group, increment));
+        for (std::size_t l = 0; l < colour[b].count; ++l) {
+          predicted[colour[b].elements[l]] = lane(state, l);
+        }
+      }
+    });
+  }
+  return predicted;
+}
+
 void evaluate(const ShellSystem& system, const Model& model, const Configuration& configuration,
-              const std::vector<double>& factors, const ViscousState& viscous, Forces& forces, BlockMatrix* tangent) {
+              const std::vector<double>& factors, const ViscousState& viscous, Forces& forces, BlockMatrix* tangent,
+              const std::vector<ElementState>& predicted) {
   const Eigen::Index size = first_freedom(system.node_count());
   forces.internal.setZero(size);
   forces.external.setZero(size);
@@ -456,8 +488,14 @@ void evaluate(const ShellSystem& system, const Model& model, const Configuration
           set_lanes(
               damping.previous, [&](std::size_t l) -> const auto& { return (*viscous.previous)[batch.elements[l]]; });
         }
+        LaneState expected;
+        if (!predicted.empty()) {
+          set_lanes(
+              expected, [&](std::size_t l) -> const auto& { return predicted[batch.elements[l]]; });
+        }
         const LaneMask whole =
-            corotational_response(elements, motion, damping, response, tangent == nullptr ? nullptr : &stiffness);
+            corotational_response(elements, motion, damping, response, tangent == nullptr ? nullptr : &stiffness,
+                                  predicted.empty() ? nullptr : &expected);
         if (!all_of(whole)) {
           valid = false;
           continue;
@@ -520,18 +558,10 @@ void linear_forces(const ShellSystem& system, const VectorX& displacement, Vecto
   for (const std::vector<Batch>& colour : system.colours) {
     parallel_for_blocks(colour.size(), grain, [&](std::size_t begin, std::size_t end) {
       ElementLanes elements;
-      LaneVector18 motion;
       for (std::size_t b = begin; b < end; ++b) {
         const ElementGroup group = members(system, colour[b]);
         gather(group, elements);
-        for (int k = 0; k < 3; ++k) {
-          const std::size_t corner = k;
-          LaneVector6 moved;
-          set_lanes(moved,
-                    [&](std::size_t l) { return displacement.segment<6>(first_freedom(group[l]->nodes[corner])); });
-          motion.segment<6>(6 * k) = moved;
-        }
-        const LaneVector18 force = linear_force(elements, motion);
+        const LaneVector18 force = linear_force(elements, corner_freedoms(group, displacement));
         for (std::size_t l = 0; l < colour[b].count; ++l) {
           const Vector18 one = lane(force, l);
           for (int k = 0; k < 3; ++k) {

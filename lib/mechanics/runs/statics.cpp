@@ -22,8 +22,8 @@ VectorX prescribed_positions(const ShellSystem& system, const Model& model, doub
 }
 
 Balance static_balance(const ShellSystem& system, const Model& model, const Configuration& configuration, double factor,
-                       Forces& forces, BlockMatrix* tangent) {
-  evaluate(system, model, configuration, load_factors(model, true, factor), {}, forces, tangent);
+                       Forces& forces, BlockMatrix* tangent, const std::vector<ElementState>& predicted) {
+  evaluate(system, model, configuration, load_factors(model, true, factor), {}, forces, tangent, predicted);
   Balance balance;
   balance.valid = forces.valid;
   balance.unbalanced = forces.external - forces.internal;
@@ -61,8 +61,8 @@ public:
       : system_(system), model_(model), settings_(settings), solver_(system, settings), matrix_(system.pattern) {}
 
   NewtonResult run(double factor, double previous_factor, Configuration& configuration) {
-    const auto balance = [&](const Configuration& c, BlockMatrix* tangent) {
-      return static_balance(system_, model_, c, factor, forces_, tangent);
+    const auto balance = [&](const Configuration& c, BlockMatrix* tangent, const std::vector<ElementState>& predicted) {
+      return static_balance(system_, model_, c, factor, forces_, tangent, predicted);
     };
     const VectorX held =
         prescribed_positions(system_, model_, factor) - prescribed_positions(system_, model_, previous_factor);
@@ -101,8 +101,8 @@ public:
   /// Where the path has lost its stability: moves what is prescribed, pushes the shell off it, and lets it creep to
   /// where it can rest.
   SettleResult let_go(double factor, double previous_factor, double thickness, Configuration& configuration) {
-    const auto balance = [&](const Configuration& c, BlockMatrix* tangent) {
-      return static_balance(system_, model_, c, factor, forces_, tangent);
+    const auto balance = [&](const Configuration& c, BlockMatrix* tangent, const std::vector<ElementState>& predicted) {
+      return static_balance(system_, model_, c, factor, forces_, tangent, predicted);
     };
     advance_configuration(configuration, prescribed_positions(system_, model_, factor) -
                                              prescribed_positions(system_, model_, previous_factor));

@@ -52,7 +52,9 @@ struct Balance {
   double floor = 0;    ///< round-off of the norm of `unbalanced`
   bool valid = false;
 };
-using BalanceFunction = std::function<Balance(const Configuration&, BlockMatrix* tangent)>;
+/// `predicted` as in evaluate().
+using BalanceFunction =
+    std::function<Balance(const Configuration&, BlockMatrix* tangent, const std::vector<ElementState>& predicted)>;
 
 struct NewtonResult {
   /// Residual below the tolerance, or at the floor of round-off with increments below largest_round_off of the change.
@@ -69,9 +71,13 @@ struct NewtonResult {
   double reached = 0;    ///< size of the whole change
 };
 
-/// Newton's method from `configuration`, which is changed. `held_increment` (6 per node) moves prescribed freedoms.
-/// Steps are cut where they turn a node by more than 0.5 rad; where the residual does not fall in the end, a line
-/// search on the work of the unbalanced forces shortens them.
+/// Newton's method from `configuration`, which is changed. Stresses count as unknowns of their own, eliminated in each
+/// element: the geometric stiffness takes those that the last tangent expects, not those of the configuration, whose
+/// membrane part any bending of a thin shell overstates by far. It meets the same equilibrium in fewer iterations.
+/// Source: Magisano, Leonetti, Garcea 2017, "How to improve efficiency and robustness of the Newton method in
+/// geometrically non-linear structural problem discretized via displacement-based finite elements". `held_increment` (6
+/// per node) moves prescribed freedoms. Steps are cut where they turn a node by more than 0.5 rad; where the residual
+/// does not fall in the end, a line search on the work of the unbalanced forces shortens them.
 /// @param likely_at_rest  the configuration may be in balance: the forces are looked at before a tangent is made
 NewtonResult newton(const ShellSystem& system, const RunSettings& settings, TangentSolver& solver,
                     const BalanceFunction& balance, const VectorX& held_increment, BlockMatrix& matrix,

@@ -34,7 +34,7 @@ VectorX prescribed_positions(const ShellSystem& system, const Model& model, doub
 
 /// What keeps a configuration from static equilibrium at a load factor.
 Balance static_balance(const ShellSystem& system, const Model& model, const Configuration& configuration, double factor,
-                       Forces& forces, BlockMatrix* tangent);
+                       Forces& forces, BlockMatrix* tangent, const std::vector<ElementState>& predicted = {});
 
 /// Load steps, each with Newton's method until it converges. Errors: RequirementError.
 Summary run_static(ShellSystem& system, const Model& model, const RunSettings& settings, const StaticRun& run,

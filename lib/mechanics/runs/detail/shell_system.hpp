@@ -105,10 +105,16 @@ struct Forces {
   bool valid = false;                     ///< false: an element has collapsed or folded by more than the normals allow
 };
 
+/// What the linearised elements deform to by an increment (6 per node) from a configuration.
+std::vector<ElementState> predicted_deformations(const ShellSystem& system, const Configuration& configuration,
+                                                 const VectorX& increment);
+
 /// Internal and external forces, and d(internal - external)/d(displacement, spin) where `tangent` is given (its
 /// pattern is system.pattern). In parallel; the same to the bit whatever the number of threads.
+/// @param predicted  as in corotational_response(), per element; empty: none
 void evaluate(const ShellSystem& system, const Model& model, const Configuration& configuration,
-              const std::vector<double>& factors, const ViscousState& viscous, Forces& forces, BlockMatrix* tangent);
+              const std::vector<double>& factors, const ViscousState& viscous, Forces& forces, BlockMatrix* tangent,
+              const std::vector<ElementState>& predicted = {});
 
 /// Stiffness of the linear theory at the reference, without any load.
 void linear_stiffness(const ShellSystem& system, BlockMatrix& matrix);
