@@ -6,12 +6,11 @@
 
 namespace tunica {
 
-double Ramp::at(double time) const {
-  if (points.empty()) {
-    return 1;
-  }
+template <typename Value>
+Value Table<Value>::at(double time) const {
+  TUNICA_ASSERT(!points.empty());
   const auto next = std::upper_bound(points.begin(), points.end(), time,
-                                     [](double t, const std::pair<double, double>& point) { return t < point.first; });
+                                     [](double t, const std::pair<double, Value>& point) { return t < point.first; });
   if (next == points.begin()) {
     return points.front().second;
   }
@@ -23,13 +22,26 @@ double Ramp::at(double time) const {
   return previous->second + fraction * (next->second - previous->second);
 }
 
-std::size_t Model::node_count() const { return first_node(shells.size()); }
+template struct Table<double>;
+template struct Table<Vec3>;
+
+double Ramp::at(double time) const { return points.empty() ? 1 : Table<double>{points}.at(time); }
+
+const std::string& Model::name_of(std::size_t body) const {
+  return is_solid(body) ? solids.at(body - shells.size()).name : shells.at(body).name;
+}
+
+const std::vector<Vec3>& Model::vertices_of(std::size_t body) const {
+  return is_solid(body) ? solids.at(body - shells.size()).mesh.vertices : shells.at(body).mesh.vertices;
+}
+
+std::size_t Model::node_count() const { return first_node(body_count()); }
 
 std::size_t Model::first_node(std::size_t body) const {
-  TUNICA_ASSERT(body <= shells.size());
+  TUNICA_ASSERT(body <= body_count());
   std::size_t count = 0;
   for (std::size_t b = 0; b < body; ++b) {
-    count += shells[b].mesh.vertices.size();
+    count += vertices_of(b).size();
   }
   return count;
 }

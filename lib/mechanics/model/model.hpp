@@ -3,6 +3,7 @@
 
 #include "tunica/core/quantity.hpp"
 #include "tunica/shell/patch/shell_mesh.hpp"
+#include "tunica/surface/mesh/tet_mesh.hpp"
 
 #include <optional>
 #include <string>
@@ -52,7 +53,104 @@ struct ShellBody {
   std::string said_at{};  ///< where the user said it, for messages; may be empty, here and below
 };
 
-/// A piecewise linear table over time (dynamic) or load factor (static); constant beyond its ends. Empty: 1.
+enum class SolidLaw {
+  corotational,  ///< the paper's: linear elasticity in the frame that follows each tetrahedron; for small strains
+  neo_hookean,   ///< for what is crushed
+};
+
+/// A body of linear tetrahedra.
+struct SolidBody {
+  std::string name;
+  TetMesh mesh;
+  Material material;
+  SolidLaw law = SolidLaw::corotational;
+  std::string said_at{};
+};
+
+/// A piecewise linear table over time (dynamic) or load factor (static); constant beyond its ends.
+template <typename Value>
+struct Table {
+  std::vector<std::pair<double, Value>> points;  ///< (time s, value), times increasing, at least one
+
+  [[nodiscard]] Value at(double time) const;
+};
+
+struct RigidSphere {
+  Table<Vec3> centre;    ///< mm
+  Table<double> radius;  ///< mm
+};
+/// All points within `radius` of the line.
+struct RigidCapsule {
+  Table<Vec3> from, to;  ///< mm
+  Table<double> radius;
+};
+/// With flat ends at right angles to the line.
+struct RigidCylinder {
+  Table<Vec3> from, to;
+  Table<double> radius;
+};
+/// The half-space below a plane.
+struct RigidPlane {
+  Table<Vec3> point;  ///< mm
+  Vec3 normal;        ///< unit; away from the body
+};
+/// A closed surface, its normals outward.
+struct RigidMesh {
+  TriangleMesh surface;
+  /// Turned by this angle (rad) about an axis.
+  struct Turn {
+    Vec3 point, axis;  ///< mm; unit
+    Table<double> angle;
+  };
+  std::optional<Turn> turn;
+  /// Distances from an axis times this factor.
+  struct Expansion {
+    Vec3 point, axis;
+    Table<double> factor;
+  };
+  std::optional<Expansion> expansion;
+};
+
+/// A body that does not deform and moves as it is told.
+struct RigidBody {
+  std::string name;
+  std::variant<RigidSphere, RigidCapsule, RigidCylinder, RigidPlane, RigidMesh> shape;
+  std::optional<Table<Vec3>> motion;  ///< mm: added to what `shape` says
+  std::string said_at{};
+};
+
+/// Nodes of a body that another body carries: they keep their place relative to its curved surface (a shell, half a
+/// wall from its middle included in the offset that the reference geometry shows) or inside its tetrahedra (a solid).
+struct Attachment {
+  std::size_t body = 0;
+  std::vector<Index> nodes;
+  std::size_t to = 0;  ///< body
+  enum class Side { inner, outer, middle };
+  Side side = Side::middle;  ///< of a shell: the face of the wall on which the nodes lie
+  std::string said_at{};
+};
+
+/// A body that deforms, by its number, or a rigid one.
+struct ContactParty {
+  bool rigid = false;
+  std::size_t index = 0;
+};
+
+struct Contact {
+  std::string name;
+  std::array<ContactParty, 2> between;  ///< at most one rigid; the same twice: self-contact
+  double friction = 0;                  ///< Coulomb's coefficient
+  /// The distance over which contact pressure builds up: this part of the thinner wall; between solids, of the mean
+  /// edge of their surfaces.
+  double resolution = 0.05;
+  bool curved = true;  ///< false: shells touch with their flat facets
+  /// False: the paper's rule for forces on a curved shell (barycentric forces, torques by the inverse of C), which
+  /// loses moments. For comparison.
+  bool consistent = true;
+  std::string said_at{};
+};
+
+/// A piecewise linear table of factors over time (dynamic) or load factor (static); constant beyond its ends. Empty: 1.
 struct Ramp {
   std::vector<std::pair<double, double>> points;  ///< (time s, factor), times increasing
 
@@ -113,13 +211,24 @@ struct Probe {
   Index node = 0;
 };
 
+/// Bodies that deform are numbered shells first, then solids; global node numbers: the bodies' vertices one after the
+/// other in that order.
 struct Model {
-  std::vector<ShellBody> shells;  ///< global node numbers: the bodies' vertices one after the other
+  std::vector<ShellBody> shells;
+  std::vector<SolidBody> solids;
+  std::vector<RigidBody> rigids;
+  std::vector<Attachment> attachments;
+  std::vector<Contact> contacts;
   std::vector<Fix> fixes;
   std::vector<RigidMotionsFix> rigid_motions;
   std::vector<Load> loads;
   std::vector<Probe> probes;
 
+  [[nodiscard]] std::size_t body_count() const { return shells.size() + solids.size(); }
+  [[nodiscard]] bool is_solid(std::size_t body) const { return body >= shells.size(); }
+  [[nodiscard]] const std::string& name_of(std::size_t body) const;
+  /// Reference positions of a body's nodes.
+  [[nodiscard]] const std::vector<Vec3>& vertices_of(std::size_t body) const;
   [[nodiscard]] std::size_t node_count() const;
   /// Global number of the first node of a body.
   [[nodiscard]] std::size_t first_node(std::size_t body) const;
