@@ -35,24 +35,28 @@ BlockMatrix make_block_matrix(std::size_t nodes, const std::vector<std::array<In
   }
   std::sort(pairs.begin(), pairs.end());
   pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+  std::vector<std::vector<Index>> neighbours(nodes);
+  for (const std::uint64_t p : pairs) {
+    neighbours[p >> 32].push_back(static_cast<Index>(p));
+  }
+  return make_block_matrix(neighbours);
+}
 
+BlockMatrix make_block_matrix(const std::vector<std::vector<Index>>& neighbours) {
+  const std::size_t nodes = neighbours.size();
   BlockMatrix matrix;
   matrix.row_start.assign(nodes + 1, 0);
-  matrix.column.reserve(pairs.size());
-  for (const std::uint64_t p : pairs) {
-    ++matrix.row_start[(p >> 32) + 1];
-    matrix.column.push_back(static_cast<Index>(p));
-  }
   for (std::size_t i = 0; i < nodes; ++i) {
-    matrix.row_start[i + 1] += matrix.row_start[i];
+    matrix.row_start[i + 1] = matrix.row_start[i] + neighbours[i].size();
+    matrix.column.insert(matrix.column.end(), neighbours[i].begin(), neighbours[i].end());
   }
-  matrix.transposed.resize(pairs.size());
+  matrix.transposed.resize(matrix.column.size());
   for (std::size_t i = 0; i < nodes; ++i) {
     for (std::size_t k = matrix.row_start[i]; k < matrix.row_start[i + 1]; ++k) {
       matrix.transposed[k] = matrix.find(matrix.column[k], narrow<Index>(i));
     }
   }
-  matrix.values.assign(36 * pairs.size(), 0);
+  matrix.values.assign(36 * matrix.column.size(), 0);
   return matrix;
 }
 

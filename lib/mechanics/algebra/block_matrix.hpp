@@ -37,6 +37,9 @@ struct BlockMatrix {
 /// The pattern of a mesh: nodes that share a triangle, and every node with itself. Values are zero.
 BlockMatrix make_block_matrix(std::size_t nodes, const std::vector<std::array<Index, 3>>& triangles);
 
+/// The pattern with these neighbours of every node, itself included, in order; both ways.
+BlockMatrix make_block_matrix(const std::vector<std::vector<Index>>& neighbours);
+
 /// y = A x, in parallel; the same to the bit whatever the number of threads.
 void multiply(const BlockMatrix& matrix, const VectorX& x, VectorX& y);
 

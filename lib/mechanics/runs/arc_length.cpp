@@ -82,7 +82,7 @@ public:
     state.configuration = start.configuration;
     VectorX change = step * start.direction;
     double factor_change = step * start.factor_slope;
-    advance_configuration(state.configuration, change);
+    advance_configuration(system_, change, state.configuration);
     const std::size_t most = std::min(settings_.newton_max, most_corrections_of_step);
     for (state.iterations = 0;; ++state.iterations) {
       check_interrupt();
@@ -113,12 +113,12 @@ public:
         return false;
       }
       correction += by * response;
-      if (largest_rotation(correction) > largest_correction) {
+      if (largest_rotation(system_, correction) > largest_correction) {
         return false;
       }
       change += correction;
       factor_change += by;
-      advance_configuration(state.configuration, correction);
+      advance_configuration(system_, correction, state.configuration);
     }
   }
 
@@ -223,7 +223,7 @@ private:
     PathState next;
     double depart = 0;
     while (true) {
-      step_ = std::min(step_, largest_turn_of_step / std::max(largest_rotation(now_.direction), 1e-300));
+      step_ = std::min(step_, largest_turn_of_step / std::max(largest_rotation(system_, now_.direction), 1e-300));
       next = PathState();
       if (find(now_, step_, next)) {
         depart = departure(now_, next);

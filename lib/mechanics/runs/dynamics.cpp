@@ -382,6 +382,7 @@ private:
     result.scale =
         std::max({force_norm(system_, forces_.external), force_norm(system_, inertia), force_norm(system_, reactions)});
     result.floor = round_off(system_, c);
+    condense(system_, c, result.unbalanced, tangent);
     return result;
   }
 
@@ -448,7 +449,8 @@ private:
     change.resize(first_freedom(start.displacement.size()));
     for (std::size_t i = 0; i < start.displacement.size(); ++i) {
       change.segment<3>(first_freedom(i)) = end.displacement[i] - start.displacement[i];
-      change.segment<3>(first_freedom(i) + 3) = logarithm(end.rotation[i] * start.rotation[i].conjugate());
+      change.segment<3>(first_freedom(i) + 3) =
+          logarithm(end.rotation[i] * start.rotation[i].conjugate());  // 0: solids
     }
   }
 

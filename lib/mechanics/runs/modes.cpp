@@ -66,14 +66,14 @@ double largest_strain(const ShellSystem& system, const VectorX& solution) {
 
 /// How the tangent changes per unit of the factor along a linear solution, at the reference: central differences.
 BlockMatrix tangent_change(const ShellSystem& system, const Model& model, const VectorX& solution) {
-  const double part = difference_size / std::max(largest_strain(system, solution), largest_rotation(solution));
+  const double part = difference_size / std::max(largest_strain(system, solution), largest_rotation(system, solution));
   std::vector<double> full = load_factors(model, true, 1);
   std::array<BlockMatrix, 2> tangent{system.pattern, system.pattern};
   Forces forces;
   for (std::size_t side = 0; side < 2; ++side) {
     const double signed_part = side == 0 ? part : -part;
     Configuration configuration = reference_configuration(system);
-    advance_configuration(configuration, signed_part * solution);
+    advance_configuration(system, signed_part * solution, configuration);
     std::vector<double> factors = full;
     for (double& factor : factors) {
       factor *= signed_part;
@@ -385,7 +385,7 @@ Summary run_buckling(ShellSystem& system, const Model& model, const RunSettings&
   const VectorX solution = linear_solution(system, model, settings);
   const double strain = largest_strain(system, solution);
   const double largest_factor = strain > 0 ? largest_linear_strain / strain : infinity;
-  if (!(std::max(strain, largest_rotation(solution)) > 0)) {
+  if (!(std::max(strain, largest_rotation(system, solution)) > 0)) {
     throw InputError("the loads do not deform anything: buckling needs a load that does");
   }
   const BlockMatrix change = tangent_change(system, model, solution);

@@ -12,6 +12,8 @@ namespace {
 
 constexpr double largest_turn = 0.5;        // rad per iteration
 constexpr std::size_t free_iterations = 6;  // full steps before the line search sets in
+constexpr int most_cuts = 6;                // of an increment
+constexpr int most_cuts_in_contact = 20;    // surfaces that come near each other from far away
 
 bool uses_cg(const RunSettings& settings) { return settings.solver == Solver::cg; }
 
@@ -27,6 +29,9 @@ TangentSolver::TangentSolver(const ShellSystem& system, const RunSettings& setti
     : settings_(settings), free_(free_freedoms(system)) {
   if (!uses_cg(settings)) {
     direct_.emplace(system.pattern, free_);
+  }
+  for (std::size_t i = system.first_solid_node; i < system.node_count(); ++i) {
+    pressures_ += free_[freedom(i, 3)] ? 1 : 0;
   }
 }
 
@@ -56,7 +61,7 @@ TangentSolver::Result TangentSolver::solve(BlockMatrix& matrix, const VectorX& b
   if (!factored_.regular) {
     return result;
   }
-  result.positive_definite = factored_.negative_pivots == 0;
+  result.positive_definite = factored_.negative_pivots == pressures_;
   direct_->solve(b, x);
   if (!x.allFinite()) {
     return result;
@@ -94,7 +99,7 @@ public:
         held_increment_(held_increment),
         matrix_(matrix),
         configuration_(configuration),
-        moving_(held_increment.squaredNorm() > 0),
+        left_(held_increment.squaredNorm() > 0 ? 1 : 0),
         whole_(VectorX::Zero(held_increment.size())) {}
 
   NewtonResult run(bool likely_at_rest) {
@@ -105,7 +110,7 @@ public:
     }
     result_.valid = result_.stable = result_.linear_converged = true;
     result_.residual = residual_of(now_);
-    result_.converged = !moving_ && (now_.scale == 0 || result_.residual <= settings_.converge);
+    result_.converged = !is_moving() && (now_.scale == 0 || result_.residual <= settings_.converge);
     while (!result_.converged && result_.valid && result_.iterations < settings_.newton_max) {
       check_interrupt();
       const bool at_floor = result_.iterations > 0 && is_at_floor();
@@ -122,6 +127,9 @@ public:
   }
 
 private:
+  /// Prescribed displacements or rigid bodies have not come to the end of the step.
+  [[nodiscard]] bool is_moving() const { return left_ > 0 || (system_.contact && system_.contact->left() > 0); }
+
   [[nodiscard]] double residual_of(const Balance& balance) const {
     VectorX free = balance.unbalanced;
     mask(solver_.free(), free);
@@ -133,6 +141,9 @@ private:
 
   /// At the floor of round-off a residual says nothing about the error any more; the increments still do.
   [[nodiscard]] bool at_rest() const {
+    if (is_moving()) {
+      return false;
+    }
     return result_.residual <= settings_.converge ||
            (is_at_floor() && last_size_ <= largest_round_off * result_.reached) || is_settled();
   }
@@ -152,8 +163,15 @@ private:
 
   /// Forces and tangent at the configuration.
   Balance linearised() {
-    return balance_(configuration_, &matrix_,
-                    last_.size() > 0 ? predicted_deformations(system_, before_, last_) : std::vector<ElementState>{});
+    if (last_.size() == 0) {
+      return balance_(configuration_, &matrix_, {});
+    }
+    VectorX all = last_;
+    expand_carried(system_.carried, system_.surfaces, system_.reference, before_, all);
+    if (system_.contact) {
+      system_.contact->predict(all);
+    }
+    return balance_(configuration_, &matrix_, predicted_deformations(system_, before_, all));
   }
 
   /// By the tangent; prescribed displacements move in the first. @return false where there is no solution.
@@ -162,9 +180,9 @@ private:
       now_ = linearised();
     }
     VectorX right = now_.unbalanced;
-    if (moving_) {
+    if (left_ > 0) {
       VectorX product;
-      multiply(matrix_, held_increment_, product);
+      multiply(matrix_, left_ * held_increment_, product);
       right -= product;
     }
     mask(solver_.free(), right);
@@ -182,9 +200,13 @@ private:
       return false;
     }
     work_ = right.dot(increment_);
-    if (moving_) {
-      increment_ += held_increment_;
-    } else if (const double turn = largest_rotation(increment_); turn > largest_turn) {
+    longest_ = 1;
+    const double turn = largest_rotation(system_, increment_);
+    if (left_ > 0) {
+      increment_ += left_ * held_increment_;
+    } else if (turn > largest_turn && is_moving()) {
+      longest_ = largest_turn / turn;
+    } else if (turn > largest_turn) {
       increment_ *= largest_turn / turn;
     }
     if (result_.iterations == 1) {
@@ -201,21 +223,27 @@ private:
     const bool more = result_.iterations < settings_.newton_max && expected > settings_.converge;
     previous_residual_ = result_.residual;
     before_ = configuration_;
-    double length = 1;
+    double length = longest_;
+    const bool moving = is_moving();
+    const double bodies_left = system_.contact ? system_.contact->left() : 0;
+    const int most_trials = system_.contact ? most_cuts_in_contact : most_cuts;
     for (int trial = 0;; ++trial) {
       configuration_ = before_;
       last_ = length * increment_;
-      advance_configuration(configuration_, last_);
+      advance_configuration(system_, last_, configuration_);
+      if (system_.contact) {
+        system_.contact->set_left(bodies_left * (1 - length));
+      }
       tangent_is_current_ = more && trial == 0;
       now_ = tangent_is_current_ ? linearised() : balance_(configuration_, nullptr, {});
-      if (moving_ || trial == 6) {
+      if ((left_ > 0 && !system_.contact) || trial == most_trials) {
         break;
       }
       if (!now_.valid) {
         length /= 2;
         continue;
       }
-      if (result_.iterations <= free_iterations) {
+      if (result_.iterations <= free_iterations || moving) {
         break;
       }
       VectorX free = now_.unbalanced;
@@ -226,7 +254,7 @@ private:
       }
       length = std::clamp(length * work_ / (work_ - left), 0.2 * length, 0.7 * length);
     }
-    moving_ = false;
+    left_ = length == 1 ? 0 : left_ * (1 - length);
     whole_ += last_;
     last_size_ = increment_size(system_, last_);
     result_.reached = increment_size(system_, whole_);
@@ -245,7 +273,8 @@ private:
   Configuration& configuration_;
   NewtonResult result_;
   Balance now_;
-  bool moving_;  ///< prescribed displacements are still to be moved
+  double left_;        ///< of the prescribed displacements, still to be moved
+  double longest_ = 1;  ///< part of the increment that may be followed
   bool tangent_is_current_ = false;
   VectorX increment_;
   Configuration before_;  ///< the last increment went from here

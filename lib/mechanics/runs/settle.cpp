@@ -126,7 +126,7 @@ private:
     positive_without_ = viscosity_ == 0;
     limit(system_, increment);
     Configuration next = configuration_;
-    advance_configuration(next, increment);
+    advance_configuration(system_, increment, next);
     BlockMatrix next_matrix = std::move(shifted);
     const Balance then = balance_(next, &next_matrix, {});
     // Beyond the bottom of a valley the forces push back.

@@ -23,6 +23,7 @@ namespace tunica {
 namespace {
 
 constexpr std::size_t grain = 16;  // batches
+constexpr std::size_t solid_grain = 64;
 
 double mean_thickness(const ShellBody& body, const std::array<Index, 3>& triangle) {
   if (body.thickness.size() == 1) {
@@ -85,7 +86,12 @@ void find_pieces(ShellSystem& system, const Model& model) {
     joined.join(e.nodes[0], e.nodes[2]);
   }
   std::vector<std::size_t> piece_of(system.node_count(), SIZE_MAX);
-  for (std::size_t body = 0; body < model.shells.size(); ++body) {
+  for (const SolidElement& e : system.solids) {
+    for (std::size_t k = 1; k < 4; ++k) {
+      joined.join(e.nodes[0], e.nodes[k]);
+    }
+  }
+  for (std::size_t body = 0; body < model.body_count(); ++body) {
     for (std::size_t i = model.first_node(body); i < model.first_node(body + 1); ++i) {
       if (system.used[i] == 0) {
         continue;
@@ -97,6 +103,29 @@ void find_pieces(ShellSystem& system, const Model& model) {
       }
       system.pieces[piece].nodes.push_back(narrow<Index>(i));
     }
+  }
+}
+
+/// Greedy, as colour_elements().
+void colour_solids(ShellSystem& system) {
+  std::vector<std::vector<bool>> taken(system.node_count());
+  for (std::size_t e = 0; e < system.solids.size(); ++e) {
+    const auto& nodes = system.solids[e].nodes;
+    std::size_t colour = 0;
+    while (std::any_of(nodes.begin(), nodes.end(),
+                       [&](Index v) { return colour < taken[v].size() && taken[v][colour]; })) {
+      ++colour;
+    }
+    for (const Index v : nodes) {
+      if (taken[v].size() <= colour) {
+        taken[v].resize(colour + 1, false);
+      }
+      taken[v][colour] = true;
+    }
+    if (system.solid_colours.size() <= colour) {
+      system.solid_colours.resize(colour + 1);
+    }
+    system.solid_colours[colour].push_back(narrow<Index>(e));
   }
 }
 
@@ -131,8 +160,8 @@ void add_area_load(const ShellSystem& system, std::size_t element, const Vec3& p
 
 Index used_node(const ShellSystem& system, const Model& model, std::size_t body, Index node) {
   const std::size_t global = model.first_node(body) + node;
-  if (node >= model.shells[body].mesh.vertices.size() || system.used[global] == 0) {
-    throw InputError(fmt::format("{}: a load acts on node {}, which no triangle uses", model.shells[body].name, node));
+  if (node >= model.vertices_of(body).size() || system.used[global] == 0) {
+    throw InputError(fmt::format("{}: a load acts on node {}, which no element uses", model.name_of(body), node));
   }
   return narrow<Index>(global);
 }
@@ -148,19 +177,42 @@ void add_edge_load(const ShellSystem& system, const Model& model, std::size_t bo
   }
 }
 
+/// Pressure that keeps its direction, or a force per area, on the surface of a solid.
+void add_solid_surface_load(const ShellSystem& system, const Load& load, DeadLoad& dead) {
+  const auto* pressure = std::get_if<PressureLoad>(&load.kind);
+  const auto* area = std::get_if<AreaLoad>(&load.kind);
+  if (pressure == nullptr && area == nullptr) {
+    return;
+  }
+  for (std::size_t f = system.surfaces.first[load.body]; f < system.surfaces.first[load.body + 1]; ++f) {
+    const auto& v = system.surfaces.faces[f].nodes;
+    const Vec3 twice =
+        (system.reference[v[1]] - system.reference[v[0]]).cross(system.reference[v[2]] - system.reference[v[0]]);
+    const Vec3 force =
+        pressure != nullptr ? Vec3(pressure->value / 6 * twice) : Vec3(twice.norm() / 6 * area->per_area);
+    for (const Index node : v) {
+      dead.force.segment<3>(first_freedom(node)) += force;
+    }
+  }
+}
+
 void make_loads(ShellSystem& system, const Model& model) {
   system.dead.resize(model.loads.size());
   for (std::size_t l = 0; l < model.loads.size(); ++l) {
     const Load& load = model.loads[l];
     DeadLoad& dead = system.dead[l];
-    const std::size_t begin = system.first_element[load.body];
-    const std::size_t end = system.first_element[load.body + 1];
+    const bool solid = model.is_solid(load.body);
+    const std::size_t begin = solid ? 0 : system.first_element[load.body];
+    const std::size_t end = solid ? 0 : system.first_element[load.body + 1];
     if (const auto* pressure = std::get_if<PressureLoad>(&load.kind); pressure != nullptr && pressure->follower) {
       system.follower_pressures.emplace_back(l, load.body);
       continue;
     }
     dead.force = VectorX::Zero(first_freedom(system.node_count()));
-    if (std::holds_alternative<AreaLoad>(load.kind)) {
+    if (solid) {
+      add_solid_surface_load(system, load, dead);
+    }
+    if (std::holds_alternative<AreaLoad>(load.kind) && !solid) {
       dead.director.assign(system.node_count(), Mat3::Zero());
     }
     if (const auto* pressure = std::get_if<PressureLoad>(&load.kind)) {
@@ -280,6 +332,15 @@ void scatter(const ShellSystem& system, const Batch& batch, const LaneMatrix18& 
   }
 }
 
+void scatter(const ShellSystem& system, Index element, const Matrix16& matrix, BlockMatrix& target) {
+  for (int j = 0; j < 4; ++j) {
+    for (int i = 0; i < 4; ++i) {
+      target.block(system.solid_placement[element][4 * i + j]).topLeftCorner<4, 4>() +=
+          matrix.block<4, 4>(4 * i, 4 * j);
+    }
+  }
+}
+
 void add_dead_loads(const ShellSystem& system, const Configuration& configuration, const std::vector<double>& factors,
                     VectorX& external, BlockMatrix* tangent) {
   for (std::size_t l = 0; l < system.dead.size(); ++l) {
@@ -301,6 +362,61 @@ void add_dead_loads(const ShellSystem& system, const Configuration& configuratio
   }
 }
 
+/// The solids: forces, energy and tangent.
+void evaluate_solids(const ShellSystem& system, const Configuration& configuration, Forces& forces,
+                     BlockMatrix* tangent, std::atomic<bool>& valid) {
+  std::vector<double> energies(system.solids.size());
+  for (const std::vector<Index>& colour : system.solid_colours) {
+    parallel_for_blocks(colour.size(), solid_grain, [&](std::size_t begin, std::size_t end) {
+      SolidResponse response;
+      Matrix16 stiffness;
+      for (std::size_t c = begin; c < end; ++c) {
+        const SolidElement& element = system.solids[colour[c]];
+        if (!solid_response(element, corner_motion(element, configuration), response,
+                            tangent == nullptr ? nullptr : &stiffness)) {
+          valid = false;
+          continue;
+        }
+        energies[colour[c]] = response.energy;
+        for (int k = 0; k < 4; ++k) {
+          forces.internal.segment<4>(first_freedom(element.nodes[k])) += response.force.segment<4>(4 * k);
+        }
+        if (tangent != nullptr) {
+          scatter(system, colour[c], stiffness, *tangent);
+        }
+      }
+    });
+  }
+  forces.energy += std::accumulate(energies.begin(), energies.end(), 0.0);
+}
+
+/// Follower pressure on the surfaces of solids.
+void push_solids(const ShellSystem& system, const Configuration& configuration, const std::vector<double>& pressure,
+                 VectorX& external, BlockMatrix* tangent) {
+  for (std::size_t body = system.first_element.size() - 1; body < pressure.size(); ++body) {
+    if (pressure[body] == 0) {
+      continue;
+    }
+    for (std::size_t f = system.surfaces.first[body]; f < system.surfaces.first[body + 1]; ++f) {
+      const auto& v = system.surfaces.faces[f].nodes;
+      std::array<Vec3, 3> corners;
+      for (std::size_t k = 0; k < 3; ++k) {
+        corners[k] = system.reference[v[k]] + configuration.displacement[v[k]];
+      }
+      Vector9 force;
+      Matrix9 stiffness;
+      unit_pressure(corners, {}, force, tangent == nullptr ? nullptr : &stiffness);
+      for (int i = 0; i < 3; ++i) {
+        external.segment<3>(first_freedom(v[i])) += pressure[body] * force.segment<3>(3 * i);
+        for (int j = 0; tangent != nullptr && j < 3; ++j) {
+          tangent->block(tangent->find(v[i], v[j])).block<3, 3>(0, 0) -=
+              pressure[body] * stiffness.block<3, 3>(3 * i, 3 * j);
+        }
+      }
+    }
+  }
+}
+
 /// What round_off() needs. The element matrices themselves, not E t: those of a sliver are larger by the square of its
 /// edge over its height, and so is the noise that one unit in the last place of a rotation makes there.
 void add_stiffness_norms(ShellSystem& system) {
@@ -312,6 +428,15 @@ void add_stiffness_norms(ShellSystem& system) {
       for (int column = 0; column < 18; ++column) {
         const double entry = stiffness(row, column) / (row % 6 < 3 ? 1 : system.length);
         (column % 6 < 3 ? translation : rotation) += entry * entry;
+      }
+    }
+  }
+  for (const SolidElement& element : system.solids) {
+    const Matrix16 stiffness = linear_stiffness(element);
+    for (int row = 0; row < 16; ++row) {
+      for (int column = 0; column < 16; ++column) {
+        const double entry = stiffness(row, column) / (row % 4 < 3 ? 1 : system.length);
+        (column % 4 < 3 ? translation : rotation) += entry * entry;
       }
     }
   }
@@ -330,6 +455,81 @@ void stiffen_short_waves(ShellSystem& system) {
 bool has_soft_waves(const ShellSystem& system) {
   return std::any_of(system.elements.begin(), system.elements.end(),
                      [](const ShellElement& element) { return element.thinness > 3; });
+}
+
+namespace {
+
+void add_solids(ShellSystem& system, const Model& model, double& edges) {
+  system.first_solid_node = system.reference.size();
+  for (std::size_t s = 0; s < model.solids.size(); ++s) {
+    const SolidBody& body = model.solids[s];
+    const std::size_t number = model.shells.size() + s;
+    const auto offset = narrow<Index>(model.first_node(number));
+    system.reference.insert(system.reference.end(), body.mesh.vertices.begin(), body.mesh.vertices.end());
+    for (const auto& v : body.mesh.tetrahedra) {
+      Corners4 corners;
+      for (int k = 0; k < 4; ++k) {
+        corners.col(k) = body.mesh.vertices[v[k]];
+      }
+      SolidElement element = make_solid_element(corners, body.material, body.law);
+      element.body = number;
+      for (int k = 0; k < 4; ++k) {
+        element.nodes[k] = v[k] + offset;
+        system.used[element.nodes[k]] = 1;
+        for (int l = 0; l < k; ++l) {
+          edges += (corners.col(k) - corners.col(l)).norm();
+        }
+      }
+      system.solids.push_back(element);
+    }
+  }
+}
+
+}  // namespace
+
+void make_pattern(ShellSystem& system, const std::vector<std::array<Index, 2>>& pairs) {
+  std::vector<std::vector<Index>> neighbours(system.node_count());
+  const auto join = [&](const auto& nodes) {
+    for (const Index i : nodes) {
+      for (const Index j : nodes) {
+        neighbours[i].push_back(j);
+      }
+    }
+  };
+  for (std::size_t i = 0; i < neighbours.size(); ++i) {
+    neighbours[i].push_back(narrow<Index>(i));
+  }
+  for (const ShellElement& e : system.elements) {
+    join(e.nodes);
+  }
+  for (const SolidElement& e : system.solids) {
+    join(e.nodes);
+  }
+  for (const auto& pair : pairs) {
+    join(pair);
+  }
+  for (std::vector<Index>& of_node : neighbours) {
+    std::sort(of_node.begin(), of_node.end());
+    of_node.erase(std::unique(of_node.begin(), of_node.end()), of_node.end());
+  }
+  add_carried_pairs(system.carried, neighbours);
+  system.pattern = make_block_matrix(neighbours);
+  const auto place = [&](const auto& nodes, auto& placement) {
+    const std::size_t count = nodes.size();
+    for (std::size_t i = 0; i < count; ++i) {
+      for (std::size_t j = 0; j < count; ++j) {
+        placement[count * i + j] = system.pattern.find(nodes[i], nodes[j]);
+      }
+    }
+  };
+  system.placement.resize(system.elements.size());
+  for (std::size_t e = 0; e < system.elements.size(); ++e) {
+    place(system.elements[e].nodes, system.placement[e]);
+  }
+  system.solid_placement.resize(system.solids.size());
+  for (std::size_t e = 0; e < system.solids.size(); ++e) {
+    place(system.solids[e].nodes, system.solid_placement[e]);
+  }
 }
 
 ShellSystem make_system(const Model& model) {
@@ -372,24 +572,20 @@ ShellSystem make_system(const Model& model) {
     }
     system.first_element.push_back(system.elements.size());
   }
-  system.length = edges / (3 * real(std::max<std::size_t>(1, system.elements.size())));
+  add_solids(system, model, edges);
+  system.length = edges / real(std::max<std::size_t>(1, 3 * system.elements.size() + 6 * system.solids.size()));
   add_stiffness_norms(system);
+  if (!model.solids.empty() || !model.attachments.empty() || !model.contacts.empty()) {
+    system.surfaces = surface_faces(model);
+  }
+  system.carried = carried_nodes(model, system.surfaces, system.reference);
+  if (!model.contacts.empty()) {
+    system.contact = std::make_shared<ContactSystem>(model, system.surfaces, system.reference);
+  }
 
-  std::vector<std::array<Index, 3>> triangles;
-  triangles.reserve(system.elements.size());
-  for (const ShellElement& e : system.elements) {
-    triangles.push_back(e.nodes);
-  }
-  system.pattern = make_block_matrix(nodes, triangles);
-  system.placement.resize(system.elements.size());
-  for (std::size_t e = 0; e < system.elements.size(); ++e) {
-    for (std::size_t i = 0; i < 3; ++i) {
-      for (std::size_t j = 0; j < 3; ++j) {
-        system.placement[e][3 * i + j] = system.pattern.find(triangles[e][i], triangles[e][j]);
-      }
-    }
-  }
+  make_pattern(system, {});
   colour_elements(system);
+  colour_solids(system);
   find_pieces(system, model);
 
   system.area = VectorX::Zero(nodes);
@@ -403,6 +599,12 @@ ShellSystem make_system(const Model& model) {
       system.inertia[node] += mass * e.thickness * e.thickness / 12;
     }
   }
+  for (const SolidElement& e : system.solids) {
+    const double density = model.solids[e.body - model.shells.size()].material.density.value_or(0);
+    for (const Index node : e.nodes) {
+      system.mass[node] += density * e.volume / 4;
+    }
+  }
   make_loads(system, model);
   make_supports(system, model);
   return system;
@@ -410,17 +612,41 @@ ShellSystem make_system(const Model& model) {
 
 Configuration reference_configuration(const ShellSystem& system) {
   return {std::vector<Vec3>(system.node_count(), Vec3::Zero()),
-          std::vector<Eigen::Quaterniond>(system.node_count(), Eigen::Quaterniond::Identity())};
+          std::vector<Eigen::Quaterniond>(system.node_count(), Eigen::Quaterniond::Identity()),
+          std::vector<double>(system.solids.empty() ? 0 : system.node_count(), 0.0)};
 }
 
-void advance_configuration(Configuration& configuration, const VectorX& increment) {
+SolidMotion corner_motion(const SolidElement& element, const Configuration& configuration) {
+  SolidMotion motion;
+  for (int k = 0; k < 4; ++k) {
+    motion.displacement.col(k) = configuration.displacement[element.nodes[k]];
+    motion.pressure[k] = configuration.pressure[element.nodes[k]];
+  }
+  return motion;
+}
+
+void condense(const ShellSystem& system, const Configuration& configuration, VectorX& unbalanced,
+              BlockMatrix* tangent) {
+  if (!system.carried.empty()) {
+    unbalanced = -unbalanced;
+    condense(system.carried, system.surfaces, system.reference, configuration, unbalanced, tangent);
+    unbalanced = -unbalanced;
+  }
+}
+
+void advance_configuration(const ShellSystem& system, const VectorX& increment, Configuration& configuration) {
   for (std::size_t i = 0; i < configuration.displacement.size(); ++i) {
     configuration.displacement[i] += increment.segment<3>(first_freedom(i));
+    if (i >= system.first_solid_node) {
+      configuration.pressure[i] += increment[first_freedom(i) + 3];
+      continue;
+    }
     const Vec3 spin = increment.segment<3>(first_freedom(i) + 3);
     if (spin != Vec3::Zero()) {
       configuration.rotation[i] = (exponential(spin) * configuration.rotation[i]).normalized();
     }
   }
+  place_carried(system.carried, system.surfaces, system.reference, configuration);
 }
 
 double factor_of(const Ramp& ramp, bool is_static, double time) {
@@ -465,7 +691,7 @@ void evaluate(const ShellSystem& system, const Model& model, const Configuration
   if (tangent != nullptr) {
     std::fill(tangent->values.begin(), tangent->values.end(), 0.0);
   }
-  std::vector<double> pressure(model.shells.size(), 0);
+  std::vector<double> pressure(model.body_count(), 0);
   for (const auto& [load, body] : system.follower_pressures) {
     pressure[body] += factors[load] * std::get<PressureLoad>(model.loads[load].kind).value;
   }
@@ -536,7 +762,14 @@ void evaluate(const ShellSystem& system, const Model& model, const Configuration
     });
   }
   forces.energy = std::accumulate(energies.begin(), energies.end(), 0.0);
+  if (!system.solids.empty()) {
+    evaluate_solids(system, configuration, forces, tangent, valid);
+    push_solids(system, configuration, pressure, forces.external, tangent);
+  }
   add_dead_loads(system, configuration, factors, forces.external, tangent);
+  if (system.contact) {
+    valid = system.contact->add(configuration, forces.external, tangent) && valid;
+  }
   forces.valid = valid && forces.internal.allFinite() && forces.external.allFinite();
 }
 
@@ -550,6 +783,9 @@ void linear_stiffness(const ShellSystem& system, BlockMatrix& matrix) {
         scatter(system, colour[b], linear_stiffness(elements), matrix);
       }
     });
+  }
+  for (std::size_t e = 0; e < system.solids.size(); ++e) {
+    scatter(system, narrow<Index>(e), linear_stiffness(system.solids[e]), matrix);
   }
 }
 
@@ -570,6 +806,16 @@ void linear_forces(const ShellSystem& system, const VectorX& displacement, Vecto
         }
       }
     });
+  }
+  for (const SolidElement& element : system.solids) {
+    Vector16 motion;
+    for (int k = 0; k < 4; ++k) {
+      motion.segment<4>(4 * k) = displacement.segment<4>(first_freedom(element.nodes[k]));
+    }
+    const Vector16 force = linear_stiffness(element) * motion;
+    for (int k = 0; k < 4; ++k) {
+      forces.segment<4>(first_freedom(element.nodes[k])) += force.segment<4>(4 * k);
+    }
   }
 }
 
@@ -594,9 +840,9 @@ double longest_side(const ShellSystem& system) {
   return (high - low).maxCoeff();
 }
 
-double largest_rotation(const VectorX& freedoms) {
+double largest_rotation(const ShellSystem& system, const VectorX& freedoms) {
   double largest = 0;
-  for (Eigen::Index i = 3; i < freedoms.size(); i += 6) {
+  for (Eigen::Index i = 3; i < first_freedom(system.first_solid_node); i += 6) {
     largest = std::max(largest, freedoms.segment<3>(i).norm());
   }
   return largest;

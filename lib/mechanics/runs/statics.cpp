@@ -31,6 +31,7 @@ Balance static_balance(const ShellSystem& system, const Model& model, const Conf
   mask(system.held, reactions);
   balance.scale = std::max(force_norm(system, forces.external), force_norm(system, reactions));
   balance.floor = round_off(system, configuration);
+  condense(system, configuration, balance.unbalanced, tangent);
   return balance;
 }
 
@@ -104,10 +105,12 @@ public:
     const auto balance = [&](const Configuration& c, BlockMatrix* tangent, const std::vector<ElementState>& predicted) {
       return static_balance(system_, model_, c, factor, forces_, tangent, predicted);
     };
-    advance_configuration(configuration, prescribed_positions(system_, model_, factor) -
-                                             prescribed_positions(system_, model_, previous_factor));
-    advance_configuration(configuration,
-                          nudge * thickness * weakest_direction(system_, solver_, balance, matrix_, configuration));
+    advance_configuration(
+        system_, prescribed_positions(system_, model_, factor) - prescribed_positions(system_, model_, previous_factor),
+        configuration);
+    advance_configuration(system_,
+                          nudge * thickness * weakest_direction(system_, solver_, balance, matrix_, configuration),
+                          configuration);
     return settle(system_, settings_, solver_, balance, matrix_, configuration);
   }
 
@@ -122,7 +125,7 @@ private:
         throw RequirementError(
             fmt::format("{}: at load factor {:.6g} the loads are no longer in balance on the deformed body, which only "
                         "its rigid motions hold: hold it by a [[fix]]",
-                        model_.shells[piece.body].name, factor));
+                        model_.name_of(piece.body), factor));
       }
     }
   }

@@ -96,12 +96,12 @@ void make_supports(ShellSystem& system, const Model& model) {
             const Fix& other = model.fixes[place->second.second];
             throw InputError(fmt::format(
                 "{}{}: two fixes prescribe different displacements {} mm{} and {} mm along {} of node {}: keep one",
-                fix.said_at.empty() ? "" : fix.said_at + ": ", model.shells[fix.body].name, place->second.first,
+                fix.said_at.empty() ? "" : fix.said_at + ": ", model.name_of(fix.body), place->second.first,
                 other.said_at.empty() ? "" : " (" + other.said_at + ")", value, "xyz"[c], node));
           }
           system.held[moved] = true;
         }
-        if (fix.rotation[c]) {
+        if (fix.rotation[c] && !model.is_solid(fix.body)) {
           system.held[moved + 3] = true;
         }
       }
@@ -122,7 +122,12 @@ void make_supports(ShellSystem& system, const Model& model) {
   for (std::size_t i = 0; i < system.node_count(); ++i) {
     if (system.used[i] == 0) {
       std::fill_n(system.held.begin() + first_freedom(i), 6, true);
+    } else if (i >= system.first_solid_node) {  // the fourth is the pressure
+      std::fill_n(system.held.begin() + first_freedom(i) + 4, 2, true);
     }
+  }
+  for (const Carried& c : system.carried) {
+    std::fill_n(system.held.begin() + first_freedom(c.node), 3, true);
   }
 }
 
@@ -150,7 +155,7 @@ std::vector<VectorX> free_rigid_modes(const ShellSystem& system, const Piece& pi
   Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
   for (const Index i : piece.nodes) {
     for (int c = 0; c < 6; ++c) {
-      if (system.held[freedom(i, narrow<std::size_t>(c))]) {
+      if (system.held[freedom(i, narrow<std::size_t>(c))] && (c < 3 || i < system.first_solid_node)) {
         const Row6 row = row_of(i, c);
         normal += row.transpose() * row;
       }

@@ -42,6 +42,7 @@ private:
   FreeMask free_;
   std::optional<DirectSolver> direct_;
   DirectSolver::Factored factored_;
+  std::size_t pressures_ = 0;  ///< each makes a pivot negative
   bool tell_direct_error_ = false;
 };
 

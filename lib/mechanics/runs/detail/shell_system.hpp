@@ -2,20 +2,19 @@
 
 #include "tunica/core/lane_count.hpp"
 #include "tunica/mechanics/algebra/block_matrix.hpp"
+#include "tunica/mechanics/contact/carried.hpp"
+#include "tunica/mechanics/contact/contact_system.hpp"
 #include "tunica/mechanics/elements/pressure.hpp"
 #include "tunica/mechanics/elements/shell_element.hpp"
+#include "tunica/mechanics/model/configuration.hpp"
 #include "tunica/mechanics/model/model.hpp"
+#include "tunica/mechanics/solids/solid_element.hpp"
 
+#include <memory>
 #include <optional>
 
 /// A model made ready for solving: elements, loads, masses and supports by global node, and the sums over them.
 namespace tunica {
-
-/// Displacements (not positions: those would lose the digits) and rotations of all nodes, from the reference.
-struct Configuration {
-  std::vector<Vec3> displacement;
-  std::vector<Eigen::Quaterniond> rotation;
-};
 
 /// A load that keeps its direction, for a factor of 1. `director` of a node is the sum over the triangles around it of
 /// n g', for normals n that turn with the node and vectors g fixed in space: its energy is -trace(R n g').
@@ -53,7 +52,15 @@ struct ShellSystem {
   BlockMatrix pattern;
   std::vector<std::size_t> first_element;  ///< per body, and the end
   std::vector<Piece> pieces;
-  std::vector<char> used;  ///< #nodes: belongs to a triangle
+  std::vector<char> used;  ///< #nodes: belongs to an element
+
+  std::vector<SolidElement> solids;
+  std::vector<std::vector<Index>> solid_colours;             ///< elements of one colour share no node
+  std::vector<std::array<std::size_t, 16>> solid_placement;  ///< as `placement`
+  std::size_t first_solid_node = 0;                          ///< those of solids are the last
+  Surfaces surfaces;  ///< of all bodies; empty where there are only shells that touch and carry nothing
+  std::vector<Carried> carried;
+  std::shared_ptr<ContactSystem> contact;  ///< none where nothing touches
 
   std::vector<DeadLoad> dead;  ///< per load; empty vectors for follower pressure
   std::vector<std::pair<std::size_t, std::size_t>> follower_pressures;  ///< (load, body)
@@ -75,6 +82,9 @@ struct ShellSystem {
 /// triangles, an edge load on an edge that is not there).
 ShellSystem make_system(const Model& model);
 
+/// Makes the pattern, with further pairs of nodes that may act on each other.
+void make_pattern(ShellSystem& system, const std::vector<std::array<Index, 2>>& pairs);
+
 /// Makes the edges' skewness stiff (shell_element.hpp): for frequencies and buckling, whose answers are the spectrum
 /// itself, and for static and dynamic runs where the shell would buckle in waves as short as its elements.
 void stiffen_short_waves(ShellSystem& system);
@@ -85,8 +95,16 @@ bool has_soft_waves(const ShellSystem& system);
 /// The configuration without displacements and rotations.
 Configuration reference_configuration(const ShellSystem& system);
 
-/// Adds spin and displacement increments (6 per node).
-void advance_configuration(Configuration& configuration, const VectorX& increment);
+/// Adds spin and displacement increments (6 per node; of solids displacements and pressures), and puts carried nodes in
+/// their places.
+void advance_configuration(const ShellSystem& system, const VectorX& increment, Configuration& configuration);
+
+/// Moves what acts on carried nodes to those that carry them (carried.hpp).
+/// @param unbalanced  6 per node: external - internal
+void condense(const ShellSystem& system, const Configuration& configuration, VectorX& unbalanced, BlockMatrix* tangent);
+
+/// Displacements and pressures of an element's corners.
+SolidMotion corner_motion(const SolidElement& element, const Configuration& configuration);
 
 /// Factors of the loads, in their order.
 std::vector<double> load_factors(const Model& model, bool is_static, double time);
@@ -101,7 +119,7 @@ struct Forces {
   VectorX internal;  ///< 6 per node: force, moment
   VectorX external;
   double energy = 0;
-  std::vector<ElementState> deformation;  ///< per element
+  std::vector<ElementState> deformation;  ///< per shell element
   bool valid = false;                     ///< false: an element has collapsed or folded by more than the normals allow
 };
 
@@ -130,8 +148,8 @@ VectorX lumped_masses(const ShellSystem& system);
 /// The longest side of the box around the model, mm.
 double longest_side(const ShellSystem& system);
 
-/// Largest rotation (rad) of any node in a vector of freedoms.
-double largest_rotation(const VectorX& freedoms);
+/// Largest rotation (rad) of any node of a shell in a vector of freedoms.
+double largest_rotation(const ShellSystem& system, const VectorX& freedoms);
 
 /// Root of the sum of squares of forces and moments / length.
 double force_norm(const ShellSystem& system, const VectorX& force);

@@ -1,0 +1,287 @@
+#include "tunica/mechanics/contact/carried.hpp"
+
+#include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
+#include "tunica/surface/distance/closest_point.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/LU>
+
+#include <algorithm>
+#include <map>
+
+namespace tunica {
+namespace {
+
+constexpr int search_level = 4;  // pieces per edge of a face, on which the search for the nearest point begins
+
+Configuration at_rest(std::size_t nodes) {
+  return {std::vector<Vec3>(nodes, Vec3::Zero()),
+          std::vector<Eigen::Quaterniond>(nodes, Eigen::Quaterniond::Identity())};
+}
+
+/// Nearest points of one body's surface in the reference.
+class BodySurface {
+public:
+  BodySurface(const Surfaces& surfaces, std::size_t body, const std::vector<Vec3>& reference)
+      : surfaces_(surfaces), reference_(reference), rest_(at_rest(reference.size())), tree_(pieces(body)) {}
+
+  /// @return face, and the parameters on it
+  [[nodiscard]] std::pair<std::size_t, Vec2> nearest(const Vec3& p) const {
+    const ClosestPoint::Hit hit = tree_.closest(p);
+    const std::size_t face = faces_[hit.triangle];
+    const PatchMap map(surfaces_.faces[face], reference_, rest_);
+    Vec2 start = (at_[hit.triangle][0] + at_[hit.triangle][1] + at_[hit.triangle][2]) / 3;
+    return {face, nearest_on_face(surfaces_.faces[face], map, p, start)};
+  }
+
+private:
+  TriangleMesh pieces(std::size_t body) {
+    TriangleMesh mesh;
+    for (std::size_t f = surfaces_.first[body]; f < surfaces_.first[body + 1]; ++f) {
+      const SurfaceFace& face = surfaces_.faces[f];
+      const PatchMap map(face, reference_, rest_);
+      const int level = face.curved ? search_level : 1;
+      const auto add = [&](const Vec2& a, const Vec2& b, const Vec2& c) {
+        const auto first = narrow<Index>(mesh.vertices.size());
+        for (const Vec2& at : {a, b, c}) {
+          mesh.vertices.push_back(map.point(patch_weights(face, at)));
+        }
+        mesh.triangles.push_back({first, first + 1, first + 2});
+        faces_.push_back(f);
+        at_.push_back({a, b, c});
+      };
+      for (int i = 0; i < level; ++i) {
+        for (int j = 0; i + j < level; ++j) {
+          const auto at = [&](int x, int y) { return Vec2(real(x) / level, real(y) / level); };
+          add(at(i, j), at(i + 1, j), at(i, j + 1));
+          if (i + j + 1 < level) {
+            add(at(i + 1, j), at(i + 1, j + 1), at(i, j + 1));
+          }
+        }
+      }
+    }
+    return mesh;
+  }
+
+  const Surfaces& surfaces_;
+  const std::vector<Vec3>& reference_;
+  Configuration rest_;
+  std::vector<std::size_t> faces_;
+  std::vector<std::array<Vec2, 3>> at_;
+  ClosestPoint tree_;
+};
+
+/// The tetrahedron that holds a point, or of several, or none, the one with the largest smallest coordinate.
+/// Cost: linear in the tetrahedra, for each point.
+std::pair<std::size_t, Eigen::Vector4d> find_tetrahedron(const TetMesh& mesh, const Vec3& p) {
+  std::pair<std::size_t, Eigen::Vector4d> best{0, Eigen::Vector4d::Constant(-infinity)};
+  for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t) {
+    const auto& v = mesh.tetrahedra[t];
+    const Vec3& x0 = mesh.vertices[v[0]];
+    Mat3 edges;
+    edges << mesh.vertices[v[1]] - x0, mesh.vertices[v[2]] - x0, mesh.vertices[v[3]] - x0;
+    const Vec3 b = edges.inverse() * (p - x0);
+    const Eigen::Vector4d all(1 - b.sum(), b[0], b[1], b[2]);
+    if (all.minCoeff() > best.second.minCoeff()) {
+      best = {t, all};
+    }
+  }
+  return best;
+}
+
+Vec3 turned_offset(const Carried& c, const Configuration& configuration, int k) {
+  return c.shares[k] * (configuration.rotation[c.carriers[k]] * c.offset);
+}
+
+/// d x / d (6 per carrier).
+Eigen::Matrix<double, 3, Eigen::Dynamic> derivative(const Carried& c, const Surfaces& surfaces,
+                                                    const std::vector<Vec3>& reference,
+                                                    const Configuration& configuration) {
+  const auto count = narrow<Eigen::Index>(c.carriers.size());
+  Eigen::Matrix<double, 3, Eigen::Dynamic> result = Eigen::Matrix<double, 3, Eigen::Dynamic>::Zero(3, 6 * count);
+  if (count == 4) {
+    for (Eigen::Index k = 0; k < 4; ++k) {
+      result.block<3, 3>(0, 6 * k).diagonal().setConstant(c.shares[k]);
+    }
+    return result;
+  }
+  PatchMap map(surfaces.faces[c.face], reference, configuration);
+  map.linearise();
+  result = map.derivative(c.weights);
+  for (int k = 0; k < 3; ++k) {
+    const Vec3 d = turned_offset(c, configuration, k);
+    Mat3 m;  // spin x d
+    m << 0, d.z(), -d.y(), -d.z(), 0, d.x(), d.y(), -d.x(), 0;
+    result.block<3, 3>(0, 6 * k + 3) += m;
+  }
+  return result;
+}
+
+}  // namespace
+
+std::vector<Carried> carried_nodes(const Model& model, const Surfaces& surfaces, const std::vector<Vec3>& reference) {
+  std::map<Index, Carried> found;
+  std::map<std::size_t, BodySurface> carriers;
+  for (const Attachment& attachment : model.attachments) {
+    const auto fail = [&](const std::string& what) {
+      throw InputError(fmt::format("{}{} on {}: {}", attachment.said_at.empty() ? "" : attachment.said_at + ": ",
+                                   model.name_of(attachment.body), model.name_of(attachment.to), what));
+    };
+    for (const Index local : attachment.nodes) {
+      Carried c;
+      c.node = narrow<Index>(model.first_node(attachment.body) + local);
+      const Vec3& x = reference[c.node];
+      if (model.is_solid(attachment.to)) {
+        const TetMesh& mesh = model.solids[attachment.to - model.shells.size()].mesh;
+        const auto [t, shares] = find_tetrahedron(mesh, x);
+        const auto offset = narrow<Index>(model.first_node(attachment.to));
+        for (const Index v : mesh.tetrahedra[t]) {
+          c.carriers.push_back(v + offset);
+        }
+        c.shares = shares;
+      } else {
+        const auto place = carriers.try_emplace(attachment.to, surfaces, attachment.to, reference).first;
+        const auto [face, b] = place->second.nearest(x);
+        c.face = face;
+        const SurfaceFace& on = surfaces.faces[face];
+        c.weights = patch_weights(on, b);
+        c.shares << 1 - b[0] - b[1], b[0], b[1], 0;
+        c.carriers.assign(on.nodes.begin(), on.nodes.end());
+        c.offset = x - PatchMap(on, reference, at_rest(reference.size())).point(c.weights);
+      }
+      if (!found.emplace(c.node, c).second) {
+        fail(fmt::format("node {} is carried twice: let one [[attach]] carry it", local));
+      }
+    }
+  }
+  // What carries comes after what it carries.
+  std::vector<Carried> order;
+  std::map<Index, int> state;  // 1: its carriers are looked at; 2: done
+  const std::function<void(const Carried&)> visit = [&](const Carried& c) {
+    state[c.node] = 1;
+    for (const Index carrier : c.carriers) {
+      const auto other = found.find(carrier);
+      if (other == found.end() || state[carrier] == 2) {
+        continue;
+      }
+      if (state[carrier] == 1) {
+        throw InputError("attachments carry each other in a circle: leave out one [[attach]]");
+      }
+      visit(other->second);
+    }
+    state[c.node] = 2;
+    order.push_back(c);
+  };
+  for (const auto& [node, c] : found) {
+    if (state[node] == 0) {
+      visit(c);
+    }
+  }
+  std::reverse(order.begin(), order.end());
+  return order;
+}
+
+void place_carried(const std::vector<Carried>& carried, const Surfaces& surfaces, const std::vector<Vec3>& reference,
+                   Configuration& configuration) {
+  for (auto c = carried.rbegin(); c != carried.rend(); ++c) {
+    Vec3 u = Vec3::Zero();
+    if (c->carriers.size() == 4) {
+      for (int k = 0; k < 4; ++k) {
+        u += c->shares[k] * configuration.displacement[c->carriers[k]];
+      }
+    } else {
+      u = PatchMap(surfaces.faces[c->face], reference, configuration).point(c->weights) - reference[c->node];
+      for (int k = 0; k < 3; ++k) {
+        u += turned_offset(*c, configuration, k);
+      }
+    }
+    configuration.displacement[c->node] = u;
+  }
+}
+
+void add_carried_pairs(const std::vector<Carried>& carried, std::vector<std::vector<Index>>& neighbours) {
+  const auto add = [&](Index a, Index b) {
+    const auto place = std::lower_bound(neighbours[a].begin(), neighbours[a].end(), b);
+    if (place == neighbours[a].end() || *place != b) {
+      neighbours[a].insert(place, b);
+    }
+  };
+  for (const Carried& c : carried) {
+    const std::vector<Index> around = neighbours[c.node];
+    for (const Index carrier : c.carriers) {
+      for (const Index other : c.carriers) {
+        add(carrier, other);
+      }
+      for (const Index j : around) {
+        add(carrier, j);
+        add(j, carrier);
+      }
+    }
+  }
+}
+
+void expand_carried(const std::vector<Carried>& carried, const Surfaces& surfaces, const std::vector<Vec3>& reference,
+                    const Configuration& configuration, VectorX& increment) {
+  for (auto c = carried.rbegin(); c != carried.rend(); ++c) {
+    VectorX of_carriers(6 * c->carriers.size());
+    for (std::size_t k = 0; k < c->carriers.size(); ++k) {
+      of_carriers.segment<6>(first_freedom(k)) = increment.segment<6>(first_freedom(c->carriers[k]));
+    }
+    increment.segment<3>(first_freedom(c->node)) = derivative(*c, surfaces, reference, configuration) * of_carriers;
+  }
+}
+
+void condense(const std::vector<Carried>& carried, const Surfaces& surfaces, const std::vector<Vec3>& reference,
+              const Configuration& configuration, VectorX& internal, BlockMatrix* tangent) {
+  for (const Carried& c : carried) {
+    const auto j = derivative(c, surfaces, reference, configuration);
+    const Vec3 force = internal.segment<3>(first_freedom(c.node));
+    internal.segment<3>(first_freedom(c.node)).setZero();
+    const std::size_t count = c.carriers.size();
+    for (std::size_t k = 0; k < count; ++k) {
+      internal.segment<6>(first_freedom(c.carriers[k])) += j.middleCols<6>(first_freedom(k)).transpose() * force;
+    }
+    if (tangent == nullptr) {
+      continue;
+    }
+    const std::size_t begin = tangent->row_start[c.node], end = tangent->row_start[c.node + 1];
+    for (std::size_t place = begin; place < end; ++place) {  // its rows go to the carriers
+      const Index column = tangent->column[place];
+      const Eigen::Matrix<double, 3, 6> row = tangent->block(place).topRows<3>();
+      tangent->block(place).topRows<3>().setZero();
+      for (std::size_t k = 0; k < count; ++k) {
+        tangent->block(tangent->find(c.carriers[k], column)) += j.middleCols<6>(first_freedom(k)).transpose() * row;
+      }
+    }
+    for (std::size_t place = begin; place < end; ++place) {  // and its columns
+      const Index row = tangent->column[place];
+      auto block = tangent->block(tangent->transposed[place]);
+      const Eigen::Matrix<double, 6, 3> column = block.leftCols<3>();
+      block.leftCols<3>().setZero();
+      for (std::size_t k = 0; k < count; ++k) {
+        tangent->block(tangent->find(row, c.carriers[k])) += column * j.middleCols<6>(first_freedom(k));
+      }
+    }
+    if (count == 4) {
+      continue;
+    }
+    PatchMap map(surfaces.faces[c.face], reference, configuration);
+    map.linearise();
+    const Matrix18 curvature = map.stiffness(PatchMap::Matrix27::Zero(), force * c.weights.transpose());
+    for (std::size_t row = 0; row < 3; ++row) {
+      for (std::size_t column = 0; column < 3; ++column) {
+        auto block = tangent->block(tangent->find(c.carriers[row], c.carriers[column]));
+        block += curvature.block<6, 6>(first_freedom(row), first_freedom(column));
+        if (row == column) {
+          // The moment is d x force; d turns with the spin.
+          const Vec3 d = turned_offset(c, configuration, narrow<int>(row));
+          block.block<3, 3>(3, 3) += d * force.transpose() - d.dot(force) * Mat3::Identity();
+        }
+      }
+    }
+  }
+}
+
+}  // namespace tunica

@@ -1,0 +1,148 @@
+#pragma once
+
+#include "tunica/mechanics/algebra/block_matrix.hpp"
+#include "tunica/mechanics/contact/rigid_shape.hpp"
+#include "tunica/mechanics/contact/surface_faces.hpp"
+
+#include <map>
+#include <vector>
+
+/// Contact of curved surfaces with each other and with rigid bodies, inside the implicit step.
+///
+/// Points are sampled on the surfaces, each with its part of the area in the reference. A point presses with
+///   p(g) = stiffness (1 - g / d)^2 d / g   for gaps 0 < g < d, else 0,
+/// d the resolution, g the distance less half of each wall; the stiffness is a thousandth of the softer body's Young's
+/// modulus: it moves the gap within d, and d alone decides how exact the answer is. The pressure counts as an unknown
+/// of its own (a primal-dual interior point method, eliminated at each point): the forces follow p(g), the tangent
+/// takes the pressure that the last one expects. States in which surfaces touch or overlap are refused. Friction by
+/// Coulomb's law with elastic slip: the traction is (friction) p u / e along the slip u since the contact began, e = a
+/// thousandth of the wall, and u is cut to e: it also holds at rest, and depends on the path. Forces reach the nodes by
+/// the transpose of the map (patch_map.hpp). Source: Li et al. 2020, "Incremental potential contact" (the barrier); Li
+/// et al. 2023, "Convergent incremental potential contact" (areas); Forsgren, Gill, Wright 2002, "Interior methods for
+/// nonlinear optimization"; Simo, Laursen 1992, "An augmented Lagrangian treatment of contact problems involving
+/// friction" (return mapping). Limits: a rigid mesh touches at the samples of what it meets, not with corners between
+/// them.
+namespace tunica {
+
+struct ContactResult {
+  Vec3 force = Vec3::Zero();                          ///< N, on the first body
+  Vec3 moment = Vec3::Zero();                         ///< N mm, about the origin
+  double area = 0;                                    ///< mm^2, of the points that press
+  double gap_lower = infinity, gap_upper = infinity;  ///< mm, the smallest
+  std::size_t points = 0;
+  double slip = 0;  ///< mm, the largest of a point that slides in this step
+};
+
+class ContactSystem {
+public:
+  /// Errors: InputError: bodies overlap in the reference; names the pair and the depth.
+  ContactSystem(const Model& model, Surfaces surfaces, std::vector<Vec3> reference);
+
+  /// A step of the rigid bodies between two times (load factors in statics). They stand at the first.
+  void set_step(double from, double to);
+  /// Of the rigid bodies' motion in the step, what is still to come.
+  [[nodiscard]] double left() const { return left_; }
+  void set_left(double left);
+
+  /// Which nodes may come to act on each other, beyond those of one element.
+  /// @return whether there are more than before
+  bool find_pairs(const Configuration& configuration);
+  [[nodiscard]] const std::vector<std::array<Index, 2>>& pairs() const { return pairs_; }
+
+  /// Adds forces; with a tangent their derivative, and to the forces what the rest of the rigid bodies' motion adds to
+  /// first order.
+  /// @return false where surfaces touch or overlap
+  bool add(const Configuration& configuration, VectorX& external, BlockMatrix* tangent);
+
+  /// The increment (6 per node) that was followed from where the last tangent was made: the next one takes the
+  /// pressures that it expected.
+  void predict(const VectorX& increment);
+
+  /// A state of rest, or the end of a time step: slip is kept, and where every point is.
+  void accept(const Configuration& configuration);
+
+  /// Whether it is certain that on straight lines from the last accepted state to this one nothing passed through
+  /// anything: a plane, or the way that there is, keeps every part of a surface from what it might meet.
+  [[nodiscard]] bool is_certain(const Configuration& configuration) const;
+
+  /// What acts in a configuration, per contact of the model; gaps as intervals.
+  [[nodiscard]] std::vector<ContactResult> results(const Configuration& configuration);
+  /// Of the last results(), per rigid body of the model: force, moment about the origin, position.
+  [[nodiscard]] const std::vector<std::array<Vec3, 3>>& on_rigids() const { return on_rigids_; }
+  /// Of the last results(): the sum over all bodies of forces and moments, relative to the sum of their magnitudes.
+  [[nodiscard]] std::array<double, 2> imbalance() const { return imbalance_; }
+
+  /// What is kept between steps.
+  [[nodiscard]] std::vector<double> memory() const;
+  void recall(const std::vector<double>& memory, const Configuration& configuration, double time);
+
+private:
+  struct Sample {
+    Vec2 at;
+    PatchWeights weights;
+    double area = 0;       ///< mm^2
+    double pressure = -1;  ///< MPa, that the next tangent takes; below zero: that of the gap
+    Vec3 slip = Vec3::Zero();
+    Vec3 before = Vec3::Zero();  ///< where it was in the last accepted state
+    bool followed = false;       ///< `before` is known
+    // As the last tangent left it:
+    bool active = false;
+    double law = 0, slope = 0;
+    Vec3 normal;
+    std::size_t other = SIZE_MAX;
+    PatchWeights other_weights;
+  };
+  /// The samples of one face towards one other party of a contact.
+  struct Group {
+    std::size_t face = 0;
+    std::size_t contact = 0;
+    ContactParty other;
+    double weight = 1;  ///< one half where both sides are sampled
+    double resolution = 0;
+    double stiffness = 0;
+    double elastic_slip = 0;
+    int level = 0;
+    std::vector<Sample> samples;
+  };
+  struct Touch {
+    double gap = infinity;
+    Vec3 normal = Vec3::Zero();
+    Mat3 curvature = Mat3::Zero();
+    std::size_t face = SIZE_MAX;  ///< of the other body, where it deforms
+    PatchWeights weights = PatchWeights::Zero();
+    Vec2 at = Vec2::Zero();
+  };
+  class Maps;
+
+  void make_samples(const Model& model);
+  [[nodiscard]] double offset(const Group& group, std::size_t other) const;
+  [[nodiscard]] bool excluded(const Group& group, std::size_t other) const;
+  /// For every group towards a body that deforms: the faces that come within its reach and `more` (mm).
+  [[nodiscard]] std::vector<std::vector<std::size_t>> near_faces(const Maps& maps, double more) const;
+  [[nodiscard]] bool is_near(const Group& group, const PatchMap& map) const;
+  [[nodiscard]] Touch touch(const Group& group, const Vec3& x, const std::vector<std::size_t>& near,
+                            const Maps& maps) const;
+  [[nodiscard]] Vec3 relative_motion(const Group& group, const Sample& sample, const Touch& touch, const Vec3& x) const;
+  [[nodiscard]] bool is_certain(const Group& group, const std::vector<std::size_t>& near, const Maps& before,
+                                const Maps& now) const;
+  [[nodiscard]] double lower_gap(const Group& group, const std::vector<std::size_t>& near, const Maps& maps,
+                                 double upper) const;
+
+  const Surfaces surfaces_;
+  const std::vector<Vec3> reference_;
+  const std::vector<Contact> contacts_;
+  std::vector<RigidShape> shapes_;         ///< now
+  std::vector<RigidShape> shapes_before_;  ///< in the last accepted state
+  std::vector<RigidShape> shapes_end_;     ///< at the end of the step
+  std::vector<RigidShape> shapes_at_tangent_;
+  Configuration at_tangent_;  ///< where the last tangent was made
+  double begin_ = 0, end_ = 0, left_ = 0;
+  std::vector<Group> groups_;
+  std::vector<std::array<Index, 2>> pairs_;
+  Configuration accepted_;
+  std::vector<std::array<Vec3, 3>> on_rigids_;
+  std::array<double, 2> imbalance_{0, 0};
+  std::vector<ContactResult>* record_ = nullptr;  ///< add() writes here what acts
+};
+
+}  // namespace tunica

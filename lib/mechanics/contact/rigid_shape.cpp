@@ -1,0 +1,242 @@
+#include "tunica/mechanics/contact/rigid_shape.hpp"
+
+#include "tunica/surface/mesh/incidence.hpp"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+
+namespace tunica {
+namespace {
+
+template <typename... Functions>
+struct Overloaded : Functions... {
+  using Functions::operator()...;
+};
+template <typename... Functions>
+Overloaded(Functions...) -> Overloaded<Functions...>;
+
+/// Of a point at `away` from the nearest point of a convex core, radius around it.
+RigidDistance around(const Vec3& away, double radius, const Mat3& free) {
+  const double length = away.norm();
+  RigidDistance result;
+  result.normal = length > 0 ? Vec3(away / length) : Vec3(Vec3::UnitZ());
+  result.distance = length - radius;
+  // Only along the directions in which the nearest point stays.
+  result.curvature = Mat3::Zero();
+  if (length > 0) {
+    result.curvature = (free - result.normal * result.normal.transpose()) / length;
+  }
+  return result;
+}
+
+RigidDistance to_segment(const Vec3& p, const Vec3& from, const Vec3& to, double radius) {
+  const Vec3 axis = to - from;
+  const double squared = axis.squaredNorm();
+  const double at = squared > 0 ? (p - from).dot(axis) / squared : 0;
+  if (at <= 0 || at >= 1) {
+    return around(p - (at <= 0 ? from : to), radius, Mat3::Identity());
+  }
+  const Vec3 direction = axis / std::sqrt(squared);
+  return around(p - (from + at * axis), radius, Mat3::Identity() - direction * direction.transpose());
+}
+
+RigidDistance to_cylinder(const Vec3& p, const Vec3& from, const Vec3& to, double radius) {
+  const double length = (to - from).norm();
+  const Vec3 axis = (to - from) / length;
+  const double along = (p - from).dot(axis);
+  const Vec3 across = p - from - along * axis;
+  const double off = across.norm();
+  const double beyond = std::max(along - length, -along);
+  const bool high = along - length > -along;
+  const Vec3 end = high ? axis : Vec3(-axis);
+  if (beyond > 0 && off > radius) {  // off the rim
+    const Vec3 rim = across * (radius / off);
+    RigidDistance result = around(beyond * end + across - rim, 0, Mat3::Identity());
+    const Vec3 tangent = axis.cross(across / off);
+    // Along the rim the nearest point follows, on a circle of the radius.
+    const double follows = radius / off;
+    result.curvature -= (follows / result.distance) * tangent * tangent.transpose();
+    return result;
+  }
+  if (beyond > 0 || (beyond > off - radius)) {
+    return {beyond, end, Mat3::Zero()};
+  }
+  return around(across, radius, Mat3::Identity() - axis * axis.transpose());
+}
+
+}  // namespace
+
+RigidShape::RigidShape(const RigidBody& body) : body_(&body) {
+  if (const auto* mesh = std::get_if<RigidMesh>(&body.shape)) {
+    surface_ = std::make_shared<ClosestPoint>(mesh->surface);
+    // Angle-weighted normals of corners, means at edges: their sign is right wherever the nearest point lies.
+    const TriangleMesh& m = mesh->surface;
+    std::vector<Vec3> at_vertex(m.vertices.size(), Vec3::Zero());
+    const auto normal_of = [&](std::size_t t) {
+      const auto& v = m.triangles[t];
+      return Vec3((m.vertices[v[1]] - m.vertices[v[0]]).cross(m.vertices[v[2]] - m.vertices[v[0]]).normalized());
+    };
+    for (std::size_t t = 0; t < m.triangles.size(); ++t) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        const Vec3& x = m.vertices[m.triangles[t][k]];
+        const Vec3 a = m.vertices[m.triangles[t][(k + 1) % 3]] - x, b = m.vertices[m.triangles[t][(k + 2) % 3]] - x;
+        at_vertex[m.triangles[t][k]] += std::atan2(a.cross(b).norm(), a.dot(b)) * normal_of(t);
+      }
+    }
+    const auto beside = neighbours(m, incidence(m));
+    std::vector<std::array<Vec3, 7>> normals(m.triangles.size());
+    for (std::size_t t = 0; t < m.triangles.size(); ++t) {
+      normals[t][0] = normal_of(t);
+      for (std::size_t k = 0; k < 3; ++k) {
+        const Index other = beside[t][k];
+        normals[t][1 + k] = normals[t][0] + (other == no_neighbour ? Vec3(Vec3::Zero()) : normal_of(other));
+        normals[t][4 + k] = at_vertex[m.triangles[t][k]];
+      }
+    }
+    pseudo_normals_ = std::make_shared<const std::vector<std::array<Vec3, 7>>>(std::move(normals));
+  }
+  set_time(0);
+}
+
+void RigidShape::set_time(double time) {
+  shift_ = body_->motion ? body_->motion->at(time) : Vec3(Vec3::Zero());
+  const auto line = [&](const auto& shape) {
+    first_ = shape.from.at(time) + shift_;
+    second_ = shape.to.at(time) + shift_;
+    radius_ = shape.radius.at(time);
+  };
+  std::visit(Overloaded{[&](const RigidSphere& s) {
+                          first_ = second_ = s.centre.at(time) + shift_;
+                          radius_ = s.radius.at(time);
+                        },
+                        [&](const RigidCapsule& s) { line(s); }, [&](const RigidCylinder& s) { line(s); },
+                        [&](const RigidPlane& s) { first_ = second_ = s.point.at(time) + shift_; },
+                        [&](const RigidMesh& s) {
+                          angle_ = s.turn ? s.turn->angle.at(time) : 0;
+                          factor_ = s.expansion ? s.expansion->factor.at(time) : 1;
+                        }},
+             body_->shape);
+}
+
+Vec3 RigidShape::to_mesh(const Vec3& p) const {
+  const auto& s = std::get<RigidMesh>(body_->shape);
+  Vec3 x = p - shift_;
+  if (s.turn) {
+    x = s.turn->point + Eigen::AngleAxisd(-angle_, s.turn->axis) * (x - s.turn->point);
+  }
+  if (s.expansion) {
+    const Vec3 arm = x - s.expansion->point;
+    const Vec3 along = s.expansion->axis * s.expansion->axis.dot(arm);
+    x = s.expansion->point + along + (arm - along) / factor_;
+  }
+  return x;
+}
+
+Vec3 RigidShape::from_mesh(const Vec3& p) const {
+  const auto& s = std::get<RigidMesh>(body_->shape);
+  Vec3 x = p;
+  if (s.expansion) {
+    const Vec3 arm = x - s.expansion->point;
+    const Vec3 along = s.expansion->axis * s.expansion->axis.dot(arm);
+    x = s.expansion->point + along + (arm - along) * factor_;
+  }
+  if (s.turn) {
+    x = s.turn->point + Eigen::AngleAxisd(angle_, s.turn->axis) * (x - s.turn->point);
+  }
+  return x + shift_;
+}
+
+RigidDistance RigidShape::at(const Vec3& p) const {
+  return std::visit(
+      Overloaded{[&](const RigidSphere&) { return around(p - first_, radius_, Mat3::Identity()); },
+                 [&](const RigidCapsule&) { return to_segment(p, first_, second_, radius_); },
+                 [&](const RigidCylinder&) { return to_cylinder(p, first_, second_, radius_); },
+                 [&](const RigidPlane& s) {
+                   return RigidDistance{s.normal.dot(p - first_), s.normal, Mat3::Zero()};
+                 },
+                 [&](const RigidMesh&) {
+                   const Vec3 local = to_mesh(p);
+                   const ClosestPoint::Hit hit = surface_->closest(local);
+                   const auto corners = surface_->corners(hit.triangle);
+                   const Vec3 e1 = corners[1] - corners[0], e2 = corners[2] - corners[0];
+                   // Which part of the triangle the nearest point lies on says which normal has the right sign.
+                   const Vec3 d = hit.point - corners[0];
+                   const double d11 = e1.dot(e1), d12 = e1.dot(e2), d22 = e2.dot(e2), r1 = d.dot(e1), r2 = d.dot(e2);
+                   const double det = d11 * d22 - d12 * d12;
+                   const std::array<double, 3> b{1 - (d22 * r1 - d12 * r2 + d11 * r2 - d12 * r1) / det,
+                                                 (d22 * r1 - d12 * r2) / det, (d11 * r2 - d12 * r1) / det};
+                   constexpr double on_side = 1e-9;
+                   std::size_t part = 0;
+                   for (std::size_t k = 0; k < 3; ++k) {
+                     if (b[(k + 2) % 3] < on_side) {
+                       part = 1 + k;  // edge k to k + 1
+                     }
+                   }
+                   for (std::size_t k = 0; k < 3; ++k) {
+                     if (b[k] > 1 - on_side) {
+                       part = 4 + k;
+                     }
+                   }
+                   const Vec3& pseudo = (*pseudo_normals_)[hit.triangle][part];
+                   const Vec3 here = from_mesh(hit.point);
+                   Vec3 away = p - here;
+                   const double length = away.norm();
+                   const double sign = (local - hit.point).dot(pseudo) >= 0 ? 1 : -1;
+                   if (length > 1e-12) {
+                     away *= sign / length;
+                   } else {
+                     away = (from_mesh(hit.point + pseudo) - here).normalized();
+                   }
+                   return RigidDistance{sign * length, away, Mat3::Zero()};
+                 }},
+      body_->shape);
+}
+
+double RigidShape::support(const Vec3& n) const {
+  return std::visit(
+      Overloaded{[&](const RigidSphere&) { return n.dot(first_) + radius_; },
+                 [&](const RigidCapsule&) { return std::max(n.dot(first_), n.dot(second_)) + radius_; },
+                 [&](const RigidCylinder&) {
+                   const Vec3 axis = (second_ - first_).normalized();
+                   return std::max(n.dot(first_), n.dot(second_)) + radius_ * (n - axis * axis.dot(n)).norm();
+                 },
+                 [&](const RigidPlane& s) { return n.dot(s.normal) > 1 - 1e-12 ? n.dot(first_) : infinity; },
+                 [&](const RigidMesh&) { return infinity; }},
+      body_->shape);
+}
+
+Vec3 RigidShape::carried(const Vec3& p, const RigidShape& before) const {
+  if (!convex()) {
+    return from_mesh(before.to_mesh(p));
+  }
+  return p + (first_ + second_ - before.first_ - before.second_) / 2;
+}
+
+double RigidShape::growth_since(const RigidShape& before) const {
+  if (!convex()) {
+    return 0;
+  }
+  const Vec3 stretch = (second_ - first_) - (before.second_ - before.first_);
+  return std::abs(radius_ - before.radius_) + stretch.norm() / 2;
+}
+
+Vec3 RigidShape::position() const { return convex() ? Vec3((first_ + second_) / 2) : shift_; }
+
+double RigidShape::largest_curvature() const {
+  const auto of_radius = [](const Table<double>& radius) {
+    double smallest = infinity;
+    for (const auto& [time, r] : radius.points) {
+      smallest = std::min(smallest, r);
+    }
+    return smallest > 0 ? 1 / smallest : 0;
+  };
+  return std::visit(Overloaded{[&](const RigidSphere& s) { return of_radius(s.radius); },
+                               [&](const RigidCapsule& s) { return of_radius(s.radius); },
+                               [&](const RigidCylinder& s) { return of_radius(s.radius); },
+                               [](const RigidPlane&) { return 0.0; }, [](const RigidMesh&) { return 0.0; }},
+                    body_->shape);
+}
+
+}  // namespace tunica

@@ -1,0 +1,56 @@
+#pragma once
+
+#include "tunica/mechanics/model/model.hpp"
+#include "tunica/surface/distance/closest_point.hpp"
+
+#include <memory>
+
+namespace tunica {
+
+/// What a rigid body is at a point near it.
+struct RigidDistance {
+  double distance = 0;  ///< mm, to its surface; negative inside
+  Vec3 normal;          ///< unit, away from the body: the distance's gradient
+  Mat3 curvature;       ///< second derivative of the distance, 1 / mm
+};
+
+/// A rigid body at a time. All shapes but the mesh are convex: their distance is a convex function, so that the plane
+/// across `normal` through the body's nearest point has the whole body below it.
+class RigidShape {
+public:
+  explicit RigidShape(const RigidBody& body);
+
+  /// In a static run the load factor is the time.
+  void set_time(double time);
+
+  [[nodiscard]] RigidDistance at(const Vec3& p) const;
+
+  /// The largest of normal.x over the body; infinite for a plane that looks elsewhere. Of convex bodies.
+  [[nodiscard]] double support(const Vec3& normal) const;
+  [[nodiscard]] bool convex() const { return surface_ == nullptr; }
+
+  /// Where the material point of the body at `p` at the time before has gone: what friction is measured against.
+  [[nodiscard]] Vec3 carried(const Vec3& p, const RigidShape& before) const;
+
+  /// How much farther than carried() a point of its surface may have moved, mm: what the body grows.
+  [[nodiscard]] double growth_since(const RigidShape& before) const;
+
+  [[nodiscard]] Vec3 position() const;
+
+  /// The largest curvature of the body over all times, 1 / mm; of a mesh that of its sampling, unknown: 0.
+  [[nodiscard]] double largest_curvature() const;
+
+private:
+  [[nodiscard]] Vec3 to_mesh(const Vec3& p) const;
+  [[nodiscard]] Vec3 from_mesh(const Vec3& p) const;
+
+  const RigidBody* body_;
+  std::shared_ptr<const ClosestPoint> surface_;
+  std::shared_ptr<const std::vector<std::array<Vec3, 7>>> pseudo_normals_;  ///< per triangle: face, edges, corners
+  Vec3 first_ = Vec3::Zero(), second_ = Vec3::Zero();                       ///< centre or ends or point
+  double radius_ = 0;
+  Vec3 shift_ = Vec3::Zero();
+  double angle_ = 0, factor_ = 1;
+};
+
+}  // namespace tunica

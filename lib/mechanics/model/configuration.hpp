@@ -1,0 +1,19 @@
+#pragma once
+
+#include "tunica/core/types.hpp"
+
+#include <Eigen/Geometry>
+
+#include <vector>
+
+namespace tunica {
+
+/// Displacements (not positions: those would lose the digits) and rotations of all nodes, from the reference.
+struct Configuration {
+  std::vector<Vec3> displacement;
+  std::vector<Eigen::Quaterniond> rotation;
+  /// Of the nodes of solids, in units of their shear modulus, positive in tension; empty where there are none.
+  std::vector<double> pressure{};
+};
+
+}  // namespace tunica
