@@ -109,8 +109,8 @@ void write_vtu(const std::filesystem::path& path, const VtuGrid& grid, bool over
       R"(<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" header_type="UInt64" compressor="vtkZLibDataCompressor">)");
   document.line("<UnstructuredGrid>");
   document.section("FieldData", grid.of_grid);
-  document.line(fmt::format(R"(<Piece NumberOfPoints="{}" NumberOfCells="{}">)", grid.coordinates.size() / 3,
-                            grid.types.size()));
+  document.line(
+      fmt::format(R"(<Piece NumberOfPoints="{}" NumberOfCells="{}">)", grid.coordinates.size() / 3, grid.types.size()));
   document.section("PointData", grid.of_points);
   document.section("CellData", grid.of_cells);
   document.section("Points", {{"Points", 3, grid.coordinates}});

@@ -52,7 +52,7 @@ struct State {
   std::optional<double> algebraic_error;  ///< of this step, relative; see Summary
   bool algebraic_error_is_bound = false;
   bool converged = false;
-  bool linear = false;  ///< of the linear theory: rotations are not finite ones
+  bool linear = false;                 ///< of the linear theory: rotations are not finite ones
   std::vector<ContactState> contacts;  ///< of the model's contacts, in order; empty where a state does not say
   std::vector<RigidState> rigids;      ///< of the model's rigid bodies, in order; the same
   double force_imbalance = 0;          ///< sum of all contact and tie forces over all bodies, relative to the largest
