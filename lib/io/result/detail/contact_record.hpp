@@ -15,6 +15,7 @@ inline ContactState contact_of(const State& state, std::size_t contact) {
                                 : state.contacts.at(contact);
 }
 
+/// Of a rigid body, the same.
 inline RigidState rigid_of(const State& state, std::size_t rigid) {
   const Vec3 nowhere = Vec3::Constant(std::numeric_limits<double>::quiet_NaN());
   return state.rigids.empty() ? RigidState{nowhere, nowhere, nowhere} : state.rigids.at(rigid);
