@@ -468,7 +468,7 @@ private:
   Summary solved() {
     Resumption resumption;
     if (!given_.resume.empty()) {
-      resumption.from = journal_->replay(model().node_count(), [&](const State& state) { record(state); });
+      resumption.from = journal_->replay(model(), [&](const State& state) { record(state); });
       tool_.note(resumption.from
                      ? fmt::format("{}: goes on after step {}", given_.resume.string(), resumption.from->summary.steps)
                      : fmt::format("{}: begins again, it has no checkpoint yet", given_.resume.string()));

@@ -1,3 +1,4 @@
+#include "hdf5_values.hpp"
 #include "scene_fixture.hpp"
 
 #include "tunica/core/error.hpp"
@@ -6,7 +7,6 @@
 #include "tunica/mechanics/runs/curved_displacement.hpp"
 
 #include <gmock/gmock.h>
-#include <hdf5.h>
 #include <Eigen/Geometry>
 
 #include <numbers>
@@ -77,21 +77,6 @@ nearest = ["10mm", "10mm", "0mm"]
     for (std::size_t i = 0; i < count; ++i) {
       result.pressure.push_back(static_cast<double>(i));
     }
-    return result;
-  }
-
-  /// All values of a data set, as double.
-  static std::vector<double> values(const fs::path& path, const char* name) {
-    const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
-    EXPECT_GE(file, 0) << path;
-    const hid_t set = H5Dopen2(file, name, H5P_DEFAULT);
-    EXPECT_GE(set, 0) << name;
-    const hid_t space = H5Dget_space(set);
-    std::vector<double> result(static_cast<std::size_t>(H5Sget_simple_extent_npoints(space)));
-    EXPECT_GE(H5Dread(set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, result.data()), 0);
-    H5Sclose(space);
-    H5Dclose(set);
-    H5Fclose(file);
     return result;
   }
 

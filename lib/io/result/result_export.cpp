@@ -96,19 +96,18 @@ struct ResultExport::Implementation {
   }
 
   void write_state(const State& state, const ElementFields& fields) const {
-    VtuTriangles triangles{grid.coordinates(), grid.connectivity(), {}, {}, {}};
+    VtuGrid drawn{grid.coordinates(), grid.connectivity(), grid.ends(), grid.types(), {}, {}, {}};
     const auto put = [&](const GridField& field, const std::vector<float>& values) {
-      (field.of_cells ? triangles.of_cells : triangles.of_points)
-          .push_back({field.name, field.components, std::span(values)});
+      (field.of_cells ? drawn.of_cells : drawn.of_points).push_back({field.name, field.components, std::span(values)});
     };
     const std::vector<std::vector<float>> values = grid.values(state, fields);
     for (std::size_t i = 0; i < values.size(); ++i) {
-      put(ResultGrid::layout()[i], values[i]);
+      put(grid.layout()[i], values[i]);
     }
     for (std::size_t i = 0; i < grid.fixed().size(); ++i) {
-      put(ResultGrid::fixed_layout()[i], grid.fixed()[i]);
+      put(grid.fixed_layout()[i], grid.fixed()[i]);
     }
-    triangles.of_cells.push_back({"body", 1, std::span(grid.body_of_cell())});
+    drawn.of_cells.push_back({"body", 1, std::span(grid.body_of_cell())});
     const std::array<std::pair<const char*, double>, 5> numbers{
         {{"TimeValue", state.time},
          {"load_factor", state.load_factor},
@@ -116,10 +115,10 @@ struct ResultExport::Implementation {
          {"strain_energy", state.strain_energy},
          {"kinetic_energy", state.kinetic_energy}}};
     for (const auto& [name, value] : numbers) {
-      triangles.of_grid.push_back({name, 1, std::span(&value, 1)});
+      drawn.of_grid.push_back({name, 1, std::span(&value, 1)});
     }
     // The first one was asked about; a later one is left from a longer run of the same name.
-    write_vtu(vtu(times.size()), triangles, true);
+    write_vtu(vtu(times.size()), drawn, true);
   }
 
   [[nodiscard]] std::string pvd_text() const {
@@ -133,44 +132,102 @@ struct ResultExport::Implementation {
     return text + "</Collection>\n</VTKFile>\n";
   }
 
+  /// Cells of one type, which follow each other.
+  struct XmfPart {
+    const char* name;
+    const char* topology;
+    std::size_t corners;
+    std::size_t first_cell, cells;
+  };
+
+  /// A grid of its own for each type: XDMF takes a mixed one only from a list that says the type before each cell.
+  [[nodiscard]] std::vector<XmfPart> xmf_parts() const {
+    std::vector<XmfPart> parts;
+    if (grid.triangles() > 0) {
+      parts.push_back({"shells", "Triangle", 3, 0, grid.triangles()});
+    }
+    if (grid.tetrahedra() > 0) {
+      parts.push_back({"solids", "Tetrahedron", 4, grid.triangles(), grid.tetrahedra()});
+    }
+    return parts;
+  }
+
+  /// Rows of a data set of the result file.
+  static std::string rows_of(std::string_view number, std::size_t stored, std::size_t components, std::size_t first,
+                             std::size_t rows, const std::string& place) {
+    const std::string data = heavy(number, stored, components, place);
+    const bool vector = components > 1;
+    return fmt::format(
+        "<DataItem ItemType=\"HyperSlab\" Dimensions=\"{}{}\"><DataItem Dimensions=\"3 {}\" "
+        "Format=\"XML\">{}</DataItem>{}</DataItem>",
+        rows, vector ? fmt::format(" {}", components) : "", vector ? 2 : 1,
+        vector ? fmt::format("{} 0 1 1 {} {}", first, rows, components) : fmt::format("{} 1 {}", first, rows), data);
+  }
+
+  /// The same, or all of it without a selection.
+  static std::string part_of(std::string_view number, std::size_t stored, std::size_t components, std::size_t first,
+                             std::size_t rows, const std::string& place) {
+    return rows == stored ? heavy(number, stored, components, place)
+                          : rows_of(number, stored, components, first, rows, place);
+  }
+
+  /// What stays the same from state to state. Parts share the points.
+  [[nodiscard]] std::string xmf_mesh(const XmfPart& part, const std::string& vtk) const {
+    const std::size_t first_corner = 3 * part.first_cell;  // only triangles come before
+    std::string text =
+        fmt::format("<Topology TopologyType=\"{}\" NumberOfElements=\"{}\">{}</Topology>\n", part.topology, part.cells,
+                    part_of(int64, grid.connectivity().size(), 1, first_corner, part.corners * part.cells,
+                            vtk + "Connectivity")) +
+        fmt::format("<Geometry GeometryType=\"XYZ\">{}</Geometry>\n", heavy(float64, grid.points(), 3, vtk + "Points"));
+    for (const GridField& field : grid.fixed_layout()) {
+      text += attribute(field, heavy(float32, grid.points(), field.components, vtk + "PointData/" + field.name));
+    }
+    return text + attribute({"body", 1, true},
+                            part_of(int32, grid.cells(), 1, part.first_cell, part.cells, vtk + "CellData/body"));
+  }
+
+  [[nodiscard]] std::string xmf_state(const XmfPart& part, const std::string& vtk, std::size_t state) const {
+    std::string text;
+    for (const GridField& field : grid.layout()) {
+      if (field.of_cells && field.of_tetrahedra != (part.corners == 4)) {
+        continue;  // it says nothing here
+      }
+      const std::string place = vtk + (field.of_cells ? "CellData/" : "PointData/") + field.name;
+      const std::size_t all = field.of_cells ? grid.cells() : grid.points();
+      const std::size_t first = field.of_cells ? part.first_cell : 0;
+      const std::size_t rows = field.of_cells ? part.cells : all;
+      text += attribute(field, options.series ? rows_of(float32, times.size() * all, field.components,
+                                                        state * all + first, rows, place)
+                                              : part_of(float32, all, field.components, first, rows, place));
+    }
+    return text;
+  }
+
   [[nodiscard]] std::string xmf_text(const fs::path& heavy_file) const {
     const std::string vtk = escaped(heavy_file.filename().string()) + ":/VTKHDF/";
-    const std::string mesh =
-        fmt::format("<Topology TopologyType=\"Triangle\" NumberOfElements=\"{}\">{}</Topology>\n", grid.cells(),
-                    heavy(int64, 3 * grid.cells(), 1, vtk + "Connectivity")) +
-        fmt::format("<Geometry GeometryType=\"XYZ\">{}</Geometry>\n", heavy(float64, grid.points(), 3, vtk + "Points"));
-    const auto place = [&](const GridField& field) {
-      return vtk + (field.of_cells ? "CellData/" : "PointData/") + field.name;
-    };
-    std::string fixed;
-    for (const GridField& field : ResultGrid::fixed_layout()) {
-      fixed += attribute(field, heavy(float32, grid.points(), field.components, place(field)));
+    const std::vector<XmfPart> parts = xmf_parts();
+    std::vector<std::string> meshes;
+    for (const XmfPart& part : parts) {
+      meshes.push_back(xmf_mesh(part, vtk));
     }
-    fixed += attribute({"body", 1, true}, heavy(int32, grid.cells(), 1, vtk + "CellData/body"));
-    std::string text =
+    const bool only = parts.size() == 1;
+    std::string text = fmt::format(
         "<?xml version=\"1.0\"?>\n<Xdmf Version=\"2.0\">\n<Domain>\n"
-        "<Grid Name=\"shells\" GridType=\"Collection\" CollectionType=\"Temporal\">\n";
+        "<Grid Name=\"{}\" GridType=\"Collection\" CollectionType=\"Temporal\">\n",
+        only ? parts.front().name : "bodies");
     // Without a series the file holds the last state alone.
     for (std::size_t state = options.series || times.empty() ? 0 : times.size() - 1; state < times.size(); ++state) {
-      text += fmt::format("<Grid Name=\"state {}\" GridType=\"Uniform\">\n<Time Value=\"{}\"/>\n", state, times[state]);
-      text += mesh + fixed;
-      for (const GridField& field : ResultGrid::layout()) {
-        const std::size_t rows = field.of_cells ? grid.cells() : grid.points();
-        const std::size_t stored = options.series ? times.size() : 1;
-        std::string data = heavy(float32, stored * rows, field.components, place(field));
-        if (options.series) {
-          const bool vector = field.components > 1;
-          data = fmt::format(
-              "<DataItem ItemType=\"HyperSlab\" Dimensions=\"{}{}\"><DataItem Dimensions=\"3 {}\" "
-              "Format=\"XML\">{}</DataItem>{}</DataItem>",
-              rows, vector ? fmt::format(" {}", field.components) : "", vector ? 2 : 1,
-              vector ? fmt::format("{} 0 1 1 {} {}", state * rows, rows, field.components)
-                     : fmt::format("{} 1 {}", state * rows, rows),
-              data);
-        }
-        text += attribute(field, data);
+      const std::string time = fmt::format("<Time Value=\"{}\"/>\n", times[state]);
+      if (!only) {
+        text +=
+            fmt::format("<Grid Name=\"state {}\" GridType=\"Collection\" CollectionType=\"Spatial\">\n{}", state, time);
       }
-      text += "</Grid>\n";
+      for (std::size_t i = 0; i < parts.size(); ++i) {
+        text += only ? fmt::format("<Grid Name=\"state {}\" GridType=\"Uniform\">\n{}", state, time)
+                     : fmt::format("<Grid Name=\"{}\" GridType=\"Uniform\">\n", parts[i].name);
+        text += meshes[i] + xmf_state(parts[i], vtk, state) + "</Grid>\n";
+      }
+      text += only ? "" : "</Grid>\n";
     }
     return text + "</Grid>\n</Domain>\n</Xdmf>\n";
   }

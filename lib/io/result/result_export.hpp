@@ -21,7 +21,8 @@ struct ExportOptions {
 /// A result for readers that know no VTKHDF with time, beside the result file: OUT.hdf gives OUT.pvd, OUT_0000.vtu …,
 /// OUT.xmf. A .vtu is whole when append() returns. What refers to them comes with commit(); a run that does not get
 /// there leaves OUT.pvd.part (and OUT.xmf.part, which refers to OUT.hdf.part) with the states so far.
-/// Limits: .xmf (XDMF 2) shows what /VTKHDF holds: of a static run the last state.
+/// Limits: .xmf (XDMF 2) shows what /VTKHDF holds: of a static run the last state. Shells and solids are grids of their
+/// own in it, over the same points.
 class ResultExport {
 public:
   /// `model` must outlive this. Errors: OutputError, also when a .vtu is there already and `overwrite` is false.

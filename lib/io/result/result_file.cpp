@@ -4,6 +4,7 @@
 #include "tunica/core/narrow.hpp"
 #include "tunica/core/version.hpp"
 #include "tunica/io/file/output_file.hpp"
+#include "tunica/io/result/detail/contact_record.hpp"
 #include "tunica/io/result/detail/hdf5_file.hpp"
 #include "tunica/io/result/detail/result_grid.hpp"
 
@@ -14,6 +15,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <span>
 
 namespace tunica {
 namespace {
@@ -27,7 +29,7 @@ constexpr Size history_chunk = 256;
 constexpr Size nodes_chunk_rows = 1;
 
 // Before anything of a state is written.
-void require_range(const std::vector<Floats>& fields) {
+void require_range(std::span<const Floats> fields) {
   for (const Floats& values : fields) {
     if (!std::all_of(values.begin(), values.end(), [](float v) { return std::isfinite(v); })) {
       throw RequirementError(
@@ -111,22 +113,36 @@ struct About {
   const char* path;
   const char* units;
   const char* description;
+  const char* with_solids = nullptr;  ///< the line where the model has tetrahedra, if it is another one
+  bool of_shells = false;             ///< is there only where the model has shells
 };
 
 constexpr std::array about{
-    About{"VTKHDF/NumberOfPoints", "1", "points of the drawn surface"},
-    About{"VTKHDF/NumberOfCells", "1", "triangles of the drawn surface"},
-    About{"VTKHDF/NumberOfConnectivityIds", "1", "three times the triangles"},
-    About{"VTKHDF/Points", "mm", "reference surface; the nodes of a body come first, in file order"},
-    About{"VTKHDF/Connectivity", "1", "points of each triangle, from 0"},
-    About{"VTKHDF/Offsets", "1", "where each triangle begins in Connectivity"},
-    About{"VTKHDF/Types", "1", "VTK cell type, 5: triangle"},
-    About{"VTKHDF/PointData/normal", "1", "unit normal of the reference surface"},
-    About{"VTKHDF/PointData/thickness", "mm", "thickness of the wall in the reference"},
-    About{"VTKHDF/PointData/displacement", "mm", "deformed curved surface minus reference"},
-    About{"VTKHDF/PointData/rotation", "rad", "rotation vectors, linear between the nodes"},
+    About{"VTKHDF/NumberOfPoints", "1", "points of the drawn surface",
+          "points of the drawn surfaces and of the solids"},
+    About{"VTKHDF/NumberOfCells", "1", "triangles of the drawn surface",
+          "triangles of the drawn surfaces, and tetrahedra"},
+    About{"VTKHDF/NumberOfConnectivityIds", "1", "three times the triangles",
+          "three times the triangles and four times the tetrahedra"},
+    About{"VTKHDF/Points", "mm", "reference surface; the nodes of a body come first, in file order",
+          "reference; shells first, the nodes of each before what is drawn between them; then the solids' nodes"},
+    About{"VTKHDF/Connectivity", "1", "points of each triangle, from 0",
+          "points of each triangle, then of each tetrahedron, from 0"},
+    About{"VTKHDF/Offsets", "1", "where each triangle begins in Connectivity",
+          "where each cell begins in Connectivity"},
+    About{"VTKHDF/Types", "1", "VTK cell type, 5: triangle", "VTK cell type, 5: triangle, 10: tetrahedron"},
+    About{"VTKHDF/PointData/normal", "1", "unit normal of the reference surface",
+          "unit normal of the reference surface; NaN in solids", true},
+    About{"VTKHDF/PointData/thickness", "mm", "thickness of the wall in the reference",
+          "thickness of the wall in the reference; NaN in solids", true},
+    About{"VTKHDF/PointData/displacement", "mm", "deformed curved surface minus reference",
+          "deformed curved surface minus reference; solids: of the nodes"},
+    About{"VTKHDF/PointData/rotation", "rad", "rotation vectors, linear between the nodes",
+          "rotation vectors, linear between the nodes; those of solids mean nothing"},
     About{"VTKHDF/PointData/von_mises", "MPa",
-          "von Mises stress, averaged at the nodes within a body, the larger of both faces, linear between the nodes"},
+          "von Mises stress, averaged at the nodes within a body, the larger of both faces, linear between the nodes",
+          "von Mises stress, averaged at the nodes within a body; shells: by area, the larger of both faces, linear "
+          "between the nodes; solids: by volume"},
     About{"VTKHDF/CellData/body", "1", "number of the body, from 0"},
     About{"tunica/scene", "1", "the resolved scene, TOML in SI units"},
     About{"tunica/command", "1", "the command of the run"},
@@ -137,8 +153,8 @@ constexpr std::array about{
     About{"tunica/nodes/position", "mm", "nodes of all bodies one after the other, in file order; reference"},
     About{"tunica/nodes/displacement", "mm", "by state and node, world axes"},
     About{"tunica/nodes/rotation", "rad", "rotation vectors by state and node, world axes"},
-    About{"tunica/elements/nodes", "1", "the three nodes of each shell, rows of tunica/nodes, from 0"},
-    About{"tunica/elements/body", "1", "the body of each shell, from 0"},
+    About{"tunica/elements/nodes", "1", "the three nodes of each shell, rows of tunica/nodes, from 0", nullptr, true},
+    About{"tunica/elements/body", "1", "the body of each shell, from 0", nullptr, true},
     About{"tunica/history/load_factor", "1", "factor of the loads; dynamic: of the first load's ramp"},
     About{"tunica/history/volume", "mm3", "enclosed by the closed bodies' curved surfaces; NaN where one is open"},
     About{"tunica/history/strain_energy", "mJ", "elastic energy"},
@@ -153,8 +169,8 @@ constexpr std::array about{
     About{"tunica/history/strain_p99", "%", "largest principal strain of either face, passed on 1 % of the area"},
     About{"tunica/history/strain_max", "%", "largest principal strain of either face, averaged at the nodes"}};
 
-// Of the elements' fields, in CellData and in tunica/elements.
-constexpr std::array about_fields{
+// Of the shells' fields, in CellData and in tunica/elements.
+constexpr std::array about_shell_fields{
     About{"pressure", "MPa", "pressure on the shell"},
     About{"von_mises_top", "MPa", "von Mises stress at the face the normal points to, constant in each shell"},
     About{"von_mises_bottom", "MPa", "von Mises stress at the other face, constant in each shell"},
@@ -163,9 +179,29 @@ constexpr std::array about_fields{
     About{"principal_strain_top", "1", "largest and smallest strain at the face the normal points to"},
     About{"principal_strain_bottom", "1", "largest and smallest strain at the other face"}};
 
+// Of the tetrahedra's, in CellData and in tunica/tetrahedra.
+constexpr std::array about_solid_fields{
+    About{"solid_von_mises", "MPa", "von Mises stress, constant in each tetrahedron"},
+    About{"solid_pressure", "MPa", "minus the mean stress, positive in compression, constant in each tetrahedron"}};
+
+// By state: each below tunica/contacts/NAME and tunica/rigid/NAME, whose rows stand beside those of tunica/history.
+constexpr std::array about_contact{
+    About{"force", "N", "on the first body, by state; NaN where a state does not say, as in the reference"},
+    About{"moment", "N*mm", "on the first body, about the origin, by state"},
+    About{"area", "mm2", "that presses, by state"},
+    About{"smallest_gap", "mm", "between which two values it lies, by state; below zero: overlap"},
+    About{"slip", "mm", "the largest of what presses, by state"},
+    About{"points", "1", "samples that press, by state"}};
+constexpr std::array about_rigid{
+    About{"position", "mm", "of its centre, or the midpoint of its axis, by state; NaN where a state does not say"},
+    About{"force", "N", "on it, by state"}, About{"moment", "N*mm", "on it, about the origin, by state"}};
+constexpr std::array about_balance{
+    About{"force_imbalance", "1", "sum of contact and tie forces over all bodies, relative to the largest"},
+    About{"moment_imbalance", "1", "sum of their moments about the origin, relative to the largest"}};
+
 constexpr std::array about_steps{About{"PartOffsets", "1", "first part of each state"},
                                  About{"PointOffsets", "1", "first point of each state"},
-                                 About{"CellOffsets", "1", "first triangle of each state"},
+                                 About{"CellOffsets", "1", "first triangle of each state", "first cell of each state"},
                                  About{"ConnectivityIdOffsets", "1", "first entry of Connectivity of each state"},
                                  About{"NumberOfParts", "1", "parts of each state"}};
 
@@ -173,6 +209,12 @@ struct ProbeSeries {
   std::size_t node = 0;
   Series displacement;
   Series rotation;
+};
+
+// Of one contact or rigid body.
+struct Record {
+  std::vector<Series> numbers;  ///< in the order of their descriptions
+  std::optional<Series> points;
 };
 
 }  // namespace
@@ -221,11 +263,9 @@ struct ResultFile::Implementation {
     writer.ascii_attribute(vtk.get(), "Type", "UnstructuredGrid");
 
     const std::vector<std::int64_t> connectivity(grid.connectivity().begin(), grid.connectivity().end());
-    std::vector<std::int64_t> offsets(grid.cells() + 1);
-    for (std::size_t i = 0; i < offsets.size(); ++i) {
-      offsets[i] = narrow<std::int64_t>(3 * i);
-    }
-    const std::vector<unsigned char> types(grid.cells(), vtk_triangle);
+    std::vector<std::int64_t> offsets{0};
+    offsets.insert(offsets.end(), grid.ends().begin(), grid.ends().end());
+    const std::vector<std::uint8_t>& types = grid.types();
     const auto count = [&](const char* name, std::size_t value) {
       const std::int64_t number = value;
       (void)writer.dataset(vtk.get(), name, H5T_NATIVE_INT64, {1}, &number);
@@ -257,22 +297,31 @@ struct ResultFile::Implementation {
       writer.attribute(steps.get(), "NSteps", H5T_NATIVE_INT64, {}, &none);
       step_count = writer.own(H5Aopen(steps.get(), "NSteps", H5P_DEFAULT), "written");
     }
-    const auto fixed_layout = ResultGrid::fixed_layout();
+    const std::vector<GridField>& fixed_layout = grid.fixed_layout();
     for (std::size_t i = 0; i < fixed_layout.size(); ++i) {
       fixed.emplace_back(writer, point_data.get(), point_offsets.get(), fixed_layout[i].name, H5T_NATIVE_FLOAT,
                          shape_of(grid.points(), fixed_layout[i].components), grid.fixed()[i].data(), series);
     }
     fixed.emplace_back(writer, cell_data.get(), cell_offsets.get(), "body", H5T_NATIVE_INT32,
                        std::vector<Size>{grid.cells()}, grid.body_of_cell().data(), series);
-    const Handle element_group = writer.group(tunica_group.get(), "elements");
-    write_elements(element_group.get());
-    for (const GridField& field : ResultGrid::layout()) {
+    Handle element_group;
+    Handle tetrahedron_group;
+    if (!model.shells.empty()) {
+      element_group = writer.group(tunica_group.get(), "elements");
+      write_elements(element_group.get());
+    }
+    if (!model.solids.empty()) {
+      tetrahedron_group = writer.group(tunica_group.get(), "tetrahedra");
+      write_tetrahedra(tetrahedron_group.get());
+    }
+    for (const GridField& field : grid.layout()) {
       fields.emplace_back(writer, (field.of_cells ? cell_data : point_data).get(),
                           (field.of_cells ? cell_offsets : point_offsets).get(), field.name,
                           field.of_cells ? grid.cells() : grid.points(), field.components, series);
       if (field.of_cells) {
-        elements.emplace_back(writer, element_group.get(), field.name, H5T_NATIVE_FLOAT,
-                              shape_of(grid.elements(), field.components), 1, true);
+        elements.emplace_back(
+            writer, (field.of_tetrahedra ? tetrahedron_group : element_group).get(), field.name, H5T_NATIVE_FLOAT,
+            shape_of(field.of_tetrahedra ? grid.tetrahedra() : grid.elements(), field.components), 1, true);
       }
     }
   }
@@ -292,12 +341,26 @@ struct ResultFile::Implementation {
     (void)writer.dataset(group, "body", H5T_NATIVE_INT32, {grid.elements()}, bodies.data());
   }
 
+  void write_tetrahedra(hid_t group) {
+    std::vector<std::int64_t> nodes;
+    for (std::size_t s = 0; s < model.solids.size(); ++s) {
+      for (const auto& tetrahedron : model.solids[s].mesh.tetrahedra) {
+        for (const Index node : tetrahedron) {
+          nodes.push_back(narrow<std::int64_t>(model.first_node(model.shells.size() + s) + node));
+        }
+      }
+    }
+    (void)writer.dataset(group, "nodes", H5T_NATIVE_INT64, {grid.tetrahedra(), 4}, nodes.data());
+    (void)writer.dataset(group, "body", H5T_NATIVE_INT32, {grid.tetrahedra()},
+                         grid.body_of_cell().data() + grid.triangles());
+  }
+
   void make_history() {
     const Size nodes = model.node_count();
     const Handle group = writer.group(tunica_group.get(), "nodes");
     std::vector<double> positions;
-    for (const ShellBody& body : model.shells) {
-      const std::vector<double> of_body = flattened(body.mesh.vertices);
+    for (std::size_t b = 0; b < model.body_count(); ++b) {
+      const std::vector<double> of_body = flattened(model.vertices_of(b));
       positions.insert(positions.end(), of_body.begin(), of_body.end());
     }
     (void)writer.dataset(group.get(), "position", H5T_NATIVE_DOUBLE, {nodes, 3}, positions.data());
@@ -323,18 +386,80 @@ struct ResultFile::Implementation {
                         Series(writer, one.get(), "displacement", H5T_NATIVE_DOUBLE, {3}, history_chunk, false),
                         Series(writer, one.get(), "rotation", H5T_NATIVE_DOUBLE, {3}, history_chunk, false)});
     }
+    make_contacts(history.get());
+  }
+
+  void make_contacts(hid_t history) {
+    const auto series_of = [&](hid_t group, const char* name, std::vector<Size> shape) {
+      return Series(writer, group, name, H5T_NATIVE_DOUBLE, shape, history_chunk, false);
+    };
+    Handle all;
+    if (!model.contacts.empty()) {
+      all = writer.group(tunica_group.get(), "contacts");
+      for (const About& one : about_balance) {
+        balance.push_back(series_of(history, one.path, {}));
+      }
+    }
+    for (const Contact& contact : model.contacts) {
+      const Handle one = writer.group(all.get(), contact.name);
+      Record& record = contacts.emplace_back();
+      record.numbers.push_back(series_of(one.get(), "force", {3}));
+      record.numbers.push_back(series_of(one.get(), "moment", {3}));
+      record.numbers.push_back(series_of(one.get(), "area", {}));
+      record.numbers.push_back(series_of(one.get(), "smallest_gap", {2}));
+      record.numbers.push_back(series_of(one.get(), "slip", {}));
+      record.points = Series(writer, one.get(), "points", H5T_NATIVE_INT64, {}, history_chunk, false);
+    }
+    if (!model.rigids.empty()) {
+      all = writer.group(tunica_group.get(), "rigid");
+    }
+    for (const RigidBody& rigid : model.rigids) {
+      const Handle one = writer.group(all.get(), rigid.name);
+      Record& record = rigids.emplace_back();
+      for (const About& about_one : about_rigid) {
+        record.numbers.push_back(series_of(one.get(), about_one.path, {3}));
+      }
+    }
   }
 
   void describe_all(const std::string& time_units) {
-    const auto under = [&](const std::string& group, const About& one) {
-      writer.describe(group + one.path, one.units, one.description);
+    const bool has_shells = !model.shells.empty();
+    const bool has_solids = !model.solids.empty();
+    const auto under = [&](const std::string& group, const About& one, const char* more = "") {
+      if (has_shells || !one.of_shells) {
+        writer.describe(
+            group + one.path, one.units,
+            std::string(has_solids && one.with_solids != nullptr ? one.with_solids : one.description) + more);
+      }
     };
     for (const About& one : about) {
       under("", one);
     }
-    for (const About& one : about_fields) {
-      under("VTKHDF/CellData/", one);
-      under("tunica/elements/", one);
+    for (std::size_t i = 0; has_shells && i < about_shell_fields.size(); ++i) {
+      under("VTKHDF/CellData/", about_shell_fields[i], has_solids ? "; NaN in tetrahedra" : "");
+      under("tunica/elements/", about_shell_fields[i]);
+    }
+    for (std::size_t i = 0; has_solids && i < about_solid_fields.size(); ++i) {
+      under("VTKHDF/CellData/", about_solid_fields[i], has_shells ? "; NaN in shells" : "");
+      under("tunica/tetrahedra/", about_solid_fields[i]);
+    }
+    if (has_solids) {
+      writer.describe("tunica/tetrahedra/nodes", "1",
+                      "the four nodes of each tetrahedron, rows of tunica/nodes, from 0");
+      writer.describe("tunica/tetrahedra/body", "1", "the body of each tetrahedron, from 0, after the shells'");
+    }
+    for (const Contact& contact : model.contacts) {
+      for (const About& one : about_contact) {
+        under("tunica/contacts/" + contact.name + "/", one);
+      }
+    }
+    for (const RigidBody& rigid : model.rigids) {
+      for (const About& one : about_rigid) {
+        under("tunica/rigid/" + rigid.name + "/", one);
+      }
+    }
+    for (std::size_t i = 0; i < balance.size(); ++i) {
+      under("tunica/history/", about_balance[i]);
     }
     writer.describe("tunica/history/time", time_units,
                     "dynamic: time; static: load factor; arc length: number of the step; modes: frequency or factor");
@@ -350,8 +475,8 @@ struct ResultFile::Implementation {
       under("VTKHDF/Steps/", one);
     }
     writer.describe("VTKHDF/Steps/Values", time_units, "time of each state, as tunica/history/time");
-    for (const auto& list : {ResultGrid::layout(), ResultGrid::fixed_layout()}) {
-      for (const GridField& field : list) {
+    for (const auto* list : {&grid.layout(), &grid.fixed_layout()}) {
+      for (const GridField& field : *list) {
         writer.describe(fmt::format("VTKHDF/Steps/{}DataOffsets/{}", field.of_cells ? "Cell" : "Point", field.name),
                         "1", "first row of each state");
       }
@@ -389,6 +514,7 @@ struct ResultFile::Implementation {
       probe.displacement.append(writer, 1, state.displacement[probe.node].data());
       probe.rotation.append(writer, 1, state.rotation[probe.node].data());
     }
+    append_contacts(state);
     writer.flush();
     if (series) {
       // Last, so that what NSteps counts is there.
@@ -399,10 +525,35 @@ struct ResultFile::Implementation {
     output.keep_partial();
   }
 
+  void append_contacts(const State& state) {
+    const auto append_all = [&](Record& record, const auto&... rows) {
+      std::size_t next = 0;
+      (record.numbers[next++].append(writer, 1, rows.data()), ...);
+    };
+    using One = std::array<double, 1>;
+    for (std::size_t i = 0; i < contacts.size(); ++i) {
+      const ContactState now = contact_of(state, i);
+      append_all(contacts[i], now.force, now.moment, One{now.area}, std::array{now.gap_lower, now.gap_upper},
+                 One{now.slip});
+      const auto pressing = narrow<std::int64_t>(now.points);
+      contacts[i].points->append(writer, 1, &pressing);
+    }
+    for (std::size_t i = 0; i < rigids.size(); ++i) {
+      const RigidState now = rigid_of(state, i);
+      append_all(rigids[i], now.position, now.force, now.moment);
+    }
+    const std::array imbalances{state.force_imbalance, state.moment_imbalance};
+    for (std::size_t i = 0; i < balance.size(); ++i) {
+      balance[i].append(writer, 1, &imbalances[i]);
+    }
+  }
+
   void put_fields(const State& state, const ElementFields& of_elements) {
     const std::vector<Floats> on_grid = grid.values(state, of_elements);
-    const std::vector<Floats> by_element = element_values(of_elements);
-    require_range(on_grid);
+    const std::vector<Floats> by_element = grid.element_values(of_elements);
+    // Those of cells are the elements' with NaN where a cell has none.
+    const auto first_of_cells = std::ranges::find_if(grid.layout(), &GridField::of_cells);
+    require_range(std::span(on_grid).first(narrow<std::size_t>(first_of_cells - grid.layout().begin())));
     require_range(by_element);
     for (std::size_t i = 0; i < fields.size(); ++i) {
       fields[i].put(writer, on_grid[i]);
@@ -447,6 +598,9 @@ struct ResultFile::Implementation {
   Series stress_max_at;
   std::vector<Series> counts;
   std::vector<ProbeSeries> probes;
+  std::vector<Record> contacts;
+  std::vector<Record> rigids;
+  std::vector<Series> balance;
 };
 
 ResultFile::ResultFile(const std::filesystem::path& path, const Model& model, ResultOptions options)

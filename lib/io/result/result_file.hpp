@@ -24,8 +24,9 @@ struct ResultOptions {
   bool overwrite = false;
 };
 
-/// A result in HDF5, for ParaView (VTKHDF UnstructuredGrid of the curved surface, as linear triangles) and for programs
-/// (/tunica: the degrees of freedom themselves, history, probes, scene). docs/results.md has the layout.
+/// A result in HDF5, for ParaView (VTKHDF UnstructuredGrid of the curved surface, as linear triangles, and of the
+/// solids' tetrahedra) and for programs (/tunica: the degrees of freedom themselves, history, probes, contacts, scene).
+/// docs/results.md has the layout.
 ///
 /// Everything goes to NAME.part. A state is flushed when append() returns and counted last, so that NAME.part can be
 /// read after a kill; it stays behind from the first state on, until commit() renames it. The file is not locked: it

@@ -6,7 +6,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
+#include <span>
 
 namespace tunica {
 namespace {
@@ -14,19 +16,20 @@ namespace {
 constexpr std::size_t most_fine_triangles = 200'000;
 constexpr int finest_level = 4;
 
+constexpr float no_value = std::numeric_limits<float>::quiet_NaN();
 constexpr std::array fixed_fields{GridField{"normal", 3, false}, GridField{"thickness", 1, false}};
 constexpr std::array point_fields{GridField{"displacement", 3, false}, GridField{"rotation", 3, false},
                                   GridField{"von_mises", 1, false}};
-constexpr std::array state_fields{point_fields[0],
-                                  point_fields[1],
-                                  point_fields[2],
-                                  GridField{"pressure", 1, true},
+constexpr std::array shell_fields{GridField{"pressure", 1, true},
                                   GridField{"von_mises_top", 1, true},
                                   GridField{"von_mises_bottom", 1, true},
                                   GridField{"membrane_force", 3, true},
                                   GridField{"bending_moment", 3, true},
                                   GridField{"principal_strain_top", 2, true},
                                   GridField{"principal_strain_bottom", 2, true}};
+// `pressure` is the load's on a shell: the state of stress of a solid has a name of its own.
+constexpr std::array solid_fields{GridField{"solid_von_mises", 1, true, true},
+                                  GridField{"solid_pressure", 1, true, true}};
 
 template <typename Vector>
 void add(Floats& values, const Vector& v) {
@@ -53,6 +56,24 @@ Value between(const std::array<Index, 3>& corners, const Vec2& b, const Value* o
                b.y() * of_nodes[corners[2]]);
 }
 
+/// What is constant in each tetrahedron as means at the nodes, by volume.
+void add_node_means(const TetMesh& mesh, std::span<const double> of_tetrahedra, Floats& values) {
+  std::vector<double> sums(mesh.vertices.size(), 0);
+  std::vector<double> volumes(mesh.vertices.size(), 0);
+  for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t) {
+    const auto& nodes = mesh.tetrahedra[t];
+    const auto edge = [&](std::size_t k) { return Vec3(mesh.vertices[nodes[k]] - mesh.vertices[nodes[0]]); };
+    const double volume = std::abs(edge(1).dot(edge(2).cross(edge(3))));
+    for (const Index node : nodes) {
+      sums[node] += volume * of_tetrahedra[t];
+      volumes[node] += volume;
+    }
+  }
+  for (std::size_t v = 0; v < sums.size(); ++v) {
+    add(values, volumes[v] > 0 ? sums[v] / volumes[v] : 0);
+  }
+}
+
 }  // namespace
 
 int drawing_level(std::size_t shells) {
@@ -62,9 +83,6 @@ int drawing_level(std::size_t shells) {
   }
   return level;
 }
-
-std::span<const GridField> ResultGrid::fixed_layout() { return fixed_fields; }
-std::span<const GridField> ResultGrid::layout() { return state_fields; }
 
 ResultGrid::Body ResultGrid::make_body(const ShellMesh& mesh, int level) {
   Body body{tessellate_uniformly(mesh, level), {}, {}, mesh.vertices.size()};
@@ -123,14 +141,23 @@ ResultGrid::ResultGrid(const Model& model, int level) : model_(model) {
   for (const ShellBody& body : model.shells) {
     elements_ += body.mesh.triangles.size();
   }
-  if (level == 0) {
-    level = drawing_level(elements_);
+  layout_.assign(point_fields.begin(), point_fields.end());
+  if (!model.shells.empty()) {
+    layout_.insert(layout_.end(), shell_fields.begin(), shell_fields.end());
+    add_shells(level == 0 ? drawing_level(elements_) : level);
   }
+  if (!model.solids.empty()) {
+    layout_.insert(layout_.end(), solid_fields.begin(), solid_fields.end());
+    add_solids();
+  }
+}
+
+void ResultGrid::add_shells(int level) {
   Floats normals;
   Floats thicknesses;
   std::size_t first_element = 0;
-  for (std::size_t b = 0; b < model.shells.size(); ++b) {
-    const ShellBody& shell = model.shells[b];
+  for (std::size_t b = 0; b < model_.shells.size(); ++b) {
+    const ShellBody& shell = model_.shells[b];
     const Body& body = bodies_.emplace_back(make_body(shell.mesh, level));
     const Tessellation& surface = body.surface;
     const auto patches = curved_patches(shell.mesh);
@@ -159,6 +186,8 @@ ResultGrid::ResultGrid(const Model& model, int level) : model_(model) {
       for (const Index v : triangle) {
         connectivity_.push_back(narrow<std::int32_t>(first + body.point[v]));
       }
+      ends_.push_back(narrow<std::int32_t>(connectivity_.size()));
+      types_.push_back(vtk_triangle);
     }
     body_of_cell_.insert(body_of_cell_.end(), surface.mesh.triangles.size(), narrow<std::int32_t>(b));
     for (const Index element : surface.shell) {
@@ -166,7 +195,30 @@ ResultGrid::ResultGrid(const Model& model, int level) : model_(model) {
     }
     first_element += shell.mesh.triangles.size();
   }
+  fixed_layout_.assign(fixed_fields.begin(), fixed_fields.end());
   fixed_ = {std::move(normals), std::move(thicknesses)};
+}
+
+void ResultGrid::add_solids() {
+  for (std::size_t s = 0; s < model_.solids.size(); ++s) {
+    const TetMesh& mesh = model_.solids[s].mesh;
+    const std::size_t first = points();
+    TUNICA_ASSERT(first + mesh.vertices.size() <= max_index);
+    for (const Vec3& vertex : mesh.vertices) {
+      coordinates_.insert(coordinates_.end(), vertex.data(), vertex.data() + 3);
+    }
+    for (const auto& tetrahedron : mesh.tetrahedra) {
+      for (const Index v : tetrahedron) {
+        connectivity_.push_back(narrow<std::int32_t>(first + v));
+      }
+      ends_.push_back(narrow<std::int32_t>(connectivity_.size()));
+      types_.push_back(vtk_tetrahedron);
+      body_of_cell_.push_back(narrow<std::int32_t>(model_.shells.size() + s));
+    }
+  }
+  for (std::size_t i = 0; i < fixed_.size(); ++i) {
+    fixed_[i].resize(fixed_layout_[i].components * points(), no_value);
+  }
 }
 
 std::vector<std::vector<float>> ResultGrid::values(const State& state, const ElementFields& fields) const {
@@ -185,28 +237,63 @@ std::vector<std::vector<float>> ResultGrid::values(const State& state, const Ele
     add_means(body, linear(state.rotation.data() + first), values[1]);
     add_means(body, linear(fields.von_mises.data() + first), values[2]);
   }
+  add_solid_values(state, fields, values);
   for (const Floats& of_elements : element_values(fields)) {
-    const std::size_t components = state_fields[values.size()].components;
-    TUNICA_ASSERT(of_elements.size() == components * elements_);
-    Floats& of_cells = values.emplace_back();
-    of_cells.reserve(components * cells());
+    const auto [name, components, of_cells, of_tetrahedra] = layout_[values.size()];
+    Floats& all = values.emplace_back();
+    all.reserve(components * cells());
+    if (of_tetrahedra) {
+      all.assign(components * triangles(), no_value);
+      all.insert(all.end(), of_elements.begin(), of_elements.end());
+      continue;
+    }
     for (const std::size_t element : element_of_cell_) {
       const auto first = of_elements.begin() + components * element;
-      of_cells.insert(of_cells.end(), first, first + components);
+      all.insert(all.end(), first, first + components);
     }
+    all.resize(components * cells(), no_value);
   }
-  TUNICA_ASSERT(values.size() == state_fields.size());
+  TUNICA_ASSERT(values.size() == layout_.size());
   return values;
 }
 
-std::vector<std::vector<float>> element_values(const ElementFields& fields) {
-  return {flat(fields.pressure),
-          flat(fields.von_mises_top),
-          flat(fields.von_mises_bottom),
-          flat(fields.membrane_force),
-          flat(fields.bending_moment),
-          flat(fields.principal_strain_top),
-          flat(fields.principal_strain_bottom)};
+void ResultGrid::add_solid_values(const State& state, const ElementFields& fields,
+                                  std::vector<std::vector<float>>& values) const {
+  std::span<const double> stress = fields.solid_von_mises;
+  TUNICA_ASSERT(stress.size() == tetrahedra());
+  for (std::size_t s = 0; s < model_.solids.size(); ++s) {
+    const TetMesh& mesh = model_.solids[s].mesh;
+    const std::size_t first = model_.first_node(model_.shells.size() + s);
+    for (std::size_t v = first; v < first + mesh.vertices.size(); ++v) {
+      add(values[0], state.displacement[v]);
+      add(values[1], state.rotation[v]);
+    }
+    add_node_means(mesh, stress.first(mesh.tetrahedra.size()), values[2]);
+    stress = stress.subspan(mesh.tetrahedra.size());
+  }
+}
+
+std::vector<std::vector<float>> ResultGrid::element_values(const ElementFields& fields) const {
+  std::vector<Floats> values;
+  const auto put = [&](const auto& list) {
+    const GridField& field = layout_[point_fields.size() + values.size()];
+    TUNICA_ASSERT(list.size() == (field.of_tetrahedra ? tetrahedra() : elements_));
+    values.push_back(flat(list));
+  };
+  if (!model_.shells.empty()) {
+    put(fields.pressure);
+    put(fields.von_mises_top);
+    put(fields.von_mises_bottom);
+    put(fields.membrane_force);
+    put(fields.bending_moment);
+    put(fields.principal_strain_top);
+    put(fields.principal_strain_bottom);
+  }
+  if (!model_.solids.empty()) {
+    put(fields.solid_von_mises);
+    put(fields.solid_pressure);
+  }
+  return values;
 }
 
 }  // namespace tunica

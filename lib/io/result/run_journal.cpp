@@ -21,7 +21,7 @@ namespace tunica {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr std::string_view states_magic = "TUNICA STATES 1\n";
+constexpr std::string_view states_magic = "TUNICA STATES 2\n";
 constexpr std::string_view checkpoint_magic = "TUNICA CHECKPOINT 1\n";
 /// Time between checkpoints, as a multiple of what the last one took.
 constexpr int spacing = 20;
@@ -56,6 +56,8 @@ private:
   void put(const std::vector<Vec3>& values) { list(values.data(), values.size()); }
   void put(const std::vector<Eigen::Quaterniond>& values) { list(values.data(), values.size()); }
   void put(const std::vector<Snap>& values) { list(values.data(), values.size()); }
+  void put(const std::vector<ContactState>& values) { list(values.data(), values.size()); }
+  void put(const std::vector<RigidState>& values) { list(values.data(), values.size()); }
   void put(const EnergyBalance& value) { raw(&value, sizeof value); }
   template <typename Value>
   void put(const std::optional<Value>& value) {
@@ -128,6 +130,8 @@ private:
   void get(std::vector<Vec3>& values) { list(values); }
   void get(std::vector<Eigen::Quaterniond>& values) { list(values); }
   void get(std::vector<Snap>& values) { list(values); }
+  void get(std::vector<ContactState>& values) { list(values); }
+  void get(std::vector<RigidState>& values) { list(values); }
   void get(EnergyBalance& value) { raw(&value, sizeof value); }
   template <typename Value>
   void get(std::optional<Value>& value) {
@@ -172,9 +176,11 @@ void identity_members(Archive& archive, Identity& identity) {
 template <typename Archive, typename AnyState>
 void state_members(Archive& archive, AnyState& state) {
   auto& [time, load_factor, displacement, rotation, velocity, angular_velocity, volume, strain, kinetic, residual,
-         newton_iterations, cg_iterations, error, error_is_bound, converged, linear] = state;
+         newton_iterations, cg_iterations, error, error_is_bound, converged, linear, contacts, rigids, force_imbalance,
+         moment_imbalance] = state;
   each(archive, time, load_factor, displacement, rotation, velocity, angular_velocity, volume, strain, kinetic,
-       residual, newton_iterations, cg_iterations, error, error_is_bound, converged, linear);
+       residual, newton_iterations, cg_iterations, error, error_is_bound, converged, linear, contacts, rigids,
+       force_imbalance, moment_imbalance);
 }
 
 template <typename Archive, typename AnyCheckpoint>
@@ -494,10 +500,12 @@ RunJournal RunJournal::open(const fs::path& part) {
 
 const RunIdentity& RunJournal::identity() const { return implementation_->identity; }
 
-std::optional<Checkpoint> RunJournal::replay(std::size_t nodes, const std::function<void(const State&)>& on_state) {
+std::optional<Checkpoint> RunJournal::replay(const Model& model, const std::function<void(const State&)>& on_state) {
   Implementation& journal = *implementation_;
+  const std::size_t nodes = model.node_count();
   const std::uint64_t end = journal.checkpoint ? journal.kept_size : journal.header_size;
   const auto fits = [&](const auto& list) { return list.empty() || list.size() == nodes; };
+  const auto one_of_each = [](const auto& list, const auto& of) { return list.empty() || list.size() == of.size(); };
   if (journal.checkpoint && !(fits(journal.checkpoint->displacement) && fits(journal.checkpoint->rotation))) {
     journal.fail(journal.checkpoint_path);
   }
@@ -512,7 +520,8 @@ std::optional<Checkpoint> RunJournal::replay(std::size_t nodes, const std::funct
       state_members(unpack, state);
       unpack.require_end();
       if (state.displacement.size() != nodes || state.rotation.size() != nodes || !fits(state.velocity) ||
-          !fits(state.angular_velocity)) {
+          !fits(state.angular_velocity) || !one_of_each(state.contacts, model.contacts) ||
+          !one_of_each(state.rigids, model.rigids)) {
         throw Damaged();
       }
     } catch (const Damaged&) {

@@ -33,7 +33,8 @@ std::string difference(const RunIdentity& before, const RunIdentity& now);
 ///   to the disk and renamed, so it is the last one or the one before.
 /// A resumed run writes NAME.part anew from the states, up to the checkpoint, and goes on from there.
 /// Whoever holds the PartLock of NAME.part, as a journal does, writes all three.
-/// Cost: 96 bytes per node and state; checkpoints are spaced so that they take at most a twentieth of the time.
+/// Cost: 96 bytes per node and state, 88 per contact; checkpoints are spaced so that they take at most a twentieth of
+/// the time.
 class RunJournal {
 public:
   /// Starts the journal of a new run; what an earlier run left under this name is removed, NAME.part emptied.
@@ -56,8 +57,8 @@ public:
 
   /// Hands over the states up to the checkpoint, and forgets the later ones. @return the checkpoint; none when the run
   /// was stopped before its first one: then it has to begin again, and no state is handed over.
-  /// @param nodes  of the model. Errors: InputError when a record is damaged or is not of this model.
-  std::optional<Checkpoint> replay(std::size_t nodes, const std::function<void(const State&)>& on_state);
+  /// Errors: InputError when a record is damaged or is not of this model.
+  std::optional<Checkpoint> replay(const Model& model, const std::function<void(const State&)>& on_state);
 
   /// Errors: OutputError.
   void append(const State& state);

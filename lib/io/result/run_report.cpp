@@ -1,9 +1,13 @@
 #include "tunica/io/result/run_report.hpp"
 
+#include "tunica/io/result/detail/contact_record.hpp"
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
+#include <initializer_list>
 
 namespace tunica {
 namespace {
@@ -14,9 +18,67 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-Json triple(const Vec3& v) { return Json::array({v.x(), v.y(), v.z()}); }
+/// What is no number has no value.
+Json known(double value) { return std::isfinite(value) ? Json(value) : Json(); }
+
+Json triple(const Vec3& v) { return Json::array({known(v.x()), known(v.y()), known(v.z())}); }
 
 Json or_null(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
+
+/// The records of contacts and rigid bodies, where there are any.
+void prepare_contacts(Json& result, const Model& model) {
+  const auto lists = [](Json& record, std::initializer_list<const char*> keys) {
+    for (const char* key : keys) {
+      record[key] = Json::array();
+    }
+  };
+  for (const Contact& contact : model.contacts) {
+    lists(result["contacts"][contact.name],
+          {"time_s", "load_factor", "force_n", "moment_n_mm", "area_mm2", "smallest_gap_mm", "points", "slip_mm"});
+  }
+  for (const RigidBody& rigid : model.rigids) {
+    lists(result["rigid"][rigid.name], {"time_s", "load_factor", "force_n", "moment_n_mm", "position_mm"});
+  }
+  if (!model.contacts.empty()) {
+    result["balance"] = {{"force", nullptr}, {"moment", nullptr}};
+  }
+}
+
+void report_contacts(Json& result, const Model& model, const State& state, bool dynamic) {
+  if (state.time == 0) {
+    return;  // the reference, before anything moves
+  }
+  const auto when = [&](Json& record) {
+    record["time_s"].push_back(dynamic ? Json(state.time) : Json());
+    record["load_factor"].push_back(state.load_factor);
+  };
+  for (std::size_t i = 0; i < model.contacts.size(); ++i) {
+    const ContactState now = contact_of(state, i);
+    Json& record = result["contacts"][model.contacts[i].name];
+    when(record);
+    record["force_n"].push_back(triple(now.force));
+    record["moment_n_mm"].push_back(triple(now.moment));
+    record["area_mm2"].push_back(known(now.area));
+    record["smallest_gap_mm"].push_back({{"lower", known(now.gap_lower)}, {"upper", known(now.gap_upper)}});
+    record["points"].push_back(now.points);
+    record["slip_mm"].push_back(known(now.slip));
+  }
+  for (std::size_t i = 0; i < model.rigids.size(); ++i) {
+    const RigidState now = rigid_of(state, i);
+    Json& record = result["rigid"][model.rigids[i].name];
+    when(record);
+    record["force_n"].push_back(triple(now.force));
+    record["moment_n_mm"].push_back(triple(now.moment));
+    record["position_mm"].push_back(triple(now.position));
+  }
+  const auto largest = [](Json& so_far, double now) {
+    so_far = known(so_far.is_null() ? now : std::max(so_far.get<double>(), now));
+  };
+  if (!state.contacts.empty()) {
+    largest(result["balance"]["force"], state.force_imbalance);
+    largest(result["balance"]["moment"], state.moment_imbalance);
+  }
+}
 
 }  // namespace
 
@@ -25,8 +87,12 @@ void prepare_result(Json& result, const Model& model) {
   for (const ShellBody& body : model.shells) {
     shells += body.mesh.triangles.size();
   }
+  std::size_t tetrahedra = 0;
+  for (const SolidBody& body : model.solids) {
+    tetrahedra += body.mesh.tetrahedra.size();
+  }
   result = {{"shells", shells},
-            {"tetrahedra", 0},
+            {"tetrahedra", tetrahedra},
             {"nodes", model.node_count()},
             {"dof", nullptr},
             {"steps", 0},
@@ -59,6 +125,7 @@ void prepare_result(Json& result, const Model& model) {
                                     {"displacement_mm", Json::array()},
                                     {"rotation_rad", Json::array()}};
   }
+  prepare_contacts(result, model);
 }
 
 void report_state(Json& result, const Model& model, const State& state, const ElementFields& fields, bool dynamic) {
@@ -68,11 +135,13 @@ void report_state(Json& result, const Model& model, const State& state, const El
   }
   result["max_displacement_mm"] = fields.largest_displacement;
   result["max_node_displacement_mm"] = most;
-  result["wall"] = {{"stress_p99_mpa", fields.wall.stress_p99},
-                    {"stress_max_mpa", fields.wall.stress_max},
-                    {"stress_max_at_mm", triple(fields.wall.stress_max_at)},
-                    {"strain_p99_percent", 1e2 * fields.wall.strain_p99},
-                    {"strain_max_percent", 1e2 * fields.wall.strain_max}};
+  if (!model.shells.empty()) {
+    result["wall"] = {{"stress_p99_mpa", fields.wall.stress_p99},
+                      {"stress_max_mpa", fields.wall.stress_max},
+                      {"stress_max_at_mm", triple(fields.wall.stress_max_at)},
+                      {"strain_p99_percent", 1e2 * fields.wall.strain_p99},
+                      {"strain_max_percent", 1e2 * fields.wall.strain_max}};
+  }
   if (result["volume_before_mm3"].is_null()) {
     result["volume_before_mm3"] = or_null(state.volume);
   }
@@ -87,6 +156,7 @@ void report_state(Json& result, const Model& model, const State& state, const El
     record["displacement_mm"].push_back(triple(state.displacement[node]));
     record["rotation_rad"].push_back(triple(state.rotation[node]));
   }
+  report_contacts(result, model, state, dynamic);
 }
 
 void report_summary(Json& result, const Summary& summary, bool converged, std::optional<double> duration) {

@@ -7,10 +7,11 @@
 /// What a report says of a simulation, key by key as the contract names them (mm, MPa, mJ, s).
 namespace tunica {
 
-/// All keys, undefined until the run fills them.
+/// All keys, undefined until the run fills them; `contacts`, `rigid` and `balance` only where the model has them.
 void prepare_result(Json& result, const Model& model);
 
-/// What is known of a run that may still fail. The probes' records grow.
+/// What is known of a run that may still fail. The records of probes, contacts and rigid bodies grow, the latter two
+/// not by the reference state.
 void report_state(Json& result, const Model& model, const State& state, const ElementFields& fields, bool dynamic);
 
 /// Of a run that has ended.

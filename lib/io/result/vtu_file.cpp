@@ -3,7 +3,6 @@
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/io/file/output_file.hpp"
-#include "tunica/io/result/detail/result_grid.hpp"
 
 #include <fmt/format.h>
 #include <openssl/evp.h>
@@ -103,26 +102,20 @@ private:
 
 }  // namespace
 
-void write_vtu(const std::filesystem::path& path, const VtuTriangles& grid, bool overwrite) {
-  const std::size_t cells = grid.connectivity.size() / 3;
-  std::vector<std::int32_t> offsets(cells);
-  for (std::size_t i = 0; i < cells; ++i) {
-    offsets[i] = narrow<std::int32_t>(3 * (i + 1));
-  }
-  const std::vector<std::uint8_t> types(cells, vtk_triangle);
+void write_vtu(const std::filesystem::path& path, const VtuGrid& grid, bool overwrite) {
   Document document;
   document.line(R"(<?xml version="1.0"?>)");
   document.line(
       R"(<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" header_type="UInt64" compressor="vtkZLibDataCompressor">)");
   document.line("<UnstructuredGrid>");
   document.section("FieldData", grid.of_grid);
-  document.line(fmt::format(R"(<Piece NumberOfPoints="{}" NumberOfCells="{}">)", grid.coordinates.size() / 3, cells));
+  document.line(
+      fmt::format(R"(<Piece NumberOfPoints="{}" NumberOfCells="{}">)", grid.coordinates.size() / 3, grid.types.size()));
   document.section("PointData", grid.of_points);
   document.section("CellData", grid.of_cells);
   document.section("Points", {{"Points", 3, grid.coordinates}});
-  document.section("Cells", {{"connectivity", 1, grid.connectivity},
-                             {"offsets", 1, std::span<const std::int32_t>(offsets)},
-                             {"types", 1, std::span<const std::uint8_t>(types)}});
+  document.section("Cells",
+                   {{"connectivity", 1, grid.connectivity}, {"offsets", 1, grid.ends}, {"types", 1, grid.types}});
   document.line("</Piece>");
   document.line("</UnstructuredGrid>");
   write_file(path, document.str(), overwrite);

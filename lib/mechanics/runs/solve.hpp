@@ -6,12 +6,32 @@
 #include <Eigen/Geometry>
 
 #include <functional>
+#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
 #include <string>
 
 namespace tunica {
+
+/// What a contact does in one state.
+struct ContactState {
+  Vec3 force = Vec3::Zero();   ///< N, on the first body
+  Vec3 moment = Vec3::Zero();  ///< N mm, on the first body, about the origin
+  double area = 0;             ///< mm^2 that press
+  /// mm, between which the smallest gap certainly lies; below zero: the bodies overlap. NaN: not known.
+  double gap_lower = std::numeric_limits<double>::quiet_NaN();
+  double gap_upper = std::numeric_limits<double>::quiet_NaN();
+  std::size_t points = 0;  ///< samples that press
+  double slip = 0;         ///< mm, the largest of them
+};
+
+/// Where a rigid body is in one state, and what the others do to it.
+struct RigidState {
+  Vec3 force = Vec3::Zero();     ///< N, on it
+  Vec3 moment = Vec3::Zero();    ///< N mm, on it, about the origin
+  Vec3 position = Vec3::Zero();  ///< mm: its centre, or the midpoint of its axis
+};
 
 /// One state of a run, as handed to the callback; everything is for all nodes of all bodies in global order.
 struct State {
@@ -32,7 +52,11 @@ struct State {
   std::optional<double> algebraic_error;  ///< of this step, relative; see Summary
   bool algebraic_error_is_bound = false;
   bool converged = false;
-  bool linear = false;  ///< of the linear theory: rotations are not finite ones
+  bool linear = false;                 ///< of the linear theory: rotations are not finite ones
+  std::vector<ContactState> contacts;  ///< of the model's contacts, in order; empty where a state does not say
+  std::vector<RigidState> rigids;      ///< of the model's rigid bodies, in order; the same
+  double force_imbalance = 0;          ///< sum of all contact and tie forces over all bodies, relative to the largest
+  double moment_imbalance = 0;         ///< the same of their moments about the origin
 };
 
 /// What the wall bears, over all bodies: of von Mises stress and largest principal strain, each the larger of both
@@ -45,7 +69,7 @@ struct Wall {
   double strain_max = 0;
 };
 
-/// Per-element results of one state (#elements of all bodies in order; components in the element's own frame whose
+/// Per-element results of one state (#elements of all shells in order; components in the element's own frame whose
 /// x axis is the projection of the first edge).
 struct ElementFields {
   std::vector<Vec3> membrane_force;      ///< N/mm: xx, yy, xy
@@ -58,7 +82,9 @@ struct ElementFields {
   std::vector<double> pressure;   ///< MPa, of this state
   std::vector<double> von_mises;  ///< MPa, #nodes: the larger of both faces' averages at the nodes
   Wall wall;
-  double largest_displacement = 0;  ///< mm, of the curved surfaces, also between the nodes
+  double largest_displacement = 0;      ///< mm, of the curved surfaces, also between the nodes
+  std::vector<double> solid_von_mises;  ///< MPa, #tetrahedra of all solids in order; of the true (Cauchy) stress
+  std::vector<double> solid_pressure;   ///< MPa, the same; minus the mean stress: positive in compression
 };
 
 /// Where a static path broke off and the shell moved by itself to the next state of rest.

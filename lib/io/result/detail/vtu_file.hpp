@@ -19,16 +19,18 @@ struct VtuArray {
       values;
 };
 
-/// A grid of linear triangles.
-struct VtuTriangles {
+/// An unstructured grid.
+struct VtuGrid {
   std::span<const double> coordinates;         ///< 3 per point
-  std::span<const std::int32_t> connectivity;  ///< 3 per triangle
+  std::span<const std::int32_t> connectivity;  ///< points of the cells, one after the other
+  std::span<const std::int32_t> ends;          ///< where each cell's points end
+  std::span<const std::uint8_t> types;         ///< VTK's numbers
   std::vector<VtuArray> of_points, of_cells, of_grid;
 };
 
 /// Writes a whole file: arrays compressed by zlib, appended in base64, so that any XML reader reads it.
 /// Source: VTK file formats, "XML file formats" (version 1.0, header_type UInt64, vtkZLibDataCompressor).
 /// Errors: OutputError.
-void write_vtu(const std::filesystem::path& path, const VtuTriangles& grid, bool overwrite);
+void write_vtu(const std::filesystem::path& path, const VtuGrid& grid, bool overwrite);
 
 }  // namespace tunica
