@@ -97,16 +97,16 @@ void stop_rigid_motion(const ShellSystem& system, const Piece& piece, double len
 /// rate of its deformation: a rigid motion is not damped by beta.
 class TimeStepper {
 public:
-  TimeStepper(const ShellSystem& system, const Model& model, const RunSettings& settings, const DynamicRun& run)
+  TimeStepper(ShellSystem& system, const Model& model, const RunSettings& settings, const DynamicRun& run)
       : system_(system),
         model_(model),
         settings_(settings),
         run_(run),
         scheme_(run),
-        solver_(system, settings),
         matrix_(system.pattern),
         mass_(lumped_masses(system)),
         part_(run.step) {
+    solver_.emplace(system, settings);
     if (run.adaptive) {
       Vec3 low = system.reference.front();
       Vec3 high = low;
@@ -251,14 +251,15 @@ public:
     }
   }
 
-  [[nodiscard]] std::size_t freedom_count() const { return solver_.freedom_count(); }
-  void tell_direct_error(bool tell) { solver_.tell_direct_error(tell); }
+  [[nodiscard]] std::size_t freedom_count() const { return solver_->freedom_count(); }
+  void tell_direct_error(bool tell) { solver_->tell_direct_error(tell); }
   [[nodiscard]] double tolerance() const { return tolerance_; }
 
 private:
   struct Step {
     Configuration start;
     Rates rates_before;
+    double time = 0;    ///< s, of its start
     double length = 0;  ///< s
     std::vector<double> factors_before;
     std::vector<double> factors;
@@ -277,6 +278,7 @@ private:
     Step s;
     s.start = motion.configuration;
     s.rates_before = motion.rates;
+    s.time = time;
     s.length = length;
     s.factors = load_factors(model_, false, time + length);
     // A load that is there from time 0 on comes onto a shell at rest without load.
@@ -329,6 +331,7 @@ private:
   void accept(double length, const Motion& motion) {
     const VectorX acted = std::move(acting_);
     keep_acting(motion);
+    accept_contact(motion.configuration);
     work_ += 0.5 * (acted + acting_).dot(change_);
     damped_ += run_.damping.mass * length * 2 * kinetic_energy(change_ / length);
     for (std::size_t e = 0; run_.damping.stiffness > 0 && e < system_.elements.size(); ++e) {
@@ -386,14 +389,36 @@ private:
     return result;
   }
 
+  void begin_contact(double from, double to, const Configuration& configuration) {
+    if (!system_.contact) {
+      return;
+    }
+    system_.contact->set_step(from, to);
+    if (system_.contact->find_pairs(configuration)) {
+      make_pattern(system_, system_.contact->pairs());
+      solver_.emplace(system_, settings_);
+      matrix_ = system_.pattern;
+    }
+  }
+
+  void accept_contact(const Configuration& configuration) {
+    if (system_.contact) {
+      system_.contact->accept(configuration);
+    }
+  }
+
   NewtonResult run(Step& s, double from, double to, Configuration& configuration) {
     const auto function = [&](const Configuration& c, BlockMatrix* tangent,
                               const std::vector<ElementState>& predicted) {
       return balance(s, to, c, tangent, predicted);
     };
-    const NewtonResult result =
-        newton(system_, settings_, solver_, function, (to - from) * s.held, matrix_, configuration, at_rest_);
+    begin_contact(s.time + from * s.length, s.time + to * s.length, configuration);
+    NewtonResult result =
+        newton(system_, settings_, *solver_, function, (to - from) * s.held, matrix_, configuration, at_rest_);
     at_rest_ = result.iterations == 0;
+    if (system_.contact && result.converged && !system_.contact->is_certain(configuration)) {
+      result.converged = false;
+    }
     return result;
   }
 
@@ -414,6 +439,7 @@ private:
       count();
       if (acceptable(attempted)) {
         configuration = std::move(attempt);
+        accept_contact(configuration);
         done = next;
         part = std::min(2 * part, 0.5);
       } else {
@@ -434,7 +460,8 @@ private:
     const auto whole = [&](const Configuration& c, BlockMatrix* tangent, const std::vector<ElementState>& predicted) {
       return balance(s, 1, c, tangent, predicted);
     };
-    const SettleResult settled = settle(system_, settings_, solver_, whole, matrix_, configuration);
+    begin_contact(s.time + s.length, s.time + s.length, configuration);
+    const SettleResult settled = settle(system_, settings_, *solver_, whole, matrix_, configuration);
     result.ran_away = settled.ran_away;
     result.newton.converged = settled.settled;
     result.newton.stable = settled.settled;
@@ -465,12 +492,12 @@ private:
     }
   }
 
-  const ShellSystem& system_;
+  ShellSystem& system_;
   const Model& model_;
   const RunSettings& settings_;
   const DynamicRun& run_;
   const TimeScheme scheme_;
-  TangentSolver solver_;
+  std::optional<TangentSolver> solver_;
   BlockMatrix matrix_;
   VectorX mass_;
   Forces forces_;

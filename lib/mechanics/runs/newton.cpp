@@ -273,7 +273,7 @@ private:
   Configuration& configuration_;
   NewtonResult result_;
   Balance now_;
-  double left_;        ///< of the prescribed displacements, still to be moved
+  double left_;         ///< of the prescribed displacements, still to be moved
   double longest_ = 1;  ///< part of the increment that may be followed
   bool tangent_is_current_ = false;
   VectorX increment_;

@@ -34,6 +34,22 @@ State make_state(const ShellSystem& system, const Model& model, const Configurat
       state.strain_energy += strain_energy(element, d);
     }
   }
+  for (const SolidElement& element : system.solids) {
+    SolidResponse response;
+    if (solid_response(element, corner_motion(element, configuration), response, nullptr)) {
+      state.strain_energy += response.energy;
+    }
+  }
+  if (system.contact) {
+    for (const ContactResult& c : system.contact->results(configuration)) {
+      state.contacts.push_back({c.force, c.moment, c.area, c.gap_lower, c.gap_upper, c.points, c.slip});
+    }
+    for (const auto& [force, moment, position] : system.contact->on_rigids()) {
+      state.rigids.push_back({force, moment, position});
+    }
+    state.force_imbalance = system.contact->imbalance()[0];
+    state.moment_imbalance = system.contact->imbalance()[1];
+  }
   return state;
 }
 
@@ -41,6 +57,12 @@ std::string describe_loads(const Model& model, const std::vector<double>& reache
   std::string text;
   for (std::size_t l = 0; l < model.loads.size(); ++l) {
     if (const auto* pressure = std::get_if<PressureLoad>(&model.loads[l].kind)) {
+      if (model.is_solid(model.loads[l].body)) {
+        text += fmt::format("{}{:.4g} kPa of {:.4g} kPa on {}", text.empty() ? "" : "; ",
+                            1e3 * reached[l] * pressure->value, 1e3 * wanted[l] * pressure->value,
+                            model.name_of(model.loads[l].body));
+        continue;
+      }
       const ShellBody& body = model.shells[model.loads[l].body];
       text += fmt::format("{}{:.4g} kPa of {:.4g} kPa on {}, {:.4g} mm thick{}", text.empty() ? "" : "; ",
                           1e3 * reached[l] * pressure->value, 1e3 * wanted[l] * pressure->value, body.name,
@@ -161,7 +183,7 @@ ElementFields ElementFieldEvaluator::operator()(const State& state) const {
   ElementFields fields;
   const std::size_t nodes = model.node_count();
   TUNICA_ASSERT(state.displacement.size() == nodes && state.rotation.size() == nodes);
-  std::vector<double> pressure(model.shells.size(), 0);
+  std::vector<double> pressure(model.body_count(), 0);
   for (const Load& load : model.loads) {
     if (const auto* p = std::get_if<PressureLoad>(&load.kind)) {
       pressure[load.body] += p->value * factor_of(load.ramp, state.velocity.empty(),

@@ -59,7 +59,9 @@ constexpr double nudge = 0.01;
 class LoadStep {
 public:
   LoadStep(ShellSystem& system, const Model& model, const RunSettings& settings)
-      : system_(system), model_(model), settings_(settings), solver_(system, settings), matrix_(system.pattern) {}
+      : system_(system), model_(model), settings_(settings), matrix_(system.pattern) {
+    solver_.emplace(system, settings);
+  }
 
   NewtonResult run(double factor, double previous_factor, Configuration& configuration) {
     const auto balance = [&](const Configuration& c, BlockMatrix* tangent, const std::vector<ElementState>& predicted) {
@@ -67,7 +69,8 @@ public:
     };
     const VectorX held =
         prescribed_positions(system_, model_, factor) - prescribed_positions(system_, model_, previous_factor);
-    NewtonResult result = newton(system_, settings_, solver_, balance, held, matrix_, configuration);
+    begin_contact(previous_factor, factor, configuration);
+    NewtonResult result = newton(system_, settings_, *solver_, balance, held, matrix_, configuration);
     const VectorX still = VectorX::Zero(held.size());
     for (int round = 0; round < 8 && result.converged; ++round) {
       bool changed = false;
@@ -80,7 +83,7 @@ public:
       if (!changed) {
         break;
       }
-      const NewtonResult again = newton(system_, settings_, solver_, balance, still, matrix_, configuration);
+      const NewtonResult again = newton(system_, settings_, *solver_, balance, still, matrix_, configuration);
       result.converged = again.converged;
       result.valid = again.valid;
       result.residual = again.residual;
@@ -105,19 +108,39 @@ public:
     const auto balance = [&](const Configuration& c, BlockMatrix* tangent, const std::vector<ElementState>& predicted) {
       return static_balance(system_, model_, c, factor, forces_, tangent, predicted);
     };
+    begin_contact(factor, factor, configuration);
     advance_configuration(
         system_, prescribed_positions(system_, model_, factor) - prescribed_positions(system_, model_, previous_factor),
         configuration);
     advance_configuration(system_,
-                          nudge * thickness * weakest_direction(system_, solver_, balance, matrix_, configuration),
+                          nudge * thickness * weakest_direction(system_, *solver_, balance, matrix_, configuration),
                           configuration);
-    return settle(system_, settings_, solver_, balance, matrix_, configuration);
+    return settle(system_, settings_, *solver_, balance, matrix_, configuration);
   }
 
-  [[nodiscard]] std::size_t freedom_count() const { return solver_.freedom_count(); }
-  void tell_direct_error(bool tell) { solver_.tell_direct_error(tell); }
+  /// A state of rest that is kept.
+  void accept(const Configuration& configuration) {
+    if (system_.contact) {
+      system_.contact->accept(configuration);
+    }
+  }
+
+  [[nodiscard]] std::size_t freedom_count() const { return solver_->freedom_count(); }
+  void tell_direct_error(bool tell) { solver_->tell_direct_error(tell); }
 
 private:
+  void begin_contact(double from, double to, const Configuration& configuration) {
+    if (!system_.contact) {
+      return;
+    }
+    system_.contact->set_step(from, to);
+    if (system_.contact->find_pairs(configuration)) {
+      make_pattern(system_, system_.contact->pairs());
+      solver_.emplace(system_, settings_);
+      matrix_ = system_.pattern;
+    }
+  }
+
   void require_balance(const Configuration& configuration, double factor) {
     static_balance(system_, model_, configuration, factor, forces_, nullptr);
     for (const Piece& piece : system_.pieces) {
@@ -144,7 +167,7 @@ private:
   ShellSystem& system_;
   const Model& model_;
   const RunSettings& settings_;
-  TangentSolver solver_;
+  std::optional<TangentSolver> solver_;
   BlockMatrix matrix_;
   Forces forces_;
 };
@@ -253,6 +276,7 @@ private:
       return std::nullopt;
     }
     configuration_ = std::move(attempt);
+    step_.accept(configuration_);
     factor_ = target;
     return result;
   }
@@ -272,8 +296,9 @@ private:
       result = step_.run(next, factor_, attempt);
       iterations += result.iterations;
       cg_iterations += result.cg_iterations;
-      if (may_stand(result)) {
+      if (may_stand(result) && (!system_.contact || system_.contact->is_certain(attempt))) {
         configuration_ = std::move(attempt);
+        step_.accept(configuration_);
         factor_ = next;
         increment_ *= 2;
         continue;
@@ -306,7 +331,8 @@ private:
       return result.valid;
     }
     const bool one_linearisation = settings_.newton_max == 1 && result.residual <= largest_unchecked_residual;
-    const bool left_the_path = result.predicted > 0 && result.reached > largest_departure * result.predicted;
+    const bool left_the_path =
+        !system_.contact && result.predicted > 0 && result.reached > largest_departure * result.predicted;
     return (result.converged || (result.valid && one_linearisation)) && result.stable && !left_the_path;
   }
 
@@ -321,6 +347,7 @@ private:
       summary_.snaps.push_back({factor_, largest_distance(attempt, configuration_)});
     }
     configuration_ = std::move(attempt);
+    step_.accept(configuration_);
     factor_ = beyond;
     return settled;
   }
