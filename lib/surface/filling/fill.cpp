@@ -20,13 +20,18 @@
 #include <CGAL/Mesh_complex_3_in_triangulation_3.h>
 #include <CGAL/Mesh_criteria_3.h>
 #include <CGAL/Mesh_triangulation_3.h>
+#include <CGAL/Polygon_mesh_processing/measure.h>
+#include <CGAL/Polygon_mesh_processing/orientation.h>
 #include <CGAL/Polyhedral_mesh_domain_with_features_3.h>
 #include <CGAL/Random.h>
 #include <CGAL/Surface_mesh.h>
 #include <CGAL/make_mesh_3.h>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <map>
+#include <set>
 #include <unordered_map>
 
 namespace tunica {
@@ -44,15 +49,15 @@ constexpr unsigned seed = 1;
 constexpr double sharp_degrees = 60;
 constexpr double wanted_dihedral = 8;     // degrees
 constexpr double aimed_dihedral = 12;     // degrees: what the optimisers are asked for, since they stop at it
-constexpr double most_tetrahedra = 20e6;  // some 20 GB of triangulation
+constexpr double most_tetrahedra = 20e6;  // some 20 GB of triangulations
 constexpr double most_volume_lost = 0.1;  // of the surface's; facets within size / 10 of it lose far less
 constexpr int rounds_of_smoothing = 20;   // of the vertices; later ones move them hardly at all
 constexpr double facet_angle = 25;        // degrees; below 30 the refinement is proven to end
 constexpr double radius_edge_ratio = 2;   // likewise, from 2 on
 // A ball through the corners of a tetrahedron whose edges are 1 has the radius 0.61, of a triangle 0.58. Criteria bound
 // these radii from above; with these bounds the mean edge comes out as 1.
-constexpr double cell_radius = 1.0;
-constexpr double facet_radius = 1.0;
+constexpr double cell_radius = 0.75;
+constexpr double facet_radius = 0.8;
 // The sag of an edge of length s on a curve of radius r is s^2 / (8 r): a tenth of s leaves the edges at their length
 // where r > 1.25 s, and shortens them where a feature would be cut off.
 constexpr double facet_distance = 0.1;
@@ -83,9 +88,10 @@ void require_fillable(const TriangleMesh& surface, double size) {
         crossing.size() == 1 ? "one pair" : fmt::format("{} pairs", crossing.size()), crossing.front()[0],
         crossing.front()[1], place.x(), place.y(), place.z()));
   }
-  const double volume = std::abs(signed_volume(surface));
-  // Half of the regular one's: what a mesh of unequal ones has on average.
-  const double needed = volume / (size * size * size * std::sqrt(2.0) / 12);
+}
+
+void require_affordable(double volume, double size) {
+  const double needed = volume / (size * size * size * std::sqrt(2.0) / 12);  // of regular ones
   if (!(needed < most_tetrahedra)) {
     throw InputError(
         fmt::format("the surface holds some {:.2g} tetrahedra of {} mm, at most {:.2g} are made: choose a larger size",
@@ -95,11 +101,10 @@ void require_fillable(const TriangleMesh& surface, double size) {
 
 FillSurface cgal_surface(const TriangleMesh& mesh) {
   FillSurface surface;
-  const TriangleMesh used = without_unused(mesh);
-  for (const Vec3& v : used.vertices) {
+  for (const Vec3& v : mesh.vertices) {
     surface.add_vertex({v.x(), v.y(), v.z()});
   }
-  for (const auto& [i, j, k] : used.triangles) {
+  for (const auto& [i, j, k] : mesh.triangles) {
     surface.add_face(FillSurface::Vertex_index(i), FillSurface::Vertex_index(j), FillSurface::Vertex_index(k));
   }
   return surface;
@@ -134,42 +139,82 @@ TetMesh tetrahedra_of(const FillComplex& complex) {
   return mesh;
 }
 
-// Pieces connected through vertices.
-std::size_t pieces_of(const std::vector<std::array<Index, 3>>& triangles, std::size_t vertices) {
-  DisjointSets<> sets(vertices);
-  std::vector<bool> used(vertices, false);
-  std::size_t pieces = 0;
-  const auto use = [&](Index v) {
-    pieces += used[v] ? 0 : 1;
-    used[v] = true;
-  };
-  for (const auto& [i, j, k] : triangles) {
-    use(i);
-    use(j);
-    use(k);
-    pieces -= (sets.join(i, j) ? 1 : 0) + (sets.join(i, k) ? 1 : 0);
+// The pieces of a surface, connected through vertices.
+class Pieces {
+public:
+  Pieces(const std::vector<std::array<Index, 3>>& triangles, std::size_t vertices) : sets_(vertices) {
+    for (const auto& [i, j, k] : triangles) {
+      sets_.join(i, j);
+      sets_.join(i, k);
+    }
+    for (const auto& corners : triangles) {
+      roots_.insert(sets_.root(corners[0]));
+    }
   }
-  return pieces;
+
+  [[nodiscard]] std::size_t count() const { return roots_.size(); }
+  [[nodiscard]] const std::set<Index>& names() const { return roots_; }
+  Index name_of(Index vertex) { return sets_.root(vertex); }
+
+private:
+  DisjointSets<> sets_;
+  std::set<Index> roots_;
+};
+
+// Where nothing is sharp, CGAL looks for the surface along a few random lines, and where something is, nowhere else: a
+// piece of several may be missed, however small the tetrahedra. Those without sharp edges get fixed vertices to start
+// from, the outermost along each axis.
+void seed_pieces(FillDomain& domain, const TriangleMesh& surface) {
+  Pieces pieces(surface.triangles, surface.vertices.size());
+  if (pieces.count() == 1) {
+    return;
+  }
+  std::map<FillKernel::Point_3, Index> vertex_at;
+  std::map<Index, std::array<Index, 6>> outermost;
+  for (Index v = 0; v < surface.vertices.size(); ++v) {
+    const Vec3& p = surface.vertices[v];
+    vertex_at[{p.x(), p.y(), p.z()}] = v;
+    std::array<Index, 6>& farthest =
+        outermost.try_emplace(pieces.name_of(v), std::array{v, v, v, v, v, v}).first->second;
+    for (std::size_t side = 0; side < 6; ++side) {
+      const Eigen::Index axis = narrow<Eigen::Index>(side / 2);
+      const double ahead = p[axis] - surface.vertices[farthest[side]][axis];
+      if (side % 2 == 0 ? ahead > 0 : ahead < 0) {
+        farthest[side] = v;
+      }
+    }
+  }
+  using Ends = std::pair<FillKernel::Point_3, FillDomain::Index>;
+  std::vector<std::tuple<FillDomain::Curve_index, Ends, Ends>> curves;
+  domain.get_curves(std::back_inserter(curves));
+  for (const auto& curve : curves) {
+    if (const auto found = vertex_at.find(std::get<1>(curve).first); found != vertex_at.end()) {
+      outermost.erase(pieces.name_of(found->second));
+    }
+  }
+  for (const auto& [piece, vertices] : outermost) {
+    for (const Index v : std::set<Index>(vertices.begin(), vertices.end())) {
+      const Vec3& p = surface.vertices[v];
+      domain.add_corner({p.x(), p.y(), p.z()});
+    }
+  }
 }
 
-double volume_of(const TetMesh& mesh, const std::vector<std::array<Index, 3>>& boundary) {
-  return signed_volume({mesh.vertices, boundary});
-}
-
-// Initial points are thrown at random: a small piece of the surface may get none, and then no mesh.
-void require_whole(const TetMesh& mesh, const TriangleMesh& surface, double size) {
+// What was found may still not be all there is, above all where the tetrahedra are large.
+// @param volume  of the surface, mm^3
+void require_whole(const TetMesh& mesh, const TriangleMesh& surface, double volume, double size) {
   const auto advice = fmt::format("with tetrahedra of {} mm: choose a smaller size", size);
   if (mesh.tetrahedra.empty()) {
     throw RequirementError(fmt::format("no mesh was found inside the surface {}", advice));
   }
   const auto boundary = boundary_triangles(mesh);
-  const std::size_t wanted = pieces_of(surface.triangles, surface.vertices.size());
-  if (const std::size_t found = pieces_of(boundary, mesh.vertices.size()); found < wanted) {
+  const std::size_t wanted = Pieces(surface.triangles, surface.vertices.size()).count();
+  if (const std::size_t found = Pieces(boundary, mesh.vertices.size()).count(); found < wanted) {
     throw RequirementError(
         fmt::format("the surface has {} pieces, the mesh inside it only {}, {}", wanted, found, advice));
   }
-  const double volume = std::abs(signed_volume(surface));
-  if (const double reached = volume_of(mesh, boundary); !(std::abs(reached - volume) <= most_volume_lost * volume)) {
+  const double reached = signed_volume({mesh.vertices, boundary});
+  if (!(std::abs(reached - volume) <= most_volume_lost * volume)) {
     throw RequirementError(
         fmt::format("the surface holds {:.4g} mm^3, the mesh inside it {:.4g} mm^3, {}", volume, reached, advice));
   }
@@ -202,8 +247,10 @@ TetMesh meshed(const FillDomain& domain, double size) {
     CGAL::perturb_mesh_3(complex, domain, params::time_limit = 0, params::sliver_bound = aimed_dihedral);
     best.offer(tetrahedra_of(complex));
     check_interrupt();
-    CGAL::exude_mesh_3(complex, params::time_limit = 0, params::sliver_bound = aimed_dihedral);
-    best.offer(tetrahedra_of(complex));
+    // Exuding gives the vertices weights, with which no other optimiser can go on.
+    FillComplex exuded = complex;
+    CGAL::exude_mesh_3(exuded, params::time_limit = 0, params::sliver_bound = aimed_dihedral);
+    best.offer(tetrahedra_of(exuded));
     check_interrupt();
   };
   without_slivers();
@@ -220,19 +267,26 @@ TetMesh meshed(const FillDomain& domain, double size) {
 
 TetMesh fill(const TriangleMesh& closed_surface, double size) {
   require_fillable(closed_surface, size);
-  const FillSurface surface = cgal_surface(closed_surface);
+  const TriangleMesh used = without_unused(closed_surface);
+  FillSurface surface = cgal_surface(used);
   CGAL::Random random(seed);
   CGAL::get_default_random() = CGAL::Random(seed);
   TetMesh mesh;
+  double volume = 0;
   try {
+    // Pieces within others are cavities, whichever way they face.
+    CGAL::Polygon_mesh_processing::orient_to_bound_a_volume(surface);
+    volume = CGAL::Polygon_mesh_processing::volume(surface);
+    require_affordable(volume, size);
     FillDomain domain(surface, &random);
     domain.detect_features(sharp_degrees);
+    seed_pieces(domain, used);
     mesh = meshed(domain, size);
   } catch (const CGAL::Failure_exception& failure) {
     throw RequirementError(fmt::format(
         "no mesh of tetrahedra of {} mm was found inside the surface ({}): choose another size", size, failure.what()));
   }
-  require_whole(mesh, closed_surface, size);
+  require_whole(mesh, used, volume, size);
   require_sound(mesh, "the mesh inside the surface");
   return mesh;
 }
