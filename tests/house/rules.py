@@ -21,7 +21,7 @@ ROOMS = {
 INNER_ROOMS = {
     "volume": {"labels": set(), "cubes": {"labels"}, "smoothing": {"labels", "cubes"}, "phantom": {"labels", "cubes"}},
     "surface": {"mesh": set(), "distance": {"mesh"}, "decimation": {"mesh", "distance"},
-                "repair": {"mesh", "decimation"}},
+                "repair": {"mesh", "decimation"}, "filling": {"mesh"}},
     "shell": {"patch": set(), "distance": {"patch"}},
     "mechanics": {"model": set(), "algebra": set(), "elements": {"model", "algebra"},
                   "runs": {"model", "algebra", "elements"}},
