@@ -80,7 +80,7 @@ void check_attachments(const Scene& scene) {
     const Places& places = attach.places;
     places.of("to").require(body != to, fmt::format("\"{}\" is attached to itself: name another body", attach.to));
     places.of("side").require(
-        !is_solid(scene, to) || attach.side == Attachment::Side::middle,
+        !is_solid(scene, to) || (attach.side == Attachment::Side::middle && !places.keys.contains("side")),
         fmt::format("\"{}\" is a solid and has no side: side belongs to an attachment to a shell", attach.to));
     places.of("where").require(!std::holds_alternative<RigidMotions>(attach.where),
                                "rigid_motions belongs to [[fix]]: select nodes");
