@@ -278,7 +278,8 @@ void read_fix(const SceneTable& table, bool dynamic, Scene& scene) {
 
 void read_load(const toml::table& node, const std::string& file, bool dynamic, Scene& scene) {
   constexpr std::array<std::string_view, 6> all{"body", "kind", "value", "follower", "ramp", "where"};
-  const SceneTable table(node, file, "[[load]]", all);
+  constexpr std::array<std::string_view, 1> later{"imaged_at"};
+  const SceneTable table(node, file, "[[load]]", all, later);
   SceneLoad load;
   load.places = table.places();
   load.body = table.text("body");
