@@ -7,6 +7,7 @@
 #include "tunica/surface/filling/fill.hpp"
 #include "tunica/surface/mesh/checks.hpp"
 #include "tunica/surface/mesh/measure.hpp"
+#include "tunica/surface/mesh/tet_checks.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -52,6 +53,8 @@ auto read_at(const Places& places, std::string_view key, const std::filesystem::
                                  places.of(key).text, mesh.string(), key));
   } catch (const InputError& error) {
     throw InputError(fmt::format("{}: {}", places.of(key).text, error.what()));
+  } catch (const RequirementError& error) {
+    throw RequirementError(fmt::format("{}: {}: {}", places.of(key).text, mesh.string(), error.what()));
   }
 }
 
@@ -180,8 +183,11 @@ SolidBody load_solid(const SceneSolid& solid, std::vector<std::string>& notes) {
   if (solid.fill_size) {
     body.mesh = fill_surface(solid);
   } else {
-    TetFile file = read_at(solid.places, "mesh", solid.mesh,
-                           [&] { return read_tetrahedra(solid.mesh, solid.unit_mm, solid.scale); });
+    TetFile file = read_at(solid.places, "mesh", solid.mesh, [&] {
+      TetFile read = read_tetrahedra(solid.mesh, solid.unit_mm, solid.scale);
+      (void)boundary_triangles(read.mesh);  // what has no surface is refused with its place
+      return read;
+    });
     body.mesh = std::move(file.mesh);
     notes.insert(notes.end(), file.notes.begin(), file.notes.end());
   }
