@@ -258,7 +258,9 @@ void AccuracyFlags::ask(const CLI::App& app, Scene& scene) const {
     if (scene.shells.size() > 1) {
       throw UsageError("--target: the scene has more than one body: name each one's in [accuracy]");
     }
-    asked.targets[scene.shells.front().name] = *target;
+    if (!scene.shells.empty()) {  // without one, check_scene() refuses the accuracy
+      asked.targets[scene.shells.front().name] = *target;
+    }
   }
   check_scene(scene);
 }

@@ -558,10 +558,7 @@ TEST_P(LaterScene, saysNotAvailableYet) {
 }
 
 const std::vector<Wrong> laters{
-    {"solid", basic("[[solid]]\nname = \"x\"\n"), ":9:3: ", ""},
-    {"rigid", basic("[[rigid]]\nname = \"x\"\n"), ":9:3: ", ""},
-    {"attach", basic("[[attach]]\nbody = \"x\"\n"), ":9:3: ", ""},
-    {"contact", basic("[[contact]]\nfriction = 0.2\n"), ":9:3: ", ""},
+    {"imagedAt", load_with("kind = \"pressure\"\nvalue = \"1kPa\"\nimaged_at = \"1kPa\""), ":13:1: ", ""},
 };
 
 INSTANTIATE_TEST_SUITE_P(all, LaterScene, ::testing::ValuesIn(laters),

@@ -23,6 +23,13 @@ struct Place {
 
   /// Throws InputError, or UsageError for a flag, with "text: what".
   [[noreturn]] void fail(const std::string& what) const;
+  void require(bool fine, const std::string& what) const {
+    if (!fine) {
+      fail(what);
+    }
+  }
+  /// Throws UsageError: it will be understood one day.
+  [[noreturn]] void fail_later(const std::string& what) const;
 };
 
 /// The place of an item and of each of its keys.
@@ -45,6 +52,33 @@ struct SceneShell {
   Membrane membrane = Membrane::adapt;
   Bending bending = Bending::dkt_comas;
   Rest rest = Rest::curved;
+  Places places;
+};
+
+struct SceneSolid {
+  std::string name;
+  std::filesystem::path mesh;       ///< of tetrahedra; beside `fill_size` the closed surface that they are to fill
+  std::optional<double> fill_size;  ///< mm, edge of the tetrahedra to be made
+  std::optional<double> unit_mm;    ///< as of a shell
+  double scale = 1;
+  Material material;
+  SolidLaw law = SolidLaw::corotational;
+  Places places;
+};
+
+/// A rigid body whose shape is in a file.
+struct SceneRigidMesh {
+  std::filesystem::path mesh;
+  std::optional<double> unit_mm;  ///< as of a shell
+  double scale = 1;
+  std::optional<RigidMesh::Turn> turn;
+  std::optional<RigidMesh::Expansion> expansion;
+};
+
+struct SceneRigid {
+  std::string name;
+  std::variant<RigidSphere, RigidCapsule, RigidCylinder, RigidPlane, SceneRigidMesh> shape;
+  std::optional<Table<Vec3>> motion;  ///< mm
   Places places;
 };
 
@@ -73,8 +107,12 @@ struct ListedNodes {
 struct NearestNode {
   Vec3 point;  ///< mm
 };
+/// All within this distance of the body that is to carry them; only in an attachment.
+struct TouchingNodes {
+  double distance = 0;  ///< mm
+};
 using Selection = std::variant<AllNodes, BoundaryNodes, RigidMotions, BoxNodes, HalfSpaceNodes, SphereNodes,
-                               ListedNodes, NearestNode>;
+                               ListedNodes, NearestNode, TouchingNodes>;
 
 struct SceneFix {
   std::string body;
@@ -91,6 +129,24 @@ struct SceneLoad {
   std::optional<Selection> where;  ///< force, moment, edge
   decltype(Load::kind) kind;       ///< nodes and edges still empty
   Ramp ramp;
+  Places places;
+};
+
+struct SceneAttach {
+  std::string body;
+  Selection where;
+  std::string to;
+  Attachment::Side side = Attachment::Side::middle;
+  Places places;
+};
+
+struct SceneContact {
+  std::string name;
+  std::array<std::string, 2> between;
+  double friction = 0;
+  double resolution = 0.05;  ///< as in Contact
+  bool curved = true;
+  bool consistent = true;
   Places places;
 };
 
@@ -118,11 +174,18 @@ struct Scene {
   std::string until_probe;  ///< of an arc-length run, whose `until` names it; empty where it has none
   Places run_places;
   std::vector<SceneShell> shells;
+  std::vector<SceneSolid> solids;
+  std::vector<SceneRigid> rigids;
   std::vector<SceneFix> fixes;
   std::vector<SceneLoad> loads;
+  std::vector<SceneAttach> attachments;
+  std::vector<SceneContact> contacts;
   std::vector<SceneProbe> probes;
   std::vector<std::string> notes;  ///< what was understood in a way that the user should know
 };
+
+/// The files of meshes that a scene names, each once, in the order of its bodies.
+std::vector<std::filesystem::path> mesh_files(const Scene& scene);
 
 /// The load factors 1/n, 2/n … 1.
 std::vector<double> equal_load_factors(std::size_t steps);
@@ -143,12 +206,21 @@ struct LoadedScene {
   std::vector<std::string> notes;  ///< of the scene and of its meshes (flat facets)
 };
 
+/// The meshes of a scene at hand: shells, solids and rigid bodies each in the scene's order.
+struct SceneBodies {
+  std::vector<ShellBody> shells;
+  std::vector<SolidBody> solids;
+  std::vector<RigidBody> rigids;
+};
+
 /// Reads the meshes and resolves every name and selection. A mesh without normals is simulated as the flat facets it
-/// holds; a note says so.
-/// Errors: InputError: as read_mesh; a selection that is empty, a node that does not exist.
+/// holds; a note says so. A rigid mesh that faces inward is turned; a note says that too.
+/// Errors: InputError: as read_mesh; a selection that is empty, a node that does not exist, or that two bodies carry.
 LoadedScene load_scene(const Scene& scene);
 
-/// The same on bodies that are at hand, one for each shell of the scene, such as finer meshes of the same.
+/// The same on bodies that are at hand, such as finer meshes of the same.
+Model resolve_scene(const Scene& scene, SceneBodies bodies);
+/// Of a scene of shells alone.
 Model resolve_scene(const Scene& scene, std::vector<ShellBody> shells);
 
 /// The scene as a scene file with everything resolved: SI units, absolute mesh paths, defaults written out. Reading it

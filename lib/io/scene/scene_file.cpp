@@ -2,6 +2,7 @@
 
 #include "tunica/core/narrow.hpp"
 #include "tunica/io/file/output_file.hpp"
+#include "tunica/io/scene/detail/scene_parts.hpp"
 #include "tunica/io/scene/detail/scene_table.hpp"
 #include "tunica/io/scene/detail/toml_depth.hpp"
 
@@ -13,117 +14,12 @@ namespace tunica {
 namespace fs = std::filesystem;
 namespace {
 
-using Table = SceneTable;
-
 constexpr std::size_t most_bytes = std::size_t{64} << 20;
 constexpr std::int64_t most_load_steps = 1'000'000;
 constexpr std::int64_t most_modes = 10'000;
 
-constexpr std::string_view like_point = R"(["0mm", "0mm", "10mm"])";
-
-HalfSpaceNodes read_half_space(const Table& where, std::string_view key) {
-  constexpr std::array<std::string_view, 2> keys{"axis", "at"};
-  const Table inner(where.table(key, R"({axis = "z", at = "1mm"})"), where.file(), std::string(key), keys);
-  HalfSpaceNodes half;
-  half.below = key == "below";
-  (void)inner.required("axis");
-  inner.choice<int>("axis", half.axis, {{"x", 0}, {"y", 1}, {"z", 2}});
-  half.at = inner.quantity("at", dimension::length);
-  return half;
-}
-
-Selection read_where(const Table& item) {
-  constexpr std::array<std::string_view, 9> forms{"boundary", "rigid_motions", "all",   "box",    "below",
-                                                  "above",    "sphere",        "nodes", "nearest"};
-  const toml::table& table = item.table("where", "{boundary = true}");
-  const Table where(table, item.file(), "where", forms);
-  if (table.size() != 1) {
-    item.place("where").fail(
-        fmt::format("where must hold exactly one of {}, this one holds {}", fmt::join(forms, ", "), table.size()));
-  }
-  const std::string_view form = table.begin()->first.str();
-  if (form == "boundary" || form == "rigid_motions" || form == "all") {
-    if (!where.flag(form)) {
-      where.place(form).fail(fmt::format("{} = false selects nothing: remove it", form));
-    }
-    if (form == "all") {
-      return AllNodes{};
-    }
-    return form == "boundary" ? Selection(BoundaryNodes{}) : Selection(RigidMotions{});
-  }
-  if (form == "box") {
-    constexpr std::string_view like = R"([["0mm", "0mm", "0mm"], ["1mm", "1mm", "1mm"]])";
-    const toml::array& corners = where.array(form, like);
-    if (corners.size() != 2) {
-      where.place(form).fail(fmt::format("box must be its lower and its upper corner, for example {}", like));
-    }
-    const BoxNodes box{where.vector_of(corners[0], "box", dimension::length, like_point),
-                       where.vector_of(corners[1], "box", dimension::length, like_point)};
-    if (!(box.lower.array() <= box.upper.array()).all()) {
-      where.place(form).fail("box has a lower corner above its upper one: swap the coordinates");
-    }
-    return box;
-  }
-  if (form == "below" || form == "above") {
-    return read_half_space(where, form);
-  }
-  if (form == "sphere") {
-    constexpr std::array<std::string_view, 2> keys{"centre", "radius"};
-    constexpr std::string_view like = R"({centre = ["0mm", "0mm", "0mm"], radius = "2mm"})";
-    const Table inner(where.table(form, like), where.file(), "sphere", keys);
-    const SphereNodes sphere{inner.vector("centre", dimension::length, like_point),
-                             inner.quantity("radius", dimension::length)};
-    if (!(sphere.radius >= 0)) {
-      inner.place("radius").fail("radius must not be negative");
-    }
-    return sphere;
-  }
-  if (form == "nodes") {
-    ListedNodes list;
-    for (const toml::node& node : where.array(form, "[3, 4]")) {
-      const auto index = node.value_exact<std::int64_t>();
-      if (!index || *index < 0 || *index > narrow<std::int64_t>(max_index)) {
-        where.at(node.source()).fail("nodes must be whole numbers from 0, in the order of the mesh file");
-      }
-      list.nodes.push_back(narrow<Index>(*index));
-    }
-    return list;
-  }
-  return NearestNode{where.vector("nearest", dimension::length, like_point)};
-}
-
-// A table over time; in a static run the load factor plays the part of time.
-Ramp read_ramp(const Table& item, bool dynamic, Scene& scene) {
-  Ramp ramp;
-  if (!item.has("ramp")) {
-    return ramp;
-  }
-  const std::string_view like = dynamic ? R"([["0s", 0.0], ["1s", 1.0]])" : "[[0.0, 0.0], [1.0, 1.0]]";
-  for (const toml::node& node : item.array("ramp", like)) {
-    const toml::array* point = node.as_array();
-    if (point == nullptr || point->size() != 2) {
-      item.at(node.source()).fail(fmt::format("ramp must be a list of pairs, for example {}", like));
-    }
-    const toml::node& when = (*point)[0];
-    const bool load_factor = !dynamic && (when.is_integer() || when.is_floating_point());
-    const double time = load_factor ? item.number_of(when, "ramp") : item.quantity_of(when, "ramp", dimension::time);
-    if (!dynamic && !load_factor && ramp.points.empty()) {
-      scene.notes.push_back(item.place("ramp").text +
-                            ": a static run has no time: the ramp is read over the load factor, 1s as factor 1");
-    }
-    if (!ramp.points.empty() && !(time > ramp.points.back().first)) {
-      item.at(when.source()).fail("the times of a ramp must increase");
-    }
-    ramp.points.emplace_back(time, item.number_of((*point)[1], "ramp"));
-  }
-  if (ramp.points.empty()) {
-    item.place("ramp").fail(fmt::format("ramp is empty: write for example {}", like));
-  }
-  return ramp;
-}
-
 // A fix says which components it holds: neither "all" nor "none" may be meant by silence.
-std::array<bool, 3> read_components(const Table& item, std::string_view key) {
+std::array<bool, 3> read_components(const SceneTable& item, std::string_view key) {
   const std::string text = item.text_of(item.required(key, R"( ("xyz" holds all axes, "" none))"), key);
   std::array<bool, 3> held{false, false, false};
   for (const char c : text) {
@@ -138,7 +34,7 @@ std::array<bool, 3> read_components(const Table& item, std::string_view key) {
 }
 
 // Which kinds of run a key belongs to; `kind` is none of them.
-void refuse_keys(const Table& run, std::string_view kind, std::string_view owners,
+void refuse_keys(const SceneTable& run, std::string_view kind, std::string_view owners,
                  std::initializer_list<std::string_view> keys) {
   for (const std::string_view key : keys) {
     if (run.has(key)) {
@@ -147,7 +43,7 @@ void refuse_keys(const Table& run, std::string_view kind, std::string_view owner
   }
 }
 
-void read_static(const Table& run, StaticRun& settings) {
+void read_static(const SceneTable& run, StaticRun& settings) {
   run.choice<bool>("geometry", settings.linear, {{"nonlinear", false}, {"linear", true}});
   if (run.has("load_steps") && run.has("load_factors")) {
     run.place("load_factors").fail("load_steps and load_factors contradict each other: give one");
@@ -168,7 +64,7 @@ void read_static(const Table& run, StaticRun& settings) {
   }
 }
 
-void read_arc_length(const Table& run, Scene& scene) {
+void read_arc_length(const SceneTable& run, Scene& scene) {
   auto& settings = scene.run.kind.emplace<ArcLengthRun>();
   bool linear = false;
   run.choice<bool>("geometry", linear, {{"nonlinear", false}, {"linear", true}});
@@ -189,8 +85,8 @@ void read_arc_length(const Table& run, Scene& scene) {
   }
   if (run.has("until")) {
     constexpr std::array<std::string_view, 3> keys{"probe", "axis", "reaches"};
-    const Table until(run.table("until", R"({probe = "tip", axis = "z", reaches = "30mm"})"), run.file(), "until",
-                      keys);
+    const SceneTable until(run.table("until", R"({probe = "tip", axis = "z", reaches = "30mm"})"), run.file(), "until",
+                           keys);
     scene.until_probe = until.text("probe");
     ArcLengthRun::Until& goal = settings.until.emplace();
     (void)until.required("axis");
@@ -201,7 +97,7 @@ void read_arc_length(const Table& run, Scene& scene) {
   }
 }
 
-void read_dynamic(const Table& run, DynamicRun& settings) {
+void read_dynamic(const SceneTable& run, DynamicRun& settings) {
   bool linear = false;
   run.choice<bool>("geometry", linear, {{"nonlinear", false}, {"linear", true}});
   if (linear) {
@@ -229,7 +125,8 @@ void read_dynamic(const Table& run, DynamicRun& settings) {
   }
   if (run.has("damping")) {
     constexpr std::array<std::string_view, 2> keys{"mass", "stiffness"};
-    const Table damping(run.table("damping", R"({mass = "0.1/s", stiffness = "2ms"})"), run.file(), "damping", keys);
+    const SceneTable damping(run.table("damping", R"({mass = "0.1/s", stiffness = "2ms"})"), run.file(), "damping",
+                             keys);
     settings.damping.mass = damping.has("mass") ? damping.quantity("mass", dimension::rate) : 0;
     settings.damping.stiffness = damping.has("stiffness") ? damping.quantity("stiffness", dimension::time) : 0;
     for (const std::string_view key : keys) {
@@ -245,7 +142,7 @@ void read_run(const toml::table& table, const std::string& file, Scene& scene) {
       "kind",    "geometry",   "load_steps",      "load_factors", "control",       "duration",   "step",
       "damping", "integrator", "solver",          "cg_tolerance", "cg_iterations", "converge",   "newton_max",
       "every",   "count",      "spectral_radius", "adaptive",     "max_steps",     "max_factor", "until"};
-  const Table run(table, file, "[run]", keys);
+  const SceneTable run(table, file, "[run]", keys);
   scene.run_places = run.places();
 
   enum class Kind { is_static, dynamic, frequencies, buckling } kind = Kind::is_static;
@@ -323,13 +220,13 @@ void read_run(const toml::table& table, const std::string& file, Scene& scene) {
 
 void read_accuracy(const toml::table& node, const std::string& file, const fs::path& folder, Scene& scene) {
   constexpr std::array<std::string_view, 3> keys{"within", "of", "target"};
-  const Table table(node, file, "[accuracy]", keys);
+  const SceneTable table(node, file, "[accuracy]", keys);
   SceneAccuracy& accuracy = scene.accuracy.emplace();
   accuracy.places = table.places();
   accuracy.within = table.part("within");
   if (table.has("of") && table.required("of").is_table()) {
     constexpr std::array<std::string_view, 2> of_probe{"probe", "axis"};
-    const Table of(table.table("of", ""), file, "of", of_probe);
+    const SceneTable of(table.table("of", ""), file, "of", of_probe);
     accuracy.of = Quantity::probe;
     accuracy.probe = of.text("probe");
     (void)of.required("axis");
@@ -348,45 +245,7 @@ void read_accuracy(const toml::table& node, const std::string& file, const fs::p
   }
 }
 
-void read_shell(const Table& table, const fs::path& folder, Scene& scene) {
-  SceneShell shell;
-  shell.places = table.places();
-  shell.name = table.text("name");
-  shell.mesh = folder / table.text("mesh");
-  if (table.has("unit")) {
-    try {
-      shell.unit_mm = parse_length_unit(table.text("unit"));
-    } catch (const UsageError& error) {
-      table.place("unit").fail(fmt::format("unit: {}", error.what()));
-    }
-  }
-  if (table.has("scale")) {
-    shell.scale = table.number("scale");
-  }
-  shell.thickness_from = table.optional_text("thickness_from");
-  if (shell.thickness_from && table.has("thickness")) {
-    table.place("thickness_from").fail("thickness and thickness_from contradict each other: give one");
-  }
-  if (!shell.thickness_from) {
-    shell.thickness = table.quantity("thickness", dimension::length, " (nor thickness_from)");
-  }
-  shell.material.young = table.quantity("young", dimension::pressure);
-  shell.material.poisson = table.number("poisson");
-  if (table.has("density")) {
-    shell.material.density = table.quantity("density", dimension::density);
-  }
-  table.choice<Membrane>("membrane", shell.membrane,
-                         {{"cst", Membrane::cst}, {"opt", Membrane::opt}, {"adapt", Membrane::adapt}});
-  table.choice<Bending>("bending", shell.bending,
-                        {{"comas", Bending::comas},
-                         {"comas-consistent", Bending::comas_consistent},
-                         {"dkt", Bending::dkt},
-                         {"dkt-comas", Bending::dkt_comas}});
-  table.choice<Rest>("rest", shell.rest, {{"curved", Rest::curved}, {"flat", Rest::flat}});
-  scene.shells.push_back(std::move(shell));
-}
-
-void read_fix(const Table& table, bool dynamic, Scene& scene) {
+void read_fix(const SceneTable& table, bool dynamic, Scene& scene) {
   SceneFix fix;
   fix.places = table.places();
   fix.body = table.text("body");
@@ -399,7 +258,13 @@ void read_fix(const Table& table, bool dynamic, Scene& scene) {
     }
   } else {
     fix.translation = read_components(table, "translation");
-    fix.rotation = read_components(table, "rotation");
+    const bool of_solid = std::any_of(scene.solids.begin(), scene.solids.end(),
+                                      [&](const SceneSolid& solid) { return solid.name == fix.body; });
+    if (of_solid && !table.has("rotation")) {
+      fix.rotation = {false, false, false};  // the nodes of a solid have none
+    } else {
+      fix.rotation = read_components(table, "rotation");
+    }
     if (table.has("displacement")) {
       fix.displacement = table.vector("displacement", dimension::length, R"(["0mm", "0mm", "1mm"])");
     }
@@ -413,7 +278,8 @@ void read_fix(const Table& table, bool dynamic, Scene& scene) {
 
 void read_load(const toml::table& node, const std::string& file, bool dynamic, Scene& scene) {
   constexpr std::array<std::string_view, 6> all{"body", "kind", "value", "follower", "ramp", "where"};
-  const Table table(node, file, "[[load]]", all);
+  constexpr std::array<std::string_view, 1> later{"imaged_at"};
+  const SceneTable table(node, file, "[[load]]", all, later);
   SceneLoad load;
   load.places = table.places();
   load.body = table.text("body");
@@ -480,7 +346,7 @@ toml::table parse_toml(const std::string& bytes, const std::string& file) {
 }
 
 // The tables of [[name]]; an empty list where there are none.
-std::vector<const toml::table*> tables_of(const toml::table& root, std::string_view name, const Table& top) {
+std::vector<const toml::table*> tables_of(const toml::table& root, std::string_view name, const SceneTable& top) {
   std::vector<const toml::table*> tables;
   const toml::node* node = root.get(name);
   if (node == nullptr) {
@@ -506,9 +372,9 @@ Scene read_scene(const fs::path& path) { return parse_scene(read_file(path, most
 Scene parse_scene(const std::string& text, const fs::path& name) {
   const std::string file = name.string();
   const toml::table root = parse_toml(text, file);
-  constexpr std::array<std::string_view, 6> sections{"run", "shell", "fix", "load", "probe", "accuracy"};
-  constexpr std::array<std::string_view, 4> later{"solid", "rigid", "attach", "contact"};
-  const Table top(root, file, "the scene", sections, later);
+  constexpr std::array<std::string_view, 10> sections{"run",  "shell",  "solid",   "rigid", "fix",
+                                                      "load", "attach", "contact", "probe", "accuracy"};
+  const SceneTable top(root, file, "the scene", sections);
 
   Scene scene;
   const toml::table* run = top.required("run").as_table();
@@ -518,23 +384,33 @@ Scene parse_scene(const std::string& text, const fs::path& name) {
   read_run(*run, file, scene);
   const bool dynamic = std::holds_alternative<DynamicRun>(scene.run.kind);
 
-  constexpr std::array<std::string_view, 12> shell_keys{"name",      "mesh",           "unit",    "scale",
-                                                        "thickness", "thickness_from", "young",   "poisson",
-                                                        "density",   "membrane",       "bending", "rest"};
+  const fs::path folder = name.parent_path();
   for (const toml::table* table : tables_of(root, "shell", top)) {
-    read_shell(Table(*table, file, "[[shell]]", shell_keys), name.parent_path(), scene);
+    read_shell(*table, file, folder, scene);
+  }
+  for (const toml::table* table : tables_of(root, "solid", top)) {
+    read_solid(*table, file, folder, scene);
+  }
+  for (const toml::table* table : tables_of(root, "rigid", top)) {
+    read_rigid(*table, file, folder, dynamic, scene);
   }
   constexpr std::array<std::string_view, 6> fix_keys{"body",     "where",        "translation",
                                                      "rotation", "displacement", "ramp"};
   for (const toml::table* table : tables_of(root, "fix", top)) {
-    read_fix(Table(*table, file, "[[fix]]", fix_keys), dynamic, scene);
+    read_fix(SceneTable(*table, file, "[[fix]]", fix_keys), dynamic, scene);
   }
   for (const toml::table* table : tables_of(root, "load", top)) {
     read_load(*table, file, dynamic, scene);
   }
+  for (const toml::table* table : tables_of(root, "attach", top)) {
+    read_attach(*table, file, scene);
+  }
+  for (const toml::table* table : tables_of(root, "contact", top)) {
+    read_contact(*table, file, scene);
+  }
   constexpr std::array<std::string_view, 3> probe_keys{"name", "body", "nearest"};
   for (const toml::table* node : tables_of(root, "probe", top)) {
-    const Table table(*node, file, "[[probe]]", probe_keys);
+    const SceneTable table(*node, file, "[[probe]]", probe_keys);
     scene.probes.push_back({table.text("name"), table.text("body"),
                             table.vector("nearest", dimension::length, like_point), table.places()});
   }
@@ -542,11 +418,12 @@ Scene parse_scene(const std::string& text, const fs::path& name) {
     if (!node->is_table()) {
       top.place("accuracy").fail("accuracy must be written as [accuracy], once");
     }
-    read_accuracy(*node->as_table(), file, name.parent_path(), scene);
+    read_accuracy(*node->as_table(), file, folder, scene);
   }
   settle_until(scene);
   settle_solver(scene);
   check_scene(scene);
+  note_idle_rigids(scene);
   return scene;
 }
 

@@ -5,28 +5,35 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace tunica {
 namespace {
 
-// The shortest decimal with this unit that reads as the same double again. Where no decimal does (scaling by the unit
-// skips some doubles), the nearest value that has one.
-std::string quantity(double value, std::string_view unit, Dimension dimension) {
-  const double size = parse_quantity(fmt::format("1{}", unit), dimension);
-  const auto text_with = [&](double wanted, int digits) {
-    return fmt::format("{:.{}g}{}", wanted / size, digits, unit);
-  };
+// The shortest decimal that reads as the same double again. Where no decimal does (a conversion skips some doubles),
+// that of the nearest value that has one.
+// @param text_with  the value with so many digits; read  what that is read as
+template <typename TextWith, typename Read>
+std::string shortest(double value, const TextWith& text_with, const Read& read) {
   for (int attempt = 0; attempt < 2; ++attempt) {
     for (int digits = 1; digits <= 17; ++digits) {
       const std::string text = text_with(value, digits);
-      if (parse_quantity(text, dimension) == value) {
+      if (read(text) == value) {
         return text;
       }
     }
-    value = parse_quantity(text_with(value, 17), dimension);
+    value = read(text_with(value, 17));
   }
   return text_with(value, 17);
+}
+
+std::string quantity(double value, std::string_view unit, Dimension dimension) {
+  const double size = parse_quantity(fmt::format("1{}", unit), dimension);
+  return shortest(
+      value, [&](double wanted, int digits) { return fmt::format("{:.{}g}{}", wanted / size, digits, unit); },
+      [&](const std::string& text) { return parse_quantity(text, dimension); });
 }
 
 std::string toml_string(std::string_view text) {
@@ -51,6 +58,14 @@ std::string number(double value) {
   return text.find_first_of(".en") == std::string::npos ? text + ".0" : text;
 }
 
+// An angle in rad, written in degrees.
+std::string degrees(double angle) {
+  const std::string text = shortest(
+      angle, [](double wanted, int digits) { return fmt::format("{:.{}g}", wanted * 180 / std::numbers::pi, digits); },
+      [](const std::string& written) { return parse_number(written).value_or(0) * std::numbers::pi / 180; });
+  return number(parse_number(text).value_or(0));
+}
+
 std::string vector(const Vec3& value, std::string_view unit, Dimension dimension) {
   return fmt::format("[{}, {}, {}]", toml_string(quantity(value.x(), unit, dimension)),
                      toml_string(quantity(value.y(), unit, dimension)),
@@ -58,6 +73,30 @@ std::string vector(const Vec3& value, std::string_view unit, Dimension dimension
 }
 
 std::string point(const Vec3& value) { return vector(value, "m", dimension::length); }
+
+std::string length(double value) { return toml_string(quantity(value, "m", dimension::length)); }
+
+std::string direction(const Vec3& value) {
+  return fmt::format("[{}, {}, {}]", number(value.x()), number(value.y()), number(value.z()));
+}
+
+// [[time, value], …]; in a static run the load factor plays the part of time.
+template <typename Value, typename Write>
+std::string pairs_text(const std::vector<std::pair<double, Value>>& points, bool dynamic, const Write& write) {
+  std::vector<std::string> pairs;
+  for (const auto& [time, value] : points) {
+    const std::string when = dynamic ? toml_string(quantity(time, "s", dimension::time)) : number(time);
+    pairs.push_back(fmt::format("[{}, {}]", when, write(value)));
+  }
+  return fmt::format("[{}]", fmt::join(pairs, ", "));
+}
+
+// A value alone, or a table over time.
+template <typename Value, typename Write>
+std::string table_text(const Table<Value>& table, bool dynamic, const Write& write) {
+  const bool constant = table.points.size() == 1 && table.points.front().first == 0;
+  return constant ? write(table.points.front().second) : pairs_text(table.points, dynamic, write);
+}
 
 class Text {
 public:
@@ -71,12 +110,7 @@ public:
     if (ramp.points.empty()) {
       return;
     }
-    std::vector<std::string> pairs;
-    for (const auto& [time, factor] : ramp.points) {
-      const std::string when = dynamic ? toml_string(quantity(time, "s", dimension::time)) : number(time);
-      pairs.push_back(fmt::format("[{}, {}]", when, number(factor)));
-    }
-    line("ramp", fmt::format("[{}]", fmt::join(pairs, ", ")));
+    line("ramp", pairs_text(ramp.points, dynamic, number));
   }
   [[nodiscard]] const std::string& str() const { return text_; }
 
@@ -150,9 +184,8 @@ void write_path(const ArcLengthRun& run, const std::string& probe, Text& text) {
     text.line("max_factor", number(*run.max_factor));
   }
   if (run.until) {
-    text.line("until",
-              fmt::format("{{probe = {}, axis = \"{}\", reaches = {}}}", toml_string(probe), "xyz"[run.until->axis],
-                          toml_string(quantity(run.until->reaches, "m", dimension::length))));
+    text.line("until", fmt::format("{{probe = {}, axis = \"{}\", reaches = {}}}", toml_string(probe),
+                                   "xyz"[run.until->axis], length(run.until->reaches)));
   }
 }
 
@@ -202,28 +235,92 @@ std::string_view name_of(Bending bending) {
   return {};
 }
 
+void write_file(std::string_view key, const std::filesystem::path& mesh, std::optional<double> unit_mm, double scale,
+                Text& text) {
+  text.word(key, std::filesystem::absolute(mesh).lexically_normal().string());
+  if (unit_mm) {
+    text.word("unit", *unit_mm == 1 ? "mm" : *unit_mm == 10 ? "cm" : *unit_mm == 1000 ? "m" : "um");
+  }
+  text.line("scale", number(scale));
+}
+
+void write_material(const Material& material, Text& text) {
+  text.value("young", material.young, "Pa", dimension::pressure);
+  text.line("poisson", number(material.poisson));
+  if (material.density) {
+    text.value("density", *material.density, "kg/m3", dimension::density);
+  }
+}
+
 void write_shell(const SceneShell& shell, Text& text) {
   text.section("[[shell]]");
   text.word("name", shell.name);
-  text.word("mesh", std::filesystem::absolute(shell.mesh).lexically_normal().string());
-  if (shell.unit_mm) {
-    const double unit = *shell.unit_mm;
-    text.word("unit", unit == 1 ? "mm" : unit == 10 ? "cm" : unit == 1000 ? "m" : "um");
-  }
-  text.line("scale", number(shell.scale));
+  write_file("mesh", shell.mesh, shell.unit_mm, shell.scale, text);
   if (shell.thickness_from) {
     text.word("thickness_from", *shell.thickness_from);
   } else {
     text.value("thickness", shell.thickness, "m", dimension::length);
   }
-  text.value("young", shell.material.young, "Pa", dimension::pressure);
-  text.line("poisson", number(shell.material.poisson));
-  if (shell.material.density) {
-    text.value("density", *shell.material.density, "kg/m3", dimension::density);
-  }
+  write_material(shell.material, text);
   text.word("membrane", name_of(shell.membrane));
   text.word("bending", name_of(shell.bending));
   text.word("rest", shell.rest == Rest::curved ? "curved" : "flat");
+}
+
+void write_solid(const SceneSolid& solid, Text& text) {
+  text.section("[[solid]]");
+  text.word("name", solid.name);
+  write_file(solid.fill_size ? "fill" : "mesh", solid.mesh, solid.unit_mm, solid.scale, text);
+  if (solid.fill_size) {
+    text.line("size", length(*solid.fill_size));
+  }
+  write_material(solid.material, text);
+  text.word("law", solid.law == SolidLaw::corotational ? "corotational" : "neo-hookean");
+}
+
+void write_shape(const RigidSphere& sphere, bool dynamic, Text& text) {
+  text.word("shape", "sphere");
+  text.line("centre", table_text(sphere.centre, dynamic, point));
+  text.line("radius", table_text(sphere.radius, dynamic, length));
+}
+template <typename Rod>
+void write_rod(std::string_view shape, const Rod& rod, bool dynamic, Text& text) {
+  text.word("shape", shape);
+  text.line("from", table_text(rod.from, dynamic, point));
+  text.line("to", table_text(rod.to, dynamic, point));
+  text.line("radius", table_text(rod.radius, dynamic, length));
+}
+void write_shape(const RigidCapsule& capsule, bool dynamic, Text& text) {
+  write_rod("capsule", capsule, dynamic, text);
+}
+void write_shape(const RigidCylinder& cylinder, bool dynamic, Text& text) {
+  write_rod("cylinder", cylinder, dynamic, text);
+}
+void write_shape(const RigidPlane& plane, bool dynamic, Text& text) {
+  text.word("shape", "plane");
+  text.line("point", table_text(plane.point, dynamic, point));
+  text.line("normal", direction(plane.normal));
+}
+void write_shape(const SceneRigidMesh& mesh, bool dynamic, Text& text) {
+  write_file("mesh", mesh.mesh, mesh.unit_mm, mesh.scale, text);
+  if (mesh.turn) {
+    text.line("turn", fmt::format("{{point = {}, axis = {}, angle = {}}}", point(mesh.turn->point),
+                                  direction(mesh.turn->axis), table_text(mesh.turn->angle, dynamic, degrees)));
+  }
+  if (mesh.expansion) {
+    text.line("expand",
+              fmt::format("{{point = {}, axis = {}, factor = {}}}", point(mesh.expansion->point),
+                          direction(mesh.expansion->axis), table_text(mesh.expansion->factor, dynamic, number)));
+  }
+}
+
+void write_rigid(const SceneRigid& rigid, bool dynamic, Text& text) {
+  text.section("[[rigid]]");
+  text.word("name", rigid.name);
+  std::visit([&](const auto& shape) { write_shape(shape, dynamic, text); }, rigid.shape);
+  if (rigid.motion) {
+    text.line("motion", table_text(*rigid.motion, dynamic, point));
+  }
 }
 
 std::string text_of(const AllNodes&) { return "all = true"; }
@@ -232,13 +329,13 @@ std::string text_of(const RigidMotions&) { return "rigid_motions = true"; }
 std::string text_of(const BoxNodes& box) { return fmt::format("box = [{}, {}]", point(box.lower), point(box.upper)); }
 std::string text_of(const HalfSpaceNodes& half) {
   return fmt::format("{} = {{axis = \"{}\", at = {}}}", half.below ? "below" : "above", "xyz"[half.axis],
-                     toml_string(quantity(half.at, "m", dimension::length)));
+                     length(half.at));
 }
 std::string text_of(const SphereNodes& sphere) {
-  return fmt::format("sphere = {{centre = {}, radius = {}}}", point(sphere.centre),
-                     toml_string(quantity(sphere.radius, "m", dimension::length)));
+  return fmt::format("sphere = {{centre = {}, radius = {}}}", point(sphere.centre), length(sphere.radius));
 }
 std::string text_of(const ListedNodes& list) { return fmt::format("nodes = [{}]", fmt::join(list.nodes, ", ")); }
+std::string text_of(const TouchingNodes& touching) { return fmt::format("touching = {}", length(touching.distance)); }
 std::string text_of(const NearestNode& nearest) { return fmt::format("nearest = {}", point(nearest.point)); }
 
 std::string where_text(const Selection& where) {
@@ -296,6 +393,30 @@ void write_kind(const GravityLoad& load, Text& text) {
   text.line("value", vector(load.acceleration, "m/s2", dimension::acceleration));
 }
 
+void write_attach(const Scene& scene, const SceneAttach& attach, Text& text) {
+  text.section("[[attach]]");
+  text.word("body", attach.body);
+  text.line("where", where_text(attach.where));
+  text.word("to", attach.to);
+  const bool to_shell = std::any_of(scene.shells.begin(), scene.shells.end(),
+                                    [&](const SceneShell& shell) { return shell.name == attach.to; });
+  if (to_shell) {
+    text.word("side", attach.side == Attachment::Side::inner   ? "inner"
+                      : attach.side == Attachment::Side::outer ? "outer"
+                                                               : "middle");
+  }
+}
+
+void write_contact(const SceneContact& contact, Text& text) {
+  text.section("[[contact]]");
+  text.word("name", contact.name);
+  text.line("between", fmt::format("[{}, {}]", toml_string(contact.between[0]), toml_string(contact.between[1])));
+  text.line("friction", number(contact.friction));
+  text.line("resolution", number(contact.resolution));
+  text.word("surface", contact.curved ? "curved" : "facets");
+  text.word("transfer", contact.consistent ? "consistent" : "paper");
+}
+
 void write_accuracy(const SceneAccuracy& accuracy, Text& text) {
   text.section("[accuracy]");
   text.line("within", number(accuracy.within));
@@ -321,6 +442,12 @@ std::string scene_text(const Scene& scene) {
   for (const SceneShell& shell : scene.shells) {
     write_shell(shell, text);
   }
+  for (const SceneSolid& solid : scene.solids) {
+    write_solid(solid, text);
+  }
+  for (const SceneRigid& rigid : scene.rigids) {
+    write_rigid(rigid, dynamic, text);
+  }
   for (const SceneFix& fix : scene.fixes) {
     write_fix(fix, dynamic, text);
   }
@@ -332,6 +459,12 @@ std::string scene_text(const Scene& scene) {
     }
     std::visit([&](const auto& kind) { write_kind(kind, text); }, load.kind);
     text.ramp(load.ramp, dynamic);
+  }
+  for (const SceneAttach& attach : scene.attachments) {
+    write_attach(scene, attach, text);
+  }
+  for (const SceneContact& contact : scene.contacts) {
+    write_contact(contact, text);
   }
   for (const SceneProbe& probe : scene.probes) {
     text.section("[[probe]]");

@@ -1,0 +1,211 @@
+#include "tunica/io/scene/detail/body_files.hpp"
+
+#include "tunica/io/mesh/mesh_file.hpp"
+#include "tunica/io/mesh/mesh_pair.hpp"
+#include "tunica/io/mesh/tet_file.hpp"
+#include "tunica/io/scene/detail/scene_names.hpp"
+#include "tunica/surface/filling/fill.hpp"
+#include "tunica/surface/mesh/checks.hpp"
+#include "tunica/surface/mesh/measure.hpp"
+#include "tunica/surface/mesh/tet_checks.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <Eigen/Geometry>
+
+namespace tunica {
+namespace {
+
+// More would neither be made nor solved on the machines of today.
+constexpr double most_tetrahedra = 2e7;
+
+// The facets as they are: every corner carries its facet's normal, so the patches are flat. Node normals are the
+// area-weighted means.
+void make_flat(ShellMesh& mesh) {
+  mesh.normals.assign(mesh.vertices.size(), Vec3::Zero());
+  mesh.corner_normals.clear();
+  mesh.corner_normals.reserve(mesh.triangles.size());
+  for (const auto& triangle : mesh.triangles) {
+    const Vec3 area = (mesh.vertices[triangle[1]] - mesh.vertices[triangle[0]])
+                          .cross(mesh.vertices[triangle[2]] - mesh.vertices[triangle[0]]);
+    const Vec3 normal = area.stableNormalized();
+    mesh.corner_normals.push_back({normal, normal, normal});
+    for (const Index v : triangle) {
+      mesh.normals[v] += area;
+    }
+  }
+  for (Vec3& normal : mesh.normals) {
+    normal = normal.squaredNorm() > 0 ? Vec3(normal.stableNormalized()) : Vec3::UnitZ();
+  }
+}
+
+// What `read` returns; its errors begin with the place of the file's name. On the command line the file's name is
+// place enough.
+template <typename Read>
+auto read_at(const Places& places, std::string_view key, const std::filesystem::path& mesh, const Read& read) {
+  if (places.item.flag) {
+    return read();
+  }
+  try {
+    return read();
+  } catch (const UsageError&) {
+    throw InputError(fmt::format("{}: {} is in a format that carries no unit of length: add unit = \"mm\" beside {}",
+                                 places.of(key).text, mesh.string(), key));
+  } catch (const InputError& error) {
+    throw InputError(fmt::format("{}: {}", places.of(key).text, error.what()));
+  } catch (const RequirementError& error) {
+    throw RequirementError(fmt::format("{}: {}: {}", places.of(key).text, mesh.string(), error.what()));
+  }
+}
+
+struct BodyMesh {
+  MeshFile file;
+  bool curved = false;
+  ShellMesh shell;
+};
+
+BodyMesh read_body_mesh(const SceneShell& shell) {
+  return read_at(shell.places, "mesh", shell.mesh, [&] {
+    BodyMesh mesh{read_mesh(shell.mesh, shell.unit_mm, true), false, {}};
+    const MeshFile& file = mesh.file;
+    require_no_other_unit(file, shell.unit_mm, shell.mesh);
+    mesh.curved = shell.rest == Rest::curved && !(file.normals.empty() && file.corner_normals.empty());
+    mesh.shell = mesh.curved
+                     ? shell_of(file, shell.mesh)
+                     : ShellMesh{file.mesh.vertices, file.mesh.triangles, {}, {}, file.patch.value_or(Patch::comas)};
+    return mesh;
+  });
+}
+
+// One value per vertex, in the order of the file.
+std::vector<double> thickness_of(const SceneShell& shell, const MeshFile& file) {
+  if (!shell.thickness_from) {
+    return {shell.thickness};
+  }
+  const Place& place = shell.places.of("thickness_from");
+  std::vector<std::string> names;
+  for (const auto& [name, values] : file.vertex_properties) {
+    if (name == *shell.thickness_from) {
+      for (std::size_t i = 0; i < values.size(); ++i) {
+        place.require(is_positive(values[i]),
+                      fmt::format("{}: '{}' is {} mm at vertex {}: a thickness must be greater than zero",
+                                  shell.mesh.string(), name, values[i], i));
+      }
+      return values;
+    }
+    names.push_back(name);
+  }
+  place.fail(fmt::format("{}: has no number '{}' at each vertex (a PLY property): {}{}", shell.mesh.string(),
+                         *shell.thickness_from, names.empty() ? "it has none" : "it has ", fmt::join(names, ", ")));
+}
+
+// A surface that encloses something, in mm.
+TriangleMesh read_closed_surface(const std::filesystem::path& path, std::optional<double> unit_mm, double scale) {
+  MeshFile file = read_mesh(path, unit_mm, true);
+  require_no_other_unit(file, unit_mm, path);
+  const MeshFacts facts = require_surface(file, path);
+  if (const auto why = why_unfit(facts, Boundary::forbidden)) {
+    throw InputError(fmt::format("{}: {}; it must be closed, to have an inside", path.string(), *why));
+  }
+  for (Vec3& vertex : file.mesh.vertices) {
+    vertex *= scale;
+  }
+  return std::move(file.mesh);
+}
+
+// The normals of a closed surface outward. @return whether they were not
+bool turn_outward(TriangleMesh& surface) {
+  if (signed_volume(surface) >= 0) {
+    return false;
+  }
+  for (auto& triangle : surface.triangles) {
+    std::swap(triangle[1], triangle[2]);
+  }
+  return true;
+}
+
+TetMesh fill_surface(const SceneSolid& solid) {
+  TriangleMesh surface = read_at(solid.places, "fill", solid.mesh,
+                                 [&] { return read_closed_surface(solid.mesh, solid.unit_mm, solid.scale); });
+  (void)turn_outward(surface);
+  const double size = *solid.fill_size;
+  // A regular tetrahedron has the volume edge^3 / (6 sqrt 2).
+  const double expected = 6 * std::sqrt(2.0) * signed_volume(surface) / (size * size * size);
+  solid.places.of("size").require(
+      expected <= most_tetrahedra,
+      fmt::format("would make about {:.2g} tetrahedra (at most {:.0e}): choose a larger size", expected,
+                  most_tetrahedra));
+  return read_at(solid.places, "fill", solid.mesh, [&] { return fill(surface, size); });
+}
+
+RigidMesh load_shape(const SceneRigidMesh& mesh, const SceneRigid& rigid, std::vector<std::string>& notes) {
+  RigidMesh shape{read_at(rigid.places, "mesh", mesh.mesh,
+                          [&] { return read_closed_surface(mesh.mesh, mesh.unit_mm, mesh.scale); }),
+                  mesh.turn, mesh.expansion};
+  if (turn_outward(shape.surface)) {
+    notes.push_back(fmt::format("{}: its triangles face inward; they were turned, so that the inside is the rigid body",
+                                mesh.mesh.string()));
+  }
+  return shape;
+}
+
+}  // namespace
+
+ShellBody load_shell(const SceneShell& shell, std::vector<std::string>& notes) {
+  BodyMesh read = read_body_mesh(shell);
+  ShellBody body;
+  body.name = shell.name;
+  body.said_at = shell.places.item.flag ? shell.mesh.string() : shell.places.item.text;
+  body.curved = read.curved;
+  body.mesh = std::move(read.shell);
+  for (Vec3& vertex : body.mesh.vertices) {
+    vertex *= shell.scale;
+  }
+  if (!body.curved) {
+    make_flat(body.mesh);
+    if (shell.rest == Rest::curved) {
+      notes.push_back(
+          fmt::format("{}: has no normals, so its flat facets are the shell (as rest = \"flat\"); "
+                      "tunica-relax makes curved shells",
+                      shell.mesh.string()));
+    }
+  }
+  body.thickness = thickness_of(shell, read.file);
+  body.material = shell.material;
+  body.membrane = shell.membrane;
+  body.bending = shell.bending;
+  body.rest = body.curved ? Rest::curved : Rest::flat;
+  return body;
+}
+
+SolidBody load_solid(const SceneSolid& solid, std::vector<std::string>& notes) {
+  SolidBody body{solid.name, {}, solid.material, solid.law, solid.places.item.text};
+  if (solid.fill_size) {
+    body.mesh = fill_surface(solid);
+  } else {
+    TetFile file = read_at(solid.places, "mesh", solid.mesh, [&] {
+      TetFile read = read_tetrahedra(solid.mesh, solid.unit_mm, solid.scale);
+      (void)boundary_triangles(read.mesh);  // what has no surface is refused with its place
+      return read;
+    });
+    body.mesh = std::move(file.mesh);
+    notes.insert(notes.end(), file.notes.begin(), file.notes.end());
+  }
+  return body;
+}
+
+RigidBody load_rigid(const SceneRigid& rigid, std::vector<std::string>& notes) {
+  RigidBody body{rigid.name, RigidSphere{}, rigid.motion, rigid.places.item.text};
+  std::visit(
+      [&]<typename Shape>(const Shape& shape) {
+        if constexpr (std::is_same_v<Shape, SceneRigidMesh>) {
+          body.shape = load_shape(shape, rigid, notes);
+        } else {
+          body.shape = shape;
+        }
+      },
+      rigid.shape);
+  return body;
+}
+
+}  // namespace tunica

@@ -1,0 +1,58 @@
+#pragma once
+
+#include "tunica/io/scene/scene.hpp"
+#include "tunica/surface/mesh/measure.hpp"
+
+namespace tunica {
+
+/// A body on which nodes are selected. Keeps references to its mesh.
+class SelectableBody {
+public:
+  explicit SelectableBody(const ShellBody& shell);
+  explicit SelectableBody(const SolidBody& solid);
+
+  [[nodiscard]] bool solid() const { return solid_; }
+  [[nodiscard]] const std::vector<Vec3>& vertices() const { return vertices_; }
+  [[nodiscard]] bool used(std::size_t vertex) const { return used_[vertex] != 0; }
+  [[nodiscard]] double tolerance() const { return tolerance_; }
+
+  /// Of a shell: the nodes of the boundary edges, in the direction of their triangles; in the order of (smaller,
+  /// larger) node.
+  [[nodiscard]] const std::vector<std::array<Index, 2>>& boundary_edges() const { return edges_; }
+  /// Of a shell the ends of these edges, of a solid the nodes of its surface.
+  [[nodiscard]] const std::vector<Index>& boundary_nodes() const { return boundary_; }
+  /// Of the nodes in use.
+  [[nodiscard]] const Box& box() const { return box_; }
+
+  template <typename Predicate>
+  [[nodiscard]] std::vector<Index> nodes_where(const Predicate& inside) const;
+
+private:
+  void measure();
+
+  const std::vector<Vec3>& vertices_;
+  bool solid_;
+  std::vector<std::array<Index, 2>> edges_;
+  std::vector<Index> boundary_;
+  std::vector<char> used_;  // by an element: loose vertices carry nothing
+  Box box_;
+  double tolerance_ = 0;
+};
+
+/// The nodes that `where` names, at least one, in increasing order. Errors: InputError with the place of "where": none,
+/// or one that does not exist or is listed twice.
+std::vector<Index> nodes_of(const SelectableBody& body, const Selection& where, const Places& places);
+
+/// The boundary edges of a shell with both ends among the nodes, at least one. Errors: InputError.
+std::vector<std::array<Index, 2>> edges_of(const SelectableBody& body, const std::vector<Index>& nodes,
+                                           const Places& places);
+
+/// The nodes of a body within a distance of another body's surface: of a shell, of that face of its wall.
+/// @param side  of a shell; the others are the shell's or the solid's that is to carry the nodes
+/// Errors: InputError as nodes_of(); as require_fit() for a shell whose patches are none.
+std::vector<Index> nodes_touching(const SelectableBody& body, double distance, const ShellBody& carrier,
+                                  Attachment::Side side, const Places& places);
+std::vector<Index> nodes_touching(const SelectableBody& body, double distance, const SolidBody& carrier,
+                                  const Places& places);
+
+}  // namespace tunica
