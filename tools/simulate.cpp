@@ -142,9 +142,9 @@ Scene read_scene_of_run(cli::Tool& tool, const Arguments& a, const std::optional
   } else {
     scene = a.flags.scene(a.files.front());
   }
-  for (const SceneShell& shell : scene.shells) {
-    if (std::find(inputs.begin(), inputs.end(), shell.mesh) == inputs.end()) {
-      inputs.push_back(tool.input(shell.mesh));
+  for (const fs::path& mesh : mesh_files(scene)) {
+    if (std::find(inputs.begin(), inputs.end(), mesh) == inputs.end()) {
+      inputs.push_back(tool.input(mesh));
     }
   }
   return scene;
@@ -201,8 +201,8 @@ RunIdentity identity_of_run(const cli::Tool& tool, const Scene& scene, const std
   for (const fs::path& path : inputs) {
     identity.inputs.emplace_back(path.string(), sha256_of_file(path));
   }
-  for (const SceneShell& shell : scene.shells) {
-    identity.meshes.emplace_back(shell.mesh.string(), sha256_of_file(shell.mesh));
+  for (const fs::path& mesh : mesh_files(scene)) {
+    identity.meshes.emplace_back(mesh.string(), sha256_of_file(mesh));
   }
   return identity;
 }

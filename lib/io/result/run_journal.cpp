@@ -175,11 +175,11 @@ void identity_members(Archive& archive, Identity& identity) {
 
 template <typename Archive, typename AnyState>
 void state_members(Archive& archive, AnyState& state) {
-  auto& [time, load_factor, displacement, rotation, velocity, angular_velocity, volume, strain, kinetic, residual,
-         newton_iterations, cg_iterations, error, error_is_bound, converged, linear, contacts, rigids, force_imbalance,
-         moment_imbalance] = state;
-  each(archive, time, load_factor, displacement, rotation, velocity, angular_velocity, volume, strain, kinetic,
-       residual, newton_iterations, cg_iterations, error, error_is_bound, converged, linear, contacts, rigids,
+  auto& [time, load_factor, displacement, rotation, velocity, angular_velocity, pressure, volume, strain, kinetic,
+         residual, newton_iterations, cg_iterations, error, error_is_bound, converged, linear, contacts, rigids,
+         force_imbalance, moment_imbalance] = state;
+  each(archive, time, load_factor, displacement, rotation, velocity, angular_velocity, pressure, volume, strain,
+       kinetic, residual, newton_iterations, cg_iterations, error, error_is_bound, converged, linear, contacts, rigids,
        force_imbalance, moment_imbalance);
 }
 

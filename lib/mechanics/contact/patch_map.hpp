@@ -22,8 +22,9 @@ struct SurfaceFace {
   bool curved = false;
   double half_thickness = 0;    ///< mm
   double young = 0;             ///< MPa
-  std::array<Vec3, 3> normals;  ///< of the reference, at the corners; of curved faces, as the next two
-  NormalsAcross across;
+  /// Of the reference, at the corners, and those of the triangles across the edges; of curved faces.
+  std::array<Vec3, 3> normals{Vec3::Zero(), Vec3::Zero(), Vec3::Zero()};
+  NormalsAcross across = own_normals_across(normals);
   std::array<double, 9> centre{};  ///< weights of corners and edge points in the centre
 };
 

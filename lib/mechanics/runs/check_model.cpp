@@ -16,8 +16,19 @@ namespace {
 
 std::string place(const Vec3& p) { return fmt::format("({:.6g}, {:.6g}, {:.6g}) mm", p.x(), p.y(), p.z()); }
 
-[[noreturn]] void refuse(const ShellBody& body, const std::string& what) {
-  throw InputError(fmt::format("{}{}: {}", body.said_at.empty() ? "" : body.said_at + ": ", body.name, what));
+[[noreturn]] void refuse(const std::string& said_at, const std::string& name, const std::string& what) {
+  throw InputError(fmt::format("{}{}: {}", said_at.empty() ? "" : said_at + ": ", name, what));
+}
+
+[[noreturn]] void refuse(const ShellBody& body, const std::string& what) { refuse(body.said_at, body.name, what); }
+
+[[noreturn]] void refuse(const Model& model, std::size_t body, const std::string& what) {
+  refuse(model.is_solid(body) ? model.solids[body - model.shells.size()].said_at : model.shells[body].said_at,
+         model.name_of(body), what);
+}
+
+const Material& material_of(const Model& model, std::size_t body) {
+  return model.is_solid(body) ? model.solids[body - model.shells.size()].material : model.shells[body].material;
 }
 
 void check_body(const ShellBody& body) {
@@ -127,16 +138,16 @@ void check_triangles(const ShellBody& body) {
 
 void check_selections(const Model& model) {
   const auto check = [&](std::size_t body, const std::vector<Index>& nodes, const char* what) {
-    if (body >= model.shells.size()) {
-      throw InputError(fmt::format("a {} names body {}, but there are {}", what, body, model.shells.size()));
+    if (body >= model.body_count()) {
+      throw InputError(fmt::format("a {} names body {}, but there are {}", what, body, model.body_count()));
     }
     if (nodes.empty()) {
-      refuse(model.shells[body], fmt::format("a {} selects no node", what));
+      refuse(model, body, fmt::format("a {} selects no node", what));
     }
     for (const Index i : nodes) {
-      if (i >= model.shells[body].mesh.vertices.size()) {
-        refuse(model.shells[body],
-               fmt::format("a {} names node {}, but there are {}", what, i, model.shells[body].mesh.vertices.size()));
+      if (i >= model.vertices_of(body).size()) {
+        refuse(model, body,
+               fmt::format("a {} names node {}, but there are {}", what, i, model.vertices_of(body).size()));
       }
     }
   };
@@ -161,8 +172,8 @@ void check_selections(const Model& model) {
         ends.insert(ends.end(), e.begin(), e.end());
       }
       check(load.body, ends, "edge load");
-    } else if (std::holds_alternative<GravityLoad>(load.kind) && !model.shells[load.body].material.density) {
-      refuse(model.shells[load.body], "gravity acts on it, but it has no density");
+    } else if (std::holds_alternative<GravityLoad>(load.kind) && !material_of(model, load.body).density) {
+      refuse(model, load.body, "gravity acts on it, but it has no density");
     }
   }
   for (const Probe& probe : model.probes) {
@@ -170,10 +181,36 @@ void check_selections(const Model& model) {
   }
 }
 
+constexpr double largest_solid_poisson = 0.4999;
+
+void check_solids(const Model& model, const RunSettings& settings) {
+  for (std::size_t b = model.shells.size(); b < model.body_count(); ++b) {
+    const SolidBody& body = model.solids[b - model.shells.size()];
+    if (body.mesh.tetrahedra.empty()) {
+      refuse(model, b, "the solid has no tetrahedra");
+    }
+    if (!(body.material.young > 0) || !std::isfinite(body.material.young)) {
+      refuse(model, b, fmt::format("Young's modulus is {:.6g} MPa: it must be positive", body.material.young));
+    }
+    if (!(body.material.poisson > -1 && body.material.poisson <= largest_solid_poisson)) {
+      refuse(model, b,
+             fmt::format("Poisson's ratio is {:.6g}: it must be above -1 and at most {}", body.material.poisson,
+                         largest_solid_poisson));
+    }
+    if (settings.solver == Solver::cg) {
+      refuse(model, b, "conjugate gradients cannot follow the pressure in a solid: use solver = \"direct\"");
+    }
+    const auto* dynamic = std::get_if<DynamicRun>(&settings.kind);
+    if (dynamic != nullptr && dynamic->damping.stiffness > 0) {
+      refuse(model, b, "damping by stiffness does not reach solids: remove it, or damp by mass");
+    }
+  }
+}
+
 void require_densities(const Model& model, const char* kind) {
-  for (const ShellBody& body : model.shells) {
-    if (!body.material.density) {
-      refuse(body, fmt::format("{} needs its density", kind));
+  for (std::size_t b = 0; b < model.body_count(); ++b) {
+    if (!material_of(model, b).density) {
+      refuse(model, b, fmt::format("{} needs its density", kind));
     }
   }
 }
@@ -280,7 +317,7 @@ void check_balance(const ShellSystem& system, const Model& model) {
     }
     const double relative = imbalance(system, piece, forces.external);
     if (relative > largest_imbalance) {
-      refuse(model.shells[piece.body],
+      refuse(model, piece.body,
              fmt::format("net force or moment is {:.3g} of the load on the piece with node {}: its rigid motions may "
                          "only be held when the loads are in balance (a closed shell under its own pressure); hold it "
                          "by a fix",
@@ -289,16 +326,31 @@ void check_balance(const ShellSystem& system, const Model& model) {
   }
 }
 
+/// Contact holds what it presses on, and attachments what they carry.
+bool may_be_held_by_others(const Model& model, const ShellSystem& system, const Piece& piece) {
+  const auto names = [&](const ContactParty& party) { return !party.rigid && party.index == piece.body; };
+  if (std::any_of(model.contacts.begin(), model.contacts.end(),
+                  [&](const Contact& c) { return names(c.between[0]) || names(c.between[1]); })) {
+    return true;
+  }
+  return std::any_of(system.carried.begin(), system.carried.end(), [&](const Carried& c) {
+    return std::binary_search(piece.nodes.begin(), piece.nodes.end(), c.node) ||
+           std::any_of(c.carriers.begin(), c.carriers.end(),
+                       [&](Index i) { return std::binary_search(piece.nodes.begin(), piece.nodes.end(), i); });
+  });
+}
+
 }  // namespace
 
 ShellSystem make_checked_system(const Model& model, const RunSettings& settings) {
-  if (model.shells.empty()) {
-    throw InputError("the model has no shell");
+  if (model.body_count() == 0) {
+    throw InputError("the model has no shell and no solid");
   }
   for (const ShellBody& body : model.shells) {
     check_body(body);
     check_triangles(body);
   }
+  check_solids(model, settings);
   check_selections(model);
   check_run(model, settings);
   ShellSystem system = make_system(model);
@@ -308,11 +360,14 @@ ShellSystem make_checked_system(const Model& model, const RunSettings& settings)
   check_balance(system, model);
   if (finds_rest(model, settings)) {
     for (const Piece& piece : system.pieces) {
+      if (may_be_held_by_others(model, system, piece)) {
+        continue;
+      }
       const int motions = free_rigid_motions(system, piece);
       if (motions > 0) {
         const Index node = piece.nodes.front();
         refuse(
-            model.shells[piece.body],
+            model, piece.body,
             fmt::format("the piece with node {} at {} can move freely ({} of its 6 rigid motions are not held): add a "
                         "fix, or hold its rigid motions",
                         node - model.first_node(piece.body), place(system.reference[node]), motions));

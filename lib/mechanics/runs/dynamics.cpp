@@ -542,12 +542,12 @@ private:
 
   void resume(const Checkpoint& from) override {
     time_ = from.position;
-    motion_.configuration = {from.displacement, from.rotation};
+    motion_.configuration = recall(from);
     stepper_.recall(from.memory, motion_);
   }
 
   [[nodiscard]] Checkpoint checkpoint() const override {
-    return {{}, time_, motion_.configuration.displacement, motion_.configuration.rotation, stepper_.memory(motion_)};
+    return keep(time_, motion_.configuration, stepper_.memory(motion_));
   }
 
   State take_step() override {

@@ -136,11 +136,16 @@ private:
     Configuration configuration = reference_configuration(system_);
     for (std::size_t i = 0; i < system_.node_count(); ++i) {
       configuration.displacement[i] = moved.segment<3>(first_freedom(i));
-      configuration.rotation[i] = exponential(moved.segment<3>(first_freedom(i) + 3));
+      if (i >= system_.first_solid_node) {
+        configuration.pressure[i] = moved[first_freedom(i) + 3];
+      } else {
+        configuration.rotation[i] = exponential(moved.segment<3>(first_freedom(i) + 3));
+      }
     }
     State state = make_state(system_, model_, configuration, factor);
     for (std::size_t i = 0; i < system_.node_count(); ++i) {
-      state.rotation[i] = moved.segment<3>(first_freedom(i) + 3);
+      state.rotation[i] =
+          i < system_.first_solid_node ? Vec3(moved.segment<3>(first_freedom(i) + 3)) : Vec3(Vec3::Zero());
     }
     VectorX left = external - internal;
     mask(solver_.free(), left);

@@ -21,6 +21,7 @@ State make_state(const ShellSystem& system, const Model& model, const Configurat
   for (const Eigen::Quaterniond& q : configuration.rotation) {
     state.rotation.push_back(logarithm(q));
   }
+  state.pressure = configuration.pressure;
   state.volume = enclosed_volume(system, model, configuration);
   for (const ShellElement& element : system.elements) {
     CornerMotion motion;
@@ -231,7 +232,20 @@ ElementFields ElementFieldEvaluator::operator()(const State& state) const {
     fields.principal_strain_bottom.push_back(principal(strain - t / 2 * curvature));
     fields.pressure.push_back(pressure[element.body]);
   }
-  find_wall(model, fields);
+  for (const SolidElement& element : system.solids) {
+    SolidMotion motion;
+    for (int k = 0; k < 4; ++k) {
+      motion.displacement.col(k) = state.displacement[element.nodes[k]];
+      motion.pressure[k] = state.pressure[element.nodes[k]];
+    }
+    const Mat3 stress = solid_stress(element, motion, state.linear);
+    const double mean = stress.trace() / 3;
+    fields.solid_von_mises.push_back(std::sqrt(1.5) * (stress - mean * Mat3::Identity()).norm());
+    fields.solid_pressure.push_back(-mean);
+  }
+  if (!system.elements.empty()) {
+    find_wall(model, fields);
+  }
   fields.largest_displacement = largest_displacement(model, state);
   return fields;
 }

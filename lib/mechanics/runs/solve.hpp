@@ -43,6 +43,7 @@ struct State {
   std::vector<Vec3> rotation;          ///< rotation vectors, rad, #nodes
   std::vector<Vec3> velocity;          ///< mm/s, dynamic only
   std::vector<Vec3> angular_velocity;  ///< rad/s, dynamic only
+  std::vector<double> pressure;  ///< of the nodes of solids, in units of their shear modulus; empty without solids
   std::optional<double> volume;        ///< mm^3 of the closed bodies' curved surfaces together; none when one is open
   double strain_energy = 0;            ///< N mm = mJ
   double kinetic_energy = 0;           ///< mJ

@@ -221,7 +221,7 @@ public:
         run_(run),
         near_(near),
         step_(system, model, settings),
-        thickness_(least_thickness(model)),
+        thickness_(model.shells.empty() ? system.length : least_thickness(model)),
         configuration_(reference_configuration(system)) {}
 
 private:
@@ -231,7 +231,7 @@ private:
   }
 
   void resume(const Checkpoint& from) override {
-    configuration_ = {from.displacement, from.rotation};
+    configuration_ = recall(from);
     factor_ = from.position;
     increment_ = from.memory.at("increment").at(0);
   }
@@ -248,7 +248,7 @@ private:
   }
 
   [[nodiscard]] Checkpoint checkpoint() const override {
-    return {{}, factor_, configuration_.displacement, configuration_.rotation, {{"increment", {increment_}}}};
+    return keep(factor_, configuration_, {{"increment", {increment_}}});
   }
 
   /// Equilibrium from the configuration that is said to be near, supports and prescribed displacements put right.

@@ -45,6 +45,28 @@ State SteppedRun::reference_state() const {
   return state;
 }
 
+Checkpoint SteppedRun::keep(double position, const Configuration& configuration,
+                            std::map<std::string, std::vector<double>, std::less<>> memory) const {
+  if (!configuration.pressure.empty()) {
+    memory["solid_pressure"] = configuration.pressure;
+  }
+  if (system_.contact) {
+    memory["contact"] = system_.contact->memory();
+  }
+  return {{}, position, configuration.displacement, configuration.rotation, std::move(memory)};
+}
+
+Configuration SteppedRun::recall(const Checkpoint& from) {
+  Configuration configuration{from.displacement, from.rotation};
+  if (const auto found = from.memory.find("solid_pressure"); found != from.memory.end()) {
+    configuration.pressure = found->second;
+  }
+  if (system_.contact) {
+    system_.contact->recall(from.memory.at("contact"), configuration, from.position);
+  }
+  return configuration;
+}
+
 void SteppedRun::hand_over(const State& state) {
   on_state_(state);
   shown_ = summary_.steps;

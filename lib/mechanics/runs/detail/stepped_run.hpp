@@ -29,6 +29,11 @@ protected:
   [[nodiscard]] virtual double part_done() const;
 
   [[nodiscard]] State reference_state() const;
+  /// A checkpoint with what every kind of run keeps: the configuration, what contact remembers.
+  [[nodiscard]] Checkpoint keep(double position, const Configuration& configuration,
+                                std::map<std::string, std::vector<double>, std::less<>> memory) const;
+  /// The configuration of a checkpoint; contact remembers.
+  [[nodiscard]] Configuration recall(const Checkpoint& from);
   [[nodiscard]] bool is_last() const { return ended_ || summary_.steps + 1 == most_steps_; }
   /// Whether the state of the step that is being taken is handed over.
   [[nodiscard]] bool wants_state() const { return (summary_.steps + 1) % settings_.every == 0 || is_last(); }
