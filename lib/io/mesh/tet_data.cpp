@@ -134,20 +134,23 @@ void Collector::refuse(const std::string& kind) const {
                   name_, kind));
 }
 
-std::string Collector::note() const {
+void Collector::remark(const std::string& what) { remarks_.push_back(fmt::format("{}: {}", name_, what)); }
+
+std::vector<std::string> Collector::notes() const {
   std::vector<std::string> counts;
   std::size_t sum = 0;
   for (const auto& [noun, count] : skipped_) {
     sum += count;
-    if (count > 0) {
-      const bool strips = noun == "strip of triangles";
-      counts.push_back(count == 1 ? "one " + noun
-                                  : fmt::format("{} {}", count, strips ? "strips of triangles" : noun + "s"));
-    }
+    const std::string several = noun == "strip of triangles" ? "strips of triangles" : noun + "s";
+    counts.push_back(count == 1 ? "one " + noun : fmt::format("{} {}", count, several));
   }
-  return sum == 0 ? ""
-                  : fmt::format("{}: {} {} passed over: only tetrahedra are read", name_, fmt::join(counts, ", "),
-                                sum == 1 ? "is" : "are");
+  std::vector<std::string> notes;
+  if (sum > 0) {
+    notes.push_back(fmt::format("{}: {} {} passed over: only tetrahedra are read", name_, fmt::join(counts, ", "),
+                                sum == 1 ? "is" : "are"));
+  }
+  notes.insert(notes.end(), remarks_.begin(), remarks_.end());
+  return notes;
 }
 
 std::vector<double> decoded_numbers(std::string_view bytes, Scalar type, ByteOrder order) {

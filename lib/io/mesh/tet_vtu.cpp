@@ -277,6 +277,11 @@ public:
     for (const VtuPiece& piece : pieces_) {
       read_piece(piece, into);
     }
+    // As VTK's own reader leaves them: which of their vertices are meant to be the same, the file does not say.
+    const auto full = std::count_if(pieces_.begin(), pieces_.end(), [](const auto& piece) { return piece.cells > 0; });
+    if (full > 1) {
+      into.remark(fmt::format("has {} pieces, whose vertices are not joined", full));
+    }
   }
 
 private:

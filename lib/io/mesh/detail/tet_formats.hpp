@@ -32,12 +32,16 @@ public:
   /// Errors: InputError, always: it says why elements of that kind, e.g. "quadratic tetrahedra", are none to read.
   [[noreturn]] void refuse(const std::string& kind) const;
 
-  /// @return the note on what was passed over; empty when nothing was
-  [[nodiscard]] std::string note() const;
+  /// What else a user should know: "has ...".
+  void remark(const std::string& what);
+
+  /// What was passed over, and the remarks.
+  [[nodiscard]] std::vector<std::string> notes() const;
 
 private:
   std::string name_;
   std::map<std::string, std::size_t> skipped_;
+  std::vector<std::string> remarks_;
 };
 
 void read_msh(std::string_view bytes, const std::string& name, Collector& into);
