@@ -20,11 +20,12 @@ namespace {
 
 constexpr std::size_t most_inflation = 1100;  // zlib makes at most 1032 bytes of one
 
-std::optional<Scalar> vtu_scalar(std::string_view word) {
-  static const std::map<std::string, Scalar, std::less<>> scalars = {
-      {"Int8", Scalar::int8},       {"UInt8", Scalar::uint8},    {"Int16", Scalar::int16}, {"UInt16", Scalar::uint16},
-      {"Int32", Scalar::int32},     {"UInt32", Scalar::uint32},  {"Int64", Scalar::int64}, {"UInt64", Scalar::uint64},
-      {"Float32", Scalar::float32}, {"Float64", Scalar::float64}};
+std::optional<NumberType> vtu_scalar(std::string_view word) {
+  static const std::map<std::string, NumberType, std::less<>> scalars = {
+      {"Int8", NumberType::int8},      {"UInt8", NumberType::uint8},   {"Int16", NumberType::int16},
+      {"UInt16", NumberType::uint16},  {"Int32", NumberType::int32},   {"UInt32", NumberType::uint32},
+      {"Int64", NumberType::int64},    {"UInt64", NumberType::uint64}, {"Float32", NumberType::float32},
+      {"Float64", NumberType::float64}};
   const auto found = scalars.find(word);
   return found == scalars.end() ? std::nullopt : std::optional(found->second);
 }
@@ -363,7 +364,7 @@ private:
       scanner_.fail(fmt::format("{} is not understood: save the file with zlib, or without compression", compressor));
     }
     order_ = order == "BigEndian" ? ByteOrder::big : ByteOrder::little;
-    header_ = header == "UInt64" ? Scalar::uint64 : Scalar::uint32;
+    header_ = header == "UInt64" ? NumberType::uint64 : NumberType::uint32;
     compressed_ = !compressor.empty();
   }
 
@@ -522,7 +523,7 @@ private:
   XmlScanner scanner_;
   const std::string& name_;
   ByteOrder order_ = ByteOrder::little;
-  Scalar header_ = Scalar::uint32;
+  NumberType header_ = NumberType::uint32;
   bool compressed_ = false;
   std::vector<VtuPiece> pieces_;
   std::string_view appended_;
