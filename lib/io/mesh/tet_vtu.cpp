@@ -489,8 +489,11 @@ private:
     const std::size_t blocks = header_number(stream);
     const std::size_t block = header_number(stream);
     const std::size_t last = header_number(stream);
+    // The size of a block says nothing where there is only the last one, which may be smaller.
+    const std::size_t whole = last > 0 && blocks > 0 ? blocks - 1 : blocks;
     const std::size_t most = stream.left() * most_inflation;
-    if (blocks > stream.left() / size_of(header_) || (blocks > 0 && block > most / blocks) || last > block) {
+    if (blocks > stream.left() / size_of(header_) || (whole > 0 && block > most / whole) || last > block ||
+        last > most) {
       throw InputError(fmt::format("{}: is truncated: {} of {} blocks of {} bytes cannot be in the bytes that are left",
                                    name_, what, blocks, block));
     }
