@@ -199,17 +199,23 @@ inline std::string vtu(VtuKind kind) {
     } else if (kind == VtuKind::appended) {
       data += base64_of(size + values);
     } else {
-      const std::size_t half = values.size() / 2 + 1;  // two blocks, the second smaller
+      // A short array is one block, smaller than the size that is named; else two, the second smaller than the first.
+      const bool is_short = values.size() < 100;
+      const std::size_t half = is_short ? values.size() : values.size() / 2 + 1;
+      std::vector<std::string> parts = {values.substr(0, half)};
+      if (!is_short) {
+        parts.push_back(values.substr(half));
+      }
+      const auto word = [](std::size_t value) { return raw(static_cast<std::uint32_t>(value)); };
       std::string blocks;
-      std::string header =
-          raw(2U) + raw(static_cast<std::uint32_t>(half)) + raw(static_cast<std::uint32_t>(values.size() - half));
-      for (const std::string& block : {values.substr(0, half), values.substr(half)}) {
+      std::string header = word(parts.size()) + word(is_short ? 1 << 20 : half) + word(parts.back().size());
+      for (const std::string& block : parts) {
         uLongf packed_size = ::compressBound(block.size());
         std::string packed(packed_size, '\0');
         ::compress(reinterpret_cast<Bytef*>(packed.data()), &packed_size, reinterpret_cast<const Bytef*>(block.data()),
                    block.size());
         blocks += packed.substr(0, packed_size);
-        header += raw(static_cast<std::uint32_t>(packed_size));
+        header += word(packed_size);
       }
       data += base64_of(header) + base64_of(blocks);
     }

@@ -31,38 +31,38 @@ void decode_as(std::string_view bytes, ByteOrder order, std::vector<To>& values)
 }
 
 template <typename To>
-std::vector<To> decoded(std::string_view bytes, Scalar type, ByteOrder order) {
+std::vector<To> decoded(std::string_view bytes, NumberType type, ByteOrder order) {
   std::vector<To> values;
   values.reserve(bytes.size() / size_of(type));
   switch (type) {
-    case Scalar::int8:
+    case NumberType::int8:
       decode_as<To, std::int8_t>(bytes, order, values);
       break;
-    case Scalar::uint8:
+    case NumberType::uint8:
       decode_as<To, std::uint8_t>(bytes, order, values);
       break;
-    case Scalar::int16:
+    case NumberType::int16:
       decode_as<To, std::int16_t>(bytes, order, values);
       break;
-    case Scalar::uint16:
+    case NumberType::uint16:
       decode_as<To, std::uint16_t>(bytes, order, values);
       break;
-    case Scalar::int32:
+    case NumberType::int32:
       decode_as<To, std::int32_t>(bytes, order, values);
       break;
-    case Scalar::uint32:
+    case NumberType::uint32:
       decode_as<To, std::uint32_t>(bytes, order, values);
       break;
-    case Scalar::int64:
+    case NumberType::int64:
       decode_as<To, std::int64_t>(bytes, order, values);
       break;
-    case Scalar::uint64:
+    case NumberType::uint64:
       decode_as<To, std::uint64_t>(bytes, order, values);
       break;
-    case Scalar::float32:
-    case Scalar::float64:
+    case NumberType::float32:
+    case NumberType::float64:
       if constexpr (std::floating_point<To>) {
-        if (type == Scalar::float32) {
+        if (type == NumberType::float32) {
           decode_as<To, float>(bytes, order, values);
         } else {
           decode_as<To, double>(bytes, order, values);
@@ -134,27 +134,30 @@ void Collector::refuse(const std::string& kind) const {
                   name_, kind));
 }
 
-std::string Collector::note() const {
+void Collector::remark(const std::string& what) { remarks_.push_back(fmt::format("{}: {}", name_, what)); }
+
+std::vector<std::string> Collector::notes() const {
   std::vector<std::string> counts;
   std::size_t sum = 0;
   for (const auto& [noun, count] : skipped_) {
     sum += count;
-    if (count > 0) {
-      const bool strips = noun == "strip of triangles";
-      counts.push_back(count == 1 ? "one " + noun
-                                  : fmt::format("{} {}", count, strips ? "strips of triangles" : noun + "s"));
-    }
+    const std::string several = noun == "strip of triangles" ? "strips of triangles" : noun + "s";
+    counts.push_back(count == 1 ? "one " + noun : fmt::format("{} {}", count, several));
   }
-  return sum == 0 ? ""
-                  : fmt::format("{}: {} {} passed over: only tetrahedra are read", name_, fmt::join(counts, ", "),
-                                sum == 1 ? "is" : "are");
+  std::vector<std::string> notes;
+  if (sum > 0) {
+    notes.push_back(fmt::format("{}: {} {} passed over: only tetrahedra are read", name_, fmt::join(counts, ", "),
+                                sum == 1 ? "is" : "are"));
+  }
+  notes.insert(notes.end(), remarks_.begin(), remarks_.end());
+  return notes;
 }
 
-std::vector<double> decoded_numbers(std::string_view bytes, Scalar type, ByteOrder order) {
+std::vector<double> decoded_numbers(std::string_view bytes, NumberType type, ByteOrder order) {
   return decoded<double>(bytes, type, order);
 }
 
-std::vector<std::int64_t> decoded_integers(std::string_view bytes, Scalar type, ByteOrder order) {
+std::vector<std::int64_t> decoded_integers(std::string_view bytes, NumberType type, ByteOrder order) {
   return decoded<std::int64_t>(bytes, type, order);
 }
 

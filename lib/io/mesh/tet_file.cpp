@@ -93,10 +93,7 @@ TetFile read_tetrahedra(const std::filesystem::path& path, std::optional<double>
   }
   tets::Collector collector(name);
   read(bytes, name, collector);
-  TetFile file{{std::move(collector.vertices), std::move(collector.tetrahedra)}, {}};
-  if (const std::string note = collector.note(); !note.empty()) {
-    file.notes.push_back(note);
-  }
+  TetFile file{{std::move(collector.vertices), std::move(collector.tetrahedra)}, collector.notes()};
   tets::scale_to_mm(file.mesh, *unit_mm, scale, name);
   if (const std::size_t turned = require_sound(file.mesh, name); turned > 0) {
     file.notes.push_back(fmt::format("{}: {} of {} tetrahedra were inside out and are turned", name, turned,

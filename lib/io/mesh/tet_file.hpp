@@ -26,8 +26,8 @@ struct TetFile {
 /// Errors: InputError naming the file: no unit, missing, truncated, counts that its size belies, bad index, not finite,
 /// no tetrahedra, tetrahedra that are quadratic or have no volume, other volume elements.
 /// Cost: linear, n log n for numbers of vertices without order (.msh).
-/// Limits: 2^31 - 1 vertices and tetrahedra, coordinates within 1e12 mm; binary .msh must be little-endian; of a .vtk,
-/// field data before the mesh must be numbers.
+/// Limits: pieces of a .vtu are not joined, which a note says; 2^31 - 1 vertices and tetrahedra, coordinates within
+/// 1e12 mm; binary .msh must be little-endian; of a .vtk, field data before the mesh must be numbers.
 TetFile read_tetrahedra(const std::filesystem::path& path, std::optional<double> unit_mm, double scale);
 
 }  // namespace tunica

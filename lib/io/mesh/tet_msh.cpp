@@ -203,7 +203,7 @@ private:
     }
     binary_ = binary == 1;
     size_bytes_ = narrow<std::size_t>(size);
-    if (binary_ && decoded_integers(text.raw(4, "$MeshFormat"), Scalar::int32, ByteOrder::little).front() != 1) {
+    if (binary_ && decoded_integers(text.raw(4, "$MeshFormat"), NumberType::int32, ByteOrder::little).front() != 1) {
       text.fail("binary files are understood in little-endian order only");
     }
   }

@@ -19,23 +19,23 @@ std::string vtk_lower(std::string_view text) {
   return lower;
 }
 
-std::optional<Scalar> vtk_scalar(std::string_view word) {
+std::optional<NumberType> vtk_scalar(std::string_view word) {
   // vtkIdType is written as int; long is that of the 64-bit Unix that VTK's files mostly come from.
-  static const std::map<std::string, Scalar, std::less<>> scalars = {{"char", Scalar::int8},
-                                                                     {"signed_char", Scalar::int8},
-                                                                     {"unsigned_char", Scalar::uint8},
-                                                                     {"short", Scalar::int16},
-                                                                     {"unsigned_short", Scalar::uint16},
-                                                                     {"int", Scalar::int32},
-                                                                     {"unsigned_int", Scalar::uint32},
-                                                                     {"long", Scalar::int64},
-                                                                     {"unsigned_long", Scalar::uint64},
-                                                                     {"vtktypeint64", Scalar::int64},
-                                                                     {"vtktypeuint64", Scalar::uint64},
-                                                                     {"vtktypeint32", Scalar::int32},
-                                                                     {"vtkidtype", Scalar::int32},
-                                                                     {"float", Scalar::float32},
-                                                                     {"double", Scalar::float64}};
+  static const std::map<std::string, NumberType, std::less<>> scalars = {{"char", NumberType::int8},
+                                                                         {"signed_char", NumberType::int8},
+                                                                         {"unsigned_char", NumberType::uint8},
+                                                                         {"short", NumberType::int16},
+                                                                         {"unsigned_short", NumberType::uint16},
+                                                                         {"int", NumberType::int32},
+                                                                         {"unsigned_int", NumberType::uint32},
+                                                                         {"long", NumberType::int64},
+                                                                         {"unsigned_long", NumberType::uint64},
+                                                                         {"vtktypeint64", NumberType::int64},
+                                                                         {"vtktypeuint64", NumberType::uint64},
+                                                                         {"vtktypeint32", NumberType::int32},
+                                                                         {"vtkidtype", NumberType::int32},
+                                                                         {"float", NumberType::float32},
+                                                                         {"double", NumberType::float64}};
   const auto found = scalars.find(vtk_lower(word));
   return found == scalars.end() ? std::nullopt : std::optional(found->second);
 }
@@ -99,7 +99,7 @@ private:
       read_cells();
     } else if (keyword == "cell_types") {
       once(types_.has_value(), "CELL_TYPES");
-      types_ = integers(text_.count("CELL_TYPES"), Scalar::int32, "types of cells");
+      types_ = integers(text_.count("CELL_TYPES"), NumberType::int32, "types of cells");
     } else if (keyword == "field") {
       skip_field();
     } else if (keyword == "metadata") {
@@ -125,7 +125,7 @@ private:
     return 3 * count;
   }
 
-  Scalar scalar(const char* what) {
+  NumberType scalar(const char* what) {
     const auto type = vtk_scalar(text_.word(what));
     if (!type) {
       text_.fail(fmt::format("{}: a type of numbers is expected: float, double, int, ...", what));
@@ -140,13 +140,13 @@ private:
   }
 
   // Bytes of `count` values that follow the line.
-  std::string_view block(std::size_t count, Scalar type, const char* what) {
+  std::string_view block(std::size_t count, NumberType type, const char* what) {
     end_of_numbers("words");
     text_.require_room(count, size_of(type), what);
     return text_.raw(count * size_of(type), what);
   }
 
-  std::vector<double> numbers(std::size_t count, Scalar type, const char* what) {
+  std::vector<double> numbers(std::size_t count, NumberType type, const char* what) {
     if (binary_) {
       return decoded_numbers(block(count, type, what), type, ByteOrder::big);
     }
@@ -157,7 +157,7 @@ private:
     return values;
   }
 
-  std::vector<std::int64_t> integers(std::size_t count, Scalar type, const char* what) {
+  std::vector<std::int64_t> integers(std::size_t count, NumberType type, const char* what) {
     if (!is_whole(type)) {
       text_.fail(fmt::format("{} are whole numbers", what));
     }
@@ -179,7 +179,7 @@ private:
       read_offsets(first, second);
       return;
     }
-    const std::vector<std::int64_t> values = integers(second, Scalar::int32, "corners of cells");
+    const std::vector<std::int64_t> values = integers(second, NumberType::int32, "corners of cells");
     ends_.emplace();
     for (std::size_t at = 0; at < values.size();) {
       const std::int64_t corners = values[at++];

@@ -20,11 +20,12 @@ namespace {
 
 constexpr std::size_t most_inflation = 1100;  // zlib makes at most 1032 bytes of one
 
-std::optional<Scalar> vtu_scalar(std::string_view word) {
-  static const std::map<std::string, Scalar, std::less<>> scalars = {
-      {"Int8", Scalar::int8},       {"UInt8", Scalar::uint8},    {"Int16", Scalar::int16}, {"UInt16", Scalar::uint16},
-      {"Int32", Scalar::int32},     {"UInt32", Scalar::uint32},  {"Int64", Scalar::int64}, {"UInt64", Scalar::uint64},
-      {"Float32", Scalar::float32}, {"Float64", Scalar::float64}};
+std::optional<NumberType> vtu_scalar(std::string_view word) {
+  static const std::map<std::string, NumberType, std::less<>> scalars = {
+      {"Int8", NumberType::int8},      {"UInt8", NumberType::uint8},   {"Int16", NumberType::int16},
+      {"UInt16", NumberType::uint16},  {"Int32", NumberType::int32},   {"UInt32", NumberType::uint32},
+      {"Int64", NumberType::int64},    {"UInt64", NumberType::uint64}, {"Float32", NumberType::float32},
+      {"Float64", NumberType::float64}};
   const auto found = scalars.find(word);
   return found == scalars.end() ? std::nullopt : std::optional(found->second);
 }
@@ -277,6 +278,11 @@ public:
     for (const VtuPiece& piece : pieces_) {
       read_piece(piece, into);
     }
+    // As VTK's own reader leaves them: which of their vertices are meant to be the same, the file does not say.
+    const auto full = std::count_if(pieces_.begin(), pieces_.end(), [](const auto& piece) { return piece.cells > 0; });
+    if (full > 1) {
+      into.remark(fmt::format("has {} pieces, whose vertices are not joined", full));
+    }
   }
 
 private:
@@ -358,7 +364,7 @@ private:
       scanner_.fail(fmt::format("{} is not understood: save the file with zlib, or without compression", compressor));
     }
     order_ = order == "BigEndian" ? ByteOrder::big : ByteOrder::little;
-    header_ = header == "UInt64" ? Scalar::uint64 : Scalar::uint32;
+    header_ = header == "UInt64" ? NumberType::uint64 : NumberType::uint32;
     compressed_ = !compressor.empty();
   }
 
@@ -483,8 +489,11 @@ private:
     const std::size_t blocks = header_number(stream);
     const std::size_t block = header_number(stream);
     const std::size_t last = header_number(stream);
+    // The size of a block says nothing where there is only the last one, which may be smaller.
+    const std::size_t whole = last > 0 && blocks > 0 ? blocks - 1 : blocks;
     const std::size_t most = stream.left() * most_inflation;
-    if (blocks > stream.left() / size_of(header_) || (blocks > 0 && block > most / blocks) || last > block) {
+    if (blocks > stream.left() / size_of(header_) || (whole > 0 && block > most / whole) || last > block ||
+        last > most) {
       throw InputError(fmt::format("{}: is truncated: {} of {} blocks of {} bytes cannot be in the bytes that are left",
                                    name_, what, blocks, block));
     }
@@ -517,7 +526,7 @@ private:
   XmlScanner scanner_;
   const std::string& name_;
   ByteOrder order_ = ByteOrder::little;
-  Scalar header_ = Scalar::uint32;
+  NumberType header_ = NumberType::uint32;
   bool compressed_ = false;
   std::vector<VtuPiece> pieces_;
   std::string_view appended_;

@@ -7,9 +7,9 @@
 namespace tunica {
 
 /// Fills a closed surface with tetrahedra whose edges are `size` mm long on average. Its boundary
-/// lies within about size / 10 of the surface, with shorter edges where that needs them. Edges at which the surface bends by more than 60 degrees
-/// are kept as edges of the mesh. Which way the surface faces does not matter; a surface within another one is a
-/// cavity.
+/// lies within about size / 10 of the surface, with shorter edges where that needs them. Edges at which the surface
+/// bends by more than 60 degrees are kept as edges of the mesh. Which way the surface faces does not matter; a surface
+/// within another one is a cavity.
 /// @param size  mm
 /// @return a mesh for which require_sound() holds. Its smallest_dihedral() is mostly 8 degrees or more: below that
 ///   further optimisation is tried, and the best mesh found is returned. The same input gives the same mesh, bit by

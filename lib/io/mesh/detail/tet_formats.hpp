@@ -32,35 +32,40 @@ public:
   /// Errors: InputError, always: it says why elements of that kind, e.g. "quadratic tetrahedra", are none to read.
   [[noreturn]] void refuse(const std::string& kind) const;
 
-  /// @return the note on what was passed over; empty when nothing was
-  [[nodiscard]] std::string note() const;
+  /// What else a user should know: "has ...".
+  void remark(const std::string& what);
+
+  /// What was passed over, and the remarks.
+  [[nodiscard]] std::vector<std::string> notes() const;
 
 private:
   std::string name_;
   std::map<std::string, std::size_t> skipped_;
+  std::vector<std::string> remarks_;
 };
 
+/// The elements of a file, into an empty collector. Errors: InputError.
 void read_msh(std::string_view bytes, const std::string& name, Collector& into);
 void read_vtk(std::string_view bytes, const std::string& name, Collector& into);
 void read_vtu(std::string_view bytes, const std::string& name, Collector& into);
 
-enum class Scalar { int8, uint8, int16, uint16, int32, uint32, int64, uint64, float32, float64 };
+enum class NumberType { int8, uint8, int16, uint16, int32, uint32, int64, uint64, float32, float64 };
 
 /// Bytes of one value.
-constexpr std::size_t size_of(Scalar scalar) {
+constexpr std::size_t size_of(NumberType scalar) {
   constexpr std::size_t sizes[] = {1, 1, 2, 2, 4, 4, 8, 8, 4, 8};
   return sizes[static_cast<std::size_t>(scalar)];
 }
 
 /// Whether it is a type of whole numbers.
-constexpr bool is_whole(Scalar scalar) { return scalar < Scalar::float32; }
+constexpr bool is_whole(NumberType scalar) { return scalar < NumberType::float32; }
 
 enum class ByteOrder { little, big };
 
 /// The values that stand one after the other in `bytes`, a multiple of their size. A whole number beyond 2^63 - 1 comes
 /// out negative: it is no index and no count anyway.
-std::vector<double> decoded_numbers(std::string_view bytes, Scalar type, ByteOrder order);
-std::vector<std::int64_t> decoded_integers(std::string_view bytes, Scalar type, ByteOrder order);
+std::vector<double> decoded_numbers(std::string_view bytes, NumberType type, ByteOrder order);
+std::vector<std::int64_t> decoded_integers(std::string_view bytes, NumberType type, ByteOrder order);
 
 /// A text of numbers that flow over the ends of lines, with blocks of bytes among them.
 class NumberText {
