@@ -13,7 +13,7 @@
 namespace tunica {
 namespace {
 
-constexpr double stiffness_of_young = 1e-3;    // of the barrier: moves the gap within the resolution
+constexpr double stiffness_of_young = 1e-5;    // of the barrier: moves the gap within the resolution
 constexpr double elastic_slip_of_wall = 1e-3;  // slip at which friction is fully there
 constexpr double sag_of_resolution = 0.1;      // what a surface may bend between samples
 constexpr int least_level = 4, most_level = 32;

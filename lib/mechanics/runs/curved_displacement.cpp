@@ -201,6 +201,9 @@ std::vector<Vec3> curved_displacement(const Model& model, std::size_t body, cons
 double largest_displacement(const Model& model, const State& state) {
   constexpr std::size_t climbed = 16;  // patches around the largest may hold it
   double largest = 0;
+  for (std::size_t i = model.first_node(model.shells.size()); i < state.displacement.size(); ++i) {
+    largest = std::max(largest, state.displacement[i].norm());
+  }
   for (std::size_t body = 0; body < model.shells.size(); ++body) {
     const MovedPatches patches(model, body, state);
     std::vector<Sample> samples(model.shells[body].mesh.triangles.size());

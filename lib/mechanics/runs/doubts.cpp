@@ -165,7 +165,7 @@ void doubt_coarseness(const ShellBody& body, std::vector<std::string>& found) {
 
 // Freedoms that the fixes hold, 6 per node of one body: translations, rotations.
 std::vector<std::array<bool, 6>> held_freedoms(const Model& model, std::size_t body) {
-  std::vector<std::array<bool, 6>> held(model.shells[body].mesh.vertices.size());
+  std::vector<std::array<bool, 6>> held(model.vertices_of(body).size());
   for (const Fix& fix : model.fixes) {
     if (fix.body != body) {
       continue;
@@ -281,7 +281,7 @@ bool jumps_within_a_step(const Ramp& ramp, const RunSettings& settings) {
 void doubt_loads(const Model& model, const RunSettings& settings,
                  const std::vector<std::vector<std::array<bool, 6>>>& held, std::vector<std::string>& found) {
   for (const Load& load : model.loads) {
-    const std::string where = at(load.said_at, model.shells[load.body].name);
+    const std::string where = at(load.said_at, model.name_of(load.body));
     if (is_zero(load)) {
       found.push_back(where + ": this load is zero");
     } else if (stays_zero(load.ramp, settings)) {
@@ -297,7 +297,7 @@ void doubt_loads(const Model& model, const RunSettings& settings,
   }
   for (const Fix& fix : model.fixes) {
     if (prescribes(fix) && stays_zero(fix.ramp, settings)) {
-      found.push_back(at(fix.said_at, model.shells[fix.body].name) +
+      found.push_back(at(fix.said_at, model.name_of(fix.body)) +
                       ": the ramp of this displacement is zero during the whole run, so it moves nothing");
     }
   }
@@ -314,9 +314,33 @@ bool prescribes(const Fix& fix) {
   return false;
 }
 
+namespace {
+
+bool moves(const RigidBody& body) {
+  const auto any = [](const auto&... tables) { return (... || (tables.points.size() > 1)); };
+  const bool shape = std::visit(
+      [&](const auto& s) {
+        using Shape = std::decay_t<decltype(s)>;
+        if constexpr (std::is_same_v<Shape, RigidSphere>) {
+          return any(s.centre, s.radius);
+        } else if constexpr (std::is_same_v<Shape, RigidPlane>) {
+          return any(s.point);
+        } else if constexpr (std::is_same_v<Shape, RigidMesh>) {
+          return (s.turn && any(s.turn->angle)) || (s.expansion && any(s.expansion->factor));
+        } else {
+          return any(s.from, s.to, s.radius);
+        }
+      },
+      body.shape);
+  return shape || (body.motion && any(*body.motion));
+}
+
+}  // namespace
+
 bool is_loaded(const Model& model) {
   return !std::all_of(model.loads.begin(), model.loads.end(), is_zero) ||
-         std::any_of(model.fixes.begin(), model.fixes.end(), prescribes);
+         std::any_of(model.fixes.begin(), model.fixes.end(), prescribes) ||
+         std::any_of(model.rigids.begin(), model.rigids.end(), moves);
 }
 
 std::vector<std::string> doubts(const Model& model, const RunSettings& settings) {
@@ -332,11 +356,21 @@ std::vector<std::string> doubts(const Model& model, const RunSettings& settings)
       found.push_back(at(body.said_at, body.name) + ": all its nodes are held, so nothing of it can move");
     }
   }
+  for (std::size_t b = model.shells.size(); b < model.body_count(); ++b) {
+    held.push_back(held_freedoms(model, b));
+  }
   doubt_loads(model, settings, held, found);
+  for (const Contact& contact : model.contacts) {
+    if (!contact.consistent) {
+      found.push_back(at(contact.said_at, contact.name) +
+                      ": transfer = \"paper\" spreads forces by the paper's rule, which is not in balance");
+    }
+  }
   const bool needs_load =
       std::holds_alternative<StaticRun>(settings.kind) || std::holds_alternative<DynamicRun>(settings.kind);
   if (needs_load && !is_loaded(model)) {
-    found.push_back(at(model.shells.front().said_at, "nothing loads the model, so it stays as it is: add a load"));
+    const std::string& place = model.shells.empty() ? model.solids.front().said_at : model.shells.front().said_at;
+    found.push_back(at(place, "nothing loads the model, so it stays as it is: add a load"));
   }
   return found;
 }

@@ -117,7 +117,7 @@ public:
       result_.valid = find_increment();
       // What is left of the increments there is noise: told, but not added.
       result_.converged =
-          result_.valid && at_floor && increment_size(system_, increment_) <= largest_round_off * result_.reached;
+          result_.valid && at_floor && !is_moving() && increment_size(system_, increment_) <= largest_round_off * result_.reached;
       if (result_.valid && !result_.converged) {
         result_.valid = advance();
         result_.converged = result_.valid && at_rest();
@@ -236,6 +236,7 @@ private:
       }
       tangent_is_current_ = more && trial == 0;
       now_ = tangent_is_current_ ? linearised() : balance_(configuration_, nullptr, {});
+      if (getenv("TUNICA_SHOW")) fprintf(stderr, "it %zu trial %d length %g valid %d residual %g size %g left %g stable %d\n", result_.iterations, trial, length, int(now_.valid), now_.valid ? residual_of(now_) : 0., increment_size(system_, increment_), system_.contact ? system_.contact->left() : 0., int(result_.stable));
       if ((left_ > 0 && !system_.contact) || trial == most_trials) {
         break;
       }
