@@ -13,9 +13,11 @@
 namespace tunica {
 namespace {
 
-constexpr double stiffness_of_young = 1e-5;    // of the barrier: moves the gap within the resolution
-constexpr double elastic_slip_of_wall = 1e-3;  // slip at which friction is fully there
-constexpr double sag_of_resolution = 0.1;      // what a surface may bend between samples
+constexpr double first_stiffness = 1e-5;        // of the barrier, of Young's modulus, while no pressure is known
+constexpr double stiffness_of_pressure = 0.1;  // of the barrier, of the mean pressure
+constexpr double blunt = 0.5;                   // of the mean pressure: above, the barrier is made softer
+constexpr double elastic_slip_of_wall = 1e-3;   // slip at which friction is fully there
+constexpr double sag_of_resolution = 0.02;      // what a surface may bend between samples
 constexpr int least_level = 4, most_level = 32;
 constexpr int most_refined = 5;              // times that a part is split for a certificate
 constexpr double largest_expectation = 100;  // pressures that the tangent takes stay within this of the law's
@@ -142,8 +144,9 @@ ContactSystem::ContactSystem(const Model& model, Surfaces surfaces, std::vector<
   shapes_before_ = shapes_end_ = shapes_;
   accepted_ = {std::vector<Vec3>(reference_.size(), Vec3::Zero()),
                std::vector<Eigen::Quaterniond>(reference_.size(), Eigen::Quaterniond::Identity())};
-  make_samples(model);
+  make_groups();
   const Maps maps(surfaces_, reference_, accepted_);
+  refine(maps);
   const auto near = near_faces(maps, 0);
   double deepest = 0;
   std::size_t which = 0;
@@ -173,7 +176,7 @@ ContactSystem::ContactSystem(const Model& model, Surfaces surfaces, std::vector<
   accept(accepted_);
 }
 
-void ContactSystem::make_samples(const Model& model) {
+void ContactSystem::make_groups() {
   const auto wall_of = [&](std::size_t body) {
     double wall = 0;
     std::size_t count = 0;
@@ -190,6 +193,12 @@ void ContactSystem::make_samples(const Model& model) {
     const Contact& contact = contacts_[c];
     const bool both = !contact.between[0].rigid && !contact.between[1].rigid;
     const bool self = both && contact.between[0].index == contact.between[1].index;
+    double young = infinity;
+    for (const ContactParty& party : contact.between) {
+      young = party.rigid ? young : std::min(young, young_of(party.index));
+    }
+    stiffness_.push_back(first_stiffness * young);
+    mean_pressure_.push_back(0);
     for (std::size_t side = 0; side < (self ? 1 : 2); ++side) {
       const ContactParty& own = contact.between[side];
       const ContactParty& other = contact.between[1 - side];
@@ -206,34 +215,72 @@ void ContactSystem::make_samples(const Model& model) {
         group.weight = both ? 0.5 : 1;
         group.resolution =
             contact.resolution * (face.half_thickness > 0 ? std::min(wall, 2 * face.half_thickness) : wall);
-        group.stiffness = stiffness_of_young * (both ? std::min(face.young, young_of(other.index)) : face.young);
         group.elastic_slip = elastic_slip_of_wall * wall;
-        const PatchMap map(face, reference_, accepted_);
-        double longest = 0, bend = 0;
-        for (std::size_t k = 0; k < 3; ++k) {
-          longest = std::max(longest, (reference_[face.nodes[(k + 1) % 3]] - reference_[face.nodes[k]]).norm());
-          bend = face.curved ? std::max(bend, (face.normals[(k + 1) % 3] - face.normals[k]).norm()) : 0;
-        }
-        double curvature = bend / longest;
-        if (other.rigid) {
-          curvature += shapes_[other.index].largest_curvature();
-        } else if (!model.is_solid(other.index)) {
-          curvature *= 2;
-        }
-        const double wanted = longest * std::sqrt(curvature / (8 * sag_of_resolution * group.resolution));
-        group.level = narrow<int>(std::lround(std::clamp(std::ceil(wanted), real(least_level), real(most_level))));
-        for (const Part& part : parts_of(group.level)) {
-          Sample sample;
-          sample.at = middle(part);
-          sample.weights = patch_weights(face, sample.at);
-          const auto along = patch_weight_derivatives(face, sample.at);
-          sample.area = map.point(along[0]).cross(map.point(along[1])).norm() / (2 * group.level * group.level);
-          group.samples.push_back(sample);
-        }
         groups_.push_back(std::move(group));
       }
     }
   }
+}
+
+void ContactSystem::sample(Group& group, int level) const {
+  const SurfaceFace& face = surfaces_.faces[group.face];
+  const Configuration rest{std::vector<Vec3>(reference_.size(), Vec3::Zero()),
+                           std::vector<Eigen::Quaterniond>(reference_.size(), Eigen::Quaterniond::Identity())};
+  const PatchMap map(face, reference_, rest);
+  const std::vector<Sample> old = std::move(group.samples);
+  group.level = level;
+  group.samples.clear();
+  for (const Part& part : parts_of(level)) {
+    Sample sample;
+    sample.at = middle(part);
+    sample.weights = patch_weights(face, sample.at);
+    const auto along = patch_weight_derivatives(face, sample.at);
+    sample.area = map.point(along[0]).cross(map.point(along[1])).norm() / (2 * level * level);
+    if (contacts_[group.contact].friction > 0 && !old.empty()) {  // it goes on with the slip of the nearest
+      const auto nearest = std::min_element(old.begin(), old.end(), [&](const Sample& a, const Sample& b) {
+        return (a.at - sample.at).squaredNorm() < (b.at - sample.at).squaredNorm();
+      });
+      sample.slip = nearest->slip;
+      sample.followed = nearest->followed;
+      sample.before = PatchMap(face, reference_, accepted_).point(sample.weights);
+    }
+    group.samples.push_back(sample);
+  }
+}
+
+void ContactSystem::refine(const Maps& maps) {
+  for (Group& group : groups_) {
+    const SurfaceFace& face = surfaces_.faces[group.face];
+    const PatchMap& map = maps[group.face];
+    double longest = 0;
+    for (int k = 0; k < 3; ++k) {
+      longest = std::max(longest, (map.points().col((k + 1) % 3) - map.points().col(k)).norm());
+    }
+    // What the farthest point of a part bends away from the plane at its middle, with one piece per edge.
+    double bend = face.curved ? flatness(patch_of(face, map), 1) : 0;
+    if (group.other.rigid) {
+      bend += longest * longest / 6 * shapes_[group.other.index].largest_curvature();
+    } else {
+      bend *= 2;
+    }
+    const double wanted = std::sqrt(bend / (sag_of_resolution * group.resolution));
+    const auto level = narrow<int>(std::lround(std::clamp(std::ceil(wanted), real(least_level), real(most_level))));
+    if (group.samples.empty() || level > group.level) {
+      sample(group, level);
+    }
+    group.sag = bend / (group.level * group.level);
+  }
+}
+
+bool ContactSystem::sharpen() {
+  bool changed = false;
+  for (std::size_t c = 0; c < contacts_.size(); ++c) {
+    if (mean_pressure_[c] > 0 && stiffness_[c] > blunt * mean_pressure_[c]) {
+      stiffness_[c] = stiffness_of_pressure * mean_pressure_[c];
+      changed = true;
+    }
+  }
+  return changed;
 }
 
 double ContactSystem::offset(const Group& group, std::size_t other) const {
@@ -323,7 +370,7 @@ ContactSystem::Touch ContactSystem::touch(const Group& group, const Vec3& x, con
   Touch result;
   if (group.other.rigid) {
     const RigidDistance distance = shapes_[group.other.index].at(x);
-    result.gap = distance.distance - offset(group, 0);
+    result.gap = distance.distance - offset(group, 0) - group.sag;
     result.normal = distance.normal;
     result.curvature = distance.curvature;
     return result;
@@ -332,7 +379,7 @@ ContactSystem::Touch ContactSystem::touch(const Group& group, const Vec3& x, con
     const SurfaceFace& face = surfaces_.faces[f];
     const PatchMap& map = maps[f];
     const Bounds bounds = bounds_of(face, map);
-    const double off = offset(group, f);
+    const double off = offset(group, f) + group.sag;
     const double beyond = (bounds.lower - x).cwiseMax(x - bounds.upper).cwiseMax(0.0).norm();
     if (beyond - off >= std::min(result.gap, group.resolution)) {
       continue;
@@ -369,13 +416,24 @@ ContactSystem::Touch ContactSystem::touch(const Group& group, const Vec3& x, con
   return result;
 }
 
-void ContactSystem::set_step(double from, double to) {
+void ContactSystem::set_step(double from, double to, const Configuration& configuration) {
+  for (std::size_t c = 0; c < contacts_.size(); ++c) {
+    if (mean_pressure_[c] > 0) {
+      stiffness_[c] = stiffness_of_pressure * mean_pressure_[c];
+    }
+  }
+  refine(Maps(surfaces_, reference_, configuration));
   begin_ = from;
   end_ = to;
   for (RigidShape& shape : shapes_end_) {
     shape.set_time(to);
   }
-  set_left(from == to ? 0 : 1);
+  set_left(1);
+  bool moves = false;
+  for (std::size_t r = 0; r < shapes_.size(); ++r) {
+    moves = moves || shapes_[r].moves_to(shapes_end_[r]);
+  }
+  set_left(moves ? 1 : 0);
   for (Group& group : groups_) {
     for (Sample& sample : group.samples) {
       sample.pressure = -1;
@@ -429,15 +487,17 @@ Vec3 ContactSystem::relative_motion(const Group& group, const Sample& sample, co
   // The point of the other surface that is touched now has come from its place in the last accepted state.
   const SurfaceFace& face = surfaces_.faces[touch.face];
   const Vec3 before = PatchMap(face, reference_, accepted_).point(touch.weights);
-  return (x - sample.before) - (x - touch.normal * (touch.gap + offset(group, touch.face)) - before);
+  return (x - sample.before) - (x - touch.normal * (touch.gap + group.sag + offset(group, touch.face)) - before);
 }
 
 bool ContactSystem::add(const Configuration& configuration, VectorX& external, BlockMatrix* tangent) {
   const Maps maps(surfaces_, reference_, configuration);
   const auto near = near_faces(maps, 0);
+  std::vector<double> pressed(contacts_.size(), 0), squared(contacts_.size(), 0);
   for (std::size_t g = 0; g < groups_.size(); ++g) {
     Group& group = groups_[g];
     const Contact& contact = contacts_[group.contact];
+    const double barrier = stiffness_[group.contact];
     if (tangent != nullptr) {
       for (Sample& sample : group.samples) {
         sample.active = false;
@@ -462,8 +522,10 @@ bool ContactSystem::add(const Configuration& configuration, VectorX& external, B
       }
       any = true;
       const double s = t.gap / group.resolution;
-      const double law = group.stiffness * (1 - s) * (1 - s) / s;
+      const double law = barrier * (1 - s) * (1 - s) / s;
       const double area = group.weight * sample.area;
+      pressed[group.contact] += area * law;
+      squared[group.contact] += area * law * law;
       const Vec3& n = t.normal;
       const Mat3 across = Mat3::Identity() - n * n.transpose();
       Vec3 slip = Vec3::Zero();
@@ -477,14 +539,17 @@ bool ContactSystem::add(const Configuration& configuration, VectorX& external, B
       const Vec3 force = area * traction;
       const double expected =
           sample.pressure < 0 ? law : std::clamp(sample.pressure, law / largest_expectation, law * largest_expectation);
-      const double slope = (expected + 2 * group.stiffness * (1 - s)) / t.gap;
+      const double slope = (expected + 2 * barrier * (1 - s)) / t.gap;
       if (record_ != nullptr) {
         ContactResult& result = (*record_)[group.contact];
         const bool on_first = !contact.between[0].rigid && contact.between[0].index == face.body;
         const double sign = on_first ? 1 : -1;
         result.force += sign * force;
         result.moment += sign * x.cross(force);
-        result.area += area;
+        const auto along = patch_weight_derivatives(face, sample.at);
+        const PatchMap& own = maps[group.face];
+        result.area +=
+            group.weight * own.point(along[0]).cross(own.point(along[1])).norm() / (2 * group.level * group.level);
         ++result.points;
         if (slip.norm() > group.elastic_slip) {
           result.slip = std::max(result.slip, slip.norm() - group.elastic_slip);
@@ -516,7 +581,7 @@ bool ContactSystem::add(const Configuration& configuration, VectorX& external, B
           // The body's point that is touched goes on: as if the surface moved back by that.
           const RigidShape& now = shapes_[group.other.index];
           const RigidShape& then = shapes_end_[group.other.index];
-          const double closes = then.at(x).distance - offset(group, 0) - t.gap;
+          const double closes = then.at(x).distance - now.at(x).distance;
           const Vec3 moved = then.carried(x, now) - x;
           all -= area * derivative * (closes * n - across * moved);
         }
@@ -571,6 +636,9 @@ bool ContactSystem::add(const Configuration& configuration, VectorX& external, B
         }
       }
     }
+  }
+  for (std::size_t c = 0; c < contacts_.size(); ++c) {
+    mean_pressure_[c] = pressed[c] > 0 ? squared[c] / pressed[c] : 0;
   }
   if (tangent != nullptr) {
     at_tangent_ = configuration;
@@ -858,7 +926,7 @@ std::vector<ContactResult> ContactSystem::results(const Configuration& configura
     ContactResult& result = results[group.contact];
     double upper = infinity;
     for (const Sample& sample : group.samples) {
-      upper = std::min(upper, touch(group, maps[group.face].point(sample.weights), near[g], maps).gap);
+      upper = std::min(upper, touch(group, maps[group.face].point(sample.weights), near[g], maps).gap + group.sag);
     }
     result.gap_upper = std::min(result.gap_upper, upper);
     result.gap_lower = std::min(result.gap_lower, lower_gap(group, near[g], maps, upper));
@@ -878,7 +946,7 @@ std::vector<double> ContactSystem::memory() const {
 }
 
 void ContactSystem::recall(const std::vector<double>& memory, const Configuration& configuration, double time) {
-  set_step(time, time);
+  set_step(time, time, configuration);
   accept(configuration);
   std::size_t next = 0;
   for (Group& group : groups_) {

@@ -11,17 +11,21 @@
 ///
 /// Points are sampled on the surfaces, each with its part of the area in the reference. A point presses with
 ///   p(g) = stiffness (1 - g / d)^2 d / g   for gaps 0 < g < d, else 0,
-/// d the resolution, g the distance less half of each wall; the stiffness is a thousandth of the softer body's Young's
-/// modulus: it moves the gap within d, and d alone decides how exact the answer is. The pressure counts as an unknown
-/// of its own (a primal-dual interior point method, eliminated at each point): the forces follow p(g), the tangent
-/// takes the pressure that the last one expects. States in which surfaces touch or overlap are refused. Friction by
-/// Coulomb's law with elastic slip: the traction is (friction) p u / e along the slip u since the contact began, e = a
-/// thousandth of the wall, and u is cut to e: it also holds at rest, and depends on the path. Forces reach the nodes by
-/// the transpose of the map (patch_map.hpp). Source: Li et al. 2020, "Incremental potential contact" (the barrier); Li
-/// et al. 2023, "Convergent incremental potential contact" (areas); Forsgren, Gill, Wright 2002, "Interior methods for
-/// nonlinear optimization"; Simo, Laursen 1992, "An augmented Lagrangian treatment of contact problems involving
-/// friction" (return mapping). Limits: a rigid mesh touches at the samples of what it meets, not with corners between
-/// them.
+/// d the resolution, g the distance less half of each wall and less what the surfaces may bend between the points (a
+/// fiftieth of d at most: the number of points follows). The stiffness is a part of the mean pressure of the contact,
+/// found on the way: so the gap is a small part of d, and d alone says how exact the answer is. The pressure counts as
+/// an unknown of its own (a primal-dual interior point method, eliminated at each point): the forces follow p(g), the
+/// tangent takes the pressure that the last one expects. States in which surfaces touch or overlap are refused.
+///
+/// Friction by Coulomb's law with elastic slip: the traction is (friction) p u / e along the slip u since the contact
+/// began, e a thousandth of the wall, and u is cut to e: it also holds at rest, and depends on the path.
+/// Forces reach the nodes by the transpose of the map (patch_map.hpp).
+///
+/// Source: Li et al. 2020, "Incremental potential contact" (the barrier); Li et al. 2023, "Convergent incremental
+/// potential contact" (areas); Forsgren, Gill, Wright 2002, "Interior methods for nonlinear optimization"; Simo,
+/// Laursen 1992, "An augmented Lagrangian treatment of contact problems involving friction" (return mapping).
+///
+/// Limits: a rigid mesh touches at the samples of what it meets, not with corners between them.
 namespace tunica {
 
 struct ContactResult {
@@ -38,8 +42,13 @@ public:
   /// Errors: InputError: bodies overlap in the reference; names the pair and the depth.
   ContactSystem(const Model& model, Surfaces surfaces, std::vector<Vec3> reference);
 
-  /// A step of the rigid bodies between two times (load factors in statics). They stand at the first.
-  void set_step(double from, double to);
+  /// A step of the rigid bodies between two times (load factors in statics). They stand at the first. What comes near
+  /// is sampled as finely as its curvature asks in this configuration.
+  void set_step(double from, double to, const Configuration& configuration);
+
+  /// Where Newton's method has come to rest: makes the barrier softer against the pressures found.
+  /// @return whether that changed anything, so that Newton's method has to go on
+  bool sharpen();
   /// Of the rigid bodies' motion in the step, what is still to come.
   [[nodiscard]] double left() const { return left_; }
   void set_left(double left);
@@ -99,9 +108,9 @@ private:
     ContactParty other;
     double weight = 1;  ///< one half where both sides are sampled
     double resolution = 0;
-    double stiffness = 0;
     double elastic_slip = 0;
     int level = 0;
+    double sag = 0;  ///< mm: what the surfaces bend between samples
     std::vector<Sample> samples;
   };
   struct Touch {
@@ -114,7 +123,10 @@ private:
   };
   class Maps;
 
-  void make_samples(const Model& model);
+  void make_groups();
+  void sample(Group& group, int level) const;
+  /// Levels and sags for a configuration.
+  void refine(const Maps& maps);
   [[nodiscard]] double offset(const Group& group, std::size_t other) const;
   [[nodiscard]] bool excluded(const Group& group, std::size_t other) const;
   /// For every group towards a body that deforms: the faces that come within its reach and `more` (mm).
@@ -138,6 +150,8 @@ private:
   Configuration at_tangent_;  ///< where the last tangent was made
   double begin_ = 0, end_ = 0, left_ = 0;
   std::vector<Group> groups_;
+  std::vector<double> stiffness_;      ///< MPa, per contact, of the barrier
+  std::vector<double> mean_pressure_;  ///< MPa, per contact, of the last forces, weighted by themselves
   std::vector<std::array<Index, 2>> pairs_;
   Configuration accepted_;
   std::vector<std::array<Vec3, 3>> on_rigids_;

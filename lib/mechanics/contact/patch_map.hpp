@@ -20,8 +20,8 @@ struct SurfaceFace {
   std::array<Index, 3> nodes{};  ///< global
   std::size_t body = 0;
   bool curved = false;
-  double half_thickness = 0;    ///< mm
-  double young = 0;             ///< MPa
+  double half_thickness = 0;  ///< mm
+  double young = 0;           ///< MPa
   /// Of the reference, at the corners, and those of the triangles across the edges; of curved faces.
   std::array<Vec3, 3> normals{Vec3::Zero(), Vec3::Zero(), Vec3::Zero()};
   NormalsAcross across = own_normals_across(normals);

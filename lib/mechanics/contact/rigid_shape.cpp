@@ -222,6 +222,11 @@ double RigidShape::growth_since(const RigidShape& before) const {
   return std::abs(radius_ - before.radius_) + stretch.norm() / 2;
 }
 
+bool RigidShape::moves_to(const RigidShape& then) const {
+  return first_ != then.first_ || second_ != then.second_ || radius_ != then.radius_ || shift_ != then.shift_ ||
+         angle_ != then.angle_ || factor_ != then.factor_;
+}
+
 Vec3 RigidShape::position() const { return convex() ? Vec3((first_ + second_) / 2) : shift_; }
 
 double RigidShape::largest_curvature() const {

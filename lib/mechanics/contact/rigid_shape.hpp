@@ -35,6 +35,8 @@ public:
   /// How much farther than carried() a point of its surface may have moved, mm: what the body grows.
   [[nodiscard]] double growth_since(const RigidShape& before) const;
 
+  [[nodiscard]] bool moves_to(const RigidShape& then) const;
+
   [[nodiscard]] Vec3 position() const;
 
   /// The largest curvature of the body over all times, 1 / mm; of a mesh that of its sampling, unknown: 0.

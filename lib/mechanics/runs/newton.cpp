@@ -116,11 +116,17 @@ public:
       const bool at_floor = result_.iterations > 0 && is_at_floor();
       result_.valid = find_increment();
       // What is left of the increments there is noise: told, but not added.
-      result_.converged =
-          result_.valid && at_floor && !is_moving() && increment_size(system_, increment_) <= largest_round_off * result_.reached;
+      result_.converged = result_.valid && at_floor && !is_moving() &&
+                          increment_size(system_, increment_) <= largest_round_off * result_.reached;
       if (result_.valid && !result_.converged) {
         result_.valid = advance();
         result_.converged = result_.valid && at_rest();
+      }
+      if (result_.converged && system_.contact && system_.contact->sharpen()) {
+        result_.converged = false;
+        now_ = balance_(configuration_, nullptr, {});
+        tangent_is_current_ = false;
+        result_.residual = residual_of(now_);
       }
     }
     return result_;
@@ -236,7 +242,11 @@ private:
       }
       tangent_is_current_ = more && trial == 0;
       now_ = tangent_is_current_ ? linearised() : balance_(configuration_, nullptr, {});
-      if (getenv("TUNICA_SHOW")) fprintf(stderr, "it %zu trial %d length %g valid %d residual %g size %g left %g stable %d\n", result_.iterations, trial, length, int(now_.valid), now_.valid ? residual_of(now_) : 0., increment_size(system_, increment_), system_.contact ? system_.contact->left() : 0., int(result_.stable));
+      if (getenv("TUNICA_SHOW"))
+        fprintf(stderr, "it %zu trial %d length %g valid %d residual %g size %g left %g stable %d\n",
+                result_.iterations, trial, length, int(now_.valid), now_.valid ? residual_of(now_) : 0.,
+                increment_size(system_, increment_), system_.contact ? system_.contact->left() : 0.,
+                int(result_.stable));
       if ((left_ > 0 && !system_.contact) || trial == most_trials) {
         break;
       }

@@ -133,7 +133,7 @@ private:
     if (!system_.contact) {
       return;
     }
-    system_.contact->set_step(from, to);
+    system_.contact->set_step(from, to, configuration);
     if (system_.contact->find_pairs(configuration)) {
       make_pattern(system_, system_.contact->pairs());
       solver_.emplace(system_, settings_);
