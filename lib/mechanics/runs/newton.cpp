@@ -254,7 +254,7 @@ private:
         length /= 2;
         continue;
       }
-      if (result_.iterations <= free_iterations || moving) {
+      if (result_.iterations <= free_iterations || moving || system_.contact) {
         break;
       }
       VectorX free = now_.unbalanced;
