@@ -2,6 +2,7 @@
 
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
+#include "tunica/core/threads.hpp"
 
 #include <fmt/format.h>
 
@@ -13,12 +14,13 @@
 namespace tunica {
 namespace {
 
-constexpr double first_stiffness = 1e-5;        // of the barrier, of Young's modulus, while no pressure is known
+constexpr double first_stiffness = 1e-5;       // of the barrier, of Young's modulus, while no pressure is known
 constexpr double stiffness_of_pressure = 0.1;  // of the barrier, of the mean pressure
-constexpr double blunt = 0.5;                   // of the mean pressure: above, the barrier is made softer
-constexpr double elastic_slip_of_wall = 1e-3;   // slip at which friction is fully there
-constexpr double sag_of_resolution = 0.02;      // what a surface may bend between samples
+constexpr double blunt = 0.5;                  // of the mean pressure: above, the barrier is made softer
+constexpr double elastic_slip_of_wall = 1e-3;  // slip at which friction is fully there
+constexpr double sag_of_resolution = 0.02;     // what a surface may bend between samples
 constexpr int least_level = 4, most_level = 32;
+constexpr std::size_t groups_per_task = 16;
 constexpr int most_refined = 5;              // times that a part is split for a certificate
 constexpr double largest_expectation = 100;  // pressures that the tangent takes stay within this of the law's
 
@@ -104,6 +106,40 @@ void add_block(BlockMatrix& matrix, Index row, Index column, const Matrix6& bloc
   }
 }
 
+/// What the samples of a face do to one other face.
+struct Other {
+  PatchMap::Points forces = PatchMap::Points::Zero();
+  PatchMap::Matrix27 own = PatchMap::Matrix27::Zero();
+  PatchMap::Matrix27 between = PatchMap::Matrix27::Zero();  ///< rows: of the face that is sampled
+};
+
+void add_other(const SurfaceFace& face, const SurfaceFace& other, const PatchMap& map, const PatchMap& its_map,
+               const Other& act, VectorX& external, BlockMatrix* tangent) {
+  const Vector18 on_nodes = its_map.to_nodes(act.forces);
+  for (int k = 0; k < 3; ++k) {
+    external.segment<6>(first_freedom(other.nodes[k])) += on_nodes.segment<6>(6 * k);
+  }
+  if (tangent == nullptr) {
+    return;
+  }
+  PatchMap::Matrix27 backwards;
+  for (int k = 0; k < 9; ++k) {
+    for (int l = 0; l < 9; ++l) {
+      backwards.block<3, 3>(3 * l, 3 * k) = act.between.block<3, 3>(3 * k, 3 * l);
+    }
+  }
+  const Matrix18 own = its_map.stiffness(act.own, -act.forces);
+  const Matrix18 there = map.jacobian().transpose() * (act.between * its_map.jacobian());
+  const Matrix18 back = its_map.jacobian().transpose() * (backwards * map.jacobian());
+  for (int k = 0; k < 3; ++k) {
+    for (int l = 0; l < 3; ++l) {
+      add_block(*tangent, face.nodes[k], other.nodes[l], there.block<6, 6>(6 * k, 6 * l));
+      add_block(*tangent, other.nodes[k], face.nodes[l], back.block<6, 6>(6 * k, 6 * l));
+      add_block(*tangent, other.nodes[k], other.nodes[l], own.block<6, 6>(6 * k, 6 * l));
+    }
+  }
+}
+
 }  // namespace
 
 /// The faces in a configuration, each made when it is asked for.
@@ -118,6 +154,26 @@ public:
       linear_.resize(maps_.size(), false);
     }
     return *maps_[face];
+  }
+  [[nodiscard]] const Bounds& bounds(std::size_t face) const {
+    prepare(face);
+    return bounds_[face]->first;
+  }
+  /// How far the surface may be from its flat facet, mm.
+  [[nodiscard]] double bend(std::size_t face) const {
+    prepare(face);
+    return bounds_[face]->second;
+  }
+  /// Makes map and bounds: what is prepared may be asked for in parallel.
+  void prepare(std::size_t face) const {
+    if (bounds_.empty()) {
+      bounds_.resize(maps_.size());
+    }
+    if (!bounds_[face]) {
+      const SurfaceFace& of = surfaces_.faces[face];
+      const PatchMap& map = (*this)[face];
+      bounds_[face] = {bounds_of(of, map), of.curved ? flatness(patch_of(of, map), 1) : 0.0};
+    }
   }
   [[nodiscard]] PatchMap& linearised(std::size_t face) const {
     PatchMap& map = (*this)[face];
@@ -134,6 +190,7 @@ private:
   const Configuration& configuration_;
   mutable std::vector<std::unique_ptr<PatchMap>> maps_;
   mutable std::vector<bool> linear_;
+  mutable std::vector<std::optional<std::pair<Bounds, double>>> bounds_;
 };
 
 ContactSystem::ContactSystem(const Model& model, Surfaces surfaces, std::vector<Vec3> reference)
@@ -328,7 +385,7 @@ std::vector<std::vector<std::size_t>> ContactSystem::near_faces(const Maps& maps
       return;
     }
     for (std::size_t f = surfaces_.first[body]; f < surfaces_.first[body + 1]; ++f) {
-      bounds[f] = bounds_of(surfaces_.faces[f], maps[f]);
+      bounds[f] = maps.bounds(f);
       widest[body] = std::max(widest[body], bounds[f].upper.x() - bounds[f].lower.x());
       faces.push_back(f);
     }
@@ -378,7 +435,7 @@ ContactSystem::Touch ContactSystem::touch(const Group& group, const Vec3& x, con
   for (const std::size_t f : near) {
     const SurfaceFace& face = surfaces_.faces[f];
     const PatchMap& map = maps[f];
-    const Bounds bounds = bounds_of(face, map);
+    const Bounds& bounds = maps.bounds(f);
     const double off = offset(group, f) + group.sag;
     const double beyond = (bounds.lower - x).cwiseMax(x - bounds.upper).cwiseMax(0.0).norm();
     if (beyond - off >= std::min(result.gap, group.resolution)) {
@@ -386,6 +443,9 @@ ContactSystem::Touch ContactSystem::touch(const Group& group, const Vec3& x, con
     }
     const Vec3 a = map.points().col(0), b = map.points().col(1), c = map.points().col(2);
     const Vec3 flat = closest_point_on_triangle(x, a, b, c);
+    if ((x - flat).norm() - maps.bend(f) - off >= std::min(result.gap, group.resolution)) {
+      continue;
+    }
     const Vec3 e1 = b - a, e2 = c - a, d = flat - a;
     const double d11 = e1.dot(e1), d12 = e1.dot(e2), d22 = e2.dot(e2), r1 = d.dot(e1), r2 = d.dot(e2);
     const double det = d11 * d22 - d12 * d12;
@@ -490,9 +550,35 @@ Vec3 ContactSystem::relative_motion(const Group& group, const Sample& sample, co
   return (x - sample.before) - (x - touch.normal * (touch.gap + group.sag + offset(group, touch.face)) - before);
 }
 
+std::vector<std::vector<ContactSystem::Touch>> ContactSystem::all_touches(
+    const Maps& maps, const std::vector<std::vector<std::size_t>>& near) const {
+  std::vector<std::vector<Touch>> touches(groups_.size());
+  for (std::size_t g = 0; g < groups_.size(); ++g) {
+    const Group& group = groups_[g];
+    if (group.other.rigid ? !is_near(group, maps[group.face]) : near[g].empty()) {
+      continue;
+    }
+    touches[g].resize(group.samples.size());
+    maps.prepare(group.face);
+    for (const std::size_t f : near[g]) {
+      maps.prepare(f);
+    }
+  }
+  parallel_for_blocks(groups_.size(), groups_per_task, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t g = begin; g < end; ++g) {
+      for (std::size_t i = 0; i < touches[g].size(); ++i) {
+        const Group& group = groups_[g];
+        touches[g][i] = touch(group, maps[group.face].point(group.samples[i].weights), near[g], maps);
+      }
+    }
+  });
+  return touches;
+}
+
 bool ContactSystem::add(const Configuration& configuration, VectorX& external, BlockMatrix* tangent) {
   const Maps maps(surfaces_, reference_, configuration);
   const auto near = near_faces(maps, 0);
+  const auto touches = all_touches(maps, near);
   std::vector<double> pressed(contacts_.size(), 0), squared(contacts_.size(), 0);
   for (std::size_t g = 0; g < groups_.size(); ++g) {
     Group& group = groups_[g];
@@ -503,23 +589,25 @@ bool ContactSystem::add(const Configuration& configuration, VectorX& external, B
         sample.active = false;
       }
     }
-    if (group.other.rigid ? !is_near(group, maps[group.face]) : near[g].empty()) {
+    if (touches[g].empty()) {
       continue;
     }
     const SurfaceFace& face = surfaces_.faces[group.face];
     PatchMap::Points forces = PatchMap::Points::Zero();
     PatchMap::Points on_samples = PatchMap::Points::Zero();  // without what the rest of a motion adds
     PatchMap::Matrix27 stiffness = PatchMap::Matrix27::Zero();
+    std::map<std::size_t, Other> others;
     bool any = false;
-    for (Sample& sample : group.samples) {
-      const Vec3 x = maps[group.face].point(sample.weights);
-      const Touch t = touch(group, x, near[g], maps);
+    for (std::size_t i = 0; i < group.samples.size(); ++i) {
+      Sample& sample = group.samples[i];
+      const Touch& t = touches[g][i];
       if (t.gap >= group.resolution) {
         continue;
       }
       if (!(t.gap > 0)) {
         return false;
       }
+      const Vec3 x = maps[group.face].point(sample.weights);
       any = true;
       const double s = t.gap / group.resolution;
       const double law = barrier * (1 - s) * (1 - s) / s;
@@ -595,26 +683,18 @@ bool ContactSystem::add(const Configuration& configuration, VectorX& external, B
         }
       }
       forces += all * sample.weights.transpose();
-      if (t.face != SIZE_MAX) {  // the other side
-        const SurfaceFace& other = surfaces_.faces[t.face];
-        PatchMap& its_map = maps.linearised(t.face);
-        const PatchMap::Points back = -force * t.weights.transpose();
-        const Vector18 on_nodes = its_map.to_nodes(back);
-        for (int k = 0; k < 3; ++k) {
-          external.segment<6>(first_freedom(other.nodes[k])) += on_nodes.segment<6>(6 * k);
-        }
-        if (tangent != nullptr) {
-          const Eigen::Matrix<double, 3, 18> theirs = its_map.derivative(t.weights);
-          const Eigen::Matrix<double, 3, 18> ours = maps.linearised(group.face).derivative(sample.weights);
-          const Matrix18 between = -area * ours.transpose() * derivative * theirs;
-          const Matrix18 backwards = -area * theirs.transpose() * derivative * ours;
-          const Matrix18 own =
-              its_map.stiffness(PatchMap::Matrix27::Zero(), -back) + area * theirs.transpose() * derivative * theirs;
-          for (int k = 0; k < 3; ++k) {
-            for (int l = 0; l < 3; ++l) {
-              add_block(*tangent, face.nodes[k], other.nodes[l], between.block<6, 6>(6 * k, 6 * l));
-              add_block(*tangent, other.nodes[k], face.nodes[l], backwards.block<6, 6>(6 * k, 6 * l));
-              add_block(*tangent, other.nodes[k], other.nodes[l], own.block<6, 6>(6 * k, 6 * l));
+      if (t.face != SIZE_MAX) {
+        Other& other = others[t.face];
+        other.forces -= force * t.weights.transpose();
+        for (int k = 0; tangent != nullptr && k < 9; ++k) {
+          for (int l = 0; l < 9; ++l) {
+            const double theirs = area * t.weights[k] * t.weights[l];
+            const double ours = area * sample.weights[k] * t.weights[l];
+            if (theirs != 0) {
+              other.own.block<3, 3>(3 * k, 3 * l) += theirs * derivative;
+            }
+            if (ours != 0) {
+              other.between.block<3, 3>(3 * k, 3 * l) -= ours * derivative;
             }
           }
         }
@@ -635,6 +715,9 @@ bool ContactSystem::add(const Configuration& configuration, VectorX& external, B
           add_block(*tangent, face.nodes[k], face.nodes[l], of_nodes.block<6, 6>(6 * k, 6 * l));
         }
       }
+    }
+    for (const auto& [number, other] : others) {
+      add_other(face, surfaces_.faces[number], map, maps.linearised(number), other, external, tangent);
     }
   }
   for (std::size_t c = 0; c < contacts_.size(); ++c) {
@@ -827,7 +910,7 @@ double ContactSystem::lower_gap(const Group& group, const std::vector<std::size_
   };
   double lower = upper;
   // A part is split while its bound could be the smallest and lies more than this below what was sampled.
-  const double close = 0.1 * group.resolution;
+  const double close = 0.5 * upper;
   if (group.other.rigid) {
     const RigidShape& shape = shapes_[group.other.index];
     const std::function<void(const Part&, int)> visit = [&](const Part& part, int level) {

@@ -134,6 +134,9 @@ private:
   [[nodiscard]] bool is_near(const Group& group, const PatchMap& map) const;
   [[nodiscard]] Touch touch(const Group& group, const Vec3& x, const std::vector<std::size_t>& near,
                             const Maps& maps) const;
+  /// Of every sample whose face is near something; in parallel.
+  [[nodiscard]] std::vector<std::vector<Touch>> all_touches(const Maps& maps,
+                                                            const std::vector<std::vector<std::size_t>>& near) const;
   [[nodiscard]] Vec3 relative_motion(const Group& group, const Sample& sample, const Touch& touch, const Vec3& x) const;
   [[nodiscard]] bool is_certain(const Group& group, const std::vector<std::size_t>& near, const Maps& before,
                                 const Maps& now) const;

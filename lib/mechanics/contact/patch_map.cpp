@@ -141,6 +141,10 @@ void PatchMap::linearise() {
   for (int k = 0; face_.curved && k < 6; ++k) {
     edges_[k].linearise();
   }
+  jacobian_.setZero();
+  for (int k = 0; k < (face_.curved ? 9 : 3); ++k) {
+    jacobian_.middleRows<3>(3 * k) = derivative(PatchWeights::Unit(k));
+  }
 }
 
 void PatchMap::EdgePoint::linearise() {
@@ -224,15 +228,11 @@ Eigen::Matrix<double, 3, 18> PatchMap::derivative(const PatchWeights& weights) c
 }
 
 Matrix18 PatchMap::stiffness(const Matrix27& of_points, const Points& forces) const {
-  Eigen::Matrix<double, 27, 18> jacobian = Eigen::Matrix<double, 27, 18>::Zero();
-  for (int k = 0; k < 9; ++k) {
-    jacobian.middleRows<3>(3 * k) = derivative(PatchWeights::Unit(k));
-  }
   Matrix18 result;
   if (face_.curved) {
-    result = jacobian.transpose() * (of_points * jacobian);
+    result = jacobian_.transpose() * (of_points * jacobian_);
   } else {
-    const auto corners = jacobian.topRows<9>();
+    const auto corners = jacobian_.topRows<9>();
     result = corners.transpose() * (of_points.topLeftCorner<9, 9>() * corners);
   }
   for (int k = 0; face_.curved && k < 6; ++k) {

@@ -61,6 +61,9 @@ public:
   /// d(forces)/d(points) by way of the nodes, and what the curvature of the map adds under these forces.
   [[nodiscard]] Matrix18 stiffness(const Matrix27& of_points, const Points& forces) const;
 
+  /// d (corners and edge points) / d (displacements, spins).
+  [[nodiscard]] const Eigen::Matrix<double, 27, 18>& jacobian() const { return jacobian_; }
+
   /// d point / d (displacements, spins) at weights.
   [[nodiscard]] Eigen::Matrix<double, 3, 18> derivative(const PatchWeights& weights) const;
 
@@ -83,6 +86,7 @@ private:
   const SurfaceFace& face_;
   Points points_;
   std::array<EdgePoint, 6> edges_;
+  Eigen::Matrix<double, 27, 18> jacobian_;
 };
 
 }  // namespace tunica

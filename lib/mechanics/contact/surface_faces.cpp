@@ -82,30 +82,18 @@ Surfaces surface_faces(const Model& model) {
 
 Vec2 nearest_on_face(const SurfaceFace& face, const PatchMap& map, const Vec3& p, const Vec2& start) {
   constexpr int most_iterations = 30;
-  constexpr double step = 1e-4;  // of the parameters, for second derivatives by differences of the first
-  // Active set on the triangle: where a step leaves it, it is cut, and the next one slides along the side.
+  // Active set on the triangle: where a step leaves it, it is cut, and the next one slides along the side. The metric
+  // stands for the second derivative: near a surface that is flat against the distance they differ by little.
   Vec2 b = start;
-  const auto gradient = [&](const Vec2& at) {
-    const auto weights = patch_weight_derivatives(face, at);
-    const Vec3 away = map.point(patch_weights(face, at)) - p;
-    return Vec2(away.dot(map.point(weights[0])), away.dot(map.point(weights[1])));
-  };
   const auto squared = [&](const Vec2& at) { return (map.point(patch_weights(face, at)) - p).squaredNorm(); };
   double value = squared(b);
   for (int iteration = 0; iteration < most_iterations; ++iteration) {
-    const Vec2 g = gradient(b);
+    const auto weights = patch_weight_derivatives(face, b);
+    const Vec3 t0 = map.point(weights[0]), t1 = map.point(weights[1]);
+    const Vec3 away = map.point(patch_weights(face, b)) - p;
+    const Vec2 g(away.dot(t0), away.dot(t1));
     Eigen::Matrix2d h;
-    for (int k = 0; k < 2; ++k) {
-      h.col(k) = (gradient(b + step * Vec2::Unit(k)) - gradient(b - step * Vec2::Unit(k))) / (2 * step);
-    }
-    h = (0.5 * (h + h.transpose())).eval();
-    const double shift = 1e-12 * h.trace();
-    if (!(h.determinant() > 0 && h(0, 0) > 0)) {  // not convex here: the map's metric instead
-      const auto weights = patch_weight_derivatives(face, b);
-      const Vec3 t0 = map.point(weights[0]), t1 = map.point(weights[1]);
-      h << t0.dot(t0), t0.dot(t1), t0.dot(t1), t1.dot(t1);
-    }
-    h.diagonal().array() += std::abs(shift);
+    h << t0.dot(t0), t0.dot(t1), t0.dot(t1), t1.dot(t1);
     // Sides that the point lies on and the descent direction leaves across are held.
     constexpr double on_side = 1e-12;
     Vec2 d = -h.inverse() * g;
@@ -133,7 +121,7 @@ Vec2 nearest_on_face(const SurfaceFace& face, const PatchMap& map, const Vec3& p
         length = std::min(length, std::max(0.0, room) / rate);
       }
     }
-    if ((length * d).norm() < 1e-13) {
+    if ((length * d).norm() < 1e-11) {
       break;
     }
     Vec2 next = b + length * d;

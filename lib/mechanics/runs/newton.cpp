@@ -202,8 +202,8 @@ private:
       result_.algebraic_error->solution = largest_solution_;
     }
     ++result_.iterations;
-    if (!solved.solved) {
-      return false;
+    if (!solved.solved || (system_.contact && increment_size(system_, increment_) > longest_side(system_))) {
+      return false;  // nothing holds some body
     }
     work_ = right.dot(increment_);
     longest_ = 1;

@@ -25,7 +25,9 @@ VectorX viscous_diagonal(const ShellSystem& system) {
   for (std::size_t i = 0; i < system.node_count(); ++i) {
     const auto block = stiffness.block(stiffness.find(narrow<Index>(i), narrow<Index>(i)));
     diagonal.segment<3>(first_freedom(i)).setConstant(block.diagonal().head<3>().mean());
-    diagonal.segment<3>(first_freedom(i) + 3).setConstant(block.diagonal().tail<3>().mean());
+    // A pressure is no place that could creep.
+    diagonal.segment<3>(first_freedom(i) + 3)
+        .setConstant(i < system.first_solid_node ? block.diagonal().tail<3>().mean() : 0.0);
   }
   return diagonal;
 }

@@ -70,7 +70,17 @@ public:
     const VectorX held =
         prescribed_positions(system_, model_, factor) - prescribed_positions(system_, model_, previous_factor);
     begin_contact(previous_factor, factor, configuration);
+    const Configuration start = configuration;
     NewtonResult result = newton(system_, settings_, *solver_, balance, held, matrix_, configuration);
+    if (system_.contact && !(result.converged && result.stable) && held.isZero(0) && !moving_bodies_) {
+      // Bodies that nothing holds yet fall until something does: Newton's method has no step for them.
+      configuration = start;
+      system_.contact->set_step(factor, factor, configuration);
+      const SettleResult settled = settle(system_, settings_, *solver_, balance, matrix_, configuration);
+      result.converged = result.stable = result.valid = settled.settled;
+      result.residual = settled.residual;
+      result.iterations += settled.iterations;
+    }
     const VectorX still = VectorX::Zero(held.size());
     for (int round = 0; round < 8 && result.converged; ++round) {
       bool changed = false;
@@ -134,6 +144,7 @@ private:
       return;
     }
     system_.contact->set_step(from, to, configuration);
+    moving_bodies_ = system_.contact->left() > 0;
     if (system_.contact->find_pairs(configuration)) {
       make_pattern(system_, system_.contact->pairs());
       solver_.emplace(system_, settings_);
@@ -168,6 +179,7 @@ private:
   const Model& model_;
   const RunSettings& settings_;
   std::optional<TangentSolver> solver_;
+  bool moving_bodies_ = false;  ///< rigid ones, in this step
   BlockMatrix matrix_;
   Forces forces_;
 };
