@@ -1,8 +1,8 @@
 // One tetrahedron: its energy, forces and tangent.
 
+#include "tunica/mechanics/solids/solid_element.hpp"
 #include "tets.hpp"
 #include "tunica/mechanics/elements/rotation.hpp"
-#include "tunica/mechanics/solids/solid_element.hpp"
 
 #include <gtest/gtest.h>
 
@@ -165,10 +165,11 @@ TEST(SolidElement, NoPressureIsWithoutStiffness) {
         of_pressures(i, j) = -stiffness(4 * i + 3, 4 * j + 3) / (element.shear * element.volume);
       }
     }
-    const auto values = Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d>(of_pressures).eigenvalues();
-    EXPECT_GT(values[0], 0);                                          // of the constant one: the compliance
-    EXPECT_NEAR(values[0], element.shear / element.bulk_of_pressure / 4, 1e-12);
-    EXPECT_GT(values[1], 0.05);                                       // of the others: the projection
+    const double compliance = element.shear / element.bulk_of_pressure;
+    const Eigen::Vector4d constant = Eigen::Vector4d::Ones(), other(1, -1, 1, -1), one(1, -1, 0, 0);
+    EXPECT_LT((of_pressures * constant - compliance / 4 * constant).norm(), 1e-13);  // no projection here
+    EXPECT_LT((of_pressures * other - 0.05 * (1 + compliance) * other).norm(), 1e-13 * (1 + compliance));
+    EXPECT_LT((of_pressures * one - 0.05 * (1 + compliance) * one).norm(), 1e-13 * (1 + compliance));
   });
 }
 
@@ -269,6 +270,8 @@ TEST(SolidPatch, LinearDisplacementsAreExact) {
   Random random;
   Mat3 gradient;
   gradient << random.vector(1e-2), random.vector(1e-2), random.vector(1e-2);
+  // A volume strain that makes no pressure beyond what the co-rotational law bears.
+  gradient.diagonal().array() += (1e-4 - gradient.trace()) / 3;
   const auto exact = [&](const Vec3& x) { return Vec3(gradient * x + Vec3(0.3, -0.2, 0.1)); };
   for (const SolidLaw law : laws) {
     for (const double poisson : {0.3, 0.4999}) {
@@ -290,7 +293,7 @@ TEST(SolidPatch, LinearDisplacementsAreExact) {
         const double of_pressure = bulk - std::min(shear, bulk / 2);
         const Mat3 f = Mat3::Identity() + gradient;
         const Mat3 stretch = Eigen::SelfAdjointEigenSolver<Mat3>(f.transpose() * f).operatorSqrt();
-        const double volume_strain = linear                              ? gradient.trace()
+        const double volume_strain = linear                          ? gradient.trace()
                                      : law == SolidLaw::corotational ? stretch.trace() - 3
                                                                      : f.determinant() - 1;
         const double pressure = of_pressure * volume_strain / shear;
@@ -301,6 +304,34 @@ TEST(SolidPatch, LinearDisplacementsAreExact) {
       }
     }
   }
+}
+
+/// The volume strain of the co-rotational law, trace(S - 1), is of second order in a rotation that the neighbours do
+/// not follow: under a pressure above 2 mu it makes the inside buckle, that of the neo-Hookean law never.
+TEST(SolidPatch, TheCorotationalLawIsStableUpToAPressureOfTwiceTheShearModulus) {
+  constexpr double poisson = 0.4999;
+  const auto squeezed = [&](SolidLaw law, double pressure, std::vector<double> factors) {
+    Model model = one_solid(make_block(4, 4, 4, [](const Vec3& u) { return Vec3(4 * u); }), 1, poisson, law);
+    const double shear = 1 / (2 * (1 + poisson)), bulk = 1 / (3 * (1 - 2 * poisson));
+    const double strain = -pressure * shear / (3 * bulk);
+    move_nodes(
+        model, 0, [](const Vec3& x) { return (x - Vec3::Constant(2)).cwiseAbs().maxCoeff() > 1.9; },
+        [&](const Vec3& x) { return Vec3(strain * x); });
+    return error_of(model, nonlinear_run(std::move(factors)));
+  };
+  EXPECT_EQ(squeezed(SolidLaw::corotational, 1.9, {0.99, 1}), "");
+  EXPECT_EQ(squeezed(SolidLaw::corotational, 4, {0.99, 1}).substr(0, 12), "requirement:");
+  EXPECT_EQ(squeezed(SolidLaw::neo_hookean, 20, {0.99, 1}), "");
+}
+
+/// Fails: where the first linearisation already gives the equilibrium, its tangent is not looked at.
+TEST(SolidPatch, DISABLED_AnUnstableStateFoundAtOnceIsNotCalledConverged) {
+  constexpr double poisson = 0.4999, strain = -4 * (1 - 2 * poisson) / (2 * (1 + poisson));
+  Model model = one_solid(make_block(4, 4, 4, [](const Vec3& u) { return Vec3(4 * u); }), 1, poisson);
+  move_nodes(
+      model, 0, [](const Vec3& x) { return (x - Vec3::Constant(2)).cwiseAbs().maxCoeff() > 1.9; },
+      [&](const Vec3& x) { return Vec3(strain * x); });
+  EXPECT_EQ(error_of(model, nonlinear_run({1})).substr(0, 12), "requirement:");
 }
 
 }  // namespace

@@ -37,7 +37,8 @@ inline TetMesh extrude(const std::vector<std::array<Index, 3>>& triangles, std::
 /// nx x ny x nz cells over the unit cube, mapped.
 inline TetMesh make_block(std::size_t nx, std::size_t ny, std::size_t nz, const std::function<Vec3(const Vec3&)>& map,
                           Diagonals diagonals = Diagonals::alternating) {
-  const Grid grid = make_grid(nx, ny, [](double u, double v) { return Vec3(u, v, 0); }, diagonals);
+  const Grid grid = make_grid(
+      nx, ny, [](double u, double v) { return Vec3(u, v, 0); }, diagonals);
   return extrude(grid.mesh.triangles, grid.mesh.vertices.size(), nz,
                  [&](Index v, double w) { return map(grid.mesh.vertices[v] + Vec3(0, 0, w)); });
 }
