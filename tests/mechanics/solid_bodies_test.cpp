@@ -164,5 +164,56 @@ TEST(SolidCook, OfACompressibleMaterial) {
   EXPECT_LT(std::abs(fine), 0.03);
 }
 
+/// A cube under pressure from all sides, free but for its rigid motions: its volume shrinks by p / K.
+double shrinks(bool linear, bool by_rigid_motions, SolidLaw law) {
+  constexpr double young = 1, poisson = 0.3, pressure = 1e-5;
+  Model model =
+      one_solid(make_block(2, 2, 2, [](const Vec3& u) { return Vec3(u - Vec3::Constant(0.5)); }), young, poisson, law);
+  if (by_rigid_motions) {
+    model.rigid_motions.push_back({0});
+  } else {
+    for (int c = 0; c < 3; ++c) {
+      hold_nodes(
+          model, 0, [&](const Vec3& x) { return std::abs(x[c]) < eps; }, std::string(1, "xyz"[c]));
+    }
+  }
+  model.loads.push_back({0, PressureLoad{-pressure, true}, {}});
+  const State state = last_state(model, linear ? linear_run() : nonlinear_run({1}));
+  const Vec3 change = state.displacement.back() - state.displacement.front();
+  const double bulk = young / (3 * (1 - 2 * poisson));
+  return change.sum() / (-pressure / bulk);
+}
+
+TEST(SolidPressure, PushesOnEverySideOfABody) {
+  for (const SolidLaw law : {SolidLaw::corotational, SolidLaw::neo_hookean}) {
+    EXPECT_NEAR(shrinks(true, false, law), 1, 1e-10);
+    EXPECT_NEAR(shrinks(false, false, law), 1, 1e-4);
+  }
+}
+
+TEST(SolidPressure, DISABLED_RigidMotionsHoldASolid) {
+  EXPECT_NEAR(shrinks(true, true, SolidLaw::corotational), 1, 1e-10);
+  EXPECT_NEAR(shrinks(false, true, SolidLaw::neo_hookean), 1, 1e-4);
+}
+
+/// Free vibration of a bar along its axis, its sides free to contract: sqrt(E / rho) / (4 L).
+TEST(SolidFrequencies, OfABarAreThoseOfTheWaveEquation) {
+  constexpr double length = 10, young = 1000, density = 1e-9;
+  Model model = one_solid(
+      make_block(20, 2, 2, [](const Vec3& u) { return Vec3(u.x() * length, u.y() - 0.5, u.z() - 0.5); }), young, 0.3);
+  model.solids[0].material.density = density;
+  hold_nodes(
+      model, 0, [](const Vec3& x) { return x.x() < eps; }, "x");
+  // Only along the axis, symmetric about it.
+  hold_nodes(
+      model, 0, [](const Vec3& x) { return std::abs(x.y()) < eps; }, "y");
+  hold_nodes(
+      model, 0, [](const Vec3& x) { return std::abs(x.z()) < eps; }, "z");
+  RunSettings settings;
+  settings.kind = FrequencyRun{1, {false, {1}}};
+  const Summary summary = solve(model, settings, [](const State&) {});
+  EXPECT_NEAR(summary.frequencies.at(0) / (std::sqrt(young / density) / (4 * length)), 1, 0.01);
+}
+
 }  // namespace
 }  // namespace tunica
