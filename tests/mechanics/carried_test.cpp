@@ -266,7 +266,7 @@ TEST(Carried, AFinerFaceOnACoarserOnePassesThePatchTest) {
   }
 }
 
-/// Fails: a linear run leaves carried nodes, and what they would drive, at rest.
+/// Fails, without a word: a linear run leaves carried nodes, and what they would drive, at rest.
 TEST(Carried, DISABLED_LinearRunsKnowAttachments) {
   EXPECT_LT(stacked_error(2, 4, SolidLaw::corotational, true), 1e-10);
 }
@@ -282,7 +282,7 @@ TEST(Carried, OfFacesThatCrossTheFinerOneShouldBeCarried) {
 }
 
 /// Two blocks of one material with fitting nodes are one block, but for a pressure of their own: its lowest frequency.
-/// Fails: a run for frequencies takes the pressures for instabilities, and knows no attachments.
+/// Fails (scenes refuse it): a run for frequencies takes the pressures for instabilities, and knows no attachments.
 TEST(Carried, DISABLED_FrequenciesKnowAttachments) {
   const auto lowest = [](bool attached) {
     Model model;

@@ -191,13 +191,13 @@ TEST(SolidPressure, PushesOnEverySideOfABody) {
   }
 }
 
-/// Fails: the linear run divides by the area of the triangles of shells.
+/// Fails (scenes refuse it): the linear run divides by the area of the triangles of shells.
 TEST(SolidPressure, DISABLED_RigidMotionsHoldASolid) {
   EXPECT_NEAR(shrinks(true, true, SolidLaw::corotational), 1, 1e-10);
   EXPECT_NEAR(shrinks(false, true, SolidLaw::neo_hookean), 1, 1e-4);
 }
 
-/// Fails: the answer is right, after thousands of iterations.
+/// Fails (scenes refuse it): the answer is right, after thousands of iterations.
 TEST(SolidPressure, DISABLED_RigidMotionsHoldASolidInAFewIterations) {
   Model model = one_solid(make_block(2, 2, 2, [](const Vec3& u) { return u; }), 1, 0.3);
   model.rigid_motions.push_back({0});
@@ -227,7 +227,7 @@ Model bar(double length, double young, double density) {
   return model;
 }
 
-/// Fails: the pressures' negative pivots are taken for instabilities.
+/// Fails (scenes refuse it): the pressures' negative pivots are taken for instabilities.
 TEST(SolidFrequencies, DISABLED_OfABarAreThoseOfTheWaveEquation) {
   constexpr double length = 10, young = 1000, density = 1e-9;
   RunSettings settings;
@@ -284,8 +284,8 @@ TEST(SolidArcLength, EndsWhereLoadControlDoes) {
   EXPECT_NEAR(path.displacement[tip[0]].x(), steps.displacement[tip[0]].x(), 1e-6);
 }
 
-/// Fails: "the loads do not deform anything", as only shells are asked. The coarse bar is far too stiff (see the
-/// cantilever above): between Euler's load and four times that.
+/// Fails (scenes refuse it): "the loads do not deform anything", as only shells are asked. The coarse bar is far too
+/// stiff (see the cantilever above): between Euler's load and four times that.
 TEST(SolidBuckling, DISABLED_OfAColumnIsEulers) {
   Model model =
       one_solid(make_block(4, 4, 24, [](const Vec3& u) { return Vec3(u.x() - 0.5, u.y() - 0.5, 12 * u.z()); }), 1, 0.3);
