@@ -157,7 +157,7 @@ void check_selections(const Model& model) {
   for (const RigidMotionsFix& fix : model.rigid_motions) {
     check(fix.body, {0}, "fix of the rigid motions");
     if (std::any_of(model.fixes.begin(), model.fixes.end(), [&](const Fix& other) { return other.body == fix.body; })) {
-      refuse(model.shells[fix.body], "it is held by its rigid motions and by another fix: keep one of them");
+      refuse(model, fix.body, "it is held by its rigid motions and by another fix: keep one of them");
     }
   }
   for (const Load& load : model.loads) {
