@@ -15,6 +15,7 @@ namespace tunica {
 namespace {
 
 constexpr double first_stiffness = 1e-5;       // of the barrier, of Young's modulus, while no pressure is known
+constexpr double least_stiffness = 1e-8;       // of the barrier, of Young's modulus: where a contact opens
 constexpr double stiffness_of_pressure = 0.1;  // of the barrier, of the mean pressure
 constexpr double blunt = 0.5;                  // of the mean pressure: above, the barrier is made softer
 constexpr double elastic_slip_of_wall = 1e-3;  // slip at which friction is fully there
@@ -254,6 +255,7 @@ void ContactSystem::make_groups() {
     for (const ContactParty& party : contact.between) {
       young = party.rigid ? young : std::min(young, young_of(party.index));
     }
+    young_.push_back(young);
     stiffness_.push_back(first_stiffness * young);
     mean_pressure_.push_back(0);
     for (std::size_t side = 0; side < (self ? 1 : 2); ++side) {
@@ -329,12 +331,16 @@ void ContactSystem::refine(const Maps& maps) {
   }
 }
 
+double ContactSystem::wanted_stiffness(std::size_t c) const {
+  return std::max(stiffness_of_pressure * mean_pressure_[c], least_stiffness * young_[c]);
+}
+
 bool ContactSystem::sharpen() {
   bool changed = false;
   for (std::size_t c = 0; c < contacts_.size(); ++c) {
     if (mean_pressure_[c] > 0 && stiffness_[c] > blunt * mean_pressure_[c]) {
-      stiffness_[c] = stiffness_of_pressure * mean_pressure_[c];
-      changed = true;
+      changed = changed || wanted_stiffness(c) < stiffness_[c];
+      stiffness_[c] = std::min(stiffness_[c], wanted_stiffness(c));
     }
   }
   return changed;
@@ -478,9 +484,7 @@ ContactSystem::Touch ContactSystem::touch(const Group& group, const Vec3& x, con
 
 void ContactSystem::set_step(double from, double to, const Configuration& configuration) {
   for (std::size_t c = 0; c < contacts_.size(); ++c) {
-    if (mean_pressure_[c] > 0) {
-      stiffness_[c] = stiffness_of_pressure * mean_pressure_[c];
-    }
+    stiffness_[c] = mean_pressure_[c] > 0 ? wanted_stiffness(c) : first_stiffness * young_[c];
   }
   refine(Maps(surfaces_, reference_, configuration));
   begin_ = from;

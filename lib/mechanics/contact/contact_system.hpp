@@ -127,6 +127,7 @@ private:
   void sample(Group& group, int level) const;
   /// Levels and sags for a configuration.
   void refine(const Maps& maps);
+  [[nodiscard]] double wanted_stiffness(std::size_t contact) const;
   [[nodiscard]] double offset(const Group& group, std::size_t other) const;
   [[nodiscard]] bool excluded(const Group& group, std::size_t other) const;
   /// For every group towards a body that deforms: the faces that come within its reach and `more` (mm).
@@ -153,6 +154,7 @@ private:
   Configuration at_tangent_;  ///< where the last tangent was made
   double begin_ = 0, end_ = 0, left_ = 0;
   std::vector<Group> groups_;
+  std::vector<double> young_;          ///< MPa, per contact, of the softer body
   std::vector<double> stiffness_;      ///< MPa, per contact, of the barrier
   std::vector<double> mean_pressure_;  ///< MPa, per contact, of the last forces, weighted by themselves
   std::vector<std::array<Index, 2>> pairs_;

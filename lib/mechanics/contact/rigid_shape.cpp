@@ -68,36 +68,49 @@ RigidDistance to_cylinder(const Vec3& p, const Vec3& from, const Vec3& to, doubl
 
 }  // namespace
 
-RigidShape::RigidShape(const RigidBody& body) : body_(&body) {
-  if (const auto* mesh = std::get_if<RigidMesh>(&body.shape)) {
-    surface_ = std::make_shared<ClosestPoint>(mesh->surface);
-    // Angle-weighted normals of corners, means at edges: their sign is right wherever the nearest point lies.
-    const TriangleMesh& m = mesh->surface;
-    std::vector<Vec3> at_vertex(m.vertices.size(), Vec3::Zero());
-    const auto normal_of = [&](std::size_t t) {
-      const auto& v = m.triangles[t];
-      return Vec3((m.vertices[v[1]] - m.vertices[v[0]]).cross(m.vertices[v[2]] - m.vertices[v[0]]).normalized());
-    };
-    for (std::size_t t = 0; t < m.triangles.size(); ++t) {
-      for (std::size_t k = 0; k < 3; ++k) {
-        const Vec3& x = m.vertices[m.triangles[t][k]];
-        const Vec3 a = m.vertices[m.triangles[t][(k + 1) % 3]] - x, b = m.vertices[m.triangles[t][(k + 2) % 3]] - x;
-        at_vertex[m.triangles[t][k]] += std::atan2(a.cross(b).norm(), a.dot(b)) * normal_of(t);
-      }
-    }
-    const auto beside = neighbours(m, incidence(m));
-    std::vector<std::array<Vec3, 7>> normals(m.triangles.size());
-    for (std::size_t t = 0; t < m.triangles.size(); ++t) {
-      normals[t][0] = normal_of(t);
-      for (std::size_t k = 0; k < 3; ++k) {
-        const Index other = beside[t][k];
-        normals[t][1 + k] = normals[t][0] + (other == no_neighbour ? Vec3(Vec3::Zero()) : normal_of(other));
-        normals[t][4 + k] = at_vertex[m.triangles[t][k]];
-      }
-    }
-    pseudo_normals_ = std::make_shared<const std::vector<std::array<Vec3, 7>>>(std::move(normals));
+RigidShape::RigidShape(const RigidBody& body) : body_(&body) { set_time(0); }
+
+/// The surface as far as it is expanded: its nearest points are not those of the surface before.
+void RigidShape::expand(const RigidMesh& mesh) {
+  TriangleMesh m = mesh.surface;
+  for (Vec3& x : m.vertices) {
+    x = expanded(x, factor_);
   }
-  set_time(0);
+  surface_ = std::make_shared<ClosestPoint>(m);
+  // Angle-weighted normals of corners, means at edges: their sign is right wherever the nearest point lies.
+  std::vector<Vec3> at_vertex(m.vertices.size(), Vec3::Zero());
+  const auto normal_of = [&](std::size_t t) {
+    const auto& v = m.triangles[t];
+    return Vec3((m.vertices[v[1]] - m.vertices[v[0]]).cross(m.vertices[v[2]] - m.vertices[v[0]]).normalized());
+  };
+  for (std::size_t t = 0; t < m.triangles.size(); ++t) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vec3& x = m.vertices[m.triangles[t][k]];
+      const Vec3 a = m.vertices[m.triangles[t][(k + 1) % 3]] - x, b = m.vertices[m.triangles[t][(k + 2) % 3]] - x;
+      at_vertex[m.triangles[t][k]] += std::atan2(a.cross(b).norm(), a.dot(b)) * normal_of(t);
+    }
+  }
+  const auto beside = neighbours(m, incidence(m));
+  std::vector<std::array<Vec3, 7>> normals(m.triangles.size());
+  for (std::size_t t = 0; t < m.triangles.size(); ++t) {
+    normals[t][0] = normal_of(t);
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Index other = beside[t][k];
+      normals[t][1 + k] = normals[t][0] + (other == no_neighbour ? Vec3(Vec3::Zero()) : normal_of(other));
+      normals[t][4 + k] = at_vertex[m.triangles[t][k]];
+    }
+  }
+  pseudo_normals_ = std::make_shared<const std::vector<std::array<Vec3, 7>>>(std::move(normals));
+}
+
+Vec3 RigidShape::expanded(const Vec3& x, double factor) const {
+  const auto& expansion = std::get<RigidMesh>(body_->shape).expansion;
+  if (!expansion) {
+    return x;
+  }
+  const Vec3 arm = x - expansion->point;
+  const Vec3 along = expansion->axis * expansion->axis.dot(arm);
+  return expansion->point + along + (arm - along) * factor;
 }
 
 void RigidShape::set_time(double time) {
@@ -115,37 +128,24 @@ void RigidShape::set_time(double time) {
                         [&](const RigidPlane& s) { first_ = second_ = s.point.at(time) + shift_; },
                         [&](const RigidMesh& s) {
                           angle_ = s.turn ? s.turn->angle.at(time) : 0;
-                          factor_ = s.expansion ? s.expansion->factor.at(time) : 1;
+                          const double factor = s.expansion ? s.expansion->factor.at(time) : 1;
+                          if (factor != factor_ || !surface_) {
+                            factor_ = factor;
+                            expand(s);
+                          }
                         }},
              body_->shape);
 }
 
 Vec3 RigidShape::to_mesh(const Vec3& p) const {
   const auto& s = std::get<RigidMesh>(body_->shape);
-  Vec3 x = p - shift_;
-  if (s.turn) {
-    x = s.turn->point + Eigen::AngleAxisd(-angle_, s.turn->axis) * (x - s.turn->point);
-  }
-  if (s.expansion) {
-    const Vec3 arm = x - s.expansion->point;
-    const Vec3 along = s.expansion->axis * s.expansion->axis.dot(arm);
-    x = s.expansion->point + along + (arm - along) / factor_;
-  }
-  return x;
+  const Vec3 x = p - shift_;
+  return s.turn ? Vec3(s.turn->point + Eigen::AngleAxisd(-angle_, s.turn->axis) * (x - s.turn->point)) : x;
 }
 
 Vec3 RigidShape::from_mesh(const Vec3& p) const {
   const auto& s = std::get<RigidMesh>(body_->shape);
-  Vec3 x = p;
-  if (s.expansion) {
-    const Vec3 arm = x - s.expansion->point;
-    const Vec3 along = s.expansion->axis * s.expansion->axis.dot(arm);
-    x = s.expansion->point + along + (arm - along) * factor_;
-  }
-  if (s.turn) {
-    x = s.turn->point + Eigen::AngleAxisd(angle_, s.turn->axis) * (x - s.turn->point);
-  }
-  return x + shift_;
+  return shift_ + (s.turn ? Vec3(s.turn->point + Eigen::AngleAxisd(angle_, s.turn->axis) * (p - s.turn->point)) : p);
 }
 
 RigidDistance RigidShape::at(const Vec3& p) const {
@@ -209,7 +209,7 @@ double RigidShape::support(const Vec3& n) const {
 
 Vec3 RigidShape::carried(const Vec3& p, const RigidShape& before) const {
   if (!convex()) {
-    return from_mesh(before.to_mesh(p));
+    return from_mesh(expanded(before.to_mesh(p), factor_ / before.factor_));
   }
   return p + (first_ + second_ - before.first_ - before.second_) / 2;
 }

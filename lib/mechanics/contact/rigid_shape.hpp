@@ -43,8 +43,12 @@ public:
   [[nodiscard]] double largest_curvature() const;
 
 private:
+  /// To and from the surface of a mesh, expanded as it is, but neither turned nor moved.
   [[nodiscard]] Vec3 to_mesh(const Vec3& p) const;
   [[nodiscard]] Vec3 from_mesh(const Vec3& p) const;
+
+  void expand(const RigidMesh& mesh);
+  [[nodiscard]] Vec3 expanded(const Vec3& x, double factor) const;
 
   const RigidBody* body_;
   std::shared_ptr<const ClosestPoint> surface_;

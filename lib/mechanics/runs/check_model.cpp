@@ -200,6 +200,12 @@ void check_solids(const Model& model, const RunSettings& settings) {
     if (settings.solver == Solver::cg) {
       refuse(model, b, "conjugate gradients cannot follow the pressure in a solid: use solver = \"direct\"");
     }
+    if (std::holds_alternative<FrequencyRun>(settings.kind) || std::holds_alternative<BucklingRun>(settings.kind)) {
+      refuse(model, b, "frequencies and buckling of solids are not available yet");
+    }
+    if (held_by_rigid_motions(model, b)) {
+      refuse(model, b, "a solid cannot be held by its rigid motions yet: hold it by a fix");
+    }
     const auto* dynamic = std::get_if<DynamicRun>(&settings.kind);
     if (dynamic != nullptr && dynamic->damping.stiffness > 0) {
       refuse(model, b, "damping by stiffness does not reach solids: remove it, or damp by mass");

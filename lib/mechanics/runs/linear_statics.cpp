@@ -15,11 +15,17 @@ namespace {
 constexpr double fine_enough = 1e-9;
 constexpr int most_corrections = 10;
 
+/// What carries moves what it carries.
+void expand(const ShellSystem& system, VectorX& moved) {
+  expand_carried(system.carried, system.surfaces, system.reference, reference_configuration(system), moved);
+}
+
 /// What the linear theory leaves unbalanced, by the elements' strains (linear_forces()).
 VectorX unbalanced_by(const ShellSystem& system, const FreeMask& free, const VectorX& external, const VectorX& moved) {
   VectorX internal;
   linear_forces(system, moved, internal);
   VectorX left = external - internal;
+  condense(system, reference_configuration(system), left, nullptr);
   mask(free, left);
   return left;
 }
@@ -36,6 +42,7 @@ AlgebraicError refine(const ShellSystem& system, TangentSolver& solver, BlockMat
     VectorX internal, correction;
     linear_forces(system, moved, internal);
     VectorX left = external - internal;
+    condense(system, reference_configuration(system), left, nullptr);
     mask(solver.free(), left);
     if (!solver.solve(matrix, left, correction, true).solved) {
       return error;
@@ -47,6 +54,7 @@ AlgebraicError refine(const ShellSystem& system, TangentSolver& solver, BlockMat
       return error;
     }
     moved += correction;
+    expand(system, moved);
   }
 }
 
@@ -59,6 +67,8 @@ public:
         solver_(system, settings),
         matrix_(system.pattern) {
     linear_stiffness(system, matrix_);
+    VectorX none = VectorX::Zero(first_freedom(system.node_count()));
+    condense(system, reference_configuration(system), none, &matrix_);
   }
 
 private:
@@ -80,6 +90,7 @@ private:
              nullptr);
     const VectorX& external = forces.external;
     VectorX moved = prescribed_positions(system_, model_, factor);
+    expand(system_, moved);
     const VectorX right = unbalanced_by(system_, solver_.free(), external, moved);
     VectorX solution;
     const TangentSolver::Result solved = solver_.solve(matrix_, right, solution, factored_);
@@ -90,6 +101,7 @@ private:
           "too distorted for double precision");
     }
     moved += solution;
+    expand(system_, moved);
     std::optional<AlgebraicError> error = solved.error;
     if (settings_.solver != Solver::cg) {
       error = refine(system_, solver_, matrix_, external, moved);
@@ -148,6 +160,7 @@ private:
           i < system_.first_solid_node ? Vec3(moved.segment<3>(first_freedom(i) + 3)) : Vec3(Vec3::Zero());
     }
     VectorX left = external - internal;
+    condense(system_, reference_configuration(system_), left, nullptr);
     mask(solver_.free(), left);
     const double scale = std::max(force_norm(system_, external), force_norm(system_, internal));
     state.linear = true;

@@ -13,7 +13,6 @@ namespace {
 constexpr double largest_turn = 0.5;        // rad per iteration
 constexpr std::size_t free_iterations = 6;  // full steps before the line search sets in
 constexpr int most_cuts = 6;                // of an increment
-constexpr int most_cuts_in_contact = 20;    // surfaces that come near each other from far away
 
 bool uses_cg(const RunSettings& settings) { return settings.solver == Solver::cg; }
 
@@ -110,7 +109,7 @@ public:
     }
     result_.valid = result_.stable = result_.linear_converged = true;
     result_.residual = residual_of(now_);
-    result_.converged = !is_moving() && (now_.scale == 0 || result_.residual <= settings_.converge);
+    result_.converged = !is_moving() && (nothing_acts() || result_.residual <= settings_.converge);
     while (!result_.converged && result_.valid && result_.iterations < settings_.newton_max) {
       check_interrupt();
       const bool at_floor = result_.iterations > 0 && is_at_floor();
@@ -143,6 +142,9 @@ private:
     return balance.scale > 0 ? norm / balance.scale : (norm > 0 ? 1.0 : 0.0);
   }
 
+  /// Nothing but round-off.
+  [[nodiscard]] bool nothing_acts() const { return now_.scale <= now_.floor; }
+
   [[nodiscard]] bool is_at_floor() const { return result_.residual * now_.scale <= now_.floor; }
 
   /// At the floor of round-off a residual says nothing about the error any more; the increments still do.
@@ -150,7 +152,7 @@ private:
     if (is_moving()) {
       return false;
     }
-    return result_.residual <= settings_.converge ||
+    return result_.residual <= settings_.converge || nothing_acts() ||
            (is_at_floor() && last_size_ <= largest_round_off * result_.reached) || is_settled();
   }
 

@@ -44,6 +44,14 @@ struct Point {
   Matrix99 derivative;  ///< of P + p d theta, by columns of F
 };
 
+/// factor times the derivative of the cofactors: a column of F enters two of the cross products.
+void add_cofactor_derivative(const Mat3& f, double factor, Matrix99& derivative) {
+  for (int l = 0; l < 3; ++l) {
+    derivative.block<3, 3>(3 * ((l + 2) % 3), 3 * l) -= factor * cross_matrix(f.col((l + 1) % 3));
+    derivative.block<3, 3>(3 * ((l + 1) % 3), 3 * l) += factor * cross_matrix(f.col((l + 2) % 3));
+  }
+}
+
 bool at_point(const SolidElement& e, const Mat3& gradient, double pressure, Point& at, bool with_derivative) {
   const Mat3 f = Mat3::Identity() + gradient;
   const double determinant = f.determinant();
@@ -51,14 +59,13 @@ bool at_point(const SolidElement& e, const Mat3& gradient, double pressure, Poin
     return false;
   }
   const double mu = e.shear;
+  // J - 1 and |F|^2 - 3 from the displacement's gradient, so that small strains keep their digits.
+  const double trace = gradient.trace();
+  at.volume_strain = trace + (trace * trace - (gradient * gradient).trace()) / 2 + gradient.determinant();
+  at.volume_derivative = cofactors(f);
   if (e.law == SolidLaw::neo_hookean) {
     const double lambda = e.bulk_of_displacement + mu / 3;
-    // J - 1 and |F|^2 - 3 from the displacement's gradient, so that small strains keep their digits.
     const double squared = gradient.squaredNorm();
-    const double trace = gradient.trace();
-    const double second = (trace * trace - (gradient * gradient).trace()) / 2;
-    at.volume_strain = trace + second + gradient.determinant();
-    at.volume_derivative = cofactors(f);
     const double on_volume = lambda * at.volume_strain - mu;
     at.energy = mu * (trace + squared / 2 - at.volume_strain) + lambda / 2 * at.volume_strain * at.volume_strain;
     at.stress = mu * (f - at.volume_derivative) + lambda * at.volume_strain * at.volume_derivative;
@@ -67,25 +74,20 @@ bool at_point(const SolidElement& e, const Mat3& gradient, double pressure, Poin
       at.derivative *= mu;
       const Eigen::Map<const Eigen::Matrix<double, 9, 1>> c(at.volume_derivative.data());
       at.derivative += lambda * c * c.transpose();
-      for (int l = 0; l < 3; ++l) {  // columns of F: f_l enters two of the cross products
-        const Mat3 after = cross_matrix(f.col((l + 1) % 3)), before = cross_matrix(f.col((l + 2) % 3));
-        at.derivative.block<3, 3>(3 * ((l + 2) % 3), 3 * l) -= (on_volume + pressure) * after;
-        at.derivative.block<3, 3>(3 * ((l + 1) % 3), 3 * l) += (on_volume + pressure) * before;
-      }
+      add_cofactor_derivative(f, on_volume + pressure, at.derivative);
     }
     return true;
   }
   const double lambda = e.bulk_of_displacement - 2 * mu / 3;
   const Mat3 r = nearest_rotation(f);
   const Mat3 strain = r.transpose() * f - Mat3::Identity();
-  at.volume_strain = strain.trace();
-  at.volume_derivative = r;
-  at.energy = mu * strain.squaredNorm() + lambda / 2 * at.volume_strain * at.volume_strain;
-  at.stress = 2 * mu * (f - r) + lambda * at.volume_strain * r;
+  const double trace_of_strain = strain.trace();
+  at.energy = mu * strain.squaredNorm() + lambda / 2 * trace_of_strain * trace_of_strain;
+  at.stress = 2 * mu * (f - r) + lambda * trace_of_strain * r;
   if (with_derivative) {
     const Mat3 stretch = strain + Mat3::Identity();
     const Mat3 spin = (stretch.trace() * Mat3::Identity() - stretch).inverse();
-    const double on_rotation = lambda * at.volume_strain + pressure - 2 * mu;
+    const double on_rotation = lambda * trace_of_strain - 2 * mu;
     for (int l = 0; l < 3; ++l) {
       for (int j = 0; j < 3; ++j) {
         Mat3 change = Mat3::Zero();
@@ -97,6 +99,7 @@ bool at_point(const SolidElement& e, const Mat3& gradient, double pressure, Poin
         at.derivative.col(3 * l + j) = Eigen::Map<const Eigen::Matrix<double, 9, 1>>(of_stress.data());
       }
     }
+    add_cofactor_derivative(f, pressure, at.derivative);
   }
   return true;
 }
@@ -192,10 +195,10 @@ Mat3 solid_stress(const SolidElement& e, const SolidMotion& motion, bool linear)
     return Mat3::Zero();
   }
   const Mat3 f = Mat3::Identity() + gradient;
-  const Mat3 piola = at.stress + p * at.volume_derivative;
   if (e.law == SolidLaw::corotational) {  // a linear law: stress of the rotated frame, whatever the small strain
-    return piola * at.volume_derivative.transpose();
+    return at.stress * nearest_rotation(f).transpose() + p * Mat3::Identity();
   }
+  const Mat3 piola = at.stress + p * at.volume_derivative;
   return piola * f.transpose() / f.determinant();
 }
 

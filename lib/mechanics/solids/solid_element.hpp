@@ -13,7 +13,9 @@
 /// works by the pressure. M is the mass matrix of the linear functions, S = M less that of their mean: it damps what
 /// the equal order leaves undetermined, and vanishes for a constant pressure. Pressures are positive in tension, and
 /// counted in units of the shear modulus, so that they have no unit and their residual that of a moment.
-///   corotational: W = mu |S - 1|^2 + (K0 - 2 mu / 3) tr(S - 1)^2 / 2, theta = tr(S - 1), F = R S
+///   corotational: W = mu |S - 1|^2 + (K0 - 2 mu / 3) tr(S - 1)^2 / 2, F = R S, theta = J - 1 (with tr(S - 1) a
+///   pressure
+///                 of twice the shear modulus would make any tetrahedron unstable)
 ///   neo_hookean:  W = mu (|F|^2 - 3) / 2 - mu (J - 1) + (K0 + mu / 3) (J - 1)^2 / 2, theta = J - 1
 /// Both are linear elasticity for small strains.
 /// Source: Dohrmann, Bochev 2004, "A stabilized finite element method for the Stokes problem based on polynomial

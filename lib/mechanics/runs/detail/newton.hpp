@@ -10,6 +10,9 @@ namespace tunica {
 /// Round-off may leave this part of a solution open, well below what any mesh does; more and there is no answer.
 inline constexpr double largest_round_off = 1e-3;
 
+/// An increment is halved this often where surfaces would overlap: they come near each other from far away.
+inline constexpr int most_cuts_in_contact = 20;
+
 /// Which freedoms no support holds.
 FreeMask free_freedoms(const ShellSystem& system);
 
