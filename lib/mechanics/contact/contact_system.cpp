@@ -18,6 +18,11 @@ constexpr double first_stiffness = 1e-5;       // of the barrier, of Young's mod
 constexpr double least_stiffness = 1e-8;       // of the barrier, of Young's modulus: where a contact opens
 constexpr double stiffness_of_pressure = 0.1;  // of the barrier, of the mean pressure
 constexpr double blunt = 0.5;                  // of the mean pressure: above, the barrier is made softer
+constexpr double hardening = 4;                // of the barrier, where a state of rest overlaps
+/// Part of the resolution below which the law goes on as a straight line, also where surfaces overlap on the way.
+constexpr double straight_below = 0.1;
+/// Part of both half walls up to which shells may overlap on the way.
+constexpr double largest_overlap = 0.8;
 constexpr double elastic_slip_of_wall = 1e-3;  // slip at which friction is fully there
 constexpr double sag_of_resolution = 0.02;     // what a surface may bend between samples
 constexpr int least_level = 4, most_level = 32;
@@ -338,7 +343,10 @@ double ContactSystem::wanted_stiffness(std::size_t c) const {
 bool ContactSystem::sharpen() {
   bool changed = false;
   for (std::size_t c = 0; c < contacts_.size(); ++c) {
-    if (mean_pressure_[c] > 0 && stiffness_[c] > blunt * mean_pressure_[c]) {
+    if (smallest_gap_[c] <= 0) {
+      stiffness_[c] *= hardening;
+      changed = true;
+    } else if (mean_pressure_[c] > 0 && stiffness_[c] > blunt * mean_pressure_[c]) {
       changed = changed || wanted_stiffness(c) < stiffness_[c];
       stiffness_[c] = std::min(stiffness_[c], wanted_stiffness(c));
     }
@@ -369,6 +377,14 @@ double ContactSystem::offset(const Group& group, std::size_t other) const {
     nearest = std::min(nearest, (p - reference_[i]).norm());
   }
   return std::min(walls, own_distance * nearest - group.resolution);
+}
+
+double ContactSystem::deepest(const Group& group, std::size_t other) const {
+  if (group.other.rigid) {
+    return offset(group, 0) + shapes_[group.other.index].deepest();
+  }
+  const double walls = largest_overlap * offset(group, other);
+  return walls > 0 ? walls : group.resolution / (4 * contacts_[group.contact].resolution);
 }
 
 bool ContactSystem::excluded(const Group& group, std::size_t other) const {
@@ -584,6 +600,7 @@ bool ContactSystem::add(const Configuration& configuration, VectorX& external, B
   const auto near = near_faces(maps, 0);
   const auto touches = all_touches(maps, near);
   std::vector<double> pressed(contacts_.size(), 0), squared(contacts_.size(), 0);
+  smallest_gap_.assign(contacts_.size(), infinity);
   for (std::size_t g = 0; g < groups_.size(); ++g) {
     Group& group = groups_[g];
     const Contact& contact = contacts_[group.contact];
@@ -608,13 +625,15 @@ bool ContactSystem::add(const Configuration& configuration, VectorX& external, B
       if (t.gap >= group.resolution) {
         continue;
       }
-      if (!(t.gap > 0)) {
+      if (t.gap < -deepest(group, t.face)) {
         return false;
       }
       const Vec3 x = maps[group.face].point(sample.weights);
       any = true;
-      const double s = t.gap / group.resolution;
-      const double law = barrier * (1 - s) * (1 - s) / s;
+      smallest_gap_[group.contact] = std::min(smallest_gap_[group.contact], t.gap);
+      const double s = std::max(t.gap / group.resolution, straight_below);
+      const double straight = barrier * (1 / (s * s) - 1);  // the derivative there
+      const double law = barrier * (1 - s) * (1 - s) / s + (s - t.gap / group.resolution) * straight;
       const double area = group.weight * sample.area;
       pressed[group.contact] += area * law;
       squared[group.contact] += area * law * law;
@@ -631,7 +650,10 @@ bool ContactSystem::add(const Configuration& configuration, VectorX& external, B
       const Vec3 force = area * traction;
       const double expected =
           sample.pressure < 0 ? law : std::clamp(sample.pressure, law / largest_expectation, law * largest_expectation);
-      const double slope = (expected + 2 * barrier * (1 - s)) / t.gap;
+      // The derivative of the law on its straight part; else that of p g = const (1 - g / d)^2 at the pressure
+      // expected.
+      const double slope = t.gap < straight_below * group.resolution ? straight / group.resolution
+                                                                     : (expected + 2 * barrier * (1 - s)) / t.gap;
       if (record_ != nullptr) {
         ContactResult& result = (*record_)[group.contact];
         const bool on_first = !contact.between[0].rigid && contact.between[0].index == face.body;

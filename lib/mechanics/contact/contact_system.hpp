@@ -15,7 +15,9 @@
 /// fiftieth of d at most: the number of points follows). The stiffness is a part of the mean pressure of the contact,
 /// found on the way: so the gap is a small part of d, and d alone says how exact the answer is. The pressure counts as
 /// an unknown of its own (a primal-dual interior point method, eliminated at each point): the forces follow p(g), the
-/// tangent takes the pressure that the last one expects. States in which surfaces touch or overlap are refused.
+/// tangent takes the pressure that the last one expects. Below a tenth of d the law goes on as a straight
+/// line, so that surfaces may overlap on the way to a state, and the first touch cuts no step short; a state of rest in
+/// which they do is refused, and the barrier hardened.
 ///
 /// Friction by Coulomb's law with elastic slip: the traction is (friction) p u / e along the slip u since the contact
 /// began, e a thousandth of the wall, and u is cut to e: it also holds at rest, and depends on the path.
@@ -46,7 +48,8 @@ public:
   /// is sampled as finely as its curvature asks in this configuration.
   void set_step(double from, double to, const Configuration& configuration);
 
-  /// Where Newton's method has come to rest: makes the barrier softer against the pressures found.
+  /// Where Newton's method has come to rest: makes the barrier softer against the pressures found, or harder where
+  /// surfaces still overlap.
   /// @return whether that changed anything, so that Newton's method has to go on
   bool sharpen();
   /// Of the rigid bodies' motion in the step, what is still to come.
@@ -60,7 +63,7 @@ public:
 
   /// Adds forces; with a tangent their derivative, and to the forces what the rest of the rigid bodies' motion adds to
   /// first order.
-  /// @return false where surfaces touch or overlap
+  /// @return false where surfaces overlap by more than can be mended
   bool add(const Configuration& configuration, VectorX& external, BlockMatrix* tangent);
 
   /// The increment (6 per node) that was followed from where the last tangent was made: the next one takes the
@@ -129,6 +132,8 @@ private:
   void refine(const Maps& maps);
   [[nodiscard]] double wanted_stiffness(std::size_t contact) const;
   [[nodiscard]] double offset(const Group& group, std::size_t other) const;
+  /// How far surfaces may overlap on the way to a state, mm.
+  [[nodiscard]] double deepest(const Group& group, std::size_t other) const;
   [[nodiscard]] bool excluded(const Group& group, std::size_t other) const;
   /// For every group towards a body that deforms: the faces that come within its reach and `more` (mm).
   [[nodiscard]] std::vector<std::vector<std::size_t>> near_faces(const Maps& maps, double more) const;
@@ -156,6 +161,7 @@ private:
   std::vector<Group> groups_;
   std::vector<double> young_;          ///< MPa, per contact, of the softer body
   std::vector<double> stiffness_;      ///< MPa, per contact, of the barrier
+  std::vector<double> smallest_gap_;   ///< mm, per contact, of the samples at the last forces
   std::vector<double> mean_pressure_;  ///< MPa, per contact, of the last forces, weighted by themselves
   std::vector<std::array<Index, 2>> pairs_;
   Configuration accepted_;

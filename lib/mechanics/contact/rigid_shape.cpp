@@ -227,6 +227,8 @@ bool RigidShape::moves_to(const RigidShape& then) const {
          angle_ != then.angle_ || factor_ != then.factor_;
 }
 
+double RigidShape::deepest() const { return std::holds_alternative<RigidPlane>(body_->shape) ? infinity : radius_ / 2; }
+
 Vec3 RigidShape::position() const { return convex() ? Vec3((first_ + second_) / 2) : shift_; }
 
 double RigidShape::largest_curvature() const {

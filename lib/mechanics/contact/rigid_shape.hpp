@@ -37,6 +37,9 @@ public:
 
   [[nodiscard]] bool moves_to(const RigidShape& then) const;
 
+  /// How deep inside the distance still leads out on the right side, mm.
+  [[nodiscard]] double deepest() const;
+
   [[nodiscard]] Vec3 position() const;
 
   /// The largest curvature of the body over all times, 1 / mm; of a mesh that of its sampling, unknown: 0.
