@@ -46,3 +46,40 @@ def disc(rings):
                 if k < ring - 1:
                     triangles.append((c, b, first[ring - 1] + (sector * (ring - 1) + k + 1) % inner))
     return np.array(points), np.array(triangles)
+
+
+def ball(splits):
+    """The unit sphere: an octahedron split `splits` times, 8 x 4^splits triangles. @return points, triangles"""
+    points = [np.array(p, float) for p in ((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1))]
+    triangles = [(0, 2, 4), (2, 1, 4), (1, 3, 4), (3, 0, 4), (2, 0, 5), (1, 2, 5), (3, 1, 5), (0, 3, 5)]
+    for _ in range(splits):
+        middles, finer = {}, []
+
+        def middle(i, j):
+            key = (min(i, j), max(i, j))
+            if key not in middles:
+                between = points[i] + points[j]
+                middles[key] = len(points)
+                points.append(between / np.linalg.norm(between))
+            return middles[key]
+
+        for a, b, c in triangles:
+            ab, bc, ca = middle(a, b), middle(b, c), middle(c, a)
+            finer += [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+        triangles = finer
+    return np.array(points), np.array(triangles)
+
+
+def tube(around, along, radius, length):
+    """A tube about z from -length / 2, rows turned by half a step. @return points, triangles, normals (outward)"""
+    row, k = np.meshgrid(np.arange(along + 1), np.arange(around), indexing="ij")
+    angle = (2 * np.pi * (k + (row % 2) / 2) / around).ravel()
+    normals = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
+    points = radius * normals + np.outer(length * (row.ravel() / along - 0.5), [0, 0, 1])
+    triangles = []
+    for i in range(along):
+        for j in range(around):
+            a, b = i * around + j, i * around + (j + 1) % around
+            c, d = a + around, b + around
+            triangles += [(a, b, c), (b, d, c)] if i % 2 == 0 else [(a, b, d), (a, d, c)]
+    return points, np.array(triangles), normals
