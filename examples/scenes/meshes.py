@@ -2,10 +2,11 @@
 import numpy as np
 
 
-def write_shell(path, vertices, triangles, normals):
-    rows = np.hstack([np.asarray(vertices, float), np.asarray(normals, float)])
+def write_shell(path, vertices, triangles, normals, **properties):
+    """`properties`: further numbers at each vertex."""
+    rows = np.column_stack([vertices, normals, *properties.values()])
     header = ["ply", "format binary_little_endian 1.0", "comment units mm", f"element vertex {len(rows)}"]
-    header += [f"property double {name}" for name in ("x", "y", "z", "nx", "ny", "nz")]
+    header += [f"property double {name}" for name in ("x", "y", "z", "nx", "ny", "nz", *properties)]
     header += [f"element face {len(triangles)}", "property list uchar int vertex_indices", "end_header\n"]
     faces = np.zeros(len(triangles), dtype=[("count", "u1"), ("corners", "<i4", 3)])
     faces["count"], faces["corners"] = 3, triangles
