@@ -120,7 +120,9 @@ def angioplasty(folder):
     folder.chart(curves, "--title", "The lumen along the vessel", "--x-label", "along the axis, mm", "--y-label",
                  "radius of the lumen, mm")
     for name, (stations, radius) in curves.items():
-        print(f"{name}: narrowest lumen {radius.min():.2f} mm, wall's middle there {middle[name][np.argmin(radius)]:.2f} mm")
+        centre = len(stations) // 2
+        print(f"{name}: radius of the lumen in the middle {radius[centre]:.2f} mm, of the wall's middle surface there "
+              f"{middle[name][centre]:.2f} mm")
     with h5py.File(folder.out / "scene.hdf") as file:
         state = int(np.argmin(np.abs(file["tunica/history/load_factor"][:] - 0.5)))
         pressure = file["tunica/tetrahedra/solid_pressure"][state]
