@@ -6,7 +6,7 @@
 RESULT.hdf comes from tunica-simulate with --export pvd, so that RESULT_0000.vtu and its like lie beside it. One panel for
 each place in --at (load factor, or seconds of a motion: the nearest state), left to right, then down. Colours are
 the von Mises stress, from 0 (blue) to --most MPa (red; default: what 1 % of the points of all panels pass). Rigid bodies
-are grey. --cut y leaves what lies at y < 0; lighter is what the cut shows of the tetrahedra. Needs python3-vtk9 and python3-h5py.
+are grey. --cut y leaves what lies at y < 0. Shells are drawn a little before what they lie on. Needs python3-vtk9 and python3-h5py.
 """
 import argparse
 import struct
@@ -44,7 +44,7 @@ def deformed(path):
 
 
 def surface(data, cut):
-    """@return points, normals, triangles, and at the points `von_mises` or None"""
+    """@return points, normals, triangles, and at the points which are a shell's and `von_mises` (None: it has neither)"""
     if cut:
         plane = vtk.vtkPlane()
         plane.SetNormal(*np.eye(3)["xyz".index(cut)])
@@ -61,7 +61,8 @@ def surface(data, cut):
     stress = data.GetPointData().GetArray("von_mises")
     triangles = vtk_to_numpy(data.GetPolys().GetData()).reshape(-1, 4)[:, 1:]
     return (vtk_to_numpy(data.GetPoints().GetData()).astype(float), vtk_to_numpy(data.GetPointData().GetNormals()).astype(float),
-            triangles, None if stress is None else vtk_to_numpy(stress).astype(float))
+            triangles, None if stress is None else np.isfinite(vtk_to_numpy(data.GetPointData().GetArray("thickness"))),
+            None if stress is None else vtk_to_numpy(stress).astype(float))
 
 
 def in_unit(text, unit=1.0):
@@ -144,8 +145,10 @@ class Panel:
         self.colour = np.ones((self.height * self.width, 3))
         self.depth = np.full(self.height * self.width, -np.inf)
 
-    def add(self, points, normals, triangles, colours):
+    def add(self, points, normals, triangles, colours, lift=0.0):
+        """@param lift  towards the viewer, mm: what lies on something else is to be seen"""
         seen = (points - self.centre) @ self.frame.T * self.scale + [self.width / 2, self.height / 2, 0]
+        seen[:, 2] += lift * self.scale
         facing = normals @ self.frame.T
         flat = seen[triangles][:, :, :2]
         longest = np.max(np.linalg.norm(flat - np.roll(flat, 1, axis=1), axis=2), axis=1)
@@ -226,12 +229,13 @@ def main():
     spread = high - low
     scale = 0.7 * min(PANEL[0] / spread[0], PANEL[1] / spread[1])
     panels = []
-    for state, (points, normals, triangles, stress) in zip(states, drawn):
+    for state, (points, normals, triangles, of_shell, stress) in zip(states, drawn):
         panel = Panel(frame, (low + high) / 2 @ frame, scale)
         part = np.clip(stress / most, 0, 1)
-        panel.add(points, normals, triangles, np.stack([np.interp(part, PLACES, c) for c in COLOURS.T], axis=1))
+        panel.add(points, normals, triangles, np.stack([np.interp(part, PLACES, c) for c in COLOURS.T], axis=1),
+                  0.006 * np.max(spread) * of_shell)
         for body in rigid_bodies(scene, places[state], 0.5 * np.linalg.norm(spread)):
-            points, normals, triangles, _ = surface(body, None)
+            points, normals, triangles, *_ = surface(body, None)
             panel.add(points, normals, triangles, np.tile(GREY, (len(points), 1)))
         panels.append(panel.picture())
     columns = 2 if len(panels) > 3 else len(panels)
