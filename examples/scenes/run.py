@@ -82,7 +82,7 @@ def liver(folder):
         curves[name] = depth[:deepest], force[:deepest]
     folder.chart(curves, "--title", "A liver with and without its capsule", "--x-label", "depth, mm", "--y-label",
                  "force on the tool, N")
-    for at in (2, 4, 8):
+    for at in (4, 6, 8):
         with_it, without = (float(np.interp(at, *curves[name])) for name in ("with-capsule", "without"))
         print(f"force at {at} mm: {with_it:.3f} N with the capsule, {without:.3f} N without: {100 * (with_it / without - 1):+.0f} %")
     print(f"balance of forces: {covered['balance']['force']:.1e} with, {bare['balance']['force']:.1e} without")
