@@ -1,0 +1,248 @@
+#!/usr/bin/python3
+"""Pictures of a result with shells, tetrahedra and rigid bodies, cut open, without a display.
+
+    draw.py RESULT.hdf OUT.png --at 0 0.25 0.5 1 [--cut y] [--view 0.4 1 0.5] [--up 0 0 1] [--most 0.2]
+
+RESULT.hdf comes from tunica-simulate with --export pvd, so that RESULT_0000.vtu and its like lie beside it. One panel for
+each place in --at (load factor, or seconds of a motion: the nearest state), left to right, then down. Colours are
+the von Mises stress, from 0 (blue) to --most MPa (red; default: what 1 % of the points of all panels pass). Rigid bodies
+are grey. --cut y leaves what lies at y < 0. Shells are drawn a little before what they lie on. Needs python3-vtk9 and python3-h5py.
+"""
+import argparse
+import struct
+import tomllib
+import zlib
+
+import h5py
+import numpy as np
+import vtk
+from vtk.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+
+PANEL = (560, 420)  # pixels
+FINER = 2           # samples per pixel and direction
+COLOURS = np.array([(0.15, 0.25, 0.55), (0.2, 0.6, 0.65), (0.98, 0.85, 0.4), (0.75, 0.12, 0.15)])
+PLACES = (0, 0.35, 0.7, 1)
+GREY = (0.62, 0.62, 0.66)
+
+
+def filtered(algorithm, data):
+    algorithm.SetInputData(data)
+    algorithm.Update()
+    return algorithm.GetOutput()
+
+
+def deformed(path):
+    reader = vtk.vtkXMLUnstructuredGridReader()
+    reader.SetFileName(path)
+    reader.Update()
+    grid = reader.GetOutput()
+    points = vtk_to_numpy(grid.GetPoints().GetData()) + vtk_to_numpy(grid.GetPointData().GetArray("displacement"))
+    moved = vtk.vtkPoints()
+    moved.SetData(numpy_to_vtk(points, deep=True))
+    grid.SetPoints(moved)
+    return grid
+
+
+def surface(data, cut):
+    """@return points, normals, triangles, and at the points which are a shell's and `von_mises` (None: it has neither)"""
+    if cut:
+        plane = vtk.vtkPlane()
+        plane.SetNormal(*np.eye(3)["xyz".index(cut)])
+        clip = vtk.vtkClipDataSet() if data.IsA("vtkUnstructuredGrid") else vtk.vtkClipPolyData()
+        clip.SetClipFunction(plane)
+        clip.InsideOutOn()
+        data = filtered(clip, data)
+    if data.IsA("vtkUnstructuredGrid"):
+        data = filtered(vtk.vtkGeometryFilter(), data)
+    data = filtered(vtk.vtkTriangleFilter(), data)
+    normals = vtk.vtkPolyDataNormals()
+    normals.SetFeatureAngle(40)
+    data = filtered(normals, data)
+    stress = data.GetPointData().GetArray("von_mises")
+    triangles = vtk_to_numpy(data.GetPolys().GetData()).reshape(-1, 4)[:, 1:]
+    return (vtk_to_numpy(data.GetPoints().GetData()).astype(float), vtk_to_numpy(data.GetPointData().GetNormals()).astype(float),
+            triangles, None if stress is None else np.isfinite(vtk_to_numpy(data.GetPointData().GetArray("thickness"))),
+            None if stress is None else vtk_to_numpy(stress).astype(float))
+
+
+def in_unit(text, unit=1.0):
+    return float(text.removesuffix("mm").removesuffix("m")) * (1 if text.endswith("mm") else 1000) * unit
+
+
+def at_place(value, place, read):
+    """A quantity of the scene, or a table of [place, quantity]."""
+    if isinstance(value, list) and isinstance(value[0], list):
+        rows = [(float(str(t).removesuffix("s")), read(v)) for t, v in value]
+        times = [t for t, _ in rows]
+        return np.array([np.interp(place, times, c) for c in np.array([np.atleast_1d(v) for _, v in rows]).T])
+    return np.atleast_1d(read(value))
+
+
+def lengths(value):
+    return np.array([in_unit(v) for v in value])
+
+
+def turned_about(axis, profile):
+    """Polydata of a profile (along the axis, radius) turned about a unit vector through the origin."""
+    side = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+    side /= np.linalg.norm(side)
+    other = np.cross(axis, side)
+    around = 2 * np.pi * np.arange(48) / 48
+    rings = np.array([[h * axis + r * (np.cos(a) * side + np.sin(a) * other) for a in around] for h, r in profile])
+    points, cells = vtk.vtkPoints(), vtk.vtkCellArray()
+    points.SetData(numpy_to_vtk(rings.reshape(-1, 3), deep=True))
+    for i in range(len(profile) - 1):
+        for k in range(48):
+            cells.InsertNextCell(4)
+            for j in (48 * i + k, 48 * i + (k + 1) % 48, 48 * (i + 1) + (k + 1) % 48, 48 * (i + 1) + k):
+                cells.InsertCellPoint(j)
+    data = vtk.vtkPolyData()
+    data.SetPoints(points)
+    data.SetPolys(cells)
+    return data
+
+
+def rigid_bodies(scene, place, size):
+    """Polydata of the spheres, capsules and cylinders at a load factor or time; of planes a square."""
+    bodies = []
+    for rigid in scene.get("rigid", []):
+        moved = at_place(rigid["motion"], place, lengths) if "motion" in rigid else np.zeros(3)
+        shape = rigid.get("shape")
+        if shape is None:
+            continue
+        if shape == "plane":
+            axis, middle = np.array(rigid["normal"], float), at_place(rigid["point"], place, lengths) + moved
+            profile = [(0, 0), (0, size)]
+        else:
+            radius = at_place(rigid["radius"], place, in_unit)[0]
+            ends = [at_place(rigid[key], place, lengths) + moved for key in (("from", "to") if shape != "sphere" else ("centre", "centre"))]
+            middle, axis = (ends[0] + ends[1]) / 2, ends[1] - ends[0]
+            half = np.linalg.norm(axis) / 2
+            axis = axis / (2 * half) if half > 0 else np.array([0.0, 0.0, 1.0])
+            angles = np.linspace(0, np.pi / 2, 13)
+            if shape == "cylinder":
+                profile = [(-half, 0), (-half, radius), (half, radius), (half, 0)]
+            else:
+                profile = ([(-half - radius * np.cos(a), radius * np.sin(a)) for a in angles]
+                           + [(half + radius * np.cos(a), radius * np.sin(a)) for a in angles[::-1]])
+        body = turned_about(axis, profile)
+        points = vtk_to_numpy(body.GetPoints().GetData())
+        points += middle
+        bodies.append(body)
+    return bodies
+
+
+def barycentric(n):
+    return np.array([(i / n, j / n, (n - i - j) / n) for i in range(n + 1) for j in range(n + 1 - i)])
+
+
+class Panel:
+    """Parallel projection of triangles onto a raster with depths."""
+
+    def __init__(self, frame, centre, scale):
+        self.frame, self.centre, self.scale = frame, centre, scale * FINER
+        self.width, self.height = PANEL[0] * FINER, PANEL[1] * FINER
+        self.colour = np.ones((self.height * self.width, 3))
+        self.depth = np.full(self.height * self.width, -np.inf)
+
+    def add(self, points, normals, triangles, colours, lift=0.0):
+        """@param lift  towards the viewer, mm: what lies on something else is to be seen"""
+        seen = (points - self.centre) @ self.frame.T * self.scale + [self.width / 2, self.height / 2, 0]
+        seen[:, 2] += lift * self.scale
+        facing = normals @ self.frame.T
+        flat = seen[triangles][:, :, :2]
+        longest = np.max(np.linalg.norm(flat - np.roll(flat, 1, axis=1), axis=2), axis=1)
+        pieces = 2 ** np.ceil(np.log2(np.maximum(1.4 * longest, 1))).astype(int)
+        for n in np.unique(pieces):
+            weights = barycentric(n)
+            some = triangles[pieces == n]
+            for part in np.array_split(some, max(1, len(some) * len(weights) // 2000000)):
+                self._put(np.einsum("sk,tkc->tsc", weights, seen[part]).reshape(-1, 3),
+                          np.einsum("sk,tkc->tsc", weights, facing[part]).reshape(-1, 3),
+                          np.einsum("sk,tkc->tsc", weights, colours[part]).reshape(-1, 3))
+
+    def _put(self, seen, facing, colours):
+        x, y = np.floor(seen[:, 0]).astype(int), np.floor(seen[:, 1]).astype(int)
+        inside = (x >= 0) & (x < self.width) & (y >= 0) & (y < self.height)
+        pixel = (self.height - 1 - y[inside]) * self.width + x[inside]
+        depth = seen[inside, 2]
+        order = np.lexsort((depth, pixel))
+        last = np.flatnonzero(np.append(np.diff(pixel[order]) > 0, True)) if len(order) else []
+        best = order[last]
+        nearer = depth[best] > self.depth[pixel[best]]
+        best = best[nearer]
+        normal = facing[inside][best]
+        normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-12)[:, None]
+        normal *= np.where(normal[:, 2:] < 0, -1, 1)
+        light = np.array([-0.35, 0.45, 0.82])
+        shade = 0.35 + 0.65 * np.clip(normal @ (light / np.linalg.norm(light)), 0, 1)
+        self.depth[pixel[best]] = depth[best]
+        self.colour[pixel[best]] = colours[inside][best] * shade[:, None]
+
+    def picture(self):
+        image = self.colour.reshape(PANEL[1], FINER, PANEL[0], FINER, 3).mean(axis=(1, 3))
+        image[0], image[-1], image[:, 0], image[:, -1] = 0.85, 0.85, 0.85, 0.85
+        return image
+
+
+def write_png(path, image):
+    rows = (255 * np.clip(image, 0, 1) + 0.5).astype(np.uint8)
+    raw = b"".join(b"\0" + row.tobytes() for row in rows)
+
+    def chunk(kind, data):
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    with open(path, "wb") as file:
+        file.write(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", rows.shape[1], rows.shape[0], 8, 2, 0, 0, 0))
+                   + chunk(b"IDAT", zlib.compress(raw, 9)) + chunk(b"IEND", b""))
+
+
+def view_frame(direction, up):
+    out = np.array(direction, float) / np.linalg.norm(direction)
+    right = np.cross(up, out)
+    right /= np.linalg.norm(right)
+    return np.array([right, np.cross(out, right), out])
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("result")
+    parser.add_argument("out")
+    parser.add_argument("--at", type=float, nargs="+", required=True)
+    parser.add_argument("--cut", choices=["x", "y", "z"])
+    parser.add_argument("--view", type=float, nargs=3, default=[0.4, 1, 0.5])
+    parser.add_argument("--up", type=float, nargs=3, default=[0, 0, 1])
+    parser.add_argument("--most", type=float)
+    given = parser.parse_args()
+
+    with h5py.File(given.result) as file:
+        places = file["tunica/history/time"][:]
+        text = file["tunica/scene"][()]
+        scene = tomllib.loads(text.decode() if isinstance(text, bytes) else text)
+    states = [int(np.argmin(np.abs(places - place))) for place in given.at]
+    grids = [deformed(given.result.removesuffix(".hdf") + "_%04d.vtu" % state) for state in states]
+    drawn = [surface(grid, given.cut) for grid in grids]
+    most = given.most or max(float(np.quantile(np.concatenate([stress for *_, stress in drawn]), 0.99)), 1e-9)
+    frame = view_frame(given.view, given.up)
+    seen = np.concatenate([points for points, *_ in drawn]) @ frame.T
+    low, high = seen.min(axis=0), seen.max(axis=0)
+    spread = high - low
+    scale = 0.7 * min(PANEL[0] / spread[0], PANEL[1] / spread[1])
+    panels = []
+    for state, (points, normals, triangles, of_shell, stress) in zip(states, drawn):
+        panel = Panel(frame, (low + high) / 2 @ frame, scale)
+        part = np.clip(stress / most, 0, 1)
+        panel.add(points, normals, triangles, np.stack([np.interp(part, PLACES, c) for c in COLOURS.T], axis=1),
+                  0.006 * np.max(spread) * of_shell)
+        for body in rigid_bodies(scene, places[state], 0.5 * np.linalg.norm(spread)):
+            points, normals, triangles, *_ = surface(body, None)
+            panel.add(points, normals, triangles, np.tile(GREY, (len(points), 1)))
+        panels.append(panel.picture())
+    columns = 2 if len(panels) > 3 else len(panels)
+    rows = [np.concatenate(panels[i:i + columns], axis=1) for i in range(0, len(panels), columns)]
+    write_png(given.out, np.concatenate(rows, axis=0))
+    print(f"{given.out}: at " + ", ".join("%.4g" % places[s] for s in states) + f"; red is {1000 * most:.3g} kPa")
+
+
+if __name__ == "__main__":
+    main()
