@@ -3,6 +3,7 @@
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/core/threads.hpp"
+#include "tunica/shell/patch/shape_function.hpp"
 
 #include <fmt/format.h>
 
@@ -112,6 +113,25 @@ void add_block(BlockMatrix& matrix, Index row, Index column, const Matrix6& bloc
   }
 }
 
+/// The paper's rule: the force goes to the corners by barycentric coordinates, and its part across the facet makes
+/// moments there by the shape function, (C^-1)' w(x, y). Source: Comas, Duriez, Cotin 2010, section 2. Limits: the
+/// moments are not in balance with the forces.
+Vector18 paper_transfer(const PatchMap& map, const Vec2& at, const Vec3& force) {
+  const Vec3 origin = map.points().col(0), e1 = map.points().col(1) - origin, e2 = map.points().col(2) - origin;
+  const Vec3 x = e1.normalized(), z = e1.cross(e2).normalized(), y = z.cross(x);
+  const PlaneTriangle triangle{e1.norm(), e2.dot(x), e2.dot(y)};
+  const Vec3 flat = at[0] * e1 + at[1] * e2;
+  const Vector9 values =
+      inverse_shape_matrix(triangle).transpose() * (force.dot(z) * monomials(flat.dot(x), flat.dot(y)));
+  const Vec3 shares(1 - at[0] - at[1], at[0], at[1]);
+  Vector18 on_nodes;
+  for (int k = 0; k < 3; ++k) {
+    on_nodes.segment<3>(6 * k) = shares[k] * force;
+    on_nodes.segment<3>(6 * k + 3) = values[3 * k + 1] * x + values[3 * k + 2] * y;  // by dw/dy and -dw/dx
+  }
+  return on_nodes;
+}
+
 /// What the samples of a face do to one other face.
 struct Other {
   PatchMap::Points forces = PatchMap::Points::Zero();
@@ -207,6 +227,14 @@ ContactSystem::ContactSystem(const Model& model, Surfaces surfaces, std::vector<
   shapes_before_ = shapes_end_ = shapes_;
   accepted_ = {std::vector<Vec3>(reference_.size(), Vec3::Zero()),
                std::vector<Eigen::Quaterniond>(reference_.size(), Eigen::Quaterniond::Identity())};
+  for (const Contact& contact : contacts_) {
+    for (const ContactParty& party : contact.between) {
+      for (std::size_t f = 0; !contact.curved && !party.rigid && f < surfaces_.faces.size(); ++f) {
+        SurfaceFace& face = surfaces_.faces[f];
+        face.curved = face.curved && face.body != party.index;
+      }
+    }
+  }
   make_groups();
   const Maps maps(surfaces_, reference_, accepted_);
   refine(maps);
@@ -618,6 +646,7 @@ bool ContactSystem::add(const Configuration& configuration, VectorX& external, B
     PatchMap::Points on_samples = PatchMap::Points::Zero();  // without what the rest of a motion adds
     PatchMap::Matrix27 stiffness = PatchMap::Matrix27::Zero();
     std::map<std::size_t, Other> others;
+    Vector18 by_the_paper = Vector18::Zero();
     bool any = false;
     for (std::size_t i = 0; i < group.samples.size(); ++i) {
       Sample& sample = group.samples[i];
@@ -709,6 +738,9 @@ bool ContactSystem::add(const Configuration& configuration, VectorX& external, B
         }
       }
       forces += all * sample.weights.transpose();
+      if (!contact.consistent) {
+        by_the_paper += paper_transfer(maps[group.face], sample.at, all);
+      }
       if (t.face != SIZE_MAX) {
         Other& other = others[t.face];
         other.forces -= force * t.weights.transpose();
@@ -730,7 +762,7 @@ bool ContactSystem::add(const Configuration& configuration, VectorX& external, B
       continue;
     }
     PatchMap& map = maps.linearised(group.face);
-    const Vector18 on_nodes = map.to_nodes(forces);
+    const Vector18 on_nodes = contact.consistent ? map.to_nodes(forces) : by_the_paper;
     for (int k = 0; k < 3; ++k) {
       external.segment<6>(first_freedom(face.nodes[k])) += on_nodes.segment<6>(6 * k);
     }
@@ -820,6 +852,9 @@ void ContactSystem::accept(const Configuration& configuration) {
 }
 
 bool ContactSystem::is_certain(const Configuration& configuration) const {
+  if (std::any_of(smallest_gap_.begin(), smallest_gap_.end(), [](double gap) { return gap <= 0; })) {
+    return false;
+  }
   const Maps before(surfaces_, reference_, accepted_);
   const Maps now(surfaces_, reference_, configuration);
   // Whatever comes near on the way is near at one end within what moves.

@@ -149,7 +149,7 @@ private:
   [[nodiscard]] double lower_gap(const Group& group, const std::vector<std::size_t>& near, const Maps& maps,
                                  double upper) const;
 
-  const Surfaces surfaces_;
+  Surfaces surfaces_;
   const std::vector<Vec3> reference_;
   const std::vector<Contact> contacts_;
   std::vector<RigidShape> shapes_;         ///< now

@@ -109,7 +109,7 @@ public:
     }
     result_.valid = result_.stable = result_.linear_converged = true;
     result_.residual = residual_of(now_);
-    result_.converged = !is_moving() && (nothing_acts() || result_.residual <= settings_.converge);
+    result_.converged = !is_moving() && (nothing_acts() || result_.residual <= settings_.converge) && !sharpened();
     while (!result_.converged && result_.valid && result_.iterations < settings_.newton_max) {
       check_interrupt();
       const bool at_floor = result_.iterations > 0 && is_at_floor();
@@ -121,17 +121,25 @@ public:
         result_.valid = advance();
         result_.converged = result_.valid && at_rest();
       }
-      if (result_.converged && system_.contact && system_.contact->sharpen()) {
+      if (result_.converged && sharpened()) {
         result_.converged = false;
-        now_ = balance_(configuration_, nullptr, {});
-        tangent_is_current_ = false;
-        result_.residual = residual_of(now_);
       }
     }
     return result_;
   }
 
 private:
+  /// Contact follows another barrier from here.
+  bool sharpened() {
+    if (!system_.contact || !system_.contact->sharpen()) {
+      return false;
+    }
+    now_ = balance_(configuration_, nullptr, {});
+    tangent_is_current_ = false;
+    result_.residual = residual_of(now_);
+    return true;
+  }
+
   /// Prescribed displacements or rigid bodies have not come to the end of the step.
   [[nodiscard]] bool is_moving() const { return left_ > 0 || (system_.contact && system_.contact->left() > 0); }
 
@@ -244,11 +252,6 @@ private:
       }
       tangent_is_current_ = more && trial == 0;
       now_ = tangent_is_current_ ? linearised() : balance_(configuration_, nullptr, {});
-      if (getenv("TUNICA_SHOW"))
-        fprintf(stderr, "it %zu trial %d length %g valid %d residual %g size %g left %g stable %d\n",
-                result_.iterations, trial, length, int(now_.valid), now_.valid ? residual_of(now_) : 0.,
-                increment_size(system_, increment_), system_.contact ? system_.contact->left() : 0.,
-                int(result_.stable));
       if ((left_ > 0 && !system_.contact) || trial == most_trials) {
         break;
       }

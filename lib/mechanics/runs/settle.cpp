@@ -84,6 +84,11 @@ public:
       check_interrupt();
       result_.residual = now_.scale > 0 ? norm_ / now_.scale : 0;
       const bool at_rest = result_.residual <= settings_.converge || norm_ <= now_.floor;
+      if (at_rest && positive_without_ && system_.contact && system_.contact->sharpen()) {
+        now_ = balance_(configuration_, &matrix_, {});
+        norm_ = norm_of(now_);
+        continue;
+      }
       if (at_rest && positive_without_) {
         result_.settled = true;
         return result_;
