@@ -306,9 +306,8 @@ TEST(SolidPatch, LinearDisplacementsAreExact) {
   }
 }
 
-/// The volume strain of the co-rotational law, trace(S - 1), is of second order in a rotation that the neighbours do
-/// not follow: under a pressure above 2 mu it makes the inside buckle, that of the neo-Hookean law never.
-TEST(SolidPatch, TheCorotationalLawIsStableUpToAPressureOfTwiceTheShearModulus) {
+/// With trace(S - 1) for its volume strain the co-rotational law would buckle inside under twice its shear modulus.
+TEST(SolidPatch, PressureDoesNotBuckleTheInside) {
   constexpr double poisson = 0.4999;
   const auto squeezed = [&](SolidLaw law, double pressure, std::vector<double> factors) {
     Model model = one_solid(make_block(4, 4, 4, [](const Vec3& u) { return Vec3(4 * u); }), 1, poisson, law);
@@ -319,19 +318,8 @@ TEST(SolidPatch, TheCorotationalLawIsStableUpToAPressureOfTwiceTheShearModulus) 
         [&](const Vec3& x) { return Vec3(strain * x); });
     return error_of(model, nonlinear_run(std::move(factors)));
   };
-  EXPECT_EQ(squeezed(SolidLaw::corotational, 1.9, {0.99, 1}), "");
-  EXPECT_EQ(squeezed(SolidLaw::corotational, 4, {0.99, 1}).substr(0, 12), "requirement:");
+  EXPECT_EQ(squeezed(SolidLaw::corotational, 20, {0.99, 1}), "");
   EXPECT_EQ(squeezed(SolidLaw::neo_hookean, 20, {0.99, 1}), "");
-}
-
-/// Fails: where the first linearisation already gives the equilibrium, its tangent is not looked at.
-TEST(SolidPatch, DISABLED_AnUnstableStateFoundAtOnceIsNotCalledConverged) {
-  constexpr double poisson = 0.4999, strain = -4 * (1 - 2 * poisson) / (2 * (1 + poisson));
-  Model model = one_solid(make_block(4, 4, 4, [](const Vec3& u) { return Vec3(4 * u); }), 1, poisson);
-  move_nodes(
-      model, 0, [](const Vec3& x) { return (x - Vec3::Constant(2)).cwiseAbs().maxCoeff() > 1.9; },
-      [&](const Vec3& x) { return Vec3(strain * x); });
-  EXPECT_EQ(error_of(model, nonlinear_run({1})).substr(0, 12), "requirement:");
 }
 
 }  // namespace

@@ -142,7 +142,7 @@ class Bench:
         with open(self.path(name + ".toml"), "w", encoding="utf-8") as file:
             file.write(scene)
         command = [SIMULATE, "--scene", name + ".toml", name + ".hdf", "--force", "--quiet", "--report", name + ".json"]
-        done = subprocess.run(["timeout","60"]+command + (["--threads", str(threads)] if threads else []), cwd=self.folder,
+        done = subprocess.run(command + (["--threads", str(threads)] if threads else []), cwd=self.folder,
                               capture_output=True, text=True, check=False)
         self.code, self.error = done.returncode, done.stderr.strip()
         if check and self.code != 0:

@@ -1,7 +1,7 @@
 #include "tunica/io/scene/detail/selection.hpp"
 
 #include "tunica/core/narrow.hpp"
-#include "tunica/shell/distance/detail/patch_search.hpp"
+#include "tunica/shell/distance/patch_search.hpp"
 #include "tunica/surface/distance/closest_point.hpp"
 #include "tunica/surface/mesh/incidence.hpp"
 #include "tunica/surface/mesh/tet_checks.hpp"

@@ -30,6 +30,8 @@
 /// Limits: a rigid mesh touches at the samples of what it meets, not with corners between them.
 namespace tunica {
 
+class FaceMaps;
+
 struct ContactResult {
   Vec3 force = Vec3::Zero();                          ///< N, on the first body
   Vec3 moment = Vec3::Zero();                         ///< N mm, about the origin
@@ -124,29 +126,41 @@ private:
     PatchWeights weights = PatchWeights::Zero();
     Vec2 at = Vec2::Zero();
   };
-  class Maps;
 
   void make_groups();
   void sample(Group& group, int level) const;
   /// Levels and sags for a configuration.
-  void refine(const Maps& maps);
+  void refine(const FaceMaps& maps);
   [[nodiscard]] double wanted_stiffness(std::size_t contact) const;
   [[nodiscard]] double offset(const Group& group, std::size_t other) const;
   /// How far surfaces may overlap on the way to a state, mm.
   [[nodiscard]] double deepest(const Group& group, std::size_t other) const;
   [[nodiscard]] bool excluded(const Group& group, std::size_t other) const;
   /// For every group towards a body that deforms: the faces that come within its reach and `more` (mm).
-  [[nodiscard]] std::vector<std::vector<std::size_t>> near_faces(const Maps& maps, double more) const;
+  [[nodiscard]] std::vector<std::vector<std::size_t>> near_faces(const FaceMaps& maps, double more) const;
   [[nodiscard]] bool is_near(const Group& group, const PatchMap& map) const;
   [[nodiscard]] Touch touch(const Group& group, const Vec3& x, const std::vector<std::size_t>& near,
-                            const Maps& maps) const;
+                            const FaceMaps& maps) const;
   /// Of every sample whose face is near something; in parallel.
-  [[nodiscard]] std::vector<std::vector<Touch>> all_touches(const Maps& maps,
+  [[nodiscard]] std::vector<std::vector<Touch>> all_touches(const FaceMaps& maps,
                                                             const std::vector<std::vector<std::size_t>>& near) const;
+  /// What a sample does: traction on its surface (MPa), and the derivative of minus the traction by its place.
+  struct Press {
+    double law = 0, slope = 0;
+    Vec3 traction, slip = Vec3::Zero();
+    Mat3 derivative;
+  };
+  struct Acting;
+  [[nodiscard]] Press press(const Group& group, const Sample& sample, const Touch& touch, const Vec3& x) const;
+  [[nodiscard]] Vec3 rest_of_motion(const Group& group, const Press& press, const Touch& touch, const Vec3& x) const;
+  void record(const Group& group, const Sample& sample, const PatchMap& map, const Press& press);
+  void add_sample(const Group& group, const Sample& sample, const Touch& touch, const Press& press, const Vec3& rest,
+                  bool with_derivative, Acting& acting) const;
+  void scatter(const Group& group, const Acting& acting, const FaceMaps& maps, VectorX& external,
+               BlockMatrix* tangent) const;
   [[nodiscard]] Vec3 relative_motion(const Group& group, const Sample& sample, const Touch& touch, const Vec3& x) const;
-  [[nodiscard]] bool is_certain(const Group& group, const std::vector<std::size_t>& near, const Maps& before,
-                                const Maps& now) const;
-  [[nodiscard]] double lower_gap(const Group& group, const std::vector<std::size_t>& near, const Maps& maps,
+  [[nodiscard]] bool passes_rigid(const Group& group, const PatchMap& before, const PatchMap& now) const;
+  [[nodiscard]] double lower_gap(const Group& group, const std::vector<std::size_t>& near, const FaceMaps& maps,
                                  double upper) const;
 
   Surfaces surfaces_;

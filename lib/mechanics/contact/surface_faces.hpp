@@ -11,6 +11,7 @@ struct Surfaces {
   std::vector<std::size_t> first;  ///< per body, and the end
 };
 
+/// Errors: InputError: a face of a solid has more than two tetrahedra.
 Surfaces surface_faces(const Model& model);
 
 /// The point of a face nearest to `p`, from a start; it stays within the face.

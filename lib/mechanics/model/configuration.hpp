@@ -1,3 +1,4 @@
+// mechanics/model: what a scene says, resolved: bodies, walls, loads, supports, contacts; where its nodes are.
 #pragma once
 
 #include "tunica/core/types.hpp"

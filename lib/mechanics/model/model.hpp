@@ -1,4 +1,3 @@
-// mechanics/model: what a scene says, resolved: bodies, walls, loads, supports.
 #pragma once
 
 #include "tunica/core/quantity.hpp"

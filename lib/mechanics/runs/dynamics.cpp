@@ -259,8 +259,7 @@ private:
   struct Step {
     Configuration start;
     Rates rates_before;
-    double time = 0;    ///< s, of its start
-    double length = 0;  ///< s
+    double time = 0, length = 0;  ///< s: of its start, and its own
     std::vector<double> factors_before;
     std::vector<double> factors;
     VectorX held;           ///< prescribed displacements of the whole step
@@ -331,7 +330,7 @@ private:
   void accept(double length, const Motion& motion) {
     const VectorX acted = std::move(acting_);
     keep_acting(motion);
-    accept_contact(motion.configuration);
+    accept_contact(system_, motion.configuration);
     work_ += 0.5 * (acted + acting_).dot(change_);
     damped_ += run_.damping.mass * length * 2 * kinetic_energy(change_ / length);
     for (std::size_t e = 0; run_.damping.stiffness > 0 && e < system_.elements.size(); ++e) {
@@ -389,30 +388,13 @@ private:
     return result;
   }
 
-  void begin_contact(double from, double to, const Configuration& configuration) {
-    if (!system_.contact) {
-      return;
-    }
-    system_.contact->set_step(from, to, configuration);
-    if (system_.contact->find_pairs(configuration)) {
-      make_pattern(system_, system_.contact->pairs());
-      solver_.emplace(system_, settings_);
-      matrix_ = system_.pattern;
-    }
-  }
-
-  void accept_contact(const Configuration& configuration) {
-    if (system_.contact) {
-      system_.contact->accept(configuration);
-    }
-  }
-
   NewtonResult run(Step& s, double from, double to, Configuration& configuration) {
     const auto function = [&](const Configuration& c, BlockMatrix* tangent,
                               const std::vector<ElementState>& predicted) {
       return balance(s, to, c, tangent, predicted);
     };
-    begin_contact(s.time + from * s.length, s.time + to * s.length, configuration);
+    begin_contact(system_, settings_, s.time + from * s.length, s.time + to * s.length, configuration, solver_,
+                  matrix_);
     NewtonResult result =
         newton(system_, settings_, *solver_, function, (to - from) * s.held, matrix_, configuration, at_rest_);
     at_rest_ = result.iterations == 0;
@@ -439,7 +421,7 @@ private:
       count();
       if (acceptable(attempted)) {
         configuration = std::move(attempt);
-        accept_contact(configuration);
+        accept_contact(system_, configuration);
         done = next;
         part = std::min(2 * part, 0.5);
       } else {
@@ -460,7 +442,7 @@ private:
     const auto whole = [&](const Configuration& c, BlockMatrix* tangent, const std::vector<ElementState>& predicted) {
       return balance(s, 1, c, tangent, predicted);
     };
-    begin_contact(s.time + s.length, s.time + s.length, configuration);
+    begin_contact(system_, settings_, s.time + s.length, s.time + s.length, configuration, solver_, matrix_);
     const SettleResult settled = settle(system_, settings_, *solver_, whole, matrix_, configuration);
     result.ran_away = settled.ran_away;
     result.newton.converged = settled.settled;

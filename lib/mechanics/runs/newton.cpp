@@ -74,6 +74,25 @@ TangentSolver::Result TangentSolver::solve(BlockMatrix& matrix, const VectorX& b
   return result;
 }
 
+void begin_contact(ShellSystem& system, const RunSettings& settings, double from, double to,
+                   const Configuration& configuration, std::optional<TangentSolver>& solver, BlockMatrix& matrix) {
+  if (!system.contact) {
+    return;
+  }
+  system.contact->set_step(from, to, configuration);
+  if (system.contact->find_pairs(configuration)) {
+    make_pattern(system, system.contact->pairs());
+    solver.emplace(system, settings);
+    matrix = system.pattern;
+  }
+}
+
+void accept_contact(const ShellSystem& system, const Configuration& configuration) {
+  if (system.contact) {
+    system.contact->accept(configuration);
+  }
+}
+
 double increment_size(const ShellSystem& system, const VectorX& increment) {
   double sum = 0;
   for (Eigen::Index i = 0; i < increment.size(); i += 6) {

@@ -417,6 +417,16 @@ void push_solids(const ShellSystem& system, const Configuration& configuration, 
   }
 }
 
+/// Per body, MPa.
+std::vector<double> follower_pressures(const ShellSystem& system, const Model& model,
+                                       const std::vector<double>& factors) {
+  std::vector<double> pressure(model.body_count(), 0);
+  for (const auto& [load, body] : system.follower_pressures) {
+    pressure[body] += factors[load] * std::get<PressureLoad>(model.loads[load].kind).value;
+  }
+  return pressure;
+}
+
 /// What round_off() needs. The element matrices themselves, not E t: those of a sliver are larger by the square of its
 /// edge over its height, and so is the noise that one unit in the last place of a rotation makes there.
 void add_stiffness_norms(ShellSystem& system) {
@@ -681,22 +691,13 @@ std::vector<ElementState> predicted_deformations(const ShellSystem& system, cons
   return predicted;
 }
 
-void evaluate(const ShellSystem& system, const Model& model, const Configuration& configuration,
-              const std::vector<double>& factors, const ViscousState& viscous, Forces& forces, BlockMatrix* tangent,
-              const std::vector<ElementState>& predicted) {
-  const Eigen::Index size = first_freedom(system.node_count());
-  forces.internal.setZero(size);
-  forces.external.setZero(size);
+namespace {
+
+void evaluate_shells(const ShellSystem& system, const Configuration& configuration, const std::vector<double>& pressure,
+                     const ViscousState& viscous, const std::vector<ElementState>& predicted, Forces& forces,
+                     BlockMatrix* tangent, std::atomic<bool>& valid) {
   forces.deformation.resize(system.elements.size());
-  if (tangent != nullptr) {
-    std::fill(tangent->values.begin(), tangent->values.end(), 0.0);
-  }
-  std::vector<double> pressure(model.body_count(), 0);
-  for (const auto& [load, body] : system.follower_pressures) {
-    pressure[body] += factors[load] * std::get<PressureLoad>(model.loads[load].kind).value;
-  }
   std::vector<double> energies(system.elements.size());
-  std::atomic<bool> valid{true};
   for (const std::vector<Batch>& colour : system.colours) {
     parallel_for_blocks(colour.size(), grain, [&](std::size_t begin, std::size_t end) {
       ElementLanes elements;
@@ -762,6 +763,22 @@ void evaluate(const ShellSystem& system, const Model& model, const Configuration
     });
   }
   forces.energy = std::accumulate(energies.begin(), energies.end(), 0.0);
+}
+
+}  // namespace
+
+void evaluate(const ShellSystem& system, const Model& model, const Configuration& configuration,
+              const std::vector<double>& factors, const ViscousState& viscous, Forces& forces, BlockMatrix* tangent,
+              const std::vector<ElementState>& predicted) {
+  const Eigen::Index size = first_freedom(system.node_count());
+  forces.internal.setZero(size);
+  forces.external.setZero(size);
+  if (tangent != nullptr) {
+    std::fill(tangent->values.begin(), tangent->values.end(), 0.0);
+  }
+  const std::vector<double> pressure = follower_pressures(system, model, factors);
+  std::atomic<bool> valid{true};
+  evaluate_shells(system, configuration, pressure, viscous, predicted, forces, tangent, valid);
   if (!system.solids.empty()) {
     evaluate_solids(system, configuration, forces, tangent, valid);
     push_solids(system, configuration, pressure, forces.external, tangent);

@@ -44,10 +44,10 @@ struct State {
   std::vector<Vec3> velocity;          ///< mm/s, dynamic only
   std::vector<Vec3> angular_velocity;  ///< rad/s, dynamic only
   std::vector<double> pressure;  ///< of the nodes of solids, in units of their shear modulus; empty without solids
-  std::optional<double> volume;        ///< mm^3 of the closed bodies' curved surfaces together; none when one is open
-  double strain_energy = 0;            ///< N mm = mJ
-  double kinetic_energy = 0;           ///< mJ
-  double residual = 0;                 ///< relative, as compared with RunSettings::converge
+  std::optional<double> volume;  ///< mm^3 of the closed bodies' curved surfaces together; none when one is open
+  double strain_energy = 0;      ///< N mm = mJ
+  double kinetic_energy = 0;     ///< mJ
+  double residual = 0;           ///< relative, as compared with RunSettings::converge
   std::size_t newton_iterations = 0;
   std::size_t cg_iterations = 0;
   std::optional<double> algebraic_error;  ///< of this step, relative; see Summary

@@ -69,10 +69,11 @@ public:
     };
     const VectorX held =
         prescribed_positions(system_, model_, factor) - prescribed_positions(system_, model_, previous_factor);
-    begin_contact(previous_factor, factor, configuration);
+    begin_contact(system_, settings_, previous_factor, factor, configuration, solver_, matrix_);
+    const bool moving_bodies = system_.contact && system_.contact->left() > 0;
     const Configuration start = configuration;
     NewtonResult result = newton(system_, settings_, *solver_, balance, held, matrix_, configuration);
-    if (system_.contact && !(result.converged && result.stable) && held.isZero(0) && !moving_bodies_) {
+    if (system_.contact && !(result.converged && result.stable) && held.isZero(0) && !moving_bodies) {
       // Bodies that nothing holds yet fall until something does: Newton's method has no step for them.
       configuration = start;
       system_.contact->set_step(factor, factor, configuration);
@@ -118,7 +119,7 @@ public:
     const auto balance = [&](const Configuration& c, BlockMatrix* tangent, const std::vector<ElementState>& predicted) {
       return static_balance(system_, model_, c, factor, forces_, tangent, predicted);
     };
-    begin_contact(factor, factor, configuration);
+    begin_contact(system_, settings_, factor, factor, configuration, solver_, matrix_);
     advance_configuration(
         system_, prescribed_positions(system_, model_, factor) - prescribed_positions(system_, model_, previous_factor),
         configuration);
@@ -128,30 +129,10 @@ public:
     return settle(system_, settings_, *solver_, balance, matrix_, configuration);
   }
 
-  /// A state of rest that is kept.
-  void accept(const Configuration& configuration) {
-    if (system_.contact) {
-      system_.contact->accept(configuration);
-    }
-  }
-
   [[nodiscard]] std::size_t freedom_count() const { return solver_->freedom_count(); }
   void tell_direct_error(bool tell) { solver_->tell_direct_error(tell); }
 
 private:
-  void begin_contact(double from, double to, const Configuration& configuration) {
-    if (!system_.contact) {
-      return;
-    }
-    system_.contact->set_step(from, to, configuration);
-    moving_bodies_ = system_.contact->left() > 0;
-    if (system_.contact->find_pairs(configuration)) {
-      make_pattern(system_, system_.contact->pairs());
-      solver_.emplace(system_, settings_);
-      matrix_ = system_.pattern;
-    }
-  }
-
   void require_balance(const Configuration& configuration, double factor) {
     static_balance(system_, model_, configuration, factor, forces_, nullptr);
     for (const Piece& piece : system_.pieces) {
@@ -179,7 +160,6 @@ private:
   const Model& model_;
   const RunSettings& settings_;
   std::optional<TangentSolver> solver_;
-  bool moving_bodies_ = false;  ///< rigid ones, in this step
   BlockMatrix matrix_;
   Forces forces_;
 };
@@ -288,7 +268,7 @@ private:
       return std::nullopt;
     }
     configuration_ = std::move(attempt);
-    step_.accept(configuration_);
+    accept_contact(system_, configuration_);
     factor_ = target;
     return result;
   }
@@ -310,7 +290,7 @@ private:
       cg_iterations += result.cg_iterations;
       if (may_stand(result) && (!system_.contact || system_.contact->is_certain(attempt))) {
         configuration_ = std::move(attempt);
-        step_.accept(configuration_);
+        accept_contact(system_, configuration_);
         factor_ = next;
         increment_ *= 2;
         continue;
@@ -359,7 +339,7 @@ private:
       summary_.snaps.push_back({factor_, largest_distance(attempt, configuration_)});
     }
     configuration_ = std::move(attempt);
-    step_.accept(configuration_);
+    accept_contact(system_, configuration_);
     factor_ = beyond;
     return settled;
   }

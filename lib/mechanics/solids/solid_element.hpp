@@ -39,6 +39,7 @@ struct SolidElement {
   double bulk_of_pressure = 0;
 };
 
+/// @param corners  columns, mm, in the order of TetMesh
 SolidElement make_solid_element(const Corners4& corners, const Material& material, SolidLaw law);
 
 /// Displacements (mm, columns) and pressures (in units of the shear modulus) of the corners.

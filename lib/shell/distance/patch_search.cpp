@@ -1,4 +1,4 @@
-#include "tunica/shell/distance/detail/patch_search.hpp"
+#include "tunica/shell/distance/patch_search.hpp"
 
 #include <Eigen/Geometry>
 

@@ -6,7 +6,7 @@
 
 #include "tunica/core/progress.hpp"
 #include "tunica/core/threads.hpp"
-#include "tunica/shell/distance/detail/patch_search.hpp"
+#include "tunica/shell/distance/patch_search.hpp"
 
 #include <Eigen/Geometry>
 

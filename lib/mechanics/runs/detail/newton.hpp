@@ -4,6 +4,7 @@
 #include "tunica/mechanics/runs/detail/shell_system.hpp"
 
 #include <functional>
+#include <optional>
 
 namespace tunica {
 
@@ -48,6 +49,14 @@ private:
   std::size_t pressures_ = 0;  ///< each makes a pivot negative
   bool tell_direct_error_ = false;
 };
+
+/// Makes contact ready for a step of the rigid bodies: samples, pairs of nodes that may meet, and what follows from
+/// them. Nothing where nothing touches.
+void begin_contact(ShellSystem& system, const RunSettings& settings, double from, double to,
+                   const Configuration& configuration, std::optional<TangentSolver>& solver, BlockMatrix& matrix);
+
+/// A state that is kept.
+void accept_contact(const ShellSystem& system, const Configuration& configuration);
 
 /// What keeps a configuration from equilibrium.
 struct Balance {

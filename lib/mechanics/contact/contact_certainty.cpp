@@ -1,0 +1,195 @@
+#include "tunica/mechanics/contact/detail/contact_parts.hpp"
+
+#include <algorithm>
+#include <functional>
+
+namespace tunica {
+namespace {
+
+double bend_of(const SurfaceFace& face, const PatchMap& map, int level) {
+  return face.curved ? flatness(patch_of(face, map), level) : 0.0;
+}
+
+/// Whether two faces certainly stay apart on straight lines: some plane has them on either side at both ends.
+bool stay_apart(const SurfaceFace& face, const PatchMap& a0, const PatchMap& a1, const SurfaceFace& other,
+                const PatchMap& b0, const PatchMap& b1) {
+  const std::function<bool(const Part&, const Part&, int, int)> certain = [&](const Part& p, const Part& q, int level,
+                                                                              int depth) {
+    const double bend0 = bend_of(face, a0, level) + bend_of(other, b0, level);
+    const double bend1 = bend_of(face, a1, level) + bend_of(other, b1, level);
+    const auto between = [&](const PatchMap& a, const PatchMap& b) {
+      return Vec3(a.point(patch_weights(face, middle(p))) - b.point(patch_weights(other, middle(q)))).normalized();
+    };
+    const auto normal = [&](const SurfaceFace& of, const PatchMap& map, const Part& part) {
+      const auto along = patch_weight_derivatives(of, middle(part));
+      return Vec3(map.point(along[0]).cross(map.point(along[1])).normalized());
+    };
+    for (const Vec3& n : {between(a1, b1), between(a0, b0), normal(other, b1, q), Vec3(-normal(other, b1, q)),
+                          normal(face, a1, p), Vec3(-normal(face, a1, p))}) {
+      if (extent(face, a0, p, n)[0] - extent(other, b0, q, n)[1] > bend0 &&
+          extent(face, a1, p, n)[0] - extent(other, b1, q, n)[1] > bend1) {
+        return true;
+      }
+    }
+    if (depth == most_refined) {
+      return false;
+    }
+    for (const Part& a : p.split()) {
+      for (const Part& b : q.split()) {
+        if (!certain(a, b, 2 * level, depth + 1)) {
+          return false;
+        }
+      }
+    }
+    return true;
+  };
+  const Part whole{{Vec2(0, 0), Vec2(1, 0), Vec2(0, 1)}};
+  return certain(whole, whole, 1, 0);
+}
+
+}  // namespace
+
+bool ContactSystem::is_certain(const Configuration& configuration) const {
+  if (std::any_of(smallest_gap_.begin(), smallest_gap_.end(), [](double gap) { return gap <= 0; })) {
+    return false;
+  }
+  const FaceMaps before(surfaces_, reference_, accepted_);
+  const FaceMaps now(surfaces_, reference_, configuration);
+  // Whatever comes near on the way is near at one end within what moves.
+  double farthest = 0;
+  for (std::size_t i = 0; i < reference_.size(); ++i) {
+    farthest = std::max(farthest, (configuration.displacement[i] - accepted_.displacement[i]).norm());
+  }
+  const auto near = near_faces(now, 2 * farthest);
+  for (std::size_t g = 0; g < groups_.size(); ++g) {
+    const std::size_t f = groups_[g].face;
+    if (groups_[g].other.rigid && !passes_rigid(groups_[g], before[f], now[f])) {
+      return false;
+    }
+    for (const std::size_t other : near[g]) {
+      if (!stay_apart(surfaces_.faces[f], before[f], now[f], surfaces_.faces[other], before[other], now[other])) {
+        return false;
+      }
+    }
+  }
+  return true;
+}
+
+bool ContactSystem::passes_rigid(const Group& group, const PatchMap& a0, const PatchMap& a1) const {
+  const SurfaceFace& face = surfaces_.faces[group.face];
+  const RigidShape &s0 = shapes_before_[group.other.index], &s1 = shapes_[group.other.index];
+  const auto far = [&](const PatchMap& m0, const PatchMap& m1, const Vec3& c0, const Vec3& c1, double reach) {
+    // Distances change no faster than what moves.
+    double motion = 0;
+    for (int k = 0; k < (face.curved ? 9 : 3); ++k) {
+      motion = std::max(motion, (m1.points().col(k) - s1.carried(m0.points().col(k), s0)).norm());
+    }
+    motion += s1.growth_since(s0);
+    return s0.at(c0).distance + s1.at(c1).distance - 2 * reach > motion;
+  };
+  {
+    const Bounds b0 = bounds_of(face, a0), b1 = bounds_of(face, a1);
+    const double reach = std::max((b0.upper - b0.lower).norm(), (b1.upper - b1.lower).norm()) / 2;
+    if (far(a0, a1, (b0.lower + b0.upper) / 2, (b1.lower + b1.upper) / 2, reach)) {
+      return true;
+    }
+  }
+  const std::function<bool(const Part&, int)> certain = [&](const Part& part, int level) {
+    const PatchWeights weights = patch_weights(face, middle(part));
+    const Vec3 c0 = a0.point(weights), c1 = a1.point(weights);
+    const double bend0 = bend_of(face, a0, level), bend1 = bend_of(face, a1, level);
+    for (const Vec3& n : {s1.at(c1).normal, s0.at(c0).normal}) {
+      if (s0.convex() && extent(face, a0, part, n)[0] - bend0 > s0.support(n) &&
+          extent(face, a1, part, n)[0] - bend1 > s1.support(n)) {
+        return true;
+      }
+    }
+    double reach = 0;
+    for (const Vec2& at : part.at) {
+      reach = std::max({reach, (a0.point(patch_weights(face, at)) - c0).norm() + bend0,
+                        (a1.point(patch_weights(face, at)) - c1).norm() + bend1});
+    }
+    if (far(a0, a1, c0, c1, reach)) {
+      return true;
+    }
+    const auto smaller = part.split();
+    return level < group.level << most_refined &&
+           std::all_of(smaller.begin(), smaller.end(), [&](const Part& p) { return certain(p, 2 * level); });
+  };
+  const auto parts = parts_of(group.level);
+  return std::all_of(parts.begin(), parts.end(), [&](const Part& part) { return certain(part, group.level); });
+}
+
+double ContactSystem::lower_gap(const Group& group, const std::vector<std::size_t>& near, const FaceMaps& maps,
+                                double upper) const {
+  const SurfaceFace& face = surfaces_.faces[group.face];
+  const PatchMap& a = maps[group.face];
+  double lower = upper;
+  // A part is split while its bound could be the smallest and lies more than this below what was sampled.
+  const double close = 0.5 * upper;
+  if (group.other.rigid) {
+    const RigidShape& shape = shapes_[group.other.index];
+    const std::function<void(const Part&, int)> visit = [&](const Part& part, int level) {
+      const Vec3 c = a.point(patch_weights(face, middle(part)));
+      const RigidDistance at = shape.at(c);
+      const double bend = bend_of(face, a, level);
+      double bound = 0;
+      if (shape.convex()) {  // the tangent of a convex function lies below it
+        bound = at.distance + extent(face, a, part, at.normal)[0] - at.normal.dot(c) - bend;
+      } else {
+        double reach = 0;
+        for (const Vec2& b : part.at) {
+          reach = std::max(reach, (a.point(patch_weights(face, b)) - c).norm());
+        }
+        bound = at.distance - reach - bend;
+      }
+      bound -= offset(group, 0);
+      if (bound >= lower) {
+        return;
+      }
+      if (bound > upper - close || level >= group.level << most_refined) {
+        lower = bound;
+        return;
+      }
+      for (const Part& smaller : part.split()) {
+        visit(smaller, 2 * level);
+      }
+    };
+    for (const Part& part : parts_of(group.level)) {
+      visit(part, group.level);
+    }
+    return lower;
+  }
+  for (const std::size_t f : near) {
+    const SurfaceFace& other = surfaces_.faces[f];
+    const PatchMap& b = maps[f];
+    const double walls = offset(group, f);
+    const std::function<void(const Part&, const Part&, int)> visit = [&](const Part& p, const Part& q, int level) {
+      const double bend = bend_of(face, a, level) + bend_of(other, b, level);
+      const Vec3 away = a.point(patch_weights(face, middle(p))) - b.point(patch_weights(other, middle(q)));
+      const auto along = patch_weight_derivatives(other, middle(q));
+      const Vec3 normal = b.point(along[0]).cross(b.point(along[1])).normalized();
+      double bound = -infinity;
+      for (const Vec3& n : {Vec3(away.normalized()), Vec3(normal.dot(away) >= 0 ? normal : Vec3(-normal))}) {
+        bound = std::max(bound, extent(face, a, p, n)[0] - extent(other, b, q, n)[1] - bend - walls);
+      }
+      if (bound >= lower) {
+        return;
+      }
+      if (bound > upper - close || level >= 1 << (2 + most_refined)) {
+        lower = bound;
+        return;
+      }
+      for (const Part& smaller : p.split()) {
+        for (const Part& theirs : q.split()) {
+          visit(smaller, theirs, 2 * level);
+        }
+      }
+    };
+    const Part whole{{Vec2(0, 0), Vec2(1, 0), Vec2(0, 1)}};
+    visit(whole, whole, 1);
+  }
+  return lower;
+}
+
+}  // namespace tunica

@@ -1,0 +1,378 @@
+#include "tunica/core/threads.hpp"
+#include "tunica/mechanics/contact/detail/contact_parts.hpp"
+#include "tunica/shell/patch/shape_function.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tunica {
+namespace {
+
+/// Part of the resolution below which the law goes on as a straight line, also where surfaces overlap on the way.
+constexpr double straight_below = 0.1;
+constexpr std::size_t groups_per_task = 16;
+constexpr double largest_expectation = 100;  // pressures that the tangent takes stay within this of the law's
+
+void add_block(BlockMatrix& matrix, Index row, Index column, const Matrix6& block) {
+  const auto begin = matrix.column.begin() + narrow<std::ptrdiff_t>(matrix.row_start[row]);
+  const auto end = matrix.column.begin() + narrow<std::ptrdiff_t>(matrix.row_start[row + 1]);
+  const auto place = std::lower_bound(begin, end, column);
+  if (place != end && *place == column) {  // else the pair came near within this step: the forces are there
+    matrix.block(narrow<std::size_t>(place - matrix.column.begin())) += block;
+  }
+}
+
+/// The paper's rule: the force goes to the corners by barycentric coordinates, and its part across the facet makes
+/// moments there by the shape function, (C^-1)' w(x, y). Source: Comas, Duriez, Cotin 2010, section 2. Limits: the
+/// moments are not in balance with the forces.
+Vector18 paper_transfer(const PatchMap& map, const Vec2& at, const Vec3& force) {
+  const Vec3 origin = map.points().col(0), e1 = map.points().col(1) - origin, e2 = map.points().col(2) - origin;
+  const Vec3 x = e1.normalized(), z = e1.cross(e2).normalized(), y = z.cross(x);
+  const PlaneTriangle triangle{e1.norm(), e2.dot(x), e2.dot(y)};
+  const Vec3 flat = at[0] * e1 + at[1] * e2;
+  const Vector9 values =
+      inverse_shape_matrix(triangle).transpose() * (force.dot(z) * monomials(flat.dot(x), flat.dot(y)));
+  const Vec3 shares(1 - at[0] - at[1], at[0], at[1]);
+  Vector18 on_nodes;
+  for (int k = 0; k < 3; ++k) {
+    on_nodes.segment<3>(6 * k) = shares[k] * force;
+    on_nodes.segment<3>(6 * k + 3) = values[3 * k + 1] * x + values[3 * k + 2] * y;  // by dw/dy and -dw/dx
+  }
+  return on_nodes;
+}
+
+/// What the samples of a face do to one other face.
+struct Other {
+  PatchMap::Points forces = PatchMap::Points::Zero();
+  PatchMap::Matrix27 own = PatchMap::Matrix27::Zero();
+  PatchMap::Matrix27 between = PatchMap::Matrix27::Zero();  ///< rows: of the face that is sampled
+};
+
+void add_other(const SurfaceFace& face, const SurfaceFace& other, const PatchMap& map, const PatchMap& its_map,
+               const Other& act, VectorX& external, BlockMatrix* tangent) {
+  const Vector18 on_nodes = its_map.to_nodes(act.forces);
+  for (int k = 0; k < 3; ++k) {
+    external.segment<6>(first_freedom(other.nodes[k])) += on_nodes.segment<6>(6 * k);
+  }
+  if (tangent == nullptr) {
+    return;
+  }
+  PatchMap::Matrix27 backwards;
+  for (int k = 0; k < 9; ++k) {
+    for (int l = 0; l < 9; ++l) {
+      backwards.block<3, 3>(3 * l, 3 * k) = act.between.block<3, 3>(3 * k, 3 * l);
+    }
+  }
+  const Matrix18 own = its_map.stiffness(act.own, -act.forces);
+  const Matrix18 there = map.jacobian().transpose() * (act.between * its_map.jacobian());
+  const Matrix18 back = its_map.jacobian().transpose() * (backwards * map.jacobian());
+  for (int k = 0; k < 3; ++k) {
+    for (int l = 0; l < 3; ++l) {
+      add_block(*tangent, face.nodes[k], other.nodes[l], there.block<6, 6>(6 * k, 6 * l));
+      add_block(*tangent, other.nodes[k], face.nodes[l], back.block<6, 6>(6 * k, 6 * l));
+      add_block(*tangent, other.nodes[k], other.nodes[l], own.block<6, 6>(6 * k, 6 * l));
+    }
+  }
+}
+
+}  // namespace
+
+Vec3 ContactSystem::relative_motion(const Group& group, const Sample& sample, const Touch& touch, const Vec3& x) const {
+  if (!sample.followed) {
+    return Vec3::Zero();
+  }
+  if (group.other.rigid) {
+    const Vec3 there = shapes_[group.other.index].carried(sample.before, shapes_before_[group.other.index]);
+    return x - there;
+  }
+  // The point of the other surface that is touched now has come from its place in the last accepted state.
+  const SurfaceFace& face = surfaces_.faces[touch.face];
+  const Vec3 before = PatchMap(face, reference_, accepted_).point(touch.weights);
+  return (x - sample.before) - (x - touch.normal * (touch.gap + group.sag + offset(group, touch.face)) - before);
+}
+
+std::vector<std::vector<ContactSystem::Touch>> ContactSystem::all_touches(
+    const FaceMaps& maps, const std::vector<std::vector<std::size_t>>& near) const {
+  std::vector<std::vector<Touch>> touches(groups_.size());
+  for (std::size_t g = 0; g < groups_.size(); ++g) {
+    const Group& group = groups_[g];
+    if (group.other.rigid ? !is_near(group, maps[group.face]) : near[g].empty()) {
+      continue;
+    }
+    touches[g].resize(group.samples.size());
+    maps.prepare(group.face);
+    for (const std::size_t f : near[g]) {
+      maps.prepare(f);
+    }
+  }
+  parallel_for_blocks(groups_.size(), groups_per_task, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t g = begin; g < end; ++g) {
+      for (std::size_t i = 0; i < touches[g].size(); ++i) {
+        const Group& group = groups_[g];
+        touches[g][i] = touch(group, maps[group.face].point(group.samples[i].weights), near[g], maps);
+      }
+    }
+  });
+  return touches;
+}
+
+/// What acts on one face: forces on its points, with and without what the rest of a motion adds, and their derivative.
+struct ContactSystem::Acting {
+  PatchMap::Points forces = PatchMap::Points::Zero();
+  PatchMap::Points at_rest = PatchMap::Points::Zero();
+  PatchMap::Matrix27 stiffness = PatchMap::Matrix27::Zero();
+  std::map<std::size_t, Other> others;
+  Vector18 by_the_paper = Vector18::Zero();
+  bool any = false;
+};
+
+ContactSystem::Press ContactSystem::press(const Group& group, const Sample& sample, const Touch& t,
+                                          const Vec3& x) const {
+  const double friction = contacts_[group.contact].friction;
+  const double barrier = stiffness_[group.contact];
+  const double s = std::max(t.gap / group.resolution, straight_below);
+  const double straight = barrier * (1 / (s * s) - 1);  // the derivative there
+  Press press;
+  press.law = barrier * (1 - s) * (1 - s) / s + (s - t.gap / group.resolution) * straight;
+  const double expected = sample.pressure < 0 ? press.law
+                                              : std::clamp(sample.pressure, press.law / largest_expectation,
+                                                           press.law * largest_expectation);
+  // The derivative of the law on its straight part; else that of p g = const (1 - g / d)^2 at the pressure expected.
+  press.slope = t.gap < straight_below * group.resolution ? straight / group.resolution
+                                                          : (expected + 2 * barrier * (1 - s)) / t.gap;
+  const Vec3& n = t.normal;
+  press.traction = press.law * n;
+  press.derivative = press.slope * n * n.transpose() - press.law * t.curvature;
+  if (friction > 0) {
+    const Mat3 across = Mat3::Identity() - n * n.transpose();
+    press.slip = across * (sample.slip + relative_motion(group, sample, t, x));
+    const double length = std::max(press.slip.norm(), group.elastic_slip);
+    const Vec3 direction = press.slip / length;
+    Mat3 of_slip = across;
+    if (press.slip.norm() > group.elastic_slip) {
+      of_slip -= direction * direction.transpose();
+    }
+    press.traction -= friction * press.law * direction;
+    press.derivative += friction * (expected / length * of_slip - press.slope * direction * n.transpose());
+  }
+  return press;
+}
+
+/// What the rest of the rigid body's motion adds to a traction: as if the surface moved back by that.
+Vec3 ContactSystem::rest_of_motion(const Group& group, const Press& press, const Touch& t, const Vec3& x) const {
+  if (left_ == 0 || !group.other.rigid) {
+    return Vec3::Zero();
+  }
+  const RigidShape& now = shapes_[group.other.index];
+  const RigidShape& then = shapes_end_[group.other.index];
+  const double closes = then.at(x).distance - now.at(x).distance;
+  const Vec3 moved = then.carried(x, now) - x;
+  return -press.derivative * (closes * t.normal - (moved - t.normal * t.normal.dot(moved)));
+}
+
+void ContactSystem::record(const Group& group, const Sample& sample, const PatchMap& map, const Press& press) {
+  const Contact& contact = contacts_[group.contact];
+  const SurfaceFace& face = surfaces_.faces[group.face];
+  const Vec3 x = map.point(sample.weights);
+  const Vec3 force = group.weight * sample.area * press.traction;
+  ContactResult& result = (*record_)[group.contact];
+  const bool on_first = !contact.between[0].rigid && contact.between[0].index == face.body;
+  const double sign = on_first ? 1 : -1;
+  result.force += sign * force;
+  result.moment += sign * x.cross(force);
+  const auto along = patch_weight_derivatives(face, sample.at);
+  result.area += group.weight * map.point(along[0]).cross(map.point(along[1])).norm() / (2 * group.level * group.level);
+  ++result.points;
+  if (press.slip.norm() > group.elastic_slip) {
+    result.slip = std::max(result.slip, press.slip.norm() - group.elastic_slip);
+  }
+  if (group.other.rigid) {
+    on_rigids_[group.other.index][0] -= force;
+    on_rigids_[group.other.index][1] -= x.cross(force);
+  }
+}
+
+/// Adds one sample to what acts on its face and on the face it meets.
+void ContactSystem::add_sample(const Group& group, const Sample& sample, const Touch& t, const Press& press,
+                               const Vec3& rest, bool with_derivative, Acting& acting) const {
+  const double area = group.weight * sample.area;
+  acting.any = true;
+  acting.at_rest += area * press.traction * sample.weights.transpose();
+  acting.forces += area * (press.traction + rest) * sample.weights.transpose();
+  Other* const other = t.face == SIZE_MAX ? nullptr : &acting.others[t.face];
+  if (other != nullptr) {
+    other->forces -= area * press.traction * t.weights.transpose();
+  }
+  for (int k = 0; with_derivative && k < 9; ++k) {
+    for (int l = 0; l < 9; ++l) {
+      const auto add = [&](double weight, PatchMap::Matrix27& to) {
+        if (weight != 0) {
+          to.block<3, 3>(3 * k, 3 * l) += weight * press.derivative;
+        }
+      };
+      add(area * sample.weights[k] * sample.weights[l], acting.stiffness);
+      if (other != nullptr) {
+        add(area * t.weights[k] * t.weights[l], other->own);
+        add(-area * sample.weights[k] * t.weights[l], other->between);
+      }
+    }
+  }
+}
+
+void ContactSystem::scatter(const Group& group, const Acting& acting, const FaceMaps& maps, VectorX& external,
+                            BlockMatrix* tangent) const {
+  const SurfaceFace& face = surfaces_.faces[group.face];
+  PatchMap& map = maps.linearised(group.face);
+  const Vector18 on_nodes = contacts_[group.contact].consistent ? map.to_nodes(acting.forces) : acting.by_the_paper;
+  for (int k = 0; k < 3; ++k) {
+    external.segment<6>(first_freedom(face.nodes[k])) += on_nodes.segment<6>(6 * k);
+  }
+  if (tangent != nullptr) {
+    const Matrix18 of_nodes = map.stiffness(acting.stiffness, -acting.at_rest);
+    for (int k = 0; k < 3; ++k) {
+      for (int l = 0; l < 3; ++l) {
+        add_block(*tangent, face.nodes[k], face.nodes[l], of_nodes.block<6, 6>(6 * k, 6 * l));
+      }
+    }
+  }
+  for (const auto& [number, other] : acting.others) {
+    add_other(face, surfaces_.faces[number], map, maps.linearised(number), other, external, tangent);
+  }
+}
+
+bool ContactSystem::add(const Configuration& configuration, VectorX& external, BlockMatrix* tangent) {
+  const FaceMaps maps(surfaces_, reference_, configuration);
+  const auto touches = all_touches(maps, near_faces(maps, 0));
+  std::vector<double> pressed(contacts_.size(), 0), squared(contacts_.size(), 0);
+  smallest_gap_.assign(contacts_.size(), infinity);
+  for (std::size_t g = 0; g < groups_.size(); ++g) {
+    Group& group = groups_[g];
+    Acting acting;
+    for (std::size_t i = 0; i < touches[g].size(); ++i) {
+      Sample& sample = group.samples[i];
+      const Touch& t = touches[g][i];
+      sample.active = sample.active && tangent == nullptr;
+      if (t.gap >= group.resolution) {
+        continue;
+      }
+      if (t.gap < -deepest(group, t.face)) {
+        return false;
+      }
+      smallest_gap_[group.contact] = std::min(smallest_gap_[group.contact], t.gap);
+      const Vec3 x = maps[group.face].point(sample.weights);
+      const Press here = press(group, sample, t, x);
+      pressed[group.contact] += group.weight * sample.area * here.law;
+      squared[group.contact] += group.weight * sample.area * here.law * here.law;
+      if (record_ != nullptr) {
+        record(group, sample, maps[group.face], here);
+      }
+      Vec3 rest = Vec3::Zero();
+      if (tangent != nullptr) {
+        sample.active = true;
+        sample.law = here.law;
+        sample.slope = here.slope;
+        sample.normal = t.normal;
+        sample.other = t.face;
+        sample.other_weights = t.weights;
+        rest = rest_of_motion(group, here, t, x);
+      }
+      add_sample(group, sample, t, here, rest, tangent != nullptr, acting);
+      if (!contacts_[group.contact].consistent) {
+        acting.by_the_paper +=
+            paper_transfer(maps[group.face], sample.at, group.weight * sample.area * (here.traction + rest));
+      }
+    }
+    if (touches[g].empty() && tangent != nullptr) {
+      for (Sample& sample : group.samples) {
+        sample.active = false;
+      }
+    }
+    if (acting.any) {
+      scatter(group, acting, maps, external, tangent);
+    }
+  }
+  for (std::size_t c = 0; c < contacts_.size(); ++c) {
+    mean_pressure_[c] = pressed[c] > 0 ? squared[c] / pressed[c] : 0;
+  }
+  if (tangent != nullptr) {
+    at_tangent_ = configuration;
+    shapes_at_tangent_ = shapes_;
+  }
+  return true;
+}
+
+void ContactSystem::predict(const VectorX& increment) {
+  const FaceMaps maps(surfaces_, reference_, at_tangent_);
+  const auto change_of = [&](std::size_t f) {
+    const SurfaceFace& face = surfaces_.faces[f];
+    Vector18 of_nodes;
+    for (int k = 0; k < 3; ++k) {
+      of_nodes.segment<6>(6 * k) = increment.segment<6>(first_freedom(face.nodes[k]));
+    }
+    return maps.linearised(f).change(of_nodes);
+  };
+  for (Group& group : groups_) {
+    std::optional<PatchMap::Points> own;
+    for (Sample& sample : group.samples) {
+      if (!sample.active) {
+        sample.pressure = -1;
+        continue;
+      }
+      if (!own) {
+        own = change_of(group.face);
+      }
+      Vec3 moved = *own * sample.weights;
+      if (sample.other != SIZE_MAX) {
+        moved -= change_of(sample.other) * sample.other_weights;
+      } else if (group.other.rigid) {
+        const Vec3 x = maps[group.face].point(sample.weights);
+        moved += (shapes_[group.other.index].at(x).distance - shapes_at_tangent_[group.other.index].at(x).distance) *
+                 sample.normal;
+      }
+      sample.pressure = std::max(sample.law - sample.slope * sample.normal.dot(moved), 0.0);
+    }
+  }
+}
+
+std::vector<ContactResult> ContactSystem::results(const Configuration& configuration) {
+  std::vector<ContactResult> results(contacts_.size());
+  on_rigids_.assign(shapes_.size(), {Vec3::Zero(), Vec3::Zero(), Vec3::Zero()});
+  VectorX nodal = VectorX::Zero(first_freedom(reference_.size()));
+  record_ = &results;
+  (void)add(configuration, nodal, nullptr);
+  record_ = nullptr;
+  Vec3 force = Vec3::Zero(), moment = Vec3::Zero();
+  double forces = 0, moments = 0;
+  for (std::size_t i = 0; i < reference_.size(); ++i) {
+    const Vec3 f = nodal.segment<3>(first_freedom(i)), m = nodal.segment<3>(first_freedom(i) + 3);
+    const Vec3 x = reference_[i] + configuration.displacement[i];
+    force += f;
+    moment += x.cross(f) + m;
+    forces += f.norm();
+    moments += x.norm() * f.norm() + m.norm();
+  }
+  for (std::size_t r = 0; r < shapes_.size(); ++r) {
+    on_rigids_[r][2] = shapes_[r].position();
+    force += on_rigids_[r][0];
+    moment += on_rigids_[r][1];
+  }
+  imbalance_ = {forces > 0 ? force.norm() / forces : 0, moments > 0 ? moment.norm() / moments : 0};
+  const FaceMaps maps(surfaces_, reference_, configuration);
+  const auto near = near_faces(maps, 0);
+  for (std::size_t g = 0; g < groups_.size(); ++g) {
+    const Group& group = groups_[g];
+    if (group.other.rigid ? !is_near(group, maps[group.face]) : near[g].empty()) {
+      continue;
+    }
+    ContactResult& result = results[group.contact];
+    double upper = infinity;
+    for (const Sample& sample : group.samples) {
+      upper = std::min(upper, touch(group, maps[group.face].point(sample.weights), near[g], maps).gap + group.sag);
+    }
+    result.gap_upper = std::min(result.gap_upper, upper);
+    result.gap_lower = std::min(result.gap_lower, lower_gap(group, near[g], maps, upper));
+  }
+  return results;
+}
+
+}  // namespace tunica
