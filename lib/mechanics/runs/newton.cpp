@@ -10,9 +10,10 @@
 namespace tunica {
 namespace {
 
-constexpr double largest_turn = 0.5;        // rad per iteration
-constexpr std::size_t free_iterations = 6;  // full steps before the line search sets in
-constexpr int most_cuts = 6;                // of an increment
+constexpr double largest_turn = 0.5;           // rad per iteration
+constexpr std::size_t free_iterations = 6;     // full steps before the line search sets in
+constexpr double round_off_of_nothing = 0.01;  // of the floor, where no load acts
+constexpr int most_cuts = 6;                   // of an increment
 
 bool uses_cg(const RunSettings& settings) { return settings.solver == Solver::cg; }
 
@@ -169,8 +170,10 @@ private:
     return balance.scale > 0 ? norm / balance.scale : (norm > 0 ? 1.0 : 0.0);
   }
 
-  /// Nothing but round-off.
-  [[nodiscard]] bool nothing_acts() const { return now_.scale <= now_.floor; }
+  /// Nothing, or before a first touch nothing but round-off.
+  [[nodiscard]] bool nothing_acts() const {
+    return now_.scale == 0 || (system_.contact && now_.scale <= round_off_of_nothing * now_.floor);
+  }
 
   [[nodiscard]] bool is_at_floor() const { return result_.residual * now_.scale <= now_.floor; }
 
