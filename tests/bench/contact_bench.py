@@ -1,0 +1,57 @@
+#!/usr/bin/python3
+"""What contact costs: steps of 40 ms of a clamped disc under pressure, free, with a ball that slides over it, and with one at rest.
+
+    TUNICA_BIN=build/release/bin PYTHONPATH=tests/support tests/bench/contact_bench.py
+"""
+import math
+import tempfile
+
+import numpy as np
+from contact_scenes import contact
+from published import Bench, fix, run_lines, shell, write_ply
+
+BALL = ('[[rigid]]\nname = "ball"\nshape = "sphere"\ncentre = ["-2mm", "0mm", "6mm"]\nradius = "5mm"\nmotion = [["0s", '
+        '["0mm", "0mm", "0mm"]], ["1s", ["0mm", "0mm", "-1.5mm"]], ["2s", ["{way}mm", "0mm", "-1.5mm"]]]\n')
+
+
+def disc(rings, radius=20.0):
+    """A disc of rings of triangles about its middle."""
+    points, triangles, start = [(0.0, 0.0, 0.0)], [], [0]
+    for ring in range(1, rings + 1):
+        start.append(len(points))
+        turns = 2 * math.pi * np.arange(6 * ring) / (6 * ring)
+        points += [(radius * ring / rings * math.cos(a), radius * ring / rings * math.sin(a), 0.0) for a in turns]
+    for ring in range(1, rings + 1):
+        outer, inner = 6 * ring, 6 * (ring - 1)
+        for k in range(outer):
+            side, place = divmod(k, ring)
+            here = start[ring - 1] + ((side * (ring - 1) + place) % inner if inner else 0)
+            triangles.append((here, start[ring] + k, start[ring] + (k + 1) % outer))
+            if place < ring - 1:
+                triangles.append((here, start[ring] + (k + 1) % outer,
+                                  start[ring - 1] + (side * (ring - 1) + place + 1) % inner))
+    return np.array(points), np.array(triangles)
+
+
+def main():
+    print("| shells | ball | points | ms per step, median | longest | Newton |\n|---|---|---|---|---|---|")
+    with tempfile.TemporaryDirectory() as folder:
+        bench = Bench(folder)
+        for rings in (13, 41):
+            points, triangles = disc(rings)
+            write_ply(bench.path("mesh.ply"), points, triangles, np.tile([0, 0, 1.0], (len(points), 1)))
+            scene = (run_lines(kind="dynamic", duration="2s", step="40ms") +
+                     shell("mesh.ply", 1.0, 1.0, 0.45, density="1100kg/m3") +
+                     fix(np.flatnonzero(np.hypot(*points.T[:2]) > 20 - 1e-6)) +
+                     '[[load]]\nbody = "s"\nkind = "pressure"\nvalue = "1kPa"\nramp = [["0s", 0.0], ["1s", 1.0]]\n')
+            for name, way in (("none", None), ("slides", 4), ("rests", 0)):
+                more = "" if way is None else BALL.format(way=way) + contact("s", "ball")
+                result = bench.run(scene + more)
+                median, longest = (result["ms_per_step"][key] for key in ("median", "max"))
+                touching = result["contacts"]["c"]["points"][-1] if way is not None else 0
+                print(f"| {result['shells']} | {name} | {touching} | {median:.0f} | {longest:.0f} "
+                      f"| {result['newton_iterations']} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()
