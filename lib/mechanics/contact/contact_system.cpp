@@ -423,8 +423,10 @@ void ContactSystem::accept(const Configuration& configuration) {
 }
 
 std::vector<double> ContactSystem::memory() const {
-  std::vector<double> values;
+  std::vector<double> values = stiffness_;
+  values.insert(values.end(), mean_pressure_.begin(), mean_pressure_.end());
   for (const Group& group : groups_) {
+    values.push_back(real(group.level));
     for (const Sample& sample : group.samples) {
       values.push_back(sample.followed ? 1 : 0);
       values.insert(values.end(), sample.slip.begin(), sample.slip.end());
@@ -434,17 +436,27 @@ std::vector<double> ContactSystem::memory() const {
 }
 
 void ContactSystem::recall(const std::vector<double>& memory, const Configuration& configuration, double time) {
+  std::size_t next = 2 * contacts_.size();
+  TUNICA_ASSERT(memory.size() >= next);
+  for (Group& group : groups_) {
+    TUNICA_ASSERT(next < memory.size());
+    sample(group, truncated<int>(memory[next]));
+    next += 1 + 4 * group.samples.size();
+  }
+  TUNICA_ASSERT(memory.size() == next);
   set_step(time, time, configuration);
   accept(configuration);
-  std::size_t next = 0;
+  next = 2 * contacts_.size();
   for (Group& group : groups_) {
+    ++next;
     for (Sample& sample : group.samples) {
-      TUNICA_ASSERT(next + 4 <= memory.size());
       sample.followed = memory[next] != 0;
       sample.slip = Vec3(memory[next + 1], memory[next + 2], memory[next + 3]);
       next += 4;
     }
   }
+  std::copy_n(memory.begin(), contacts_.size(), stiffness_.begin());
+  std::copy_n(memory.begin() + narrow<std::ptrdiff_t>(contacts_.size()), contacts_.size(), mean_pressure_.begin());
 }
 
 }  // namespace tunica
