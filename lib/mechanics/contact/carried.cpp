@@ -2,6 +2,7 @@
 
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
+#include "tunica/mechanics/elements/rotation.hpp"
 #include "tunica/surface/distance/closest_point.hpp"
 
 #include <fmt/format.h>
@@ -16,16 +17,14 @@ namespace {
 
 constexpr int search_level = 4;  // pieces per edge of a face, on which the search for the nearest point begins
 
-Configuration at_rest(std::size_t nodes) {
-  return {std::vector<Vec3>(nodes, Vec3::Zero()),
-          std::vector<Eigen::Quaterniond>(nodes, Eigen::Quaterniond::Identity())};
-}
-
 /// Nearest points of one body's surface in the reference.
 class BodySurface {
 public:
   BodySurface(const Surfaces& surfaces, std::size_t body, const std::vector<Vec3>& reference)
-      : surfaces_(surfaces), reference_(reference), rest_(at_rest(reference.size())), tree_(pieces(body)) {}
+      : surfaces_(surfaces),
+        reference_(reference),
+        rest_(Configuration::at_rest(reference.size())),
+        tree_(pieces(body)) {}
 
   /// @return face, and the parameters on it
   [[nodiscard]] std::pair<std::size_t, Vec2> nearest(const Vec3& p) const {
@@ -111,10 +110,7 @@ Eigen::Matrix<double, 3, Eigen::Dynamic> derivative(const Carried& c, const Surf
   map.linearise();
   result = map.derivative(c.weights);
   for (int k = 0; k < 3; ++k) {
-    const Vec3 d = turned_offset(c, configuration, k);
-    Mat3 m;  // spin x d
-    m << 0, d.z(), -d.y(), -d.z(), 0, d.x(), d.y(), -d.x(), 0;
-    result.block<3, 3>(0, 6 * k + 3) += m;
+    result.block<3, 3>(0, 6 * k + 3) -= skew(turned_offset(c, configuration, k));
   }
   return result;
 }
@@ -149,7 +145,7 @@ std::vector<Carried> carried_nodes(const Model& model, const Surfaces& surfaces,
         c.weights = patch_weights(on, b);
         c.shares << 1 - b[0] - b[1], b[0], b[1], 0;
         c.carriers.assign(on.nodes.begin(), on.nodes.end());
-        c.offset = x - PatchMap(on, reference, at_rest(reference.size())).point(c.weights);
+        c.offset = x - PatchMap(on, reference, Configuration::at_rest(reference.size())).point(c.weights);
       }
       if (!found.emplace(c.node, c).second) {
         fail(fmt::format("node {} is carried twice: let one [[attach]] carry it", local));

@@ -22,23 +22,23 @@ void add_block(BlockMatrix& matrix, Index row, Index column, const Matrix6& bloc
   }
 }
 
-/// The paper's rule: the force goes to the corners by barycentric coordinates, and its part across the facet makes
-/// moments there by the shape function, (C^-1)' w(x, y). Source: Comas, Duriez, Cotin 2010, section 2. Limits: the
-/// moments are not in balance with the forces.
-Vector18 paper_transfer(const PatchMap& map, const Vec2& at, const Vec3& force) {
+/// Forces and moments of the nodes by a force at a point, by the paper's rule: the force goes to the corners by
+/// barycentric coordinates, and its part across the facet makes moments there by the shape function, (C^-1)' w(x, y).
+/// Source: Comas, Duriez, Cotin 2010, section 2. Limits: the moments are not in balance with the forces.
+Eigen::Matrix<double, 18, 3> paper_transfer(const PatchMap& map, const Vec2& at) {
   const Vec3 origin = map.points().col(0), e1 = map.points().col(1) - origin, e2 = map.points().col(2) - origin;
   const Vec3 x = e1.normalized(), z = e1.cross(e2).normalized(), y = z.cross(x);
   const PlaneTriangle triangle{e1.norm(), e2.dot(x), e2.dot(y)};
   const Vec3 flat = at[0] * e1 + at[1] * e2;
-  const Vector9 values =
-      inverse_shape_matrix(triangle).transpose() * (force.dot(z) * monomials(flat.dot(x), flat.dot(y)));
+  const Vector9 values = inverse_shape_matrix(triangle).transpose() * monomials(flat.dot(x), flat.dot(y));
   const Vec3 shares(1 - at[0] - at[1], at[0], at[1]);
-  Vector18 on_nodes;
+  Eigen::Matrix<double, 18, 3> transfer;
   for (int k = 0; k < 3; ++k) {
-    on_nodes.segment<3>(6 * k) = shares[k] * force;
-    on_nodes.segment<3>(6 * k + 3) = values[3 * k + 1] * x + values[3 * k + 2] * y;  // by dw/dy and -dw/dx
+    transfer.middleRows<3>(6 * k) = shares[k] * Mat3::Identity();
+    // By dw/dy and -dw/dx.
+    transfer.middleRows<3>(6 * k + 3) = (values[3 * k + 1] * x + values[3 * k + 2] * y) * z.transpose();
   }
-  return on_nodes;
+  return transfer;
 }
 
 /// What the samples of a face do to one other face.
@@ -122,7 +122,8 @@ struct ContactSystem::Acting {
   PatchMap::Points at_rest = PatchMap::Points::Zero();
   PatchMap::Matrix27 stiffness = PatchMap::Matrix27::Zero();
   std::map<std::size_t, Other> others;
-  Vector18 by_the_paper = Vector18::Zero();
+  Vector18 by_the_paper = Vector18::Zero();  ///< instead of `forces`, where the contact asks for it
+  Matrix18 paper_stiffness = Matrix18::Zero();
   bool any = false;
 };
 
@@ -175,7 +176,7 @@ void ContactSystem::record(const Group& group, const Sample& sample, const Patch
   const SurfaceFace& face = surfaces_.faces[group.face];
   const Vec3 x = map.point(sample.weights);
   const Vec3 force = group.weight * sample.area * press.traction;
-  ContactResult& result = (*record_)[group.contact];
+  ContactState& result = (*record_)[group.contact];
   const bool on_first = !contact.between[0].rigid && contact.between[0].index == face.body;
   const double sign = on_first ? 1 : -1;
   result.force += sign * force;
@@ -187,8 +188,8 @@ void ContactSystem::record(const Group& group, const Sample& sample, const Patch
     result.slip = std::max(result.slip, press.slip.norm() - group.elastic_slip);
   }
   if (group.other.rigid) {
-    on_rigids_[group.other.index][0] -= force;
-    on_rigids_[group.other.index][1] -= x.cross(force);
+    on_rigids_[group.other.index].force -= force;
+    on_rigids_[group.other.index].moment -= x.cross(force);
   }
 }
 
@@ -228,7 +229,8 @@ void ContactSystem::scatter(const Group& group, const Acting& acting, const Face
     external.segment<6>(first_freedom(face.nodes[k])) += on_nodes.segment<6>(6 * k);
   }
   if (tangent != nullptr) {
-    const Matrix18 of_nodes = map.stiffness(acting.stiffness, -acting.at_rest);
+    const Matrix18 of_nodes =
+        contacts_[group.contact].consistent ? map.stiffness(acting.stiffness, -acting.at_rest) : acting.paper_stiffness;
     for (int k = 0; k < 3; ++k) {
       for (int l = 0; l < 3; ++l) {
         add_block(*tangent, face.nodes[k], face.nodes[l], of_nodes.block<6, 6>(6 * k, 6 * l));
@@ -278,8 +280,13 @@ bool ContactSystem::add(const Configuration& configuration, VectorX& external, B
       }
       add_sample(group, sample, t, here, rest, tangent != nullptr, acting);
       if (!contacts_[group.contact].consistent) {
-        acting.by_the_paper +=
-            paper_transfer(maps[group.face], sample.at, group.weight * sample.area * (here.traction + rest));
+        const double area = group.weight * sample.area;
+        const auto transfer = paper_transfer(maps[group.face], sample.at);
+        acting.by_the_paper += area * transfer * (here.traction + rest);
+        if (tangent != nullptr) {
+          acting.paper_stiffness +=
+              area * transfer * (here.derivative * maps.linearised(group.face).derivative(sample.weights));
+        }
       }
     }
     if (touches[g].empty() && tangent != nullptr) {
@@ -334,9 +341,9 @@ void ContactSystem::predict(const VectorX& increment) {
   }
 }
 
-std::vector<ContactResult> ContactSystem::results(const Configuration& configuration) {
-  std::vector<ContactResult> results(contacts_.size());
-  on_rigids_.assign(shapes_.size(), {Vec3::Zero(), Vec3::Zero(), Vec3::Zero()});
+std::vector<ContactState> ContactSystem::results(const Configuration& configuration) {
+  std::vector<ContactState> results(contacts_.size());
+  on_rigids_.assign(shapes_.size(), {});
   VectorX nodal = VectorX::Zero(first_freedom(reference_.size()));
   record_ = &results;
   (void)add(configuration, nodal, nullptr);
@@ -352,9 +359,9 @@ std::vector<ContactResult> ContactSystem::results(const Configuration& configura
     moments += x.norm() * f.norm() + m.norm();
   }
   for (std::size_t r = 0; r < shapes_.size(); ++r) {
-    on_rigids_[r][2] = shapes_[r].position();
-    force += on_rigids_[r][0];
-    moment += on_rigids_[r][1];
+    on_rigids_[r].position = shapes_[r].position();
+    force += on_rigids_[r].force;
+    moment += on_rigids_[r].moment;
   }
   imbalance_ = {forces > 0 ? force.norm() / forces : 0, moments > 0 ? moment.norm() / moments : 0};
   const FaceMaps maps(surfaces_, reference_, configuration);
@@ -364,13 +371,15 @@ std::vector<ContactResult> ContactSystem::results(const Configuration& configura
     if (group.other.rigid ? !is_near(group, maps[group.face]) : near[g].empty()) {
       continue;
     }
-    ContactResult& result = results[group.contact];
+    ContactState& result = results[group.contact];
     double upper = infinity;
     for (const Sample& sample : group.samples) {
       upper = std::min(upper, touch(group, maps[group.face].point(sample.weights), near[g], maps).gap + group.sag);
     }
-    result.gap_upper = std::min(result.gap_upper, upper);
-    result.gap_lower = std::min(result.gap_lower, lower_gap(group, near[g], maps, upper));
+    if (std::isfinite(upper)) {
+      result.gap_upper = std::fmin(result.gap_upper, upper);
+      result.gap_lower = std::fmin(result.gap_lower, lower_gap(group, near[g], maps, upper));
+    }
   }
   return results;
 }

@@ -11,11 +11,12 @@
 namespace tunica {
 namespace {
 
-constexpr double first_stiffness = 1e-5;       // of the barrier, of Young's modulus, while no pressure is known
-constexpr double least_stiffness = 1e-8;       // of the barrier, of Young's modulus: where a contact opens
-constexpr double stiffness_of_pressure = 0.1;  // of the barrier, of the mean pressure
-constexpr double blunt = 0.5;                  // of the mean pressure: above, the barrier is made softer
-constexpr double hardening = 4;                // of the barrier, where a state of rest overlaps
+constexpr double first_stiffness = 1e-5;  // of the barrier, of Young's modulus, while no pressure is known
+constexpr double least_stiffness = 1e-8;  // of the barrier, of Young's modulus: where a contact opens
+constexpr double stiffness_of_pressure =
+    0.1;                         // of the barrier, of the mean pressure; more where that lets surfaces overlap
+constexpr double blunt = 5;      // of what is wanted: above, the barrier is made softer
+constexpr double hardening = 4;  // of the barrier, where a state of rest overlaps
 /// Part of both half walls up to which shells may overlap on the way.
 constexpr double largest_overlap = 0.8;
 constexpr double elastic_slip_of_wall = 1e-3;  // slip at which friction is fully there
@@ -33,8 +34,7 @@ ContactSystem::ContactSystem(const Model& model, Surfaces surfaces, std::vector<
     shapes_.emplace_back(body);
   }
   shapes_before_ = shapes_end_ = shapes_;
-  accepted_ = {std::vector<Vec3>(reference_.size(), Vec3::Zero()),
-               std::vector<Eigen::Quaterniond>(reference_.size(), Eigen::Quaterniond::Identity())};
+  accepted_ = rest_ = Configuration::at_rest(reference_.size());
   for (const Contact& contact : contacts_) {
     for (const ContactParty& party : contact.between) {
       for (std::size_t f = 0; !contact.curved && !party.rigid && f < surfaces_.faces.size(); ++f) {
@@ -124,9 +124,7 @@ void ContactSystem::make_groups() {
 
 void ContactSystem::sample(Group& group, int level) const {
   const SurfaceFace& face = surfaces_.faces[group.face];
-  const Configuration rest{std::vector<Vec3>(reference_.size(), Vec3::Zero()),
-                           std::vector<Eigen::Quaterniond>(reference_.size(), Eigen::Quaterniond::Identity())};
-  const PatchMap map(face, reference_, rest);
+  const PatchMap map(face, reference_, rest_);
   const std::vector<Sample> old = std::move(group.samples);
   group.level = level;
   group.samples.clear();
@@ -173,18 +171,19 @@ void ContactSystem::refine(const FaceMaps& maps) {
 }
 
 double ContactSystem::wanted_stiffness(std::size_t c) const {
-  return std::max(stiffness_of_pressure * mean_pressure_[c], least_stiffness * young_[c]);
+  return std::max(ratio_[c] * mean_pressure_[c], least_stiffness * young_[c]);
 }
 
 bool ContactSystem::sharpen() {
   bool changed = false;
   for (std::size_t c = 0; c < contacts_.size(); ++c) {
-    if (smallest_gap_[c] <= 0) {
+    if (smallest_gap_[c] <= 0) {  // somewhere the pressure is far above its mean
       stiffness_[c] *= hardening;
+      ratio_[c] *= hardening;
       changed = true;
-    } else if (mean_pressure_[c] > 0 && stiffness_[c] > blunt * mean_pressure_[c]) {
-      changed = changed || wanted_stiffness(c) < stiffness_[c];
-      stiffness_[c] = std::min(stiffness_[c], wanted_stiffness(c));
+    } else if (mean_pressure_[c] > 0 && stiffness_[c] > blunt * wanted_stiffness(c)) {
+      stiffness_[c] = wanted_stiffness(c);
+      changed = true;
     }
   }
   return changed;
@@ -236,7 +235,7 @@ std::vector<std::vector<std::size_t>> ContactSystem::near_faces(const FaceMaps& 
   std::vector<std::vector<std::size_t>> near(groups_.size());
   std::map<std::size_t, std::vector<std::size_t>> sorted;  // faces of a body, by their lower x
   std::vector<Bounds> bounds(surfaces_.faces.size());
-  std::map<std::size_t, double> widest;
+  std::map<std::size_t, double> widest, thickest;  // half walls
   const auto prepare = [&](std::size_t body) {
     auto& faces = sorted[body];
     if (!faces.empty()) {
@@ -245,6 +244,7 @@ std::vector<std::vector<std::size_t>> ContactSystem::near_faces(const FaceMaps& 
     for (std::size_t f = surfaces_.first[body]; f < surfaces_.first[body + 1]; ++f) {
       bounds[f] = maps.bounds(f);
       widest[body] = std::max(widest[body], bounds[f].upper.x() - bounds[f].lower.x());
+      thickest[body] = std::max(thickest[body], surfaces_.faces[f].half_thickness);
       faces.push_back(f);
     }
     std::sort(faces.begin(), faces.end(), [&](std::size_t a, std::size_t b) {
@@ -260,8 +260,8 @@ std::vector<std::vector<std::size_t>> ContactSystem::near_faces(const FaceMaps& 
     prepare(surfaces_.faces[group.face].body);
     const auto& faces = sorted[group.other.index];
     const Bounds& own = bounds[group.face];
-    const double reach = group.resolution + surfaces_.faces[group.face].half_thickness +
-                         surfaces_.faces[surfaces_.first[group.other.index]].half_thickness + more;
+    const double reach =
+        group.resolution + group.sag + surfaces_.faces[group.face].half_thickness + thickest[group.other.index] + more;
     auto place = std::lower_bound(faces.begin(), faces.end(), own.lower.x() - reach - widest[group.other.index],
                                   [&](std::size_t f, double x) { return bounds[f].lower.x() < x; });
     for (; place != faces.end() && bounds[*place].lower.x() <= own.upper.x() + reach; ++place) {
@@ -277,7 +277,7 @@ bool ContactSystem::is_near(const Group& group, const PatchMap& map) const {
   const Bounds bounds = bounds_of(surfaces_.faces[group.face], map);
   const Vec3 centre = (bounds.lower + bounds.upper) / 2;
   const double radius = (bounds.upper - centre).norm();
-  return shapes_[group.other.index].at(centre).distance - radius < group.resolution + offset(group, 0);
+  return shapes_[group.other.index].at(centre).distance - radius < group.resolution + group.sag + offset(group, 0);
 }
 
 ContactSystem::Touch ContactSystem::touch(const Group& group, const Vec3& x, const std::vector<std::size_t>& near,
@@ -304,14 +304,7 @@ ContactSystem::Touch ContactSystem::touch(const Group& group, const Vec3& x, con
     if ((x - flat).norm() - maps.bend(f) - off >= std::min(result.gap, group.resolution)) {
       continue;
     }
-    const Vec3 e1 = b - a, e2 = c - a, d = flat - a;
-    const double d11 = e1.dot(e1), d12 = e1.dot(e2), d22 = e2.dot(e2), r1 = d.dot(e1), r2 = d.dot(e2);
-    const double det = d11 * d22 - d12 * d12;
-    Vec2 at((d22 * r1 - d12 * r2) / det, (d11 * r2 - d12 * r1) / det);
-    at = at.cwiseMax(0.0);
-    if (at.sum() > 1) {
-      at /= at.sum();
-    }
+    Vec2 at = barycentric(flat, a, b, c).tail<2>();
     if (face.curved) {
       at = nearest_on_face(face, map, x, at);
     }
@@ -320,7 +313,7 @@ ContactSystem::Touch ContactSystem::touch(const Group& group, const Vec3& x, con
     const double length = away.norm();
     double sign = 1;
     if (face.half_thickness == 0) {  // the surface of a solid has an inside
-      sign = away.dot(e1.cross(e2)) >= 0 ? 1 : -1;
+      sign = away.dot((b - a).cross(c - a)) >= 0 ? 1 : -1;
     }
     const double gap = sign * length - off;
     if (gap < result.gap && length > 0) {
@@ -328,13 +321,13 @@ ContactSystem::Touch ContactSystem::touch(const Group& group, const Vec3& x, con
       result.normal = sign / length * away;
       result.face = f;
       result.weights = weights;
-      result.at = at;
     }
   }
   return result;
 }
 
 void ContactSystem::set_step(double from, double to, const Configuration& configuration) {
+  ratio_.assign(contacts_.size(), stiffness_of_pressure);
   for (std::size_t c = 0; c < contacts_.size(); ++c) {
     stiffness_[c] = mean_pressure_[c] > 0 ? wanted_stiffness(c) : first_stiffness * young_[c];
   }
@@ -393,14 +386,24 @@ bool ContactSystem::find_pairs(const Configuration& configuration) {
 }
 
 void ContactSystem::accept(const Configuration& configuration) {
+  if (std::any_of(contacts_.begin(), contacts_.end(), [](const Contact& c) { return c.friction > 0; })) {
+    keep_slip(configuration);
+  }
+  accepted_ = configuration;
+  shapes_before_ = shapes_;
+}
+
+void ContactSystem::keep_slip(const Configuration& configuration) {
   const FaceMaps maps(surfaces_, reference_, configuration);
   const auto near = near_faces(maps, 0);
   for (std::size_t g = 0; g < groups_.size(); ++g) {
     Group& group = groups_[g];
-    const bool friction = contacts_[group.contact].friction > 0;
+    if (contacts_[group.contact].friction == 0) {
+      continue;
+    }
     const bool is_close = group.other.rigid ? is_near(group, maps[group.face]) : !near[g].empty();
     for (Sample& sample : group.samples) {
-      if (!friction || !is_close) {
+      if (!is_close) {
         sample.followed = false;
         sample.slip.setZero();
         continue;
@@ -418,13 +421,10 @@ void ContactSystem::accept(const Configuration& configuration) {
       sample.followed = true;
     }
   }
-  accepted_ = configuration;
-  shapes_before_ = shapes_;
 }
 
 std::vector<double> ContactSystem::memory() const {
-  std::vector<double> values = stiffness_;
-  values.insert(values.end(), mean_pressure_.begin(), mean_pressure_.end());
+  std::vector<double> values = mean_pressure_;
   for (const Group& group : groups_) {
     values.push_back(real(group.level));
     for (const Sample& sample : group.samples) {
@@ -436,7 +436,7 @@ std::vector<double> ContactSystem::memory() const {
 }
 
 void ContactSystem::recall(const std::vector<double>& memory, const Configuration& configuration, double time) {
-  std::size_t next = 2 * contacts_.size();
+  std::size_t next = contacts_.size();
   TUNICA_ASSERT(memory.size() >= next);
   for (Group& group : groups_) {
     TUNICA_ASSERT(next < memory.size());
@@ -446,7 +446,7 @@ void ContactSystem::recall(const std::vector<double>& memory, const Configuratio
   TUNICA_ASSERT(memory.size() == next);
   set_step(time, time, configuration);
   accept(configuration);
-  next = 2 * contacts_.size();
+  next = contacts_.size();
   for (Group& group : groups_) {
     ++next;
     for (Sample& sample : group.samples) {
@@ -455,8 +455,7 @@ void ContactSystem::recall(const std::vector<double>& memory, const Configuratio
       next += 4;
     }
   }
-  std::copy_n(memory.begin(), contacts_.size(), stiffness_.begin());
-  std::copy_n(memory.begin() + narrow<std::ptrdiff_t>(contacts_.size()), contacts_.size(), mean_pressure_.begin());
+  std::copy_n(memory.begin(), contacts_.size(), mean_pressure_.begin());
 }
 
 }  // namespace tunica

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "tunica/mechanics/algebra/block_matrix.hpp"
+#include "tunica/mechanics/contact/contact_state.hpp"
 #include "tunica/mechanics/contact/rigid_shape.hpp"
 #include "tunica/mechanics/contact/surface_faces.hpp"
 
@@ -31,15 +32,6 @@
 namespace tunica {
 
 class FaceMaps;
-
-struct ContactResult {
-  Vec3 force = Vec3::Zero();                          ///< N, on the first body
-  Vec3 moment = Vec3::Zero();                         ///< N mm, about the origin
-  double area = 0;                                    ///< mm^2, of the points that press
-  double gap_lower = infinity, gap_upper = infinity;  ///< mm, the smallest
-  std::size_t points = 0;
-  double slip = 0;  ///< mm, the largest of a point that slides in this step
-};
 
 class ContactSystem {
 public:
@@ -80,14 +72,15 @@ public:
   [[nodiscard]] bool is_certain(const Configuration& configuration) const;
 
   /// What acts in a configuration, per contact of the model; gaps as intervals.
-  [[nodiscard]] std::vector<ContactResult> results(const Configuration& configuration);
-  /// Of the last results(), per rigid body of the model: force, moment about the origin, position.
-  [[nodiscard]] const std::vector<std::array<Vec3, 3>>& on_rigids() const { return on_rigids_; }
+  [[nodiscard]] std::vector<ContactState> results(const Configuration& configuration);
+  /// Of the last results(), per rigid body of the model.
+  [[nodiscard]] const std::vector<RigidState>& on_rigids() const { return on_rigids_; }
   /// Of the last results(): the sum over all bodies of forces and moments, relative to the sum of their magnitudes.
   [[nodiscard]] std::array<double, 2> imbalance() const { return imbalance_; }
 
-  /// What is kept between steps.
+  /// What is kept between steps, so that a run that goes on repeats the uninterrupted one.
   [[nodiscard]] std::vector<double> memory() const;
+  /// @param memory  of the same model; configuration, time  of the last accepted state
   void recall(const std::vector<double>& memory, const Configuration& configuration, double time);
 
 private:
@@ -124,11 +117,11 @@ private:
     Mat3 curvature = Mat3::Zero();
     std::size_t face = SIZE_MAX;  ///< of the other body, where it deforms
     PatchWeights weights = PatchWeights::Zero();
-    Vec2 at = Vec2::Zero();
   };
 
   void make_groups();
   void sample(Group& group, int level) const;
+  void keep_slip(const Configuration& configuration);
   /// Levels and sags for a configuration.
   void refine(const FaceMaps& maps);
   [[nodiscard]] double wanted_stiffness(std::size_t contact) const;
@@ -175,13 +168,14 @@ private:
   std::vector<Group> groups_;
   std::vector<double> young_;          ///< MPa, per contact, of the softer body
   std::vector<double> stiffness_;      ///< MPa, per contact, of the barrier
+  std::vector<double> ratio_;          ///< per contact, in this step: the barrier's stiffness of the mean pressure
   std::vector<double> smallest_gap_;   ///< mm, per contact, of the samples at the last forces
   std::vector<double> mean_pressure_;  ///< MPa, per contact, of the last forces, weighted by themselves
   std::vector<std::array<Index, 2>> pairs_;
-  Configuration accepted_;
-  std::vector<std::array<Vec3, 3>> on_rigids_;
+  Configuration rest_, accepted_;
+  std::vector<RigidState> on_rigids_;
   std::array<double, 2> imbalance_{0, 0};
-  std::vector<ContactResult>* record_ = nullptr;  ///< add() writes here what acts
+  std::vector<ContactState>* record_ = nullptr;  ///< add() writes here what acts
 };
 
 }  // namespace tunica

@@ -1,12 +1,12 @@
 #include "tunica/mechanics/contact/patch_map.hpp"
 
+#include "tunica/mechanics/elements/rotation.hpp"
+
 #include <algorithm>
 #include <cmath>
 
 namespace tunica {
 namespace {
-
-constexpr double crease_squared = 0.12061475842818326;  // as in curved_surface.cpp: normals 20 degrees apart
 
 /// A number with its first and second derivatives by three variables.
 struct Jet {
@@ -34,12 +34,6 @@ Jet inverse(const Jet& a) {
 Jet root(const Jet& a) {
   const double r = std::sqrt(a.v);
   return apply(a, r, 0.5 / r, -0.25 / (r * a.v));
-}
-
-Mat3 cross_matrix(const Vec3& w) {
-  Mat3 m;
-  m << 0, -w.z(), w.y(), w.z(), 0, -w.x(), -w.y(), w.x(), 0;
-  return m;
 }
 
 int next_of(int corner) { return (corner + 1) % 3; }
@@ -154,7 +148,7 @@ void PatchMap::EdgePoint::linearise() {
   jacobian = edge * (scalars * d_alpha).transpose() - mean * (scalars * d_beta).transpose() -
              difference * (scalars * d_gamma).transpose();
   jacobian.leftCols<3>().diagonal().array() += alpha;
-  jacobian.rightCols<3>() += beta * cross_matrix(mean) + gamma * cross_matrix(difference);
+  jacobian.rightCols<3>() += beta * skew(mean) + gamma * skew(difference);
 }
 
 Matrix6 PatchMap::EdgePoint::curvature(const Vec3& f) const {
@@ -170,10 +164,10 @@ Matrix6 PatchMap::EdgePoint::curvature(const Vec3& f) const {
   h.topRows<3>() = f * (scalars * d_alpha).transpose() + m * changes.col(0).transpose() +
                    d * changes.col(1).transpose() + 2 * e * changes.col(2).transpose();
   h.topLeftCorner<3, 3>().diagonal().array() += 2 * psi[2];
-  h.topRightCorner<3, 3>() -= psi[0] * cross_matrix(m) + psi[1] * cross_matrix(d);
+  h.topRightCorner<3, 3>() -= psi[0] * skew(m) + psi[1] * skew(d);
   h.bottomRows<3>() = m.cross(e) * changes.col(0).transpose() + d.cross(e) * changes.col(1).transpose() -
                       m.cross(f) * (scalars * d_beta).transpose() - d.cross(f) * (scalars * d_gamma).transpose();
-  h.bottomLeftCorner<3, 3>() += psi[0] * cross_matrix(m) + psi[1] * cross_matrix(d);
+  h.bottomLeftCorner<3, 3>() += psi[0] * skew(m) + psi[1] * skew(d);
   const auto turned = [](const Vec3& carried, const Vec3& by) {  // (spin x carried) x by
     return Mat3(carried * by.transpose() - carried.dot(by) * Mat3::Identity());
   };

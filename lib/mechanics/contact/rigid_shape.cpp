@@ -149,49 +149,44 @@ Vec3 RigidShape::from_mesh(const Vec3& p) const {
 }
 
 RigidDistance RigidShape::at(const Vec3& p) const {
-  return std::visit(
-      Overloaded{[&](const RigidSphere&) { return around(p - first_, radius_, Mat3::Identity()); },
-                 [&](const RigidCapsule&) { return to_segment(p, first_, second_, radius_); },
-                 [&](const RigidCylinder&) { return to_cylinder(p, first_, second_, radius_); },
-                 [&](const RigidPlane& s) {
-                   return RigidDistance{s.normal.dot(p - first_), s.normal, Mat3::Zero()};
-                 },
-                 [&](const RigidMesh&) {
-                   const Vec3 local = to_mesh(p);
-                   const ClosestPoint::Hit hit = surface_->closest(local);
-                   const auto corners = surface_->corners(hit.triangle);
-                   const Vec3 e1 = corners[1] - corners[0], e2 = corners[2] - corners[0];
-                   // Which part of the triangle the nearest point lies on says which normal has the right sign.
-                   const Vec3 d = hit.point - corners[0];
-                   const double d11 = e1.dot(e1), d12 = e1.dot(e2), d22 = e2.dot(e2), r1 = d.dot(e1), r2 = d.dot(e2);
-                   const double det = d11 * d22 - d12 * d12;
-                   const std::array<double, 3> b{1 - (d22 * r1 - d12 * r2 + d11 * r2 - d12 * r1) / det,
-                                                 (d22 * r1 - d12 * r2) / det, (d11 * r2 - d12 * r1) / det};
-                   constexpr double on_side = 1e-9;
-                   std::size_t part = 0;
-                   for (std::size_t k = 0; k < 3; ++k) {
-                     if (b[(k + 2) % 3] < on_side) {
-                       part = 1 + k;  // edge k to k + 1
-                     }
-                   }
-                   for (std::size_t k = 0; k < 3; ++k) {
-                     if (b[k] > 1 - on_side) {
-                       part = 4 + k;
-                     }
-                   }
-                   const Vec3& pseudo = (*pseudo_normals_)[hit.triangle][part];
-                   const Vec3 here = from_mesh(hit.point);
-                   Vec3 away = p - here;
-                   const double length = away.norm();
-                   const double sign = (local - hit.point).dot(pseudo) >= 0 ? 1 : -1;
-                   if (length > 1e-12) {
-                     away *= sign / length;
-                   } else {
-                     away = (from_mesh(hit.point + pseudo) - here).normalized();
-                   }
-                   return RigidDistance{sign * length, away, Mat3::Zero()};
-                 }},
-      body_->shape);
+  return std::visit(Overloaded{[&](const RigidSphere&) { return around(p - first_, radius_, Mat3::Identity()); },
+                               [&](const RigidCapsule&) { return to_segment(p, first_, second_, radius_); },
+                               [&](const RigidCylinder&) { return to_cylinder(p, first_, second_, radius_); },
+                               [&](const RigidPlane& s) {
+                                 return RigidDistance{s.normal.dot(p - first_), s.normal, Mat3::Zero()};
+                               },
+                               [&](const RigidMesh&) {
+                                 const Vec3 local = to_mesh(p);
+                                 const ClosestPoint::Hit hit = surface_->closest(local);
+                                 const auto corners = surface_->corners(hit.triangle);
+                                 // Which part of the triangle the nearest point lies on says which normal has the right
+                                 // sign.
+                                 const Vec3 b = barycentric(hit.point, corners[0], corners[1], corners[2]);
+                                 constexpr double on_side = 1e-9;
+                                 std::size_t part = 0;
+                                 for (std::size_t k = 0; k < 3; ++k) {
+                                   if (b[(k + 2) % 3] < on_side) {
+                                     part = 1 + k;  // edge k to k + 1
+                                   }
+                                 }
+                                 for (std::size_t k = 0; k < 3; ++k) {
+                                   if (b[k] > 1 - on_side) {
+                                     part = 4 + k;
+                                   }
+                                 }
+                                 const Vec3& pseudo = (*pseudo_normals_)[hit.triangle][part];
+                                 const Vec3 here = from_mesh(hit.point);
+                                 Vec3 away = p - here;
+                                 const double length = away.norm();
+                                 const double sign = (local - hit.point).dot(pseudo) >= 0 ? 1 : -1;
+                                 if (length > 1e-12) {
+                                   away *= sign / length;
+                                 } else {
+                                   away = (from_mesh(hit.point + pseudo) - here).normalized();
+                                 }
+                                 return RigidDistance{sign * length, away, Mat3::Zero()};
+                               }},
+                    body_->shape);
 }
 
 double RigidShape::support(const Vec3& n) const {

@@ -15,6 +15,12 @@ struct Configuration {
   std::vector<Eigen::Quaterniond> rotation;
   /// Of the nodes of solids, in units of their shear modulus, positive in tension; empty where there are none.
   std::vector<double> pressure{};
+
+  /// The reference, without pressures.
+  static Configuration at_rest(std::size_t nodes) {
+    return {std::vector<Vec3>(nodes, Vec3::Zero()),
+            std::vector<Eigen::Quaterniond>(nodes, Eigen::Quaterniond::Identity())};
+  }
 };
 
 }  // namespace tunica

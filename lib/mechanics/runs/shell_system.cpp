@@ -621,9 +621,9 @@ ShellSystem make_system(const Model& model) {
 }
 
 Configuration reference_configuration(const ShellSystem& system) {
-  return {std::vector<Vec3>(system.node_count(), Vec3::Zero()),
-          std::vector<Eigen::Quaterniond>(system.node_count(), Eigen::Quaterniond::Identity()),
-          std::vector<double>(system.solids.empty() ? 0 : system.node_count(), 0.0)};
+  Configuration configuration = Configuration::at_rest(system.node_count());
+  configuration.pressure.assign(system.solids.empty() ? 0 : system.node_count(), 0.0);
+  return configuration;
 }
 
 SolidMotion corner_motion(const SolidElement& element, const Configuration& configuration) {

@@ -42,12 +42,8 @@ State make_state(const ShellSystem& system, const Model& model, const Configurat
     }
   }
   if (system.contact) {
-    for (const ContactResult& c : system.contact->results(configuration)) {
-      state.contacts.push_back({c.force, c.moment, c.area, c.gap_lower, c.gap_upper, c.points, c.slip});
-    }
-    for (const auto& [force, moment, position] : system.contact->on_rigids()) {
-      state.rigids.push_back({force, moment, position});
-    }
+    state.contacts = system.contact->results(configuration);
+    state.rigids = system.contact->on_rigids();
     state.force_imbalance = system.contact->imbalance()[0];
     state.moment_imbalance = system.contact->imbalance()[1];
   }

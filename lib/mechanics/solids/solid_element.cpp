@@ -1,5 +1,7 @@
 #include "tunica/mechanics/solids/solid_element.hpp"
 
+#include "tunica/mechanics/elements/rotation.hpp"
+
 #include <Eigen/Dense>
 
 #include <algorithm>
@@ -13,12 +15,6 @@ Mat3 cofactors(const Mat3& f) {
   Mat3 c;
   c << f.col(1).cross(f.col(2)), f.col(2).cross(f.col(0)), f.col(0).cross(f.col(1));
   return c;
-}
-
-Mat3 cross_matrix(const Vec3& w) {
-  Mat3 m;
-  m << 0, -w.z(), w.y(), w.z(), 0, -w.x(), -w.y(), w.x(), 0;
-  return m;
 }
 
 /// The rotation next to a matrix of positive determinant, by Newton's method. Source: Higham 1986.
@@ -47,8 +43,8 @@ struct Point {
 /// factor times the derivative of the cofactors: a column of F enters two of the cross products.
 void add_cofactor_derivative(const Mat3& f, double factor, Matrix99& derivative) {
   for (int l = 0; l < 3; ++l) {
-    derivative.block<3, 3>(3 * ((l + 2) % 3), 3 * l) -= factor * cross_matrix(f.col((l + 1) % 3));
-    derivative.block<3, 3>(3 * ((l + 1) % 3), 3 * l) += factor * cross_matrix(f.col((l + 2) % 3));
+    derivative.block<3, 3>(3 * ((l + 2) % 3), 3 * l) -= factor * skew(f.col((l + 1) % 3));
+    derivative.block<3, 3>(3 * ((l + 1) % 3), 3 * l) += factor * skew(f.col((l + 2) % 3));
   }
 }
 
@@ -94,7 +90,7 @@ bool at_point(const SolidElement& e, const Mat3& gradient, double pressure, Poin
         change(j, l) = 1;
         const Mat3 turned = r.transpose() * change;
         const Vec3 axial(turned(2, 1) - turned(1, 2), turned(0, 2) - turned(2, 0), turned(1, 0) - turned(0, 1));
-        const Mat3 of_rotation = r * cross_matrix(spin * axial);
+        const Mat3 of_rotation = r * skew(spin * axial);
         const Mat3 of_stress = 2 * mu * change + lambda * r(j, l) * r + on_rotation * of_rotation;
         at.derivative.col(3 * l + j) = Eigen::Map<const Eigen::Matrix<double, 9, 1>>(of_stress.data());
       }

@@ -20,7 +20,6 @@ namespace {
 
 constexpr std::size_t patches_per_task = 64;
 constexpr double least_height = 1e-6;  // of the longest edge: less has no usable stiffness in double precision
-constexpr double crease_squared = 0.12061475842818326;  // (2 sin 10 degrees)^2: normals 20 degrees apart
 
 /// The quadratic Bezier triangle of derivatives along the direction with barycentric components d (sum 0), divided by
 /// 3: control points 200, 020, 002, 110, 011, 101.

@@ -14,6 +14,10 @@ namespace tunica {
 /// patch there, tan of the angle between them, would pass 4.9, and the patch leave its facet like a spike.
 inline constexpr double least_normal_agreement = 0.2;
 
+/// Squared distance of the unit normals of two triangles at an edge from which on it is a crease, (2 sin 10 degrees)^2:
+/// normals 20 degrees apart.
+inline constexpr double crease_squared = 0.12061475842818326;
+
 /// A cubic Bezier triangle. Control points in the order 300, 030, 003 (corners), 210, 120 (edge 1-2), 021, 012 (edge
 /// 2-3), 102, 201 (edge 3-1), 111 (centre); the digits count the weights of corners 1, 2, 3.
 struct CubicPatch {

@@ -89,6 +89,15 @@ constexpr std::size_t parallel_from = 20'000;  // triangles: below, threads cost
 
 }  // namespace
 
+Vec3 barycentric(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
+  const Vec3 e1 = b - a, e2 = c - a, d = p - a;
+  const double d11 = e1.dot(e1), d12 = e1.dot(e2), d22 = e2.dot(e2), r1 = d.dot(e1), r2 = d.dot(e2);
+  const double determinant = d11 * d22 - d12 * d12;
+  const double at_b = (d22 * r1 - d12 * r2) / determinant, at_c = (d11 * r2 - d12 * r1) / determinant;
+  const Vec3 all = Vec3(1 - at_b - at_c, at_b, at_c).cwiseMax(0.0);
+  return all / all.sum();
+}
+
 Vec3 closest_point_on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
   const Vec3 ab = b - a;
   const Vec3 ac = c - a;

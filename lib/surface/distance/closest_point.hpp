@@ -8,6 +8,9 @@ namespace tunica {
 /// it is never below the true one but for rounding, however thin the triangle.
 Vec3 closest_point_on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c);
 
+/// Barycentric coordinates of a point of the triangle abc, each within [0, 1], sum 1.
+Vec3 barycentric(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c);
+
 /// Answers "which point of this surface is closest to p" in logarithmic time: a bounding volume hierarchy with four
 /// children per node, built by the surface-area heuristic. Queries are thread-safe.
 /// The tree does not depend on the number of threads that build it.

@@ -90,12 +90,16 @@ inline Vec2 middle(const Part& part) { return (part.at[0] + part.at[1] + part.at
 class FaceMaps {
 public:
   FaceMaps(const Surfaces& surfaces, const std::vector<Vec3>& reference, const Configuration& configuration)
-      : surfaces_(surfaces), reference_(reference), configuration_(configuration), maps_(surfaces.faces.size()) {}
+      : surfaces_(surfaces),
+        reference_(reference),
+        configuration_(configuration),
+        maps_(surfaces.faces.size()),
+        linear_(maps_.size(), false),
+        bounds_(maps_.size()) {}
 
   [[nodiscard]] PatchMap& operator[](std::size_t face) const {
     if (!maps_[face]) {
       maps_[face] = std::make_unique<PatchMap>(surfaces_.faces[face], reference_, configuration_);
-      linear_.resize(maps_.size(), false);
     }
     return *maps_[face];
   }
@@ -110,9 +114,6 @@ public:
   }
   /// Makes map and bounds: what is prepared may be asked for in parallel.
   void prepare(std::size_t face) const {
-    if (bounds_.empty()) {
-      bounds_.resize(maps_.size());
-    }
     if (!bounds_[face]) {
       const SurfaceFace& of = surfaces_.faces[face];
       const PatchMap& map = (*this)[face];
