@@ -1,5 +1,6 @@
 #!/usr/bin/python3
-"""What contact costs: steps of 40 ms of a clamped disc under pressure, free, with a ball that slides over it, and with one at rest.
+"""How exact contact is, against known answers, and what it costs: steps of 40 ms of a clamped disc under pressure, free,
+with a ball that slides over it, and with one at rest.
 
     TUNICA_BIN=build/release/bin PYTHONPATH=tests/support tests/bench/contact_bench.py
 """
@@ -7,7 +8,7 @@ import math
 import tempfile
 
 import numpy as np
-from contact_scenes import contact
+from contact_scenes import RING, SPHERE, contact, ring, sphere, tube
 from published import Bench, fix, run_lines, shell, write_ply
 
 BALL = ('[[rigid]]\nname = "ball"\nshape = "sphere"\ncentre = ["-2mm", "0mm", "6mm"]\nradius = "5mm"\nmotion = [["0s", '
@@ -33,24 +34,39 @@ def disc(rings, radius=20.0):
     return np.array(points), np.array(triangles)
 
 
+def exactness(bench):
+    print("| checked against | resolution | error, % |\n|---|---|---|")
+    for resolution in ("5%", "1%"):
+        cases = [(f"ring, flattened by {100 * d:.0f} %", ring(bench, d, resolution)[0] / answer) for d, answer in RING.items()]
+        cases += [(f"sphere, {d} walls deep", sphere(bench, d, resolution=resolution)[0] / answer)
+                  for d, answer in SPHERE.items()]
+        cases.append(("tube on a rigid cylinder", tube(bench, resolution)[0]))
+        for name, ratio in cases:
+            print(f"| {name} | {resolution} | {100 * (ratio - 1):.2f} |", flush=True)
+
+
+def cost(bench):
+    print("\n| shells | ball | points | ms per step, median | longest | Newton |\n|---|---|---|---|---|---|")
+    for rings in (13, 41):
+        points, triangles = disc(rings)
+        write_ply(bench.path("mesh.ply"), points, triangles, np.tile([0, 0, 1.0], (len(points), 1)))
+        scene = (run_lines(kind="dynamic", duration="2s", step="40ms") +
+                 shell("mesh.ply", 1.0, 1.0, 0.45, density="1100kg/m3") +
+                 fix(np.flatnonzero(np.hypot(*points.T[:2]) > 20 - 1e-6)) +
+                 '[[load]]\nbody = "s"\nkind = "pressure"\nvalue = "1kPa"\nramp = [["0s", 0.0], ["1s", 1.0]]\n')
+        for name, way in (("none", None), ("slides", 4), ("rests", 0)):
+            more = "" if way is None else BALL.format(way=way) + contact("s", "ball")
+            result = bench.run(scene + more)
+            median, longest = (result["ms_per_step"][key] for key in ("median", "max"))
+            touching = result["contacts"]["c"]["points"][-1] if way is not None else 0
+            print(f"| {result['shells']} | {name} | {touching} | {median:.0f} | {longest:.0f} "
+                  f"| {result['newton_iterations']} |", flush=True)
+
+
 def main():
-    print("| shells | ball | points | ms per step, median | longest | Newton |\n|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as folder:
-        bench = Bench(folder)
-        for rings in (13, 41):
-            points, triangles = disc(rings)
-            write_ply(bench.path("mesh.ply"), points, triangles, np.tile([0, 0, 1.0], (len(points), 1)))
-            scene = (run_lines(kind="dynamic", duration="2s", step="40ms") +
-                     shell("mesh.ply", 1.0, 1.0, 0.45, density="1100kg/m3") +
-                     fix(np.flatnonzero(np.hypot(*points.T[:2]) > 20 - 1e-6)) +
-                     '[[load]]\nbody = "s"\nkind = "pressure"\nvalue = "1kPa"\nramp = [["0s", 0.0], ["1s", 1.0]]\n')
-            for name, way in (("none", None), ("slides", 4), ("rests", 0)):
-                more = "" if way is None else BALL.format(way=way) + contact("s", "ball")
-                result = bench.run(scene + more)
-                median, longest = (result["ms_per_step"][key] for key in ("median", "max"))
-                touching = result["contacts"]["c"]["points"][-1] if way is not None else 0
-                print(f"| {result['shells']} | {name} | {touching} | {median:.0f} | {longest:.0f} "
-                      f"| {result['newton_iterations']} |", flush=True)
+        exactness(Bench(folder))
+        cost(Bench(folder))
 
 
 if __name__ == "__main__":

@@ -51,6 +51,25 @@ protected:
 
   [[nodiscard]] LoadedScene load(const std::string& text) const { return load_scene(read(text)); }
 
+  /// Every byte of a scene replaced by each of these, and the scene cut off there: any sentence will do, a crash will
+  /// not.
+  void load_damaged(const std::string& text, std::initializer_list<char> replacements) const {
+    const auto loaded = [&](const std::string& damaged) {
+      try {
+        (void)load(damaged);
+      } catch (const Error&) {
+      }
+    };
+    for (std::size_t i = 0; i < text.size(); ++i) {
+      for (const char c : replacements) {
+        std::string damaged = text;
+        damaged[i] = c;
+        loaded(damaged);
+      }
+      loaded(text.substr(0, i));
+    }
+  }
+
   TemporaryFolder folder_;
 };
 

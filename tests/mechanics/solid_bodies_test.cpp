@@ -196,6 +196,24 @@ TEST(SolidPressure, RigidMotionsOfASolidAreRefused) {
               testing::HasSubstr("solid: a solid cannot be held by its rigid motions yet"));
 }
 
+TEST(SolidBody, WhatSolidsCannotDoIsRefused) {
+  Model model = one_solid(make_block(2, 2, 2, [](const Vec3& u) { return u; }), 1, 0.3);
+  model.solids[0].material.density = 1e-9;
+  hold_nodes(
+      model, 0, [](const Vec3& x) { return x.z() < eps; }, "xyz");
+  RunSettings by_cg = nonlinear_run({1});
+  by_cg.solver = Solver::cg;
+  EXPECT_THAT(error_of(model, by_cg), testing::HasSubstr("use solver = \"direct\""));
+  RunSettings damped;
+  damped.kind = DynamicRun{.duration = 1, .step = 0.1, .damping = {0, 0.1}};
+  EXPECT_THAT(error_of(model, damped), testing::HasSubstr("damping by stiffness does not reach solids"));
+  RunSettings modes;
+  modes.kind = FrequencyRun{};
+  EXPECT_THAT(error_of(model, modes), testing::HasSubstr("not available yet"));
+  model.solids[0].material.poisson = 0.49995;
+  EXPECT_THAT(error_of(model, nonlinear_run({1})), testing::HasSubstr("at most 0.4999"));
+}
+
 /// A bar that can only move along its axis, its sides free to contract.
 Model bar(double length, double young, double density) {
   Model model = one_solid(

@@ -1,5 +1,6 @@
 #!/usr/bin/python3
 """Contact against known answers, friction, balance, and what is refused."""
+import json
 import math
 import tempfile
 import unittest
@@ -47,6 +48,14 @@ class Contact(unittest.TestCase):
     def test_flat_facets_touch_elsewhere_than_the_curved_surface(self):
         curved, flat = tube(self.bench)[0], tube(self.bench, more="surface = \"facets\"\n")[0]
         self.assertGreater(abs(flat / curved - 1), 1e-3)
+
+    def test_the_papers_rule_is_not_in_balance_and_says_so(self):
+        ratio, _, result = tube(self.bench, more="transfer = \"paper\"\n")
+        self.assertAlmostEqual(ratio, 1, delta=0.005)
+        self.assertLess(result["balance"]["force"], 1e-12)
+        self.assertGreater(result["balance"]["moment"], 1e-3)
+        with open(self.bench.path("run.json"), encoding="utf-8") as file:
+            self.assertIn("which is not in balance", "".join(json.load(file)["warnings"]))
 
     def test_a_block_sticks_below_the_angle_of_friction(self):
         result = slope(self.bench, 0.999 * math.atan(0.3), 0.3, run_lines(kind="static", load_steps=1))

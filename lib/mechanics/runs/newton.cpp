@@ -262,7 +262,6 @@ private:
     previous_residual_ = result_.residual;
     before_ = configuration_;
     double length = longest_;
-    const bool moving = is_moving();
     const double bodies_left = system_.contact ? system_.contact->left() : 0;
     const int most_trials = system_.contact ? most_cuts_in_contact : most_cuts;
     for (int trial = 0;; ++trial) {
@@ -281,7 +280,7 @@ private:
         length /= 2;
         continue;
       }
-      if (result_.iterations <= free_iterations || moving || system_.contact) {
+      if (result_.iterations <= free_iterations || system_.contact) {
         break;
       }
       VectorX free = now_.unbalanced;

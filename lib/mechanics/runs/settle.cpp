@@ -134,15 +134,6 @@ private:
     limit(system_, increment);
     Configuration next = configuration_;
     advance_configuration(system_, increment, next);
-    if (system_.contact) {
-      // As far as no surfaces overlap: there the barrier is steep.
-      for (int cut = 0; cut < most_cuts_in_contact && !balance_(next, nullptr, {}).valid; ++cut) {
-        increment /= 2;
-        next = configuration_;
-        advance_configuration(system_, increment, next);
-      }
-      system_.contact->predict(increment);
-    }
     BlockMatrix next_matrix = std::move(shifted);
     const Balance then = balance_(next, &next_matrix, {});
     // Beyond the bottom of a valley the forces push back.

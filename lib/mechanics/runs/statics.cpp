@@ -70,18 +70,7 @@ public:
     const VectorX held =
         prescribed_positions(system_, model_, factor) - prescribed_positions(system_, model_, previous_factor);
     begin_contact(system_, settings_, previous_factor, factor, configuration, solver_, matrix_);
-    const bool moving_bodies = system_.contact && system_.contact->left() > 0;
-    const Configuration start = configuration;
     NewtonResult result = newton(system_, settings_, *solver_, balance, held, matrix_, configuration);
-    if (system_.contact && !(result.converged && result.stable) && held.isZero(0) && !moving_bodies) {
-      // Bodies that nothing holds yet fall until something does: Newton's method has no step for them.
-      configuration = start;
-      system_.contact->set_step(factor, factor, configuration);
-      const SettleResult settled = settle(system_, settings_, *solver_, balance, matrix_, configuration);
-      result.converged = result.stable = result.valid = settled.settled;
-      result.residual = settled.residual;
-      result.iterations += settled.iterations;
-    }
     const VectorX still = VectorX::Zero(held.size());
     for (int round = 0; round < 8 && result.converged; ++round) {
       bool changed = false;

@@ -2,6 +2,7 @@
 
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
+#include "tunica/mechanics/elements/rotation.hpp"
 
 #include <fmt/format.h>
 
@@ -192,6 +193,76 @@ double imbalance(const ShellSystem& system, const Piece& piece, const VectorX& e
     magnitude += f.norm() + m.norm() / size;
   }
   return magnitude > 0 ? std::max(force.norm(), moment.norm() / size) / magnitude : 0;
+}
+
+void take_out_rigid_motion(const ShellSystem& system, const Piece& piece, Configuration& configuration) {
+  double weight = 0;
+  Vec3 centre = Vec3::Zero();
+  for (const Index i : piece.nodes) {
+    weight += system.area[i];
+    centre += system.area[i] * system.reference[i];
+  }
+  centre /= weight;
+  for (int iteration = 0; iteration < 30; ++iteration) {
+    Vec3 shift = Vec3::Zero();
+    Vec3 moment = Vec3::Zero();
+    Mat3 inertia = Mat3::Zero();
+    for (const Index i : piece.nodes) {
+      shift += system.area[i] / weight * configuration.displacement[i];
+    }
+    for (const Index i : piece.nodes) {
+      const Vec3 arm = system.reference[i] - centre;
+      const Vec3 now = arm + configuration.displacement[i] - shift;
+      moment += system.area[i] * arm.cross(configuration.displacement[i] - shift);
+      inertia += system.area[i] * (arm.dot(now) * Mat3::Identity() - now * arm.transpose());
+    }
+    const Vec3 turn = -inertia.partialPivLu().solve(moment);
+    const Eigen::Quaterniond q = exponential(turn);
+    // (q - 1) x, so that small displacements keep their digits.
+    const auto change = [&](const Vec3& x) {
+      const Vec3 t = 2 * q.vec().cross(x);
+      return Vec3(q.w() * t + q.vec().cross(t));
+    };
+    for (const Index i : piece.nodes) {
+      Vec3& u = configuration.displacement[i];
+      u -= shift;
+      u += change(system.reference[i] - centre + u);
+      configuration.rotation[i] = (q * configuration.rotation[i]).normalized();
+    }
+    if (!(turn.norm() > 1e-14)) {
+      break;
+    }
+  }
+}
+
+void take_out_linear_rigid_motion(const ShellSystem& system, const Model& model, VectorX& displacement) {
+  for (const Piece& piece : system.pieces) {
+    if (!held_by_rigid_motions(model, piece.body)) {
+      continue;
+    }
+    double weight = 0;
+    Vec3 centre = Vec3::Zero();
+    Vec3 shift = Vec3::Zero();
+    for (const Index i : piece.nodes) {
+      weight += system.area[i];
+      centre += system.area[i] * system.reference[i];
+      shift += system.area[i] * displacement.segment<3>(first_freedom(i));
+    }
+    centre /= weight;
+    shift /= weight;
+    Vec3 moment = Vec3::Zero();
+    Mat3 inertia = Mat3::Zero();
+    for (const Index i : piece.nodes) {
+      const Vec3 arm = system.reference[i] - centre;
+      moment += system.area[i] * arm.cross(displacement.segment<3>(first_freedom(i)) - shift);
+      inertia += system.area[i] * (arm.squaredNorm() * Mat3::Identity() - arm * arm.transpose());
+    }
+    const Vec3 turn = inertia.ldlt().solve(moment);
+    for (const Index i : piece.nodes) {
+      displacement.segment<3>(first_freedom(i)) -= shift + turn.cross(system.reference[i] - centre);
+      displacement.segment<3>(first_freedom(i) + 3) -= turn;
+    }
+  }
 }
 
 }  // namespace tunica

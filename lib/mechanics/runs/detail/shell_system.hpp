@@ -165,11 +165,4 @@ ShellMesh deformed_mesh(const ShellSystem& system, const Model& model, const Con
 std::optional<double> enclosed_volume(const ShellSystem& system, const Model& model,
                                       const Configuration& configuration);
 
-/// The rigid motion of a piece that leaves the mean displacement and the mean rotation, weighted by area, at zero is
-/// added to its nodes. Follower loads and internal forces only turn with it.
-void take_out_rigid_motion(const ShellSystem& system, const Piece& piece, Configuration& configuration);
-
-/// The same in the linear theory, on 6 numbers per node, for the bodies that are held by their rigid motions.
-void take_out_linear_rigid_motion(const ShellSystem& system, const Model& model, VectorX& displacement);
-
 }  // namespace tunica

@@ -29,4 +29,11 @@ bool held_by_rigid_motions(const Model& model, std::size_t body);
 /// Releases the supports of bodies held by their rigid motions: in a dynamic run inertia holds them.
 void release_rigid_motion_supports(ShellSystem& system, const Model& model);
 
+/// The rigid motion of a piece that leaves the mean displacement and the mean rotation, weighted by area, at zero is
+/// added to its nodes. Follower loads and internal forces only turn with it.
+void take_out_rigid_motion(const ShellSystem& system, const Piece& piece, Configuration& configuration);
+
+/// The same in the linear theory, on 6 numbers per node, for the bodies that are held by their rigid motions.
+void take_out_linear_rigid_motion(const ShellSystem& system, const Model& model, VectorX& displacement);
+
 }  // namespace tunica

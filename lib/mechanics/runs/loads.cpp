@@ -1,0 +1,128 @@
+#include "tunica/mechanics/runs/detail/loads.hpp"
+
+#include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
+#include "tunica/mechanics/elements/pressure.hpp"
+
+#include <fmt/format.h>
+
+namespace tunica {
+namespace {
+
+std::array<Vec3, 3> reference_corners(const ShellElement& e) {
+  return {e.from_centroid.col(0), e.from_centroid.col(1), e.from_centroid.col(2)};
+}
+
+void add_dead_pressure(const ShellSystem& system, std::size_t element, double value, DeadLoad& load) {
+  const ShellElement& e = system.elements[element];
+  Vector9 force;
+  unit_pressure(reference_corners(e), system.heights[element], force, nullptr);
+  for (int k = 0; k < 3; ++k) {
+    load.force.segment<3>(first_freedom(e.nodes[k])) += value * force.segment<3>(3 * k);
+  }
+}
+
+/// A force per area of fixed direction: its normal part works on the deflection of the cubic.
+void add_area_load(const ShellSystem& system, std::size_t element, const Vec3& per_area, DeadLoad& load) {
+  const ShellElement& e = system.elements[element];
+  const Vec3 normal = e.axes.row(2).transpose();
+  const double across = normal.dot(per_area);
+  const Vec3 in_plane = (per_area - across * normal) * (e.area / 3);
+  const auto corners = reference_corners(e);
+  const PlateLoad plate = plate_load(corners);
+  // The patch has more area than its facet.
+  const double spread = 2 * e.area / (corners[1] - corners[0]).cross(corners[2] - corners[0]).norm();
+  for (std::size_t k = 0; k < 3; ++k) {
+    load.force.segment<3>(first_freedom(e.nodes[k])) += in_plane + spread * across * plate.force[k] * normal;
+    load.director[e.nodes[k]] += spread * across * normal * plate.director[k].transpose();
+  }
+}
+
+Index used_node(const ShellSystem& system, const Model& model, std::size_t body, Index node) {
+  const std::size_t global = model.first_node(body) + node;
+  if (node >= model.vertices_of(body).size() || system.used[global] == 0) {
+    throw InputError(fmt::format("{}: a load acts on node {}, which no element uses", model.name_of(body), node));
+  }
+  return narrow<Index>(global);
+}
+
+void add_edge_load(const ShellSystem& system, const Model& model, std::size_t body, const EdgeLoad& edge_load,
+                   DeadLoad& load) {
+  for (const auto& edge : edge_load.edges) {
+    const Index a = used_node(system, model, body, edge[0]);
+    const Index b = used_node(system, model, body, edge[1]);
+    const double length = (system.reference[a] - system.reference[b]).norm();
+    load.force.segment<3>(first_freedom(a)) += edge_load.per_length * (length / 2);
+    load.force.segment<3>(first_freedom(b)) += edge_load.per_length * (length / 2);
+  }
+}
+
+/// Pressure that keeps its direction, or a force per area, on the surface of a solid.
+void add_solid_surface_load(const ShellSystem& system, const Load& load, DeadLoad& dead) {
+  const auto* pressure = std::get_if<PressureLoad>(&load.kind);
+  const auto* area = std::get_if<AreaLoad>(&load.kind);
+  if (pressure == nullptr && area == nullptr) {
+    return;
+  }
+  for (std::size_t f = system.surfaces.first[load.body]; f < system.surfaces.first[load.body + 1]; ++f) {
+    const auto& v = system.surfaces.faces[f].nodes;
+    const Vec3 twice =
+        (system.reference[v[1]] - system.reference[v[0]]).cross(system.reference[v[2]] - system.reference[v[0]]);
+    const Vec3 force =
+        pressure != nullptr ? Vec3(pressure->value / 6 * twice) : Vec3(twice.norm() / 6 * area->per_area);
+    for (const Index node : v) {
+      dead.force.segment<3>(first_freedom(node)) += force;
+    }
+  }
+}
+
+}  // namespace
+
+void make_loads(ShellSystem& system, const Model& model) {
+  system.dead.resize(model.loads.size());
+  for (std::size_t l = 0; l < model.loads.size(); ++l) {
+    const Load& load = model.loads[l];
+    DeadLoad& dead = system.dead[l];
+    const bool solid = model.is_solid(load.body);
+    const std::size_t begin = solid ? 0 : system.first_element[load.body];
+    const std::size_t end = solid ? 0 : system.first_element[load.body + 1];
+    if (const auto* pressure = std::get_if<PressureLoad>(&load.kind); pressure != nullptr && pressure->follower) {
+      system.follower_pressures.emplace_back(l, load.body);
+      continue;
+    }
+    dead.force = VectorX::Zero(first_freedom(system.node_count()));
+    if (solid) {
+      add_solid_surface_load(system, load, dead);
+    }
+    if (std::holds_alternative<AreaLoad>(load.kind) && !solid) {
+      dead.director.assign(system.node_count(), Mat3::Zero());
+    }
+    if (const auto* pressure = std::get_if<PressureLoad>(&load.kind)) {
+      for (std::size_t e = begin; e < end; ++e) {
+        add_dead_pressure(system, e, pressure->value, dead);
+      }
+    } else if (const auto* area = std::get_if<AreaLoad>(&load.kind)) {
+      for (std::size_t e = begin; e < end; ++e) {
+        add_area_load(system, e, area->per_area, dead);
+      }
+    } else if (const auto* force = std::get_if<ForceLoad>(&load.kind)) {
+      for (const Index node : force->nodes) {
+        dead.force.segment<3>(first_freedom(used_node(system, model, load.body, node))) +=
+            force->total / real(force->nodes.size());
+      }
+    } else if (const auto* moment = std::get_if<MomentLoad>(&load.kind)) {
+      for (const Index node : moment->nodes) {
+        dead.force.segment<3>(first_freedom(used_node(system, model, load.body, node)) + 3) +=
+            moment->total / real(moment->nodes.size());
+      }
+    } else if (const auto* edge = std::get_if<EdgeLoad>(&load.kind)) {
+      add_edge_load(system, model, load.body, *edge, dead);
+    } else if (const auto* gravity = std::get_if<GravityLoad>(&load.kind)) {
+      for (std::size_t i = model.first_node(load.body); i < model.first_node(load.body + 1); ++i) {
+        dead.force.segment<3>(first_freedom(i)) = system.mass[i] * gravity->acceleration;
+      }
+    }
+  }
+}
+
+}  // namespace tunica
