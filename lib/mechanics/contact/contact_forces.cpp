@@ -8,9 +8,8 @@
 namespace tunica {
 namespace {
 
-/// Part of the resolution below which the law goes on as a straight line, also where surfaces overlap on the way.
-constexpr double straight_below = 0.1;
 constexpr std::size_t groups_per_task = 16;
+constexpr double least_part_of_mean = 0.1;   // pressure, below which an area does not count
 constexpr double largest_expectation = 100;  // pressures that the tangent takes stay within this of the law's
 
 void add_block(BlockMatrix& matrix, Index row, Index column, const Matrix6& block) {
@@ -176,13 +175,15 @@ void ContactSystem::record(const Group& group, const Sample& sample, const Patch
   const SurfaceFace& face = surfaces_.faces[group.face];
   const Vec3 x = map.point(sample.weights);
   const Vec3 force = group.weight * sample.area * press.traction;
-  ContactState& result = (*record_)[group.contact];
+  ContactState& result = recorded_->states[group.contact];
   const bool on_first = !contact.between[0].rigid && contact.between[0].index == face.body;
   const double sign = on_first ? 1 : -1;
   result.force += sign * force;
   result.moment += sign * x.cross(force);
   const auto along = patch_weight_derivatives(face, sample.at);
-  result.area += group.weight * map.point(along[0]).cross(map.point(along[1])).norm() / (2 * group.level * group.level);
+  recorded_->pressing[group.contact].push_back(
+      {press.law,
+       group.weight * map.point(along[0]).cross(map.point(along[1])).norm() / (2 * group.level * group.level)});
   ++result.points;
   if (press.slip.norm() > group.elastic_slip) {
     result.slip = std::max(result.slip, press.slip.norm() - group.elastic_slip);
@@ -245,7 +246,7 @@ void ContactSystem::scatter(const Group& group, const Acting& acting, const Face
 bool ContactSystem::add(const Configuration& configuration, VectorX& external, BlockMatrix* tangent) {
   const FaceMaps maps(surfaces_, reference_, configuration);
   const auto touches = all_touches(maps, near_faces(maps, 0));
-  std::vector<double> pressed(contacts_.size(), 0), squared(contacts_.size(), 0);
+  largest_pressure_.assign(contacts_.size(), 0);
   smallest_gap_.assign(contacts_.size(), infinity);
   for (std::size_t g = 0; g < groups_.size(); ++g) {
     Group& group = groups_[g];
@@ -263,9 +264,8 @@ bool ContactSystem::add(const Configuration& configuration, VectorX& external, B
       smallest_gap_[group.contact] = std::min(smallest_gap_[group.contact], t.gap);
       const Vec3 x = maps[group.face].point(sample.weights);
       const Press here = press(group, sample, t, x);
-      pressed[group.contact] += group.weight * sample.area * here.law;
-      squared[group.contact] += group.weight * sample.area * here.law * here.law;
-      if (record_ != nullptr) {
+      largest_pressure_[group.contact] = std::max(largest_pressure_[group.contact], here.law);
+      if (recorded_ != nullptr) {
         record(group, sample, maps[group.face], here);
       }
       Vec3 rest = Vec3::Zero();
@@ -297,9 +297,6 @@ bool ContactSystem::add(const Configuration& configuration, VectorX& external, B
     if (acting.any) {
       scatter(group, acting, maps, external, tangent);
     }
-  }
-  for (std::size_t c = 0; c < contacts_.size(); ++c) {
-    mean_pressure_[c] = pressed[c] > 0 ? squared[c] / pressed[c] : 0;
   }
   if (tangent != nullptr) {
     at_tangent_ = configuration;
@@ -341,13 +338,30 @@ void ContactSystem::predict(const VectorX& increment) {
   }
 }
 
+/// The area with more than a small part of the mean pressure: beyond it the law of contact presses at a distance.
+double pressing_area(const std::vector<ContactSystem::Pressing>& pressing) {
+  double force = 0, squared = 0, area = 0;
+  for (const auto& [pressure, of] : pressing) {
+    force += of * pressure;
+    squared += of * pressure * pressure;
+  }
+  for (const auto& [pressure, of] : pressing) {
+    area += pressure * force > least_part_of_mean * squared ? of : 0;
+  }
+  return area;
+}
+
 std::vector<ContactState> ContactSystem::results(const Configuration& configuration) {
-  std::vector<ContactState> results(contacts_.size());
+  Recorded recorded{std::vector<ContactState>(contacts_.size()), std::vector<std::vector<Pressing>>(contacts_.size())};
+  std::vector<ContactState>& results = recorded.states;
   on_rigids_.assign(shapes_.size(), {});
   VectorX nodal = VectorX::Zero(first_freedom(reference_.size()));
-  record_ = &results;
+  recorded_ = &recorded;
   (void)add(configuration, nodal, nullptr);
-  record_ = nullptr;
+  recorded_ = nullptr;
+  for (std::size_t c = 0; c < contacts_.size(); ++c) {
+    results[c].area = pressing_area(recorded.pressing[c]);
+  }
   Vec3 force = Vec3::Zero(), moment = Vec3::Zero();
   double forces = 0, moments = 0;
   for (std::size_t i = 0; i < reference_.size(); ++i) {

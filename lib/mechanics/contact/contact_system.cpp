@@ -13,14 +13,16 @@ namespace {
 
 constexpr double first_stiffness = 1e-5;  // of the barrier, of Young's modulus, while no pressure is known
 constexpr double least_stiffness = 1e-8;  // of the barrier, of Young's modulus: where a contact opens
+/// Barrier's stiffness over the largest pressure that takes just that part of the resolution below which the law is
+/// straight.
 constexpr double stiffness_of_pressure =
-    0.1;                         // of the barrier, of the mean pressure; more where that lets surfaces overlap
-constexpr double blunt = 5;      // of what is wanted: above, the barrier is made softer
-constexpr double hardening = 4;  // of the barrier, where a state of rest overlaps
+    ContactSystem::straight_below / ((1 - ContactSystem::straight_below) * (1 - ContactSystem::straight_below));
+constexpr double blunt = 2;               // of what is wanted: above, the barrier is made softer
+constexpr double largest_hardening = 10;  // of the barrier at a time: pressures of iterates may be far too large
 /// Part of both half walls up to which shells may overlap on the way.
 constexpr double largest_overlap = 0.8;
 constexpr double elastic_slip_of_wall = 1e-3;  // slip at which friction is fully there
-constexpr double sag_of_resolution = 0.02;     // what a surface may bend between samples
+constexpr double sag_of_resolution = 0.05;     // what a surface may bend between samples
 constexpr int least_level = 4, most_level = 32;
 
 /// Two surfaces of one body are as far apart as they were in the reference: this part of it counts as no contact.
@@ -98,7 +100,7 @@ void ContactSystem::make_groups() {
     }
     young_.push_back(young);
     stiffness_.push_back(first_stiffness * young);
-    mean_pressure_.push_back(0);
+    largest_pressure_.push_back(0);
     for (std::size_t side = 0; side < (self ? 1 : 2); ++side) {
       const ContactParty& own = contact.between[side];
       const ContactParty& other = contact.between[1 - side];
@@ -113,8 +115,8 @@ void ContactSystem::make_groups() {
         group.contact = c;
         group.other = other;
         group.weight = both ? 0.5 : 1;
-        group.resolution =
-            contact.resolution * (face.half_thickness > 0 ? std::min(wall, 2 * face.half_thickness) : wall);
+        group.wall = face.half_thickness > 0 ? std::min(wall, 2 * face.half_thickness) : wall;
+        group.resolution = contact.resolution * group.wall;
         group.elastic_slip = elastic_slip_of_wall * wall;
         groups_.push_back(std::move(group));
       }
@@ -170,19 +172,24 @@ void ContactSystem::refine(const FaceMaps& maps) {
   }
 }
 
-double ContactSystem::wanted_stiffness(std::size_t c) const {
-  return std::max(ratio_[c] * mean_pressure_[c], least_stiffness * young_[c]);
+bool ContactSystem::harden() {
+  bool changed = false;
+  for (std::size_t c = 0; c < contacts_.size(); ++c) {
+    const double wanted = stiffness_of_pressure * largest_pressure_[c];
+    if (smallest_gap_[c] <= 0 && wanted > stiffness_[c]) {
+      stiffness_[c] = std::min(wanted, largest_hardening * stiffness_[c]);
+      changed = true;
+    }
+  }
+  return changed;
 }
 
 bool ContactSystem::sharpen() {
-  bool changed = false;
+  bool changed = harden();
   for (std::size_t c = 0; c < contacts_.size(); ++c) {
-    if (smallest_gap_[c] <= 0) {  // somewhere the pressure is far above its mean
-      stiffness_[c] *= hardening;
-      ratio_[c] *= hardening;
-      changed = true;
-    } else if (mean_pressure_[c] > 0 && stiffness_[c] > blunt * wanted_stiffness(c)) {
-      stiffness_[c] = wanted_stiffness(c);
+    const double wanted = std::max(stiffness_of_pressure * largest_pressure_[c], least_stiffness * young_[c]);
+    if (largest_pressure_[c] > 0 && stiffness_[c] > blunt * wanted) {
+      stiffness_[c] = wanted;
       changed = true;
     }
   }
@@ -219,7 +226,7 @@ double ContactSystem::deepest(const Group& group, std::size_t other) const {
     return offset(group, 0) + shapes_[group.other.index].deepest();
   }
   const double walls = largest_overlap * offset(group, other);
-  return walls > 0 ? walls : group.resolution / (4 * contacts_[group.contact].resolution);
+  return walls > 0 ? walls : group.wall / 4;
 }
 
 bool ContactSystem::excluded(const Group& group, std::size_t other) const {
@@ -327,10 +334,6 @@ ContactSystem::Touch ContactSystem::touch(const Group& group, const Vec3& x, con
 }
 
 void ContactSystem::set_step(double from, double to, const Configuration& configuration) {
-  ratio_.assign(contacts_.size(), stiffness_of_pressure);
-  for (std::size_t c = 0; c < contacts_.size(); ++c) {
-    stiffness_[c] = mean_pressure_[c] > 0 ? wanted_stiffness(c) : first_stiffness * young_[c];
-  }
   refine(FaceMaps(surfaces_, reference_, configuration));
   begin_ = from;
   end_ = to;
@@ -424,7 +427,7 @@ void ContactSystem::keep_slip(const Configuration& configuration) {
 }
 
 std::vector<double> ContactSystem::memory() const {
-  std::vector<double> values = mean_pressure_;
+  std::vector<double> values = stiffness_;
   for (const Group& group : groups_) {
     values.push_back(real(group.level));
     for (const Sample& sample : group.samples) {
@@ -455,7 +458,7 @@ void ContactSystem::recall(const std::vector<double>& memory, const Configuratio
       next += 4;
     }
   }
-  std::copy_n(memory.begin(), contacts_.size(), mean_pressure_.begin());
+  std::copy_n(memory.begin(), contacts_.size(), stiffness_.begin());
 }
 
 }  // namespace tunica

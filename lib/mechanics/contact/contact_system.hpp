@@ -13,10 +13,10 @@
 /// Points are sampled on the surfaces, each with its part of the area in the reference. A point presses with
 ///   p(g) = stiffness (1 - g / d)^2 d / g   for gaps 0 < g < d, else 0,
 /// d the resolution, g the distance less half of each wall and less what the surfaces may bend between the points (a
-/// fiftieth of d at most: the number of points follows). The stiffness is a part of the mean pressure of the contact,
-/// found on the way: so the gap is a small part of d, and d alone says how exact the answer is. The pressure counts as
-/// an unknown of its own (a primal-dual interior point method, eliminated at each point): the forces follow p(g), the
-/// tangent takes the pressure that the last one expects. Below a tenth of d the law goes on as a straight
+/// twentieth of d at most: the number of points follows). The stiffness is such that the largest pressure of the
+/// contact, found on the way, takes a gap of a twentieth of d: so d alone says how exact the answer is. The pressure
+/// counts as an unknown of its own (a primal-dual interior point method, eliminated at each point): the forces follow
+/// p(g), the tangent takes the pressure that the last one expects. Below a twentieth of d the law goes on as a straight
 /// line, so that surfaces may overlap on the way to a state, and the first touch cuts no step short; a state of rest in
 /// which they do is refused, and the barrier hardened.
 ///
@@ -35,6 +35,9 @@ class FaceMaps;
 
 class ContactSystem {
 public:
+  /// Part of the resolution below which the law goes on as a straight line, also where surfaces overlap on the way.
+  static constexpr double straight_below = 0.05;
+
   /// Errors: InputError: bodies overlap in the reference; names the pair and the depth.
   ContactSystem(const Model& model, Surfaces surfaces, std::vector<Vec3> reference);
 
@@ -42,8 +45,11 @@ public:
   /// is sampled as finely as its curvature asks in this configuration.
   void set_step(double from, double to, const Configuration& configuration);
 
-  /// Where Newton's method has come to rest: makes the barrier softer against the pressures found, or harder where
-  /// surfaces still overlap.
+  /// Makes the barrier harder where surfaces overlap.
+  /// @return whether that changed anything
+  bool harden();
+  /// Where Newton's method has come to rest: also makes the barrier softer where it is more than the pressures found
+  /// ask for.
   /// @return whether that changed anything, so that Newton's method has to go on
   bool sharpen();
   /// Of the rigid bodies' motion in the step, what is still to come.
@@ -78,6 +84,11 @@ public:
   /// Of the last results(): the sum over all bodies of forces and moments, relative to the sum of their magnitudes.
   [[nodiscard]] std::array<double, 2> imbalance() const { return imbalance_; }
 
+  struct Pressing {
+    double pressure = 0;  ///< MPa
+    double area = 0;      ///< mm^2
+  };
+
   /// What is kept between steps, so that a run that goes on repeats the uninterrupted one.
   [[nodiscard]] std::vector<double> memory() const;
   /// @param memory  of the same model; configuration, time  of the last accepted state
@@ -104,8 +115,9 @@ private:
     std::size_t face = 0;
     std::size_t contact = 0;
     ContactParty other;
-    double weight = 1;  ///< one half where both sides are sampled
-    double resolution = 0;
+    double weight = 1;      ///< one half where both sides are sampled
+    double wall = 0;        ///< mm; of a solid the length of its edges
+    double resolution = 0;  ///< mm, over which pressure builds up
     double elastic_slip = 0;
     int level = 0;
     double sag = 0;  ///< mm: what the surfaces bend between samples
@@ -124,7 +136,6 @@ private:
   void keep_slip(const Configuration& configuration);
   /// Levels and sags for a configuration.
   void refine(const FaceMaps& maps);
-  [[nodiscard]] double wanted_stiffness(std::size_t contact) const;
   [[nodiscard]] double offset(const Group& group, std::size_t other) const;
   /// How far surfaces may overlap on the way to a state, mm.
   [[nodiscard]] double deepest(const Group& group, std::size_t other) const;
@@ -146,6 +157,10 @@ private:
   struct Acting;
   [[nodiscard]] Press press(const Group& group, const Sample& sample, const Touch& touch, const Vec3& x) const;
   [[nodiscard]] Vec3 rest_of_motion(const Group& group, const Press& press, const Touch& touch, const Vec3& x) const;
+  struct Recorded {
+    std::vector<ContactState> states;
+    std::vector<std::vector<Pressing>> pressing;
+  };
   void record(const Group& group, const Sample& sample, const PatchMap& map, const Press& press);
   void add_sample(const Group& group, const Sample& sample, const Touch& touch, const Press& press, const Vec3& rest,
                   bool with_derivative, Acting& acting) const;
@@ -166,16 +181,15 @@ private:
   Configuration at_tangent_;  ///< where the last tangent was made
   double begin_ = 0, end_ = 0, left_ = 0;
   std::vector<Group> groups_;
-  std::vector<double> young_;          ///< MPa, per contact, of the softer body
-  std::vector<double> stiffness_;      ///< MPa, per contact, of the barrier
-  std::vector<double> ratio_;          ///< per contact, in this step: the barrier's stiffness of the mean pressure
-  std::vector<double> smallest_gap_;   ///< mm, per contact, of the samples at the last forces
-  std::vector<double> mean_pressure_;  ///< MPa, per contact, of the last forces, weighted by themselves
+  std::vector<double> young_;             ///< MPa, per contact, of the softer body
+  std::vector<double> stiffness_;         ///< MPa, per contact, of the barrier
+  std::vector<double> smallest_gap_;      ///< mm, per contact, of the samples at the last forces
+  std::vector<double> largest_pressure_;  ///< MPa, per contact, of the last forces
   std::vector<std::array<Index, 2>> pairs_;
   Configuration rest_, accepted_;
   std::vector<RigidState> on_rigids_;
   std::array<double, 2> imbalance_{0, 0};
-  std::vector<ContactState>* record_ = nullptr;  ///< add() writes here what acts
+  Recorded* recorded_ = nullptr;  ///< add() writes here what acts
 };
 
 }  // namespace tunica

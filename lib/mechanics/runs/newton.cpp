@@ -13,6 +13,7 @@ namespace {
 constexpr double largest_turn = 0.5;           // rad per iteration
 constexpr std::size_t free_iterations = 6;     // full steps before the line search sets in
 constexpr double round_off_of_nothing = 0.01;  // of the floor, where no load acts
+constexpr double near_balance = 0.1;           // residual from which the pressures of a contact mean something
 constexpr int most_cuts = 6;                   // of an increment
 
 bool uses_cg(const RunSettings& settings) { return settings.solver == Solver::cg; }
@@ -122,6 +123,7 @@ public:
         whole_(VectorX::Zero(held_increment.size())) {}
 
   NewtonResult run(bool likely_at_rest) {
+    likely_at_rest = likely_at_rest || system_.contact;
     now_ = balance_(configuration_, likely_at_rest ? nullptr : &matrix_, {});
     tangent_is_current_ = !likely_at_rest;
     if (!now_.valid) {
@@ -207,6 +209,9 @@ private:
     VectorX all = last_;
     expand_carried(system_.carried, system_.surfaces, system_.reference, before_, all);
     if (system_.contact) {
+      if (result_.residual < near_balance) {
+        system_.contact->harden();
+      }
       system_.contact->predict(all);
     }
     return balance_(configuration_, &matrix_, predicted_deformations(system_, before_, all));
