@@ -10,24 +10,44 @@ double bend_of(const SurfaceFace& face, const PatchMap& map, int level) {
   return face.curved ? flatness(patch_of(face, map), level) : 0.0;
 }
 
+std::array<Vec3, 3> corners_of(const SurfaceFace& face, const PatchMap& map, const Part& part) {
+  std::array<Vec3, 3> corners;
+  for (int k = 0; k < 3; ++k) {
+    corners[k] = map.point(patch_weights(face, part.at[k]));
+  }
+  return corners;
+}
+
+Vec3 normal_of(const SurfaceFace& face, const PatchMap& map, const Part& part) {
+  const auto along = patch_weight_derivatives(face, middle(part));
+  return map.point(along[0]).cross(map.point(along[1])).normalized();
+}
+
+/// From q to p, between their facets' nearest points as seen from the corners.
+Vec3 shortest_way(const std::array<Vec3, 3>& p, const std::array<Vec3, 3>& q) {
+  Vec3 shortest = Vec3::Constant(infinity);
+  const auto look = [&](const Vec3& way) { shortest = way.squaredNorm() < shortest.squaredNorm() ? way : shortest; };
+  for (int k = 0; k < 3; ++k) {
+    look(p[k] - closest_point_on_triangle(p[k], q[0], q[1], q[2]));
+    look(closest_point_on_triangle(q[k], p[0], p[1], p[2]) - q[k]);
+  }
+  return shortest.normalized();
+}
+
 /// Whether two faces certainly stay apart on straight lines: some plane has them on either side at both ends.
 bool stay_apart(const SurfaceFace& face, const PatchMap& a0, const PatchMap& a1, const SurfaceFace& other,
-                const PatchMap& b0, const PatchMap& b1) {
+                const PatchMap& b0, const PatchMap& b1, double slack) {
   const std::function<bool(const Part&, const Part&, int, int)> certain = [&](const Part& p, const Part& q, int level,
                                                                               int depth) {
     const double bend0 = bend_of(face, a0, level) + bend_of(other, b0, level);
     const double bend1 = bend_of(face, a1, level) + bend_of(other, b1, level);
     const auto between = [&](const PatchMap& a, const PatchMap& b) {
-      return Vec3(a.point(patch_weights(face, middle(p))) - b.point(patch_weights(other, middle(q)))).normalized();
+      return shortest_way(corners_of(face, a, p), corners_of(other, b, q));
     };
-    const auto normal = [&](const SurfaceFace& of, const PatchMap& map, const Part& part) {
-      const auto along = patch_weight_derivatives(of, middle(part));
-      return Vec3(map.point(along[0]).cross(map.point(along[1])).normalized());
-    };
-    for (const Vec3& n : {between(a1, b1), between(a0, b0), normal(other, b1, q), Vec3(-normal(other, b1, q)),
-                          normal(face, a1, p), Vec3(-normal(face, a1, p))}) {
-      if (extent(face, a0, p, n)[0] - extent(other, b0, q, n)[1] > bend0 &&
-          extent(face, a1, p, n)[0] - extent(other, b1, q, n)[1] > bend1) {
+    for (const Vec3& n : {between(a1, b1), between(a0, b0), normal_of(other, b1, q), Vec3(-normal_of(other, b1, q)),
+                          normal_of(face, a1, p), Vec3(-normal_of(face, a1, p))}) {
+      if (extent(face, a0, p, n)[0] - extent(other, b0, q, n)[1] > bend0 - slack &&
+          extent(face, a1, p, n)[0] - extent(other, b1, q, n)[1] > bend1 - slack) {
         return true;
       }
     }
@@ -67,7 +87,8 @@ bool ContactSystem::is_certain(const Configuration& configuration) const {
       return false;
     }
     for (const std::size_t other : near[g]) {
-      if (!stay_apart(surfaces_.faces[f], before[f], now[f], surfaces_.faces[other], before[other], now[other])) {
+      if (!stay_apart(surfaces_.faces[f], before[f], now[f], surfaces_.faces[other], before[other], now[other],
+                      same_distance * groups_[g].wall)) {
         return false;
       }
     }
@@ -77,6 +98,7 @@ bool ContactSystem::is_certain(const Configuration& configuration) const {
 
 bool ContactSystem::passes_rigid(const Group& group, const PatchMap& a0, const PatchMap& a1) const {
   const SurfaceFace& face = surfaces_.faces[group.face];
+  const double slack = same_distance * group.wall;
   const RigidShape &s0 = shapes_before_[group.other.index], &s1 = shapes_[group.other.index];
   const auto far = [&](const PatchMap& m0, const PatchMap& m1, const Vec3& c0, const Vec3& c1, double reach) {
     // Distances change no faster than what moves.
@@ -99,8 +121,8 @@ bool ContactSystem::passes_rigid(const Group& group, const PatchMap& a0, const P
     const Vec3 c0 = a0.point(weights), c1 = a1.point(weights);
     const double bend0 = bend_of(face, a0, level), bend1 = bend_of(face, a1, level);
     for (const Vec3& n : {s1.at(c1).normal, s0.at(c0).normal}) {
-      if (s0.convex() && extent(face, a0, part, n)[0] - bend0 > s0.support(n) &&
-          extent(face, a1, part, n)[0] - bend1 > s1.support(n)) {
+      if (s0.convex() && extent(face, a0, part, n)[0] - bend0 > s0.support(n) - slack &&
+          extent(face, a1, part, n)[0] - bend1 > s1.support(n) - slack) {
         return true;
       }
     }
@@ -166,11 +188,10 @@ double ContactSystem::lower_gap(const Group& group, const std::vector<std::size_
     const double walls = offset(group, f);
     const std::function<void(const Part&, const Part&, int)> visit = [&](const Part& p, const Part& q, int level) {
       const double bend = bend_of(face, a, level) + bend_of(other, b, level);
-      const Vec3 away = a.point(patch_weights(face, middle(p))) - b.point(patch_weights(other, middle(q)));
-      const auto along = patch_weight_derivatives(other, middle(q));
-      const Vec3 normal = b.point(along[0]).cross(b.point(along[1])).normalized();
+      const Vec3 away = shortest_way(corners_of(face, a, p), corners_of(other, b, q));
+      const Vec3 n_own = normal_of(face, a, p), n_other = normal_of(other, b, q);
       double bound = -infinity;
-      for (const Vec3& n : {Vec3(away.normalized()), Vec3(normal.dot(away) >= 0 ? normal : Vec3(-normal))}) {
+      for (const Vec3& n : {away, n_other, Vec3(-n_other), n_own, Vec3(-n_own)}) {
         bound = std::max(bound, extent(face, a, p, n)[0] - extent(other, b, q, n)[1] - bend - walls);
       }
       if (bound >= lower) {

@@ -40,16 +40,33 @@ Eigen::Matrix<double, 18, 3> paper_transfer(const PatchMap& map, const Vec2& at)
   return transfer;
 }
 
+/// What friction adds on nodes because it acts on a face of the wall, not on its middle.
+struct Turning {
+  Vector18 moments = Vector18::Zero();
+  Matrix18 own = Matrix18::Zero(), there = Matrix18::Zero(), back = Matrix18::Zero();
+};
+
+/// How a lever moves with the spins of the nodes.
+Eigen::Matrix<double, 3, 18> lever_derivative(const Vec2& at, const Vec3& lever) {
+  const Vec3 shares(1 - at[0] - at[1], at[0], at[1]);
+  Eigen::Matrix<double, 3, 18> result = Eigen::Matrix<double, 3, 18>::Zero();
+  for (int k = 0; k < 3; ++k) {
+    result.middleCols<3>(6 * k + 3) = -shares[k] * skew(lever);
+  }
+  return result;
+}
+
 /// What the samples of a face do to one other face.
 struct Other {
   PatchMap::Points forces = PatchMap::Points::Zero();
   PatchMap::Matrix27 own = PatchMap::Matrix27::Zero();
   PatchMap::Matrix27 between = PatchMap::Matrix27::Zero();  ///< rows: of the face that is sampled
+  Turning turning;
 };
 
 void add_other(const SurfaceFace& face, const SurfaceFace& other, const PatchMap& map, const PatchMap& its_map,
                const Other& act, VectorX& external, BlockMatrix* tangent) {
-  const Vector18 on_nodes = its_map.to_nodes(act.forces);
+  const Vector18 on_nodes = its_map.to_nodes(act.forces) + act.turning.moments;
   for (int k = 0; k < 3; ++k) {
     external.segment<6>(first_freedom(other.nodes[k])) += on_nodes.segment<6>(6 * k);
   }
@@ -62,9 +79,9 @@ void add_other(const SurfaceFace& face, const SurfaceFace& other, const PatchMap
       backwards.block<3, 3>(3 * l, 3 * k) = act.between.block<3, 3>(3 * k, 3 * l);
     }
   }
-  const Matrix18 own = its_map.stiffness(act.own, -act.forces);
-  const Matrix18 there = map.jacobian().transpose() * (act.between * its_map.jacobian());
-  const Matrix18 back = its_map.jacobian().transpose() * (backwards * map.jacobian());
+  const Matrix18 own = its_map.stiffness(act.own, -act.forces) + act.turning.own;
+  const Matrix18 there = map.jacobian().transpose() * (act.between * its_map.jacobian()) + act.turning.there;
+  const Matrix18 back = its_map.jacobian().transpose() * (backwards * map.jacobian()) + act.turning.back;
   for (int k = 0; k < 3; ++k) {
     for (int l = 0; l < 3; ++l) {
       add_block(*tangent, face.nodes[k], other.nodes[l], there.block<6, 6>(6 * k, 6 * l));
@@ -76,18 +93,47 @@ void add_other(const SurfaceFace& face, const SurfaceFace& other, const PatchMap
 
 }  // namespace
 
-Vec3 ContactSystem::relative_motion(const Group& group, const Sample& sample, const Touch& touch, const Vec3& x) const {
+ContactSystem::Levers ContactSystem::levers(const Group& group, const Touch& touch) const {
+  const Contact& contact = contacts_[group.contact];
+  if (contact.friction == 0 || !contact.consistent) {
+    return {};
+  }
+  // The nodes of solids have no rotations: where both are solids, friction acts at both ends of the gap.
+  const double distance = touch.gap + group.sag + offset(group, touch.face);
+  const double theirs = group.other.rigid ? 0 : surfaces_.faces[touch.face].half_thickness;
+  if (surfaces_.faces[group.face].half_thickness > 0) {
+    return {(theirs - distance) * touch.normal, theirs * touch.normal};
+  }
+  return {Vec3::Zero(), theirs > 0 ? Vec3(distance * touch.normal) : Vec3(Vec3::Zero())};
+}
+
+Vec3 ContactSystem::lever_before(const SurfaceFace& face, const Vec2& at, const Vec3& lever,
+                                 const FaceMaps& maps) const {
+  const Vec3 shares(1 - at[0] - at[1], at[0], at[1]);
+  Vec3 before = Vec3::Zero();
+  for (int k = 0; k < 3; ++k) {
+    const Index node = face.nodes[k];
+    before += shares[k] * (accepted_.rotation[node] * (maps.configuration().rotation[node].conjugate() * lever));
+  }
+  return before;
+}
+
+Vec3 ContactSystem::relative_motion(const Group& group, const Sample& sample, const Touch& touch, const Vec3& x,
+                                    const FaceMaps& maps) const {
   if (!sample.followed) {
     return Vec3::Zero();
   }
+  const Levers lever = levers(group, touch);
+  const Vec3 before = sample.before + lever_before(surfaces_.faces[group.face], sample.at, lever.own, maps);
   if (group.other.rigid) {
-    const Vec3 there = shapes_[group.other.index].carried(sample.before, shapes_before_[group.other.index]);
-    return x - there;
+    return x + lever.own - shapes_[group.other.index].carried(before, shapes_before_[group.other.index]);
   }
   // The point of the other surface that is touched now has come from its place in the last accepted state.
   const SurfaceFace& face = surfaces_.faces[touch.face];
-  const Vec3 before = PatchMap(face, reference_, accepted_).point(touch.weights);
-  return (x - sample.before) - (x - touch.normal * (touch.gap + group.sag + offset(group, touch.face)) - before);
+  const Vec3 there = x - touch.normal * (touch.gap + group.sag + offset(group, touch.face));
+  const Vec3 there_before =
+      PatchMap(face, reference_, accepted_).point(touch.weights) + lever_before(face, touch.at, lever.other, maps);
+  return (x + lever.own - before) - (there + lever.other - there_before);
 }
 
 std::vector<std::vector<ContactSystem::Touch>> ContactSystem::all_touches(
@@ -121,13 +167,14 @@ struct ContactSystem::Acting {
   PatchMap::Points at_rest = PatchMap::Points::Zero();
   PatchMap::Matrix27 stiffness = PatchMap::Matrix27::Zero();
   std::map<std::size_t, Other> others;
+  Turning turning;
   Vector18 by_the_paper = Vector18::Zero();  ///< instead of `forces`, where the contact asks for it
   Matrix18 paper_stiffness = Matrix18::Zero();
   bool any = false;
 };
 
-ContactSystem::Press ContactSystem::press(const Group& group, const Sample& sample, const Touch& t,
-                                          const Vec3& x) const {
+ContactSystem::Press ContactSystem::press(const Group& group, const Sample& sample, const Touch& t, const Vec3& x,
+                                          const FaceMaps& maps) const {
   const double friction = contacts_[group.contact].friction;
   const double barrier = stiffness_[group.contact];
   const double s = std::max(t.gap / group.resolution, straight_below);
@@ -145,7 +192,7 @@ ContactSystem::Press ContactSystem::press(const Group& group, const Sample& samp
   press.derivative = press.slope * n * n.transpose() - press.law * t.curvature;
   if (friction > 0) {
     const Mat3 across = Mat3::Identity() - n * n.transpose();
-    press.slip = across * (sample.slip + relative_motion(group, sample, t, x));
+    press.slip = across * (sample.slip + relative_motion(group, sample, t, x, maps));
     const double length = std::max(press.slip.norm(), group.elastic_slip);
     const Vec3 direction = press.slip / length;
     Mat3 of_slip = across;
@@ -170,10 +217,11 @@ Vec3 ContactSystem::rest_of_motion(const Group& group, const Press& press, const
   return -press.derivative * (closes * t.normal - (moved - t.normal * t.normal.dot(moved)));
 }
 
-void ContactSystem::record(const Group& group, const Sample& sample, const PatchMap& map, const Press& press) {
+void ContactSystem::record(const Group& group, const Sample& sample, const PatchMap& map, const Touch& t,
+                           const Press& press) {
   const Contact& contact = contacts_[group.contact];
   const SurfaceFace& face = surfaces_.faces[group.face];
-  const Vec3 x = map.point(sample.weights);
+  const Vec3 x = map.point(sample.weights) + levers(group, t).own;
   const Vec3 force = group.weight * sample.area * press.traction;
   ContactState& result = recorded_->states[group.contact];
   const bool on_first = !contact.between[0].rigid && contact.between[0].index == face.body;
@@ -182,8 +230,7 @@ void ContactSystem::record(const Group& group, const Sample& sample, const Patch
   result.moment += sign * x.cross(force);
   const auto along = patch_weight_derivatives(face, sample.at);
   recorded_->pressing[group.contact].push_back(
-      {press.law,
-       group.weight * map.point(along[0]).cross(map.point(along[1])).norm() / (2 * group.level * group.level)});
+      {press.law, group.weight * sample.share * map.point(along[0]).cross(map.point(along[1])).norm()});
   ++result.points;
   if (press.slip.norm() > group.elastic_slip) {
     result.slip = std::max(result.slip, press.slip.norm() - group.elastic_slip);
@@ -194,9 +241,39 @@ void ContactSystem::record(const Group& group, const Sample& sample, const Patch
   }
 }
 
+void ContactSystem::add_turning(const Group& group, const Sample& sample, const Touch& t, double area,
+                                const Press& press, const Vec3& rest, bool with_derivative, const FaceMaps& maps,
+                                Acting& acting) const {
+  using Derivative = Eigen::Matrix<double, 3, 18>;
+  const Levers lever = levers(group, t);
+  Other* const other = t.face == SIZE_MAX ? nullptr : &acting.others[t.face];
+  const Derivative own = lever_derivative(sample.at, lever.own);
+  const Derivative theirs = lever_derivative(t.at, lever.other);
+  acting.turning.moments += area * own.transpose() * (press.traction + rest);
+  if (other != nullptr) {
+    other->turning.moments -= area * theirs.transpose() * press.traction;
+  }
+  if (!with_derivative) {
+    return;
+  }
+  // What (point + lever) adds to the derivative for the point alone.
+  const auto more = [&](const Derivative& x, const Derivative& l, const Derivative& y, const Derivative& m) {
+    return Matrix18(area *
+                    ((x + l).transpose() * (press.derivative * (y + m)) - x.transpose() * (press.derivative * y)));
+  };
+  const Derivative x = maps.linearised(group.face).derivative(sample.weights);
+  acting.turning.own += more(x, own, x, own);
+  if (other != nullptr) {
+    const Derivative y = maps.linearised(t.face).derivative(t.weights);
+    other->turning.own += more(y, theirs, y, theirs);
+    other->turning.there -= more(x, own, y, theirs);
+    other->turning.back -= more(y, theirs, x, own);
+  }
+}
+
 /// Adds one sample to what acts on its face and on the face it meets.
 void ContactSystem::add_sample(const Group& group, const Sample& sample, const Touch& t, const Press& press,
-                               const Vec3& rest, bool with_derivative, Acting& acting) const {
+                               const Vec3& rest, bool with_derivative, const FaceMaps& maps, Acting& acting) const {
   const double area = group.weight * sample.area;
   acting.any = true;
   acting.at_rest += area * press.traction * sample.weights.transpose();
@@ -204,6 +281,9 @@ void ContactSystem::add_sample(const Group& group, const Sample& sample, const T
   Other* const other = t.face == SIZE_MAX ? nullptr : &acting.others[t.face];
   if (other != nullptr) {
     other->forces -= area * press.traction * t.weights.transpose();
+  }
+  if (contacts_[group.contact].friction > 0 && contacts_[group.contact].consistent) {
+    add_turning(group, sample, t, area, press, rest, with_derivative, maps, acting);
   }
   for (int k = 0; with_derivative && k < 9; ++k) {
     for (int l = 0; l < 9; ++l) {
@@ -225,13 +305,16 @@ void ContactSystem::scatter(const Group& group, const Acting& acting, const Face
                             BlockMatrix* tangent) const {
   const SurfaceFace& face = surfaces_.faces[group.face];
   PatchMap& map = maps.linearised(group.face);
-  const Vector18 on_nodes = contacts_[group.contact].consistent ? map.to_nodes(acting.forces) : acting.by_the_paper;
+  const Vector18 on_nodes = contacts_[group.contact].consistent
+                                ? Vector18(map.to_nodes(acting.forces) + acting.turning.moments)
+                                : acting.by_the_paper;
   for (int k = 0; k < 3; ++k) {
     external.segment<6>(first_freedom(face.nodes[k])) += on_nodes.segment<6>(6 * k);
   }
   if (tangent != nullptr) {
-    const Matrix18 of_nodes =
-        contacts_[group.contact].consistent ? map.stiffness(acting.stiffness, -acting.at_rest) : acting.paper_stiffness;
+    const Matrix18 of_nodes = contacts_[group.contact].consistent
+                                  ? Matrix18(map.stiffness(acting.stiffness, -acting.at_rest) + acting.turning.own)
+                                  : acting.paper_stiffness;
     for (int k = 0; k < 3; ++k) {
       for (int l = 0; l < 3; ++l) {
         add_block(*tangent, face.nodes[k], face.nodes[l], of_nodes.block<6, 6>(6 * k, 6 * l));
@@ -247,6 +330,7 @@ bool ContactSystem::add(const Configuration& configuration, VectorX& external, B
   const FaceMaps maps(surfaces_, reference_, configuration);
   const auto touches = all_touches(maps, near_faces(maps, 0));
   largest_pressure_.assign(contacts_.size(), 0);
+  slides_ = false;
   smallest_gap_.assign(contacts_.size(), infinity);
   for (std::size_t g = 0; g < groups_.size(); ++g) {
     Group& group = groups_[g];
@@ -263,10 +347,10 @@ bool ContactSystem::add(const Configuration& configuration, VectorX& external, B
       }
       smallest_gap_[group.contact] = std::min(smallest_gap_[group.contact], t.gap);
       const Vec3 x = maps[group.face].point(sample.weights);
-      const Press here = press(group, sample, t, x);
+      const Press here = press(group, sample, t, x, maps);
       largest_pressure_[group.contact] = std::max(largest_pressure_[group.contact], here.law);
       if (recorded_ != nullptr) {
-        record(group, sample, maps[group.face], here);
+        record(group, sample, maps[group.face], t, here);
       }
       Vec3 rest = Vec3::Zero();
       if (tangent != nullptr) {
@@ -278,7 +362,8 @@ bool ContactSystem::add(const Configuration& configuration, VectorX& external, B
         sample.other_weights = t.weights;
         rest = rest_of_motion(group, here, t, x);
       }
-      add_sample(group, sample, t, here, rest, tangent != nullptr, acting);
+      add_sample(group, sample, t, here, rest, tangent != nullptr, maps, acting);
+      slides_ = slides_ || here.slip.norm() > group.elastic_slip;
       if (!contacts_[group.contact].consistent) {
         const double area = group.weight * sample.area;
         const auto transfer = paper_transfer(maps[group.face], sample.at);

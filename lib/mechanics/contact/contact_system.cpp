@@ -57,8 +57,8 @@ ContactSystem::ContactSystem(const Model& model, Surfaces surfaces, std::vector<
       continue;
     }
     for (const Sample& sample : group.samples) {
-      const double gap = touch(group, maps[group.face].point(sample.weights), near[g], maps).gap;
-      if (gap <= deepest) {
+      const double gap = touch(group, maps[group.face].point(sample.weights), near[g], maps).gap + group.sag;
+      if (gap < std::min(deepest, -same_distance * group.wall)) {
         deepest = gap;
         which = group.contact + 1;
       }
@@ -130,22 +130,36 @@ void ContactSystem::sample(Group& group, int level) const {
   const std::vector<Sample> old = std::move(group.samples);
   group.level = level;
   group.samples.clear();
-  for (const Part& part : parts_of(level)) {
-    Sample sample;
-    sample.at = middle(part);
-    sample.weights = patch_weights(face, sample.at);
-    const auto along = patch_weight_derivatives(face, sample.at);
-    sample.area = map.point(along[0]).cross(map.point(along[1])).norm() / (2 * level * level);
-    if (contacts_[group.contact].friction > 0 && !old.empty()) {  // it goes on with the slip of the nearest
-      const auto nearest = std::min_element(old.begin(), old.end(), [&](const Sample& a, const Sample& b) {
-        return (a.at - sample.at).squaredNorm() < (b.at - sample.at).squaredNorm();
-      });
-      sample.slip = nearest->slip;
-      sample.followed = nearest->followed;
-      sample.before = PatchMap(face, reference_, accepted_).point(sample.weights);
+  for (int i = 0; i <= level; ++i) {
+    for (int j = 0; i + j <= level; ++j) {
+      group.samples.push_back(sample_at(group, map, i, j));
     }
-    group.samples.push_back(sample);
   }
+  if (contacts_[group.contact].friction == 0 || old.empty()) {
+    return;
+  }
+  for (Sample& sample : group.samples) {  // it goes on with the slip of the nearest
+    const auto nearest = std::min_element(old.begin(), old.end(), [&](const Sample& a, const Sample& b) {
+      return (a.at - sample.at).squaredNorm() < (b.at - sample.at).squaredNorm();
+    });
+    sample.slip = nearest->slip;
+    sample.followed = nearest->followed;
+    sample.before = PatchMap(face, reference_, accepted_).point(sample.weights);
+  }
+}
+
+ContactSystem::Sample ContactSystem::sample_at(const Group& group, const PatchMap& map, int i, int j) const {
+  // A third of each part that meets at the point.
+  const int level = group.level;
+  const int sides = (i == 0 ? 1 : 0) + (j == 0 ? 1 : 0) + (i + j == level ? 1 : 0);
+  const int parts = sides == 0 ? 6 : sides == 1 ? 3 : 1;
+  Sample sample;
+  sample.at = Vec2(real(i) / level, real(j) / level);
+  sample.share = parts / (6.0 * level * level);
+  sample.weights = patch_weights(surfaces_.faces[group.face], sample.at);
+  const auto along = patch_weight_derivatives(surfaces_.faces[group.face], sample.at);
+  sample.area = sample.share * map.point(along[0]).cross(map.point(along[1])).norm();
+  return sample;
 }
 
 void ContactSystem::refine(const FaceMaps& maps) {
@@ -267,8 +281,9 @@ std::vector<std::vector<std::size_t>> ContactSystem::near_faces(const FaceMaps& 
     prepare(surfaces_.faces[group.face].body);
     const auto& faces = sorted[group.other.index];
     const Bounds& own = bounds[group.face];
+    const double walls = surfaces_.faces[group.face].half_thickness + thickest[group.other.index];
     const double reach =
-        group.resolution + group.sag + surfaces_.faces[group.face].half_thickness + thickest[group.other.index] + more;
+        std::max(group.resolution, thickest[group.other.index] == 0 ? group.wall / 4 : 0) + group.sag + walls + more;
     auto place = std::lower_bound(faces.begin(), faces.end(), own.lower.x() - reach - widest[group.other.index],
                                   [&](std::size_t f, double x) { return bounds[f].lower.x() < x; });
     for (; place != faces.end() && bounds[*place].lower.x() <= own.upper.x() + reach; ++place) {
@@ -297,18 +312,28 @@ ContactSystem::Touch ContactSystem::touch(const Group& group, const Vec3& x, con
     result.curvature = distance.curvature;
     return result;
   }
+  // The nearest counts, also from inside a solid; of faces that share their nearest point the one that faces it, or
+  // where they touch the one that faces the sample's own.
+  const PatchMap& self = maps[group.face];
+  const Vec3 own =
+      (self.points().col(1) - self.points().col(0)).cross(self.points().col(2) - self.points().col(0)).normalized();
+  double nearest = infinity, facing = 0;
   for (const std::size_t f : near) {
     const SurfaceFace& face = surfaces_.faces[f];
     const PatchMap& map = maps[f];
     const Bounds& bounds = maps.bounds(f);
+    const bool has_inside = face.half_thickness == 0;
     const double off = offset(group, f) + group.sag;
+    const double tie = has_inside ? same_distance * group.wall : 0;
+    const double most =
+        std::min(nearest + tie, has_inside ? std::max(group.resolution, deepest(group, f)) : group.resolution);
     const double beyond = (bounds.lower - x).cwiseMax(x - bounds.upper).cwiseMax(0.0).norm();
-    if (beyond - off >= std::min(result.gap, group.resolution)) {
+    if (beyond - off >= most) {
       continue;
     }
     const Vec3 a = map.points().col(0), b = map.points().col(1), c = map.points().col(2);
     const Vec3 flat = closest_point_on_triangle(x, a, b, c);
-    if ((x - flat).norm() - maps.bend(f) - off >= std::min(result.gap, group.resolution)) {
+    if ((x - flat).norm() - maps.bend(f) - off >= most) {
       continue;
     }
     Vec2 at = barycentric(flat, a, b, c).tail<2>();
@@ -318,17 +343,24 @@ ContactSystem::Touch ContactSystem::touch(const Group& group, const Vec3& x, con
     const PatchWeights weights = patch_weights(face, at);
     const Vec3 away = x - map.point(weights);
     const double length = away.norm();
-    double sign = 1;
-    if (face.half_thickness == 0) {  // the surface of a solid has an inside
-      sign = away.dot((b - a).cross(c - a)) >= 0 ? 1 : -1;
+    Vec3 outward = Vec3::Zero();
+    double up = 0;
+    if (has_inside) {
+      outward = (b - a).cross(c - a).normalized();
+      up = length > tie ? outward.dot(away) : -group.wall * outward.dot(own);
     }
-    const double gap = sign * length - off;
-    if (gap < result.gap && length > 0) {
-      result.gap = gap;
-      result.normal = sign / length * away;
-      result.face = f;
-      result.weights = weights;
+    if (length - off >= most || (length - off > nearest - tie && std::abs(up) <= facing)) {
+      continue;
     }
+    const bool touches = length <= tie || length == 0;
+    const double sign = up < 0 && !touches ? -1 : 1;
+    nearest = length - off;
+    facing = std::abs(up);
+    result.gap = sign * length - off;
+    result.normal = touches ? outward : Vec3(sign / length * away);
+    result.face = f;
+    result.at = at;
+    result.weights = weights;
   }
   return result;
 }
@@ -414,7 +446,7 @@ void ContactSystem::keep_slip(const Configuration& configuration) {
       const Vec3 x = maps[group.face].point(sample.weights);
       const Touch t = touch(group, x, near[g], maps);
       if (t.gap < group.resolution) {
-        Vec3 slip = sample.slip + relative_motion(group, sample, t, x);
+        Vec3 slip = sample.slip + relative_motion(group, sample, t, x, maps);
         slip -= t.normal * t.normal.dot(slip);
         sample.slip = slip * std::min(1.0, group.elastic_slip / std::max(slip.norm(), group.elastic_slip));
       } else {

@@ -61,6 +61,13 @@ public:
   bool find_pairs(const Configuration& configuration);
   [[nodiscard]] const std::vector<std::array<Index, 2>>& pairs() const { return pairs_; }
 
+  /// Whether two bodies that deform press on each other: their normals jump from one face to the next.
+  [[nodiscard]] bool has_kinks() const { return !pairs_.empty(); }
+
+  /// Whether friction has given way somewhere, by the last forces: the tangent then is not symmetric, and its pivots
+  /// say nothing about stability.
+  [[nodiscard]] bool slides() const { return slides_; }
+
   /// Adds forces; with a tangent their derivative, and to the forces what the rest of the rigid bodies' motion adds to
   /// first order.
   /// @return false where surfaces overlap by more than can be mended
@@ -98,6 +105,7 @@ private:
   struct Sample {
     Vec2 at;
     PatchWeights weights;
+    double share = 0;      ///< of twice the area of the parameters' triangle
     double area = 0;       ///< mm^2
     double pressure = -1;  ///< MPa, that the next tangent takes; below zero: that of the gap
     Vec3 slip = Vec3::Zero();
@@ -128,11 +136,17 @@ private:
     Vec3 normal = Vec3::Zero();
     Mat3 curvature = Mat3::Zero();
     std::size_t face = SIZE_MAX;  ///< of the other body, where it deforms
+    Vec2 at = Vec2::Zero();       ///< parameters there
     PatchWeights weights = PatchWeights::Zero();
+  };
+  /// From the middle of both walls to where they rub: friction turns them.
+  struct Levers {
+    Vec3 own = Vec3::Zero(), other = Vec3::Zero();
   };
 
   void make_groups();
   void sample(Group& group, int level) const;
+  [[nodiscard]] Sample sample_at(const Group& group, const PatchMap& map, int i, int j) const;
   void keep_slip(const Configuration& configuration);
   /// Levels and sags for a configuration.
   void refine(const FaceMaps& maps);
@@ -155,18 +169,27 @@ private:
     Mat3 derivative;
   };
   struct Acting;
-  [[nodiscard]] Press press(const Group& group, const Sample& sample, const Touch& touch, const Vec3& x) const;
+  [[nodiscard]] Press press(const Group& group, const Sample& sample, const Touch& touch, const Vec3& x,
+                            const FaceMaps& maps) const;
   [[nodiscard]] Vec3 rest_of_motion(const Group& group, const Press& press, const Touch& touch, const Vec3& x) const;
   struct Recorded {
     std::vector<ContactState> states;
     std::vector<std::vector<Pressing>> pressing;
   };
-  void record(const Group& group, const Sample& sample, const PatchMap& map, const Press& press);
+  void record(const Group& group, const Sample& sample, const PatchMap& map, const Touch& touch, const Press& press);
   void add_sample(const Group& group, const Sample& sample, const Touch& touch, const Press& press, const Vec3& rest,
-                  bool with_derivative, Acting& acting) const;
+                  bool with_derivative, const FaceMaps& maps, Acting& acting) const;
+  /// Friction's moments about the middle of the walls.
+  void add_turning(const Group& group, const Sample& sample, const Touch& touch, double area, const Press& press,
+                   const Vec3& rest, bool with_derivative, const FaceMaps& maps, Acting& acting) const;
   void scatter(const Group& group, const Acting& acting, const FaceMaps& maps, VectorX& external,
                BlockMatrix* tangent) const;
-  [[nodiscard]] Vec3 relative_motion(const Group& group, const Sample& sample, const Touch& touch, const Vec3& x) const;
+  [[nodiscard]] Levers levers(const Group& group, const Touch& touch) const;
+  [[nodiscard]] Vec3 relative_motion(const Group& group, const Sample& sample, const Touch& touch, const Vec3& x,
+                                     const FaceMaps& maps) const;
+  /// Where a lever of a face was in the last accepted state, relative to its point of the middle.
+  [[nodiscard]] Vec3 lever_before(const SurfaceFace& face, const Vec2& at, const Vec3& lever,
+                                  const FaceMaps& maps) const;
   [[nodiscard]] bool passes_rigid(const Group& group, const PatchMap& before, const PatchMap& now) const;
   [[nodiscard]] double lower_gap(const Group& group, const std::vector<std::size_t>& near, const FaceMaps& maps,
                                  double upper) const;
@@ -180,6 +203,7 @@ private:
   std::vector<RigidShape> shapes_at_tangent_;
   Configuration at_tangent_;  ///< where the last tangent was made
   double begin_ = 0, end_ = 0, left_ = 0;
+  bool slides_ = false;
   std::vector<Group> groups_;
   std::vector<double> young_;             ///< MPa, per contact, of the softer body
   std::vector<double> stiffness_;         ///< MPa, per contact, of the barrier

@@ -14,7 +14,9 @@ constexpr double largest_turn = 0.5;           // rad per iteration
 constexpr std::size_t free_iterations = 6;     // full steps before the line search sets in
 constexpr double round_off_of_nothing = 0.01;  // of the floor, where no load acts
 constexpr double near_balance = 0.1;           // residual from which the pressures of a contact mean something
-constexpr int most_cuts = 6;                   // of an increment
+constexpr double largest_residual_at_kinks = 1e-4;
+constexpr double largest_swing = 1e-4;  // of the step's change, by the last two increments
+constexpr int most_cuts = 6;            // of an increment
 
 bool uses_cg(const RunSettings& settings) { return settings.solver == Solver::cg; }
 
@@ -185,7 +187,14 @@ private:
       return false;
     }
     return result_.residual <= settings_.converge || nothing_acts() ||
-           (is_at_floor() && last_size_ <= largest_round_off * result_.reached) || is_settled();
+           (is_at_floor() && last_size_ <= largest_round_off * result_.reached) || is_settled() || swings_at_kinks();
+  }
+
+  /// Where contact jumps from one face to the next, residuals get no smaller; what is left moves next to nothing.
+  [[nodiscard]] bool swings_at_kinks() const {
+    return system_.contact && system_.contact->has_kinks() && result_.stable &&
+           result_.residual <= largest_residual_at_kinks && last_size_ <= largest_swing * result_.reached &&
+           previous_size_ <= largest_swing * result_.reached;
   }
 
   /// What is left after an increment this small is smaller still: its square, or by the tolerance of the linear solver.
@@ -231,7 +240,7 @@ private:
     mask(solver_.free(), right);
     const TangentSolver::Result solved = solver_.solve(matrix_, right, increment_);
     result_.cg_iterations += solved.cg_iterations;
-    result_.stable = solved.positive_definite;
+    result_.stable = solved.positive_definite || (system_.contact && system_.contact->slides());
     result_.linear_converged = solved.converged;
     result_.algebraic_error = solved.error;
     if (solved.error) {
@@ -298,6 +307,7 @@ private:
     }
     left_ = length == 1 ? 0 : left_ * (1 - length);
     whole_ += last_;
+    previous_size_ = last_size_;
     last_size_ = increment_size(system_, last_);
     result_.reached = increment_size(system_, whole_);
     if (now_.valid) {
@@ -319,11 +329,12 @@ private:
   double longest_ = 1;  ///< part of the increment that may be followed
   bool tangent_is_current_ = false;
   VectorX increment_;
-  Configuration before_;  ///< the last increment went from here
-  VectorX last_;          ///< the last increment, as far as it was followed
-  VectorX whole_;         ///< the sum of all increments
-  double work_ = 0;       ///< of the unbalanced forces along the increment
-  double last_size_ = 0;  ///< of the last increment
+  Configuration before_;             ///< the last increment went from here
+  VectorX last_;                     ///< the last increment, as far as it was followed
+  VectorX whole_;                    ///< the sum of all increments
+  double work_ = 0;                  ///< of the unbalanced forces along the increment
+  double last_size_ = 0;             ///< of the last increment
+  double previous_size_ = infinity;  ///< of the one before
   double largest_solution_ = 0;
   double previous_residual_ = 0;
 };

@@ -10,7 +10,8 @@
 /// Faces, their parts and where they are, for the files of ContactSystem alone.
 namespace tunica {
 
-inline constexpr int most_refined = 5;  ///< times that a part is split for a certificate
+inline constexpr int most_refined = 5;         ///< times that a part is split for a certificate
+inline constexpr double same_distance = 1e-9;  ///< of a wall: what touches does not overlap
 
 struct Bounds {
   Vec3 lower, upper;
@@ -97,6 +98,7 @@ public:
         linear_(maps_.size(), false),
         bounds_(maps_.size()) {}
 
+  [[nodiscard]] const Configuration& configuration() const { return configuration_; }
   [[nodiscard]] PatchMap& operator[](std::size_t face) const {
     if (!maps_[face]) {
       maps_[face] = std::make_unique<PatchMap>(surfaces_.faces[face], reference_, configuration_);
