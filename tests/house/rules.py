@@ -23,7 +23,7 @@ INNER_ROOMS = {
     "surface": {"mesh": set(), "distance": {"mesh"}, "decimation": {"mesh", "distance"},
                 "repair": {"mesh", "decimation"}, "filling": {"mesh"}},
     "shell": {"patch": set(), "distance": {"patch"}},
-    "mechanics": {"model": set(), "algebra": set(), "elements": {"model", "algebra"}, "solids": {"model"},
+    "mechanics": {"model": set(), "algebra": set(), "elements": {"model", "algebra"}, "solids": {"model", "elements"},
                   "contact": {"model", "algebra", "elements"},
                   "runs": {"model", "algebra", "elements", "solids", "contact"}},
     "io": {"file": set(), "volume": {"file"}, "mesh": {"file"}, "scene": {"file", "mesh"}, "result": {"file"}},
