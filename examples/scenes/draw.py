@@ -1,12 +1,13 @@
 #!/usr/bin/python3
 """Pictures of a result with shells, tetrahedra and rigid bodies, cut open, without a display.
 
-    draw.py RESULT.hdf OUT.png --at 0 0.25 0.5 1 [--cut y] [--view 0.4 1 0.5] [--up 0 0 1] [--most 0.2]
+    draw.py RESULT.hdf OUT.png --at 0 0.25 0.5 1 [--cut y=0] [--view 0.4 1 0.5] [--up 0 0 1] [--most 0.2]
 
 RESULT.hdf comes from tunica-simulate with --export pvd, so that RESULT_0000.vtu and its like lie beside it. One panel for
 each place in --at (load factor, or seconds of a motion: the nearest state), left to right, then down. Colours are
 the von Mises stress, from 0 (blue) to --most MPa (red; default: what 1 % of the points of all panels pass). Rigid bodies
-are grey. --cut y leaves what lies at y < 0. Shells are drawn a little before what they lie on. Needs python3-vtk9 and python3-h5py.
+are grey. --cut y=1 leaves what lies at y < 1, --cut=-y=1 what lies at y > 1. Shells are drawn a little before what they lie
+on. Needs python3-vtk9 and python3-h5py.
 """
 import argparse
 import struct
@@ -43,11 +44,25 @@ def deformed(path):
     return grid
 
 
+def polydata(grid, kind):
+    """The surface of the cells of one kind (vtk.VTK_TRIANGLE: the shells; vtk.VTK_TETRA)."""
+    some = vtk.vtkExtractCells()
+    cells = vtk.vtkIdList()
+    for cell in range(grid.GetNumberOfCells()):
+        if grid.GetCellType(cell) == kind:
+            cells.InsertNextId(cell)
+    some.SetCellList(cells)
+    return filtered(vtk.vtkTriangleFilter(), filtered(vtk.vtkGeometryFilter(), filtered(some, grid)))
+
+
 def surface(data, cut):
     """@return points, normals, triangles, and at the points which are a shell's and `von_mises` (None: it has neither)"""
     if cut:
         plane = vtk.vtkPlane()
-        plane.SetNormal(*np.eye(3)["xyz".index(cut)])
+        axis, _, at = cut.removeprefix("-").partition("=")
+        normal = np.eye(3)["xyz".index(axis)]
+        plane.SetNormal(*(-normal if cut.startswith("-") else normal))
+        plane.SetOrigin(*(float(at or 0) * normal))
         clip = vtk.vtkClipDataSet() if data.IsA("vtkUnstructuredGrid") else vtk.vtkClipPolyData()
         clip.SetClipFunction(plane)
         clip.InsideOutOn()
@@ -88,6 +103,10 @@ def turned_about(axis, profile):
     side /= np.linalg.norm(side)
     other = np.cross(axis, side)
     around = 2 * np.pi * np.arange(48) / 48
+    profile = np.array(profile, float)
+    width = np.max(profile[:, 1]) * 2 * np.pi / 48
+    pieces = [max(1, int(np.linalg.norm(b - a) / (4 * width))) for a, b in zip(profile, profile[1:])]  # long triangles are slow
+    profile = np.concatenate([*(np.linspace(a, b, n, endpoint=False) for n, a, b in zip(pieces, profile, profile[1:])), profile[-1:]])
     rings = np.array([[h * axis + r * (np.cos(a) * side + np.sin(a) * other) for a in around] for h, r in profile])
     points, cells = vtk.vtkPoints(), vtk.vtkCellArray()
     points.SetData(numpy_to_vtk(rings.reshape(-1, 3), deep=True))
@@ -209,7 +228,7 @@ def main():
     parser.add_argument("result")
     parser.add_argument("out")
     parser.add_argument("--at", type=float, nargs="+", required=True)
-    parser.add_argument("--cut", choices=["x", "y", "z"])
+    parser.add_argument("--cut")
     parser.add_argument("--view", type=float, nargs=3, default=[0.4, 1, 0.5])
     parser.add_argument("--up", type=float, nargs=3, default=[0, 0, 1])
     parser.add_argument("--most", type=float)

@@ -1,28 +1,39 @@
 #!/usr/bin/python3
-"""run.py NAME BIN OUT [THREADS]: meshes, result, pictures and curve of the scene NAME, made by the tools in BIN, into OUT.
+"""run.py NAME BIN OUT [--threads N]: meshes, result, pictures and curve of the scene NAME, made by the tools in BIN, into OUT.
 
-Every command is printed as it is run in OUT.
+Every command is printed as it is run in OUT. --own "VESSEL [DEPOSITS] KEY=VALUE ..." takes a vessel of your own into the
+angioplasty, see angioplasty/own.py.
 """
+import argparse
 import json
 import math
 import shlex
 import shutil
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import h5py
 import numpy as np
+import vtk
+from vtk.util.numpy_support import vtk_to_numpy
+
+import draw
 
 HERE = Path(__file__).resolve().parent
 
 
 class Folder:
-    def __init__(self, name, tools, out, threads):
-        self.source, self.tools, self.out, self.threads = HERE / name, tools, out, threads
-        out.mkdir(parents=True, exist_ok=True)
+    def __init__(self, given):
+        self.source, self.threads, self.own = HERE / given.name, given.threads, shlex.split(given.own)
+        self.tools, self.out = Path(given.tools).resolve(), Path(given.out).resolve()
+        self.out.mkdir(parents=True, exist_ok=True)
+        if self.own:
+            self.python(self.source / "own.py", ".", *self.own)
+            return
         for scene in self.source.glob("*.toml"):
-            shutil.copy(scene, out)
+            shutil.copy(scene, self.out)
         self.python(self.source / "mesh.py", ".")
 
     def run(self, command):
@@ -88,50 +99,87 @@ def liver(folder):
     print(f"balance of forces: {covered['balance']['force']:.1e} with, {bare['balance']['force']:.1e} without")
 
 
-def lumen(path, places):
-    """Radius of the lumen along z at the states nearest to the load factors: {name: (z, radius)}; and of the wall's middle."""
-    with h5py.File(path) as file:
+def first_hits(surface, points, directions):
+    """How far from each point the triangles of a polydata are, mean over the directions, mm; inf where one meets none."""
+    tree, hits = vtk.vtkOBBTree(), vtk.vtkPoints()
+    tree.SetDataSet(surface)
+    tree.BuildLocator()
+    far = surface.GetLength()
+
+    def distance(point, direction):
+        if tree.IntersectWithLine(point, point + far * direction, hits, None) == 0:
+            return np.inf
+        return np.linalg.norm(vtk_to_numpy(hits.GetData()) - point, axis=1).min()
+
+    return np.array([np.mean([distance(point, direction) for direction in directions]) for point in points])
+
+
+def lumen(folder, balloon, wall, places):
+    """Along the balloon's axis, mean over 36 directions, at the states nearest to the load factors.
+    @return {name: (mm from the balloon's middle, radius of the lumen)}, {name: radius of the wall's middle surface}
+    """
+    start, end = draw.lengths(balloon["from"]), draw.lengths(balloon["to"])
+    half, largest = np.linalg.norm(end - start) / 2, max(draw.in_unit(radius) for _, radius in balloon["radius"])
+    axis = (end - start) / (2 * half)
+    stations = np.linspace(-4 / 3, 4 / 3, 57) * (half + largest)
+    points = (start + end) / 2 + np.outer(stations, axis)
+    _, up, side = draw.view_frame(axis, np.eye(3)[np.argmin(np.abs(axis))])[[2, 1, 0]]
+    angles = 2 * np.pi * (np.arange(36) + 0.5) / 36
+    directions = np.outer(np.cos(angles), side) + np.outer(np.sin(angles), up)
+    with h5py.File(folder.out / "scene.hdf") as file:
         factors = file["tunica/history/load_factor"][:]
-        rest, moved = file["tunica/nodes/position"][:], file["tunica/nodes/displacement"][:]
-        wall = np.unique(file["tunica/elements/nodes"][:])
-        deposit = np.unique(file["tunica/tetrahedra/nodes"][:])
-    stations = np.linspace(-14, 14, 57)
     curves, middle = {}, {}
     for name, place in places.items():
-        now = rest + moved[int(np.argmin(np.abs(factors - place)))]
-        radius = np.hypot(now[:, 0], now[:, 1])
-
-        def along(nodes, of, smallest):
-            rings = np.unique(rest[nodes, 2].round(6))
-            some = [nodes[np.abs(rest[nodes, 2] - z) < 1e-5] for z in rings]
-            mean = [np.sort(of[s])[:len(s) // smallest].mean() for s in some]
-            return np.interp(stations, [now[s, 2].mean() for s in some], mean, left=np.inf, right=np.inf)
-
-        middle[name] = along(wall, radius, 1)
-        inner = along(deposit, radius, 3)  # the innermost of three layers
-        curves[name] = stations, np.minimum(middle[name] - 0.5, inner)
+        grid = draw.deformed(str(folder.out / f"scene_{int(np.argmin(np.abs(factors - place))):04d}.vtu"))
+        shells, deposits = (draw.polydata(grid, kind) for kind in (vtk.VTK_TRIANGLE, vtk.VTK_TETRA))
+        middle[name] = first_hits(shells, points, directions)
+        inner = first_hits(deposits, points, directions) if deposits.GetNumberOfCells() else np.inf
+        radius = np.minimum(middle[name] - wall / 2, inner)
+        curves[name] = stations[np.isfinite(radius)], radius[np.isfinite(radius)]
+        middle[name] = middle[name][np.isfinite(radius)]
     return curves, middle
+
+
+def lengthwise(folder, balloon):
+    """Flags of a picture that is cut along the balloon, which lies across it; the larger part of the bodies stays."""
+    start, end = draw.lengths(balloon["from"]), draw.lengths(balloon["to"])
+    along = int(np.argmax(np.abs(end - start)))
+    cut = 1 if along != 1 else 2
+    up, at = 3 - along - cut, (start + end)[cut] / 2
+    with h5py.File(folder.out / "scene.hdf") as file:
+        side = 1 if np.mean(file["tunica/nodes/position"][:, cut]) <= at + 1e-6 else -1
+    view = 0.35 * np.eye(3)[along] + side * np.eye(3)[cut] + 0.25 * np.eye(3)[up]
+    return ["--cut=%s%s=%.6g" % ("" if side > 0 else "-", "xyz"[cut], at), "--up", *np.eye(3, dtype=int)[up], "--view", *view]
 
 
 def angioplasty(folder):
     result = folder.simulate()
-    folder.draw("--at", 0, 0.2, 0.5, 1, "--cut", "y", "--up", 1, 0, 0, "--view", 0.25, 1, 0.35)
-    curves, middle = lumen(folder.out / "scene.hdf", {"before": 0.2, "inflated": 0.5, "after": 1.0})
+    scene = tomllib.loads((folder.out / "scene.toml").read_text(encoding="utf-8"))
+    balloon, wall = scene["rigid"][0], draw.in_unit(scene["shell"][0]["thickness"])
+    folder.draw("--at", 0, 0.2, 0.5, 1, *lengthwise(folder, balloon))
+    curves, middle = lumen(folder, balloon, wall, {"before": 0.2, "inflated": 0.5, "after": 1.0})
     folder.chart(curves, "--title", "The lumen along the vessel", "--x-label", "along the axis, mm", "--y-label",
                  "radius of the lumen, mm")
     for name, (stations, radius) in curves.items():
-        centre = len(stations) // 2
-        print(f"{name}: radius of the lumen in the middle {radius[centre]:.2f} mm, of the wall's middle surface there "
-              f"{middle[name][centre]:.2f} mm")
+        print(f"{name}: radius of the lumen in the middle of the balloon {np.interp(0, stations, radius):.2f} mm, of the wall's middle "
+              f"surface there {np.interp(0, stations, middle[name]):.2f} mm")
+    say_inflated(folder, result)
+
+
+def say_inflated(folder, result):
+    """What presses on what where the balloon is largest."""
     with h5py.File(folder.out / "scene.hdf") as file:
         state = int(np.argmin(np.abs(file["tunica/history/load_factor"][:] - 0.5)))
-        pressure = file["tunica/tetrahedra/solid_pressure"][state]
-        stress = file["tunica/history/stress_p99"][state]
-        area = file["tunica/contacts/balloon-deposit/area"][state]
-        gap = file["tunica/contacts/balloon-deposit/smallest_gap"][state]
-    print(f"inflated: the balloon presses on {area:.0f} mm2 (of the reference), the mean pressure in the deposit is "
-          f"{1000 * np.mean(pressure):.1f} kPa, 99 % of the wall stay below {1000 * stress:.0f} kPa, smallest gap {1000 * gap[0]:.1f} um; "
-          f"balance of forces {result['balance']['force']:.1e}")
+        print(f"inflated: 99 % of the wall stay below {1000 * file['tunica/history/stress_p99'][state]:.0f} kPa")
+        if "tetrahedra" in file["tunica"]:
+            pressure = file["tunica/tetrahedra/solid_pressure"][state]
+            print(f"inflated: the mean pressure in the deposit is {1000 * np.mean(pressure):.1f} kPa")
+        for name, contact in file["tunica/contacts"].items():
+            if contact["area"][state] > 0:
+                force = ", ".join("%.2g" % (1000 * f) for f in contact["force"][state])
+                print(f"inflated: {name} presses on {contact['area'][state]:.0f} mm2 (of the reference), its forces sum up to "
+                      f"({force}) mN, smallest gap {1000 * contact['smallest_gap'][state][0]:.1f} um")
+    print(f"balance of forces {result['balance']['force']:.1e}")
 
 
 def lens(folder):
@@ -147,10 +195,20 @@ def lens(folder):
           "from their places at the end")
 
 
-if __name__ == "__main__":
+def main():
     scenes = {"membrane": membrane, "liver": liver, "angioplasty": angioplasty, "lens": lens}
-    if len(sys.argv) not in (4, 5) or sys.argv[1] not in scenes:
-        sys.exit(f"{__doc__}NAME is one of: {', '.join(scenes)}")
-    target = Path(sys.argv[3]).resolve()
-    scenes[sys.argv[1]](Folder(sys.argv[1], Path(sys.argv[2]).resolve(), target, sys.argv[4] if len(sys.argv) > 4 else ""))
-    print(f"in {sys.argv[3]}: scene.hdf, scene.json, moments.png, curve.svg, curve.csv")
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("name", choices=scenes)
+    parser.add_argument("tools", metavar="BIN")
+    parser.add_argument("out", metavar="OUT")
+    parser.add_argument("--threads", default="")
+    parser.add_argument("--own", default="")
+    given = parser.parse_args()
+    if given.own and given.name != "angioplasty":
+        parser.error(f"--own: {given.name} has no vessel")
+    scenes[given.name](Folder(given))
+    print(f"in {given.out}: scene.hdf, scene.json, moments.png, curve.svg, curve.csv")
+
+
+if __name__ == "__main__":
+    main()

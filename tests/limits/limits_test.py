@@ -9,6 +9,7 @@ import unittest
 
 import numpy as np
 
+from contact_scenes import block, tube, write_vtk
 from published import LINEAR, Bench, fix, grid, load, organ, probe, run_lines, shell, vessel, write_ply
 
 PAPER = {"membrane": "cst", "bending": "comas", "rest": "flat"}
@@ -256,11 +257,108 @@ class Integrators(Limit):
         self.assertAlmostEqual(amplitude_left(40, integrator="generalised-alpha"), 1, delta=0.1)
 
 
+class Coupling(Limit):
+    """Contact, tetrahedra, and bodies that carry each other."""
+
+    def test_the_papers_rule_of_contact_is_out_of_balance(self):
+        """Barycentric forces, torques by the shape function: on a tube on a rigid cylinder forces balance and moments do not."""
+        for more, moment in (("", (0, 1e-12)), ("transfer = \"paper\"\n", (1e-3, 1))):
+            balance = tube(self.bench, more=more)[2]["balance"]
+            self.assertLess(balance["force"], 1e-12)
+            self.assertTrue(moment[0] <= balance["moment"] < moment[1], balance)
+
+    def deflection(self, height):
+        """The upper half of a beam 24 long under a pure moment: a core, 2 high, and a skin, 1 thick, twenty times as stiff, its
+        middle at `height`. @return the tip's deflection over that of a skin whose face is on the core's"""
+        young, skin, core, right = 20.0, 1.0, 2.0, 2.5
+        points, tetrahedra = block(6, np.array([24.0, 1.0, core]), np.zeros(3))
+        write_vtk(self.bench.path("core.vtk"), points, tetrahedra)
+        mesh = grid(24, 1, lambda u, v: (24 * u, v, 0 * u + height))
+        write_ply(self.bench.path("mesh.ply"), *mesh)
+        x, z = points[:, 0], points[:, 2]
+        below = z < core - 1e-9  # what is carried is not held
+        held = fix(np.flatnonzero(below), "y").replace('"s"', '"core"').replace('rotation = "xyz"\n', "")
+        for nodes, what in ((below & ((x < 1e-9) | (z < 1e-9)), "x"), ((x < 1e-9) & (z < 1e-9), "z")):
+            held += fix(np.flatnonzero(nodes), what).replace('"s"', '"core"').replace('rotation = "xyz"\n', "")
+        start = np.flatnonzero(mesh[0][:, 0] < 1e-9)
+        end = np.flatnonzero(mesh[0][:, 0] > 24 - 1e-9)
+        held += fix(range(len(mesh[0])), "y", "xz") + fix(start, "x", "y")
+        moment = 1e-4
+        result = self.bench.run(
+            LINEAR + shell("mesh.ply", skin, young, 0.0) + "[[solid]]\nname = \"core\"\nmesh = \"core.vtk\"\nunit = \"mm\"\n"
+            "young = \"1MPa\"\npoisson = 0.0\n[[attach]]\nbody = \"core\"\nto = \"s\"\n"
+            f"where = {{above = {{axis = \"z\", at = \"{core}mm\"}}}}\n" + held +
+            load("force", (moment / (2 * height), 0.0, 0.0), "N", end) + probe("tip", (24.0, 0.0, height)))
+        stiffness = 2 * (young * skin * right**2 + young * skin**3 / 12) + (2 * core)**3 / 12
+        return abs(result["probes"]["tip"]["displacement_mm"][-1][2]) * 2 * stiffness / (moment * 24**2)
+
+    def test_tied_at_the_middle_a_skin_is_too_soft(self):
+        """A core that reaches to the middle of its skin leaves half a wall of lever out. With the skin's face on the core the
+        carried nodes keep their offset, and it is the beam's."""
+        on_the_face = self.deflection(2.5)
+        self.assertAlmostEqual(on_the_face, 1, delta=0.05)  # the core's tetrahedra are coarse
+        self.assertAlmostEqual(self.deflection(2.0) / on_the_face, 1.5, delta=0.02)
+
+    def cook(self, n):
+        """Cook's membrane in plane strain, one layer of tetrahedra, Poisson's ratio .4999: deflection of the tip over 19.42
+        by constant strains, and by tunica. The end's force is shared equally by its nodes."""
+        flat, triangles, _ = grid(n, n, lambda u, v: (48 * u, 44 * u + v * (44 - 28 * u), 0 * u))
+        count, layer = len(flat), 48 / n
+        points = np.concatenate([flat, flat + [0, 0, layer]])
+        rows = np.sort(triangles, axis=1)
+        a, b, c = rows.T
+        tetrahedra = np.concatenate([np.stack(t, axis=1) for t in (
+            (a, b, c, c + count), (a, b, b + count, c + count), (a, a + count, b + count, c + count))])
+        sides = points[tetrahedra[:, 1:]] - points[tetrahedra[:, :1]]
+        turned = np.linalg.det(sides) < 0
+        tetrahedra[turned] = tetrahedra[turned][:, [0, 2, 1, 3]]
+        end = np.flatnonzero(points[:, 0] > 48 - 1e-9)
+        tip = int(end[np.argmax(points[end, 1])])
+        plain = constant_strain(points, tetrahedra, 0.4999, points[:, 0] < 1e-9, end, layer)[tip, 1]
+        write_vtk(self.bench.path("cook.vtk"), points, tetrahedra)
+        held = "".join(fix(nodes, what).replace('rotation = "xyz"\n', "") for nodes, what in (
+            (range(len(points)), "z"), (np.flatnonzero(points[:, 0] < 1e-9), "xy")))
+        result = self.bench.run(LINEAR + "[[solid]]\nname = \"s\"\nmesh = \"cook.vtk\"\nunit = \"mm\"\nyoung = \"1MPa\"\n"
+                                "poisson = 0.4999\n" + held + load("force", (0.0, layer, 0.0), "N", end) +
+                                probe("tip", tuple(points[tip])))
+        return plain / 19.42, result["probes"]["tip"]["displacement_mm"][-1][1] / 19.42
+
+    def test_tetrahedra_of_constant_strain_lock(self):
+        """Three quarters of the deflection are lost on any mesh; with a pressure of its own the error falls with the mesh."""
+        (locked, coarse), (locked_too, fine) = self.cook(8), self.cook(16)
+        self.assertAlmostEqual(locked, 0.27, delta=0.03)
+        self.assertAlmostEqual(locked_too, 0.27, delta=0.03)
+        self.assertLess(1 - coarse, 0.25)
+        self.assertLess(1 - fine, 0.12)
+
+
+def constant_strain(points, tetrahedra, poisson, clamped, end, force):
+    """Linear tetrahedra without more, E = 1, in plane strain: displacements (x, y) under a force along y on the nodes `end`."""
+    rows = np.concatenate([np.ones((len(tetrahedra), 4, 1)), points[tetrahedra]], axis=2)
+    gradients = np.linalg.inv(rows)[:, 1:3]  # of the four hat functions, along x and y
+    volumes = np.abs(np.linalg.det(rows)) / 6
+    shear, first = 1 / (2 * (1 + poisson)), poisson / ((1 + poisson) * (1 - 2 * poisson))
+    stiffness = np.zeros((2 * len(points), 2 * len(points)))
+    for i in range(2):
+        for j in range(2):
+            block_ij = first * np.einsum("ta,tb->tab", gradients[:, i], gradients[:, j])
+            block_ij += shear * np.einsum("ta,tb->tab", gradients[:, j], gradients[:, i])
+            if i == j:
+                block_ij += shear * np.einsum("tka,tkb->tab", gradients, gradients)
+            np.add.at(stiffness, (2 * tetrahedra[:, :, None] + i, 2 * tetrahedra[:, None, :] + j), volumes[:, None, None] * block_ij)
+    forces = np.zeros((len(points), 2))
+    forces[end, 1] = force / len(end)
+    free = np.flatnonzero(np.repeat(~clamped, 2))
+    result = np.zeros(2 * len(points))
+    result[free] = np.linalg.solve(stiffness[np.ix_(free, free)], forces.ravel()[free])
+    return result.reshape(-1, 2)
+
+
 class Table(unittest.TestCase):
     def test_every_row_has_its_test_and_every_test_its_row(self):
         with open(os.path.join(os.environ["TUNICA_SOURCE"], "docs", "limits.md"), encoding="utf-8") as file:
             rows = re.findall(r"`(\w+\.test_\w+)`", file.read())
-        tests = [f"{case.__name__}.{name}" for case in (Elements, Solvers, Integrators) for name in dir(case)
+        tests = [f"{case.__name__}.{name}" for case in (Elements, Solvers, Integrators, Coupling) for name in dir(case)
                  if name.startswith("test_")]
         self.assertEqual(sorted(rows), sorted(tests))
 

@@ -1,15 +1,19 @@
 #!/usr/bin/python3
-"""The scenes of docs/scenes.md: every one is understood, and the membrane's runs on a coarse mesh."""
+"""The scenes of docs/scenes.md: every one is understood, the membrane's runs on a coarse mesh, and the angioplasty takes
+another vessel."""
 
 import json
 import os
+import re
 import subprocess
 import tempfile
 import unittest
 from pathlib import Path
 
 SCENES = Path(os.environ["TUNICA_SOURCE"]) / "examples" / "scenes"
-SIMULATE = Path(os.environ["TUNICA_BIN"]) / "tunica-simulate"
+BIN = Path(os.environ["TUNICA_BIN"])
+SIMULATE = BIN / "tunica-simulate"
+SHARED = Path(os.environ.get("TUNICA_SHARED_DATA", "absent"))
 
 
 def with_meshes(name, folder, *fineness):
@@ -55,6 +59,68 @@ class Scenes(unittest.TestCase):
 
     def test_no_state_has_bodies_inside_each_other(self):
         self.assertGreater(min(gap["lower"] for gap in self.contact["smallest_gap_mm"]), 0)
+
+
+class OwnVessel(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory(prefix="tunica-test-")
+        self.addCleanup(self.folder.cleanup)
+
+    def run_in_folder(self, *command, code=0):
+        done = subprocess.run([str(word) for word in command], cwd=self.folder.name, capture_output=True, text=True, check=False)
+        self.assertEqual(done.returncode, code, done.stderr)
+        return done
+
+    def own(self, *words, code=0):
+        return self.run_in_folder("/usr/bin/python3", "-B", SCENES / "angioplasty" / "own.py", ".", *words, code=code).stderr
+
+    def check(self):
+        self.run_in_folder(SIMULATE, "--scene", "scene.toml", "--check")
+
+    def up_to(self, factor):
+        """Runs the scene as far as this load factor. @return the report's result"""
+        scene = Path(self.folder.name) / "scene.toml"
+        text = scene.read_text(encoding="utf-8")
+        some = [f for f in json.loads(re.search(r"load_factors = (.*)", text)[1]) if f <= factor]
+        scene.write_text(re.sub("load_factors = .*", f"load_factors = {some}", text), encoding="utf-8")
+        self.run_in_folder(SIMULATE, "--scene", "scene.toml", "out.hdf", "--report", "report.json", "--quiet")
+        return json.loads((Path(self.folder.name) / "report.json").read_text(encoding="utf-8"))["result"]
+
+    def test_the_samples_meshes_make_a_scene(self):
+        with_meshes("angioplasty", self.folder.name)
+        place = ("from=0,0,-6", "to=0,0,6", "inflated=4.5")
+        for words in (("vessel.ply", "deposit.vtk", "push=24", "friction=0.1"), ("vessel.ply", "pressure=80"),
+                      ("vessel.ply", "hold=0,0,15,6", "hold=0,0,-15,6")):
+            with self.subTest(words=words):
+                self.own(*words, *place)
+                self.check()
+
+    def test_what_is_missing_or_unknown_is_named(self):
+        self.assertIn("missing: to, inflated", self.own("vessel.ply", "from=0,0,0", code=1))
+        self.assertIn("unknown: inflate", self.own("vessel.ply", "from=0,0,0", "to=1,0,0", "inflated=1", "inflate=2", code=1))
+
+    @unittest.skipUnless((SHARED / "paper").is_dir(), f"the shared meshes of the paper are absent ({SHARED})")
+    def test_the_papers_vessel_and_deposits(self):
+        paper = SHARED / "paper"
+        self.run_in_folder("/usr/bin/python3", "-B", SCENES / "angioplasty" / "paper.py", paper / "vesselScale.msh",
+                           paper / "stenosis2.xml", ".")
+        self.own("vessel.ply", "deposits.vtk", "from=-8,0,0", "to=8,0,0", "inflated=0.7", "collapsed=0.15", "push=20", "wall=0.3")
+        result = self.up_to(0.23)
+        self.assertEqual((result["shells"], result["tetrahedra"]), (160, 2978))
+        contact = result["contacts"]["balloon-deposit"]
+        self.assertEqual(contact["area_mm2"][1], 0)  # pushed in, not yet inflated
+        self.assertGreater(contact["area_mm2"][-1], 0.5)
+        self.assertLess(result["balance"]["force"], 1e-9)
+
+    @unittest.skipUnless((SHARED / "meshes").is_dir(), f"the shared meshes are absent ({SHARED})")
+    def test_a_real_aneurysm(self):
+        surface = SHARED / "meshes" / "sofa_aneurysm3D_1.obj"
+        unit = ("--mesh-unit", "mm", "--quiet")
+        self.run_in_folder(BIN / "tunica-decimate", surface, "coarse.ply", "--triangles", 900, "--min-angle", 20, *unit)
+        self.run_in_folder(BIN / "tunica-relax", "coarse.ply", surface, "vessel.ply", "--refine", "--tolerance", "1%", *unit)
+        self.own("vessel.ply", "from=-11.5,1.8,-5.8", "to=-8.6,2.55,-3.7", "inflated=1.6", "collapsed=0.6", "wall=0.3",
+                 "hold=-19.6,-17.3,-13.3,2.6", "hold=-3.1,-6.05,5.6,2.2", "hold=4.9,-5.3,-12.9,1.3")
+        self.check()
 
 
 if __name__ == "__main__":

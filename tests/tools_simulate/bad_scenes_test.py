@@ -1,0 +1,117 @@
+#!/usr/bin/python3
+"""Scenes with contact that can hardly be meant are named before the first step: by `--check`, with their place."""
+import re
+import unittest
+
+import numpy as np
+from contact_scenes import block, write_vtk
+from support import SimulateTest, grid, sphere, write_ply
+
+RUN = "[run]\nkind = \"static\"\n"
+HELD = "where = {boundary = true}\ntranslation = \"xyz\"\nrotation = \"xyz\"\n"
+
+
+def shell(name="plate", mesh="plate.ply"):
+    """Held at its rim; 10 x 10 x 0.2 mm from the origin, its middle at z = 0. Ten lines."""
+    return (f"[[shell]]\nname = \"{name}\"\nmesh = \"{mesh}\"\nthickness = \"0.2mm\"\nyoung = \"1MPa\"\npoisson = 0.3\n"
+            f"[[fix]]\nbody = \"{name}\"\n{HELD}")
+
+
+def solid(mesh, name="cube"):
+    return (f"[[solid]]\nname = \"{name}\"\nmesh = \"{mesh}\"\nunit = \"mm\"\nyoung = \"60kPa\"\npoisson = 0.3\n"
+            f"[[fix]]\nbody = \"{name}\"\nwhere = {{all = true}}\ntranslation = \"xyz\"\n")
+
+
+def ball(height, name="ball", more=""):
+    return (f"[[rigid]]\nname = \"{name}\"\nshape = \"sphere\"\ncentre = [\"5mm\", \"5mm\", \"{height}mm\"]\nradius = \"1mm\"\n{more}")
+
+
+def contact(one, other, more=""):
+    return f"[[contact]]\nbetween = [\"{one}\", \"{other}\"]\n{more}"
+
+
+class BadScenes(SimulateTest):
+    def setUp(self):
+        super().setUp()
+        points, triangles = grid(6, 6, 10, 10)
+        write_ply(self.path("plate.ply"), points, triangles)
+        write_ply(self.path("above.ply"), points + [0, 0, 0.15], triangles)
+        points, triangles, normals = sphere(1, 2)
+        write_ply(self.path("ball.ply"), points + [5, 5, 1.5], triangles, normals)
+        write_ply(self.path("open.ply"), points, triangles[:-1], normals)
+        self.points, self.tetrahedra = block(2, np.array([2.0, 2.0, 2.0]), np.array([4.0, 4.0, 0.2]))
+        write_vtk(self.path("cube.vtk"), self.points, self.tetrahedra)
+        write_vtk(self.path("low.vtk"), self.points - [0, 0, 0.15], self.tetrahedra)
+        write_vtk(self.path("far.vtk"), self.points + [0, 0, 5], self.tetrahedra)
+
+    def named(self, scene, *words, place=None):
+        """Exit 3 and all the words in one line, which begins with the place of the scene's last line that holds `place`."""
+        self.write("scene.toml", scene)
+        self.run_tool("--scene", "scene.toml", "--check", expect=3)
+        line = self.done.stderr.strip().splitlines()[-1]
+        for word in words:
+            self.assertIn(word, line)
+        if place:
+            number = max(i for i, text in enumerate(scene.splitlines(), 1) if place in text)
+            self.assertTrue(line.startswith(f"tunica-simulate: scene.toml:{number}:"), line)
+
+    def noted(self, scene, *words):
+        self.write("scene.toml", scene)
+        self.run_tool("--scene", "scene.toml", "--check")
+        for word in words:
+            self.assertIn(word, self.done.stderr)
+
+    def test_bodies_that_overlap(self):
+        for more, pair, depth in ((ball(0.9), ("ball", "plate"), 0.2),  # the wall's face is at 0.1
+                                  (shell("upper", "above.ply"), ("plate", "upper"), 0.05),
+                                  (solid("low.vtk"), ("plate", "cube"), None),
+                                  ("[[rigid]]\nname = \"tool\"\nmesh = \"ball.ply\"\n", ("tool", "plate"), None)):
+            with self.subTest(pair=pair):
+                self.named(RUN + shell() + more + contact(*pair), f"{pair[0]} and {pair[1]} overlap by ", "move them apart",
+                           place="[[contact]]")
+                said = float(re.search(r"overlap by ([0-9.]+) mm", self.done.stderr)[1])
+                self.assertAlmostEqual(said, depth or said, delta=0.001)
+
+    def test_a_body_that_crosses_itself(self):
+        points, triangles, normals = sphere(1, 2)
+        write_ply(self.path("twins.ply"), np.concatenate([points, points + [1, 0.1, 0.2]]),
+                  np.concatenate([triangles, triangles + len(points)]), np.concatenate([normals, normals]))
+        body = shell("twins", "twins.ply").replace("boundary = true", "all = true")
+        self.named(RUN + body + contact("twins", "twins"), "twins and twins overlap by ", place="[[contact]]")
+
+    def test_a_tetrahedron_without_volume(self):
+        flat = self.points.copy()
+        flat[13] = flat[0]  # the node in the middle onto a corner
+        write_vtk(self.path("flat.vtk"), flat, self.tetrahedra)
+        self.named(RUN + solid("flat.vtk"), "flat.vtk: tetrahedron ", "has no volume", place="mesh = ")
+
+    def test_tetrahedra_that_are_inside_out_are_turned_and_counted(self):
+        turned = self.tetrahedra.copy()
+        turned[5:8] = turned[5:8][:, [0, 2, 1, 3]]
+        write_vtk(self.path("turned.vtk"), self.points, turned)
+        self.noted(RUN + solid("turned.vtk"), "turned.vtk: 3 of 48 tetrahedra were inside out")
+
+    def test_an_attachment_out_of_reach(self):
+        body = solid("far.vtk").split("[[fix]]", maxsplit=1)[0]
+        self.named(RUN + shell() + body + "[[attach]]\nbody = \"cube\"\nto = \"plate\"\nwhere = {touching = \"0.1mm\"}\n",
+                   "selects no node", "the closest lies 5.2 mm from the surface", place="touching")
+
+    def test_a_rigid_body_that_touches_nothing(self):
+        self.noted(RUN + shell() + ball(5), "no [[contact]] names \"ball\", so it does nothing")
+
+    def test_friction_without_contact(self):
+        self.named(RUN + shell() + ball(5, more="friction = 0.2\n"), "unknown key 'friction' in [[rigid]]", place="friction")
+        self.named(RUN + shell() + ball(5) + "[[contact]]\nfriction = 0.2\n", "between", place="[[contact]]")
+
+    def test_two_bodies_of_one_name(self):
+        for more in (ball(5, "plate"), shell("plate", "above.ply"), solid("cube.vtk", "plate")):
+            self.named(RUN + shell() + more, "two bodies named \"plate\"")
+
+    def test_a_surface_with_holes_is_not_filled(self):
+        for body in ("[[solid]]\nname = \"s\"\nfill = \"open.ply\"\nsize = \"1mm\"\nyoung = \"1kPa\"\npoisson = 0.3\n",
+                     shell() + "[[rigid]]\nname = \"s\"\nmesh = \"open.ply\"\n"):
+            self.named(RUN + body, "open.ply: 3 edges have a triangle on one side only", "it must be closed", place="open.ply")
+
+
+if __name__ == "__main__":
+    unittest.main()
