@@ -15,7 +15,8 @@
 namespace tunica {
 namespace {
 
-constexpr int search_level = 4;  // pieces per edge of a face, on which the search for the nearest point begins
+constexpr double farthest_share = 1;  // of a corner, below zero: as far out as the tetrahedron is high
+constexpr int search_level = 4;       // pieces per edge of a face, on which the search for the nearest point begins
 
 /// Nearest points of one body's surface in the reference.
 class BodySurface {
@@ -132,6 +133,12 @@ std::vector<Carried> carried_nodes(const Model& model, const Surfaces& surfaces,
       if (model.is_solid(attachment.to)) {
         const TetMesh& mesh = model.solids[attachment.to - model.shells.size()].mesh;
         const auto [t, shares] = find_tetrahedron(mesh, x);
+        if (shares.minCoeff() < -farthest_share) {
+          fail(fmt::format(
+              "node {} is out of reach, farther out than a tetrahedron: move the bodies together, or select "
+              "fewer nodes",
+              local));
+        }
         const auto offset = narrow<Index>(model.first_node(attachment.to));
         for (const Index v : mesh.tetrahedra[t]) {
           c.carriers.push_back(v + offset);
@@ -146,6 +153,16 @@ std::vector<Carried> carried_nodes(const Model& model, const Surfaces& surfaces,
         c.shares << 1 - b[0] - b[1], b[0], b[1], 0;
         c.carriers.assign(on.nodes.begin(), on.nodes.end());
         c.offset = x - PatchMap(on, reference, Configuration::at_rest(reference.size())).point(c.weights);
+        double longest = 0;
+        for (int k = 0; k < 3; ++k) {
+          longest = std::max(longest, (reference[on.nodes[(k + 1) % 3]] - reference[on.nodes[k]]).norm());
+        }
+        if (c.offset.norm() > longest + on.half_thickness) {
+          fail(fmt::format(
+              "node {} is {:.4g} mm away, out of reach of shells of {:.4g} mm: move the bodies together, or "
+              "select fewer nodes",
+              local, c.offset.norm(), longest));
+        }
       }
       if (!found.emplace(c.node, c).second) {
         fail(fmt::format("node {} is carried twice: let one [[attach]] carry it", local));

@@ -225,7 +225,9 @@ void ContactSystem::record(const Group& group, const Sample& sample, const Patch
   const Vec3 force = group.weight * sample.area * press.traction;
   ContactState& result = recorded_->states[group.contact];
   const bool on_first = !contact.between[0].rigid && contact.between[0].index == face.body;
-  const double sign = on_first ? 1 : -1;
+  // What a body does to itself adds up to nothing.
+  const bool self = !group.other.rigid && group.other.index == face.body;
+  const double sign = self ? 0 : on_first ? 1 : -1;
   result.force += sign * force;
   result.moment += sign * x.cross(force);
   const auto along = patch_weight_derivatives(face, sample.at);

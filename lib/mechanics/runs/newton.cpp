@@ -12,6 +12,7 @@ namespace {
 
 constexpr double largest_turn = 0.5;           // rad per iteration
 constexpr std::size_t free_iterations = 6;     // full steps before the line search sets in
+constexpr double round_off_of_length = 1e-11;  // of the model's longest side
 constexpr double round_off_of_nothing = 0.01;  // of the floor, where no load acts
 constexpr double near_balance = 0.1;           // residual from which the pressures of a contact mean something
 constexpr double largest_residual_at_kinks = 1e-4;
@@ -139,8 +140,7 @@ public:
       const bool at_floor = result_.iterations > 0 && is_at_floor();
       result_.valid = find_increment();
       // What is left of the increments there is noise: told, but not added.
-      result_.converged = result_.valid && at_floor && !is_moving() &&
-                          increment_size(system_, increment_) <= largest_round_off * result_.reached;
+      result_.converged = result_.valid && at_floor && !is_moving() && increment_size(system_, increment_) <= noise();
       if (result_.valid && !result_.converged) {
         result_.valid = advance();
         result_.converged = result_.valid && at_rest();
@@ -179,6 +179,11 @@ private:
     return now_.scale == 0 || (system_.contact && now_.scale <= round_off_of_nothing * now_.floor);
   }
 
+  /// Increments that say nothing where the residual is round-off; also of a step in which nothing changes.
+  [[nodiscard]] double noise() const {
+    return std::max(largest_round_off * result_.reached, round_off_of_length * longest_side(system_));
+  }
+
   [[nodiscard]] bool is_at_floor() const { return result_.residual * now_.scale <= now_.floor; }
 
   /// At the floor of round-off a residual says nothing about the error any more; the increments still do.
@@ -186,8 +191,8 @@ private:
     if (is_moving()) {
       return false;
     }
-    return result_.residual <= settings_.converge || nothing_acts() ||
-           (is_at_floor() && last_size_ <= largest_round_off * result_.reached) || is_settled() || swings_at_kinks();
+    return result_.residual <= settings_.converge || nothing_acts() || (is_at_floor() && last_size_ <= noise()) ||
+           is_settled() || swings_at_kinks();
   }
 
   /// Where contact jumps from one face to the next, residuals get no smaller; what is left moves next to nothing.

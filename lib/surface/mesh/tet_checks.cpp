@@ -36,6 +36,12 @@ bool corner_twice(std::array<Index, 4> corners) {
   return std::adjacent_find(corners.begin(), corners.end()) != corners.end();
 }
 
+std::array<Index, 3> corners_of(const TetMesh& mesh, std::size_t t, std::size_t opposite) {
+  const auto& [a, b, c] = faces_of_tet[opposite];
+  const std::array<Index, 4>& tet = mesh.tetrahedra[t];
+  return {tet[a], tet[b], tet[c]};
+}
+
 // What the rounding of the coordinates, and of the products of the sides, makes of no volume.
 double rounding_of_volume(const std::array<Vec3, 4>& p) {
   double coordinate = 0;
@@ -50,6 +56,44 @@ double rounding_of_volume(const std::array<Vec3, 4>& p) {
   // A height below the spacing of the coordinates is none. A face's area has an error of side^2 eps of its own.
   constexpr double epsilon = std::numeric_limits<double>::epsilon();
   return 4 * epsilon * (coordinate + side) * std::max(area, 4 * epsilon * side * side) / 6;
+}
+
+// All faces, those of the same corners beside each other.
+std::vector<SortedFace> sorted_faces(const TetMesh& mesh) {
+  std::vector<SortedFace> faces;
+  faces.reserve(4 * mesh.tetrahedra.size());
+  for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t) {
+    for (std::uint8_t opposite = 0; opposite < 4; ++opposite) {
+      std::array<Index, 3> corners = corners_of(mesh, t, opposite);
+      std::sort(corners.begin(), corners.end());
+      faces.push_back({corners, narrow<Index>(t), opposite});
+    }
+  }
+  const auto key = [](const SortedFace& face) { return std::tuple(face.corners, face.tet, face.opposite); };
+  std::sort(faces.begin(), faces.end(), [&](const SortedFace& l, const SortedFace& r) { return key(l) < key(r); });
+  return faces;
+}
+
+// Where neighbours lie on the same side of the face that they share, one of them is folded over.
+void require_unfolded(const TetMesh& mesh, const std::string& name) {
+  const std::vector<SortedFace> faces = sorted_faces(mesh);
+  for (std::size_t i = 1; i < faces.size(); ++i) {
+    const SortedFace &one = faces[i - 1], &other = faces[i];
+    if (one.corners != other.corners) {
+      continue;
+    }
+    const auto& [a, b, c] = one.corners;
+    const auto side = [&](const SortedFace& of) {
+      return tet_volume(mesh.vertices[a], mesh.vertices[b], mesh.vertices[c],
+                        mesh.vertices[mesh.tetrahedra[of.tet][of.opposite]]) > 0;
+    };
+    if (side(one) == side(other)) {
+      throw InputError(
+          fmt::format("{}: tetrahedra {} and {} {} lie on the same side of the face that they share: one of "
+                      "them is folded over",
+                      name, one.tet, other.tet, place_of_tet(mesh, mesh.tetrahedra[one.tet])));
+    }
+  }
 }
 
 }  // namespace
@@ -92,26 +136,12 @@ std::size_t require_sound(TetMesh& mesh, const std::string& name) {
       ++turned;
     }
   }
+  require_unfolded(mesh, name);
   return turned;
 }
 
 std::vector<std::array<Index, 3>> boundary_triangles(const TetMesh& mesh) {
-  std::vector<SortedFace> faces;
-  faces.reserve(4 * mesh.tetrahedra.size());
-  const auto corners_of = [&](std::size_t t, std::size_t opposite) {
-    const auto& [a, b, c] = faces_of_tet[opposite];
-    const std::array<Index, 4>& tet = mesh.tetrahedra[t];
-    return std::array<Index, 3>{tet[a], tet[b], tet[c]};
-  };
-  for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t) {
-    for (std::uint8_t opposite = 0; opposite < 4; ++opposite) {
-      std::array<Index, 3> corners = corners_of(t, opposite);
-      std::sort(corners.begin(), corners.end());
-      faces.push_back({corners, narrow<Index>(t), opposite});
-    }
-  }
-  const auto key = [](const SortedFace& face) { return std::tuple(face.corners, face.tet, face.opposite); };
-  std::sort(faces.begin(), faces.end(), [&](const SortedFace& l, const SortedFace& r) { return key(l) < key(r); });
+  const std::vector<SortedFace> faces = sorted_faces(mesh);
   std::vector<SortedFace> outer;
   for (auto begin = faces.begin(); begin != faces.end();) {
     const auto end = std::find_if(begin, faces.end(), [&](const auto& face) { return face.corners != begin->corners; });
@@ -133,7 +163,7 @@ std::vector<std::array<Index, 3>> boundary_triangles(const TetMesh& mesh) {
   std::vector<std::array<Index, 3>> triangles;
   triangles.reserve(outer.size());
   for (const SortedFace& face : outer) {
-    triangles.push_back(corners_of(face.tet, face.opposite));
+    triangles.push_back(corners_of(mesh, face.tet, face.opposite));
   }
   return triangles;
 }

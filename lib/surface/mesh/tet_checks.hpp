@@ -15,7 +15,7 @@ double tet_volume(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d);
 /// @return how many were turned
 /// Errors: InputError with the first tetrahedron (or vertex) that is wrong, its number from 0 and its place: no
 /// tetrahedra, a corner that does not exist or is there twice, a position that is not finite, no height within
-/// rounding. Cost: linear.
+/// rounding, two on the same side of the face that they share. Cost: n log n.
 std::size_t require_sound(TetMesh& mesh, const std::string& name);
 
 /// The faces that belong to one tetrahedron only, counter-clockwise seen from outside; by tetrahedron, then by the
