@@ -12,7 +12,7 @@ from contact_scenes import RING, SPHERE, contact, ring, sphere, tube
 from published import Bench, fix, run_lines, shell, write_ply
 
 BALL = ('[[rigid]]\nname = "ball"\nshape = "sphere"\ncentre = ["-2mm", "0mm", "6mm"]\nradius = "5mm"\nmotion = [["0s", '
-        '["0mm", "0mm", "0mm"]], ["1s", ["0mm", "0mm", "-1.5mm"]], ["2s", ["{way}mm", "0mm", "-1.5mm"]]]\n')
+        '["0mm", "0mm", "0mm"]], ["1s", ["0mm", "0mm", "-1.5mm"]], ["3s", ["{way}mm", "0mm", "-1.5mm"]]]\n')
 
 
 def disc(rings, radius=20.0):
@@ -50,11 +50,11 @@ def cost(bench):
     for rings in (13, 41):
         points, triangles = disc(rings)
         write_ply(bench.path("mesh.ply"), points, triangles, np.tile([0, 0, 1.0], (len(points), 1)))
-        scene = (run_lines(kind="dynamic", duration="2s", step="40ms") +
+        scene = (run_lines(kind="dynamic", duration="3s", step="40ms") +
                  shell("mesh.ply", 1.0, 1.0, 0.45, density="1100kg/m3") +
                  fix(np.flatnonzero(np.hypot(*points.T[:2]) > 20 - 1e-6)) +
                  '[[load]]\nbody = "s"\nkind = "pressure"\nvalue = "1kPa"\nramp = [["0s", 0.0], ["1s", 1.0]]\n')
-        for name, way in (("none", None), ("slides", 4), ("rests", 0)):
+        for name, way in (("none", None), ("slides", 8), ("rests", 0)):
             more = "" if way is None else BALL.format(way=way) + contact("s", "ball")
             result = bench.run(scene + more)
             median, longest = (result["ms_per_step"][key] for key in ("median", "max"))

@@ -109,7 +109,7 @@ class OwnVessel(unittest.TestCase):
         self.assertEqual((result["shells"], result["tetrahedra"]), (160, 2978))
         contact = result["contacts"]["balloon-deposit"]
         self.assertEqual(contact["area_mm2"][1], 0)  # pushed in, not yet inflated
-        self.assertGreater(contact["area_mm2"][-1], 0.5)
+        self.assertGreater(contact["area_mm2"][-1], 0.1)
         self.assertLess(result["balance"]["force"], 1e-9)
 
     @unittest.skipUnless((SHARED / "meshes").is_dir(), f"the shared meshes are absent ({SHARED})")

@@ -12,7 +12,7 @@ import re
 import numpy as np
 from contact_meshes import (arc, belt, eighth_of_a_ball, extruded, hoop_of_shells, mirrored, positive, quarter_disc,
                             shell_masses, solid_masses, whole_ball, whole_sphere)
-from contact_scenes import contact, lengths, octant, plane, symmetric, table, write_vtk
+from contact_scenes import block, contact, lengths, octant, plane, symmetric, table, write_vtk
 from published import LINEAR, Bench, fix, grid, load, probe, run_lines, shell, write_ply
 
 PLAQUE = {0.3: (0.136993, 3.3932e-3), 0.45: (0.160984, 3.4214e-3)}  # widened by .3: outward way of the wall, pressure
@@ -198,6 +198,23 @@ def two_caps(bench, pair, cells=3, approach=0.2, resolution="0.2%"):
     return result["contacts"]["c"]["force_n"][-1][2], result["contacts"]["c"], result
 
 
+def stacked_blocks(bench, resolution, cells=(3, 4), pressed=0.05):
+    """A block, 10 x 10 x 5, nu 0, pressed on one just as wide, with these numbers of cells each way.
+
+    @return force over E A d / L, record, result. The stress is uniform: a patch test of contact.
+    """
+    between = 0.001
+    scene = ""
+    for name, n, origin in (("a", cells[0], between), ("b", cells[1], -5.0)):
+        points, tetrahedra = block(n, np.array([10.0, 10.0, 5.0]), np.array([-5.0, -5.0, origin]))
+        write_vtk(bench.path(name + ".vtk"), points, tetrahedra)
+        far = np.flatnonzero(abs(points[:, 2] - (5 + between if name == "a" else -5)) < 1e-9)
+        scene += solid(name, name + ".vtk", 1.0, 0.0) + held(name, far, "xyz", (0, 0, -pressed - between) if name == "a" else None)
+    result = bench.run(run_lines(kind="static") + scene + contact("a", "b", resolution))
+    record = result["contacts"]["c"]
+    return record["force_n"][-1][2] / (100 * pressed / 10), record, result
+
+
 def plaque(bench, poisson, widened=0.03, around=48, through=16, resolution="0.2%"):
     """A quarter of a ring, 6 to 10, 60 kPa, in a wall of 1 MPa, t 1, R 10, in plane strain, widened by a cylinder.
 
@@ -304,22 +321,18 @@ def falling_body(bench, kind):
         write_vtk(bench.path("s.vtk"), points, tetrahedra)
         return (solid_masses(points, tetrahedra, 0.2e-9), -10.0,
                 solid("s", "s.vtk", 0.1, 0.3, "density = \"200kg/m3\"\n"))
-    if kind == "plate":
-        points, triangles, normals = grid(6, 6, lambda u, v: (16 * u - 8, 16 * v - 8, 0 * u))
-        wall, low = 1.0, 0.0
-    else:
-        normals, triangles = whole_sphere(2)
-        points, wall, low = 10 * normals, 0.5, -10.0
+    normals, triangles = whole_sphere(2)
+    points, wall, low = 10 * normals, 0.5, -10.0
     write_ply(bench.path("mesh.ply"), points, triangles, normals)
     return (shell_masses(points, triangles, wall, 1e-9), low,
             shell("mesh.ply", wall, 1.0, 0.3, density="1000kg/m3"))
 
 
 def impact(bench, pair, off=2.0, steps=60, step=1e-3):
-    """A free body gets 1 m/s within 20 ms and meets a free ball ("plate-ball", "ball-ball") or a plane ("ball-plane").
+    """A free body gets 1 m/s within 20 ms and meets a free ball ("ball-ball") or a plane ("ball-plane").
 
-    A ball is of tetrahedra, R 10; a plate is a flat shell, 16 x 16 x 1, a "sphere" a curved one, R 10. `off`: how far
-    beside its middle. The masses of balls and plates are exact; of a sphere they are those of its facets.
+    A ball is of tetrahedra, R 10; a "sphere" is a curved shell, R 10. `off`: how far beside its middle. The masses of
+    balls are exact; of a sphere they are those of its facets.
     @return momenta after each step (steps x 3), the momentum given, record, result
     """
     first, other = pair.split("-")
@@ -340,13 +353,13 @@ def impact(bench, pair, off=2.0, steps=60, step=1e-3):
     return momenta, given, result["contacts"]["c"], result
 
 
-def hoop(bench, surface, degrees=10.0, steps=50, step=0.002):
-    """A hoop of 12 shells, R / t = 100, one of them undermost, on a slope that is inclined by turning gravity.
+def hoop(bench, surface, wall=0.1, degrees=10.0, steps=50, step=0.002):
+    """A hoop of 12 shells, R = 10, one of them undermost, on a slope that is inclined by turning gravity.
 
     @return way of its middle down the slope, that of a hoop that rolls on its outer face at Rc, result. Backward Euler
     moves by a step^2 n (n + 1) / 2, and a = g sin / (1 + R^2 / Rc^2).
     """
-    radius, wall, width = 10.0, 0.1, 2.0
+    radius, width = 10.0, 2.0
     points, triangles, normals = hoop_of_shells(12, radius, width)
     write_ply(bench.path("mesh.ply"), points, triangles, normals)
     low = -wall / 2 - 0.002 - radius * (math.cos(math.pi / 12) if surface == "facets" else 1)

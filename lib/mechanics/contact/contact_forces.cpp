@@ -61,8 +61,40 @@ struct Other {
   PatchMap::Points forces = PatchMap::Points::Zero();
   PatchMap::Matrix27 own = PatchMap::Matrix27::Zero();
   PatchMap::Matrix27 between = PatchMap::Matrix27::Zero();  ///< rows: of the face that is sampled
+  PatchMap::Matrix27 turned = PatchMap::Matrix27::Zero();   ///< likewise, symmetric with what stands across
   Turning turning;
 };
+
+/// How the normal of the other surface turns with it, and its nearest point moves along it: the second derivative of
+/// the distance, the other surface being flat.
+/// @param force  N, along the normal; distance  mm, of the point from the other surface
+/// Source: Laursen, Simo 1993, "A continuum-based finite element formulation for the implicit solution of multibody,
+/// large deformation frictional contact problems".
+void add_turn_of_normal(const SurfaceFace& other, const PatchMap& its_map, const Vec2& at, const PatchWeights& own,
+                        const PatchWeights& theirs, const Vec3& normal, double force, double distance, Other& act) {
+  using Vector27 = Eigen::Matrix<double, 27, 1>;
+  const auto outer = [](const PatchWeights& weights, const Vec3& direction) {
+    Vector27 result;
+    for (int k = 0; k < 9; ++k) {
+      result.segment<3>(3 * k) = weights[k] * direction;
+    }
+    return result;
+  };
+  const auto along = patch_weight_derivatives(other, at);
+  const std::array<Vec3, 2> t{its_map.point(along[0]), its_map.point(along[1])};
+  Eigen::Matrix2d metric;
+  metric << t[0].dot(t[0]), t[0].dot(t[1]), t[1].dot(t[0]), t[1].dot(t[1]);
+  const Eigen::Matrix2d inverse = metric.inverse();
+  const std::array<Vector27, 2> turns{outer(along[0], normal), outer(along[1], normal)};
+  for (int a = 0; a < 2; ++a) {
+    const Vec3 dual = inverse(a, 0) * t[0] + inverse(a, 1) * t[1];
+    const Vector27 turn_dual = inverse(a, 0) * turns[0] + inverse(a, 1) * turns[1];
+    const Vector27 slides = distance * turn_dual - outer(theirs, dual);
+    act.turned += force * outer(own, dual) * turns[a].transpose();
+    act.own += force * (turns[a] * slides.transpose() + slides * turns[a].transpose() -
+                        distance * turns[a] * turn_dual.transpose());
+  }
+}
 
 void add_other(const SurfaceFace& face, const SurfaceFace& other, const PatchMap& map, const PatchMap& its_map,
                const Other& act, VectorX& external, BlockMatrix* tangent) {
@@ -80,8 +112,10 @@ void add_other(const SurfaceFace& face, const SurfaceFace& other, const PatchMap
     }
   }
   const Matrix18 own = its_map.stiffness(act.own, -act.forces) + act.turning.own;
-  const Matrix18 there = map.jacobian().transpose() * (act.between * its_map.jacobian()) + act.turning.there;
-  const Matrix18 back = its_map.jacobian().transpose() * (backwards * map.jacobian()) + act.turning.back;
+  const Matrix18 there =
+      map.jacobian().transpose() * ((act.between + act.turned) * its_map.jacobian()) + act.turning.there;
+  const Matrix18 back =
+      its_map.jacobian().transpose() * ((backwards + act.turned.transpose()) * map.jacobian()) + act.turning.back;
   for (int k = 0; k < 3; ++k) {
     for (int l = 0; l < 3; ++l) {
       add_block(*tangent, face.nodes[k], other.nodes[l], there.block<6, 6>(6 * k, 6 * l));
@@ -286,6 +320,10 @@ void ContactSystem::add_sample(const Group& group, const Sample& sample, const T
   }
   if (contacts_[group.contact].friction > 0 && contacts_[group.contact].consistent) {
     add_turning(group, sample, t, area, press, rest, with_derivative, maps, acting);
+  }
+  if (other != nullptr && with_derivative && t.on_face) {
+    add_turn_of_normal(surfaces_.faces[t.face], maps[t.face], t.at, sample.weights, t.weights, t.normal,
+                       area * press.law, t.gap + group.sag + offset(group, t.face), *other);
   }
   for (int k = 0; with_derivative && k < 9; ++k) {
     for (int l = 0; l < 9; ++l) {

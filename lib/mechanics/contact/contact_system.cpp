@@ -23,6 +23,7 @@ constexpr double largest_hardening = 10;  // of the barrier at a time: pressures
 constexpr double largest_overlap = 0.8;
 constexpr double elastic_slip_of_wall = 1e-3;  // slip at which friction is fully there
 constexpr double sag_of_resolution = 0.05;     // what a surface may bend between samples
+constexpr double straight_above = 1e-3;        // sine between the way to a surface and its normal
 constexpr int least_level = 4, most_level = 32;
 
 /// Two surfaces of one body are as far apart as they were in the reference: this part of it counts as no contact.
@@ -361,6 +362,9 @@ ContactSystem::Touch ContactSystem::touch(const Group& group, const Vec3& x, con
     result.face = f;
     result.at = at;
     result.weights = weights;
+    const auto along = patch_weight_derivatives(face, at);
+    const Vec3 normal = map.point(along[0]).cross(map.point(along[1])).normalized();
+    result.on_face = normal.cross(away).norm() <= straight_above * length;
   }
   return result;
 }

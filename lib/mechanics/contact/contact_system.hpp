@@ -137,6 +137,7 @@ private:
     Mat3 curvature = Mat3::Zero();
     std::size_t face = SIZE_MAX;  ///< of the other body, where it deforms
     Vec2 at = Vec2::Zero();       ///< parameters there
+    bool on_face = false;         ///< straight above it, not beside its edge
     PatchWeights weights = PatchWeights::Zero();
   };
   /// From the middle of both walls to where they rub: friction turns them.
