@@ -57,6 +57,14 @@ TEST(TetChecks, UnsoundMeshesAreRefused) {
   EXPECT_EQ(unsound(bad), "a.msh: vertex 5 lies at (1, nan, 1): coordinates must be finite");
 }
 
+TEST(TetChecks, FoldedMeshesAreRefused) {
+  TetMesh folded{{Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(0, 1, 0), Vec3(0, 0, 1), Vec3(0, 0, -1)},
+                 {{0, 1, 2, 3}, {0, 2, 1, 4}}};
+  EXPECT_EQ(unsound(folded), "sound");
+  folded.vertices[4].z() = 2;
+  EXPECT_THAT(unsound(folded), StartsWith("a.msh: tetrahedra 0 and 1 near (0, 0, 0) lie on the same side of the face"));
+}
+
 TEST(TetChecks, NoHeightWithinRoundingIsNoVolume) {
   const auto slab = [](double height, double at, double size) {
     TetMesh mesh{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0.3, 0.3, height}}, {{0, 1, 2, 3}}};

@@ -55,6 +55,12 @@ class BadScenes(SimulateTest):
             number = max(i for i, text in enumerate(scene.splitlines(), 1) if place in text)
             self.assertTrue(line.startswith(f"tunica-simulate: scene.toml:{number}:"), line)
 
+    def refused(self, scene, message):
+        """By the run, not by --check."""
+        self.write("scene.toml", scene)
+        self.run_tool("--scene", "scene.toml", "out.hdf", expect=3)
+        self.assertIn(message, self.done.stderr)
+
     def noted(self, scene, *words):
         self.write("scene.toml", scene)
         self.run_tool("--scene", "scene.toml", "--check")
@@ -95,6 +101,21 @@ class BadScenes(SimulateTest):
         body = solid("far.vtk").split("[[fix]]", maxsplit=1)[0]
         self.named(RUN + shell() + body + "[[attach]]\nbody = \"cube\"\nto = \"plate\"\nwhere = {touching = \"0.1mm\"}\n",
                    "selects no node", "the closest lies 5.2 mm from the surface", place="touching")
+
+    def test_all_nodes_attached_out_of_reach(self):
+        body = solid("far.vtk").split("[[fix]]", maxsplit=1)[0]
+        self.refused(RUN + shell() + body + "[[attach]]\nbody = \"cube\"\nto = \"plate\"\nwhere = {all = true}\n",
+                     "cube on plate: node 0 is 5.2 mm away, out of reach")
+        plate = shell().split("[[fix]]", maxsplit=1)[0]
+        self.refused(RUN + solid("far.vtk") + plate + "[[attach]]\nbody = \"plate\"\nto = \"cube\"\nwhere = {all = true}\n",
+                     "plate on cube: node 0 is out of reach, farther out than a tetrahedron")
+
+    def test_a_tetrahedron_that_is_folded_over(self):
+        folded = self.points.copy()
+        folded[13] = folded[0] - 1  # the node in the middle out through a corner
+        write_vtk(self.path("folded.vtk"), folded, self.tetrahedra)
+        self.named(RUN + solid("folded.vtk"), "folded.vtk: tetrahedra ", "lie on the same side of the face that they share",
+                   place="mesh = ")
 
     def test_a_rigid_body_that_touches_nothing(self):
         self.noted(RUN + shell() + ball(5), "no [[contact]] names \"ball\", so it does nothing")

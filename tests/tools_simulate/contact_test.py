@@ -6,7 +6,8 @@ import tempfile
 import unittest
 from pathlib import Path
 
-from contact_scenes import RING, SPHERE, ring, slope, sphere, tube
+import numpy as np
+from contact_scenes import RING, SPHERE, block, ring, slope, sphere, tube, write_vtk
 from published import Bench, run_lines
 
 
@@ -73,6 +74,14 @@ class Contact(unittest.TestCase):
         # Backward Euler moves by a step^2 n (n + 1) / 2.
         way = 9810 * (math.sin(angle) - friction * math.cos(angle)) * step**2 * steps * (steps + 1) / 2
         self.assertAlmostEqual(result["max_displacement_mm"] / way, 1, delta=0.01)
+
+    def test_bodies_that_touch_in_the_reference_are_understood(self):
+        slope(self.bench, 0.1, 0.3, run_lines(kind="static", load_steps=1))
+        points, tetrahedra = block(2, np.array([10.0, 10.0, 5.0]), np.zeros(3))
+        write_vtk(self.bench.path("mesh.vtk"), points, tetrahedra)
+        result = self.bench.run(Path(self.bench.path("run.toml")).read_text(encoding="utf-8"), check=False)
+        self.assertEqual(self.bench.code, 0, self.bench.error)
+        self.assert_sound(result["contacts"]["c"], result)
 
     def test_bodies_that_overlap_are_named(self):
         slope(self.bench, 0.1, 0.3, run_lines(kind="static", load_steps=1))

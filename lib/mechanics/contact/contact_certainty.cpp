@@ -18,11 +18,6 @@ std::array<Vec3, 3> corners_of(const SurfaceFace& face, const PatchMap& map, con
   return corners;
 }
 
-Vec3 normal_of(const SurfaceFace& face, const PatchMap& map, const Part& part) {
-  const auto along = patch_weight_derivatives(face, middle(part));
-  return map.point(along[0]).cross(map.point(along[1])).normalized();
-}
-
 /// From q to p, between their facets' nearest points as seen from the corners.
 Vec3 shortest_way(const std::array<Vec3, 3>& p, const std::array<Vec3, 3>& q) {
   Vec3 shortest = Vec3::Constant(infinity);
@@ -34,6 +29,20 @@ Vec3 shortest_way(const std::array<Vec3, 3>& p, const std::array<Vec3, 3>& q) {
   return shortest.normalized();
 }
 
+/// The directions that can tell two triangles apart, and the shortest way between them first.
+/// Source: the separating axes of convex bodies: normals, and what is normal to an edge of each.
+std::array<Vec3, 12> separating_directions(const std::array<Vec3, 3>& p, const std::array<Vec3, 3>& q) {
+  const auto edge = [](const std::array<Vec3, 3>& of, std::size_t k) { return Vec3(of[(k + 1) % 3] - of[k]); };
+  std::array<Vec3, 12> directions;
+  directions[0] = shortest_way(p, q);
+  directions[1] = edge(p, 0).cross(edge(p, 1)).normalized();
+  directions[2] = edge(q, 0).cross(edge(q, 1)).normalized();
+  for (std::size_t k = 0; k < 9; ++k) {
+    directions[3 + k] = edge(p, k / 3).cross(edge(q, k % 3)).normalized();  // zero of parallel edges: tells nothing
+  }
+  return directions;
+}
+
 /// Whether two faces certainly stay apart on straight lines: some plane has them on either side at both ends.
 bool stay_apart(const SurfaceFace& face, const PatchMap& a0, const PatchMap& a1, const SurfaceFace& other,
                 const PatchMap& b0, const PatchMap& b1, double slack) {
@@ -41,14 +50,15 @@ bool stay_apart(const SurfaceFace& face, const PatchMap& a0, const PatchMap& a1,
                                                                               int depth) {
     const double bend0 = bend_of(face, a0, level) + bend_of(other, b0, level);
     const double bend1 = bend_of(face, a1, level) + bend_of(other, b1, level);
-    const auto between = [&](const PatchMap& a, const PatchMap& b) {
-      return shortest_way(corners_of(face, a, p), corners_of(other, b, q));
+    const auto told_by = [&](const Vec3& n) {
+      return extent(face, a0, p, n)[0] - extent(other, b0, q, n)[1] > bend0 - slack &&
+             extent(face, a1, p, n)[0] - extent(other, b1, q, n)[1] > bend1 - slack;
     };
-    for (const Vec3& n : {between(a1, b1), between(a0, b0), normal_of(other, b1, q), Vec3(-normal_of(other, b1, q)),
-                          normal_of(face, a1, p), Vec3(-normal_of(face, a1, p))}) {
-      if (extent(face, a0, p, n)[0] - extent(other, b0, q, n)[1] > bend0 - slack &&
-          extent(face, a1, p, n)[0] - extent(other, b1, q, n)[1] > bend1 - slack) {
-        return true;
+    for (const auto& [a, b] : {std::pair(&a1, &b1), std::pair(&a0, &b0)}) {
+      for (const Vec3& n : separating_directions(corners_of(face, *a, p), corners_of(other, *b, q))) {
+        if (n != Vec3::Zero() && (told_by(n) || told_by(-n))) {
+          return true;
+        }
       }
     }
     if (depth == most_refined) {
@@ -151,7 +161,8 @@ double ContactSystem::lower_gap(const Group& group, const std::vector<std::size_
   const double close = 0.5 * upper;
   if (group.other.rigid) {
     const RigidShape& shape = shapes_[group.other.index];
-    const std::function<void(const Part&, int)> visit = [&](const Part& part, int level) {
+    // What bounds a part bounds its parts.
+    const std::function<void(const Part&, int, double)> visit = [&](const Part& part, int level, double known) {
       const Vec3 c = a.point(patch_weights(face, middle(part)));
       const RigidDistance at = shape.at(c);
       const double bend = bend_of(face, a, level);
@@ -165,7 +176,7 @@ double ContactSystem::lower_gap(const Group& group, const std::vector<std::size_
         }
         bound = at.distance - reach - bend;
       }
-      bound -= offset(group, 0);
+      bound = std::max(bound - offset(group, 0), known);
       if (bound >= lower) {
         return;
       }
@@ -174,11 +185,11 @@ double ContactSystem::lower_gap(const Group& group, const std::vector<std::size_
         return;
       }
       for (const Part& smaller : part.split()) {
-        visit(smaller, 2 * level);
+        visit(smaller, 2 * level, bound);
       }
     };
     for (const Part& part : parts_of(group.level)) {
-      visit(part, group.level);
+      visit(part, group.level, -infinity);
     }
     return lower;
   }
@@ -186,16 +197,18 @@ double ContactSystem::lower_gap(const Group& group, const std::vector<std::size_
     const SurfaceFace& other = surfaces_.faces[f];
     const PatchMap& b = maps[f];
     const double walls = offset(group, f);
-    const std::function<void(const Part&, const Part&, int)> visit = [&](const Part& p, const Part& q, int level) {
+    const std::function<void(const Part&, const Part&, int, double)> visit = [&](const Part& p, const Part& q,
+                                                                                 int level, double known) {
       const double bend = bend_of(face, a, level) + bend_of(other, b, level);
-      const Vec3 away = shortest_way(corners_of(face, a, p), corners_of(other, b, q));
-      const Vec3 n_own = normal_of(face, a, p), n_other = normal_of(other, b, q);
-      double bound = -infinity;
-      for (const Vec3& n : {away, n_other, Vec3(-n_other), n_own, Vec3(-n_own)}) {
-        bound = std::max(bound, extent(face, a, p, n)[0] - extent(other, b, q, n)[1] - bend - walls);
-      }
-      if (bound >= lower) {
-        return;
+      double bound = known;
+      for (const Vec3& n : separating_directions(corners_of(face, a, p), corners_of(other, b, q))) {
+        const auto own = extent(face, a, p, n), theirs = extent(other, b, q, n);
+        if (n != Vec3::Zero()) {
+          bound = std::max({bound, own[0] - theirs[1] - bend - walls, theirs[0] - own[1] - bend - walls});
+        }
+        if (bound >= lower) {
+          return;
+        }
       }
       if (bound > upper - close || level >= 1 << (2 + most_refined)) {
         lower = bound;
@@ -203,12 +216,12 @@ double ContactSystem::lower_gap(const Group& group, const std::vector<std::size_
       }
       for (const Part& smaller : p.split()) {
         for (const Part& theirs : q.split()) {
-          visit(smaller, theirs, 2 * level);
+          visit(smaller, theirs, 2 * level, bound);
         }
       }
     };
     const Part whole{{Vec2(0, 0), Vec2(1, 0), Vec2(0, 1)}};
-    visit(whole, whole, 1);
+    visit(whole, whole, 1, -infinity);
   }
   return lower;
 }

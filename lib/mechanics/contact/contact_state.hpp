@@ -8,9 +8,9 @@ namespace tunica {
 
 /// What a contact does in one state.
 struct ContactState {
-  Vec3 force = Vec3::Zero();   ///< N, on the first body
+  Vec3 force = Vec3::Zero();   ///< N, on the first body; of a body with itself none
   Vec3 moment = Vec3::Zero();  ///< N mm, on the first body, about the origin
-  double area = 0;             ///< mm^2 that press
+  double area = 0;             ///< mm^2 where more than a tenth of the mean pressure acts
   /// mm, between which the smallest gap certainly lies; below zero: the bodies overlap. NaN: not known.
   double gap_lower = std::numeric_limits<double>::quiet_NaN();
   double gap_upper = std::numeric_limits<double>::quiet_NaN();

@@ -190,9 +190,8 @@ void ContactSystem::refine(const FaceMaps& maps) {
 bool ContactSystem::harden() {
   bool changed = false;
   for (std::size_t c = 0; c < contacts_.size(); ++c) {
-    const double wanted = stiffness_of_pressure * largest_pressure_[c];
-    if (smallest_gap_[c] <= 0 && wanted > stiffness_[c]) {
-      stiffness_[c] = std::min(wanted, largest_hardening * stiffness_[c]);
+    if (smallest_gap_[c] <= 0) {
+      stiffness_[c] = std::min(stiffness_of_pressure * largest_pressure_[c], largest_hardening * stiffness_[c]);
       changed = true;
     }
   }
@@ -315,9 +314,7 @@ ContactSystem::Touch ContactSystem::touch(const Group& group, const Vec3& x, con
   }
   // The nearest counts, also from inside a solid; of faces that share their nearest point the one that faces it, or
   // where they touch the one that faces the sample's own.
-  const PatchMap& self = maps[group.face];
-  const Vec3 own =
-      (self.points().col(1) - self.points().col(0)).cross(self.points().col(2) - self.points().col(0)).normalized();
+  const Vec3 own = facet_normal(maps[group.face]);
   double nearest = infinity, facing = 0;
   for (const std::size_t f : near) {
     const SurfaceFace& face = surfaces_.faces[f];
@@ -347,7 +344,7 @@ ContactSystem::Touch ContactSystem::touch(const Group& group, const Vec3& x, con
     Vec3 outward = Vec3::Zero();
     double up = 0;
     if (has_inside) {
-      outward = (b - a).cross(c - a).normalized();
+      outward = facet_normal(map);
       up = length > tie ? outward.dot(away) : -group.wall * outward.dot(own);
     }
     if (length - off >= most || (length - off > nearest - tie && std::abs(up) <= facing)) {

@@ -61,7 +61,7 @@ public:
   bool find_pairs(const Configuration& configuration);
   [[nodiscard]] const std::vector<std::array<Index, 2>>& pairs() const { return pairs_; }
 
-  /// Whether two bodies that deform press on each other: their normals jump from one face to the next.
+  /// Whether two bodies that deform are near each other: their normals jump from one face to the next.
   [[nodiscard]] bool has_kinks() const { return !pairs_.empty(); }
 
   /// Whether friction has given way somewhere, by the last forces: the tangent then is not symmetric, and its pivots

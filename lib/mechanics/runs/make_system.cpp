@@ -116,23 +116,19 @@ void find_pieces(ShellSystem& system, const Model& model) {
 void add_stiffness_norms(ShellSystem& system) {
   double translation = 0;
   double rotation = 0;
-  for (const ShellElement& element : system.elements) {
-    const Matrix18 stiffness = linear_stiffness(element);
-    for (int row = 0; row < 18; ++row) {
-      for (int column = 0; column < 18; ++column) {
-        const double entry = stiffness(row, column) / (row % 6 < 3 ? 1 : system.length);
-        (column % 6 < 3 ? translation : rotation) += entry * entry;
+  const auto add = [&](const auto& stiffness, Eigen::Index per_node) {
+    for (Eigen::Index row = 0; row < stiffness.rows(); ++row) {
+      for (Eigen::Index column = 0; column < stiffness.cols(); ++column) {
+        const double entry = stiffness(row, column) / (row % per_node < 3 ? 1 : system.length);
+        (column % per_node < 3 ? translation : rotation) += entry * entry;
       }
     }
+  };
+  for (const ShellElement& element : system.elements) {
+    add(linear_stiffness(element), 6);
   }
   for (const SolidElement& element : system.solids) {
-    const Matrix16 stiffness = linear_stiffness(element);
-    for (int row = 0; row < 16; ++row) {
-      for (int column = 0; column < 16; ++column) {
-        const double entry = stiffness(row, column) / (row % 4 < 3 ? 1 : system.length);
-        (column % 4 < 3 ? translation : rotation) += entry * entry;
-      }
-    }
+    add(linear_stiffness(element), 4);
   }
   system.translation_stiffness = std::sqrt(translation);
   system.rotation_stiffness = std::sqrt(rotation);

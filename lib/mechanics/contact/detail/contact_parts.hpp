@@ -38,6 +38,12 @@ inline Bounds bounds_of(const SurfaceFace& face, const PatchMap& map) {
   return bounds;
 }
 
+/// Of the flat triangle of the corners; of a solid it points outward.
+inline Vec3 facet_normal(const PatchMap& map) {
+  const auto& p = map.points();
+  return (p.col(1) - p.col(0)).cross(p.col(2) - p.col(0)).normalized();
+}
+
 /// The face as a cubic patch, for flatness().
 inline CubicPatch patch_of(const SurfaceFace& face, const PatchMap& map) {
   CubicPatch patch;
