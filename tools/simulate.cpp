@@ -516,6 +516,9 @@ private:
     for (const std::string& text : run_warnings(scene_.run, summary, wall_, unresolved_)) {
       tool_.warn(fmt::format("{}: {}", subject().string(), text));
     }
+    for (const std::string& text : contact_warnings(tool_.result())) {
+      tool_.warn(fmt::format("{}: {}", subject().string(), text));
+    }
   }
 
   cli::Tool& tool_;

@@ -246,17 +246,18 @@ TEST(SolidElement, NeoHookeanStretchIsThatOfItsEnergy) {
     const SolidElement element = make_solid_element(corners, {2.5, poisson, {}}, SolidLaw::neo_hookean);
     const double mu = element.shear, k = element.bulk_of_displacement + element.bulk_of_pressure;
     for (const double stretch : {0.6, 0.9, 1.3, 1.8}) {
-      // W = mu (F:F - 3) / 2 - mu (J - 1) + (K + mu / 3) (J - 1)^2 / 2; p = K1 (J - 1).
+      // W = mu (F:F - 3) / 2 - mu ln J + lambda (ln J)^2 / 2, lambda = K - 2 mu / 3; p = K1 ln J.
+      const double lambda = k - 2 * mu / 3;
       double low = 0.2, high = 3;
       for (int i = 0; i < 200; ++i) {
         const double side = (low + high) / 2, j = stretch * side * side;
-        (mu * side + ((k + mu / 3) * (j - 1) - mu) * side * stretch > 0 ? high : low) = side;
+        (mu * side * side + lambda * std::log(j) - mu > 0 ? high : low) = side;
       }
       const double j = stretch * low * low;
-      const double stress = (mu * stretch + ((k + mu / 3) * (j - 1) - mu) * low * low) / (low * low);
+      const double stress = (mu * stretch * stretch + lambda * std::log(j) - mu) / j;
       SolidMotion motion;
       motion.displacement = Vec3(low - 1, low - 1, stretch - 1).asDiagonal() * corners;
-      motion.pressure.setConstant(element.bulk_of_pressure * (j - 1) / mu);
+      motion.pressure.setConstant(element.bulk_of_pressure * std::log(j) / mu);
       const Mat3 cauchy = solid_stress(element, motion, false);
       EXPECT_NEAR(cauchy(2, 2), stress, 1e-12 * k);
       EXPECT_NEAR(cauchy(0, 0), 0, 1e-12 * k);
@@ -291,7 +292,9 @@ TEST(SolidPatch, LinearDisplacementsAreExact) {
         const double shear = 2.5 / (2 * (1 + poisson)), bulk = 2.5 / (3 * (1 - 2 * poisson));
         const double of_pressure = bulk - std::min(shear, bulk / 2);
         const Mat3 f = Mat3::Identity() + gradient;
-        const double volume_strain = linear ? gradient.trace() : f.determinant() - 1;
+        const double volume_strain = linear                          ? gradient.trace()
+                                     : law == SolidLaw::corotational ? f.determinant() - 1
+                                                                     : std::log(f.determinant());
         const double pressure = of_pressure * volume_strain / shear;
         for (std::size_t i = 0; i < model.solids[0].mesh.vertices.size(); ++i) {
           EXPECT_LT((state.displacement[i] - exact(model.solids[0].mesh.vertices[i])).norm(), 1e-12);

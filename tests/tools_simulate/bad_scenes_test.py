@@ -78,6 +78,40 @@ class BadScenes(SimulateTest):
                 said = float(re.search(r"overlap by ([0-9.]+) mm", self.done.stderr)[1])
                 self.assertAlmostEqual(said, depth or said, delta=0.001)
 
+    def test_a_body_wholly_inside_another(self):
+        points, tetrahedra = block(3, np.array([4.0, 4.0, 4.0]), np.array([3.0, 3.0, -2.0]))
+        write_vtk(self.path("big.vtk"), points, tetrahedra)
+        points, tetrahedra = block(2, np.array([1.0, 1.0, 1.0]), np.array([4.5, 4.5, -0.5]))
+        write_vtk(self.path("small.vtk"), points, tetrahedra)
+        points, triangles, normals = sphere(1, 0.5)
+        write_ply(self.path("inside.ply"), points + [5, 5, 0], triangles, normals)
+        closed = shell("ball", "inside.ply").replace("boundary = true", "all = true")
+        big = solid("big.vtk")
+        for more, name in ((solid("small.vtk", "small"), "small"), (closed, "ball"), (ball(0), "ball"),
+                           ("[[rigid]]\nname = \"tool\"\nmesh = \"inside.ply\"\n", "tool")):
+            with self.subTest(name=name):
+                self.named(RUN + big + more + contact("cube", name), f"cube and {name} overlap by ", place="[[contact]]")
+                self.assertGreaterEqual(float(re.search(r"overlap by ([0-9.]+) mm", self.done.stderr)[1]), 1.499)
+
+    def test_solids_that_overlap_are_told_how_deep(self):
+        for name, shift in (("one", 0), ("two", 1.3)):
+            points, tetrahedra = block(4, np.array([2.0, 2.0, 2.0]), np.array([shift, 0.1, 0.1]))
+            write_vtk(self.path(f"{name}.vtk"), points, tetrahedra)
+        self.named(RUN + solid("one.vtk", "one") + solid("two.vtk", "two") + contact("one", "two"), "one and two overlap by 0.7 mm")
+
+    def test_a_body_that_nothing_holds(self):
+        scene = (RUN + solid("far.vtk").split("[[fix]]", maxsplit=1)[0] + ball(1) + contact("cube", "ball", 'name = "c"\n') +
+                 "[[load]]\nbody = \"cube\"\nkind = \"gravity\"\nvalue = [\"0m/s2\", \"0m/s2\", \"9.81m/s2\"]\n")
+        self.write("scene.toml", scene.replace("poisson = 0.3", 'poisson = 0.3\ndensity = "1g/cm3"'))
+        self.run_tool("--scene", "scene.toml", "out.hdf", expect=4)
+        self.assertIn("nothing but contact could hold cube", self.done.stderr)
+
+    def test_bodies_that_never_meet(self):
+        self.write("scene.toml", RUN + shell() + ball(5) + contact("plate", "ball", 'name = "c"\n') +
+                   "[[load]]\nbody = \"plate\"\nkind = \"pressure\"\nvalue = \"-1Pa\"\n")
+        self.run_tool("--scene", "scene.toml", "out.hdf")
+        self.assertIn("c: nothing touches in any step", self.done.stderr)
+
     def test_a_body_that_crosses_itself(self):
         points, triangles, normals = sphere(1, 2)
         write_ply(self.path("twins.ply"), np.concatenate([points, points + [1, 0.1, 0.2]]),

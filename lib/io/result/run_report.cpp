@@ -276,6 +276,20 @@ std::string modes_note(const Summary& summary, std::size_t asked) {
                      values.size() < asked ? fmt::format(", of {} asked for: there are no more", asked) : "");
 }
 
+std::vector<std::string> contact_warnings(const Json& result) {
+  std::vector<std::string> warnings;
+  if (!result.contains("contacts")) {
+    return warnings;
+  }
+  for (const auto& [name, record] : result["contacts"].items()) {
+    const Json& points = record["points"];
+    if (!points.empty() && std::all_of(points.begin(), points.end(), [](const Json& n) { return n == 0; })) {
+      warnings.push_back(fmt::format("{}: nothing touches in any step: do these bodies come together?", name));
+    }
+  }
+  return warnings;
+}
+
 std::vector<std::string> run_warnings(const RunSettings& run, const Summary& summary, const Wall& wall,
                                       std::size_t unresolved) {
   std::vector<std::string> warnings;

@@ -39,4 +39,8 @@ std::string modes_note(const Summary& summary, std::size_t asked);
 std::vector<std::string> run_warnings(const RunSettings& run, const Summary& summary, const Wall& wall,
                                       std::size_t unresolved);
 
+/// Contacts in which nothing ever touches.
+/// @param result  of a run that has ended
+std::vector<std::string> contact_warnings(const Json& result);
+
 }  // namespace tunica

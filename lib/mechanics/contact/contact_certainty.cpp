@@ -79,16 +79,16 @@ bool stay_apart(const SurfaceFace& face, const PatchMap& a0, const PatchMap& a1,
 
 }  // namespace
 
-bool ContactSystem::is_certain(const Configuration& configuration) const {
+bool ContactSystem::is_certain(const Configuration& configuration) {
   if (std::any_of(smallest_gap_.begin(), smallest_gap_.end(), [](double gap) { return gap <= 0; })) {
     return false;
   }
-  const FaceMaps before(surfaces_, reference_, accepted_);
-  const FaceMaps now(surfaces_, reference_, configuration);
+  const auto kept = maps_at(configuration);
+  const FaceMaps &now = *kept, &before = *accepted_;
   // Whatever comes near on the way is near at one end within what moves.
   double farthest = 0;
   for (std::size_t i = 0; i < reference_.size(); ++i) {
-    farthest = std::max(farthest, (configuration.displacement[i] - accepted_.displacement[i]).norm());
+    farthest = std::max(farthest, (configuration.displacement[i] - before.configuration().displacement[i]).norm());
   }
   const auto near = near_faces(now, 2 * farthest);
   for (std::size_t g = 0; g < groups_.size(); ++g) {

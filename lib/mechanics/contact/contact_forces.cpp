@@ -147,7 +147,8 @@ Vec3 ContactSystem::lever_before(const SurfaceFace& face, const Vec2& at, const 
   Vec3 before = Vec3::Zero();
   for (int k = 0; k < 3; ++k) {
     const Index node = face.nodes[k];
-    before += shares[k] * (accepted_.rotation[node] * (maps.configuration().rotation[node].conjugate() * lever));
+    before += shares[k] *
+              (accepted_->configuration().rotation[node] * (maps.configuration().rotation[node].conjugate() * lever));
   }
   return before;
 }
@@ -166,7 +167,7 @@ Vec3 ContactSystem::relative_motion(const Group& group, const Sample& sample, co
   const SurfaceFace& face = surfaces_.faces[touch.face];
   const Vec3 there = x - touch.normal * (touch.gap + group.sag + offset(group, touch.face));
   const Vec3 there_before =
-      PatchMap(face, reference_, accepted_).point(touch.weights) + lever_before(face, touch.at, lever.other, maps);
+      (*accepted_)[touch.face].point(touch.weights) + lever_before(face, touch.at, lever.other, maps);
   return (x + lever.own - before) - (there + lever.other - there_before);
 }
 
@@ -367,7 +368,8 @@ void ContactSystem::scatter(const Group& group, const Acting& acting, const Face
 }
 
 bool ContactSystem::add(const Configuration& configuration, VectorX& external, BlockMatrix* tangent) {
-  const FaceMaps maps(surfaces_, reference_, configuration);
+  const auto kept = maps_at(configuration);
+  const FaceMaps& maps = *kept;
   const auto touches = all_touches(maps, near_faces(maps, 0));
   largest_pressure_.assign(contacts_.size(), 0);
   slides_ = false;
@@ -424,14 +426,14 @@ bool ContactSystem::add(const Configuration& configuration, VectorX& external, B
     }
   }
   if (tangent != nullptr) {
-    at_tangent_ = configuration;
+    at_tangent_ = kept;
     shapes_at_tangent_ = shapes_;
   }
   return true;
 }
 
 void ContactSystem::predict(const VectorX& increment) {
-  const FaceMaps maps(surfaces_, reference_, at_tangent_);
+  const FaceMaps& maps = *at_tangent_;
   const auto change_of = [&](std::size_t f) {
     const SurfaceFace& face = surfaces_.faces[f];
     Vector18 of_nodes;
@@ -503,7 +505,8 @@ std::vector<ContactState> ContactSystem::results(const Configuration& configurat
     moment += on_rigids_[r].moment;
   }
   imbalance_ = {forces > 0 ? force.norm() / forces : 0, moments > 0 ? moment.norm() / moments : 0};
-  const FaceMaps maps(surfaces_, reference_, configuration);
+  const auto kept = maps_at(configuration);
+  const FaceMaps& maps = *kept;
   const auto near = near_faces(maps, 0);
   for (std::size_t g = 0; g < groups_.size(); ++g) {
     const Group& group = groups_[g];

@@ -1,8 +1,5 @@
-#include "tunica/mechanics/contact/detail/contact_parts.hpp"
-
 #include "tunica/core/error.hpp"
-
-#include <fmt/format.h>
+#include "tunica/mechanics/contact/detail/contact_parts.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -32,12 +29,14 @@ constexpr double own_distance = 0.9;
 }  // namespace
 
 ContactSystem::ContactSystem(const Model& model, Surfaces surfaces, std::vector<Vec3> reference)
-    : surfaces_(std::move(surfaces)), reference_(std::move(reference)), contacts_(model.contacts) {
+    : surfaces_(std::move(surfaces)),
+      reference_(std::move(reference)),
+      contacts_(model.contacts),
+      rest_(Configuration::at_rest(reference_.size())) {
   for (const RigidBody& body : model.rigids) {
     shapes_.emplace_back(body);
   }
   shapes_before_ = shapes_end_ = shapes_;
-  accepted_ = rest_ = Configuration::at_rest(reference_.size());
   for (const Contact& contact : contacts_) {
     for (const ContactParty& party : contact.between) {
       for (std::size_t f = 0; !contact.curved && !party.rigid && f < surfaces_.faces.size(); ++f) {
@@ -47,35 +46,22 @@ ContactSystem::ContactSystem(const Model& model, Surfaces surfaces, std::vector<
     }
   }
   make_groups();
-  const FaceMaps maps(surfaces_, reference_, accepted_);
+  accepted_ = maps_at(rest_);
+  const FaceMaps& maps = *accepted_;
   refine(maps);
-  const auto near = near_faces(maps, 0);
-  double deepest = 0;
-  std::size_t which = 0;
-  for (std::size_t g = 0; g < groups_.size(); ++g) {
-    const Group& group = groups_[g];
-    if (group.other.rigid ? !is_near(group, maps[group.face]) : near[g].empty()) {
-      continue;
-    }
-    for (const Sample& sample : group.samples) {
-      const double gap = touch(group, maps[group.face].point(sample.weights), near[g], maps).gap + group.sag;
-      if (gap < std::min(deepest, -same_distance * group.wall)) {
-        deepest = gap;
-        which = group.contact + 1;
-      }
+  require_apart(model);
+  accept(rest_);
+}
+
+/// Most states are asked for several times: by Newton's method, certificates and results.
+std::shared_ptr<const FaceMaps> ContactSystem::maps_at(const Configuration& configuration) {
+  for (const auto& known : {last_, accepted_, at_tangent_}) {
+    if (known && known->are_at(configuration)) {
+      return known;
     }
   }
-  if (which > 0) {
-    const Contact& contact = contacts_[which - 1];
-    const auto name = [&](const ContactParty& party) {
-      return party.rigid ? model.rigids[party.index].name : model.name_of(party.index);
-    };
-    throw InputError(
-        fmt::format("{}{} and {} overlap by {:.4g} mm in the reference (walls have thickness): move them apart",
-                    contact.said_at.empty() ? "" : contact.said_at + ": ", name(contact.between[0]),
-                    name(contact.between[1]), -deepest));
-  }
-  accept(accepted_);
+  last_ = std::make_shared<const FaceMaps>(surfaces_, reference_, configuration);
+  return last_;
 }
 
 void ContactSystem::make_groups() {
@@ -145,7 +131,7 @@ void ContactSystem::sample(Group& group, int level) const {
     });
     sample.slip = nearest->slip;
     sample.followed = nearest->followed;
-    sample.before = PatchMap(face, reference_, accepted_).point(sample.weights);
+    sample.before = (*accepted_)[group.face].point(sample.weights);
   }
 }
 
@@ -367,7 +353,7 @@ ContactSystem::Touch ContactSystem::touch(const Group& group, const Vec3& x, con
 }
 
 void ContactSystem::set_step(double from, double to, const Configuration& configuration) {
-  refine(FaceMaps(surfaces_, reference_, configuration));
+  refine(*maps_at(configuration));
   begin_ = from;
   end_ = to;
   for (RigidShape& shape : shapes_end_) {
@@ -402,8 +388,7 @@ bool ContactSystem::find_pairs(const Configuration& configuration) {
   for (const SurfaceFace& face : surfaces_.faces) {
     edges += (reference_[face.nodes[1]] - reference_[face.nodes[0]]).norm() / real(surfaces_.faces.size());
   }
-  const FaceMaps maps(surfaces_, reference_, configuration);
-  const auto near = near_faces(maps, edges / 2);
+  const auto near = near_faces(*maps_at(configuration), edges / 2);
   std::set<std::array<Index, 2>> all(pairs_.begin(), pairs_.end());
   for (std::size_t g = 0; g < groups_.size(); ++g) {
     for (const std::size_t f : near[g]) {
@@ -425,12 +410,13 @@ void ContactSystem::accept(const Configuration& configuration) {
   if (std::any_of(contacts_.begin(), contacts_.end(), [](const Contact& c) { return c.friction > 0; })) {
     keep_slip(configuration);
   }
-  accepted_ = configuration;
+  accepted_ = maps_at(configuration);
   shapes_before_ = shapes_;
 }
 
 void ContactSystem::keep_slip(const Configuration& configuration) {
-  const FaceMaps maps(surfaces_, reference_, configuration);
+  const auto kept = maps_at(configuration);
+  const FaceMaps& maps = *kept;
   const auto near = near_faces(maps, 0);
   for (std::size_t g = 0; g < groups_.size(); ++g) {
     Group& group = groups_[g];

@@ -6,6 +6,7 @@
 #include "tunica/mechanics/contact/surface_faces.hpp"
 
 #include <map>
+#include <memory>
 #include <vector>
 
 /// Contact of curved surfaces with each other and with rigid bodies, inside the implicit step.
@@ -82,7 +83,7 @@ public:
 
   /// Whether it is certain that on straight lines from the last accepted state to this one nothing passed through
   /// anything: a plane, or the way that there is, keeps every part of a surface from what it might meet.
-  [[nodiscard]] bool is_certain(const Configuration& configuration) const;
+  [[nodiscard]] bool is_certain(const Configuration& configuration);
 
   /// What acts in a configuration, per contact of the model; gaps as intervals.
   [[nodiscard]] std::vector<ContactState> results(const Configuration& configuration);
@@ -145,7 +146,11 @@ private:
     Vec3 own = Vec3::Zero(), other = Vec3::Zero();
   };
 
+  [[nodiscard]] std::shared_ptr<const FaceMaps> maps_at(const Configuration& configuration);
+
   void make_groups();
+  /// Errors: InputError: bodies overlap in the reference.
+  void require_apart(const Model& model);
   void sample(Group& group, int level) const;
   [[nodiscard]] Sample sample_at(const Group& group, const PatchMap& map, int i, int j) const;
   void keep_slip(const Configuration& configuration);
@@ -202,7 +207,6 @@ private:
   std::vector<RigidShape> shapes_before_;  ///< in the last accepted state
   std::vector<RigidShape> shapes_end_;     ///< at the end of the step
   std::vector<RigidShape> shapes_at_tangent_;
-  Configuration at_tangent_;  ///< where the last tangent was made
   double begin_ = 0, end_ = 0, left_ = 0;
   bool slides_ = false;
   std::vector<Group> groups_;
@@ -211,7 +215,10 @@ private:
   std::vector<double> smallest_gap_;      ///< mm, per contact, of the samples at the last forces
   std::vector<double> largest_pressure_;  ///< MPa, per contact, of the last forces
   std::vector<std::array<Index, 2>> pairs_;
-  Configuration rest_, accepted_;
+  const Configuration rest_;
+  std::shared_ptr<const FaceMaps> accepted_;    ///< of the last accepted state
+  std::shared_ptr<const FaceMaps> at_tangent_;  ///< where the last tangent was made
+  std::shared_ptr<const FaceMaps> last_;        ///< that were asked for
   std::vector<RigidState> on_rigids_;
   std::array<double, 2> imbalance_{0, 0};
   Recorded* recorded_ = nullptr;  ///< add() writes here what acts

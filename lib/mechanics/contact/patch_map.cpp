@@ -14,8 +14,11 @@ struct Jet {
   Vec3 g = Vec3::Zero();
   Mat3 h = Mat3::Zero();
 
+  Jet() = default;
+  Jet(double value) : v(value) {}  // NOLINT(google-explicit-constructor): a constant
+  Jet(double value, const Vec3& gradient, const Mat3& hessian) : v(value), g(gradient), h(hessian) {}
+
   static Jet variable(double value, int index) { return {value, Vec3(Vec3::Unit(index)), Mat3::Zero()}; }
-  static Jet constant(double value) { return {value, Vec3::Zero(), Mat3::Zero()}; }
 };
 
 Jet operator+(const Jet& a, const Jet& b) { return {a.v + b.v, a.g + b.g, a.h + b.h}; }
@@ -27,13 +30,43 @@ Jet operator*(const Jet& a, const Jet& b) {
 Jet apply(const Jet& a, double f, double df, double ddf) {
   return {f, df * a.g, df * a.h + ddf * a.g * a.g.transpose()};
 }
+double inverse(double a) { return 1 / a; }
 Jet inverse(const Jet& a) {
   const double r = 1 / a.v;
   return apply(a, r, -r * r, 2 * r * r * r);
 }
+double root(double a) { return std::sqrt(a); }
 Jet root(const Jet& a) {
   const double r = std::sqrt(a.v);
   return apply(a, r, 0.5 / r, -0.25 / (r * a.v));
+}
+double value_of(double a) { return a; }
+double value_of(const Jet& a) { return a.v; }
+
+/// watertight_edge_point() is the corner + alpha edge - beta mean - gamma difference: {alpha, beta, gamma}.
+/// @param s, a  products of the edge with mean and difference of the normals; q  with itself
+/// @param squared  length of the difference
+template <typename Scalar>
+std::array<Scalar, 3> edge_factors(const Scalar& s, const Scalar& a, const Scalar& q, double squared) {
+  Scalar share = 0.0;
+  if (squared > 0) {
+    share = std::min(1.0, squared / crease_squared);
+    const Scalar across = (1 / squared) * (a * a) * inverse(q);
+    const Scalar fades = Scalar(2.0) - 4 * across;
+    if (value_of(fades) <= 0) {
+      share = 0.0;
+    } else if (value_of(fades) < 1) {
+      share = share * fades;
+    }
+  }
+  Scalar tangent = q - s * s;
+  if (squared > 0) {
+    tangent = tangent - (1 / squared) * ((2 * share - share * share) * (a * a));
+  }
+  const Scalar ratio = tangent * inverse(q);
+  const Scalar cosine = value_of(ratio) > 1e-18 ? root(ratio) : Scalar(1e-9);
+  const Scalar alpha = (2.0 / 3) * inverse((Scalar(1.0) + cosine) * cosine);
+  return {alpha, alpha * s, squared > 0 ? (1 / squared) * (alpha * share * a) : Scalar(0.0)};
 }
 
 int next_of(int corner) { return (corner + 1) % 3; }
@@ -77,71 +110,39 @@ std::array<PatchWeights, 2> patch_weight_derivatives(const SurfaceFace& face, co
 }
 
 PatchMap::PatchMap(const SurfaceFace& face, const std::vector<Vec3>& reference, const Configuration& configuration)
-    : face_(face) {
-  std::array<Vec3, 3> x;
+    : face_(&face) {
   points_.setZero();
   for (int k = 0; k < 3; ++k) {
-    x[k] = reference[face.nodes[k]] + configuration.displacement[face.nodes[k]];
-    points_.col(k) = x[k];
+    points_.col(k) = reference[face.nodes[k]] + configuration.displacement[face.nodes[k]];
+    turns_[k] = configuration.rotation[face.nodes[k]];
   }
   for (int k = 0; face.curved && k < 6; ++k) {
-    find_edge_point(k, x, configuration);
+    const EdgePoint p = edge_point(k);
+    const auto [alpha, beta, gamma] =
+        edge_factors(p.mean.dot(p.edge), p.difference.dot(p.edge), p.edge.squaredNorm(), p.difference.squaredNorm());
+    points_.col(3 + k) = points_.col(p.here) + alpha * p.edge - beta * p.mean - gamma * p.difference;
   }
 }
 
-/// watertight_edge_point(), as alpha e - beta mean - gamma difference.
-void PatchMap::find_edge_point(int k, const std::array<Vec3, 3>& x, const Configuration& configuration) {
-  EdgePoint& p = edges_[k];
+PatchMap::EdgePoint PatchMap::edge_point(int k) const {
   const int edge = k / 2;
+  EdgePoint p;
   p.here = k % 2 == 0 ? edge : next_of(edge);
   p.there = k % 2 == 0 ? next_of(edge) : edge;
-  p.edge = x[p.there] - x[p.here];
-  const Eigen::Quaterniond& turn = configuration.rotation[face_.nodes[p.here]];
-  const Vec3& own = face_.normals[p.here];
-  const Vec3& other = face_.across[edge][k % 2];
-  p.mean = turn * (own + other).normalized();
-  p.difference = turn * (own - other);
-  const Jet s = Jet::variable(p.mean.dot(p.edge), 0);
-  const Jet a = Jet::variable(p.difference.dot(p.edge), 1);
-  const Jet q = Jet::variable(p.edge.squaredNorm(), 2);
-  const double squared = p.difference.squaredNorm();
-  Jet share = Jet::constant(0);
-  if (squared > 0) {
-    share = Jet::constant(std::min(1.0, squared / crease_squared));
-    const Jet across = (1 / squared) * (a * a) * inverse(q);
-    const Jet fades = Jet::constant(2) - 4 * across;
-    if (fades.v <= 0) {
-      share = Jet::constant(0);
-    } else if (fades.v < 1) {
-      share = share * fades;
-    }
-  }
-  Jet tangent = q - s * s;
-  if (squared > 0) {
-    tangent = tangent - (1 / squared) * ((2 * share - share * share) * (a * a));
-  }
-  const Jet ratio = tangent * inverse(q);
-  const Jet cosine = ratio.v > 1e-18 ? root(ratio) : Jet::constant(1e-9);
-  const Jet alpha = (2.0 / 3) * inverse((Jet::constant(1) + cosine) * cosine);
-  const Jet beta = alpha * s;
-  const Jet gamma = squared > 0 ? (1 / squared) * (alpha * share * a) : Jet::constant(0);
-  p.alpha = alpha.v, p.beta = beta.v, p.gamma = gamma.v;
-  p.d_alpha = alpha.g, p.d_beta = beta.g, p.d_gamma = gamma.g;
-  p.dd_alpha = alpha.h, p.dd_beta = beta.h, p.dd_gamma = gamma.h;
-  points_.col(3 + k) = x[p.here] + p.alpha * p.edge - p.beta * p.mean - p.gamma * p.difference;
+  p.edge = points_.col(p.there) - points_.col(p.here);
+  const Vec3& own = face_->normals[p.here];
+  const Vec3& other = face_->across[edge][k % 2];
+  p.mean = turns_[p.here] * (own + other).normalized();
+  p.difference = turns_[p.here] * (own - other);
+  return p;
 }
 
-void PatchMap::linearise() {
-  for (int k = 0; face_.curved && k < 6; ++k) {
-    edges_[k].linearise();
-  }
-  jacobian_.setZero();
-  for (int k = 0; k < (face_.curved ? 9 : 3); ++k) {
-    jacobian_.middleRows<3>(3 * k) = derivative(PatchWeights::Unit(k));
-  }
-}
-
-void PatchMap::EdgePoint::linearise() {
+PatchMap::LinearEdge::LinearEdge(const EdgePoint& p) : EdgePoint(p) {
+  const auto [a, b, c] = edge_factors(Jet::variable(mean.dot(edge), 0), Jet::variable(difference.dot(edge), 1),
+                                      Jet::variable(edge.squaredNorm(), 2), difference.squaredNorm());
+  alpha = a.v, beta = b.v, gamma = c.v;
+  d_alpha = a.g, d_beta = b.g, d_gamma = c.g;
+  dd_alpha = a.h, dd_beta = b.h, dd_gamma = c.h;
   // Columns: s, a and q by the edge and by the spin.
   Eigen::Matrix<double, 6, 3> scalars;
   scalars << mean, difference, 2 * edge, mean.cross(edge), difference.cross(edge), Vec3::Zero();
@@ -151,7 +152,21 @@ void PatchMap::EdgePoint::linearise() {
   jacobian.rightCols<3>() += beta * skew(mean) + gamma * skew(difference);
 }
 
-Matrix6 PatchMap::EdgePoint::curvature(const Vec3& f) const {
+void PatchMap::linearise() {
+  if (linear_) {
+    return;
+  }
+  linear_ = std::make_unique<Linear>();
+  for (int k = 0; face_->curved && k < 6; ++k) {
+    linear_->edges.emplace_back(edge_point(k));
+  }
+  linear_->jacobian.setZero();
+  for (int k = 0; k < (face_->curved ? 9 : 3); ++k) {
+    linear_->jacobian.middleRows<3>(3 * k) = derivative(PatchWeights::Unit(k));
+  }
+}
+
+Matrix6 PatchMap::LinearEdge::curvature(const Vec3& f) const {
   const Vec3 &e = edge, &m = mean, &d = difference;
   Eigen::Matrix<double, 6, 3> scalars;
   scalars << m, d, 2 * e, m.cross(e), d.cross(e), Vec3::Zero();
@@ -181,8 +196,8 @@ PatchMap::Points PatchMap::change(const Vector18& of_nodes) const {
   for (int k = 0; k < 3; ++k) {
     result.col(k) = of_nodes.segment<3>(6 * k);
   }
-  for (int k = 0; face_.curved && k < 6; ++k) {
-    const EdgePoint& p = edges_[k];
+  for (int k = 0; face_->curved && k < 6; ++k) {
+    const LinearEdge& p = linear_->edges[k];
     Vector6 z;
     z << of_nodes.segment<3>(6 * p.there) - of_nodes.segment<3>(6 * p.here), of_nodes.segment<3>(6 * p.here + 3);
     result.col(3 + k) = of_nodes.segment<3>(6 * p.here) + p.jacobian * z;
@@ -195,8 +210,8 @@ Vector18 PatchMap::to_nodes(const Points& forces) const {
   for (int k = 0; k < 3; ++k) {
     result.segment<3>(6 * k) = forces.col(k);
   }
-  for (int k = 0; face_.curved && k < 6; ++k) {
-    const EdgePoint& p = edges_[k];
+  for (int k = 0; face_->curved && k < 6; ++k) {
+    const LinearEdge& p = linear_->edges[k];
     const Vector6 z = p.jacobian.transpose() * forces.col(3 + k);
     result.segment<3>(6 * p.there) += z.head<3>();
     result.segment<3>(6 * p.here) += forces.col(3 + k) - z.head<3>();
@@ -210,8 +225,8 @@ Eigen::Matrix<double, 3, 18> PatchMap::derivative(const PatchWeights& weights) c
   for (int k = 0; k < 3; ++k) {
     result.block<3, 3>(0, 6 * k).diagonal().array() += weights[k];
   }
-  for (int k = 0; face_.curved && k < 6; ++k) {
-    const EdgePoint& p = edges_[k];
+  for (int k = 0; face_->curved && k < 6; ++k) {
+    const LinearEdge& p = linear_->edges[k];
     const double w = weights[3 + k];
     result.block<3, 3>(0, 6 * p.here).diagonal().array() += w;
     result.block<3, 3>(0, 6 * p.there) += w * p.jacobian.leftCols<3>();
@@ -223,14 +238,14 @@ Eigen::Matrix<double, 3, 18> PatchMap::derivative(const PatchWeights& weights) c
 
 Matrix18 PatchMap::stiffness(const Matrix27& of_points, const Points& forces) const {
   Matrix18 result;
-  if (face_.curved) {
-    result = jacobian_.transpose() * (of_points * jacobian_);
+  if (face_->curved) {
+    result = jacobian().transpose() * (of_points * jacobian());
   } else {
-    const auto corners = jacobian_.topRows<9>();
+    const auto corners = jacobian().topRows<9>();
     result = corners.transpose() * (of_points.topLeftCorner<9, 9>() * corners);
   }
-  for (int k = 0; face_.curved && k < 6; ++k) {
-    const EdgePoint& p = edges_[k];
+  for (int k = 0; face_->curved && k < 6; ++k) {
+    const LinearEdge& p = linear_->edges[k];
     const Matrix6 h = p.curvature(forces.col(3 + k));
     // z = (x_there - x_here, spin_here)
     const std::array<int, 3> places{6 * p.there, 6 * p.here, 6 * p.here + 3};

@@ -4,6 +4,9 @@
 #include "tunica/mechanics/model/configuration.hpp"
 #include "tunica/shell/patch/curved_surface.hpp"
 
+#include <memory>
+#include <vector>
+
 /// From the nodes of a triangle to the points of its surface, and by the transpose of the derivative from forces on the
 /// points to forces and moments on the nodes: whatever acts is in balance, and does the same work on both sides.
 ///
@@ -36,7 +39,7 @@ PatchWeights patch_weights(const SurfaceFace& face, const Vec2& b);
 /// Derivatives of the weights by b2 and by b3.
 std::array<PatchWeights, 2> patch_weight_derivatives(const SurfaceFace& face, const Vec2& b);
 
-/// A face in a configuration.
+/// A face in a configuration. Cost: .3 kB; with its derivatives 8 kB.
 class PatchMap {
 public:
   using Points = Eigen::Matrix<double, 3, 9>;
@@ -61,31 +64,38 @@ public:
   [[nodiscard]] Matrix18 stiffness(const Matrix27& of_points, const Points& forces) const;
 
   /// d (corners and edge points) / d (displacements, spins).
-  [[nodiscard]] const Eigen::Matrix<double, 27, 18>& jacobian() const { return jacobian_; }
+  [[nodiscard]] const Eigen::Matrix<double, 27, 18>& jacobian() const { return linear_->jacobian; }
 
   /// d point / d (displacements, spins) at weights.
   [[nodiscard]] Eigen::Matrix<double, 3, 18> derivative(const PatchWeights& weights) const;
 
 private:
-  /// An edge point as a function of the edge from its corner, and the spin there.
+  /// What an edge point depends on: the edge from its corner, and the normals there.
   struct EdgePoint {
     int here = 0, there = 0;
     Vec3 edge, mean, difference;
+  };
+  /// An edge point as a function of the edge and the spin of its corner.
+  struct LinearEdge : EdgePoint {
     double alpha = 0, beta = 0, gamma = 0;
     Vec3 d_alpha, d_beta, d_gamma;  ///< by s = mean.edge, a = difference.edge, q = edge.edge
     Mat3 dd_alpha, dd_beta, dd_gamma;
     Eigen::Matrix<double, 3, 6> jacobian;
 
-    void linearise();
+    explicit LinearEdge(const EdgePoint& point);
     [[nodiscard]] Matrix6 curvature(const Vec3& force) const;
   };
+  struct Linear {
+    std::vector<LinearEdge> edges;
+    Eigen::Matrix<double, 27, 18> jacobian;
+  };
 
-  void find_edge_point(int k, const std::array<Vec3, 3>& x, const Configuration& configuration);
+  [[nodiscard]] EdgePoint edge_point(int k) const;
 
-  const SurfaceFace& face_;
+  const SurfaceFace* face_;
   Points points_;
-  std::array<EdgePoint, 6> edges_;
-  Eigen::Matrix<double, 27, 18> jacobian_;
+  std::array<Eigen::Quaterniond, 3> turns_;
+  std::unique_ptr<Linear> linear_;
 };
 
 }  // namespace tunica

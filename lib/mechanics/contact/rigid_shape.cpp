@@ -1,7 +1,5 @@
 #include "tunica/mechanics/contact/rigid_shape.hpp"
 
-#include "tunica/surface/mesh/incidence.hpp"
-
 #include <Eigen/Geometry>
 
 #include <algorithm>
@@ -76,31 +74,7 @@ void RigidShape::expand(const RigidMesh& mesh) {
   for (Vec3& x : m.vertices) {
     x = expanded(x, factor_);
   }
-  surface_ = std::make_shared<ClosestPoint>(m);
-  // Angle-weighted normals of corners, means at edges: their sign is right wherever the nearest point lies.
-  std::vector<Vec3> at_vertex(m.vertices.size(), Vec3::Zero());
-  const auto normal_of = [&](std::size_t t) {
-    const auto& v = m.triangles[t];
-    return Vec3((m.vertices[v[1]] - m.vertices[v[0]]).cross(m.vertices[v[2]] - m.vertices[v[0]]).normalized());
-  };
-  for (std::size_t t = 0; t < m.triangles.size(); ++t) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      const Vec3& x = m.vertices[m.triangles[t][k]];
-      const Vec3 a = m.vertices[m.triangles[t][(k + 1) % 3]] - x, b = m.vertices[m.triangles[t][(k + 2) % 3]] - x;
-      at_vertex[m.triangles[t][k]] += std::atan2(a.cross(b).norm(), a.dot(b)) * normal_of(t);
-    }
-  }
-  const auto beside = neighbours(m, incidence(m));
-  std::vector<std::array<Vec3, 7>> normals(m.triangles.size());
-  for (std::size_t t = 0; t < m.triangles.size(); ++t) {
-    normals[t][0] = normal_of(t);
-    for (std::size_t k = 0; k < 3; ++k) {
-      const Index other = beside[t][k];
-      normals[t][1 + k] = normals[t][0] + (other == no_neighbour ? Vec3(Vec3::Zero()) : normal_of(other));
-      normals[t][4 + k] = at_vertex[m.triangles[t][k]];
-    }
-  }
-  pseudo_normals_ = std::make_shared<const std::vector<std::array<Vec3, 7>>>(std::move(normals));
+  surface_ = std::make_shared<SignedDistance>(m);
 }
 
 Vec3 RigidShape::expanded(const Vec3& x, double factor) const {
@@ -157,34 +131,14 @@ RigidDistance RigidShape::at(const Vec3& p) const {
                                },
                                [&](const RigidMesh&) {
                                  const Vec3 local = to_mesh(p);
-                                 const ClosestPoint::Hit hit = surface_->closest(local);
-                                 const auto corners = surface_->corners(hit.triangle);
-                                 // Which part of the triangle the nearest point lies on says which normal has the right
-                                 // sign.
-                                 const Vec3 b = barycentric(hit.point, corners[0], corners[1], corners[2]);
-                                 constexpr double on_side = 1e-9;
-                                 std::size_t part = 0;
-                                 for (std::size_t k = 0; k < 3; ++k) {
-                                   if (b[(k + 2) % 3] < on_side) {
-                                     part = 1 + k;  // edge k to k + 1
-                                   }
-                                 }
-                                 for (std::size_t k = 0; k < 3; ++k) {
-                                   if (b[k] > 1 - on_side) {
-                                     part = 4 + k;
-                                   }
-                                 }
-                                 const Vec3& pseudo = (*pseudo_normals_)[hit.triangle][part];
+                                 const SignedDistance::Hit hit = surface_->at(local);
                                  const Vec3 here = from_mesh(hit.point);
-                                 Vec3 away = p - here;
-                                 const double length = away.norm();
-                                 const double sign = (local - hit.point).dot(pseudo) >= 0 ? 1 : -1;
-                                 if (length > 1e-12) {
-                                   away *= sign / length;
-                                 } else {
-                                   away = (from_mesh(hit.point + pseudo) - here).normalized();
-                                 }
-                                 return RigidDistance{sign * length, away, Mat3::Zero()};
+                                 const double length = std::abs(hit.distance);
+                                 const Vec3 away =
+                                     length > 1e-12
+                                         ? Vec3((p - here) / hit.distance)
+                                         : Vec3((from_mesh(hit.point + hit.pseudo_normal) - here).normalized());
+                                 return RigidDistance{hit.distance, away, Mat3::Zero()};
                                }},
                     body_->shape);
 }
@@ -223,6 +177,13 @@ bool RigidShape::moves_to(const RigidShape& then) const {
 }
 
 double RigidShape::deepest() const { return std::holds_alternative<RigidPlane>(body_->shape) ? infinity : radius_ / 2; }
+
+std::optional<Vec3> RigidShape::inner_point() const {
+  if (std::holds_alternative<RigidPlane>(body_->shape)) {
+    return {};
+  }
+  return convex() ? position() : from_mesh(surface_->vertices().front());
+}
 
 Vec3 RigidShape::position() const { return convex() ? Vec3((first_ + second_) / 2) : shift_; }
 

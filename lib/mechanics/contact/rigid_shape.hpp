@@ -1,9 +1,10 @@
 #pragma once
 
 #include "tunica/mechanics/model/model.hpp"
-#include "tunica/surface/distance/closest_point.hpp"
+#include "tunica/surface/distance/signed_distance.hpp"
 
 #include <memory>
+#include <optional>
 
 namespace tunica {
 
@@ -42,6 +43,9 @@ public:
 
   [[nodiscard]] Vec3 position() const;
 
+  /// Some point of the body; none of a plane.
+  [[nodiscard]] std::optional<Vec3> inner_point() const;
+
   /// The largest curvature of the body over all times, 1 / mm; of a mesh that of its sampling, unknown: 0.
   [[nodiscard]] double largest_curvature() const;
 
@@ -54,9 +58,8 @@ private:
   [[nodiscard]] Vec3 expanded(const Vec3& x, double factor) const;
 
   const RigidBody* body_;
-  std::shared_ptr<const ClosestPoint> surface_;
-  std::shared_ptr<const std::vector<std::array<Vec3, 7>>> pseudo_normals_;  ///< per triangle: face, edges, corners
-  Vec3 first_ = Vec3::Zero(), second_ = Vec3::Zero();                       ///< centre or ends or point
+  std::shared_ptr<const SignedDistance> surface_;
+  Vec3 first_ = Vec3::Zero(), second_ = Vec3::Zero();  ///< centre or ends or point
   double radius_ = 0;
   Vec3 shift_ = Vec3::Zero();
   double angle_ = 0, factor_ = 1;

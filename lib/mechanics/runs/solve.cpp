@@ -6,6 +6,7 @@
 #include "tunica/mechanics/model/wall.hpp"
 #include "tunica/mechanics/runs/curved_displacement.hpp"
 #include "tunica/mechanics/runs/detail/run.hpp"
+#include "tunica/mechanics/runs/doubts.hpp"
 
 #include <fmt/format.h>
 
@@ -68,7 +69,8 @@ std::string describe_loads(const Model& model, const std::vector<double>& reache
     }
   }
   if (model.loads.empty()) {
-    return "of the prescribed displacements";
+    const bool of_nodes = std::any_of(model.fixes.begin(), model.fixes.end(), prescribes);
+    return of_nodes ? "of the prescribed displacements" : "of the rigid bodies' motion";
   }
   return text.empty() ? fmt::format("{:.4g} of {:.4g} times the loads", reached.front(), wanted.front()) : text;
 }

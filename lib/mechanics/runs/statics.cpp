@@ -175,10 +175,16 @@ struct Failure {
   std::string reason;
 };
 
-Failure why(const NewtonResult& result, const SettleResult& let_go, bool prescribed) {
+/// @param loose  the body that nothing holds, if any
+Failure why(const NewtonResult& result, const SettleResult& let_go, bool prescribed, const std::string& loose) {
   // Prescribed displacements hold a shell that loads alone would carry off: what cannot follow them has no limit load.
   const std::string limit = prescribed ? "limit point" : "limit load";
   const std::string none = "no stable static equilibrium";
+  if (!loose.empty()) {
+    return {none, fmt::format("nothing but contact could hold {}, and it does not: hold it by a fix, or place it so "
+                              "that what it touches stops it",
+                              loose)};
+  }
   if (let_go.ran_away) {
     return {none, limit + ": beyond it there is no equilibrium, the shell yields without bound"};
   }
@@ -322,7 +328,7 @@ private:
     Configuration attempt = configuration_;
     const SettleResult settled = step_.let_go(beyond, factor_, thickness_, attempt);
     if (!settled.settled) {
-      fail(failed, settled);
+      fail(failed, settled, settled.ran_away ? loose_body(attempt) : "");
     }
     if (distance(attempt, configuration_) > largest_branch * thickness_) {
       summary_.snaps.push_back({factor_, largest_distance(attempt, configuration_)});
@@ -333,14 +339,30 @@ private:
     return settled;
   }
 
-  [[noreturn]] void fail(const NewtonResult& failed, const SettleResult& let_go) {
+  /// Whose node has moved farthest, if its supports leave a rigid motion free.
+  [[nodiscard]] std::string loose_body(const Configuration& ended) const {
+    const auto& u = ended.displacement;
+    const auto farthest = std::max_element(
+        u.begin(), u.end(), [](const Vec3& a, const Vec3& b) { return a.squaredNorm() < b.squaredNorm(); });
+    const auto node = narrow<Index>(farthest - u.begin());
+    for (const Piece& piece : system_.pieces) {
+      if (std::find(piece.nodes.begin(), piece.nodes.end(), node) != piece.nodes.end()) {
+        return !held_by_rigid_motions(model_, piece.body) && free_rigid_motions(system_, piece) > 0
+                   ? model_.name_of(piece.body)
+                   : "";
+      }
+    }
+    return "";
+  }
+
+  [[noreturn]] void fail(const NewtonResult& failed, const SettleResult& let_go, const std::string& loose) {
     if (factor_ != (shown_ == 0 ? 0 : run_.load_factors[shown_ - 1])) {  // the last good state, also within a step
       NewtonResult good;
       good.converged = true;
       hand_over(state_of(good));
     }
     const double last = run_.load_factors.back();
-    const auto [found, reason] = why(failed, let_go, !system_.prescribed.empty());
+    const auto [found, reason] = why(failed, let_go, !system_.prescribed.empty(), loose);
     throw RequirementError(
         fmt::format("{} beyond load factor {:.6g} of {:.6g} ({}): {}; the last good state is at {:.6g}", found, factor_,
                     last, describe_loads(model_, load_factors(model_, true, factor_), load_factors(model_, true, last)),

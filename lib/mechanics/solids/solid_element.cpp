@@ -5,6 +5,7 @@
 #include <Eigen/Dense>
 
 #include <algorithm>
+#include <cmath>
 
 namespace tunica {
 namespace {
@@ -34,7 +35,7 @@ Mat3 nearest_rotation(const Mat3& f) {
 /// At a deformation gradient: stress P and volume strain theta with their derivatives.
 struct Point {
   Mat3 stress;             ///< of W: first Piola-Kirchhoff
-  Mat3 volume_derivative;  ///< of theta
+  Mat3 volume_derivative;  ///< of theta by F
   double volume_strain = 0;
   double energy = 0;    ///< W
   Matrix99 derivative;  ///< of P + p d theta, by columns of F
@@ -55,26 +56,27 @@ bool at_point(const SolidElement& e, const Mat3& gradient, double pressure, Poin
     return false;
   }
   const double mu = e.shear;
+  const double lambda = e.bulk_of_displacement - 2 * mu / 3;
   // J - 1 and |F|^2 - 3 from the displacement's gradient, so that small strains keep their digits.
   const double trace = gradient.trace();
   at.volume_strain = trace + (trace * trace - (gradient * gradient).trace()) / 2 + gradient.determinant();
   at.volume_derivative = cofactors(f);
   if (e.law == SolidLaw::neo_hookean) {
-    const double lambda = e.bulk_of_displacement + mu / 3;
-    const double squared = gradient.squaredNorm();
+    at.volume_strain = std::log1p(at.volume_strain);
+    at.volume_derivative /= determinant;
     const double on_volume = lambda * at.volume_strain - mu;
-    at.energy = mu * (trace + squared / 2 - at.volume_strain) + lambda / 2 * at.volume_strain * at.volume_strain;
+    at.energy =
+        mu * (trace + gradient.squaredNorm() / 2 - at.volume_strain) + lambda / 2 * at.volume_strain * at.volume_strain;
     at.stress = mu * (f - at.volume_derivative) + lambda * at.volume_strain * at.volume_derivative;
     if (with_derivative) {
       at.derivative.setIdentity();
       at.derivative *= mu;
       const Eigen::Map<const Eigen::Matrix<double, 9, 1>> c(at.volume_derivative.data());
-      at.derivative += lambda * c * c.transpose();
-      add_cofactor_derivative(f, on_volume + pressure, at.derivative);
+      at.derivative += (lambda - on_volume - pressure) * c * c.transpose();
+      add_cofactor_derivative(f, (on_volume + pressure) / determinant, at.derivative);
     }
     return true;
   }
-  const double lambda = e.bulk_of_displacement - 2 * mu / 3;
   const Mat3 r = nearest_rotation(f);
   const Mat3 strain = r.transpose() * f - Mat3::Identity();
   const double trace_of_strain = strain.trace();

@@ -16,10 +16,13 @@
 ///   corotational: W = mu |S - 1|^2 + (K0 - 2 mu / 3) tr(S - 1)^2 / 2, F = R S, theta = J - 1 (with tr(S - 1) a
 ///   pressure
 ///                 of twice the shear modulus would make any tetrahedron unstable)
-///   neo_hookean:  W = mu (|F|^2 - 3) / 2 - mu (J - 1) + (K0 + mu / 3) (J - 1)^2 / 2, theta = J - 1
+///   neo_hookean:  W = mu (|F|^2 - 3) / 2 - mu ln J + (K0 - 2 mu / 3) (ln J)^2 / 2, theta = ln J: no pressure crushes
+///   it
+///                 to nothing
 /// Both are linear elasticity for small strains.
 /// Source: Dohrmann, Bochev 2004, "A stabilized finite element method for the Stokes problem based on polynomial
-/// pressure projections"; Smith, de Goes, Kim 2018, "Stable neo-Hookean flesh simulation"; the derivative of R: McAdams
+/// pressure projections"; Bonet, Wood 2008, "Nonlinear continuum mechanics for
+/// finite element analysis", section 6.4.3; the derivative of R: McAdams
 /// et al. 2011. Limits: a tetrahedron that has turned inside out has no answer. Co-rotational strains should stay below
 /// a tenth.
 namespace tunica {

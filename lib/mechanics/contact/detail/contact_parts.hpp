@@ -4,7 +4,6 @@
 #include "tunica/mechanics/contact/contact_system.hpp"
 
 #include <algorithm>
-#include <memory>
 #include <optional>
 
 /// Faces, their parts and where they are, for the files of ContactSystem alone.
@@ -93,21 +92,26 @@ inline std::array<double, 2> extent(const SurfaceFace& face, const PatchMap& map
 /// Parameters of a part's middle.
 inline Vec2 middle(const Part& part) { return (part.at[0] + part.at[1] + part.at[2]) / 3; }
 
-/// The faces in a configuration, each made when it is asked for.
+/// The faces in a configuration, each made when it is asked for, and kept.
 class FaceMaps {
 public:
-  FaceMaps(const Surfaces& surfaces, const std::vector<Vec3>& reference, const Configuration& configuration)
+  FaceMaps(const Surfaces& surfaces, const std::vector<Vec3>& reference, Configuration configuration)
       : surfaces_(surfaces),
         reference_(reference),
-        configuration_(configuration),
+        configuration_(std::move(configuration)),
         maps_(surfaces.faces.size()),
-        linear_(maps_.size(), false),
         bounds_(maps_.size()) {}
 
   [[nodiscard]] const Configuration& configuration() const { return configuration_; }
+  [[nodiscard]] bool are_at(const Configuration& other) const {
+    const auto same = [](const Eigen::Quaterniond& a, const Eigen::Quaterniond& b) { return a.coeffs() == b.coeffs(); };
+    return configuration_.displacement == other.displacement &&
+           std::equal(configuration_.rotation.begin(), configuration_.rotation.end(), other.rotation.begin(),
+                      other.rotation.end(), same);
+  }
   [[nodiscard]] PatchMap& operator[](std::size_t face) const {
     if (!maps_[face]) {
-      maps_[face] = std::make_unique<PatchMap>(surfaces_.faces[face], reference_, configuration_);
+      maps_[face] = PatchMap(surfaces_.faces[face], reference_, configuration_);
     }
     return *maps_[face];
   }
@@ -130,19 +134,15 @@ public:
   }
   [[nodiscard]] PatchMap& linearised(std::size_t face) const {
     PatchMap& map = (*this)[face];
-    if (!linear_[face]) {
-      map.linearise();
-      linear_[face] = true;
-    }
+    map.linearise();
     return map;
   }
 
 private:
   const Surfaces& surfaces_;
   const std::vector<Vec3>& reference_;
-  const Configuration& configuration_;
-  mutable std::vector<std::unique_ptr<PatchMap>> maps_;
-  mutable std::vector<bool> linear_;
+  const Configuration configuration_;
+  mutable std::vector<std::optional<PatchMap>> maps_;
   mutable std::vector<std::optional<std::pair<Bounds, double>>> bounds_;
 };
 
