@@ -15,6 +15,7 @@
 #include "tunica/mechanics/runs/curved_displacement.hpp"
 #include "tunica/mechanics/runs/doubts.hpp"
 #include "tunica/mechanics/runs/solve.hpp"
+#include "tunica/mechanics/runs/unloaded.hpp"
 #include "tunica/shell/distance/shell_distance.hpp"
 
 #include <fmt/format.h>
@@ -36,6 +37,7 @@ struct Arguments {
   cli::AccuracyFlags accuracy;
   std::optional<std::string> tessellation;
   std::vector<std::string> exports;
+  std::optional<fs::path> unloaded;
   bool check = false;
 };
 
@@ -60,6 +62,7 @@ void declare(cli::Tool& tool, Arguments& a) {
   app.add_option("--tessellation", a.tessellation,
                  "pieces per edge into which a curved shell is cut for drawing (default 4, less for many shells)")
       ->type_name("N");
+  app.add_option("--unloaded", a.unloaded, "with --imaged-at: the shells without that pressure")->type_name("OUT.ply");
   app.add_option("--export", a.exports,
                  "write beside OUT.hdf, may repeat: pvd (OUT.pvd with a .vtu per state) | xmf (OUT.xmf, XDMF)")
       ->type_name("pvd|xmf")
@@ -227,13 +230,21 @@ public:
       tool_.print(scene_text(scene_));
       return;
     }
+    if (is_imaged_under_pressure(model())) {
+      unload();
+    }
     begin();
     const Summary summary = accuracy_ ? recorded() : solved();
     stage("write");
     if (given_.accuracy.shell_out) {
-      write_shells(!accuracy_->reasons.empty());
+      write_shells(*given_.accuracy.shell_out, model().shells.front().mesh, !accuracy_->reasons.empty());
     }
     require_accuracy();
+    if (given_.unloaded) {
+      const SceneShell& shell = scene_.shells.front();
+      space_ = read_mesh(shell.mesh, shell.unit_mm).space.value_or(space_);
+      write_shells(*given_.unloaded, model().shells.front().mesh, false);
+    }
     // A fixed count of iterations asks for no convergence, so none is claimed.
     const bool converged = summary.converged && !scene_.run.cg_fixed_count;
     const auto* dynamic = kind<DynamicRun>();
@@ -292,6 +303,7 @@ private:
     }
     given_.accuracy.ask(tool_.arguments(), scene_);
     require_fresh();
+    name_unloaded();
     asked_ = scene_text(scene_);
     loaded_.emplace(load_scene(scene_));
     read_targets();
@@ -322,6 +334,21 @@ private:
       }
       tool_.output(*given_.accuracy.shell_out, {".ply"});
     }
+  }
+
+  void name_unloaded() {
+    if (!given_.unloaded) {
+      return;
+    }
+    const bool imaged = std::any_of(scene_.loads.begin(), scene_.loads.end(), [](const SceneLoad& load) {
+      const auto* pressure = std::get_if<PressureLoad>(&load.kind);
+      return pressure != nullptr && pressure->imaged_at.has_value();
+    });
+    if (!imaged || scene_.shells.size() > 1) {
+      throw UsageError(imaged ? "--unloaded: the scene has more than one body, one can be written"
+                              : "--unloaded belongs to --imaged-at, or imaged_at in a scene: give that too");
+    }
+    tool_.output(*given_.unloaded, {".ply"});
   }
 
   void read_targets() {
@@ -397,6 +424,25 @@ private:
     tool_.result()["accuracy"] = accuracy_report(*accuracy_);
   }
 
+  /// Takes the shells back to what they are without the pressure under which they were imaged.
+  void unload() {
+    stage("solve");
+    Unloaded found = naming(subject(), [&] {
+      return find_unloaded(model(), scene_.run, [&](double part, double distance) {
+        tool_.detail(fmt::format("unloaded shape: {:.3g} of the pressure, loaded {:.3g} mm from the image in the mean",
+                                 part, distance));
+      });
+    });
+    loaded_->model = std::move(found.model);
+    tool_.result()["unloaded"] = {{"volume_mm3", found.volume ? Json(*found.volume) : Json()},
+                                  {"distance_mm", {{"mean", found.mean_distance}, {"max", found.largest_distance}}},
+                                  {"iterations", found.iterations}};
+    tool_.note(
+        fmt::format("the unloaded shape is found: under the pressure of the image it lies {:.2g} mm from the "
+                    "image, {:.2g} mm at most",
+                    found.mean_distance, found.largest_distance));
+  }
+
   /// What choose_model() has solved, as solved() hands it over.
   Summary recorded() {
     stage("write");
@@ -407,13 +453,13 @@ private:
     return accuracy_->summary;
   }
 
-  void write_shells(bool partial) const {
+  void write_shells(const fs::path& out, const ShellMesh& mesh, bool partial) const {
     PlyOptions options;
     options.comments = {"made by " + tool_.command()};
     options.space = space_;
     options.overwrite = tool_.force();
     options.partial = partial;
-    write_ply(*given_.accuracy.shell_out, model().shells.front().mesh, options);
+    write_ply(out, mesh, options);
   }
 
   void require_accuracy() {

@@ -123,6 +123,8 @@ void SceneFlags::declare(Tool& tool) {
   tool.group("Load and supports");
   tool.quantity("--pressure", pressure, dimension::pressure,
                 "pressure that follows the surface; positive pushes along the normals, outward");
+  tool.quantity("--imaged-at", imaged_at, dimension::pressure,
+                "the organ was under this pressure when it was imaged: the shape without it is found first");
   app.add_option("--fix", fixes,
                  "what is held, may repeat: boundary | 'below z=-10mm' | 'above x=3cm' | rigid-motions (a closed organ "
                  "under its own pressure)")
@@ -162,6 +164,7 @@ void SceneFlags::declare(Tool& tool) {
 Scene SceneFlags::scene(const std::filesystem::path& mesh) const {
   Scene scene;
   SceneLoad load{"shell", std::nullopt, PressureLoad{}, {}, flags_as_places({})};
+  load.places.keys["imaged_at"] = {"--imaged-at", true};
   scene.run_places = flags_as_places({"duration", "step", "solver", "converge", "every"});
   scene.run_places.keys["cg_tolerance"] = {"--cg-tolerance", true};
   scene.run_places.keys["cg_iterations"] = {"--cg-iterations", true};
@@ -200,7 +203,7 @@ Scene SceneFlags::scene(const std::filesystem::path& mesh) const {
                    {"dkt-comas", Bending::dkt_comas}});
   scene.shells.push_back(shell);
 
-  load.kind = PressureLoad{required(pressure, "--pressure", "100mmHg"), true};
+  load.kind = PressureLoad{required(pressure, "--pressure", "100mmHg"), true, imaged_at};
   scene.loads.push_back(load);
   for (const std::string& text : fixes) {
     SceneFix fix;

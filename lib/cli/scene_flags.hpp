@@ -11,17 +11,17 @@ namespace tunica::cli {
 
 /// What tunica-simulate can be told of a scene without a file: one shell under pressure.
 struct SceneFlags {
-  std::optional<double> young, thickness, density, pressure, duration, step, ramp;
+  std::optional<double> young, thickness, density, pressure, imaged_at, duration, step, ramp;
   std::optional<std::string> poisson, mesh_unit, membrane, bending, solver, cg_tolerance, converge;
   std::optional<std::string> load_steps, cg_iterations, every;
   std::vector<std::string> fixes;
   bool is_static = false;
 
   /// All of them: what a scene file says itself.
-  static constexpr std::array names{"--young",         "--poisson",  "--thickness",  "--density",  "--pressure",
-                                    "--fix",           "--static",   "--load-steps", "--duration", "--step",
-                                    "--ramp",          "--membrane", "--bending",    "--solver",   "--cg-tolerance",
-                                    "--cg-iterations", "--converge", "--every",      "--mesh-unit"};
+  static constexpr std::array names{"--young",         "--poisson",  "--thickness",  "--density",   "--pressure",
+                                    "--fix",           "--static",   "--load-steps", "--duration",  "--step",
+                                    "--ramp",          "--membrane", "--bending",    "--solver",    "--cg-tolerance",
+                                    "--cg-iterations", "--converge", "--every",      "--mesh-unit", "--imaged-at"};
 
   void declare(Tool& tool);
 

@@ -543,27 +543,6 @@ TEST_F(SceneTest, thicknessOfEveryVertexComesFromTheMesh) {
 INSTANTIATE_TEST_SUITE_P(all, WrongScene, ::testing::ValuesIn(wrongs),
                          [](const auto& test) { return std::string(test.param.name); });
 
-class LaterScene : public SceneTest, public ::testing::WithParamInterface<Wrong> {};
-
-TEST_P(LaterScene, saysNotAvailableYet) {
-  const Wrong& later = GetParam();
-  try {
-    (void)load(later.text);
-    FAIL() << "accepted:\n" << later.text;
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ExitCode::usage) << error.what();
-    EXPECT_THAT(error.what(), StartsWith(path().string() + later.place));
-    EXPECT_THAT(error.what(), HasSubstr("not available yet"));
-  }
-}
-
-const std::vector<Wrong> laters{
-    {"imagedAt", load_with("kind = \"pressure\"\nvalue = \"1kPa\"\nimaged_at = \"1kPa\""), ":13:1: ", ""},
-};
-
-INSTANTIATE_TEST_SUITE_P(all, LaterScene, ::testing::ValuesIn(laters),
-                         [](const auto& test) { return std::string(test.param.name); });
-
 TEST_F(SceneTest, damagedTextNeverCrashes) {
   const std::string text = scene_text(read(basic(clamped)));
   load_damaged(text, {'\0', '"', ']', '{', '\xff', '9'});

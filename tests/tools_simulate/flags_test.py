@@ -173,9 +173,6 @@ class Flags(SimulateTest):
         refused("--scene", "nosuch.toml", "out.hdf", says="nosuch.toml: no such file")
         self.write("bad.toml", "[run]\nkind = \"static\"\n[[shell]]\nname = 3\n")
         refused("--scene", "bad.toml", "out.hdf", says="bad.toml:4:8: ")
-        self.write("later.toml", "[run]\nkind = \"static\"\n[[load]]\nimaged_at = \"1kPa\"\n")
-        self.run_tool("--scene", "later.toml", "out.hdf", expect=2)
-        self.assertIn("later.toml:4:1: ", self.done.stderr)
 
     def test_mesh_without_a_unit_needs_one(self):
         vertices, triangles, _ = sphere(1, 0.01)

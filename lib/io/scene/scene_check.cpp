@@ -233,6 +233,18 @@ void refuse_later(const Scene& scene) {
       !(scene.solids.empty() && scene.rigids.empty() && scene.attachments.empty() && scene.contacts.empty())) {
     scene.accuracy->places.item.fail_later("an accuracy beside [[solid]], [[rigid]], [[attach]] or [[contact]]");
   }
+  for (const SceneLoad& load : scene.loads) {
+    const auto* pressure = std::get_if<PressureLoad>(&load.kind);
+    if (pressure == nullptr || !pressure->imaged_at) {
+      continue;
+    }
+    if (scene.accuracy) {
+      load.places.of("imaged_at").fail_later("imaged_at and an accuracy in one run");
+    }
+    if (!(scene.solids.empty() && scene.rigids.empty() && scene.attachments.empty() && scene.contacts.empty())) {
+      load.places.of("imaged_at").fail_later("imaged_at beside [[solid]], [[rigid]], [[attach]] or [[contact]]");
+    }
+  }
 }
 
 }  // namespace

@@ -277,9 +277,8 @@ void read_fix(const SceneTable& table, bool dynamic, Scene& scene) {
 }
 
 void read_load(const toml::table& node, const std::string& file, bool dynamic, Scene& scene) {
-  constexpr std::array<std::string_view, 6> all{"body", "kind", "value", "follower", "ramp", "where"};
-  constexpr std::array<std::string_view, 1> later{"imaged_at"};
-  const SceneTable table(node, file, "[[load]]", all, later);
+  constexpr std::array<std::string_view, 7> all{"body", "kind", "value", "follower", "ramp", "where", "imaged_at"};
+  const SceneTable table(node, file, "[[load]]", all);
   SceneLoad load;
   load.places = table.places();
   load.body = table.text("body");
@@ -293,8 +292,10 @@ void read_load(const toml::table& node, const std::string& file, bool dynamic, S
                       {"edge", Kind::edge},
                       {"area", Kind::area},
                       {"gravity", Kind::gravity}});
-  if (kind != Kind::pressure && table.has("follower")) {
-    table.place("follower").fail("follower belongs to a pressure: remove it");
+  for (const char* key : {"follower", "imaged_at"}) {
+    if (kind != Kind::pressure && table.has(key)) {
+      table.place(key).fail(fmt::format("{} belongs to a pressure: remove it", key));
+    }
   }
   if (kind == Kind::force || kind == Kind::moment || kind == Kind::edge) {
     (void)table.required("where", " (which nodes carry the load)");
@@ -308,8 +309,9 @@ void read_load(const toml::table& node, const std::string& file, bool dynamic, S
   }
   switch (kind) {
     case Kind::pressure:
-      load.kind =
-          PressureLoad{table.quantity("value", dimension::pressure), !table.has("follower") || table.flag("follower")};
+      load.kind = PressureLoad{
+          table.quantity("value", dimension::pressure), !table.has("follower") || table.flag("follower"),
+          table.has("imaged_at") ? std::optional(table.quantity("imaged_at", dimension::pressure)) : std::nullopt};
       break;
     case Kind::force:
       load.kind = ForceLoad{{}, table.vector("value", dimension::force, R"(["0N", "0N", "-1N"])")};

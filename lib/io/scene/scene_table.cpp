@@ -9,14 +9,11 @@
 
 namespace tunica {
 
-SceneTable::SceneTable(const toml::table& table, const std::string& file, std::string name, Keys known, Keys later)
+SceneTable::SceneTable(const toml::table& table, const std::string& file, std::string name, Keys known)
     : table_(table), file_(file), name_(std::move(name)) {
   for (const auto& [key, value] : table) {
     const Place place = at(key.source());
     places_.keys.emplace(std::string(key.str()), at(value.source()));
-    if (std::find(later.begin(), later.end(), key.str()) != later.end()) {
-      throw UsageError(fmt::format("{}: {} in {}: not available yet", place.text, key.str(), name_));
-    }
     if (std::find(known.begin(), known.end(), key.str()) == known.end()) {
       place.fail(fmt::format("unknown key '{}' in {}: {}", key.str(), name_, suggestion(key.str(), known)));
     }

@@ -371,6 +371,9 @@ void write_kind(const PressureLoad& load, Text& text) {
   text.word("kind", "pressure");
   text.value("value", load.value, "Pa", dimension::pressure);
   text.line("follower", load.follower ? "true" : "false");
+  if (load.imaged_at) {
+    text.value("imaged_at", *load.imaged_at, "Pa", dimension::pressure);
+  }
 }
 void write_kind(const ForceLoad& load, Text& text) {
   text.word("kind", "force");

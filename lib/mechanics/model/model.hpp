@@ -176,6 +176,7 @@ struct RigidMotionsFix {
 struct PressureLoad {
   double value = 0;      ///< MPa
   bool follower = true;  ///< turns and grows with the surface
+  std::optional<double> imaged_at{};  ///< MPa, under which the shells were imaged
 };
 struct ForceLoad {
   std::vector<Index> nodes;

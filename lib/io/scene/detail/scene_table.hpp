@@ -16,8 +16,8 @@ using Keys = std::span<const std::string_view>;
 /// One table of a scene file, and what it may hold. What is wrong is said with its place (InputError).
 class SceneTable {
 public:
-  /// @param known  keys of this table; `later`: keys that a later version brings
-  SceneTable(const toml::table& table, const std::string& file, std::string name, Keys known, Keys later = {});
+  /// @param known  keys of this table
+  SceneTable(const toml::table& table, const std::string& file, std::string name, Keys known);
 
   [[nodiscard]] const Places& places() const { return places_; }
   [[nodiscard]] const Place& place(std::string_view key) const { return places_.of(key); }

@@ -1,0 +1,118 @@
+#!/usr/bin/python3
+"""`--imaged-at`: the shape that an organ has without the pressure under which it was imaged."""
+import math
+import unittest
+
+import numpy as np
+from published import fix, grid, load, run_lines, shell
+from support import SimulateTest, sphere, write_ply
+
+YOUNG, POISSON = 1.0, 0.3  # MPa
+WALL = ("--young", "1MPa", "--poisson", "0.3", "--static")
+
+
+def read_shells(path):
+    """Vertices (n x 3) and normals of a binary PLY as the tools write it."""
+    with open(path, "rb") as file:
+        header, body = file.read().split(b"end_header\n", 1)
+    lines = header.decode().splitlines()
+    count = next(int(line.split()[2]) for line in lines if line.startswith("element vertex"))
+    return np.frombuffer(body, "<f8", 6 * count).reshape(-1, 6)
+
+
+class Unloaded(SimulateTest):
+    def imaged(self, mesh, pressure, *more, expect=0):
+        return self.run_tool(mesh, "out.hdf", *WALL, "--pressure", f"{pressure!r}MPa", "--imaged-at", f"{pressure!r}MPa",
+                             "--force", *more, expect=expect)
+
+    def test_a_sphere_shrinks_by_its_formula(self):
+        """p R0 / (E t) = 2 / (1 - nu) e / (1 + e)^2, R = (1 + e) R0: a linear law in engineering strains. By a third, too."""
+        radius, thickness = 10, 0.2
+        for part, splits in ((0.02, 2), (0.25, 3)):
+            with self.subTest(part):
+                write_ply(self.path("image.ply"), *sphere(splits, radius))
+                pressure = part * 2 * YOUNG * thickness / (radius * (1 - POISSON))
+                report = self.imaged("image.ply", pressure, "--thickness", "0.2mm", "--fix", "rigid-motions")["result"]
+                unloaded = (3 / (4 * math.pi) * report["unloaded"]["volume_mm3"])**(1 / 3)
+                self.assertAlmostEqual(unloaded / (radius * (1 - part)), 1, delta=1e-3)
+                self.assertAlmostEqual(report["volume_after_mm3"] / (4 / 3 * math.pi * radius**3), 1, delta=3e-3)
+                self.assertLess(report["unloaded"]["distance_mm"]["mean"], 1e-3 * part * radius)
+
+    def test_a_tube_shrinks_by_its_formula(self):
+        """Plane strain: R / R0 - 1 = p R (1 - nu^2) / (E t). A quarter; nothing moves along the axis."""
+        radius, thickness, strain = 10.0, 0.2, 0.1
+        points, triangles, normals = grid(
+            16, 2, lambda u, v: (radius * np.cos(math.pi / 2 * u), radius * np.sin(math.pi / 2 * u), 3 * v),
+            lambda p, u, v: (p[:, 0], p[:, 1], 0 * u))
+        write_ply(self.path("tube.ply"), points, triangles, normals)
+        pressure = strain * YOUNG * thickness / (radius * (1 - POISSON**2))
+        scene = (run_lines(kind="static") + shell("tube.ply", thickness, YOUNG, POISSON) +
+                 fix(range(len(points)), "z", "xy") + fix(np.flatnonzero(points[:, 1] < 1e-9), "y", "xz") +
+                 fix(np.flatnonzero(points[:, 0] < 1e-9), "x", "yz") +
+                 load("pressure", f"{pressure!r}MPa", more=f'imaged_at = "{pressure!r}MPa"\n'))
+        self.write("scene.toml", scene)
+        self.run_tool("--scene", "scene.toml", "out.hdf", "--unloaded", "unloaded.ply")
+        found = np.hypot(*read_shells(self.path("unloaded.ply")).T[:2])
+        np.testing.assert_allclose(found, radius / (1 + strain), rtol=1e-3)
+
+    def test_a_loaded_shape_goes_back_to_where_it_came_from(self):
+        """An ellipsoid, loaded, taken for the image: nodes and normals come back, and the volume under twice the pressure is that
+        of the known shape under it."""
+        points, triangles, normals = sphere(2, 1)
+        axes = np.array([12.0, 9.0, 7.0])
+        normals = normals / axes
+        normals /= np.linalg.norm(normals, axis=1)[:, None]
+        write_ply(self.path("known.ply"), points * axes, triangles, normals)
+        thin = ("--thickness", "0.5mm", "--fix", "rigid-motions")
+        double = self.run_tool("known.ply", "out.hdf", *WALL, "--pressure", "8kPa", *thin, "--force")["result"]
+        self.run_tool("known.ply", "known.hdf", *WALL, "--pressure", "4kPa", *thin)
+        import h5py  # noqa: PLC0415: of this test alone
+        with h5py.File(self.path("known.hdf")) as file:
+            moved = file["VTKHDF/PointData"]["displacement"]
+            self.assertGreater(np.abs(moved).max(), 0.1)
+            nodes = file["tunica/nodes"]
+            displacement, rotation = (nodes[key][-1] for key in ("displacement", "rotation"))
+        angle = np.linalg.norm(rotation, axis=1, keepdims=True)
+        axis = rotation / np.maximum(angle, 1e-300)
+        turned = (normals * np.cos(angle) + np.cross(axis, normals) * np.sin(angle) +
+                  axis * (axis * normals).sum(axis=1, keepdims=True) * (1 - np.cos(angle)))
+        write_ply(self.path("image.ply"), points * axes + displacement, triangles, turned)
+        report = self.run_tool("image.ply", "out.hdf", *WALL, "--pressure", "8kPa", "--imaged-at", "4kPa", *thin,
+                               "--unloaded", "back.ply", "--force")["result"]
+        back = read_shells(self.path("back.ply"))
+        largest = np.linalg.norm(displacement, axis=1).max()
+        self.assertLess(np.linalg.norm(back[:, :3] - points * axes, axis=1).max(), 5e-3 * largest)
+        self.assertLess(np.linalg.norm(back[:, 3:] - normals, axis=1).max(), 5e-3)
+        self.assertAlmostEqual(report["volume_after_mm3"] / double["volume_after_mm3"], 1, delta=1e-3)
+
+    def test_beyond_the_limit_load_there_is_none(self):
+        write_ply(self.path("image.ply"), *sphere(1, 10))
+        pressure = 0.6 * 2 * YOUNG * 0.2 / (10 * (1 - POISSON))  # a sphere has no more than .5
+        self.imaged("image.ply", pressure, "--thickness", "0.2mm", "--fix", "rigid-motions", expect=4)
+        self.assertIn("no unloaded shape was found", self.done.stderr)
+        self.assertIn("times the pressure imaged_at: ", self.done.stderr)
+
+    def test_a_wall_that_buckles_on_the_way_is_refused(self):
+        """Under an outer pressure well above the classical one."""
+        write_ply(self.path("image.ply"), *sphere(2, 10))
+        classical = 2 * YOUNG / math.sqrt(3 * (1 - POISSON**2)) * (0.1 / 10)**2
+        self.imaged("image.ply", -4 * classical, "--thickness", "0.1mm", "--fix", "rigid-motions", expect=4)
+        self.assertIn("no unloaded shape was found", self.done.stderr)
+
+    def test_misuse(self):
+        write_ply(self.path("image.ply"), *sphere(1, 10))
+        held = ("--thickness", "0.2mm", "--fix", "rigid-motions", "--pressure", "1kPa")
+        self.run_tool("image.ply", "out.hdf", *WALL, *held, "--unloaded", "u.ply", expect=2)
+        self.assertIn("--unloaded belongs to --imaged-at", self.done.stderr)
+        self.run_tool("image.ply", "out.hdf", *WALL, *held, "--imaged-at", "5", expect=2)
+        self.run_tool("image.ply", "out.hdf", *WALL, *held, "--imaged-at", "1kPa", "--accuracy", "5%", "--target", "image.ply",
+                      expect=2)
+        self.assertIn("imaged_at and an accuracy", self.done.stderr)
+        self.write("scene.toml", run_lines(kind="static") + shell("image.ply", 0.2, YOUNG, POISSON) +
+                   load("gravity", [0.0, 0.0, -1.0], "m/s2", more='imaged_at = "1kPa"\n'))
+        self.run_tool("--scene", "scene.toml", "out.hdf", expect=3)
+        self.assertIn("imaged_at belongs to a pressure", self.done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
