@@ -9,6 +9,7 @@
 #include "tunica/io/mesh/mesh_pair.hpp"
 #include "tunica/shell/distance/boundary_distance.hpp"
 #include "tunica/shell/distance/mean_bound.hpp"
+#include "tunica/shell/distance/mid_surface.hpp"
 #include "tunica/shell/distance/shell_crossings.hpp"
 #include "tunica/shell/distance/shell_quality.hpp"
 #include "tunica/shell/patch/curved_surface.hpp"
@@ -19,6 +20,7 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cmath>
 #include <tuple>
 #include <utility>
@@ -46,6 +48,8 @@ struct Arguments {
   std::optional<std::string> tolerance_text;
   std::optional<LengthTolerance> tolerance;
   std::optional<double> thickness, mean;  ///< mm; of the distance, where it is asked for as a part of the wall
+  std::optional<std::string> mid_surface;
+  std::optional<fs::path> other_face;
   std::string method = "fit";
   std::optional<std::string> surface;
   std::optional<std::string> mesh_unit;
@@ -66,7 +70,16 @@ void declare(cli::Tool& tool, Arguments& given) {
          "stop when the two-sided distance is certainly below it, e.g. 0.5% of the target's diagonal or 0.2mm, or "
          "when its mean is certainly below a part of the wall, e.g. 5%t; exit code 4 when it cannot be reached")
       ->type_name("TOLERANCE");
-  tool.quantity("--thickness", given.thickness, dimension::length, "of the wall, for a --tolerance such as 5%t");
+  tool.quantity("--thickness", given.thickness, dimension::length,
+                "of the wall, for a --tolerance such as 5%t, and for --mid-surface");
+  tool.group("Wall");
+  app.add_option("--mid-surface", given.mid_surface,
+                 "TARGET is the outer or the inner face of the wall: the shells end up in its middle, half of the "
+                 "--thickness away, or half way to --other-face")
+      ->check(CLI::IsMember({"inner", "outer"}));
+  app.add_option("--other-face", given.other_face,
+                 "the wall's other face: the thickness is measured, and written as the vertices' property thickness")
+      ->type_name("SURFACE");
   tool.group("Method");
   app.add_option(
          "--method", given.method,
@@ -111,8 +124,11 @@ void declare(cli::Tool& tool, Arguments& given) {
 void understand_tolerance(Arguments& given) {
   std::string_view text = given.tolerance_text ? std::string_view(*given.tolerance_text) : std::string_view();
   const bool of_wall = text.ends_with('t');
-  if (given.thickness && !of_wall) {
-    throw UsageError("--thickness belongs to a --tolerance in parts of the wall, for example 5%t");
+  if (given.thickness && !of_wall && !given.mid_surface) {
+    throw UsageError("--thickness belongs to a --tolerance in parts of the wall, for example 5%t, or to --mid-surface");
+  }
+  if (given.thickness && !(*given.thickness > 0)) {
+    throw UsageError("--thickness must be greater than zero");
   }
   if (!given.tolerance_text) {
     return;
@@ -127,8 +143,8 @@ void understand_tolerance(Arguments& given) {
     if (!given.thickness) {
       throw UsageError("it is a part of the wall: give --thickness too, for example --thickness 1.5mm");
     }
-    if (!(part > 0 && *given.thickness > 0)) {
-      throw UsageError("tolerance and thickness must be greater than zero");
+    if (!(part > 0)) {
+      throw UsageError("must be greater than zero");
     }
     given.mean = part * *given.thickness;
     given.tolerance = LengthTolerance{farthest_by_mean * *given.mean, false};
@@ -138,6 +154,12 @@ void understand_tolerance(Arguments& given) {
 }
 
 void refuse_contradictions(const Arguments& given) {
+  if (given.other_face && !given.mid_surface) {
+    throw UsageError("--other-face belongs to --mid-surface: say which face TARGET is");
+  }
+  if (given.mid_surface && !given.other_face && !given.thickness) {
+    throw UsageError("--mid-surface needs the wall's thickness: give --thickness, for example 1.5mm, or --other-face");
+  }
   const bool fit = given.method == "fit";
   if (given.shells && !fit) {
     throw UsageError(
@@ -289,6 +311,18 @@ void write_maps(cli::Tool& tool, const Arguments& given, const ShellMesh& shell,
   }
 }
 
+/// Says which file a refused mid-surface belongs to.
+template <typename Work>
+auto naming(const fs::path& file, const Work& work) {
+  try {
+    return work();
+  } catch (const InputError& error) {
+    throw InputError(fmt::format("{}: {}", file.string(), error.what()));
+  } catch (const RequirementError& error) {
+    throw RequirementError(fmt::format("{}: {}", file.string(), error.what()));
+  }
+}
+
 /// One run: read, relax, measure, write.
 class Run {
 public:
@@ -327,6 +361,14 @@ private:
     require_same_scale(start.file, given_.coarse, surface.file, given_.target, unit_mm);
     require_near(start.file, given_.coarse, surface.file, given_.target);
     ply_ = ply_options(tool_, common_space(start.file, given_.coarse, surface.file, given_.target));
+    if (given_.other_face) {
+      tool_.input(*given_.other_face);
+      Surface other = read_surface(tool_, *given_.other_face, unit_mm);
+      require_same_scale(surface.file, given_.target, other.file, *given_.other_face, unit_mm);
+      require_near(surface.file, given_.target, other.file, *given_.other_face);
+      common_space(surface.file, given_.target, other.file, *given_.other_face);
+      other_.emplace(std::move(other.file.mesh));
+    }
     coarse_ = std::move(start.file.mesh);
     target_.emplace(std::move(surface.file.mesh));
     if (surface.with_spikes) {
@@ -530,15 +572,43 @@ private:
     require_fit(relaxed_.shell, out);
   }
 
+  /// The shells as they are written: those on the target, or half of the wall away.
+  MidSurface written_shell() {
+    if (!given_.mid_surface) {
+      return {relaxed_.shell, {}};
+    }
+    const WallFace which = given_.mid_surface == "outer" ? WallFace::outer : WallFace::inner;
+    Json& said = tool_.result()["mid_surface"];
+    MidSurface middle;
+    if (other_) {
+      middle = naming(*given_.other_face, [&] { return mid_surface_between(relaxed_.shell, which, *other_); });
+      said["error_mm"] = nullptr;
+    } else {
+      middle = naming(given_.out, [&] { return mid_surface(relaxed_.shell, which, *given_.thickness); });
+      const auto [mean, largest] = half_wall_error(middle.shell, whole(), *given_.thickness);
+      said["error_mm"] = {{"mean", mean}, {"max", largest}};
+    }
+    const auto [thinnest, thickest] = std::minmax_element(middle.thickness.begin(), middle.thickness.end());
+    said["target"] = *given_.mid_surface;
+    said["thickness_mm"] = {{"min", *thinnest}, {"max", *thickest}};
+    const std::size_t crossings = crossing_patches(middle.shell).size();
+    tool_.result()["self_intersections"] = crossings;
+    if (crossings > 0) {
+      tool_.warn(fmt::format("{} pair(s) of curved shells cross in the middle of the wall", crossings));
+    }
+    return middle;
+  }
+
   void write() {
     const auto stage = tool_.stage("write");
     require_what_was_asked();
+    const auto [shell, thickness] = written_shell();
     std::vector<fs::path> written;
     try {
-      write_ply(given_.out, relaxed_.shell, ply_);
+      write_ply(given_.out, shell, given_.other_face ? thickness : std::vector<double>(), ply_);
       written.push_back(given_.out);
       if (given_.curved) {
-        write_ply(*given_.curved, tessellate(relaxed_.shell, curved_deviation * whole().diagonal()).mesh, ply_);
+        write_ply(*given_.curved, tessellate(shell, curved_deviation * whole().diagonal()).mesh, ply_);
         written.push_back(*given_.curved);
       }
       if (given_.map || given_.picture) {
@@ -560,7 +630,8 @@ private:
   std::optional<double> min_angle_;  // degrees
   TriangleMesh coarse_;
   std::optional<Target> target_, with_spikes_;
-  double moved_ = 0;  // of the target, mm: by taking its spikes
+  std::optional<Target> other_;  // the wall's other face
+  double moved_ = 0;             // of the target, mm: by taking its spikes
   PlyOptions ply_;
   std::optional<double> tolerance_;   // mm
   double mean_ = 0;                   // mm, of the distance, where that is asked for

@@ -595,6 +595,71 @@ class Fit(Case):
         self.assertLessEqual(record["result"]["shells"], fewest)
 
 
+class MidSurface(Case):
+    def setUp(self):
+        super().setUp()
+        self.ball, self.out = self.path("ball.ply"), self.path("out.ply")
+        write_ply(self.ball, *sphere(4, 10.0))
+
+    def points(self):
+        return columns(read_ply(self.out)[0], "xyz")
+
+    def test_of_a_sphere_is_a_sphere_half_a_wall_away(self):
+        for face, radius in (("outer", 9.0), ("inner", 11.0)):
+            with self.subTest(face):
+                record, _ = self.relax(self.ball, self.ball, self.out, "--shells", 300, "--mid-surface", face, "--thickness",
+                                       "2mm", "--force")
+                result = record["result"]["mid_surface"]
+                self.assertEqual(result["thickness_mm"], {"min": 2, "max": 2})
+                self.assertLess(result["error_mm"]["max"], 0.02)
+                np.testing.assert_allclose(np.linalg.norm(self.points(), axis=1), radius, atol=0.01)
+
+    def test_of_a_box_has_its_edges_where_the_middles_of_its_sides_meet(self):
+        corners = np.array([(x, y, z) for x in (0, 8) for y in (0, 6) for z in (0, 4)], float)
+        sides = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+        box = self.path("box.ply")
+        write_ply(box, corners, [t for a, b, c, d in sides for t in ((a, b, c), (a, c, d))])
+        self.relax(box, box, self.out, "--refine", "--tolerance", "0.1%", "--mid-surface", "outer", "--thickness", "1mm")
+        points = self.points()
+        np.testing.assert_allclose([points.min(axis=0), points.max(axis=0)], [(0.5, 0.5, 0.5), (7.5, 5.5, 3.5)], atol=1e-6)
+
+    def test_between_two_faces_measures_the_thickness(self):
+        inner = self.path("inner.ply")
+        points, triangles = sphere(4, 8.0)
+        write_ply(inner, points + [0.5, 0, 0], triangles)
+        record, _ = self.relax(self.ball, self.ball, self.out, "--shells", 300, "--mid-surface", "outer", "--other-face", inner)
+        thickness = record["result"]["mid_surface"]["thickness_mm"]
+        self.assertAlmostEqual(thickness["min"], 1.5, delta=0.02)
+        self.assertAlmostEqual(thickness["max"], 2.5, delta=0.02)
+        with open(self.out, "rb") as file:
+            self.assertIn(b"property double thickness\n", file.read(2000))
+        scene = ('[run]\nkind = "static"\n[[shell]]\nname = "s"\nmesh = "out.ply"\nthickness_from = "thickness"\n'
+                 'young = "1MPa"\npoisson = 0.3\n[[fix]]\nbody = "s"\nwhere = {rigid_motions = true}\n'
+                 '[[load]]\nbody = "s"\nkind = "pressure"\nvalue = "1kPa"\n')
+        with open(self.path("scene.toml"), "w", encoding="utf-8") as file:
+            file.write(scene)
+        subprocess.run([os.path.join(BIN, "tunica-simulate"), "--scene", self.path("scene.toml"), self.path("out.hdf"), "--quiet"],
+                       check=True)
+        _, error = self.relax(self.ball, self.ball, self.out, "--shells", 300, "--mid-surface", "inner", "--other-face", inner,
+                              "--force", expect=3)
+        self.assertIn("the wall's other face lies inside the target", error)
+
+    def test_a_wall_thicker_than_its_radius_is_refused(self):
+        _, error = self.relax(self.ball, self.ball, self.out, "--shells", 300, "--mid-surface", "outer", "--thickness", "21mm",
+                              expect=4)
+        self.assertIn("the middle of the wall folds at", error)
+        self.assertFalse(os.path.exists(self.out))
+
+    def test_misuse(self):
+        for arguments, says in ((("--mid-surface", "outer"), "needs the wall's thickness"),
+                                (("--mid-surface", "middle", "--thickness", "1mm"), "middle"),
+                                (("--mid-surface", "outer", "--thickness", "0mm"), "greater than zero"),
+                                (("--mid-surface", "outer", "--thickness", "1"), "has no unit"),
+                                (("--other-face", self.ball), "belongs to --mid-surface")):
+            _, error = self.relax(self.ball, self.ball, self.out, "--shells", 300, *arguments, expect=2)
+            self.assertIn(says, error)
+
+
 class Patch(Case):
     def test_the_file_alone_gives_the_curved_surface(self):
         vertices, triangles = sphere(3)

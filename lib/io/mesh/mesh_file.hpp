@@ -59,6 +59,9 @@ struct PlyOptions {
 /// Binary little-endian PLY, double x y z, int indices. Errors: OutputError.
 void write_ply(const std::filesystem::path& path, const TriangleMesh& mesh, const PlyOptions& options);
 void write_ply(const std::filesystem::path& path, const ShellMesh& shell, const PlyOptions& options);
+/// With a per-vertex `thickness` (double, mm); none where that is empty.
+void write_ply(const std::filesystem::path& path, const ShellMesh& shell, const std::vector<double>& thickness,
+               const PlyOptions& options);
 /// With a per-vertex `quality` (double).
 void write_ply(const std::filesystem::path& path, const TriangleMesh& mesh, const std::vector<double>& quality,
                const PlyOptions& options);

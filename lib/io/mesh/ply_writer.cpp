@@ -79,7 +79,8 @@ struct Content {
   const std::vector<std::array<Index, 3>>& triangles;
   const std::vector<Vec3>* normals = nullptr;
   const std::vector<std::array<Vec3, 3>>* corner_normals = nullptr;
-  const std::vector<double>* quality = nullptr;
+  const char* property = nullptr;  ///< of the vertices
+  const std::vector<double>* values = nullptr;
   std::optional<Patch> patch = {};
 };
 
@@ -110,8 +111,8 @@ std::string ply_header(const Content& content, const PlyOptions& options) {
   if (content.normals != nullptr) {
     header += "property double nx\nproperty double ny\nproperty double nz\n";
   }
-  if (content.quality != nullptr) {
-    header += "property double quality\n";
+  if (content.property != nullptr) {
+    header += fmt::format("property double {}\n", content.property);
   }
   header += fmt::format("element face {}\nproperty list uchar int vertex_indices\n", content.triangles.size());
   if (content.corner_normals != nullptr) {
@@ -123,7 +124,7 @@ std::string ply_header(const Content& content, const PlyOptions& options) {
 void write(const std::filesystem::path& path, const Content& content, const PlyOptions& options) {
   TUNICA_ASSERT(content.vertices.size() <= max_index && content.triangles.size() <= max_index);
   TUNICA_ASSERT(content.normals == nullptr || content.normals->size() == content.vertices.size());
-  TUNICA_ASSERT(content.quality == nullptr || content.quality->size() == content.vertices.size());
+  TUNICA_ASSERT(content.values == nullptr || content.values->size() == content.vertices.size());
   TUNICA_ASSERT(content.corner_normals == nullptr || content.corner_normals->size() == content.triangles.size());
   OutputFile output(path, options.overwrite);
   Writer writer(output.partial_path());
@@ -133,8 +134,8 @@ void write(const std::filesystem::path& path, const Content& content, const PlyO
     if (content.normals != nullptr) {
       writer.vector((*content.normals)[v]);
     }
-    if (content.quality != nullptr) {
-      writer.number((*content.quality)[v]);
+    if (content.values != nullptr) {
+      writer.number((*content.values)[v]);
     }
   }
   for (std::size_t t = 0; t < content.triangles.size(); ++t) {
@@ -164,18 +165,26 @@ void write_ply(const std::filesystem::path& path, const TriangleMesh& mesh, cons
 }
 
 void write_ply(const std::filesystem::path& path, const ShellMesh& shell, const PlyOptions& options) {
+  write_ply(path, shell, {}, options);
+}
+
+void write_ply(const std::filesystem::path& path, const ShellMesh& shell, const std::vector<double>& thickness,
+               const PlyOptions& options) {
   write(path,
         {.vertices = shell.vertices,
          .triangles = shell.triangles,
          .normals = &shell.normals,
          .corner_normals = shell.corner_normals.empty() ? nullptr : &shell.corner_normals,
+         .property = thickness.empty() ? nullptr : "thickness",
+         .values = thickness.empty() ? nullptr : &thickness,
          .patch = shell.patch},
         options);
 }
 
 void write_ply(const std::filesystem::path& path, const TriangleMesh& mesh, const std::vector<double>& quality,
                const PlyOptions& options) {
-  write(path, {.vertices = mesh.vertices, .triangles = mesh.triangles, .quality = &quality}, options);
+  write(path, {.vertices = mesh.vertices, .triangles = mesh.triangles, .property = "quality", .values = &quality},
+        options);
 }
 
 }  // namespace tunica

@@ -1,0 +1,125 @@
+#include "tunica/shell/distance/mid_surface.hpp"
+
+#include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
+#include "tunica/shell/patch/curved_surface.hpp"
+#include "tunica/surface/mesh/measure.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+
+#include <algorithm>
+#include <cmath>
+
+namespace tunica {
+namespace {
+
+constexpr int pieces_per_edge = 4;  // where distances are sampled
+
+/// The normals that a vertex has in its triangles; one where they agree.
+std::vector<std::vector<Vec3>> normals_at_vertices(const ShellMesh& mesh) {
+  std::vector<std::vector<Vec3>> normals(mesh.vertices.size());
+  if (mesh.corner_normals.empty()) {
+    for (std::size_t v = 0; v < normals.size(); ++v) {
+      normals[v].push_back(mesh.normals[v]);
+    }
+    return normals;
+  }
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      auto& at = normals[mesh.triangles[t][k]];
+      const Vec3& n = mesh.corner_normals[t][k];
+      if (std::none_of(at.begin(), at.end(), [&](const Vec3& known) { return (known - n).norm() < 1e-9; })) {
+        at.push_back(n);
+      }
+    }
+  }
+  return normals;
+}
+
+/// The shortest way that leads as far along each normal, by least squares.
+Vec3 offset_along(const std::vector<Vec3>& normals, double distance) {
+  Eigen::MatrixXd rows(narrow<Eigen::Index>(normals.size()), 3);
+  for (std::size_t k = 0; k < normals.size(); ++k) {
+    rows.row(narrow<Eigen::Index>(k)) = normals[k].transpose();
+  }
+  return rows.completeOrthogonalDecomposition().solve(Eigen::VectorXd::Constant(rows.rows(), distance));
+}
+
+void require_unturned(const ShellMesh& before, const ShellMesh& after) {
+  for (std::size_t t = 0; t < before.triangles.size(); ++t) {
+    const auto across = [&](const ShellMesh& mesh) {
+      const auto& v = mesh.triangles[t];
+      return Vec3((mesh.vertices[v[1]] - mesh.vertices[v[0]]).cross(mesh.vertices[v[2]] - mesh.vertices[v[0]]));
+    };
+    if (!(across(before).dot(across(after)) > 0)) {
+      const Vec3& at = before.vertices[before.triangles[t][0]];
+      throw RequirementError(fmt::format(
+          "the middle of the wall folds at ({:.4g}, {:.4g}, {:.4g}) mm: half of the wall is thicker than the "
+          "face's radius of curvature there; take a smaller thickness, or fewer shells",
+          at.x(), at.y(), at.z()));
+    }
+  }
+}
+
+}  // namespace
+
+MidSurface mid_surface(const ShellMesh& face, WallFace which, double thickness) {
+  MidSurface middle{face, std::vector<double>(face.vertices.size(), thickness)};
+  const auto normals = normals_at_vertices(face);
+  const double distance = which == WallFace::outer ? -thickness / 2 : thickness / 2;
+  for (std::size_t v = 0; v < normals.size(); ++v) {
+    middle.shell.vertices[v] += offset_along(normals[v], distance);
+  }
+  require_unturned(face, middle.shell);
+  return middle;
+}
+
+MidSurface mid_surface_between(const ShellMesh& face, WallFace which, const Target& other) {
+  MidSurface middle{face, {}};
+  const std::vector<Vec3> its_normals = vertex_normals(other.mesh());
+  const auto facets = facet_normals(other.mesh());
+  double inwards = 0;
+  for (std::size_t v = 0; v < face.vertices.size(); ++v) {
+    const ClosestPoint::Hit hit = other.tree().closest(face.vertices[v]);
+    const Vec3 way = hit.point - face.vertices[v];
+    middle.thickness.push_back(way.norm());
+    middle.shell.vertices[v] += way / 2;
+    inwards -= way.dot(face.normals[v]);
+    const auto& corners = other.mesh().triangles[hit.triangle];
+    const Vec3 b = barycentric(hit.point, other.mesh().vertices[corners[0]], other.mesh().vertices[corners[1]],
+                               other.mesh().vertices[corners[2]]);
+    const Vec3 there = b[0] * its_normals[corners[0]] + b[1] * its_normals[corners[1]] + b[2] * its_normals[corners[2]];
+    const Vec3 mean = face.normals[v] + (there.norm() > 0 ? Vec3(there.normalized()) : facets[hit.triangle]);
+    if (mean.norm() > 0) {
+      middle.shell.normals[v] = mean.normalized();
+    }
+  }
+  if ((inwards > 0) != (which == WallFace::outer)) {
+    throw InputError(fmt::format("the wall's other face lies {} the target, which is said to be its {} face",
+                                 inwards > 0 ? "inside" : "outside", which == WallFace::outer ? "outer" : "inner"));
+  }
+  require_unturned(face, middle.shell);
+  return middle;
+}
+
+std::array<double, 2> half_wall_error(const ShellMesh& shell, const Target& face, double thickness) {
+  const Tessellation fine = tessellate_uniformly(shell, pieces_per_edge);
+  const std::vector<Vec3>& x = fine.mesh.vertices;
+  std::vector<double> off(x.size());
+  double largest = 0;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    off[i] = std::abs(std::sqrt(face.tree().closest(x[i]).squared_distance) - thickness / 2);
+    largest = std::max(largest, off[i]);
+  }
+  double sum = 0, whole = 0;
+  for (const auto& v : fine.mesh.triangles) {
+    const double area = triangle_area(x[v[0]], x[v[1]], x[v[2]]);
+    whole += area;
+    sum += area * (off[v[0]] + off[v[1]] + off[v[2]]) / 3;
+  }
+  return {whole > 0 ? sum / whole : 0, largest};
+}
+
+}  // namespace tunica
