@@ -114,7 +114,8 @@ bool ContactSystem::passes_rigid(const Group& group, const PatchMap& a0, const P
     // Distances change no faster than what moves.
     double motion = 0;
     for (int k = 0; k < (face.curved ? 9 : 3); ++k) {
-      motion = std::max(motion, (m1.points().col(k) - s1.carried(m0.points().col(k), s0)).norm());
+      const Vec3 before = m0.points().col(k);
+      motion = std::max(motion, (m1.points().col(k) - s1.carried(before, s0)).norm() + s1.detour_since(s0, before));
     }
     motion += s1.growth_since(s0);
     return s0.at(c0).distance + s1.at(c1).distance - 2 * reach > motion;

@@ -269,8 +269,8 @@ void ContactSystem::record(const Group& group, const Sample& sample, const Patch
   recorded_->pressing[group.contact].push_back(
       {press.law, group.weight * sample.share * map.point(along[0]).cross(map.point(along[1])).norm()});
   ++result.points;
-  if (press.slip.norm() > group.elastic_slip) {
-    result.slip = std::max(result.slip, press.slip.norm() - group.elastic_slip);
+  if (contact.friction > 0) {
+    result.slip = std::max(result.slip, sample.slipped + std::max(0.0, press.slip.norm() - group.elastic_slip));
   }
   if (group.other.rigid) {
     on_rigids_[group.other.index].force -= force;
@@ -374,6 +374,7 @@ bool ContactSystem::add(const Configuration& configuration, VectorX& external, B
   largest_pressure_.assign(contacts_.size(), 0);
   slides_ = false;
   smallest_gap_.assign(contacts_.size(), infinity);
+  closest_ = {};
   for (std::size_t g = 0; g < groups_.size(); ++g) {
     Group& group = groups_[g];
     Acting acting;
@@ -383,6 +384,9 @@ bool ContactSystem::add(const Configuration& configuration, VectorX& external, B
       sample.active = sample.active && tangent == nullptr;
       if (t.gap >= group.resolution) {
         continue;
+      }
+      if (t.gap < closest_.gap) {
+        closest_ = {t.gap, group.contact, maps[group.face].point(sample.weights)};
       }
       if (t.gap < -deepest(group, t.face)) {
         return false;

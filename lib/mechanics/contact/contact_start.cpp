@@ -55,7 +55,8 @@ void ContactSystem::require_apart(const Model& model) {
   for (std::size_t g = 0; g < groups_.size(); ++g) {
     const Group& group = groups_[g];
     const SurfaceFace& face = surfaces_.faces[group.face];
-    const bool in_solid = !group.other.rigid && model.is_solid(group.other.index) && group.other.index != face.body;
+    const bool in_solid = !group.other.rigid && model.is_solid(group.other.index) && group.other.index != face.body &&
+                          !is_carried(face, group.other.index);
     if (in_solid) {
       const auto& [distance, box] = solid(group.other.index);
       for (std::size_t i = 0; box.meets(maps.bounds(group.face), face.half_thickness) && i < group.samples.size();

@@ -1,6 +1,8 @@
 #include "tunica/core/error.hpp"
 #include "tunica/mechanics/contact/detail/contact_parts.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <set>
@@ -28,13 +30,21 @@ constexpr double own_distance = 0.9;
 
 }  // namespace
 
-ContactSystem::ContactSystem(const Model& model, Surfaces surfaces, std::vector<Vec3> reference)
+ContactSystem::ContactSystem(const Model& model, Surfaces surfaces, std::vector<Vec3> reference,
+                             const std::vector<Carried>& carried)
     : surfaces_(std::move(surfaces)),
       reference_(std::move(reference)),
       contacts_(model.contacts),
       rest_(Configuration::at_rest(reference_.size())) {
   for (const RigidBody& body : model.rigids) {
     shapes_.emplace_back(body);
+  }
+  for (const Carried& c : carried) {
+    std::size_t body = 0;
+    while (body + 1 < model.body_count() && model.first_node(body + 1) <= c.carriers.front()) {
+      ++body;
+    }
+    carrier_[c.node] = body;
   }
   shapes_before_ = shapes_end_ = shapes_;
   for (const Contact& contact : contacts_) {
@@ -130,6 +140,7 @@ void ContactSystem::sample(Group& group, int level) const {
       return (a.at - sample.at).squaredNorm() < (b.at - sample.at).squaredNorm();
     });
     sample.slip = nearest->slip;
+    sample.slipped = nearest->slipped;
     sample.followed = nearest->followed;
     sample.before = (*accepted_)[group.face].point(sample.weights);
   }
@@ -160,7 +171,8 @@ void ContactSystem::refine(const FaceMaps& maps) {
     // What the farthest point of a part bends away from the plane at its middle, with one piece per edge.
     double bend = face.curved ? flatness(patch_of(face, map), 1) : 0;
     if (group.other.rigid) {
-      bend += longest * longest / 6 * shapes_[group.other.index].largest_curvature();
+      // However small a body is, between samples it moves away by no more than they are apart.
+      bend += std::min(longest * longest / 6 * shapes_[group.other.index].largest_curvature(), longest);
     } else {
       bend *= 2;
     }
@@ -235,7 +247,15 @@ bool ContactSystem::excluded(const Group& group, std::size_t other) const {
   if (std::any_of(a.begin(), a.end(), [&](Index i) { return std::find(b.begin(), b.end(), i) != b.end(); })) {
     return true;
   }
-  return surfaces_.faces[group.face].body == surfaces_.faces[other].body && offset(group, other) <= 0;
+  const SurfaceFace &own = surfaces_.faces[group.face], &its = surfaces_.faces[other];
+  return (own.body == its.body && offset(group, other) <= 0) || is_carried(own, its.body) || is_carried(its, own.body);
+}
+
+bool ContactSystem::is_carried(const SurfaceFace& face, std::size_t body) const {
+  return std::any_of(face.nodes.begin(), face.nodes.end(), [&](Index i) {
+    const auto found = carrier_.find(i);
+    return found != carrier_.end() && found->second == body;
+  });
 }
 
 std::vector<std::vector<std::size_t>> ContactSystem::near_faces(const FaceMaps& maps, double more) const {
@@ -353,6 +373,7 @@ ContactSystem::Touch ContactSystem::touch(const Group& group, const Vec3& x, con
 }
 
 void ContactSystem::set_step(double from, double to, const Configuration& configuration) {
+  stiffness_ = accepted_stiffness_;
   refine(*maps_at(configuration));
   begin_ = from;
   end_ = to;
@@ -412,6 +433,21 @@ void ContactSystem::accept(const Configuration& configuration) {
   }
   accepted_ = maps_at(configuration);
   shapes_before_ = shapes_;
+  accepted_stiffness_ = stiffness_;
+}
+
+void ContactSystem::go_back() {
+  shapes_ = shapes_before_;
+  stiffness_ = accepted_stiffness_;
+  left_ = 0;
+}
+
+std::string ContactSystem::closest_place() const {
+  if (!std::isfinite(closest_.gap)) {
+    return "";
+  }
+  return fmt::format("; in contact {} they are closest at ({:.4g}, {:.4g}, {:.4g}) mm",
+                     contacts_[closest_.contact].name, closest_.at.x(), closest_.at.y(), closest_.at.z());
 }
 
 void ContactSystem::keep_slip(const Configuration& configuration) {
@@ -428,6 +464,7 @@ void ContactSystem::keep_slip(const Configuration& configuration) {
       if (!is_close) {
         sample.followed = false;
         sample.slip.setZero();
+        sample.slipped = 0;
         continue;
       }
       const Vec3 x = maps[group.face].point(sample.weights);
@@ -435,9 +472,12 @@ void ContactSystem::keep_slip(const Configuration& configuration) {
       if (t.gap < group.resolution) {
         Vec3 slip = sample.slip + relative_motion(group, sample, t, x, maps);
         slip -= t.normal * t.normal.dot(slip);
-        sample.slip = slip * std::min(1.0, group.elastic_slip / std::max(slip.norm(), group.elastic_slip));
+        const double most = std::max(slip.norm(), group.elastic_slip);
+        sample.slipped += most - group.elastic_slip;
+        sample.slip = slip * (group.elastic_slip / most);
       } else {
         sample.slip.setZero();
+        sample.slipped = 0;
       }
       sample.before = x;
       sample.followed = true;
@@ -452,6 +492,7 @@ std::vector<double> ContactSystem::memory() const {
     for (const Sample& sample : group.samples) {
       values.push_back(sample.followed ? 1 : 0);
       values.insert(values.end(), sample.slip.begin(), sample.slip.end());
+      values.push_back(sample.slipped);
     }
   }
   return values;
@@ -463,7 +504,7 @@ void ContactSystem::recall(const std::vector<double>& memory, const Configuratio
   for (Group& group : groups_) {
     TUNICA_ASSERT(next < memory.size());
     sample(group, truncated<int>(memory[next]));
-    next += 1 + 4 * group.samples.size();
+    next += 1 + 5 * group.samples.size();
   }
   TUNICA_ASSERT(memory.size() == next);
   set_step(time, time, configuration);
@@ -474,10 +515,12 @@ void ContactSystem::recall(const std::vector<double>& memory, const Configuratio
     for (Sample& sample : group.samples) {
       sample.followed = memory[next] != 0;
       sample.slip = Vec3(memory[next + 1], memory[next + 2], memory[next + 3]);
-      next += 4;
+      sample.slipped = memory[next + 4];
+      next += 5;
     }
   }
   std::copy_n(memory.begin(), contacts_.size(), stiffness_.begin());
+  accepted_stiffness_ = stiffness_;
 }
 
 }  // namespace tunica

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "tunica/mechanics/algebra/block_matrix.hpp"
+#include "tunica/mechanics/contact/carried.hpp"
 #include "tunica/mechanics/contact/contact_state.hpp"
 #include "tunica/mechanics/contact/rigid_shape.hpp"
 #include "tunica/mechanics/contact/surface_faces.hpp"
@@ -40,7 +41,9 @@ public:
   static constexpr double straight_below = 0.05;
 
   /// Errors: InputError: bodies overlap in the reference; names the pair and the depth.
-  ContactSystem(const Model& model, Surfaces surfaces, std::vector<Vec3> reference);
+  /// @param carried  nodes do not touch the body that carries them
+  ContactSystem(const Model& model, Surfaces surfaces, std::vector<Vec3> reference,
+                const std::vector<Carried>& carried);
 
   /// A step of the rigid bodies between two times (load factors in statics). They stand at the first. What comes near
   /// is sampled as finely as its curvature asks in this configuration.
@@ -85,6 +88,13 @@ public:
   /// anything: a plane, or the way that there is, keeps every part of a surface from what it might meet.
   [[nodiscard]] bool is_certain(const Configuration& configuration);
 
+  /// Back to the last accepted state, after attempts that came to nothing.
+  void go_back();
+
+  /// Where bodies were closest at the last forces: "; in contact NAME they are closest at (x, y, z) mm". Empty where
+  /// nothing came near.
+  [[nodiscard]] std::string closest_place() const;
+
   /// What acts in a configuration, per contact of the model; gaps as intervals.
   [[nodiscard]] std::vector<ContactState> results(const Configuration& configuration);
   /// Of the last results(), per rigid body of the model.
@@ -106,10 +116,11 @@ private:
   struct Sample {
     Vec2 at;
     PatchWeights weights;
-    double share = 0;      ///< of twice the area of the parameters' triangle
-    double area = 0;       ///< mm^2
-    double pressure = -1;  ///< MPa, that the next tangent takes; below zero: that of the gap
-    Vec3 slip = Vec3::Zero();
+    double share = 0;            ///< of twice the area of the parameters' triangle
+    double area = 0;             ///< mm^2
+    double pressure = -1;        ///< MPa, that the next tangent takes; below zero: that of the gap
+    Vec3 slip = Vec3::Zero();    ///< mm, elastic
+    double slipped = 0;          ///< mm, beyond that, since it touches
     Vec3 before = Vec3::Zero();  ///< where it was in the last accepted state
     bool followed = false;       ///< `before` is known
     // As the last tangent left it:
@@ -160,6 +171,7 @@ private:
   /// How far surfaces may overlap on the way to a state, mm.
   [[nodiscard]] double deepest(const Group& group, std::size_t other) const;
   [[nodiscard]] bool excluded(const Group& group, std::size_t other) const;
+  [[nodiscard]] bool is_carried(const SurfaceFace& face, std::size_t body) const;
   /// For every group towards a body that deforms: the faces that come within its reach and `more` (mm).
   [[nodiscard]] std::vector<std::vector<std::size_t>> near_faces(const FaceMaps& maps, double more) const;
   [[nodiscard]] bool is_near(const Group& group, const PatchMap& map) const;
@@ -203,6 +215,7 @@ private:
   Surfaces surfaces_;
   const std::vector<Vec3> reference_;
   const std::vector<Contact> contacts_;
+  std::map<Index, std::size_t> carrier_;   ///< body, of carried nodes
   std::vector<RigidShape> shapes_;         ///< now
   std::vector<RigidShape> shapes_before_;  ///< in the last accepted state
   std::vector<RigidShape> shapes_end_;     ///< at the end of the step
@@ -210,9 +223,16 @@ private:
   double begin_ = 0, end_ = 0, left_ = 0;
   bool slides_ = false;
   std::vector<Group> groups_;
-  std::vector<double> young_;             ///< MPa, per contact, of the softer body
-  std::vector<double> stiffness_;         ///< MPa, per contact, of the barrier
-  std::vector<double> smallest_gap_;      ///< mm, per contact, of the samples at the last forces
+  std::vector<double> young_;               ///< MPa, per contact, of the softer body
+  std::vector<double> stiffness_;           ///< MPa, per contact, of the barrier
+  std::vector<double> accepted_stiffness_;  ///< of the last accepted state
+  std::vector<double> smallest_gap_;        ///< mm, per contact, of the samples at the last forces
+  struct Closest {
+    double gap = infinity;
+    std::size_t contact = 0;
+    Vec3 at = Vec3::Zero();
+  };
+  Closest closest_;                       ///< at the last forces
   std::vector<double> largest_pressure_;  ///< MPa, per contact, of the last forces
   std::vector<std::array<Index, 2>> pairs_;
   const Configuration rest_;

@@ -171,6 +171,16 @@ double RigidShape::growth_since(const RigidShape& before) const {
   return std::abs(radius_ - before.radius_) + stretch.norm() / 2;
 }
 
+double RigidShape::detour_since(const RigidShape& before, const Vec3& p) const {
+  const auto* mesh = std::get_if<RigidMesh>(&body_->shape);
+  if (mesh == nullptr || !mesh->turn || angle_ == before.angle_) {
+    return 0;
+  }
+  const Vec3 arm = p - before.shift_ - mesh->turn->point;
+  const double radius = mesh->turn->axis.cross(arm).norm(), angle = std::abs(angle_ - before.angle_);
+  return radius * (angle - 2 * std::abs(std::sin(angle / 2)));
+}
+
 bool RigidShape::moves_to(const RigidShape& then) const {
   return first_ != then.first_ || second_ != then.second_ || radius_ != then.radius_ || shift_ != then.shift_ ||
          angle_ != then.angle_ || factor_ != then.factor_;
@@ -186,6 +196,34 @@ std::optional<Vec3> RigidShape::inner_point() const {
 }
 
 Vec3 RigidShape::position() const { return convex() ? Vec3((first_ + second_) / 2) : shift_; }
+
+std::vector<double> table_times(const RigidBody& body) {
+  std::vector<double> times;
+  const auto add = [&](const auto&... tables) {
+    const auto from = [&](const auto& table) {
+      for (const auto& point : table.points) {
+        times.push_back(point.first);
+      }
+    };
+    (from(tables), ...);
+  };
+  std::visit(
+      Overloaded{[&](const RigidSphere& s) { add(s.centre, s.radius); }, [&](const RigidPlane& s) { add(s.point); },
+                 [&](const RigidMesh& s) {
+                   if (s.turn) {
+                     add(s.turn->angle);
+                   }
+                   if (s.expansion) {
+                     add(s.expansion->factor);
+                   }
+                 },
+                 [&](const auto& s) { add(s.from, s.to, s.radius); }},
+      body.shape);
+  if (body.motion) {
+    add(*body.motion);
+  }
+  return times;
+}
 
 double RigidShape::largest_curvature() const {
   const auto of_radius = [](const Table<double>& radius) {

@@ -36,6 +36,9 @@ public:
   /// How much farther than carried() a point of its surface may have moved, mm: what the body grows.
   [[nodiscard]] double growth_since(const RigidShape& before) const;
 
+  /// How much longer than straight the way of a turning body's material point is that was at `p` before, mm.
+  [[nodiscard]] double detour_since(const RigidShape& before, const Vec3& p) const;
+
   [[nodiscard]] bool moves_to(const RigidShape& then) const;
 
   /// How deep inside the distance still leads out on the right side, mm.
@@ -64,5 +67,8 @@ private:
   Vec3 shift_ = Vec3::Zero();
   double angle_ = 0, factor_ = 1;
 };
+
+/// When a body's motion may change its direction or speed: the times of its tables.
+std::vector<double> table_times(const RigidBody& body);
 
 }  // namespace tunica

@@ -399,7 +399,7 @@ private:
         newton(system_, settings_, *solver_, function, (to - from) * s.held, matrix_, configuration, at_rest_);
     at_rest_ = result.iterations == 0;
     if (system_.contact && result.converged && !system_.contact->is_certain(configuration)) {
-      result.converged = false;
+      result.converged = result.apart = false;
     }
     return result;
   }
@@ -445,10 +445,9 @@ private:
     begin_contact(system_, settings_, s.time + s.length, s.time + s.length, configuration, solver_, matrix_);
     const SettleResult settled = settle(system_, settings_, *solver_, whole, matrix_, configuration);
     result.ran_away = settled.ran_away;
-    result.newton.converged = settled.settled;
-    result.newton.stable = settled.settled;
-    result.newton.valid = settled.settled;
-    result.newton.linear_converged = settled.settled;
+    result.newton.apart = !system_.contact || !settled.settled || system_.contact->is_certain(configuration);
+    const bool rests = settled.settled && result.newton.apart;
+    result.newton.converged = result.newton.stable = result.newton.valid = result.newton.linear_converged = rests;
     result.newton.residual = settled.residual;
     result.newton.iterations += settled.iterations;
     result.newton.cg_iterations += settled.cg_iterations;
@@ -580,6 +579,10 @@ private:
   }
 
   [[noreturn]] void fail(const TimeStepper::StepResult& step, const Motion& before, double end) {
+    const std::string place = system_.contact ? system_.contact->closest_place() : "";
+    if (system_.contact) {
+      system_.contact->go_back();
+    }
     if (summary_.steps > shown_) {  // the last good state, also where it is none of every `every` steps
       motion_ = before;
       hand_over(state_now());
@@ -591,21 +594,28 @@ private:
     for (std::size_t l = 0; l < carried.size(); ++l) {
       carried[l] += step.reached * (wanted[l] - carried[l]);
     }
+    if (!step.newton.apart) {
+      throw RequirementError(fmt::format(
+          "no state found in the step from {:.6g} s to {:.6g} s that bodies can reach without passing through each "
+          "other{}: take a smaller step; the last good state is at {:.6g} s",
+          time_, end, place, time_));
+    }
     if (step.reached < 1 && carried != wanted) {
       throw RequirementError(fmt::format(
           "no equilibrium in the step from {:.6g} s to {:.6g} s: the limit load is reached at "
-          "{:.3g} of its change of load ({}); beyond it {}; the last good state is at {:.6g} s",
+          "{:.3g} of its change of load ({}); beyond it {}{}; the last good state is at {:.6g} s",
           time_, end, step.reached, describe_loads(model_, carried, wanted),
-          step.ran_away ? "the shell yields without bound" : "no state was found that the shell could rest in", time_));
+          step.ran_away ? "the shell yields without bound" : "no state was found that the shell could rest in", place,
+          time_));
     }
     throw RequirementError(
         fmt::format("the step from {:.6g} s to {:.6g} s {} (relative residual {:.3g} after {} "
-                    "iterations): take a smaller step, a ramp or damping; the last good state is at {:.6g} s",
+                    "iterations){}: take a smaller step, a ramp or damping; the last good state is at {:.6g} s",
                     time_, end,
                     !result.valid                        ? "made elements collapse or fold"
                     : result.converged && !result.stable ? "leads to a state that is not stable"
                                                          : "did not converge",
-                    result.residual, result.iterations, time_));
+                    result.residual, result.iterations, place, time_));
   }
 
   [[nodiscard]] State state_now() const {

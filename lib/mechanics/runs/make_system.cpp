@@ -266,7 +266,7 @@ ShellSystem make_system(const Model& model) {
   }
   system.carried = carried_nodes(model, system.surfaces, system.reference);
   if (!model.contacts.empty()) {
-    system.contact = std::make_shared<ContactSystem>(model, system.surfaces, system.reference);
+    system.contact = std::make_shared<ContactSystem>(model, system.surfaces, system.reference, system.carried);
   }
 
   make_pattern(system, {});

@@ -1,5 +1,6 @@
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
+#include "tunica/mechanics/contact/rigid_shape.hpp"
 #include "tunica/mechanics/elements/rotation.hpp"
 #include "tunica/mechanics/model/wall.hpp"
 #include "tunica/mechanics/runs/detail/settle.hpp"
@@ -185,6 +186,9 @@ Failure why(const NewtonResult& result, const SettleResult& let_go, bool prescri
                               "that what it touches stops it",
                               loose)};
   }
+  if (!result.apart) {
+    return {"no state found that bodies can reach without passing through each other", "take more load steps"};
+  }
   if (let_go.ran_away) {
     return {none, limit + ": beyond it there is no equilibrium, the shell yields without bound"};
   }
@@ -195,6 +199,17 @@ Failure why(const NewtonResult& result, const SettleResult& let_go, bool prescri
   return {"no static equilibrium found", result.valid ? "Newton's method does not converge, although the stiffness is "
                                                         "positive as far as it came: take more load steps"
                                                       : "elements collapse or fold"};
+}
+
+/// The times of the rigid bodies' tables, sorted, and infinity.
+std::vector<double> rigid_times(const Model& model) {
+  std::vector<double> times{infinity};
+  for (const RigidBody& body : model.rigids) {
+    const std::vector<double> own = table_times(body);
+    times.insert(times.end(), own.begin(), own.end());
+  }
+  std::sort(times.begin(), times.end());
+  return times;
 }
 
 /// What load control does: the load grows to one load factor after the other, each in one step, which is cut only where
@@ -209,6 +224,7 @@ public:
         near_(near),
         step_(system, model, settings),
         thickness_(model.shells.empty() ? system.length : least_thickness(model)),
+        turns_(rigid_times(model)),
         configuration_(reference_configuration(system)) {}
 
 private:
@@ -278,12 +294,14 @@ private:
     std::size_t cg_iterations = 0;
     while (factor_ != target) {
       const double before = factor_;
-      const double next = increment_ >= target - factor_ - 1e-12 * step ? target : factor_ + increment_;
+      const double end = std::min(target, *std::upper_bound(turns_.begin(), turns_.end(), factor_));
+      const double next = increment_ >= end - factor_ - 1e-12 * step ? end : factor_ + increment_;
       Configuration attempt = configuration_;
       result = step_.run(next, factor_, attempt);
       iterations += result.iterations;
       cg_iterations += result.cg_iterations;
-      if (may_stand(result) && (!system_.contact || system_.contact->is_certain(attempt))) {
+      result.apart = !may_stand(result) || is_apart(attempt);
+      if (may_stand(result) && result.apart) {
         configuration_ = std::move(attempt);
         accept_contact(system_, configuration_);
         factor_ = next;
@@ -312,6 +330,10 @@ private:
     return result;
   }
 
+  [[nodiscard]] bool is_apart(const Configuration& attempt) const {
+    return !system_.contact || system_.contact->is_certain(attempt);
+  }
+
   [[nodiscard]] bool may_stand(const NewtonResult& result) const {
     // With a fixed count of iterations, or one linearisation, nobody asks for a tolerance.
     if (settings_.cg_fixed_count) {
@@ -327,10 +349,11 @@ private:
   SettleResult leave_path(double beyond, const NewtonResult& failed) {
     Configuration attempt = configuration_;
     const SettleResult settled = step_.let_go(beyond, factor_, thickness_, attempt);
-    if (!settled.settled) {
+    if (!settled.settled || !is_apart(attempt)) {
       fail(failed, settled, settled.ran_away ? loose_body(attempt) : "");
     }
-    if (distance(attempt, configuration_) > largest_branch * thickness_) {
+    const bool unstable = !failed.stable || settled.lost_stability;
+    if (unstable && distance(attempt, configuration_) > largest_branch * thickness_) {
       summary_.snaps.push_back({factor_, largest_distance(attempt, configuration_)});
     }
     configuration_ = std::move(attempt);
@@ -356,6 +379,10 @@ private:
   }
 
   [[noreturn]] void fail(const NewtonResult& failed, const SettleResult& let_go, const std::string& loose) {
+    const std::string place = system_.contact ? system_.contact->closest_place() : "";
+    if (system_.contact) {
+      system_.contact->go_back();
+    }
     if (factor_ != (shown_ == 0 ? 0 : run_.load_factors[shown_ - 1])) {  // the last good state, also within a step
       NewtonResult good;
       good.converged = true;
@@ -363,10 +390,10 @@ private:
     }
     const double last = run_.load_factors.back();
     const auto [found, reason] = why(failed, let_go, !system_.prescribed.empty(), loose);
-    throw RequirementError(
-        fmt::format("{} beyond load factor {:.6g} of {:.6g} ({}): {}; the last good state is at {:.6g}", found, factor_,
-                    last, describe_loads(model_, load_factors(model_, true, factor_), load_factors(model_, true, last)),
-                    reason, factor_));
+    throw RequirementError(fmt::format(
+        "{} beyond load factor {:.6g} of {:.6g} ({}): {}{}; the last good state is at {:.6g}", found, factor_, last,
+        describe_loads(model_, load_factors(model_, true, factor_), load_factors(model_, true, last)), reason, place,
+        factor_));
   }
 
   [[nodiscard]] State state_of(const NewtonResult& result) const {
@@ -384,6 +411,7 @@ private:
   const std::optional<Checkpoint>& near_;
   LoadStep step_;
   const double thickness_;
+  const std::vector<double> turns_;  ///< where a rigid body's motion changes its direction or speed, and infinity
   Configuration configuration_;
   double factor_ = 0;
   double increment_ = infinity;  ///< of the load factor, to be tried next

@@ -70,6 +70,7 @@ using BalanceFunction =
     std::function<Balance(const Configuration&, BlockMatrix* tangent, const std::vector<ElementState>& predicted)>;
 
 struct NewtonResult {
+  bool apart = true;  ///< contact is certain that nothing passed through anything
   /// Residual below the tolerance, or at the floor of round-off with increments below largest_round_off of the change.
   bool converged = false;
   bool linear_converged = false;  ///< the last linear system was solved to its own tolerance
