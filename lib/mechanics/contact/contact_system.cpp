@@ -436,6 +436,14 @@ void ContactSystem::accept(const Configuration& configuration) {
   accepted_stiffness_ = stiffness_;
 }
 
+double ContactSystem::resolution() const {
+  double smallest = infinity;
+  for (const Group& group : groups_) {
+    smallest = std::min(smallest, group.resolution);
+  }
+  return smallest;
+}
+
 void ContactSystem::go_back() {
   shapes_ = shapes_before_;
   stiffness_ = accepted_stiffness_;

@@ -68,6 +68,9 @@ public:
   /// Whether two bodies that deform are near each other: their normals jump from one face to the next.
   [[nodiscard]] bool has_kinks() const { return !pairs_.empty(); }
 
+  /// mm: the smallest over which pressure builds up.
+  [[nodiscard]] double resolution() const;
+
   /// Whether friction has given way somewhere, by the last forces: the tangent then is not symmetric, and its pivots
   /// say nothing about stability.
   [[nodiscard]] bool slides() const { return slides_; }

@@ -16,10 +16,53 @@ constexpr double round_off_of_length = 1e-11;  // of the model's longest side
 constexpr double round_off_of_nothing = 0.01;  // of the floor, where no load acts
 constexpr double near_balance = 0.1;           // residual from which the pressures of a contact mean something
 constexpr double largest_residual_at_kinks = 1e-4;
-constexpr double largest_swing = 1e-4;  // of the step's change, by the last two increments
+constexpr double canceled = 0.3;        // by the mean of both sides of a kink, of the residual
+constexpr double largest_swing = 1e-3;  // of the contact's resolution, by the last two increments
+constexpr std::size_t sides = 4;        // of a kink, or of several, that are looked at together
 constexpr int most_cuts = 6;            // of an increment
 
 bool uses_cg(const RunSettings& settings) { return settings.solver == Solver::cg; }
+
+double largest_shift(const VectorX& increment) {
+  double largest = 0;
+  for (Eigen::Index i = 0; i < increment.size(); i += 6) {
+    largest = std::max(largest, increment.segment<3>(i).squaredNorm());
+  }
+  return std::sqrt(largest);
+}
+
+/// Where contact jumps from one face to the next, forces jump: a state of rest may lie on the kink, and Newton's method
+/// swings from one side to the other. There it is at rest where some mean of the sides' unbalanced forces vanishes.
+/// Source: Goldstein 1977, "Optimization of Lipschitz continuous functions" (the convex hull of nearby gradients).
+class Sides {
+public:
+  void look(VectorX unbalanced) {
+    if (seen_.size() == sides) {
+      seen_.erase(seen_.begin());
+    }
+    seen_.push_back(std::move(unbalanced));
+  }
+
+  /// The weighted mean that is nearest to zero, by Frank and Wolfe's method with exact line searches.
+  [[nodiscard]] VectorX least_mean() const {
+    constexpr int iterations = 100;
+    VectorX mean = seen_.back();
+    for (int k = 0; k < iterations; ++k) {
+      const auto farthest = std::min_element(
+          seen_.begin(), seen_.end(), [&](const VectorX& a, const VectorX& b) { return a.dot(mean) < b.dot(mean); });
+      const VectorX way = *farthest - mean;
+      const double gain = -way.dot(mean);
+      if (!(gain > 1e-12 * mean.squaredNorm())) {
+        break;
+      }
+      mean += std::min(1.0, gain / way.squaredNorm()) * way;
+    }
+    return mean;
+  }
+
+private:
+  std::vector<VectorX> seen_;
+};
 
 }  // namespace
 
@@ -187,7 +230,7 @@ private:
   [[nodiscard]] bool is_at_floor() const { return result_.residual * now_.scale <= now_.floor; }
 
   /// At the floor of round-off a residual says nothing about the error any more; the increments still do.
-  [[nodiscard]] bool at_rest() const {
+  [[nodiscard]] bool at_rest() {
     if (is_moving()) {
       return false;
     }
@@ -195,11 +238,25 @@ private:
            is_settled() || swings_at_kinks();
   }
 
-  /// Where contact jumps from one face to the next, residuals get no smaller; what is left moves next to nothing.
-  [[nodiscard]] bool swings_at_kinks() const {
-    return system_.contact && system_.contact->has_kinks() && result_.stable &&
-           result_.residual <= largest_residual_at_kinks && last_size_ <= largest_swing * result_.reached &&
-           previous_size_ <= largest_swing * result_.reached;
+  /// The last sides cancel for the most part.
+  [[nodiscard]] bool is_on_kink() const { return has_kinks() && between_sides_ <= canceled * result_.residual; }
+  [[nodiscard]] bool has_kinks() const { return system_.contact && system_.contact->has_kinks(); }
+
+  /// At rest on a kink: the last increments move next to nothing.
+  [[nodiscard]] bool swings_at_kinks() {
+    const double most = has_kinks() ? largest_swing * system_.contact->resolution() : 0;
+    if (between_sides_ > largest_residual_at_kinks || !result_.stable || last_shift_ > most || previous_shift_ > most) {
+      return false;
+    }
+    result_.residual = std::min(result_.residual, between_sides_);
+    return true;
+  }
+
+  /// Whether an increment leads back to where the last one came from.
+  [[nodiscard]] bool turns_back() const {
+    constexpr double back = -0.7, as_far = 0.3;
+    const double both = increment_.norm() * last_.norm();
+    return last_.size() > 0 && increment_.dot(last_) < back * both && increment_.norm() > as_far * last_.norm();
   }
 
   /// What is left after an increment this small is smaller still: its square, or by the tolerance of the linear solver.
@@ -257,7 +314,7 @@ private:
       return false;  // nothing holds some body
     }
     work_ = right.dot(increment_);
-    longest_ = 1;
+    longest_ = !is_on_kink() || is_moving() ? 1 : turns_back() ? length_ / 2 : length_;
     const double turn = largest_rotation(system_, increment_);
     if (left_ > 0) {
       increment_ += left_ * held_increment_;
@@ -311,12 +368,20 @@ private:
       length = std::clamp(length * work_ / (work_ - left), 0.2 * length, 0.7 * length);
     }
     left_ = length == 1 ? 0 : left_ * (1 - length);
+    length_ = length;
     whole_ += last_;
-    previous_size_ = last_size_;
     last_size_ = increment_size(system_, last_);
+    previous_shift_ = last_shift_;
+    last_shift_ = largest_shift(last_);
     result_.reached = increment_size(system_, whole_);
     if (now_.valid) {
       result_.residual = residual_of(now_);
+    }
+    if (now_.valid && has_kinks()) {
+      VectorX free = now_.unbalanced;
+      mask(solver_.free(), free);
+      sides_.look(std::move(free));
+      between_sides_ = now_.scale > 0 ? force_norm(system_, sides_.least_mean()) / now_.scale : 0;
     }
     return now_.valid && std::isfinite(result_.residual);
   }
@@ -332,14 +397,18 @@ private:
   Balance now_;
   double left_;         ///< of the prescribed displacements, still to be moved
   double longest_ = 1;  ///< part of the increment that may be followed
+  double length_ = 1;   ///< part of the last one that was
   bool tangent_is_current_ = false;
   VectorX increment_;
-  Configuration before_;             ///< the last increment went from here
-  VectorX last_;                     ///< the last increment, as far as it was followed
-  VectorX whole_;                    ///< the sum of all increments
-  double work_ = 0;                  ///< of the unbalanced forces along the increment
-  double last_size_ = 0;             ///< of the last increment
-  double previous_size_ = infinity;  ///< of the one before
+  Configuration before_;              ///< the last increment went from here
+  VectorX last_;                      ///< the last increment, as far as it was followed
+  VectorX whole_;                     ///< the sum of all increments
+  double work_ = 0;                   ///< of the unbalanced forces along the increment
+  double last_size_ = 0;              ///< of the last increment
+  double last_shift_ = infinity;      ///< mm, of the node that it moved farthest
+  double previous_shift_ = infinity;  ///< by the one before
+  Sides sides_;
+  double between_sides_ = infinity;  ///< residual of the least mean of the last sides
   double largest_solution_ = 0;
   double previous_residual_ = 0;
 };
