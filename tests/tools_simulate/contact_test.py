@@ -61,7 +61,7 @@ class Contact(unittest.TestCase):
     def test_a_block_sticks_below_the_angle_of_friction(self):
         result = slope(self.bench, 0.999 * math.atan(0.3), 0.3, run_lines(kind="static", load_steps=1))
         self.assertEqual(self.bench.code, 0, self.bench.error)
-        self.assertEqual(result["contacts"]["c"]["slip_mm"][-1] > 1e-6, False)
+        self.assertLess(result["contacts"]["c"]["slip_mm"][-1], 1e-4)
 
     def test_a_block_finds_no_rest_above_it(self):
         slope(self.bench, 1.05 * math.atan(0.3), 0.3, run_lines(kind="static", load_steps=1))

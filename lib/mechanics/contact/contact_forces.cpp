@@ -96,8 +96,8 @@ void add_turn_of_normal(const SurfaceFace& other, const PatchMap& its_map, const
   }
 }
 
-void add_other(const SurfaceFace& face, const SurfaceFace& other, const PatchMap& map, const PatchMap& its_map,
-               const Other& act, VectorX& external, BlockMatrix* tangent) {
+void add_to_other(const SurfaceFace& other, const PatchMap& its_map, const Other& act, VectorX& external,
+                  BlockMatrix* tangent) {
   const Vector18 on_nodes = its_map.to_nodes(act.forces) + act.turning.moments;
   for (int k = 0; k < 3; ++k) {
     external.segment<6>(first_freedom(other.nodes[k])) += on_nodes.segment<6>(6 * k);
@@ -105,22 +105,30 @@ void add_other(const SurfaceFace& face, const SurfaceFace& other, const PatchMap
   if (tangent == nullptr) {
     return;
   }
+  const Matrix18 own = its_map.stiffness(act.own, -act.forces) + act.turning.own;
+  for (int k = 0; k < 3; ++k) {
+    for (int l = 0; l < 3; ++l) {
+      add_block(*tangent, other.nodes[k], other.nodes[l], own.block<6, 6>(6 * k, 6 * l));
+    }
+  }
+}
+
+void add_between(const SurfaceFace& face, const SurfaceFace& other, const PatchMap& map, const PatchMap& its_map,
+                 const Other& act, BlockMatrix& tangent) {
   PatchMap::Matrix27 backwards;
   for (int k = 0; k < 9; ++k) {
     for (int l = 0; l < 9; ++l) {
       backwards.block<3, 3>(3 * l, 3 * k) = act.between.block<3, 3>(3 * k, 3 * l);
     }
   }
-  const Matrix18 own = its_map.stiffness(act.own, -act.forces) + act.turning.own;
   const Matrix18 there =
       map.jacobian().transpose() * ((act.between + act.turned) * its_map.jacobian()) + act.turning.there;
   const Matrix18 back =
       its_map.jacobian().transpose() * ((backwards + act.turned.transpose()) * map.jacobian()) + act.turning.back;
   for (int k = 0; k < 3; ++k) {
     for (int l = 0; l < 3; ++l) {
-      add_block(*tangent, face.nodes[k], other.nodes[l], there.block<6, 6>(6 * k, 6 * l));
-      add_block(*tangent, other.nodes[k], face.nodes[l], back.block<6, 6>(6 * k, 6 * l));
-      add_block(*tangent, other.nodes[k], other.nodes[l], own.block<6, 6>(6 * k, 6 * l));
+      add_block(tangent, face.nodes[k], other.nodes[l], there.block<6, 6>(6 * k, 6 * l));
+      add_block(tangent, other.nodes[k], face.nodes[l], back.block<6, 6>(6 * k, 6 * l));
     }
   }
 }
@@ -135,6 +143,9 @@ ContactSystem::Levers ContactSystem::levers(const Group& group, const Touch& tou
   // The nodes of solids have no rotations: where both are solids, friction acts at both ends of the gap.
   const double distance = touch.gap + group.sag + offset(group, touch.face);
   const double theirs = group.other.rigid ? 0 : surfaces_.faces[touch.face].half_thickness;
+  if (group.point) {
+    return {Vec3::Zero(), theirs * touch.normal};
+  }
   if (surfaces_.faces[group.face].half_thickness > 0) {
     return {(theirs - distance) * touch.normal, theirs * touch.normal};
   }
@@ -159,7 +170,9 @@ Vec3 ContactSystem::relative_motion(const Group& group, const Sample& sample, co
     return Vec3::Zero();
   }
   const Levers lever = levers(group, touch);
-  const Vec3 before = sample.before + lever_before(surfaces_.faces[group.face], sample.at, lever.own, maps);
+  const Vec3 before = group.point
+                          ? sample.before
+                          : Vec3(sample.before + lever_before(surfaces_.faces[group.face], sample.at, lever.own, maps));
   if (group.other.rigid) {
     return x + lever.own - shapes_[group.other.index].carried(before, shapes_before_[group.other.index]);
   }
@@ -176,11 +189,13 @@ std::vector<std::vector<ContactSystem::Touch>> ContactSystem::all_touches(
   std::vector<std::vector<Touch>> touches(groups_.size());
   for (std::size_t g = 0; g < groups_.size(); ++g) {
     const Group& group = groups_[g];
-    if (group.other.rigid ? !is_near(group, maps[group.face]) : near[g].empty()) {
+    if (!is_close(group, near[g], maps)) {
       continue;
     }
     touches[g].resize(group.samples.size());
-    maps.prepare(group.face);
+    if (!group.point) {
+      maps.prepare(group.face);
+    }
     for (const std::size_t f : near[g]) {
       maps.prepare(f);
     }
@@ -189,7 +204,7 @@ std::vector<std::vector<ContactSystem::Touch>> ContactSystem::all_touches(
     for (std::size_t g = begin; g < end; ++g) {
       for (std::size_t i = 0; i < touches[g].size(); ++i) {
         const Group& group = groups_[g];
-        touches[g][i] = touch(group, maps[group.face].point(group.samples[i].weights), near[g], maps);
+        touches[g][i] = touch(group, place(group, group.samples[i], maps), near[g], maps);
       }
     }
   });
@@ -242,6 +257,9 @@ ContactSystem::Press ContactSystem::press(const Group& group, const Sample& samp
 
 /// What the rest of the rigid body's motion adds to a traction: as if the surface moved back by that.
 Vec3 ContactSystem::rest_of_motion(const Group& group, const Press& press, const Touch& t, const Vec3& x) const {
+  if (left_ > 0 && group.point) {
+    return -press.derivative * (shapes_end_[group.rigid].of_mesh(*group.point) - x);
+  }
   if (left_ == 0 || !group.other.rigid) {
     return Vec3::Zero();
   }
@@ -252,29 +270,36 @@ Vec3 ContactSystem::rest_of_motion(const Group& group, const Press& press, const
   return -press.derivative * (closes * t.normal - (moved - t.normal * t.normal.dot(moved)));
 }
 
-void ContactSystem::record(const Group& group, const Sample& sample, const PatchMap& map, const Touch& t,
+void ContactSystem::record(const Group& group, const Sample& sample, const FaceMaps& maps, const Touch& t,
                            const Press& press) {
   const Contact& contact = contacts_[group.contact];
-  const SurfaceFace& face = surfaces_.faces[group.face];
-  const Vec3 x = map.point(sample.weights) + levers(group, t).own;
+  const Vec3 x = place(group, sample, maps) + levers(group, t).own;
   const Vec3 force = group.weight * sample.area * press.traction;
   ContactState& result = recorded_->states[group.contact];
-  const bool on_first = !contact.between[0].rigid && contact.between[0].index == face.body;
+  const std::size_t body = group.point ? SIZE_MAX : surfaces_.faces[group.face].body;
+  const bool on_first =
+      group.point ? contact.between[0].rigid : !contact.between[0].rigid && contact.between[0].index == body;
   // What a body does to itself adds up to nothing.
-  const bool self = !group.other.rigid && group.other.index == face.body;
+  const bool self = !group.other.rigid && group.other.index == body;
   const double sign = self ? 0 : on_first ? 1 : -1;
   result.force += sign * force;
   result.moment += sign * x.cross(force);
-  const auto along = patch_weight_derivatives(face, sample.at);
-  recorded_->pressing[group.contact].push_back(
-      {press.law, group.weight * sample.share * map.point(along[0]).cross(map.point(along[1])).norm()});
+  double area = sample.area;
+  if (!group.point) {
+    const auto along = patch_weight_derivatives(surfaces_.faces[group.face], sample.at);
+    const PatchMap& map = maps[group.face];
+    area = sample.share * map.point(along[0]).cross(map.point(along[1])).norm();
+    recorded_->pressing[group.contact].push_back({press.law, group.weight * area});
+  }
   ++result.points;
   if (contact.friction > 0) {
     result.slip = std::max(result.slip, sample.slipped + std::max(0.0, press.slip.norm() - group.elastic_slip));
   }
-  if (group.other.rigid) {
-    on_rigids_[group.other.index].force -= force;
-    on_rigids_[group.other.index].moment -= x.cross(force);
+  if (group.other.rigid || group.point) {
+    RigidState& rigid = on_rigids_[group.point ? group.rigid : group.other.index];
+    const double on_it = group.point ? 1 : -1;
+    rigid.force += on_it * force;
+    rigid.moment += on_it * x.cross(force);
   }
 }
 
@@ -288,7 +313,7 @@ void ContactSystem::add_turning(const Group& group, const Sample& sample, const 
   const Derivative theirs = lever_derivative(t.at, lever.other);
   acting.turning.moments += area * own.transpose() * (press.traction + rest);
   if (other != nullptr) {
-    other->turning.moments -= area * theirs.transpose() * press.traction;
+    other->turning.moments -= area * theirs.transpose() * (press.traction + rest);
   }
   if (!with_derivative) {
     return;
@@ -298,7 +323,8 @@ void ContactSystem::add_turning(const Group& group, const Sample& sample, const 
     return Matrix18(area *
                     ((x + l).transpose() * (press.derivative * (y + m)) - x.transpose() * (press.derivative * y)));
   };
-  const Derivative x = maps.linearised(group.face).derivative(sample.weights);
+  const Derivative x =
+      group.point ? Derivative(Derivative::Zero()) : Derivative(maps.linearised(group.face).derivative(sample.weights));
   acting.turning.own += more(x, own, x, own);
   if (other != nullptr) {
     const Derivative y = maps.linearised(t.face).derivative(t.weights);
@@ -317,7 +343,7 @@ void ContactSystem::add_sample(const Group& group, const Sample& sample, const T
   acting.forces += area * (press.traction + rest) * sample.weights.transpose();
   Other* const other = t.face == SIZE_MAX ? nullptr : &acting.others[t.face];
   if (other != nullptr) {
-    other->forces -= area * press.traction * t.weights.transpose();
+    other->forces -= area * (press.traction + rest) * t.weights.transpose();
   }
   if (contacts_[group.contact].friction > 0 && contacts_[group.contact].consistent) {
     add_turning(group, sample, t, area, press, rest, with_derivative, maps, acting);
@@ -344,6 +370,12 @@ void ContactSystem::add_sample(const Group& group, const Sample& sample, const T
 
 void ContactSystem::scatter(const Group& group, const Acting& acting, const FaceMaps& maps, VectorX& external,
                             BlockMatrix* tangent) const {
+  if (group.point) {
+    for (const auto& [number, other] : acting.others) {
+      add_to_other(surfaces_.faces[number], maps.linearised(number), other, external, tangent);
+    }
+    return;
+  }
   const SurfaceFace& face = surfaces_.faces[group.face];
   PatchMap& map = maps.linearised(group.face);
   const Vector18 on_nodes = contacts_[group.contact].consistent
@@ -363,7 +395,10 @@ void ContactSystem::scatter(const Group& group, const Acting& acting, const Face
     }
   }
   for (const auto& [number, other] : acting.others) {
-    add_other(face, surfaces_.faces[number], map, maps.linearised(number), other, external, tangent);
+    add_to_other(surfaces_.faces[number], maps.linearised(number), other, external, tangent);
+    if (tangent != nullptr) {
+      add_between(face, surfaces_.faces[number], map, maps.linearised(number), other, *tangent);
+    }
   }
 }
 
@@ -386,17 +421,17 @@ bool ContactSystem::add(const Configuration& configuration, VectorX& external, B
         continue;
       }
       if (t.gap < closest_.gap) {
-        closest_ = {t.gap, group.contact, maps[group.face].point(sample.weights)};
+        closest_ = {t.gap, group.contact, place(group, sample, maps)};
       }
       if (t.gap < -deepest(group, t.face)) {
         return false;
       }
       smallest_gap_[group.contact] = std::min(smallest_gap_[group.contact], t.gap);
-      const Vec3 x = maps[group.face].point(sample.weights);
+      const Vec3 x = place(group, sample, maps);
       const Press here = press(group, sample, t, x, maps);
       largest_pressure_[group.contact] = std::max(largest_pressure_[group.contact], here.law);
       if (recorded_ != nullptr) {
-        record(group, sample, maps[group.face], t, here);
+        record(group, sample, maps, t, here);
       }
       Vec3 rest = Vec3::Zero();
       if (tangent != nullptr) {
@@ -410,7 +445,7 @@ bool ContactSystem::add(const Configuration& configuration, VectorX& external, B
       }
       add_sample(group, sample, t, here, rest, tangent != nullptr, maps, acting);
       slides_ = slides_ || here.slip.norm() > group.elastic_slip;
-      if (!contacts_[group.contact].consistent) {
+      if (!contacts_[group.contact].consistent && !group.point) {
         const double area = group.weight * sample.area;
         const auto transfer = paper_transfer(maps[group.face], sample.at);
         acting.by_the_paper += area * transfer * (here.traction + rest);
@@ -453,10 +488,13 @@ void ContactSystem::predict(const VectorX& increment) {
         sample.pressure = -1;
         continue;
       }
-      if (!own) {
-        own = change_of(group.face);
+      Vec3 moved = Vec3::Zero();
+      if (group.point) {
+        moved = shapes_[group.rigid].of_mesh(*group.point) - shapes_at_tangent_[group.rigid].of_mesh(*group.point);
+      } else {
+        own = own ? own : change_of(group.face);
+        moved = *own * sample.weights;
       }
-      Vec3 moved = *own * sample.weights;
       if (sample.other != SIZE_MAX) {
         moved -= change_of(sample.other) * sample.other_weights;
       } else if (group.other.rigid) {
@@ -514,17 +552,17 @@ std::vector<ContactState> ContactSystem::results(const Configuration& configurat
   const auto near = near_faces(maps, 0);
   for (std::size_t g = 0; g < groups_.size(); ++g) {
     const Group& group = groups_[g];
-    if (group.other.rigid ? !is_near(group, maps[group.face]) : near[g].empty()) {
+    if (!is_close(group, near[g], maps)) {
       continue;
     }
     ContactState& result = results[group.contact];
     double upper = infinity;
     for (const Sample& sample : group.samples) {
-      upper = std::min(upper, touch(group, maps[group.face].point(sample.weights), near[g], maps).gap + group.sag);
+      upper = std::min(upper, touch(group, place(group, sample, maps), near[g], maps).gap + group.sag);
     }
     if (std::isfinite(upper)) {
       result.gap_upper = std::fmin(result.gap_upper, upper);
-      result.gap_lower = std::fmin(result.gap_lower, lower_gap(group, near[g], maps, upper));
+      result.gap_lower = std::fmin(result.gap_lower, group.point ? upper : lower_gap(group, near[g], maps, upper));
     }
   }
   return results;

@@ -54,9 +54,14 @@ void ContactSystem::require_apart(const Model& model) {
   Overlap deepest;
   for (std::size_t g = 0; g < groups_.size(); ++g) {
     const Group& group = groups_[g];
+    if (group.point && model.is_solid(group.other.index)) {
+      deepest.look(solid(group.other.index).first.at(place(group, group.samples[0], maps)).distance,
+                   same_distance * group.wall, group.contact);
+      continue;
+    }
     const SurfaceFace& face = surfaces_.faces[group.face];
-    const bool in_solid = !group.other.rigid && model.is_solid(group.other.index) && group.other.index != face.body &&
-                          !is_carried(face, group.other.index);
+    const bool in_solid = !group.point && !group.other.rigid && model.is_solid(group.other.index) &&
+                          group.other.index != face.body && !is_carried(face, group.other.index);
     if (in_solid) {
       const auto& [distance, box] = solid(group.other.index);
       for (std::size_t i = 0; box.meets(maps.bounds(group.face), face.half_thickness) && i < group.samples.size();
@@ -64,9 +69,9 @@ void ContactSystem::require_apart(const Model& model) {
         const Vec3 x = maps[group.face].point(group.samples[i].weights);
         deepest.look(distance.at(x).distance - face.half_thickness, same_distance * group.wall, group.contact);
       }
-    } else if (group.other.rigid ? is_near(group, maps[group.face]) : !near[g].empty()) {
+    } else if (is_close(group, near[g], maps)) {
       for (const Sample& sample : group.samples) {
-        const double gap = touch(group, maps[group.face].point(sample.weights), near[g], maps).gap + group.sag;
+        const double gap = touch(group, place(group, sample, maps), near[g], maps).gap + group.sag;
         deepest.look(gap, same_distance * group.wall, group.contact);
       }
     }

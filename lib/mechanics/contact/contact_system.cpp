@@ -102,6 +102,9 @@ void ContactSystem::make_groups() {
       const ContactParty& own = contact.between[side];
       const ContactParty& other = contact.between[1 - side];
       if (own.rigid) {
+        if (!shapes_[own.index].convex()) {
+          add_points(contact, c, side, wall_of(other.index));
+        }
         continue;
       }
       const double wall = both ? std::min(wall_of(own.index), wall_of(other.index)) : wall_of(own.index);
@@ -111,7 +114,7 @@ void ContactSystem::make_groups() {
         group.face = f;
         group.contact = c;
         group.other = other;
-        group.weight = both ? 0.5 : 1;
+        group.weight = both || !shapes_[other.index].convex() ? 0.5 : 1;
         group.wall = face.half_thickness > 0 ? std::min(wall, 2 * face.half_thickness) : wall;
         group.resolution = contact.resolution * group.wall;
         group.elastic_slip = elastic_slip_of_wall * wall;
@@ -121,7 +124,47 @@ void ContactSystem::make_groups() {
   }
 }
 
+void ContactSystem::add_points(const Contact& contact, std::size_t number, std::size_t side, double wall) {
+  constexpr double spacing_of_edge = 0.25;
+  const ContactParty& other = contact.between[1 - side];
+  const std::size_t rigid = contact.between[side].index;
+  double edges = 0;
+  for (std::size_t f = surfaces_.first[other.index]; f < surfaces_.first[other.index + 1]; ++f) {
+    edges += (reference_[surfaces_.faces[f].nodes[1]] - reference_[surfaces_.faces[f].nodes[0]]).norm();
+  }
+  const double mean =
+      edges / real(std::max<std::size_t>(1, surfaces_.first[other.index + 1] - surfaces_.first[other.index]));
+  for (const MeshPoint& point : shapes_[rigid].corners_and_edges(spacing_of_edge * mean)) {
+    Group group;
+    group.point = point.at;
+    group.rigid = rigid;
+    group.contact = number;
+    group.other = other;
+    group.weight = 0.5;
+    group.wall = wall;
+    group.resolution = contact.resolution * wall;
+    group.elastic_slip = elastic_slip_of_wall * wall;
+    group.level = 1;
+    group.samples.emplace_back();
+    group.samples.back().weights.setZero();
+    group.samples.back().at.setZero();
+    group.samples.back().area = point.area;
+    groups_.push_back(std::move(group));
+  }
+}
+
+Vec3 ContactSystem::place(const Group& group, const Sample& sample, const FaceMaps& maps) const {
+  return group.point ? shapes_[group.rigid].of_mesh(*group.point) : maps[group.face].point(sample.weights);
+}
+
+bool ContactSystem::is_close(const Group& group, const std::vector<std::size_t>& near, const FaceMaps& maps) const {
+  return group.other.rigid ? is_near(group, maps[group.face]) : !near.empty();
+}
+
 void ContactSystem::sample(Group& group, int level) const {
+  if (group.point) {
+    return;
+  }
   const SurfaceFace& face = surfaces_.faces[group.face];
   const PatchMap map(face, reference_, rest_);
   const std::vector<Sample> old = std::move(group.samples);
@@ -162,6 +205,9 @@ ContactSystem::Sample ContactSystem::sample_at(const Group& group, const PatchMa
 
 void ContactSystem::refine(const FaceMaps& maps) {
   for (Group& group : groups_) {
+    if (group.point) {
+      continue;
+    }
     const SurfaceFace& face = surfaces_.faces[group.face];
     const PatchMap& map = maps[group.face];
     double longest = 0;
@@ -209,6 +255,9 @@ bool ContactSystem::sharpen() {
 }
 
 double ContactSystem::offset(const Group& group, std::size_t other) const {
+  if (group.point) {
+    return surfaces_.faces[other].half_thickness;
+  }
   const SurfaceFace& own = surfaces_.faces[group.face];
   if (group.other.rigid) {
     return own.half_thickness;
@@ -242,6 +291,9 @@ double ContactSystem::deepest(const Group& group, std::size_t other) const {
 }
 
 bool ContactSystem::excluded(const Group& group, std::size_t other) const {
+  if (group.point) {
+    return false;
+  }
   const auto& a = surfaces_.faces[group.face].nodes;
   const auto& b = surfaces_.faces[other].nodes;
   if (std::any_of(a.begin(), a.end(), [&](Index i) { return std::find(b.begin(), b.end(), i) != b.end(); })) {
@@ -284,10 +336,13 @@ std::vector<std::vector<std::size_t>> ContactSystem::near_faces(const FaceMaps& 
       continue;
     }
     prepare(group.other.index);
-    prepare(surfaces_.faces[group.face].body);
+    if (!group.point) {
+      prepare(surfaces_.faces[group.face].body);
+    }
     const auto& faces = sorted[group.other.index];
-    const Bounds& own = bounds[group.face];
-    const double walls = surfaces_.faces[group.face].half_thickness + thickest[group.other.index];
+    const Vec3 point = group.point ? shapes_[group.rigid].of_mesh(*group.point) : Vec3(Vec3::Zero());
+    const Bounds own = group.point ? Bounds{point, point} : bounds[group.face];
+    const double walls = (group.point ? 0 : surfaces_.faces[group.face].half_thickness) + thickest[group.other.index];
     const double reach =
         std::max(group.resolution, thickest[group.other.index] == 0 ? group.wall / 4 : 0) + group.sag + walls + more;
     auto place = std::lower_bound(faces.begin(), faces.end(), own.lower.x() - reach - widest[group.other.index],
@@ -320,7 +375,7 @@ ContactSystem::Touch ContactSystem::touch(const Group& group, const Vec3& x, con
   }
   // The nearest counts, also from inside a solid; of faces that share their nearest point the one that faces it, or
   // where they touch the one that faces the sample's own.
-  const Vec3 own = facet_normal(maps[group.face]);
+  const Vec3 own = group.point ? Vec3(Vec3::Zero()) : facet_normal(maps[group.face]);
   double nearest = infinity, facing = 0;
   for (const std::size_t f : near) {
     const SurfaceFace& face = surfaces_.faces[f];
@@ -402,7 +457,8 @@ void ContactSystem::set_left(double left) {
 }
 
 bool ContactSystem::find_pairs(const Configuration& configuration) {
-  if (std::all_of(groups_.begin(), groups_.end(), [](const Group& group) { return group.other.rigid; })) {
+  if (std::all_of(groups_.begin(), groups_.end(),
+                  [](const Group& group) { return group.other.rigid || group.point; })) {
     return false;
   }
   double edges = 0;
@@ -412,7 +468,8 @@ bool ContactSystem::find_pairs(const Configuration& configuration) {
   const auto near = near_faces(*maps_at(configuration), edges / 2);
   std::set<std::array<Index, 2>> all(pairs_.begin(), pairs_.end());
   for (std::size_t g = 0; g < groups_.size(); ++g) {
-    for (const std::size_t f : near[g]) {
+    for (std::size_t n = 0; !groups_[g].point && n < near[g].size(); ++n) {
+      const std::size_t f = near[g][n];
       for (const Index i : surfaces_.faces[groups_[g].face].nodes) {
         for (const Index j : surfaces_.faces[f].nodes) {
           all.insert({std::min(i, j), std::max(i, j)});
@@ -467,15 +524,15 @@ void ContactSystem::keep_slip(const Configuration& configuration) {
     if (contacts_[group.contact].friction == 0) {
       continue;
     }
-    const bool is_close = group.other.rigid ? is_near(group, maps[group.face]) : !near[g].empty();
+    const bool close = is_close(group, near[g], maps);
     for (Sample& sample : group.samples) {
-      if (!is_close) {
+      if (!close) {
         sample.followed = false;
         sample.slip.setZero();
         sample.slipped = 0;
         continue;
       }
-      const Vec3 x = maps[group.face].point(sample.weights);
+      const Vec3 x = place(group, sample, maps);
       const Touch t = touch(group, x, near[g], maps);
       if (t.gap < group.resolution) {
         Vec3 slip = sample.slip + relative_motion(group, sample, t, x, maps);

@@ -6,8 +6,10 @@
 #include "tunica/mechanics/contact/rigid_shape.hpp"
 #include "tunica/mechanics/contact/surface_faces.hpp"
 
+#include <algorithm>
 #include <map>
 #include <memory>
+#include <optional>
 #include <vector>
 
 /// Contact of curved surfaces with each other and with rigid bodies, inside the implicit step.
@@ -30,7 +32,7 @@
 /// potential contact" (areas); Forsgren, Gill, Wright 2002, "Interior methods for nonlinear optimization"; Simo,
 /// Laursen 1992, "An augmented Lagrangian treatment of contact problems involving friction" (return mapping).
 ///
-/// Limits: a rigid mesh touches at the samples of what it meets, not with corners between them.
+/// A rigid mesh also touches with its own corners, and with points along its sharp edges.
 namespace tunica {
 
 class FaceMaps;
@@ -65,8 +67,11 @@ public:
   bool find_pairs(const Configuration& configuration);
   [[nodiscard]] const std::vector<std::array<Index, 2>>& pairs() const { return pairs_; }
 
-  /// Whether two bodies that deform are near each other: their normals jump from one face to the next.
-  [[nodiscard]] bool has_kinks() const { return !pairs_.empty(); }
+  /// Whether points may touch a body that deforms: its normals jump from one face to the next.
+  [[nodiscard]] bool has_kinks() const {
+    return !pairs_.empty() ||
+           std::any_of(groups_.begin(), groups_.end(), [](const Group& group) { return group.point.has_value(); });
+  }
 
   /// mm: the smallest over which pressure builds up.
   [[nodiscard]] double resolution() const;
@@ -133,9 +138,12 @@ private:
     std::size_t other = SIZE_MAX;
     PatchWeights other_weights;
   };
-  /// The samples of one face towards one other party of a contact.
+  /// The samples of one face towards one other party of a contact; or one point of a rigid mesh, whose corners and
+  /// edges may lie between the samples of what it meets.
   struct Group {
     std::size_t face = 0;
+    std::optional<Vec3> point;  ///< of the rigid mesh, as it is given
+    std::size_t rigid = 0;      ///< whose point that is
     std::size_t contact = 0;
     ContactParty other;
     double weight = 1;      ///< one half where both sides are sampled
@@ -163,6 +171,10 @@ private:
   [[nodiscard]] std::shared_ptr<const FaceMaps> maps_at(const Configuration& configuration);
 
   void make_groups();
+  void add_points(const Contact& contact, std::size_t number, std::size_t side, double wall);
+  [[nodiscard]] Vec3 place(const Group& group, const Sample& sample, const FaceMaps& maps) const;
+  /// Whether a group may touch what it looks at.
+  [[nodiscard]] bool is_close(const Group& group, const std::vector<std::size_t>& near, const FaceMaps& maps) const;
   /// Errors: InputError: bodies overlap in the reference.
   void require_apart(const Model& model);
   void sample(Group& group, int level) const;
@@ -197,7 +209,7 @@ private:
     std::vector<ContactState> states;
     std::vector<std::vector<Pressing>> pressing;
   };
-  void record(const Group& group, const Sample& sample, const PatchMap& map, const Touch& touch, const Press& press);
+  void record(const Group& group, const Sample& sample, const FaceMaps& maps, const Touch& touch, const Press& press);
   void add_sample(const Group& group, const Sample& sample, const Touch& touch, const Press& press, const Vec3& rest,
                   bool with_derivative, const FaceMaps& maps, Acting& acting) const;
   /// Friction's moments about the middle of the walls.

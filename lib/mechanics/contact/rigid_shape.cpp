@@ -2,6 +2,9 @@
 
 #include <Eigen/Geometry>
 
+#include "tunica/core/narrow.hpp"
+#include "tunica/surface/mesh/incidence.hpp"
+
 #include <algorithm>
 #include <cmath>
 
@@ -196,6 +199,36 @@ std::optional<Vec3> RigidShape::inner_point() const {
 }
 
 Vec3 RigidShape::position() const { return convex() ? Vec3((first_ + second_) / 2) : shift_; }
+
+std::vector<MeshPoint> corners_and_edges(const TriangleMesh& mesh, double spacing) {
+  constexpr double sharp = 0.94;  // cosine of 20 degrees
+  constexpr std::size_t most_per_edge = 64;
+  std::vector<MeshPoint> points;
+  for (const Vec3& x : mesh.vertices) {
+    points.push_back({x, spacing * spacing});
+  }
+  const auto normal = [&](std::size_t t) {
+    const auto& v = mesh.triangles[t];
+    const auto& x = mesh.vertices;
+    return Vec3((x[v[1]] - x[v[0]]).cross(x[v[2]] - x[v[0]]).normalized());
+  };
+  const auto beside = neighbours(mesh, incidence(mesh));
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Index other = beside[t][k];
+      if (other == no_neighbour || other < t || normal(t).dot(normal(other)) > sharp) {
+        continue;
+      }
+      const Vec3 &a = mesh.vertices[mesh.triangles[t][k]], &b = mesh.vertices[mesh.triangles[t][(k + 1) % 3]];
+      const auto pieces =
+          std::min<std::size_t>(most_per_edge, truncated<std::size_t>(std::ceil((b - a).norm() / spacing)));
+      for (std::size_t i = 1; i < pieces; ++i) {
+        points.push_back({a + (b - a) * (real(i) / real(pieces)), spacing * spacing});
+      }
+    }
+  }
+  return points;
+}
 
 std::vector<double> table_times(const RigidBody& body) {
   std::vector<double> times;

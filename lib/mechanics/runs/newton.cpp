@@ -43,6 +43,18 @@ public:
     seen_.push_back(std::move(unbalanced));
   }
 
+  [[nodiscard]] bool known() const { return !seen_.empty(); }
+
+  /// Contact follows another law from here.
+  void forget() { seen_.clear(); }
+
+  /// What an increment is expected to mend, on all sides.
+  void take(const VectorX& mended) {
+    for (VectorX& side : seen_) {
+      side -= mended;
+    }
+  }
+
   /// The weighted mean that is nearest to zero, by Frank and Wolfe's method with exact line searches.
   [[nodiscard]] VectorX least_mean() const {
     constexpr int iterations = 100;
@@ -201,6 +213,7 @@ private:
     if (!system_.contact || !system_.contact->sharpen()) {
       return false;
     }
+    sides_.forget();
     now_ = balance_(configuration_, nullptr, {});
     tangent_is_current_ = false;
     result_.residual = residual_of(now_);
@@ -245,7 +258,8 @@ private:
   /// At rest on a kink: the last increments move next to nothing.
   [[nodiscard]] bool swings_at_kinks() {
     const double most = has_kinks() ? largest_swing * system_.contact->resolution() : 0;
-    if (between_sides_ > largest_residual_at_kinks || !result_.stable || last_shift_ > most || previous_shift_ > most) {
+    if (!is_on_kink() || between_sides_ > largest_residual_at_kinks || !result_.stable || last_shift_ > most ||
+        previous_shift_ > most) {
       return false;
     }
     result_.residual = std::min(result_.residual, between_sides_);
@@ -280,8 +294,8 @@ private:
     VectorX all = last_;
     expand_carried(system_.carried, system_.surfaces, system_.reference, before_, all);
     if (system_.contact) {
-      if (result_.residual < near_balance) {
-        system_.contact->harden();
+      if (result_.residual < near_balance && system_.contact->harden()) {
+        sides_.forget();
       }
       system_.contact->predict(all);
     }
@@ -300,6 +314,13 @@ private:
       right -= product;
     }
     mask(solver_.free(), right);
+    // Near enough to a kink, what both sides have in common is left to be mended.
+    const bool by_mean =
+        sides_.known() && is_on_kink() && !is_moving() && last_shift_ <= largest_swing * system_.contact->resolution();
+    if (by_mean) {
+      right = sides_.least_mean();
+      sides_.take(right);
+    }
     const TangentSolver::Result solved = solver_.solve(matrix_, right, increment_);
     result_.cg_iterations += solved.cg_iterations;
     result_.stable = solved.positive_definite || (system_.contact && system_.contact->slides());
@@ -314,7 +335,7 @@ private:
       return false;  // nothing holds some body
     }
     work_ = right.dot(increment_);
-    longest_ = !is_on_kink() || is_moving() ? 1 : turns_back() ? length_ / 2 : length_;
+    longest_ = !is_on_kink() || is_moving() || by_mean ? 1 : turns_back() ? length_ / 2 : length_;
     const double turn = largest_rotation(system_, increment_);
     if (left_ > 0) {
       increment_ += left_ * held_increment_;
