@@ -1,6 +1,9 @@
 #!/usr/bin/python3
 """`--imaged-at`: the shape that an organ has without the pressure under which it was imaged."""
+import json
 import math
+import os
+import subprocess
 import unittest
 
 import numpy as np
@@ -84,6 +87,27 @@ class Unloaded(SimulateTest):
         self.assertLess(np.linalg.norm(back[:, :3] - points * axes, axis=1).max(), 5e-3 * largest)
         self.assertLess(np.linalg.norm(back[:, 3:] - normals, axis=1).max(), 5e-3)
         self.assertAlmostEqual(report["volume_after_mm3"] / double["volume_after_mm3"], 1, delta=1e-3)
+
+    def test_a_ball_of_voxels_shrinks_by_the_formula(self):
+        """From an image to the unloaded organ: the volume by the formula of the sphere whose voxels were imaged."""
+        def tool(name, *arguments):
+            report = self.path(name + ".json")
+            subprocess.run([os.path.join(os.environ["TUNICA_BIN"], "tunica-" + name), *arguments, "--quiet", "--report", report],
+                           cwd=self.folder, check=True)
+            with open(report, encoding="utf-8") as file:
+                return json.load(file)["result"]
+
+        tool("phantom", "sphere", "ball.nii.gz", "--size", "48", "--spacing", "0.5")
+        imaged = tool("extract", "ball.nii.gz", "surface.ply", "--label", "1", "--smooth", "staircase")["volume_mm3"]
+        tool("decimate", "surface.ply", "coarse.ply", "--triangles", "600")
+        tool("relax", "coarse.ply", "surface.ply", "shell.ply")
+        radius = (3 * imaged / (4 * math.pi))**(1 / 3)
+        part, thickness = 0.1, 0.3
+        pressure = part * 2 * YOUNG * thickness / (radius * (1 - POISSON))
+        report = self.imaged("shell.ply", pressure, "--thickness", "0.3mm", "--fix", "rigid-motions")["result"]
+        unloaded = (3 / (4 * math.pi) * report["unloaded"]["volume_mm3"])**(1 / 3)
+        self.assertAlmostEqual(unloaded / (radius * (1 - part)), 1, delta=3e-3)
+        self.assertAlmostEqual(report["volume_after_mm3"] / imaged, 1, delta=2e-3)
 
     def test_beyond_the_limit_load_there_is_none(self):
         write_ply(self.path("image.ply"), *sphere(1, 10))

@@ -174,8 +174,8 @@ struct RigidMotionsFix {
 
 /// Pressure along the outward normals (positive: along them), on the whole body.
 struct PressureLoad {
-  double value = 0;      ///< MPa
-  bool follower = true;  ///< turns and grows with the surface
+  double value = 0;                   ///< MPa
+  bool follower = true;               ///< turns and grows with the surface
   std::optional<double> imaged_at{};  ///< MPa, under which the shells were imaged
 };
 struct ForceLoad {

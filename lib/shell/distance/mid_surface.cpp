@@ -15,7 +15,8 @@
 namespace tunica {
 namespace {
 
-constexpr int pieces_per_edge = 4;  // where distances are sampled
+constexpr int pieces_per_edge = 4;   // where distances are sampled
+constexpr double least_stand = 0.2;  // of a normal on its facet: less is no shell
 
 /// The normals that a vertex has in its triangles; one where they agree.
 std::vector<std::vector<Vec3>> normals_at_vertices(const ShellMesh& mesh) {
@@ -47,18 +48,20 @@ Vec3 offset_along(const std::vector<Vec3>& normals, double distance) {
   return rows.completeOrthogonalDecomposition().solve(Eigen::VectorXd::Constant(rows.rows(), distance));
 }
 
-void require_unturned(const ShellMesh& before, const ShellMesh& after) {
-  for (std::size_t t = 0; t < before.triangles.size(); ++t) {
-    const auto across = [&](const ShellMesh& mesh) {
-      const auto& v = mesh.triangles[t];
-      return Vec3((mesh.vertices[v[1]] - mesh.vertices[v[0]]).cross(mesh.vertices[v[2]] - mesh.vertices[v[0]]));
-    };
-    if (!(across(before).dot(across(after)) > 0)) {
-      const Vec3& at = before.vertices[before.triangles[t][0]];
-      throw RequirementError(fmt::format(
-          "the middle of the wall folds at ({:.4g}, {:.4g}, {:.4g}) mm: half of the wall is thicker than the "
-          "face's radius of curvature there; take a smaller thickness, or fewer shells",
-          at.x(), at.y(), at.z()));
+void require_unfolded(const ShellMesh& before, const ShellMesh& after) {
+  for (std::size_t t = 0; t < after.triangles.size(); ++t) {
+    const auto& v = after.triangles[t];
+    const auto& x = after.vertices;
+    const Vec3 facet = (x[v[1]] - x[v[0]]).cross(x[v[2]] - x[v[0]]).normalized();
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (!(facet.dot(after.normal(t, k)) >= least_stand)) {
+        const Vec3& at = before.vertices[v[0]];
+        throw RequirementError(
+            fmt::format("the middle of the wall folds at ({:.4g}, {:.4g}, {:.4g}) mm: half of the wall is thicker than "
+                        "the face's radius of curvature there; take a smaller thickness, fewer shells or a smoother "
+                        "surface",
+                        at.x(), at.y(), at.z()));
+      }
     }
   }
 }
@@ -72,7 +75,7 @@ MidSurface mid_surface(const ShellMesh& face, WallFace which, double thickness) 
   for (std::size_t v = 0; v < normals.size(); ++v) {
     middle.shell.vertices[v] += offset_along(normals[v], distance);
   }
-  require_unturned(face, middle.shell);
+  require_unfolded(face, middle.shell);
   return middle;
 }
 
@@ -100,7 +103,7 @@ MidSurface mid_surface_between(const ShellMesh& face, WallFace which, const Targ
     throw InputError(fmt::format("the wall's other face lies {} the target, which is said to be its {} face",
                                  inwards > 0 ? "inside" : "outside", which == WallFace::outer ? "outer" : "inner"));
   }
-  require_unturned(face, middle.shell);
+  require_unfolded(face, middle.shell);
   return middle;
 }
 

@@ -16,8 +16,8 @@ struct MidSurface {
 /// Every node moves half of the thickness along its normal, from the outer face inwards, from the inner one outwards;
 /// at a crease by as much along each of its normals, as nearly as there is such a place. Normals stay.
 /// @param face  normals outward; thickness  mm, of the whole wall
-/// Errors: RequirementError: a shell turns over, the wall being thicker than the face's radius of curvature: names the
-/// place. Cost: linear.
+/// Errors: RequirementError: a shell folds, half of the wall being thicker than the face's radius of curvature: names
+/// the place. Cost: linear.
 MidSurface mid_surface(const ShellMesh& face, WallFace which, double thickness);
 
 /// Between both faces of a wall: every node moves half way to its nearest point of the other face; the length of the
