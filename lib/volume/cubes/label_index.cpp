@@ -124,11 +124,15 @@ std::optional<std::vector<Label>> LabelIndex::labels(const std::vector<std::pair
     return std::nullopt;
   }
   const double voxel_volume = std::abs(affine_.leftCols<3>().determinant());
+  std::map<double, std::string> name_of;  // the first of several
+  for (const auto& [value, name] : names) {
+    name_of.emplace(value, name);
+  }
   std::vector<Label> labels;
   for (const auto& [value, entry] : entries_) {
-    const auto name = std::ranges::find(names, value, [](const auto& named) { return named.first; });
+    const auto name = name_of.find(value);
     labels.push_back(
-        {value, entry.voxels, real(entry.voxels) * voxel_volume, name == names.end() ? std::string{} : name->second});
+        {value, entry.voxels, real(entry.voxels) * voxel_volume, name == name_of.end() ? std::string{} : name->second});
   }
   return labels;
 }
