@@ -1,10 +1,12 @@
 #!/usr/bin/env python3
 """Cohorts: the table CASES, names of volumes that are called alike, labels by name."""
 
+import csv
 import sys
 import unittest
 
-from pipeline_test import LOAD, STAGES, WithStubs
+import cohort
+from pipeline_test import LOAD, STAGES, TOOLS, Pipeline, WithStubs
 
 WALL = "pressure\tyoung\tpoisson\tthickness\tdensity"
 
@@ -211,6 +213,54 @@ class Alike(WithStubs):
         done = self.make(CASES="cases.tsv", LABELS="aorta", **LOAD)
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertEqual(sorted(self.summary()), ["p1/aorta", "p2/aorta", "third/aorta"])
+
+
+@unittest.skipUnless(all((TOOLS / f"tunica-{verb}").exists() for verb in STAGES + ["phantom"]), "the tools are not built")
+class WholeCohort(Pipeline):
+    """The real tools on phantoms, with broken cases among them."""
+
+    def run_cohort(self):
+        self.done = self.make("-j2", "-k", CASES=self.folder / "cases.tsv", SHELLS=60, THREADS=1, **cohort.WALL)
+        self.assertNotIn("Traceback", self.done.stderr)
+        with open(self.out / "summary.tsv", newline="") as file:
+            return list(csv.DictReader(file, delimiter="\t", quoting=csv.QUOTE_NONE))
+
+    def state(self):
+        """When each file of the results was written, but for reports and logs, by the case's name."""
+        state = {}
+        for path in self.out.glob("*/*/*"):
+            if path.suffix in (".ply", ".hdf", ".png"):
+                state.setdefault(path.parts[-3], {})[path.name] = path.stat().st_mtime_ns
+        return state
+
+    def redone(self, before):
+        """Names of the cases of whose results any file is another one."""
+        now = self.state()
+        return sorted(name for name in {*before, *now} if before.get(name) != now.get(name))
+
+    def test_runs_to_its_end_and_redoes_only_what_changed(self):
+        good = cohort.make_cohort(self.folder, TOOLS, 4, (16, 18))
+        self.assertEqual(cohort.wrong_rows(self.run_cohort(), good), [])
+        self.assertEqual(self.done.returncode, 2)
+        before = self.state()
+        self.assertEqual(sorted(before), sorted([*good, "held-wrongly", "no-unit", "too-close"]))
+        for name in good:
+            self.assertEqual(sorted(before[name]), ["coarse.ply", "map.png", "result.hdf", "shell.ply", "surface.ply"])
+        self.assertEqual(sorted(before["no-unit"]), ["coarse.ply", "map.png", "shell.ply", "surface.ply"])
+        self.assertEqual(sorted(before["too-close"]), ["coarse.ply", "surface.ply"])
+        self.assertEqual(cohort.wrong_rows(self.run_cohort(), good), [], "the broken ones are tried again, and named again")
+        self.assertEqual(self.redone(before), [])
+
+        table = self.folder / "cases.tsv"
+        lines = table.read_text().splitlines()
+        changed = [line.replace("1.5mm", "2mm") if line.startswith(good[0]) else line for line in lines]
+        table.write_text("\n".join(line.replace("\t1\t1.5mm", "\t1kPa\t1.5mm") for line in changed) + "\n")
+        cohort.phantom(TOOLS, self.folder / "scans" / "missing.nii.gz", "sphere", 16, 0, 1)
+        done = {row["case"].split("/")[0] for row in self.run_cohort() if row["message"] == "done"}
+        self.assertEqual(sorted(done), sorted([*good, "missing", "no-unit"]))
+        self.assertEqual(self.redone(before), sorted([good[0], "missing", "no-unit"]))
+        self.assertEqual({name: time for name, time in self.state()[good[0]].items() if name != "result.hdf"},
+                         {name: time for name, time in before[good[0]].items() if name != "result.hdf"})
 
 
 if __name__ == "__main__":

@@ -611,14 +611,6 @@ class WholeChain(Pipeline):
             self.assertFalse((self.out / name / "surface.ply").exists())
         self.assertIn("missing.nii.gz", rows["missing/1"]["message"])
 
-    @unittest.skipUnless(shutil.which("srun") and subprocess.run(["srun", "-n1", "true"], capture_output=True,
-                                                                  timeout=30).returncode == 0, "no Slurm here")
-    def test_on_slurm(self):
-        self.phantom("sphere")
-        done = self.make("-j2", VOLUMES="sphere.nii.gz", LABELS=1, SHELLS=100, THREADS=1, MEM=1000,
-                         RUN="srun -n1 -c$(THREADS) --mem=$(MEM)M --quiet", **LOAD)
-        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
-
 
 if __name__ == "__main__":
     unittest.main(argv=sys.argv[:1] + ["-v"] + sys.argv[1:])
