@@ -1,3 +1,4 @@
+#include "tunica/cli/case_memory.hpp"
 #include "tunica/cli/tool.hpp"
 #include "tunica/cli/usage.hpp"
 #include "tunica/core/narrow.hpp"
@@ -43,6 +44,7 @@ struct Arguments {
   std::optional<std::size_t> slab;
   VolumeOptions volume_options;
   bool info = false;
+  std::optional<std::size_t> shells;  // of which the memory is told
 };
 
 struct Smoothing {
@@ -102,7 +104,12 @@ void declare(cli::Tool& tool, Arguments& arguments) {
          "volume up to 1 GiB at once)")
       ->check(cli::whole_number(1))
       ->type_name("N");
-  app.add_flag("--info", arguments.info, "print size, spacing, orientation and labels with volumes, and stop");
+  app.add_flag("--info", arguments.info,
+               "print size, spacing, orientation and labels with volumes, names and the memory they take, and stop");
+  app.add_option("--shells", arguments.shells,
+                 "with --info: the shells of the chain whose memory is estimated (default 800, as the pipeline's)")
+      ->check(cli::whole_number(4))
+      ->type_name("N");
 }
 
 Vec3 parse_spacing(const std::string& text) {
@@ -160,6 +167,9 @@ void refuse_contradictions(const Arguments& arguments) {
   }
   if (arguments.info) {
     return;
+  }
+  if (arguments.shells) {
+    refuse("--shells is of the estimate that --info prints: leave it out here; tunica-relax --shells takes a count");
   }
   if (arguments.out.empty()) {
     refuse("OUT.ply is missing: name the surface to write, or pass --info to look at the volume");
@@ -230,7 +240,8 @@ private:
 // What the messages about a choice need, of a volume that may not be at hand.
 struct Contents {
   std::vector<std::string> warnings;
-  std::optional<std::vector<Label>> labels;  // none: a grey volume
+  std::optional<std::vector<Label>> labels;   // none: a grey volume
+  std::vector<std::size_t> surface_vertices;  // per label
   LabelNames names;
   Interval values{infinity, -infinity};
 };
@@ -296,6 +307,10 @@ Contents contents_of(cli::Tool& tool, const Arguments& arguments, const Names& n
   contents.labels = index->labels(contents.names);
   if (!are_labels(contents.labels)) {
     contents.labels.reset();
+    return contents;
+  }
+  for (const Label& label : *contents.labels) {
+    contents.surface_vertices.push_back(index->surface_vertices(label.value));
   }
   return contents;
 }
@@ -534,11 +549,36 @@ void to_space(TriangleMesh& mesh, const std::string& space) {
   }
 }
 
-void print_info(cli::Tool& tool, const fs::path& path, const VolumeFile& file, const Contents& contents) {
+// The labels as lines of text, and for the report.
+std::pair<std::string, Json> list_labels(const VolumeFile& file, const Contents& contents, std::size_t shells) {
+  std::string text = fmt::format("labels       {}, with MiB of memory of extract and of the chain to {} shells\n",
+                                 contents.labels->size(), shells);
+  Json list = Json::array();
+  const std::size_t voxel_bytes = std::visit([](const auto& values) { return sizeof(values[0]); }, file.volume.data);
+  for (std::size_t i = 0; i < contents.labels->size(); ++i) {
+    const Label& label = (*contents.labels)[i];
+    const auto memory = cli::estimate_memory(contents.surface_vertices[i], shells, file.volume.voxels(), voxel_bytes);
+    text += fmt::format("  {:<8} {:>12} voxels {:>14.1f} mm3 {:>7.0f} {:>7.0f} MiB  {}\n", label.value, label.voxels,
+                        label.volume_mm3, memory.extract, memory.chain(), printable(label.name));
+    list.push_back({{"label", label.value},
+                    {"voxels", label.voxels},
+                    {"volume_mm3", label.volume_mm3},
+                    {"name", label.name.empty() ? Json() : Json(label.name)},
+                    {"memory_mib",
+                     {{"extract", memory.extract},
+                      {"decimate", memory.decimate},
+                      {"relax", memory.relax},
+                      {"simulate", memory.simulate},
+                      {"chain", memory.chain()}}}});
+  }
+  return {std::move(text), std::move(list)};
+}
+
+void print_info(cli::Tool& tool, const Arguments& arguments, const VolumeFile& file, const Contents& contents) {
   const Volume& volume = file.volume;
   const auto& labels = contents.labels;
   const Interval& range = contents.values;
-  std::string text = path.string() + "\n";
+  std::string text = arguments.volume.string() + "\n";
   text += fmt::format("format       {}, {}\n", file.format, file.datatype);
   text += fmt::format("dims         {} x {} x {}\n", volume.dims[0], volume.dims[1], volume.dims[2]);
   text +=
@@ -551,17 +591,11 @@ void print_info(cli::Tool& tool, const fs::path& path, const VolumeFile& file, c
     text += fmt::format("layers       {}\n", file.layers);
   }
   text += fmt::format("values       {:.6g} .. {:.6g}\n", range.lower, range.upper);
-  Json list = Json::array();
+  Json list;
   if (labels) {
-    text += fmt::format("labels       {}\n", labels->size());
-    for (const Label& label : *labels) {
-      text += fmt::format("  {:<8} {:>12} voxels {:>14.1f} mm3  {}\n", label.value, label.voxels, label.volume_mm3,
-                          printable(label.name));
-      list.push_back({{"label", label.value},
-                      {"voxels", label.voxels},
-                      {"volume_mm3", label.volume_mm3},
-                      {"name", label.name.empty() ? Json() : Json(label.name)}});
-    }
+    auto [lines, entries] = list_labels(file, contents, arguments.shells.value_or(800));
+    text += lines;
+    list = std::move(entries);
   } else {
     text += fmt::format("labels       none: a grey volume\n");
   }
@@ -576,7 +610,7 @@ void print_info(cli::Tool& tool, const fs::path& path, const VolumeFile& file, c
   result["frames"] = file.frames;
   result["layers"] = file.layers;
   result["values"] = {range.lower, range.upper};
-  result["labels"] = labels ? list : Json();
+  result["labels"] = list;
   tool.print(text);
 }
 
@@ -751,7 +785,7 @@ void run(cli::Tool& tool, Arguments& arguments) {
     const Contents contents = contents_of(tool, arguments, names);
     header.warnings = contents.warnings;
     note_file(tool, header);
-    print_info(tool, arguments.volume, header, contents);
+    print_info(tool, arguments, header, contents);
   } else if (arguments.label) {
     set_result(tool, run_label(tool, arguments, names, smoothing));
   } else if (arguments.isovalue) {

@@ -42,7 +42,7 @@ def main():
         seconds, code, rows = run(folder, options.jobs)
         own = [float(row["seconds"]) for row in rows if row["message"] == "done"]
         print(f"{len(rows)} cases, {len(own)} done, {len(rows) - len(own)} failed: {seconds:.0f} s, exit code {code}; "
-              f"a case {statistics.median(own):.1f} s in the median, {max(own):.1f} s at most")
+              f"a case {statistics.median(own):.1f} s in the median, {max(own):.1f} s at most", flush=True)
         wrong = cohort.wrong_rows(rows, good)
         again, code, rows = run(folder, options.jobs)
         print(f"again, with nothing changed: {again:.0f} s, exit code {code}")

@@ -149,4 +149,32 @@ Mask LabelIndex::mask(double label) const {
 
 MaskBounds LabelIndex::bounds(double label) const { return entries_.at(label).bounds; }
 
+std::size_t LabelIndex::surface_vertices(double label) const {
+  const Entry& entry = entries_.at(label);
+  const std::size_t words = (dims_[0] + 63) / 64;
+  const std::size_t rows = dims_[1];
+  std::size_t pairs = 0;  // neighbours that both have the label
+  std::size_t next_row = 0;
+  std::size_t next_slice = 0;
+  const auto shared = [&](std::size_t& other, std::size_t at, std::uint64_t bits) {
+    while (other < entry.at.size() && entry.at[other] < at) {
+      ++other;
+    }
+    return other < entry.at.size() && entry.at[other] == at ? std::popcount(bits & entry.bits[other]) : 0;
+  };
+  for (std::size_t i = 0; i < entry.at.size(); ++i) {
+    const std::size_t at = entry.at[i];
+    const std::uint64_t bits = entry.bits[i];
+    pairs += std::popcount(bits & (bits >> 1));
+    if (at % words + 1 < words && i + 1 < entry.at.size() && entry.at[i + 1] == at + 1) {
+      pairs += bits >> 63 & entry.bits[i + 1] & 1;
+    }
+    if (at / words % rows + 1 < rows) {
+      pairs += shared(next_row, at + words, bits);
+    }
+    pairs += shared(next_slice, at + words * rows, bits);
+  }
+  return 6 * entry.voxels - 2 * pairs;
+}
+
 }  // namespace tunica
