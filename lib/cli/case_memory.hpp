@@ -1,3 +1,4 @@
+// cli: what every tool's command line shares.
 #pragma once
 
 #include <algorithm>

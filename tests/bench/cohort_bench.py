@@ -23,7 +23,7 @@ TOOLS = Path(os.environ.get("TUNICA_BIN", SOURCE / "build" / "release" / "bin"))
 def run(folder, jobs):
     """@return seconds, make's exit code and the rows of summary.tsv"""
     start = time.monotonic()
-    words = {"BIN": TOOLS, "OUT": folder / "out", "CASES": folder / "cases.tsv", "SHELLS": "150", **cohort.WALL}
+    words = {"BIN": TOOLS, "OUT": folder / "out", "CASES": folder / "cases.tsv", "SHELLS": "60", **cohort.WALL}
     done = subprocess.run(["make", "-f", SOURCE / "Makefile.pipeline", f"-j{jobs}", "-k", *(f"{k}={v}" for k, v in words.items())],
                           capture_output=True, check=False)
     with open(folder / "out" / "summary.tsv", newline="", encoding="utf-8") as file:
@@ -38,7 +38,7 @@ def main():
     options = arguments.parse_args()
     with tempfile.TemporaryDirectory(prefix="tunica-cohort-") as name:
         folder = Path(name)
-        good = cohort.make_cohort(folder, TOOLS, options.cases, (20, 24, 28, 32))
+        good = cohort.make_cohort(folder, TOOLS, options.cases, (16, 18, 20))
         seconds, code, rows = run(folder, options.jobs)
         own = [float(row["seconds"]) for row in rows if row["message"] == "done"]
         print(f"{len(rows)} cases, {len(own)} done, {len(rows) - len(own)} failed: {seconds:.0f} s, exit code {code}; "
