@@ -38,6 +38,8 @@ endef
 
 # $(call rules,case)
 define rules
+$(addprefix $(1)/out/,surface.ply coarse.ply shell.ply result.hdf): MEM := $$(file < $(1)/mem)
+
 $(1)/done: $(1)/out/result.hdf
 	@touch $$@
 

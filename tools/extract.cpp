@@ -1,8 +1,10 @@
+#include "tunica/cli/case_memory.hpp"
 #include "tunica/cli/tool.hpp"
 #include "tunica/cli/usage.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/core/version.hpp"
 #include "tunica/io/mesh/mesh_file.hpp"
+#include "tunica/io/volume/label_names.hpp"
 #include "tunica/io/volume/volume_file.hpp"
 #include "tunica/surface/mesh/checks.hpp"
 #include "tunica/surface/mesh/measure.hpp"
@@ -38,9 +40,11 @@ struct Arguments {
   std::string smooth = "none";
   std::string space = "lps";
   std::optional<std::string> spacing;
+  std::optional<fs::path> names;  // a table of labels
   std::optional<std::size_t> slab;
   VolumeOptions volume_options;
   bool info = false;
+  std::optional<std::size_t> shells;  // of which the memory is told
 };
 
 struct Smoothing {
@@ -59,8 +63,14 @@ void declare(cli::Tool& tool, Arguments& arguments) {
   app.add_option("VOLUME", arguments.volume, "segmented or grey volume: NIfTI, NRRD, MetaImage, slices")->required();
   app.add_option("OUT.ply", arguments.out, "the surface; with --all-labels {label} in it is the label");
   tool.group("What is inside");
-  app.add_option("--label", arguments.label, "the label whose surface is wanted, by value or by the name in the file")
+  app.add_option(
+         "--label", arguments.label,
+         "the label whose surface is wanted, by value or by the name that the volume, --names or a table beside "
+         "the volume (scan.tsv, .ctbl, .label, .lut, .txt, .csv of scan.nii.gz) gives it")
       ->type_name("N");
+  app.add_option("--names", arguments.names,
+                 "a table of label names: BIDS _dseg.tsv, ITK-SNAP's, Slicer's .ctbl, FreeSurfer's look-up table")
+      ->type_name("FILE");
   app.add_option("--isovalue", arguments.isovalue, "the value on the surface of a grey volume")->type_name("V");
   app.add_option("--inside", arguments.inside,
                  "which side of the isovalue is inside (default above; a sample equal to it is outside)")
@@ -94,7 +104,12 @@ void declare(cli::Tool& tool, Arguments& arguments) {
          "volume up to 1 GiB at once)")
       ->check(cli::whole_number(1))
       ->type_name("N");
-  app.add_flag("--info", arguments.info, "print size, spacing, orientation and labels with volumes, and stop");
+  app.add_flag("--info", arguments.info,
+               "print size, spacing, orientation and labels with volumes, names and the memory they take, and stop");
+  app.add_option("--shells", arguments.shells,
+                 "with --info: the shells of the chain whose memory is estimated (default 800, as the pipeline's)")
+      ->check(cli::whole_number(4))
+      ->type_name("N");
 }
 
 Vec3 parse_spacing(const std::string& text) {
@@ -153,6 +168,9 @@ void refuse_contradictions(const Arguments& arguments) {
   if (arguments.info) {
     return;
   }
+  if (arguments.shells) {
+    refuse("--shells is of the estimate that --info prints: leave it out here; tunica-relax --shells takes a count");
+  }
   if (arguments.out.empty()) {
     refuse("OUT.ply is missing: name the surface to write, or pass --info to look at the volume");
   }
@@ -164,8 +182,16 @@ void refuse_contradictions(const Arguments& arguments) {
   }
 }
 
+// One line of printable text, whatever a file says or is called.
+std::string printable(std::string text) {
+  std::replace_if(
+      text.begin(), text.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, '?');
+  return text;
+}
+
 std::string named(const Label& label) {
-  return label.name.empty() ? fmt::format("{}", label.value) : fmt::format("{} ({})", label.value, label.name);
+  return label.name.empty() ? fmt::format("{}", label.value)
+                            : fmt::format("{} ({})", label.value, printable(label.name));
 }
 
 std::string list_of(const std::vector<Label>& labels) {
@@ -183,10 +209,40 @@ bool are_labels(const std::optional<std::vector<Label>>& labels) {
                                [](const Label& label) { return label.value == std::floor(label.value); });
 }
 
+// The names of a volume's labels: those of --names, else the volume's own, else those of a table beside it.
+class Names {
+public:
+  void read(cli::Tool& tool, const Arguments& arguments) {
+    if (arguments.names) {
+      given_ = read_label_names(tool.input(*arguments.names));
+      return;
+    }
+    for (const fs::path& table : label_tables_beside(arguments.volume)) {
+      try {
+        beside_ = read_label_names(table);
+        tool.input(table);
+        return;
+      } catch (const InputError& error) {
+        tool.warn(fmt::format("{}; left out, the volume's labels have no names of it", error.what()));
+      }
+    }
+  }
+
+  [[nodiscard]] const LabelNames& of(const VolumeFile& file) const {
+    return !given_.empty() ? given_ : !file.volume.label_names.empty() ? file.volume.label_names : beside_;
+  }
+
+private:
+  LabelNames given_;
+  LabelNames beside_;
+};
+
 // What the messages about a choice need, of a volume that may not be at hand.
 struct Contents {
   std::vector<std::string> warnings;
-  std::optional<std::vector<Label>> labels;  // none: a grey volume
+  std::optional<std::vector<Label>> labels;   // none: a grey volume
+  std::vector<std::size_t> surface_vertices;  // per label
+  LabelNames names;
   Interval values{infinity, -infinity};
 };
 
@@ -235,7 +291,7 @@ VolumeFile read_slabs(cli::Tool& tool, const Arguments& arguments, const char* d
   return read;
 }
 
-Contents contents_of(cli::Tool& tool, const Arguments& arguments) {
+Contents contents_of(cli::Tool& tool, const Arguments& arguments, const Names& names) {
   Contents contents;
   std::optional<LabelIndex> index;
   const VolumeFile file =
@@ -247,9 +303,14 @@ Contents contents_of(cli::Tool& tool, const Arguments& arguments) {
         widen(contents.values, slab);
       });
   contents.warnings = file.warnings;
-  contents.labels = index->labels(file.volume.label_names);
+  contents.names = names.of(file);
+  contents.labels = index->labels(contents.names);
   if (!are_labels(contents.labels)) {
     contents.labels.reset();
+    return contents;
+  }
+  for (const Label& label : *contents.labels) {
+    contents.surface_vertices.push_back(index->surface_vertices(label.value));
   }
   return contents;
 }
@@ -271,6 +332,16 @@ Contents contents_of(cli::Tool& tool, const Arguments& arguments) {
 
 [[noreturn]] void throw_no_label(const fs::path& path, const Contents& contents, const std::string& text) {
   const auto& labels = contents.labels;
+  if (!parse_number(text) && !find_label(contents.names, text)) {
+    const std::string near = nearest_label(contents.names, text);
+    const std::string hint =
+        !near.empty() ? fmt::format("did you mean '{}'?", printable(near))
+        : labels && !labels->empty()
+            ? fmt::format("{}its labels are {}",
+                          contents.names.empty() ? "nothing names its labels (--names FILE); " : "", list_of(*labels))
+            : std::string(labels ? "every voxel is 0" : "it is a grey volume; pass --isovalue V");
+    throw InputError(fmt::format("{}: has no label of the name '{}': {}", path.string(), printable(text), hint));
+  }
   throw InputError(
       labels && !labels->empty()
           ? fmt::format("{}: has no voxel with label {}; its labels are {}", path.string(), text, list_of(*labels))
@@ -278,16 +349,20 @@ Contents contents_of(cli::Tool& tool, const Arguments& arguments) {
                         labels ? "every voxel is 0" : "it is a grey volume; pass --isovalue V"));
 }
 
-// The label asked for, by value or by its name in the file.
-std::optional<Target> label_target(const VolumeFile& file, const std::string& text) {
-  const auto value = parse_number(text);
-  for (const auto& [label, name] : file.volume.label_names) {
-    if (value ? label == *value : name == text) {
-      return Target{{Inside::Rule::label, label}, "label " + named({label, 0, 0, name})};
-    }
+// The label asked for, by value or by name; none where there is none of that name, or the background.
+std::optional<Target> label_target(const fs::path& path, const LabelNames& names, const std::string& text) {
+  std::optional<double> value;
+  try {
+    value = find_label(names, text);
+  } catch (const InputError& error) {
+    throw InputError(fmt::format("{}: {}", path.string(), error.what()));
   }
-  return value && *value != 0 ? std::optional(Target{{Inside::Rule::label, *value}, fmt::format("label {}", *value)})
-                              : std::nullopt;
+  if (!value || *value == 0) {
+    return {};
+  }
+  const auto at = std::ranges::find(names, *value, [](const auto& label) { return label.first; });
+  const std::string name = parse_number(text) ? (at == names.end() ? "" : at->second) : text;
+  return Target{{Inside::Rule::label, *value}, "label " + named({*value, 0, 0, name})};
 }
 
 Target isovalue_target(const Arguments& arguments) {
@@ -368,7 +443,8 @@ SmoothedField smoothed_field(cli::Tool& tool, const Selection& selection, double
              : smooth_mask(selection.mask, sigma, progress);
 }
 
-Surface extract(cli::Tool& tool, Selection selection, const Arguments& arguments, const Smoothing& smoothing) {
+Surface extract(cli::Tool& tool, Selection selection, const Arguments& arguments, const Names& names,
+                const Smoothing& smoothing) {
   double voxel_volume = 0;
   {
     const auto stage = tool.stage("extract");
@@ -379,7 +455,7 @@ Surface extract(cli::Tool& tool, Selection selection, const Arguments& arguments
   }
   const Target target = selection.target;
   if (voxel_volume == 0) {
-    const Contents contents = contents_of(tool, arguments);
+    const Contents contents = contents_of(tool, arguments, names);
     if (arguments.label) {
       throw_no_label(arguments.volume, contents, *arguments.label);
     }
@@ -473,18 +549,36 @@ void to_space(TriangleMesh& mesh, const std::string& space) {
   }
 }
 
-// A comment is one line of printable text, whatever the file is called.
-std::string comment(std::string text) {
-  std::replace_if(
-      text.begin(), text.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, '?');
-  return text;
+// The labels as lines of text, and for the report.
+std::pair<std::string, Json> list_labels(const VolumeFile& file, const Contents& contents, std::size_t shells) {
+  std::string text = fmt::format("labels       {}, with MiB of memory of extract and of the chain to {} shells\n",
+                                 contents.labels->size(), shells);
+  Json list = Json::array();
+  const std::size_t voxel_bytes = std::visit([](const auto& values) { return sizeof(values[0]); }, file.volume.data);
+  for (std::size_t i = 0; i < contents.labels->size(); ++i) {
+    const Label& label = (*contents.labels)[i];
+    const auto memory = cli::estimate_memory(contents.surface_vertices[i], shells, file.volume.voxels(), voxel_bytes);
+    text += fmt::format("  {:<8} {:>12} voxels {:>14.1f} mm3 {:>7.0f} {:>7.0f} MiB  {}\n", label.value, label.voxels,
+                        label.volume_mm3, memory.extract, memory.chain(), printable(label.name));
+    list.push_back({{"label", label.value},
+                    {"voxels", label.voxels},
+                    {"volume_mm3", label.volume_mm3},
+                    {"name", label.name.empty() ? Json() : Json(label.name)},
+                    {"memory_mib",
+                     {{"extract", memory.extract},
+                      {"decimate", memory.decimate},
+                      {"relax", memory.relax},
+                      {"simulate", memory.simulate},
+                      {"chain", memory.chain()}}}});
+  }
+  return {std::move(text), std::move(list)};
 }
 
-void print_info(cli::Tool& tool, const fs::path& path, const VolumeFile& file, const Contents& contents) {
+void print_info(cli::Tool& tool, const Arguments& arguments, const VolumeFile& file, const Contents& contents) {
   const Volume& volume = file.volume;
   const auto& labels = contents.labels;
   const Interval& range = contents.values;
-  std::string text = path.string() + "\n";
+  std::string text = arguments.volume.string() + "\n";
   text += fmt::format("format       {}, {}\n", file.format, file.datatype);
   text += fmt::format("dims         {} x {} x {}\n", volume.dims[0], volume.dims[1], volume.dims[2]);
   text +=
@@ -497,17 +591,11 @@ void print_info(cli::Tool& tool, const fs::path& path, const VolumeFile& file, c
     text += fmt::format("layers       {}\n", file.layers);
   }
   text += fmt::format("values       {:.6g} .. {:.6g}\n", range.lower, range.upper);
-  Json list = Json::array();
+  Json list;
   if (labels) {
-    text += fmt::format("labels       {}\n", labels->size());
-    for (const Label& label : *labels) {
-      text += fmt::format("  {:<8} {:>12} voxels {:>14.1f} mm3  {}\n", label.value, label.voxels, label.volume_mm3,
-                          comment(label.name));
-      list.push_back({{"label", label.value},
-                      {"voxels", label.voxels},
-                      {"volume_mm3", label.volume_mm3},
-                      {"name", label.name.empty() ? Json() : Json(label.name)}});
-    }
+    auto [lines, entries] = list_labels(file, contents, arguments.shells.value_or(800));
+    text += lines;
+    list = std::move(entries);
   } else {
     text += fmt::format("labels       none: a grey volume\n");
   }
@@ -522,7 +610,7 @@ void print_info(cli::Tool& tool, const fs::path& path, const VolumeFile& file, c
   result["frames"] = file.frames;
   result["layers"] = file.layers;
   result["values"] = {range.lower, range.upper};
-  result["labels"] = labels ? list : Json();
+  result["labels"] = list;
   tool.print(text);
 }
 
@@ -554,10 +642,11 @@ void warn_of_few_voxels(const cli::Tool& tool, const Surface& surface, const Jso
 }
 
 // Extracts one surface, writes it and returns what the report says of it.
-Json extract_to_file(cli::Tool& tool, Selection selection, const Arguments& arguments, const Smoothing& smoothing) {
+Json extract_to_file(cli::Tool& tool, Selection selection, const Arguments& arguments, const Names& names,
+                     const Smoothing& smoothing) {
   const Target target = selection.target;
   const Vec3 voxel = selection.mask.affine().leftCols<3>().colwise().norm();
-  Surface surface = extract(tool, std::move(selection), arguments, smoothing);
+  Surface surface = extract(tool, std::move(selection), arguments, names, smoothing);
   Json result = measured(surface, arguments.open_border);
   warn_of_few_voxels(tool, surface, result, target.name);
   const fs::path out = output_path(arguments.out, target);
@@ -565,7 +654,7 @@ Json extract_to_file(cli::Tool& tool, Selection selection, const Arguments& argu
     const auto stage = tool.stage("write");
     PlyOptions options;
     options.comments = {fmt::format("tunica-extract {}", version),
-                        comment("source " + arguments.volume.filename().string()), comment(target.name),
+                        printable("source " + arguments.volume.filename().string()), printable(target.name),
                         fmt::format("voxel {:.6g} {:.6g} {:.6g} mm", voxel.x(), voxel.y(), voxel.z())};
     options.space = arguments.space == "ras" ? "RAS" : "LPS";
     options.overwrite = tool.force();
@@ -584,7 +673,7 @@ void set_result(cli::Tool& tool, const Json& result) {
 }
 
 // One pass over the volume, whatever the number of labels.
-void run_all_labels(cli::Tool& tool, const Arguments& arguments, const Smoothing& smoothing) {
+void run_all_labels(cli::Tool& tool, const Arguments& arguments, const Names& names, const Smoothing& smoothing) {
   std::optional<LabelIndex> index;
   const VolumeFile file = read_slabs(tool, arguments, "extract",
                                      [&](const VolumeFile& header, const Volume& slab, std::size_t first_slice) {
@@ -594,7 +683,7 @@ void run_all_labels(cli::Tool& tool, const Arguments& arguments, const Smoothing
                                        index->add(slab, first_slice);
                                      });
   note_file(tool, file);
-  const auto labels = index->labels(file.volume.label_names);
+  const auto labels = index->labels(names.of(file));
   if (!are_labels(labels) || labels->empty()) {
     throw InputError(fmt::format("{}: {}", arguments.volume.string(),
                                  are_labels(labels) ? "holds no label: every voxel is 0"
@@ -614,7 +703,7 @@ void run_all_labels(cli::Tool& tool, const Arguments& arguments, const Smoothing
       selection.emplace(Selection{target, index->mask(value), index->bounds(value)});
     }
     results[fmt::format("{}", target.inside.value)] =
-        extract_to_file(tool, std::move(*selection), arguments, smoothing);
+        extract_to_file(tool, std::move(*selection), arguments, names, smoothing);
   }
   set_result(tool, summed(results));
   tool.result()["labels"] = results;
@@ -629,7 +718,7 @@ bool hold_values(const Arguments& arguments, const Smoothing& smoothing, const V
          (!arguments.slab && header.volume.voxels() <= most_bytes / voxel_bytes);
 }
 
-Json run_isovalue(cli::Tool& tool, const Arguments& arguments, const Smoothing& smoothing) {
+Json run_isovalue(cli::Tool& tool, const Arguments& arguments, const Names& names, const Smoothing& smoothing) {
   const Target target = isovalue_target(arguments);
   tool.output(arguments.out, {".ply"});
   std::optional<VolumeFile> file;
@@ -655,17 +744,18 @@ Json run_isovalue(cli::Tool& tool, const Arguments& arguments, const Smoothing& 
                       });
   }
   note_file(tool, *file);
-  return extract_to_file(tool, {target, std::move(*mask), {}, held ? &file->volume : nullptr}, arguments, smoothing);
+  return extract_to_file(tool, {target, std::move(*mask), {}, held ? &file->volume : nullptr}, arguments, names,
+                         smoothing);
 }
 
-Json run_label(cli::Tool& tool, const Arguments& arguments, const Smoothing& smoothing) {
+Json run_label(cli::Tool& tool, const Arguments& arguments, const Names& names, const Smoothing& smoothing) {
   std::optional<Target> target;
   std::optional<Mask> mask;
   const VolumeFile file = read_slabs(tool, arguments, "extract",
                                      [&](const VolumeFile& header, const Volume& slab, std::size_t first_slice) {
                                        if (!mask) {
                                          mask.emplace(header.volume.dims, header.volume.affine);
-                                         target = label_target(header, *arguments.label);
+                                         target = label_target(arguments.volume, names.of(header), *arguments.label);
                                          if (target) {
                                            tool.output(output_path(arguments.out, *target), {".ply"});
                                          }
@@ -676,9 +766,9 @@ Json run_label(cli::Tool& tool, const Arguments& arguments, const Smoothing& smo
                                      });
   note_file(tool, file);
   if (!target) {
-    throw_no_label(arguments.volume, contents_of(tool, arguments), *arguments.label);
+    throw_no_label(arguments.volume, contents_of(tool, arguments, names), *arguments.label);
   }
-  return extract_to_file(tool, {*target, std::move(*mask), {}, nullptr}, arguments, smoothing);
+  return extract_to_file(tool, {*target, std::move(*mask), {}, nullptr}, arguments, names, smoothing);
 }
 
 void run(cli::Tool& tool, Arguments& arguments) {
@@ -688,20 +778,22 @@ void run(cli::Tool& tool, Arguments& arguments) {
     arguments.volume_options.spacing = parse_spacing(*arguments.spacing);
   }
   tool.input(arguments.volume);
+  Names names;
+  names.read(tool, arguments);
   if (arguments.info) {
     VolumeFile header = read_volume_header(arguments.volume, arguments.volume_options);
-    const Contents contents = contents_of(tool, arguments);
+    const Contents contents = contents_of(tool, arguments, names);
     header.warnings = contents.warnings;
     note_file(tool, header);
-    print_info(tool, arguments.volume, header, contents);
+    print_info(tool, arguments, header, contents);
   } else if (arguments.label) {
-    set_result(tool, run_label(tool, arguments, smoothing));
+    set_result(tool, run_label(tool, arguments, names, smoothing));
   } else if (arguments.isovalue) {
-    set_result(tool, run_isovalue(tool, arguments, smoothing));
+    set_result(tool, run_isovalue(tool, arguments, names, smoothing));
   } else if (arguments.all_labels) {
-    run_all_labels(tool, arguments, smoothing);
+    run_all_labels(tool, arguments, names, smoothing);
   } else {
-    throw_choice(arguments.volume, contents_of(tool, arguments));
+    throw_choice(arguments.volume, contents_of(tool, arguments, names));
   }
 }
 

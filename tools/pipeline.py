@@ -4,6 +4,7 @@
 make and the shell cannot hold any name a file may have, so they see none. For every case there is a folder in OUT/.run,
 called by a harmless name, with
   out              a link to the case's own folder, OUT/<volume stem>/<label>
+  mem              its MEM
   STAGE.command    the command of the stage, its words quoted for the shell
   STAGE.flags      what its result depends on besides the files make sees; as old as can be when that has not changed
   STAGE.exit       the exit code of the stage in this run; empty while it runs
@@ -17,7 +18,6 @@ ended: runs on one OUT come one after the other, also after a kill that left som
 import argparse
 import errno
 import fcntl
-import glob
 import hashlib
 import os
 import re
@@ -29,108 +29,10 @@ import sys
 import tempfile
 
 import summary
+from cases import CONTROL, Refused, find_cases
 
-ENDINGS = (".seg.nrrd", ".nii.gz", ".nii", ".nrrd", ".nhdr", ".mha", ".mhd", ".tiff", ".tif", ".png")
 PRODUCTS = {"extract": ["surface.ply"], "decimate": ["coarse.ply"], "relax": ["shell.ply", "map.png"],
             "simulate": ["result.hdf"]}
-OF_THE_RUN = (".lock", ".run", "summary.tsv", "chart.svg")
-BLANKS = re.compile(r"\s+", re.ASCII)
-CONTROL = re.compile(r"[\x00-\x1f\x7f]")
-
-
-class Refused(Exception):
-    """What is asked for cannot be meant; the text says why and what to do."""
-
-
-class Case:
-    """One label of one volume."""
-
-    def __init__(self, out, volume, stem, label):
-        self.volume = volume
-        self.label = label
-        self.name = f"{stem}/{label}"
-        self.folder = os.path.join(out, stem, label)
-        self.plan = None  # its folder in OUT/.run
-        self.refused = unfit(volume, stem)  # why it is not run, or None
-
-
-def setting(name):
-    """A setting in one line; blank when it is not given. Texts with blanks in them may be names only where VOLUMES and
-    OUT are read."""
-    return BLANKS.sub(" ", os.environ.get(name, "")).strip()
-
-
-def switched_on(name):
-    return setting(name) not in ("", "0", "no", "off", "false")
-
-
-def shown(name):
-    """A name in one line."""
-    return CONTROL.sub(lambda sign: repr(sign.group())[1:-1], name)
-
-
-# ------------------------------------------------------------------------------------------------------- which cases
-
-def matching(text):
-    """The files a word of VOLUMES means: itself where there is such a file, else what it matches."""
-    path = os.path.expanduser(text)
-    return [path] if os.path.lexists(path) else sorted(glob.glob(path))
-
-
-def find_volumes(text):
-    """The volumes of a list of names and globs. Neighbouring words are one name with blanks where only that exists."""
-    words = list(re.finditer(r"\S+", text, re.ASCII))
-    if os.path.lexists(text):
-        return [text]
-    found = []
-    first = 0
-    while first < len(words):
-        for last in range(first, len(words)):
-            volumes = matching(text[words[first].start():words[last].end()])
-            if volumes:
-                break
-        else:
-            word, last = words[first].group(), first
-            if glob.has_magic(word):
-                raise Refused(f"VOLUMES: nothing matches {word}")
-            volumes = [word]  # the tool says what is wrong with it
-        found += volumes
-        first = last + 1
-    return found
-
-
-def stem_of(volume):
-    """The name of a volume's folder of results."""
-    name = os.path.basename(os.path.abspath(volume))
-    for ending in ENDINGS:
-        if name.endswith(ending) and name != ending:
-            return name[:-len(ending)]
-    return name
-
-
-def unfit(volume, stem):
-    """Why no case can be made of a volume, or None."""
-    if CONTROL.search(volume):
-        return f"{shown(volume)}: has a control character in its name: rename the file or link to it"
-    if stem in ("", *OF_THE_RUN):
-        return f"{volume}: its results cannot be called '{stem}' in OUT: rename the file or link to it"
-    return None
-
-
-def find_cases(out):
-    labels = ["iso" + setting("ISOVALUE")] if setting("ISOVALUE") else setting("LABELS").split()
-    for label in labels:
-        if "/" in label or label in (".", ".."):
-            raise Refused(f"LABELS: '{label}' cannot be the name of a folder: give the label's value")
-    volumes = {os.path.abspath(path): path for path in reversed(find_volumes(os.environ.get("VOLUMES", "")))}
-    if not volumes:
-        raise Refused("VOLUMES is empty: name segmented volumes, or leave it out to see a shipped sample")
-    by_stem = {}
-    for volume in reversed(volumes.values()):
-        other = by_stem.setdefault(stem_of(volume), volume)
-        if other is not volume:
-            raise Refused(f"{shown(other)} and {shown(volume)} have the same stem and would share a folder: rename one")
-    return [Case(out, volume, stem, label) for stem, volume in by_stem.items() for label in dict.fromkeys(labels)]
 
 
 # ------------------------------------------------------------------------------------------------------ what they run
@@ -140,27 +42,29 @@ def flag(name, value):
     return [f"{name}={value}"] if value.startswith("-") else [name, value]
 
 
-def flag_if(name, setting_name):
-    return flag(name, setting(setting_name)) if setting(setting_name) else []
-
-
 def path_word(path):
     """A path that no tool takes for a flag."""
     return os.path.join(".", path) if path.startswith("-") else path
 
 
-def stage_flags(label):
+def stage_flags(case):
     """Per stage what changes its result, as text for the shell."""
-    extract = flag_if("--isovalue", "ISOVALUE") or flag("--label", label)
-    extract += flag_if("--smooth", "SMOOTH")
+    setting = case.setting
+
+    def flag_if(name, setting_name):
+        return flag(name, setting(setting_name)) if setting(setting_name) else []
+
+    extract = flag_if("--isovalue", "ISOVALUE") or flag("--label", case.label)
+    extract += flag_if("--names", "NAMES") + flag_if("--smooth", "SMOOTH")
     for name, word in (("LARGEST", "--largest"), ("FILL", "--fill-cavities"), ("OPEN", "--open-border")):
-        extract += [word] if switched_on(name) else []
-    decimate = flag_if("--triangles", "SHELLS")
+        extract += [word] if case.switched_on(name) else []
+    shells = setting("SHELLS") or ("190" if setting("ACCURACY") else "800")
+    decimate = ["--triangles", shells]
     relax = flag("--tolerance", setting("TOLERANCE")) + ["--refine"] if setting("TOLERANCE") else []
     if setting("ACCURACY"):
         # The coarsest of the levels: well shaped, and near enough to be refitted.
         decimate += ["--min-angle", "20"]
-        relax = ["--shells", setting("SHELLS"), "--max-iterations", "1"]
+        relax = ["--shells", shells, "--max-iterations", "1"]
     relax += flag_if("--method", "METHOD")
     simulate = flag_if("--fix", "FIX") + flag_if("--accuracy", "ACCURACY") + flag_if("--of", "OF")
     for name in ("pressure", "young", "poisson", "thickness", "density"):
@@ -170,7 +74,7 @@ def stage_flags(label):
     else:
         simulate += flag_if("--duration", "DURATION") + flag_if("--step", "STEP")
     words = {"extract": extract, "decimate": decimate, "relax": relax, "simulate": simulate}
-    return {stage: " ".join([shlex.join(words[stage]), setting(stage.upper())]).strip() for stage in words}
+    return {stage: f"{shlex.join(words[stage])} {setting(stage.upper())}".strip() for stage in words}
 
 
 def stage_commands(case, binaries, flags):
@@ -180,10 +84,10 @@ def stage_commands(case, binaries, flags):
         for name in ("surface.ply", "coarse.ply", "shell.ply", "map.png", "result.hdf", "extract.json"))
     words = {"extract": [path_word(case.volume), surface], "decimate": [surface, coarse],
              "relax": [coarse, surface, shell, "--picture", picture],
-             "simulate": [shell, result, *(["--target", surface] if setting("ACCURACY") else [])]}
+             "simulate": [shell, result, *(["--target", surface] if case.setting("ACCURACY") else [])]}
     # Whether there is a boundary to hold is known once the surface is.
     is_closed = f"grep -q '\"closed\": *true' {shlex.quote(facts)}"
-    chosen_fix = "" if setting("FIX") else f' --fix "$(if {is_closed}; then echo rigid-motions; else echo boundary; fi)"'
+    chosen_fix = "" if case.setting("FIX") else f' --fix "$(if {is_closed}; then echo rigid-motions; else echo boundary; fi)"'
     commands = {}
     for stage, stage_words in words.items():
         tool = os.path.join(binaries, f"tunica-{stage}")
@@ -253,7 +157,8 @@ def plan_case(case, binaries, dry):
     os.makedirs(os.path.dirname(case.plan), exist_ok=True)
     os.mkdir(case.plan)
     os.symlink(os.path.abspath(case.folder), os.path.join(case.plan, "out"))
-    flags = stage_flags(case.label)
+    write_text(os.path.join(case.plan, "mem"), case.setting("MEM"))
+    flags = stage_flags(case)
     commands = stage_commands(case, binaries, flags)
     for stage in summary.STAGES:
         # The volume itself, which may be a folder of slices, stands here: a report names the files.
@@ -379,12 +284,15 @@ def main():
     arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     arguments.add_argument("--make", default="make", help="how make is called")
     arguments.add_argument("--dry-run", action="store_true", help="write nothing")
+    arguments.add_argument("--check", action="store_true", help="only see whether the cases can be meant")
     options = arguments.parse_args()
     out = path_word(os.environ.get("OUT", ""))
     if not out.strip() or CONTROL.search(out):
         raise Refused("OUT: has no name for the folder of the results that fits in one line")
     binaries = path_word(os.environ.get("BIN", "").rstrip("/"))
     cases = find_cases(out)
+    if options.check:
+        return 0
     if options.dry_run:
         return dry_run(cases, binaries, options.make)
     return real_run(cases, out, binaries, options.make)
@@ -397,7 +305,8 @@ if __name__ == "__main__":
     try:
         sys.exit(main())
     except Refused as refusal:
-        say(refusal)
+        for line in refusal.args:
+            say(line)
     except OSError as failure:
         say(f"{failure.filename or 'OUT'}: {failure.strerror}")
     except KeyboardInterrupt:

@@ -44,6 +44,7 @@ OWNERS = [
     (r"tiffio\.h", "libtiff", r"lib/io/.*\.cpp"),
     (r"png\.h", "libpng", r"lib/(draw|io)/.*\.cpp"),
     (r"zlib\.h", "zlib", r"lib/io/.*\.cpp"),
+    (r"expat\.h", "Expat", r"lib/io/.*\.cpp"),
     (r"openssl/", "OpenSSL", r"lib/io/.*\.cpp"),
     (r"(suitesparse/|cholmod|SuiteSparse|umfpack|amd\.h|colamd\.h)", "CHOLMOD", r"lib/mechanics/.*\.cpp"),
     (r"Eigen/CholmodSupport", "CHOLMOD", r"lib/mechanics/.*\.cpp"),

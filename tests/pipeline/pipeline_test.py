@@ -238,9 +238,9 @@ class Rules(WithStubs):
         self.assertIn("KIND=quick", self.refusal(VOLUMES="a.nii.gz", LABEL=1, KIND="quick", **LOAD))
         self.assertIn("exclude each other", self.refusal(VOLUMES="a.nii.gz", LABEL=1, ISOVALUE=2, **LOAD))
         self.assertIn("nothing matches none*.nii", self.refusal(VOLUMES="none*.nii", LABEL=1, **LOAD))
-        (self.folder / "other").mkdir()
-        (self.folder / "other" / "a.nii").write_text("another")
-        self.assertIn("same stem", self.refusal(VOLUMES="a.nii.gz other/a.nii", LABEL=1, **LOAD))
+        (self.folder / "a.nii").write_text("another")
+        self.assertIn("same stem", self.refusal(VOLUMES="a.nii.gz a.nii", LABEL=1, **LOAD))
+        self.assertIn("LABELS: a quotation mark", self.refusal(VOLUMES="a.nii.gz", LABELS="'aorta", **LOAD))
         self.assertIn("VOLUMES is empty", self.refusal(VOLUMES="", LABEL=1, **LOAD))
         self.assertIn("OUT: has no name", self.refusal(VOLUMES="a.nii.gz", LABEL=1, **{**LOAD, "OUT": ""}))
         self.assertIn("folder", self.refusal(VOLUMES="a.nii.gz", LABELS="../1", **LOAD))
@@ -610,14 +610,6 @@ class WholeChain(Pipeline):
             self.assertEqual((rows[name]["stage"], rows[name]["exit"]), ("extract", "3"), name)
             self.assertFalse((self.out / name / "surface.ply").exists())
         self.assertIn("missing.nii.gz", rows["missing/1"]["message"])
-
-    @unittest.skipUnless(shutil.which("srun") and subprocess.run(["srun", "-n1", "true"], capture_output=True,
-                                                                  timeout=30).returncode == 0, "no Slurm here")
-    def test_on_slurm(self):
-        self.phantom("sphere")
-        done = self.make("-j2", VOLUMES="sphere.nii.gz", LABELS=1, SHELLS=100, THREADS=1, MEM=1000,
-                         RUN="srun -n1 -c$(THREADS) --mem=$(MEM)M --quiet", **LOAD)
-        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
 
 
 if __name__ == "__main__":

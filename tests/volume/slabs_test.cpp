@@ -140,6 +140,24 @@ TEST(LabelIndex, ThreeHundredLabelsInOnePassAreThoseOfEachLabelAlone) {
   }
 }
 
+// Edges of the grid, one voxel wider on each side, between inside and outside.
+std::size_t edges_between(const Mask& mask) {
+  const auto& dims = mask.dims();
+  std::size_t edges = 0;
+  for (std::size_t k = 0; k < dims[2]; ++k) {
+    for (std::size_t j = 0; j < dims[1]; ++j) {
+      for (std::size_t i = 0; i < dims[0]; ++i) {
+        if (mask(i, j, k)) {
+          edges += (i == 0 || !mask(i - 1, j, k)) + (i + 1 == dims[0] || !mask(i + 1, j, k));
+          edges += (j == 0 || !mask(i, j - 1, k)) + (j + 1 == dims[1] || !mask(i, j + 1, k));
+          edges += (k == 0 || !mask(i, j, k - 1)) + (k + 1 == dims[2] || !mask(i, j, k + 1));
+        }
+      }
+    }
+  }
+  return edges;
+}
+
 TEST(LabelIndex, RowsOfEveryLengthAroundAWordAndEveryKindOfValue) {
   Random random(12);
   for (std::size_t columns = 1; columns <= 131; columns += columns < 60 ? 13 : 1) {
@@ -152,7 +170,9 @@ TEST(LabelIndex, RowsOfEveryLengthAroundAWordAndEveryKindOfValue) {
     const auto labels = index.labels();
     for (const Label& label : *labels) {
       EXPECT_NE(label.value, 0);
-      EXPECT_EQ(index.mask(label.value), select(volume, {Inside::Rule::label, label.value})) << columns;
+      const Mask mask = index.mask(label.value);
+      EXPECT_EQ(mask, select(volume, {Inside::Rule::label, label.value})) << columns;
+      EXPECT_EQ(index.surface_vertices(label.value), edges_between(mask)) << columns;
     }
   }
 }

@@ -1,4 +1,3 @@
-// io/volume: formats of segmented volumes, a file each.
 #pragma once
 
 #include "tunica/core/types.hpp"

@@ -1,6 +1,7 @@
 // NIfTI-1 and NIfTI-2: https://nifti.nimh.nih.gov/pub/dist/src/niftilib/nifti1.h and .../nifti2.h
 
 #include "tunica/core/error.hpp"
+#include "tunica/io/volume/detail/label_table.hpp"
 #include "tunica/io/volume/detail/volume_format.hpp"
 
 #include <fmt/format.h>
@@ -12,6 +13,7 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <limits>
 
 namespace tunica::volume_format {
 namespace fs = std::filesystem;
@@ -352,6 +354,45 @@ std::uint64_t voxel_offset(const fs::path& path, const Header& header) {
   return static_cast<std::uint64_t>(offset);
 }
 
+// Reads the label names of the extensions between the header, which has just been read, and the voxels. What is wrong
+// with them is a warning: the voxels are whole.
+void read_extensions(VolumeFile& file, const fs::path& path, const Header& header, ByteStream& stream) {
+  constexpr std::uint64_t most_bytes = std::uint64_t{4} << 20;
+  const std::uint64_t end = header.pair ? std::numeric_limits<std::uint64_t>::max() : voxel_offset(path, header);
+  const auto damaged = [&](const std::string& why) {
+    file.warnings.push_back(
+        fmt::format("{}: the label names in its header's extension are damaged: {}", path.string(), why));
+  };
+  std::array<char, 8> head{};
+  if (stream.read(head.data(), 4) < 4 || head[0] == 0) {
+    return;
+  }
+  while (stream.position() + head.size() <= end && stream.read(head.data(), head.size()) == head.size()) {
+    const Fields fields(std::string_view(head.data(), head.size()), header.big_endian);
+    const std::int64_t size = fields.at<std::int32_t>(0) - std::int64_t{8};
+    const auto code = fields.at<std::int32_t>(4);
+    if (size < 0 || static_cast<std::uint64_t>(size) > end - stream.position()) {
+      return;  // no extension begins here
+    }
+    const auto bytes = static_cast<std::uint64_t>(size);
+    // Code 0 is TotalSegmentator's, 30 Caret's own.
+    if ((code != 0 && code != 30) || bytes > most_bytes) {
+      stream.skip(bytes);
+      continue;
+    }
+    std::string text(bytes, '\0');
+    text.resize(stream.read(text.data(), text.size()));
+    std::optional<std::string> why;
+    file.volume.label_names = parse_label_table_xml(text, why);
+    if (why) {
+      damaged(*why);
+    }
+    if (!file.volume.label_names.empty()) {
+      return;
+    }
+  }
+}
+
 }  // namespace
 
 bool looks_like_nifti(std::string_view head) { return version_of(head, false) != 0 || version_of(head, true) != 0; }
@@ -379,6 +420,9 @@ VolumeFile read_nifti(const fs::path& path, const VolumeOptions& options, const 
   choose(path, "layer", 1, options.layer);
   file.frames = sizes[3];
   const std::size_t frame = choose(path, "frame", sizes[3], options.frame);
+  stream = std::make_unique<ByteStream>(path, 0, coding_of(path));
+  stream->skip(header.version == 1 ? size_1 : size_2);
+  read_extensions(file, path, header, *stream);
 
   const fs::path voxels = header.pair ? image_of(path) : path;
   if (header.pair) {

@@ -124,11 +124,15 @@ std::optional<std::vector<Label>> LabelIndex::labels(const std::vector<std::pair
     return std::nullopt;
   }
   const double voxel_volume = std::abs(affine_.leftCols<3>().determinant());
+  std::map<double, std::string> name_of;  // the first of several
+  for (const auto& [value, name] : names) {
+    name_of.emplace(value, name);
+  }
   std::vector<Label> labels;
   for (const auto& [value, entry] : entries_) {
-    const auto name = std::ranges::find(names, value, [](const auto& named) { return named.first; });
+    const auto name = name_of.find(value);
     labels.push_back(
-        {value, entry.voxels, real(entry.voxels) * voxel_volume, name == names.end() ? std::string{} : name->second});
+        {value, entry.voxels, real(entry.voxels) * voxel_volume, name == name_of.end() ? std::string{} : name->second});
   }
   return labels;
 }
@@ -144,5 +148,33 @@ Mask LabelIndex::mask(double label) const {
 }
 
 MaskBounds LabelIndex::bounds(double label) const { return entries_.at(label).bounds; }
+
+std::size_t LabelIndex::surface_vertices(double label) const {
+  const Entry& entry = entries_.at(label);
+  const std::size_t words = (dims_[0] + 63) / 64;
+  const std::size_t rows = dims_[1];
+  std::size_t pairs = 0;  // neighbours that both have the label
+  std::size_t next_row = 0;
+  std::size_t next_slice = 0;
+  const auto shared = [&](std::size_t& other, std::size_t at, std::uint64_t bits) {
+    while (other < entry.at.size() && entry.at[other] < at) {
+      ++other;
+    }
+    return other < entry.at.size() && entry.at[other] == at ? std::popcount(bits & entry.bits[other]) : 0;
+  };
+  for (std::size_t i = 0; i < entry.at.size(); ++i) {
+    const std::size_t at = entry.at[i];
+    const std::uint64_t bits = entry.bits[i];
+    pairs += std::popcount(bits & (bits >> 1));
+    if (at % words + 1 < words && i + 1 < entry.at.size() && entry.at[i + 1] == at + 1) {
+      pairs += bits >> 63 & entry.bits[i + 1] & 1;
+    }
+    if (at / words % rows + 1 < rows) {
+      pairs += shared(next_row, at + words, bits);
+    }
+    pairs += shared(next_slice, at + words * rows, bits);
+  }
+  return 6 * entry.voxels - 2 * pairs;
+}
 
 }  // namespace tunica

@@ -38,6 +38,11 @@ public:
   [[nodiscard]] Mask mask(double label) const;
   [[nodiscard]] MaskBounds bounds(double label) const;
 
+  /// Vertices of the closed surface of a label that labels() lists: edges between a voxel with it and one without.
+  /// Its surface has about twice as many triangles. Cost: one pass over the label's words. Limits: too many where
+  /// several stored values mean the same label.
+  [[nodiscard]] std::size_t surface_vertices(double label) const;
+
 private:
   struct Entry {
     std::size_t voxels = 0;

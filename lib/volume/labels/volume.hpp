@@ -22,7 +22,7 @@ struct Volume {
   double intercept = 0;
   /// Voxel index (i, j, k) of a voxel's centre to world millimetres, LPS, rows x y z.
   Eigen::Matrix<double, 3, 4> affine = Eigen::Matrix<double, 3, 4>::Identity();
-  /// Names of labels where the file has them (.seg.nrrd), by label value.
+  /// Names of labels where the file has them (.seg.nrrd, NIfTI's header extension), by label value.
   std::vector<std::pair<double, std::string>> label_names;
 
   [[nodiscard]] std::size_t voxels() const { return dims[0] * dims[1] * dims[2]; }

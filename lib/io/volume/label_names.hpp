@@ -1,0 +1,37 @@
+// io/volume: formats of segmented volumes, a file each, and names of their labels.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace tunica {
+
+/// Names of labels, by label value; as Volume::label_names.
+using LabelNames = std::vector<std::pair<double, std::string>>;
+
+/// Reads a table of labels; what it is its content says, not its name:
+///   BIDS `_dseg.tsv`       tab-separated, columns `index` and `name` (brainlife's `label` and Slicer's .csv too)
+///   ITK-SNAP               lines `index R G B A visible mesh "name"`
+///   Slicer .ctbl, FreeSurfer's look-up table   lines `index name R G B A`; a name may have blanks, `#` is a comment
+/// @return the names in the file's order, at least one
+/// Errors: InputError naming file and line: missing, no such table, larger than 16 MiB, more than 65536 labels, a name
+/// of more than 200 bytes or with control characters.
+/// Sources: BIDS 1.8 "Segmentations"; ITK-SNAP's "Save Label Descriptions"; FreeSurfer "ColorLUT".
+LabelNames read_label_names(const std::filesystem::path& path);
+
+/// The tables of labels beside a volume: files of its stem that end in .tsv, .ctbl, .label, .lut, .txt or .csv.
+std::vector<std::filesystem::path> label_tables_beside(const std::filesystem::path& volume);
+
+/// The label a text means: its value, or its name. @return none where there is no such name
+/// Errors: InputError: several labels have that name.
+std::optional<double> find_label(const LabelNames& names, const std::string& text);
+
+/// The name that was probably meant by one that is not there; empty where none is near. Cost: the names of about its
+/// length.
+std::string nearest_label(const LabelNames& names, std::string_view text);
+
+}  // namespace tunica

@@ -1,0 +1,289 @@
+"""Which cases a run of Makefile.pipeline has, and the settings of each: of VOLUMES and LABELS, or of the table CASES."""
+
+import csv
+import difflib
+import glob
+import os
+import re
+import shlex
+
+ENDINGS = (".seg.nrrd", ".nii.gz", ".nii", ".nrrd", ".nhdr", ".mha", ".mhd", ".tiff", ".tif", ".png")
+OF_THE_RUN = (".lock", ".run", "summary.tsv", "chart.svg")
+BLANKS = re.compile(r"\s+", re.ASCII)
+CONTROL = re.compile(r"[\x00-\x1f\x7f]")
+
+WALL = ("PRESSURE", "YOUNG", "POISSON", "THICKNESS", "DENSITY")
+MOTION = ("DURATION", "STEP")
+FURTHER = ("EXTRACT", "DECIMATE", "RELAX", "SIMULATE")
+# Variables that a case may have of its own, and those that a run has.
+OF_A_CASE = ("LABEL", "ISOVALUE", "NAMES", "SMOOTH", "LARGEST", "FILL", "OPEN", "SHELLS", "TOLERANCE", "ACCURACY", "OF",
+             "METHOD", *WALL, "KIND", "LOAD_STEPS", *MOTION, "FIX", "MEM", *FURTHER)
+OF_A_RUN = ("VOLUMES", "LABELS", "CASES", "OUT", "THREADS", "RUN", "BIN")
+# What a case says of the one side takes the place of what make says of the other.
+INSTEAD = ((("LABEL",), ("ISOVALUE",)), (("ACCURACY",), ("SHELLS", "TOLERANCE")))
+
+
+class Refused(Exception):
+    """What is asked for cannot be meant; each argument is a line that says why and what to do."""
+
+
+class Case:
+    """One label of one volume. `own` are the settings that are not make's."""
+
+    def __init__(self, out, volume, name, label, own=None):
+        self.volume = volume
+        self.label = label
+        self.own = own or {}
+        self.name = f"{name}/{label}"
+        self.folder = os.path.join(out, name, label)
+        self.plan = None  # its folder in OUT/.run
+        self.refused = unfit(volume, name)  # why it is not run, or None
+
+    def setting(self, name):
+        return one_line(self.own[name]) if name in self.own else setting(name)
+
+    def switched_on(self, name):
+        return self.setting(name) not in ("", "0", "no", "off", "false")
+
+
+def one_line(text):
+    return BLANKS.sub(" ", text).strip()
+
+
+def setting(name):
+    """A setting of make in one line; blank when it is not given. Texts with blanks in them may be names only where
+    VOLUMES and OUT are read."""
+    return one_line(os.environ.get(name, ""))
+
+
+def shown(name):
+    """A name in one line."""
+    return CONTROL.sub(lambda sign: repr(sign.group())[1:-1], name)
+
+
+# ------------------------------------------------------------------------------------------------------------- volumes
+
+def matching(text):
+    """The files a word of VOLUMES means: itself where there is such a file, else what it matches."""
+    path = os.path.expanduser(text)
+    return [path] if os.path.lexists(path) else sorted(glob.glob(path))
+
+
+def find_volumes(text):
+    """The volumes of a list of names and globs. Neighbouring words are one name with blanks where only that exists."""
+    words = list(re.finditer(r"\S+", text, re.ASCII))
+    if os.path.lexists(text):
+        return [text]
+    found = []
+    first = 0
+    while first < len(words):
+        for last in range(first, len(words)):
+            volumes = matching(text[words[first].start():words[last].end()])
+            if volumes:
+                break
+        else:
+            word, last = words[first].group(), first
+            if glob.has_magic(word):
+                raise Refused(f"VOLUMES: nothing matches {word}")
+            volumes = [word]  # the tool says what is wrong with it
+        found += volumes
+        first = last + 1
+    return found
+
+
+def stem_of(volume):
+    """The name of a volume without what says its format."""
+    name = os.path.basename(os.path.abspath(volume))
+    for ending in ENDINGS:
+        if name.endswith(ending) and name != ending:
+            return name[:-len(ending)]
+    return name
+
+
+def name_volumes(volumes):
+    """A name for each: its stem; where two have the same, the parts in which the paths differ, joined by '_', so that
+    p1/segmentations/aorta.nii.gz and p2/segmentations/aorta.nii.gz are p1 and p2."""
+    stems = [stem_of(volume) for volume in volumes]
+    if len(set(stems)) == len(stems):
+        return stems
+    paths = [os.path.abspath(volume).split(os.sep)[:-1] + [stem] for volume, stem in zip(volumes, stems)]
+    if len({len(path) for path in paths}) == 1:
+        differing = [at for at in range(len(paths[0])) if len({path[at] for path in paths}) > 1]
+        names = ["_".join(path[at] for at in differing) for path in paths]
+    else:
+        common = len(os.path.commonprefix(paths))
+        names = ["_".join(path[common:]) or stem for path, stem in zip(paths, stems)]
+    first = {}
+    for volume, name in zip(volumes, names):
+        if first.setdefault(name, volume) != volume:
+            raise Refused(f"{shown(first[name])} and {shown(volume)} have the same stem and would share a folder: rename "
+                          "one, or name the cases in a table, CASES")
+    return names
+
+
+def unfit(volume, name):
+    """Why no case can be made of a volume, or None."""
+    if CONTROL.search(volume):
+        return f"{shown(volume)}: has a control character in its name: rename the file or link to it"
+    if name in ("", *OF_THE_RUN):
+        return f"{volume}: its results cannot be called '{name}' in OUT: rename the file or link to it"
+    return None
+
+
+# -------------------------------------------------------------------------------------------------------------- labels
+
+def is_folder_name(text):
+    return "/" not in text and text not in ("", ".", "..") and not CONTROL.search(text)
+
+
+def find_labels():
+    """The labels of LABELS: words, or names with blanks between quotation marks."""
+    if setting("ISOVALUE"):
+        return ["iso" + setting("ISOVALUE")]
+    try:
+        labels = shlex.split(setting("LABELS"))
+    except ValueError:
+        raise Refused("LABELS: a quotation mark is not closed") from None
+    for label in labels:
+        if not is_folder_name(label):
+            raise Refused(f"LABELS: '{shown(label)}' cannot be the name of a folder: give the label's value")
+    return list(dict.fromkeys(labels))
+
+
+# --------------------------------------------------------------------------------------------------------------- table
+
+class Row:
+    """A line of the table: its cells that are not blank, by the variable's name."""
+
+    def __init__(self, place, cells):
+        self.place = place  # "cases.tsv:3"
+        self.cells = cells
+
+
+def read_rows(path):
+    """The lines of the table. Errors: Refused: unreadable, no text, columns that are not known or twice there."""
+    try:
+        with open(path, encoding="utf-8-sig", newline="") as file:
+            reader = csv.reader(file, delimiter="\t")
+            lines = [(reader.line_num, [cell.strip() for cell in line]) for line in reader]
+    except OSError as error:
+        raise Refused(f"{path}: {error.strerror}") from None
+    except (UnicodeDecodeError, csv.Error):
+        raise Refused(f"{path}: is no table of text with tabs between its columns") from None
+    lines = [(number, line) for number, line in lines if any(line) and not line[0].startswith("#")]
+    if not lines:
+        raise Refused(f"{path}: is empty: its first line names the columns, such as case, volume, label, pressure")
+    columns = [check_column(path, lines[0][1], name) for name in lines[0][1]]
+    rows = []
+    for number, line in lines[1:]:
+        if any(line[len(columns):]):
+            raise Refused(f"{path}:{number}: has {len(line)} cells, the table has {len(columns)} columns")
+        rows.append(Row(f"{path}:{number}", {name: cell for name, cell in zip(columns, line) if cell}))
+    if not rows:
+        raise Refused(f"{path}: has columns but no case")
+    return rows
+
+
+def check_column(path, heads, head):
+    """The variable of a column. Errors: Refused."""
+    name = head.upper()
+    known = ["CASE", "VOLUME", *OF_A_CASE]
+    if len(heads) == 1 and re.search(r"[,;]", head):
+        raise Refused(f"{path}: its columns are to be separated by tabs: save the table as TSV")
+    if name in OF_A_RUN:
+        raise Refused(f"{path}: {head} is the same for a whole run: give {name} to make")
+    if name not in known:
+        near = difflib.get_close_matches(name, known, 1)
+        hint = f"did you mean {near[0].lower()}?" if near else "known are " + ", ".join(known).lower()
+        raise Refused(f"{path}: no such column: '{shown(head)}': {hint}")
+    if sum(other.upper() == name for other in heads) > 1:
+        raise Refused(f"{path}: the column {name.lower()} is there twice")
+    return name
+
+
+def own_settings(row, folder):
+    """The settings of a line, and what is wrong with them, by words."""
+    own = {name: cell for name, cell in row.cells.items() if name in OF_A_CASE and name != "LABEL"}
+    problems = [f"{name.lower()}: '{shown(cell)}' has a control character" for name, cell in row.cells.items()
+                if CONTROL.search(cell)]
+    for sides in INSTEAD:
+        given = [[name for name in side if name in row.cells] for side in sides]
+        if all(given):
+            problems.append(f"{given[0][0].lower()} and {given[1][0].lower()} exclude each other")
+        for side, other in (sides, sides[::-1]):
+            if any(name in row.cells for name in side):
+                own.update({name: "" for name in other if name != "LABEL"})
+    if "NAMES" in own:
+        own["NAMES"] = os.path.join(folder, os.path.expanduser(own["NAMES"]))
+    if not re.fullmatch(r"[0-9]*", own.get("MEM", ""), re.ASCII):
+        problems.append(f"mem: '{shown(own['MEM'])}' is no number of megabytes")
+    for name in FURTHER:
+        try:
+            # A make variable is the user's own command line; a table may come from elsewhere: its cells are words.
+            own.update({name: shlex.join(shlex.split(own[name]))} if name in own else {})
+        except ValueError:
+            problems.append(f"{name.lower()}: a quotation mark is not closed")
+    return own, problems
+
+
+def missing_of(case):
+    """What a case still needs, by words."""
+    needed = list(WALL)
+    kind = case.setting("KIND")
+    if kind == "dynamic":
+        needed += MOTION
+    elif kind != "static":
+        return [f"kind: '{shown(kind)}' is not understood: static or dynamic"]
+    missing = [name for name in needed if not case.setting(name)]
+    if not missing:
+        return []
+    return [f"{', '.join(missing).lower()} not given: fill the cell, or give {missing[0]} to make for all such cases"]
+
+
+def cases_of_table(path, out):
+    """The cases of a table. Errors: Refused, with a line for each problem of up to twenty."""
+    folder = os.path.dirname(path)
+    rows = read_rows(path)
+    problems = []
+    volumes = [os.path.join(folder, os.path.expanduser(row.cells.get("VOLUME", ""))) for row in rows]
+    unnamed = list(dict.fromkeys(volume for row, volume in zip(rows, volumes)
+                                 if "CASE" not in row.cells and "VOLUME" in row.cells))
+    names = dict(zip(unnamed, name_volumes(unnamed)))
+    first, cases = {}, []
+    for row, volume in zip(rows, volumes):
+        own, wrong = own_settings(row, folder)
+        name = row.cells.get("CASE", names.get(volume, ""))
+        if "VOLUME" not in row.cells:
+            wrong.append("volume not given: the path of a segmented volume, from the table's folder")
+        elif "CASE" in row.cells and (not is_folder_name(name) or name in OF_THE_RUN):
+            wrong.append(f"case: '{shown(name)}' cannot be the name of a folder of OUT")
+        labels = ["iso" + own["ISOVALUE"]] if own.get("ISOVALUE") else [row.cells["LABEL"]] if "LABEL" in row.cells \
+            else find_labels()
+        if not labels:
+            wrong.append("label not given: fill the cell of label or isovalue, or give LABELS to make for all such cases")
+        for label in labels:
+            if not is_folder_name(label):
+                wrong.append(f"label: '{shown(label)}' cannot be the name of a folder: give the label's value")
+            case = Case(out, volume, name, label, own)
+            other = first.setdefault(case.name, row)
+            if other is not row and not wrong:
+                wrong.append(f"{case.name} is there already, at {other.place}: give one another name")
+            cases.append(case)
+        wrong += missing_of(Case(out, volume, name, "", own))
+        problems += [f"{row.place}: {shown(name)}: {words}" if name else f"{row.place}: {words}" for words in wrong]
+    if problems:
+        more = [f"{path}: and {len(problems) - 20} problems more"] if len(problems) > 20 else []
+        raise Refused(*problems[:20], *more)
+    return cases
+
+
+def find_cases(out):
+    """All cases of the run. Errors: Refused."""
+    if setting("CASES"):
+        return cases_of_table(os.path.expanduser(os.environ["CASES"].strip()), out)
+    labels = find_labels()
+    volumes = {os.path.abspath(path): path for path in reversed(find_volumes(os.environ.get("VOLUMES", "")))}
+    if not volumes:
+        raise Refused("VOLUMES is empty: name segmented volumes, or leave it out to see a shipped sample")
+    volumes = list(reversed(volumes.values()))
+    return [Case(out, volume, name, label) for volume, name in zip(volumes, name_volumes(volumes)) for label in labels]
