@@ -1,6 +1,6 @@
+#include "tunica/report/report.hpp"
 #include "tunica/cli/tool.hpp"
 #include "tunica/io/file/output_file.hpp"
-#include "tunica/report/report.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -34,8 +34,7 @@ void declare(cli::Tool& tool, Arguments& given) {
   arguments.add_flag("--verify", given.verify,
                      "compare the SHA-256 of the outputs with the reports; exit code 4 names what differs");
   tool.group("Tables");
-  arguments
-      .add_option("--tsv", given.tsv, "write the table, and COHORT.json, which says what each column means")
+  arguments.add_option("--tsv", given.tsv, "write the table, and COHORT.json, which says what each column means")
       ->type_name("COHORT.tsv");
   arguments.add_option("--summary", given.summary, "write how each case ended")->type_name("SUMMARY.tsv");
   arguments.add_option("--chart", given.chart, "draw time against distance, where shells were made")
@@ -70,9 +69,9 @@ void require_verified(const std::vector<std::string>& different) {
   constexpr std::size_t most = 5;
   if (!different.empty()) {
     const std::size_t told = std::min(different.size(), most);
-    throw RequirementError(
-        fmt::format("{}{}", fmt::join(different.begin(), different.begin() + told, "; "),
-                    different.size() > told ? fmt::format("; and {} more, see the page", different.size() - told) : ""));
+    throw RequirementError(fmt::format(
+        "{}{}", fmt::join(different.begin(), different.begin() + told, "; "),
+        different.size() > told ? fmt::format("; and {} more, see the page", different.size() - told) : ""));
   }
 }
 
@@ -101,8 +100,7 @@ void run(cli::Tool& tool, const Arguments& given) {
   report::Page page;
   {
     const auto stage = tool.stage("draw");
-    page = report::make_page(
-        cases, {!given.no_paths, given.verify, tool.command(), tool.progress("draw")});
+    page = report::make_page(cases, {!given.no_paths, given.verify, tool.command(), tool.progress("draw")});
   }
   {
     const auto stage = tool.stage("write");
@@ -117,8 +115,9 @@ void run(cli::Tool& tool, const Arguments& given) {
   if (lost) {
     throw OutputError(*lost);
   }
-  say_table(tool, given.summary.empty() ? fmt::format("report: {}\n", given.out.string())
-                                        : fmt::format("summary: {}   report: {}\n", given.summary.string(), given.out.string()));
+  say_table(tool, given.summary.empty()
+                      ? fmt::format("report: {}\n", given.out.string())
+                      : fmt::format("summary: {}   report: {}\n", given.summary.string(), given.out.string()));
   require_verified(page.different);
 }
 

@@ -12,7 +12,7 @@
 namespace tunica {
 namespace {
 
-constexpr int gap = 4;           // pixels between panels
+constexpr int gap = 4;             // pixels between panels
 constexpr int sub_pixel_bits = 4;  // of cv::line: sixteenths of a pixel
 
 // The colour of a sample, red, green, blue: what is selected keeps its grey, tinted.

@@ -4,7 +4,10 @@
 #include "tunica/report/detail/measures.hpp"
 #include "tunica/report/detail/sections.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <sstream>
 
@@ -161,7 +164,8 @@ Markup geometry_and_mesh(const CaseReport& one) {
   add_if_known(geometry, one, "extract", "result.components", "Components");
   add_if_known(geometry, one, "extract", "result.euler", "Euler number");
   add_if_known(geometry, one, "extract", "result.closed", "Closed");
-  std::vector<Line> mesh = lines_of(one, {"shells", "distance_mm", "distance_percent", "mean_distance_mm", "min_angle_deg"});
+  std::vector<Line> mesh =
+      lines_of(one, {"shells", "distance_mm", "distance_percent", "mean_distance_mm", "min_angle_deg"});
   add_if_known(mesh, one, "relax", "result.normal_error_deg.mean", "Normals, mean error", "°");
   add_if_known(mesh, one, "relax", "result.size_ratio", "Neighbours' size ratio");
   add_if_known(mesh, one, "relax", "result.self_intersections", "Self-intersections");
@@ -170,8 +174,8 @@ Markup geometry_and_mesh(const CaseReport& one) {
 }
 
 Markup mechanics(const CaseReport& one) {
-  std::vector<Line> lines = lines_of(one, {"stress_p99_kpa", "stress_max_kpa", "strain_p99_percent",
-                                           "max_displacement_mm", "volume_change_percent"});
+  std::vector<Line> lines = lines_of(
+      one, {"stress_p99_kpa", "stress_max_kpa", "strain_p99_percent", "max_displacement_mm", "volume_change_percent"});
   add_if_known(lines, one, "simulate", "result.strain_energy_mj", "Strain energy", "mJ");
   add_if_known(lines, one, "simulate", "result.converged", "Converged");
   add_if_known(lines, one, "simulate", "result.residual", "Residual");
@@ -213,10 +217,11 @@ Markup costs(const CaseReport& one) {
     }
   }
   return rows.text.empty() ? Markup{}
-                           : html("<table class=\"facts grid\"><caption>Time and memory</caption><thead><tr><th "
-                                  "scope=\"col\">Stage</th><th scope=\"col\">s</th><th scope=\"col\">MiB</th><th "
-                                  "scope=\"col\">Threads</th></tr></thead><tbody>\n{}</tbody></table>\n",
-                                  rows);
+                           : html(
+                                 "<table class=\"facts grid\"><caption>Time and memory</caption><thead><tr><th "
+                                 "scope=\"col\">Stage</th><th scope=\"col\">s</th><th scope=\"col\">MiB</th><th "
+                                 "scope=\"col\">Threads</th></tr></thead><tbody>\n{}</tbody></table>\n",
+                                 rows);
 }
 
 Markup list_section(const std::string& title, const std::vector<std::string>& texts, int level) {
@@ -252,12 +257,12 @@ Markup files(const CaseReport& one, int level, bool paths) {
   if (rows.text.empty()) {
     return {};
   }
-  return heading(level, "Files") +=
-         html("<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"Files of {}\"><table "
-              "class=\"facts grid files\"><caption>What each stage read and wrote</caption><thead><tr><th "
-              "scope=\"col\">Stage</th><th scope=\"col\">File</th><th scope=\"col\">SHA-256</th></tr></thead><tbody>\n"
-              "{}</tbody></table></div>\n",
-              one.name, rows);
+  return heading(level, "Files") += html(
+             "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"Files of {}\"><table "
+             "class=\"facts grid files\"><caption>What each stage read and wrote</caption><thead><tr><th "
+             "scope=\"col\">Stage</th><th scope=\"col\">File</th><th scope=\"col\">SHA-256</th></tr></thead><tbody>\n"
+             "{}</tbody></table></div>\n",
+             one.name, rows);
 }
 
 Markup commands(const CaseReport& one, int level) {
@@ -271,7 +276,8 @@ Markup commands(const CaseReport& one, int level) {
   if (lines.empty()) {
     return {};
   }
-  return heading(level, "Commands") += html("<p>tunica {}.</p>\n<pre tabindex=\"0\"><code>{}</code></pre>\n", version, lines);
+  return heading(level, "Commands") +=
+         html("<p>tunica {}.</p>\n<pre tabindex=\"0\"><code>{}</code></pre>\n", version, lines);
 }
 
 }  // namespace
@@ -287,7 +293,8 @@ std::string next_command(const CaseReport& one) {
     // The volume is the first word after the tool that is no flag; what is in it is what to look at.
     const std::size_t blank = command.find(' ');
     const std::vector<std::string> words = command_words(command);
-    const std::size_t quoted = command.find(" '") == blank ? command.find("' ", blank + 2) + 1 : command.find(' ', blank + 1);
+    const std::size_t quoted =
+        command.find(" '") == blank ? command.find("' ", blank + 2) + 1 : command.find(' ', blank + 1);
     return words.size() > 1 && !words[1].starts_with("-") ? one.redacted(command.substr(0, quoted) + " --info")
                                                           : one.redacted(command + " --verbose");
   }
@@ -303,7 +310,8 @@ Markup case_section(const CaseReport& one, int level, bool paths) {
   made += list_section("Outputs that are not what the reports say", one.different, level);
   made += list_section("Not drawn", one.missing, level);
   made += heading(level, "Numbers");
-  made += html("<div class=\"tables\">\n{}{}{}{}</div>\n", geometry_and_mesh(one), mechanics(one), inputs(one), costs(one));
+  made +=
+      html("<div class=\"tables\">\n{}{}{}{}</div>\n", geometry_and_mesh(one), mechanics(one), inputs(one), costs(one));
   made += files(one, level, paths);
   made += commands(one, level);
   made += methods_section(one, level);

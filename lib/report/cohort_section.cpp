@@ -1,6 +1,8 @@
 #include "tunica/report/detail/measures.hpp"
 #include "tunica/report/detail/sections.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 
@@ -8,11 +10,16 @@ namespace tunica::report {
 namespace {
 
 // Columns of the page's table: fewer than the file's.
-constexpr std::array shown_keys{"volume_ml",          "shells",
-                                "distance_percent",   "min_angle_deg",
-                                "stress_p99_kpa",     "strain_p99_percent",
-                                "max_displacement_mm", "volume_change_percent",
-                                "pressure_kpa",       "thickness_mm",
+constexpr std::array shown_keys{"volume_ml",
+                                "shells",
+                                "distance_percent",
+                                "min_angle_deg",
+                                "stress_p99_kpa",
+                                "strain_p99_percent",
+                                "max_displacement_mm",
+                                "volume_change_percent",
+                                "pressure_kpa",
+                                "thickness_mm",
                                 "seconds"};
 
 Markup link_to(const CaseReport& one) { return html("<a href=\"#{}\"><bdi>{}</bdi></a>", one.id(), one.name); }
@@ -22,9 +29,10 @@ Markup counts(const std::vector<CaseReport>& cases) {
     return std::ranges::count_if(cases, [&](const CaseReport& one) { return status_of(one) == status; });
   };
   return html(
-      "<dl class=\"counts\"><div class=\"done\"><dt>Done</dt><dd>{}</dd></div><div class=\"failed\"><dt>Failed</dt>"
-      "<dd>{}</dd></div><div class=\"warned\"><dt>Done, with warnings</dt><dd>{}</dd></div></dl>\n",
-      count("done") + count("warned"), count("failed"), count("warned"));
+      "<dl class=\"counts\"><div class=\"{}\"><dt>Done</dt><dd>{}</dd></div><div class=\"{}\"><dt>Failed</dt>"
+      "<dd>{}</dd></div><div class=\"{}\"><dt>Done, with warnings</dt><dd>{}</dd></div></dl>\n",
+      "done", count("done") + count("warned"), count("failed") > 0 ? "failed" : "none", count("failed"),
+      count("warned") > 0 ? "warned" : "none", count("warned"));
 }
 
 Markup failures(const std::vector<CaseReport>& cases) {
@@ -34,9 +42,10 @@ Markup failures(const std::vector<CaseReport>& cases) {
       continue;
     }
     const std::string next = next_command(one);
-    items += html("<li>{}: {}{}: {}{}</li>\n", link_to(one), one.source.stage == "none" ? "not begun" : one.source.stage,
-                  one.source.exit.empty() ? "" : ", exit code " + one.source.exit, one.redacted(one.source.message),
-                  next.empty() ? Markup{} : html("<br>Next: <code>{}</code>", next));
+    items +=
+        html("<li>{}: {}{}: {}{}</li>\n", link_to(one), one.source.stage == "none" ? "not begun" : one.source.stage,
+             one.source.exit.empty() ? "" : ", exit code " + one.source.exit, one.redacted(one.source.message),
+             next.empty() ? Markup{} : html("<br>Next: <code>{}</code>", next));
   }
   return items.text.empty() ? Markup{} : heading(2, "Failures") += html("<ul class=\"failures\">\n{}</ul>\n", items);
 }
@@ -44,9 +53,9 @@ Markup failures(const std::vector<CaseReport>& cases) {
 Markup row_of(const CaseReport& one) {
   const std::string status = status_of(one);
   Markup row = html("<tr class=\"{}\"><td class=\"thumb\">{}</td><th scope=\"row\">{}</th><td>{}</td>", status,
-                    one.picture.empty() ? Markup{}
-                                        : html("<img src=\"{}\" alt=\"\" loading=\"lazy\">",
-                                               data_address("image/png", one.picture)),
+                    one.picture.empty()
+                        ? Markup{}
+                        : html("<img src=\"{}\" alt=\"\" loading=\"lazy\">", data_address("image/png", one.picture)),
                     link_to(one), status);
   for (const char* key : shown_keys) {
     const Measure& what = measure(key);
@@ -54,13 +63,17 @@ Markup row_of(const CaseReport& one) {
     const bool none = !value || (std::string_view(key) == "seconds" && *value == 0);
     const bool whole = !none && what.unit.empty();
     row += html("<td class=\"number\" data-value=\"{}\">{}</td>", none ? "" : fmt::format("{:.9g}", *value),
-                none ? "–" : whole ? fmt::format("{:.0f}", *value) : figure(*value));
+                none    ? "–"
+                : whole ? fmt::format("{:.0f}", *value)
+                        : figure(*value));
   }
   return row += html("</tr>\n");
 }
 
 Markup table(const std::vector<CaseReport>& cases, const std::string& tsv) {
-  Markup heads = html("<th scope=\"col\"><span class=\"hidden\">Picture</span></th><th scope=\"col\">Case</th><th scope=\"col\">Status</th>");
+  Markup heads = html(
+      "<th scope=\"col\"><span class=\"hidden\">Picture</span></th><th scope=\"col\">Case</th><th "
+      "scope=\"col\">Status</th>");
   for (const char* key : shown_keys) {
     const Measure& what = measure(key);
     heads += html("<th scope=\"col\" title=\"{}\">{}{}</th>", what.description, what.title,
@@ -103,8 +116,9 @@ Markup spread(const std::vector<CaseReport>& cases) {
     }
   }
   Markup made = heading(2, "Spread and outliers");
-  made += html("<p>An outlier is farther from the median than 3.5 robust standard deviations (by the median absolute "
-               "deviation), among at least five cases that are done.</p>\n");
+  made += html(
+      "<p>An outlier is farther from the median than 3.5 robust standard deviations (by the median absolute "
+      "deviation), among at least five cases that are done.</p>\n");
   made += items.text.empty() ? html("<p>None.</p>\n") : html("<ul class=\"outliers\">\n{}</ul>\n", items);
   return made += html("<div class=\"strips\">\n{}</div>\n", strips);
 }
@@ -126,8 +140,10 @@ std::string cohort_tsv(const std::vector<CaseReport>& cases) {
   }
   text += "\n";
   for (const CaseReport& one : cases) {
-    for (std::string field : {one.name, status_of(one), one.source.stage, one.source.exit, one.redacted(one.source.message)}) {
-      std::ranges::replace_if(field, [](char sign) { return static_cast<unsigned char>(sign) < 0x20 || sign == 0x7f; }, ' ');
+    for (std::string field :
+         {one.name, status_of(one), one.source.stage, one.source.exit, one.redacted(one.source.message)}) {
+      std::ranges::replace_if(
+          field, [](char sign) { return static_cast<unsigned char>(sign) < 0x20 || sign == 0x7f; }, ' ');
       text += (field.empty() ? "n/a" : field) + "\t";
     }
     text += std::to_string(one.warnings.size());

@@ -1,6 +1,10 @@
 #include "tunica/report/detail/html.hpp"
 
+#include "tunica/core/quantity.hpp"
 #include "tunica/io/file/encoding.hpp"
+
+#include <fmt/args.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
@@ -75,6 +79,14 @@ std::string escaped(std::string_view text) {
   return safe;
 }
 
+Markup filled(std::string_view format, const std::vector<std::string>& shielded_texts) {
+  fmt::dynamic_format_arg_store<fmt::format_context> store;
+  for (const std::string& text : shielded_texts) {
+    store.push_back(text);
+  }
+  return {fmt::vformat(format, store)};
+}
+
 Markup heading(int level, std::string_view text) { return html("<h{0}>{1}</h{0}>\n", level, text); }
 
 Markup data_address(std::string_view kind, std::string_view bytes) {
@@ -89,7 +101,16 @@ std::string figure(double value) {
     return "0";
   }
   const int before = static_cast<int>(std::floor(std::log10(std::abs(value)))) + 1;  // digits before the point
-  return before < -3 ? fmt::format("{:.2e}", value) : fmt::format("{:.{}f}", value, std::max(0, 3 - std::max(before, 1) - std::min(before - 1, 0)));
+  if (before < -3) {
+    return fmt::format("{:.2e}", value);
+  }
+  std::string text = fmt::format("{:.{}f}", value, std::max(0, 3 - before));
+  // What was stated is told as it was: 1.5, not 1.50.
+  if (text.find('.') != std::string::npos && parse_number(text) == value) {
+    text.erase(text.find_last_not_of('0') + 1);
+    text.erase(text.find_last_not_of('.') + 1);
+  }
+  return text;
 }
 
 }  // namespace tunica::report

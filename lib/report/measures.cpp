@@ -87,35 +87,35 @@ std::vector<Measure> make_geometry() {
 }
 
 std::vector<Measure> make_mechanics() {
-  return {{"stress_p99_kpa", "Stress p99", "kPa",
-           "99th percentile, by area, of the von Mises stress at either face of the wall.",
-           "simulate: result.wall.stress_p99_mpa × 1000", true, reported("simulate", "result.wall.stress_p99_mpa", 1e3)},
-          {"stress_max_kpa", "Stress max.", "kPa", "Largest von Mises stress at either face of the wall.",
-           "simulate: result.wall.stress_max_mpa × 1000", false, reported("simulate", "result.wall.stress_max_mpa", 1e3)},
-          {"strain_p99_percent", "Strain p99", "%",
-           "99th percentile, by area, of the largest principal strain at either face of the wall.",
-           "simulate: result.wall.strain_p99_percent", true, reported("simulate", "result.wall.strain_p99_percent")},
-          {"max_displacement_mm", "Displacement", "mm", "Largest displacement of the curved surface.",
-           "simulate: result.max_displacement_mm", true, reported("simulate", "result.max_displacement_mm")},
-          {"volume_change_percent", "Volume change", "%", "Change of the volume that a closed organ encloses.",
-           "simulate: result.volume_after_mm3 / result.volume_before_mm3 - 1", true, volume_change},
-          {"pressure_kpa", "Pressure", "kPa", "Pressure on the wall, as stated.", "simulate: command, --pressure", false,
-           stated("--pressure", dimension::pressure, 1e3)},
-          {"thickness_mm", "Thickness", "mm", "Thickness of the wall, as stated.", "simulate: command, --thickness",
-           false, stated("--thickness", dimension::length)},
-          {"young_mpa", "Young's modulus", "MPa", "Young's modulus of the wall, as stated.",
-           "simulate: command, --young", false, stated("--young", dimension::pressure)},
-          {"poisson", "Poisson's ratio", "", "Poisson's ratio of the wall, as stated.", "simulate: command, --poisson",
-           false,
-           [](const PipelineCase& one) -> std::optional<double> {
-             const Json command = one.at("simulate", "command");
-             const auto text =
-                 command.is_string() ? flag_value(command_words(command.get<std::string>()), "--poisson") : std::nullopt;
-             return text ? parse_number(*text) : std::nullopt;
-           }},
-          {"seconds", "Time", "s", "Seconds of all stages.", "all stages: seconds.total", false, seconds},
-          {"peak_mib", "Memory", "MiB", "Largest memory that a stage had in use.", "all stages: peak_mib", false,
-           memory}};
+  return {
+      {"stress_p99_kpa", "Stress p99", "kPa",
+       "99th percentile, by area, of the von Mises stress at either face of the wall.",
+       "simulate: result.wall.stress_p99_mpa × 1000", true, reported("simulate", "result.wall.stress_p99_mpa", 1e3)},
+      {"stress_max_kpa", "Stress max.", "kPa", "Largest von Mises stress at either face of the wall.",
+       "simulate: result.wall.stress_max_mpa × 1000", false, reported("simulate", "result.wall.stress_max_mpa", 1e3)},
+      {"strain_p99_percent", "Strain p99", "%",
+       "99th percentile, by area, of the largest principal strain at either face of the wall.",
+       "simulate: result.wall.strain_p99_percent", true, reported("simulate", "result.wall.strain_p99_percent")},
+      {"max_displacement_mm", "Displacement", "mm", "Largest displacement of the curved surface.",
+       "simulate: result.max_displacement_mm", true, reported("simulate", "result.max_displacement_mm")},
+      {"volume_change_percent", "Volume change", "%", "Change of the volume that a closed organ encloses.",
+       "simulate: result.volume_after_mm3 / result.volume_before_mm3 - 1", true, volume_change},
+      {"pressure_kpa", "Pressure", "kPa", "Pressure on the wall, as stated.", "simulate: command, --pressure", false,
+       stated("--pressure", dimension::pressure, 1e3)},
+      {"thickness_mm", "Thickness", "mm", "Thickness of the wall, as stated.", "simulate: command, --thickness", false,
+       stated("--thickness", dimension::length)},
+      {"young_mpa", "Young's modulus", "MPa", "Young's modulus of the wall, as stated.", "simulate: command, --young",
+       false, stated("--young", dimension::pressure)},
+      {"poisson", "Poisson's ratio", "", "Poisson's ratio of the wall, as stated.", "simulate: command, --poisson",
+       false,
+       [](const PipelineCase& one) -> std::optional<double> {
+         const Json command = one.at("simulate", "command");
+         const auto text =
+             command.is_string() ? flag_value(command_words(command.get<std::string>()), "--poisson") : std::nullopt;
+         return text ? parse_number(*text) : std::nullopt;
+       }},
+      {"seconds", "Time", "s", "Seconds of all stages.", "all stages: seconds.total", false, seconds},
+      {"peak_mib", "Memory", "MiB", "Largest memory that a stage had in use.", "all stages: peak_mib", false, memory}};
 }
 
 }  // namespace

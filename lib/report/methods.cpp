@@ -70,7 +70,8 @@ std::string load_sentence(const CaseReport& one) {
                                          : *fixed == "rigid-motions" ? "only its rigid motions held"
                                                                      : "the region '" + *fixed + "' held")
                 : "";
-  text += std::string("; the equations were solved ") + (linear ? "linearly" : "with large rotations (co-rotational), by Newton's method") +
+  text += std::string("; the equations were solved ") +
+          (linear ? "linearly" : "with large rotations (co-rotational), by Newton's method") +
           (dynamic ? ", in time" : ", in statics") + ". ";
   return text + "Stresses are von Mises stresses at either face of the wall, as the 99th percentile by area.";
 }

@@ -262,19 +262,19 @@ void draw_shells(CaseReport& one, const Room& room, DrawnShells shells, const st
 Room room_for(std::size_t cases) {
   const std::size_t count = std::max<std::size_t>(cases, 1);
   Room room;
-  room.triangles = std::clamp<std::size_t>(700'000 / count, 1'000, 60'000);
+  room.triangles = std::clamp<std::size_t>(600'000 / count, 1'000, 60'000);
   room.states = std::clamp<std::size_t>(400 / count, 2, 41);
-  room.picture_width = count == 1 ? 1080 : count <= 12 ? 720 : count <= 60 ? 400 : 240;
-  room.slice = count == 1 ? 220 : count <= 12 ? 150 : count <= 60 ? 100 : 64;
+  room.picture_width = count == 1 ? 1080 : count <= 12 ? 720 : count <= 60 ? 400 : 200;
+  room.slice = count == 1 ? 220 : count <= 12 ? 150 : count <= 60 ? 100 : 60;
   return room;
 }
 
 void draw_organ(CaseReport& one, const Room& room) {
   const auto surface = attempt(one, "surface.ply", [](const fs::path& path) { return read_mesh(path).mesh; });
   const bool simulated = one.source.at("simulate", "ok") == true;
-  auto result = simulated ? attempt(one, "result.hdf",
-                                    [&](const fs::path& path) { return read_drawn_result(path, room.states); })
-                          : std::nullopt;
+  auto result =
+      simulated ? attempt(one, "result.hdf", [&](const fs::path& path) { return read_drawn_result(path, room.states); })
+                : std::nullopt;
   const bool loaded = result.has_value();
   if (!loaded) {
     result = attempt(one, "shell.ply", unloaded);

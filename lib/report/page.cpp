@@ -9,6 +9,8 @@
 #include "tunica/report/detail/organ.hpp"
 #include "tunica/report/detail/sections.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <filesystem>
 
@@ -100,12 +102,15 @@ Markup head(const std::string& title) {
 
 Markup footer(const std::string& command) {
   Markup made = html(
-      "<footer>\n<p><strong>Not a medical device.</strong> For research only. The wall is linear elastic and as thick as "
+      "<footer>\n<p><strong>Not a medical device.</strong> For research only. The wall is linear elastic and as thick "
+      "as "
       "stated; the image is taken as unloaded.</p>\n<p>Made by tunica {} (GPL-3.0-or-later)",
       version);
   made += command.empty() ? html(".</p>\n") : html(": <code>{}</code></p>\n", command);
-  made += html("<details><summary>Licences of what this page carries</summary><pre tabindex=\"0\">{}</pre></details>\n</footer>\n",
-               embedded::LICENCES_txt());
+  made += html(
+      "<details><summary>Licences of what this page carries</summary><pre "
+      "tabindex=\"0\">{}</pre></details>\n</footer>\n",
+      embedded::LICENCES_txt());
   return made;
 }
 
@@ -116,8 +121,9 @@ Markup body(const std::vector<CaseReport>& cases, const std::string& tsv, const 
                  cases[0].name);
     made += case_section(cases[0], 2, paths);
   } else {
-    made += html("<body class=\"many\">\n<header><p class=\"brand\">tunica report</p><h1>{} cases</h1></header>\n<main>\n",
-                 cases.size());
+    made +=
+        html("<body class=\"many\">\n<header><p class=\"brand\">tunica report</p><h1>{} cases</h1></header>\n<main>\n",
+             cases.size());
     made += cohort_section(cases, tsv);
     made += heading(2, "Case by case");
     for (const CaseReport& one : cases) {

@@ -58,7 +58,8 @@ std::string without_paths(const std::string& text) {
 
 std::string stem_of_volume(const fs::path& path) {
   const std::string name = path.filename().string();
-  for (const char* ending : {".seg.nrrd", ".nii.gz", ".nii", ".nrrd", ".nhdr", ".mha", ".mhd", ".tiff", ".tif", ".png"}) {
+  for (const char* ending :
+       {".seg.nrrd", ".nii.gz", ".nii", ".nrrd", ".nhdr", ".mha", ".mhd", ".tiff", ".tif", ".png"}) {
     if (name.ends_with(ending)) {
       return name.substr(0, name.size() - std::string(ending).size());
     }

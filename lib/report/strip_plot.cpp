@@ -1,6 +1,8 @@
 #include "tunica/report/detail/measures.hpp"
 #include "tunica/report/detail/sections.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 namespace tunica::report {
@@ -30,7 +32,8 @@ Markup strip_plot(const std::string& title, const std::string& unit, const std::
   }
   return html(
       "<figure class=\"strip\"><figcaption>{0}{1}</figcaption><svg viewBox=\"0 0 320 58\" role=\"img\" "
-      "aria-label=\"{0}: {2} cases from {3} to {4} {5}, median {6}\"><line class=\"axis\" x1=\"8\" x2=\"312\" y1=\"40\" "
+      "aria-label=\"{0}: {2} cases from {3} to {4} {5}, median {6}\"><line class=\"axis\" x1=\"8\" x2=\"312\" "
+      "y1=\"40\" "
       "y2=\"40\"/><line class=\"median\" x1=\"{7}\" x2=\"{7}\" y1=\"6\" y2=\"40\"/>{8}<text x=\"8\" y=\"54\">{3}</text>"
       "<text x=\"312\" y=\"54\" text-anchor=\"end\">{4}</text></svg></figure>\n",
       title, unit.empty() ? "" : ", " + unit, marks.size(), figure(least), figure(most), unit, figure(middle),

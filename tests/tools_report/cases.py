@@ -12,7 +12,8 @@ STAGES = ["extract", "decimate", "relax", "simulate"]
 
 
 def run(verb, *words, code=0):
-    done = subprocess.run([TOOLS / f"tunica-{verb}", *map(str, words)], capture_output=True, text=True)
+    done = subprocess.run([TOOLS / f"tunica-{verb}", *map(str, words)], capture_output=True, text=True,
+                          errors="surrogateescape")
     assert done.returncode == code, done.stderr
     return done
 

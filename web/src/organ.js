@@ -234,7 +234,7 @@ class Stage {
       return;
     }
     event.preventDefault();
-    camera.updateProjectionMatrix();
+    this.orbit.update();
     this.#draw();
   }
 
@@ -253,7 +253,6 @@ class Stage {
 
   #draw() {
     this.organ.camera.updateProjectionMatrix();
-    this.orbit.update();
     this.renderer.render(this.organ.scene, this.organ.camera);
   }
 }

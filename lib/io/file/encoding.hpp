@@ -1,3 +1,4 @@
+// io/file: outputs that are whole or absent; what the readers share.
 #pragma once
 
 #include <string>

@@ -130,7 +130,8 @@ std::vector<Vec3> vectors_of(const Reader& reader, const std::vector<double>& nu
 // The triangles of the shells, which come before the solids' tetrahedra.
 void read_triangles(const Reader& reader, DrawnResult& result) {
   const auto types = reader.all<std::int64_t>("VTKHDF/Types");
-  const auto count = narrow<std::size_t>(std::ranges::find_if(types, [](auto type) { return type != 5; }) - types.begin());
+  const auto count =
+      narrow<std::size_t>(std::ranges::find_if(types, [](auto type) { return type != 5; }) - types.begin());
   const auto corners = reader.rows<std::int64_t>("VTKHDF/Connectivity", 0, 3 * count);
   const std::size_t points = result.reference.vertices.size();
   result.reference.triangles.resize(count);

@@ -16,7 +16,7 @@ struct DrawnResult {
     std::vector<Vec3> displacement;  ///< #V, mm
     std::vector<double> von_mises;   ///< #V, MPa
   };
-  TriangleMesh reference;          ///< mm; the triangles of a shell are consecutive
+  TriangleMesh reference;  ///< mm; the triangles of a shell are consecutive
   std::size_t shells = 0;
   std::vector<State> states;  ///< the written ones, evenly chosen; of a static result the reference and the last
   bool timed = false;         ///< the states' times are seconds

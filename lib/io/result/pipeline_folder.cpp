@@ -87,7 +87,8 @@ std::optional<std::vector<PipelineCase>> read_record(const fs::path& folder) {
     if (fields.size() != 5 || within.is_absolute() || (!within.empty() && *within.begin() == "..")) {
       throw InputError(path.string() + ": is not what Makefile.pipeline writes: remove it, and all cases are taken");
     }
-    cases.push_back({fields[0], within.empty() ? fs::path() : folder / within, fields[2], fields[3], fields[4], {}, {}});
+    cases.push_back(
+        {fields[0], within.empty() ? fs::path() : folder / within, fields[2], fields[3], fields[4], {}, {}});
   }
   return cases;
 }
@@ -126,7 +127,8 @@ std::vector<fs::path> folders_in(const fs::path& folder) {
 }
 
 std::vector<PipelineCase> find_cases(const fs::path& folder) {
-  if (auto own = case_in(folder, fs::absolute(folder / ".").parent_path().filename().string())) {
+  const fs::path place = fs::absolute(folder / ".").parent_path();
+  if (auto own = case_in(folder, (place.parent_path().filename() / place.filename()).string())) {
     return {*own};
   }
   std::vector<PipelineCase> cases;
@@ -164,7 +166,8 @@ Json PipelineCase::at(const std::string& stage_name, const std::string& key) con
 std::vector<PipelineCase> read_pipeline_folder(const fs::path& folder) {
   std::error_code error;
   if (!fs::is_directory(folder, error)) {
-    throw InputError(folder.string() + ": is not a folder: give the OUT of Makefile.pipeline, or a case's folder in it");
+    throw InputError(folder.string() +
+                     ": is not a folder: give the OUT of Makefile.pipeline, or a case's folder in it");
   }
   auto recorded = read_record(folder);
   std::vector<PipelineCase> cases = recorded ? std::move(*recorded) : find_cases(folder);

@@ -16,11 +16,11 @@ inline constexpr std::array<const char*, 4> pipeline_stages{"extract", "decimate
 
 /// A case: one label of one volume.
 struct PipelineCase {
-  std::string name;               ///< "STEM/LABEL", any bytes
-  std::filesystem::path folder;   ///< where its files lie; empty where it has none
-  std::string stage;              ///< the last that was run, or "none"
-  std::string exit;               ///< its exit code, "" where it did not end
-  std::string message;            ///< "done", or why it is not
+  std::string name;                     ///< "STEM/LABEL", any bytes
+  std::filesystem::path folder;         ///< where its files lie; empty where it has none
+  std::string stage;                    ///< the last that was run, or "none"
+  std::string exit;                     ///< its exit code, "" where it did not end
+  std::string message;                  ///< "done", or why it is not
   std::map<std::string, Json> reports;  ///< by stage, up to the last; an object each
   std::vector<std::string> unreadable;  ///< reports that are there and cannot be read, with the reason
 

@@ -10,11 +10,11 @@ namespace tunica::report {
 
 /// The shells of a case as they are drawn in 3-D.
 struct DrawnShells {
-  TriangleMesh mesh;                            ///< as imaged, mm
-  std::vector<std::array<Index, 2>> edges;      ///< of the shells, in pieces; empty where they are too many
-  std::vector<DrawnResult::State> states;       ///< at least one
-  std::vector<std::string> labels;              ///< of the states
-  std::vector<double> distance;                 ///< #V, mm, to the segmented surface; empty: not known
+  TriangleMesh mesh;                        ///< as imaged, mm
+  std::vector<std::array<Index, 2>> edges;  ///< of the shells, in pieces; empty where they are too many
+  std::vector<DrawnResult::State> states;   ///< at least one
+  std::vector<std::string> labels;          ///< of the states
+  std::vector<double> distance;             ///< #V, mm, to the segmented surface; empty: not known
 };
 
 /// What a result draws, with at most `triangles`: fewer pieces per shell first, and where the shells alone are too

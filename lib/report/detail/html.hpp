@@ -1,10 +1,9 @@
 #pragma once
 
-#include <fmt/format.h>
-
 #include <concepts>
 #include <string>
 #include <string_view>
+#include <vector>
 
 /// HTML that no name of a file can break out of: what is put into it is text, unless it is Markup already.
 namespace tunica::report {
@@ -19,23 +18,23 @@ struct Markup {
   }
 };
 
-/// A text for elements and for attributes in quotes: the signs of HTML escaped; what is no UTF-8, no character of HTML or turns the
-/// direction of reading becomes U+FFFD.
+/// A text for elements and for attributes in quotes: the signs of HTML escaped; what is no UTF-8, no character of HTML
+/// or turns the direction of reading becomes U+FFFD.
 std::string escaped(std::string_view text);
 
 /// What stands for an argument of html().
-inline const std::string& shielded(const Markup& markup) { return markup.text; }
+inline std::string shielded(const Markup& markup) { return markup.text; }
 inline std::string shielded(std::string_view text) { return escaped(text); }
-template <std::integral Number>
-Number shielded(Number number) {
-  return number;
-}
+inline std::string shielded(std::integral auto number) { return std::to_string(number); }
+
+/// HTML from a format, whose literal parts are HTML, and texts that are HTML already.
+Markup filled(std::string_view format, const std::vector<std::string>& shielded_texts);
 
 /// HTML from a format as fmt::format() takes it, whose literal parts are HTML. Arguments are escaped unless they are
 /// Markup.
 template <typename... Arguments>
 Markup html(std::string_view format, const Arguments&... arguments) {
-  return {fmt::format(fmt::runtime(format), shielded(arguments)...)};
+  return filled(format, {shielded(arguments)...});
 }
 
 /// A heading of level 1 to 6.

@@ -20,8 +20,8 @@ Room room_for(std::size_t cases);
 /// Cost: some 0.2 s for a surface of 10,000 triangles and as many shells as the pipeline makes.
 void draw_organ(CaseReport& one, const Room& room);
 
-/// Fills in nine slices of the volume that the extraction read, with the shells' outline. What cannot be read is named in
-/// `missing`. Cost: that of reading the volume, twice (it has to be the one that was read then).
+/// Fills in nine slices of the volume that the extraction read, with the shells' outline. What cannot be read is named
+/// in `missing`. Cost: that of reading the volume, twice (it has to be the one that was read then).
 void draw_slices(CaseReport& one, const Room& room);
 
 }  // namespace tunica::report
