@@ -75,13 +75,14 @@ Markup legend(const CaseReport& one) {
   }
   const bool loaded = one.picture_top > 0;
   return html(
-      "<div class=\"legend\"><span class=\"quantity\">{0}</span><span class=\"scale\"><span>0</span>"
+      "<div class=\"legend\"><span class=\"quantity\">{0}</span><span class=\"scale\"{5}><span>0</span>"
       "<svg viewBox=\"0 0 160 10\" preserveAspectRatio=\"none\" aria-hidden=\"true\"><defs><linearGradient "
       "id=\"bar-{1}\">{2}</linearGradient></defs><rect width=\"160\" height=\"10\" rx=\"2\" "
       "fill=\"url(#bar-{1})\"/></svg><span class=\"top\">{3}</span></span><span class=\"drawn\">{4}</span></div>\n",
       loaded ? "Wall stress (von Mises)" : "Shells", one.id(), stops,
       loaded ? figure(one.picture_top * 1e3) + " kPa" : "",
-      loaded ? fmt::format("Loaded; displacement drawn × {}.", figure(one.magnification)) : "Drawn as imaged.");
+      loaded ? fmt::format("Loaded; displacement drawn × {}.", figure(one.magnification)) : "Drawn as imaged.",
+      loaded ? Markup{} : Markup{" hidden"});
 }
 
 Markup organ_figure(const CaseReport& one, int level) {

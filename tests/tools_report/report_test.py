@@ -170,13 +170,14 @@ class CohortPage(ReportTest):
             for report in reports.values():
                 report["warnings"] = []
             reports["simulate"]["result"]["wall"]["stress_p99_mpa"] = 0.05
+            reports["extract"]["result"]["voxel_volume_mm3"] = 40400
             reports["simulate"]["warnings"] = ["shells wave"]
         self.copy("zz-out", stand_out)
         done, text, page = self.report()
         self.assertRegex(done.stdout, r"zz-failed/1 +relax .*the tolerance cannot be held")
         self.assertEqual(re.findall(r"<dd>(\d+)</dd>", text), ["9", "1", "1"])
         self.assertRegex(page.text, r"zz-failed/1: relax: shell.ply: the tolerance cannot be held\s*Next: tunica-relax .* --verbose")
-        self.assertRegex(page.text, r"zz-out/1: Stress p99 50.0 kPa \(robust z \+\d+")
+        self.assertRegex(page.text, r"zz-out/1: Stress p99 50 kPa \(robust z \+\d+")
         self.assertEqual(text.count("(robust z"), 1)
         self.assertEqual(page.of("details")[0]["class"], "case failed", "failures first")
         self.assertEqual(text.count('<svg viewBox="0 0 320 58" role="img"'), 7)

@@ -6,6 +6,7 @@ import {
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { readOrgan } from "./data.js";
 
+const PLAIN = new Color(0xc4c8ce);
 const MAGNIFICATIONS = [0, 1, 2, 5, 10, 20, 50, 100];
 
 function element(name, properties = {}, ...children) {
@@ -34,7 +35,7 @@ class Organ {
     const { header } = organ;
     this.state = header.states.length - 1;
     this.magnification = header.magnification;
-    this.colour = "stress";
+    this.colour = Object.keys(header.tops).find((key) => header.tops[key] !== null); // none of shells alone
     this.palette = palette(header.palette);
     this.#makeScene();
     this.#makeControls();
@@ -157,14 +158,17 @@ class Organ {
       positions.array[i] = shell.positions[i] + this.magnification * state.displacement[i];
     }
     for (let i = 0; i < header.shell.points; ++i) {
-      const level = Math.round(this.#valueAt(i, state));
-      this.palette[Math.max(0, Math.min(255, level || 0))].toArray(colours.array, 3 * i);
+      const level = this.colour ? Math.round(this.#valueAt(i, state)) : 0;
+      (this.colour ? this.palette[Math.max(0, Math.min(255, level || 0))] : PLAIN).toArray(colours.array, 3 * i);
     }
     positions.needsUpdate = colours.needsUpdate = true;
     this.geometry.computeVertexNormals();
     const legend = this.figure.querySelector(".legend");
-    legend.querySelector(".quantity").textContent = header.names[this.colour];
-    legend.querySelector(".top").textContent = `${number(header.tops[this.colour])} ${header.units[this.colour]}`;
+    legend.querySelector(".scale").hidden = !this.colour;
+    if (this.colour) {
+      legend.querySelector(".quantity").textContent = header.names[this.colour];
+      legend.querySelector(".top").textContent = `${number(header.tops[this.colour])} ${header.units[this.colour]}`;
+    }
     legend.querySelector(".drawn").textContent = this.magnification === 0
       ? "Drawn as imaged." : `${header.states[this.state]}; displacement drawn × ${this.magnification}.`;
     this.changed();

@@ -1,4 +1,4 @@
-// io/file: outputs that are whole or absent; what the readers share.
+// io/file: outputs that are whole or absent; what the readers share; bytes as text.
 #pragma once
 
 #include <string>
