@@ -80,6 +80,11 @@ void run(cli::Tool& tool, const Arguments& given) {
   {
     const auto stage = tool.stage("read");
     cases = read_pipeline_folder(given.folder);
+    for (const PipelineCase& one : cases) {
+      for (const auto& [name, content] : one.reports) {
+        tool.input(one.folder / (name + ".json"));
+      }
+    }
   }
   const auto chart = given.chart.empty() ? std::nullopt : report::summary_chart(cases);
   std::string table = report::summary_text(cases);

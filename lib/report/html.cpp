@@ -36,7 +36,7 @@ Character first_character(std::string_view text) {
   }
   constexpr std::array<std::uint32_t, 5> least{0, 0, 0x80, 0x800, 0x10000};
   const bool valid = code >= least[count] && code <= 0x10ffff && (code < 0xd800 || code > 0xdfff);
-  return {code, valid ? count : 0};
+  return valid ? Character{code, count} : Character{};
 }
 
 // Control characters, and those that turn or hide what stands beside them.

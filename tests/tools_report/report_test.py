@@ -327,6 +327,8 @@ class Errors(ReportTest):
         self.assertIn(".html", done.stderr)
         report = json.loads(cases.run("report", self.out, "-o", self.page, "--force", "--report", "-").stdout)
         self.assertEqual(report["outputs"], [{"path": str(self.page), "sha256": cases.sha256(self.page)}])
+        self.assertEqual([pathlib.Path(entry["path"]).name for entry in report["inputs"]],
+                         ["decimate.json", "extract.json", "relax.json", "simulate.json"])
         self.assertEqual(report["result"]["cases"], 1)
 
 

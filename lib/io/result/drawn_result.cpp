@@ -14,6 +14,7 @@
 namespace tunica {
 namespace {
 
+constexpr std::size_t most_numbers = 200'000'000;  // in one reading: what a page cannot show, and damaged files claim
 constexpr std::size_t most_text = std::size_t{16} << 20;
 
 /// One file, of which every failure is an InputError that names it.
@@ -59,13 +60,15 @@ public:
   template <typename Number>
   [[nodiscard]] std::vector<Number> rows(const std::string& dataset, std::size_t first, std::size_t count) const {
     const std::vector<std::size_t> whole = shape(dataset);
-    if (whole.empty() || whole.size() > 2 || first > whole[0] || count > whole[0] - first || count > max_index ||
-        (whole.size() == 2 && whole[1] > 9)) {
+    const std::size_t width = whole.size() == 2 ? whole[1] : 1;
+    if (whole.empty() || whole.size() > 2 || first > whole[0] || count > whole[0] - first || width == 0 || width > 9) {
       fail(dataset + " has no shape of a result");
+    }
+    if (count > most_numbers / width) {
+      fail(dataset + " is too large to be drawn");
     }
     const hdf5::Handle data = open(dataset);
     const hdf5::Handle space(H5Dget_space(data.get()));
-    const std::size_t width = whole.size() == 2 ? whole[1] : 1;
     const std::array<hsize_t, 2> start{first, 0};
     const std::array<hsize_t, 2> extent{count, width};
     const hdf5::Handle memory(H5Screate_simple(narrow<int>(whole.size()), extent.data(), nullptr));
