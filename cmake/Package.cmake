@@ -9,7 +9,7 @@ endforeach()
 install(TARGETS ${libraries} tunica_cholmod tunica_opencv EXPORT tunicaTargets ARCHIVE DESTINATION lib)
 install(EXPORT tunicaTargets NAMESPACE tunica:: DESTINATION ${package})
 install(DIRECTORY lib/ DESTINATION include/tunica FILES_MATCHING PATTERN "*.hpp" PATTERN detail EXCLUDE
-        PATTERN cli EXCLUDE)
+        PATTERN cli EXCLUDE PATTERN report EXCLUDE)
 install(FILES ${PROJECT_BINARY_DIR}/include/generated/tunica/core/version.hpp DESTINATION include/tunica/core)
 configure_package_config_file(cmake/tunicaConfig.cmake.in ${PROJECT_BINARY_DIR}/tunicaConfig.cmake
                               INSTALL_DESTINATION ${package})

@@ -8,16 +8,17 @@ import re
 import shlex
 
 ENDINGS = (".seg.nrrd", ".nii.gz", ".nii", ".nrrd", ".nhdr", ".mha", ".mhd", ".tiff", ".tif", ".png")
-OF_THE_RUN = (".lock", ".run", "summary.tsv", "chart.svg")
+OF_THE_RUN = (".lock", ".run", ".cases", "summary.tsv", "chart.svg", "report.html")
 BLANKS = re.compile(r"\s+", re.ASCII)
 CONTROL = re.compile(r"[\x00-\x1f\x7f]")
 
 WALL = ("PRESSURE", "YOUNG", "POISSON", "THICKNESS", "DENSITY")
+IMAGE = ("IMAGED_AT", "MID_SURFACE")
 MOTION = ("DURATION", "STEP")
 FURTHER = ("EXTRACT", "DECIMATE", "RELAX", "SIMULATE")
 # Variables that a case may have of its own, and those that a run has.
 OF_A_CASE = ("LABEL", "ISOVALUE", "NAMES", "SMOOTH", "LARGEST", "FILL", "OPEN", "SHELLS", "TOLERANCE", "ACCURACY", "OF",
-             "METHOD", *WALL, "KIND", "LOAD_STEPS", *MOTION, "FIX", "MEM", *FURTHER)
+             "METHOD", *WALL, *IMAGE, "KIND", "LOAD_STEPS", *MOTION, "FIX", "MEM", *FURTHER)
 OF_A_RUN = ("VOLUMES", "LABELS", "CASES", "OUT", "THREADS", "RUN", "BIN")
 # What a case says of the one side takes the place of what make says of the other.
 INSTEAD = ((("LABEL",), ("ISOVALUE",)), (("ACCURACY",), ("SHELLS", "TOLERANCE")))

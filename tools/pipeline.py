@@ -19,6 +19,7 @@ import argparse
 import errno
 import fcntl
 import hashlib
+import json
 import os
 import re
 import shlex
@@ -28,9 +29,9 @@ import subprocess
 import sys
 import tempfile
 
-import summary
 from cases import CONTROL, Refused, find_cases
 
+STAGES = ("extract", "decimate", "relax", "simulate")
 PRODUCTS = {"extract": ["surface.ply"], "decimate": ["coarse.ply"], "relax": ["shell.ply", "map.png"],
             "simulate": ["result.hdf"]}
 
@@ -66,9 +67,12 @@ def stage_flags(case):
         decimate += ["--min-angle", "20"]
         relax = ["--shells", shells, "--max-iterations", "1"]
     relax += flag_if("--method", "METHOD")
+    if setting("MID_SURFACE"):
+        relax += flag("--mid-surface", setting("MID_SURFACE")) + flag_if("--thickness", "THICKNESS")
     simulate = flag_if("--fix", "FIX") + flag_if("--accuracy", "ACCURACY") + flag_if("--of", "OF")
     for name in ("pressure", "young", "poisson", "thickness", "density"):
         simulate += flag_if("--" + name, name.upper())
+    simulate += flag_if("--imaged-at", "IMAGED_AT")
     if setting("KIND") == "static":
         simulate += ["--static", *flag_if("--load-steps", "LOAD_STEPS")]
     else:
@@ -98,6 +102,16 @@ def stage_commands(case, binaries, flags):
 
 
 # ------------------------------------------------------------------------------------------------ what is up to date
+
+def read_report(path):
+    """A tool's report; empty when there is none."""
+    try:
+        with open(path, "rb") as file:
+            report = json.loads(file.read())
+        return report if isinstance(report, dict) else {}
+    except (OSError, ValueError, RecursionError):
+        return {}
+
 
 def read_text(path):
     try:
@@ -143,7 +157,7 @@ def is_up_to_date(case, stage, remembered):
         return False
     if not all(os.path.isfile(os.path.join(case.folder, name)) for name in PRODUCTS[stage]):
         return False
-    report = summary.read_report(os.path.join(case.folder, f"{stage}.json"))
+    report = read_report(os.path.join(case.folder, f"{stage}.json"))
     if read_text(os.path.join(case.folder, f".{stage}.flags")) != remembered or report.get("ok") is not True:
         return False
     inputs = report.get("inputs") or []
@@ -160,7 +174,7 @@ def plan_case(case, binaries, dry):
     write_text(os.path.join(case.plan, "mem"), case.setting("MEM"))
     flags = stage_flags(case)
     commands = stage_commands(case, binaries, flags)
-    for stage in summary.STAGES:
+    for stage in STAGES:
         # The volume itself, which may be a folder of slices, stands here: a report names the files.
         remembered = flags[stage] if stage != "extract" else f"{os.path.abspath(case.volume)} {flags[stage]}"
         path = os.path.join(case.plan, f"{stage}.flags")
@@ -255,9 +269,49 @@ def run_make(make, run):
 
 
 def check_tools(binaries):
-    for stage in summary.STAGES:
+    for stage in (*STAGES, "report"):
         if not os.access(os.path.join(binaries, f"tunica-{stage}"), os.X_OK):
             raise Refused(f"{binaries}: has no tunica-{stage} that can be run: build it, or correct BIN")
+
+
+# ------------------------------------------------------------------------------------------------------- how it went
+
+def how_it_ended(case):
+    """@return the last stage of this run, its exit code ("" when it did not end), and the message; "" for that of the
+    stage itself, which its report tells."""
+    if case.refused:
+        return "none", "2", case.refused
+    if os.path.exists(os.path.join(case.plan, "done")):
+        return STAGES[-1], "0", "done"
+    last = ("none", "", "not run")
+    for stage in STAGES:
+        code = read_text(os.path.join(case.plan, f"{stage}.exit"))
+        if code is None:
+            continue
+        code = code.strip()
+        if code != "0":
+            return stage, code, "" if code else "stopped while it ran"
+        last = (stage, code, "stopped before the next stage")
+    return last
+
+
+def tell(out, cases, binaries):
+    """Leaves word of this run in OUT/.cases, for tunica-report, which prints the table, draws the chart and writes the
+    page. @return 1 when a case did not reach its result or the table is lost, else 0"""
+    ends = [how_it_ended(case) for case in cases]
+    folders = ["" if case.refused else os.path.relpath(case.folder, out) for case in cases]
+    lines = ["\t".join(re.sub(r"[\x00-\x1f\x7f]+", " ", field) for field in (case.name, folder, *end))
+             for case, folder, end in zip(cases, folders, ends)]
+    path = os.path.join(out, ".cases")
+    write_text(path + ".part", "\n".join(lines) + "\n")
+    os.replace(path + ".part", path)
+    chart = os.path.join(out, "chart.svg")
+    if os.path.isfile(chart):
+        os.remove(chart)  # where no shells were made there is none
+    command = [os.path.join(binaries, "tunica-report"), out, "--force", "-o", os.path.join(out, "report.html"),
+               "--summary", os.path.join(out, "summary.tsv"), "--chart", chart]
+    told = subprocess.run(command, check=False, stdin=subprocess.DEVNULL).returncode == 0
+    return 0 if told and all(message == "done" for _, _, message in ends) else 1
 
 
 def dry_run(cases, binaries, make):
@@ -275,7 +329,7 @@ def real_run(cases, out, binaries, make):
     os.mkdir(run)
     plan_cases(cases, run, binaries, dry=False)
     code, stopped = run_make(make, run)
-    failed = summary.tell(out, cases, os.path.join(binaries, "tunica-chart"))
+    failed = tell(out, cases, binaries)
     shutil.rmtree(run, ignore_errors=True)
     return 128 + stopped if stopped else code or failed
 

@@ -239,7 +239,7 @@ After a requirement that was not met or a signal it holds the best or last good 
 .I REPORT
 With
 .B \-\-report
-a JSON record of the run: inputs with their SHA\-256, outputs, seconds of each stage, peak memory, and the results;
+a JSON record of the run: inputs and outputs with their SHA\-256, seconds of each stage, peak memory, and the results;
 also, with the error, when the run fails.
 .SH ENVIRONMENT
 .TP

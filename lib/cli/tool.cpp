@@ -148,6 +148,15 @@ void allow_many_files() {
   }
 }
 
+// SHA-256 of a file; null where it cannot be read as one.
+Json hash_if_readable(const std::filesystem::path& path) {
+  try {
+    return sha256_of_file(path);
+  } catch (const InputError&) {
+    return nullptr;
+  }
+}
+
 // --force is meant for an older report: a slip of the pen must not turn a mesh or a patient's volume into JSON.
 void require_no_other_file(const std::filesystem::path& report) {
   std::ifstream file(report, std::ios::binary);
@@ -385,18 +394,22 @@ int Tool::finish(ExitCode code, const std::string& error) {
   return static_cast<int>(code);
 }
 
-void Tool::write_report(bool ok, const std::string& error) {
+Json Tool::describe_outputs(bool ok) const {
   Json outputs = Json::array();
   for (const std::filesystem::path& path : outputs_) {
     for (const std::string& name : {path.string(), part_of(path).string()}) {
       std::error_code missing;  // an older file that --force would have replaced is not an output of a run that failed
       const auto written = std::filesystem::last_write_time(name, missing);
       if (!missing && (ok || written >= start_on_disk_)) {
-        outputs.push_back(name);
+        outputs.push_back({{"path", name}, {"sha256", hash_if_readable(name)}});
       }
     }
   }
-  Json seconds{{"total", seconds_since(start_)}};
+  return outputs;
+}
+
+void Tool::write_report(bool ok, const std::string& error) {
+  Json seconds{{"total", seconds_since(start_)}};  // without the hashes of the outputs
   seconds.update(seconds_);
   const Json report{
       {"tool", "tunica-" + verb_},
@@ -406,7 +419,7 @@ void Tool::write_report(bool ok, const std::string& error) {
       {"warnings", warnings_},
       {"command", command_},
       {"inputs", inputs_},
-      {"outputs", outputs},
+      {"outputs", describe_outputs(ok)},
       {"seconds", seconds},
       {"peak_mib", peak_mebibytes()},
       {"threads", thread_count()},
@@ -446,15 +459,8 @@ void Tool::claim(const std::filesystem::path& path, bool written) {
 const std::filesystem::path& Tool::input(const std::filesystem::path& path) {
   claim(path, false);
   at_hand_ = path.string();
-  Json hash;
-  if (!report_.empty()) {
-    try {
-      hash = sha256_of_file(path);
-    } catch (const InputError&) {
-      hash = nullptr;  // a missing input or a folder is for the reader to refuse; the report still has to be written
-    }
-  }
-  inputs_.push_back({{"path", path.string()}, {"sha256", hash}});
+  // A missing input or a folder is for the reader to refuse; the report still has to be written.
+  inputs_.push_back({{"path", path.string()}, {"sha256", report_.empty() ? Json() : hash_if_readable(path)}});
   return path;
 }
 

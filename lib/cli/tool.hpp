@@ -105,6 +105,9 @@ public:
   /// The `result` object of the report. A value that is undefined is set to null (`Json()`).
   [[nodiscard]] Json& result() { return result_; }
 
+  /// Whether standard output belongs to the report (`--report -`).
+  [[nodiscard]] bool reports_to_standard_output() const { return report_ == "-"; }
+
   [[nodiscard]] bool force() const { return force_; }
   [[nodiscard]] bool quiet() const { return quiet_; }
   [[nodiscard]] bool verbose() const { return verbose_; }
@@ -118,6 +121,7 @@ private:
   int perform(const std::function<void()>& body);
   int finish(ExitCode code, const std::string& error);
   void register_report();
+  [[nodiscard]] Json describe_outputs(bool ok) const;
   void write_report(bool ok, const std::string& error);
   void parse_common();
   void claim(const std::filesystem::path& path, bool written);

@@ -14,6 +14,7 @@ ROOMS = {
     "accuracy": {"core", "surface", "shell", "fit", "mechanics", "accuracy"},
     "draw": {"core", "surface", "draw"},
     "io": {"core", "volume", "surface", "shell", "fit", "mechanics", "accuracy", "draw", "io"},
+    "report": {"core", "volume", "surface", "shell", "draw", "io", "report"},
     "cli": {"core", "volume", "surface", "shell", "fit", "mechanics", "accuracy", "draw", "io", "cli"},
 }
 

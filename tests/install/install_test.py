@@ -10,7 +10,7 @@ import tempfile
 import unittest
 from pathlib import Path
 
-TOOLS = ["phantom", "extract", "decimate", "relax", "compare", "simulate", "chart"]
+TOOLS = ["phantom", "extract", "decimate", "relax", "compare", "simulate", "chart", "report"]
 SECTIONS = ["NAME", "SYNOPSIS", "DESCRIPTION", "OPTIONS", "EXIT STATUS", "FILES", "ENVIRONMENT", "EXAMPLE"]
 
 

@@ -50,6 +50,7 @@ class Pipeline(unittest.TestCase):
             return {row["case"]: row for row in csv.DictReader(file, delimiter="\t", quoting=csv.QUOTE_NONE)}
 
 
+@unittest.skipUnless((TOOLS / "tunica-report").exists(), "tunica-report is not built")
 class WithStubs(Pipeline):
     """Tools that do nothing, and two volumes."""
 
@@ -57,7 +58,8 @@ class WithStubs(Pipeline):
         super().setUp()
         self.bin = self.folder / "bin"
         self.bin.mkdir()
-        for verb in STAGES + ["chart"]:
+        (self.bin / "tunica-report").symlink_to(TOOLS / "tunica-report")
+        for verb in STAGES:
             shutil.copy(SOURCE / "tests" / "pipeline" / "stub_tool", self.bin / f"tunica-{verb}")
         for name in ("a.nii.gz", "b.seg.nrrd"):
             (self.folder / name).write_text("a volume")
@@ -67,7 +69,7 @@ class WithStubs(Pipeline):
         log = self.bin / "calls"
         lines = log.read_text().splitlines() if log.exists() else []
         log.unlink(missing_ok=True)
-        return [line for line in lines if not line.startswith("chart")]
+        return lines
 
     def verbs(self):
         return sorted(line.split()[0] for line in self.calls())
@@ -100,6 +102,9 @@ class Rules(WithStubs):
         for name in ("result.hdf", "map.png"):
             self.assertIn(str(self.out / "a" / "3" / name), done.stdout)
         self.assertIn(str(self.out / "chart.svg"), done.stdout)
+        self.assertIn("<svg", (self.out / "chart.svg").read_text())
+        self.assertIn(f"report: {self.out / 'report.html'}", done.stdout)
+        self.assertIn("surface.ply: ", (self.out / "report.html").read_text(), "the stub's files are no meshes: told")
 
     def test_variables_reach_the_tools(self):
         self.make(VOLUMES="a.nii.gz", LABEL=3, SMOOTH="none", LARGEST=0, FILL=0, OPEN=1, SHELLS=123, TOLERANCE="0.5%",
@@ -541,7 +546,7 @@ class Runs(WithStubs):
         done = self.make(**self.ARGUMENTS)
         self.assertNotEqual(done.returncode, 0)
         self.assertNotIn("Traceback", done.stderr)
-        self.assertIn("summary.tsv cannot be written", done.stdout)
+        self.assertIn(f"tunica-report: {self.out / 'summary.tsv'}: ", done.stderr)
         self.assertEqual(done.stdout.count("  done\n"), 4)
 
     @unittest.skipIf(os.geteuid() == 0, "the superuser may write anywhere")
@@ -562,7 +567,7 @@ class Runs(WithStubs):
         self.assertEqual([row["message"] for row in self.summary().values()], ["done"] * 4)
 
 
-@unittest.skipUnless(all((TOOLS / f"tunica-{verb}").exists() for verb in STAGES + ["phantom", "chart"]),
+@unittest.skipUnless(all((TOOLS / f"tunica-{verb}").exists() for verb in STAGES + ["phantom", "report"]),
                      "the tools are not built")
 class WholeChain(Pipeline):
     """The real tools on tiny phantoms."""

@@ -276,7 +276,7 @@ class WhatIsDrawn(ChartCase):
         made = json.loads((self.folder / "r.json").read_text())
         self.assertTrue(made["ok"])
         self.assertEqual(len(made["inputs"]), 2)
-        self.assertEqual([Path(p).name for p in made["outputs"]], ["chart.svg", "chart.csv"])
+        self.assertEqual([Path(entry["path"]).name for entry in made["outputs"]], ["chart.svg", "chart.csv"])
         self.assertEqual(made["result"]["marks"], 1)
         self.assertEqual(made["result"]["skipped"], [runs[1]])
         self.assertTrue({"read", "draw", "write"} <= set(made["seconds"]))

@@ -253,7 +253,8 @@ class Choices(ExtractTest):
         array = self.two_labels()
         path = self.nifti(array)
         record, _ = self.run_tool(path, self.folder / "organ-{label}.ply", "--all-labels")
-        self.assertEqual(record["outputs"], [str(self.folder / "organ-1.ply"), str(self.folder / "organ-7.ply")])
+        self.assertEqual([entry["path"] for entry in record["outputs"]],
+                         [str(self.folder / "organ-1.ply"), str(self.folder / "organ-7.ply")])
         for label in (1, 7):
             self.check_surface(Ply(self.folder / f"organ-{label}.ply"), record["result"]["labels"][str(label)],
                                array == label, LPS)
@@ -360,11 +361,11 @@ class Choices(ExtractTest):
                                 (self.nifti(labels, name="labels.nii.gz"), ["--all-labels", "--fill-cavities"])):
             out = self.folder / "organ-{label}.ply"
             whole, _ = self.run_tool(path, out, *selection)
-            written = [pathlib.Path(output).read_bytes() for output in whole["outputs"]]
+            written = [pathlib.Path(output["path"]).read_bytes() for output in whole["outputs"]]
             self.assertGreaterEqual(len(written), 1)
             for slices in (1, 3, 1000):
                 record, _ = self.run_tool(path, out, *selection, "--slab", slices)
-                self.assertEqual([pathlib.Path(output).read_bytes() for output in record["outputs"]], written)
+                self.assertEqual([pathlib.Path(output["path"]).read_bytes() for output in record["outputs"]], written)
                 self.assertEqual(record["result"], whole["result"])
         self.refuse(2, path, self.out, "--label", 1, "--slab", 0, saying="--slab")
 
@@ -439,7 +440,7 @@ class Choices(ExtractTest):
         self.assertEqual([key for key in ("total", "read", "smooth", "extract", "write") if key not in record["seconds"]],
                          [])
         self.assertEqual(record["inputs"][0]["path"], str(path))
-        self.assertEqual(record["outputs"], [str(self.out)])
+        self.assertEqual([entry["path"] for entry in record["outputs"]], [str(self.out)])
         comments = Ply(self.out).comments
         self.assertIn("source v.nii.gz", comments)
         self.assertIn("label 1", comments)

@@ -1,4 +1,5 @@
 """The command line of tunica-simulate: every flag, every exit code, signals, --check."""
+import hashlib
 import os
 import resource
 import signal
@@ -44,7 +45,8 @@ class Flags(SimulateTest):
         self.assertEqual(list(report["seconds"]), ["total", "read", "setup", "solve", "write"])
         self.assertTrue(all(report["seconds"][stage] > 0 for stage in report["seconds"]))
         self.assertEqual([i["path"] for i in report["inputs"]], ["ball.ply"])
-        self.assertEqual(report["outputs"], ["out.hdf"])
+        with open(self.path("out.hdf"), "rb") as file:
+            self.assertEqual(report["outputs"], [{"path": "out.hdf", "sha256": hashlib.sha256(file.read()).hexdigest()}])
         self.assertEqual(os.listdir(self.folder).count("out.hdf.part"), 0)
 
     def test_open_body_has_no_volume(self):

@@ -1,4 +1,3 @@
-// io/result: result files, reports, journals of runs, and what is drawn from reports.
 #pragma once
 
 #include "tunica/draw/chart.hpp"

@@ -1,0 +1,12 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace tunica {
+
+/// A PNG of these pixels, rows from the top.
+/// @param pixels  width x height x 4: red, green, blue, cover, each 0 to 255
+std::string png_of(const std::vector<unsigned char>& pixels, int width, int height);
+
+}  // namespace tunica

@@ -1,0 +1,40 @@
+#pragma once
+
+#include "tunica/core/json.hpp"
+
+#include <array>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+/// What Makefile.pipeline leaves in its folder: cases, their stages and the stages' reports.
+namespace tunica {
+
+/// The stages of a case, in order. A stage's report is STAGE.json in the case's folder.
+inline constexpr std::array<const char*, 4> pipeline_stages{"extract", "decimate", "relax", "simulate"};
+
+/// A case: one label of one volume.
+struct PipelineCase {
+  std::string name;                     ///< "STEM/LABEL", any bytes
+  std::filesystem::path folder;         ///< where its files lie; empty where it has none
+  std::string stage;                    ///< the last that was run, or "none"
+  std::string exit;                     ///< its exit code, "" where it did not end
+  std::string message;                  ///< "done", or why it is not
+  std::map<std::string, Json> reports;  ///< by stage, up to the last; an object each
+  std::vector<std::string> unreadable;  ///< reports that are there and cannot be read, with the reason
+
+  [[nodiscard]] bool done() const { return message == "done"; }
+  /// The value behind a stage's report's dotted key; null where there is none.
+  [[nodiscard]] Json at(const std::string& stage_name, const std::string& key) const;
+};
+
+/// The cases of a folder, as the last run of the pipeline left word of them in FOLDER/.cases (a line per case: name,
+/// folder within FOLDER, last stage, exit code, message, separated by tabs), or else all there are: folders with a
+/// stage's report, at most two levels down, or FOLDER itself.
+/// Reports are read up to the last stage that was run: what an earlier run left behind it does not count.
+/// Errors: InputError when the folder is none, cannot be read, or holds no case.
+/// Cost: the reports' bytes. Limits: a report of more than 16 MiB is unreadable.
+std::vector<PipelineCase> read_pipeline_folder(const std::filesystem::path& folder);
+
+}  // namespace tunica

@@ -1,0 +1,322 @@
+#include "tunica/core/narrow.hpp"
+#include "tunica/draw/thumbnail.hpp"
+#include "tunica/report/detail/command_words.hpp"
+#include "tunica/report/detail/measures.hpp"
+#include "tunica/report/detail/sections.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <sstream>
+
+namespace tunica::report {
+namespace {
+
+std::string text_at(const PipelineCase& one, const std::string& stage, const std::string& key) {
+  const Json value = one.at(stage, key);
+  return value.is_string() ? value.get<std::string>() : "";
+}
+
+Markup verdict(const CaseReport& one) {
+  const PipelineCase& source = one.source;
+  const std::string status = status_of(one);
+  if (status == "failed") {
+    const std::string exit = source.exit.empty() ? "" : ", exit code " + source.exit;
+    Markup line = html("<p class=\"verdict failed\"><strong>Failed</strong> at {}{}: {}</p>\n",
+                       source.stage == "none" ? "the start" : source.stage, exit, one.redacted(source.message));
+    const std::string next = next_command(one);
+    if (!next.empty()) {
+      line += html("<p class=\"next\">Next: <code>{}</code></p>\n", next);
+    }
+    return line;
+  }
+  const std::string warnings = one.warnings.empty()       ? "no warning"
+                               : one.warnings.size() == 1 ? "1 warning"
+                                                          : fmt::format("{} warnings", one.warnings.size());
+  const bool converged = source.at("simulate", "result.converged") == true;
+  return html("<p class=\"verdict {}\"><strong>{}</strong>, {}.</p>\n", status,
+              converged ? "Done and converged" : "Done", warnings);
+}
+
+Markup big_number(const char* key, const std::string& label, const CaseReport& one, const std::string& aside) {
+  const Measure& what = measure(key);
+  const auto value = what.value(one.source);
+  return html("<div><dt>{}</dt><dd><b>{}</b> {}<small>{}</small></dd></div>\n", label, value ? figure(*value) : "–",
+              value ? what.unit : "", aside);
+}
+
+Markup three_numbers(const CaseReport& one) {
+  const auto maximum = measure("stress_max_kpa").value(one.source);
+  const auto percent = measure("distance_percent").value(one.source);
+  const auto pressure = measure("pressure_kpa").value(one.source);
+  Markup list = html("<dl class=\"three\">\n");
+  list += big_number("stress_p99_kpa", "Wall stress, 99th percentile", one,
+                     maximum ? "von Mises, at either face; largest " + figure(*maximum) + " kPa" : "not computed");
+  list += big_number("max_displacement_mm", "Largest displacement", one,
+                     pressure ? "under " + figure(*pressure) + " kPa" : "of the curved surface");
+  list += big_number("distance_mm", "Shells to surface, at most", one,
+                     percent ? "certified, both ways; " + figure(*percent) + " % of the diagonal" : "not certified");
+  return list += html("</dl>\n");
+}
+
+// The colour bar, whose texts the page's script changes with the colours.
+Markup legend(const CaseReport& one) {
+  if (one.organ.empty()) {
+    return {};
+  }
+  Markup stops;
+  const auto palette = thumbnail_palette();
+  for (std::size_t i = 0; i < palette.size(); ++i) {
+    const auto [red, green, blue] = palette[i];
+    stops += html("<stop offset=\"{}\" stop-color=\"{}\"/>", fmt::format("{:.4g}", real(i) / real(palette.size() - 1)),
+                  fmt::format("#{:02x}{:02x}{:02x}", red, green, blue));
+  }
+  const bool loaded = one.picture_top > 0;
+  return html(
+      "<div class=\"legend\"><span class=\"quantity\">{0}</span><span class=\"scale\"{5}><span>0</span>"
+      "<svg viewBox=\"0 0 160 10\" preserveAspectRatio=\"none\" aria-hidden=\"true\"><defs><linearGradient "
+      "id=\"bar-{1}\">{2}</linearGradient></defs><rect width=\"160\" height=\"10\" rx=\"2\" "
+      "fill=\"url(#bar-{1})\"/></svg><span class=\"top\">{3}</span></span><span class=\"drawn\">{4}</span></div>\n",
+      loaded ? "Wall stress (von Mises)" : "Shells", one.id(), stops,
+      loaded ? figure(one.picture_top * 1e3) + " kPa" : "",
+      loaded ? fmt::format("Loaded; displacement drawn × {}.", figure(one.magnification)) : "Drawn as imaged.",
+      loaded ? Markup{} : Markup{" hidden"});
+}
+
+Markup organ_figure(const CaseReport& one, int level) {
+  if (one.picture.empty()) {
+    return {};
+  }
+  Markup made = heading(level, "The organ");
+  const std::string what =
+      one.picture_top > 0 ? "The loaded organ, coloured by the von Mises stress of its wall" : "The organ as imaged";
+  made += html("<figure class=\"organ\"{}>\n<div class=\"stage\"><img src=\"{}\" alt=\"{}\"></div>\n",
+               one.organ.empty() ? Markup{} : html(" data-organ=\"{}-data\"", one.id()),
+               data_address("image/png", one.picture), what);
+  made += legend(one);
+  made += html("<p class=\"note\" role=\"status\"></p>\n</figure>\n");
+  if (!one.organ.empty()) {
+    made += html("<script type=\"text/plain\" id=\"{}-data\">{}</script>\n", one.id(), one.organ);
+  }
+  return made;
+}
+
+Markup slices_figure(const CaseReport& one, int level) {
+  if (one.slices.empty()) {
+    return {};
+  }
+  Markup made = heading(level, "Shells on the image");
+  return made += html(
+             "<figure class=\"slices\"><img src=\"{}\" alt=\"Nine slices of the image with the outline of the "
+             "shells\"><figcaption>Blue: the segmented organ; amber: the shells. Rows: axial, coronal, sagittal; "
+             "columns: at a quarter, half and three quarters of the organ. The patient's left is on the right, "
+             "the front on top or on the left.</figcaption></figure>\n",
+             data_address("image/png", one.slices));
+}
+
+struct Line {
+  std::string head;
+  std::string value;
+};
+
+Markup table_of(const std::string& caption, const std::vector<Line>& lines) {
+  if (lines.empty()) {
+    return {};
+  }
+  Markup rows;
+  for (const Line& line : lines) {
+    rows += html("<tr><th scope=\"row\">{}</th><td>{}</td></tr>\n", line.head, line.value);
+  }
+  return html("<table class=\"facts\"><caption>{}</caption><tbody>\n{}</tbody></table>\n", caption, rows);
+}
+
+// Values of a cohort's columns; what is not known has no line.
+std::vector<Line> lines_of(const CaseReport& one, const std::vector<const char*>& keys) {
+  std::vector<Line> lines;
+  for (const char* key : keys) {
+    const Measure& what = measure(key);
+    if (const auto value = what.value(one.source)) {
+      const bool whole = what.unit.empty() && *value == std::floor(*value);
+      lines.push_back({what.title, (whole ? fmt::format("{:.0f}", *value) : figure(*value)) + " " + what.unit});
+    }
+  }
+  return lines;
+}
+
+void add_if_known(std::vector<Line>& lines, const CaseReport& one, const char* stage, const char* key,
+                  const std::string& head, const std::string& unit = "") {
+  const Json value = one.source.at(stage, key);
+  if (value.is_boolean()) {
+    lines.push_back({head, value.get<bool>() ? "yes" : "no"});
+  } else if (value.is_number_integer()) {
+    lines.push_back({head, fmt::format("{} {}", value.get<long long>(), unit)});
+  } else if (value.is_number()) {
+    lines.push_back({head, figure(value.get<double>()) + " " + unit});
+  } else if (value.is_string()) {
+    lines.push_back({head, one.redacted(value.get<std::string>())});
+  }
+}
+
+Markup geometry_and_mesh(const CaseReport& one) {
+  std::vector<Line> geometry = lines_of(one, {"volume_ml", "area_cm2", "diagonal_mm"});
+  add_if_known(geometry, one, "extract", "result.triangles", "Triangles");
+  add_if_known(geometry, one, "extract", "result.components", "Components");
+  add_if_known(geometry, one, "extract", "result.euler", "Euler number");
+  add_if_known(geometry, one, "extract", "result.closed", "Closed");
+  std::vector<Line> mesh =
+      lines_of(one, {"shells", "distance_mm", "distance_percent", "mean_distance_mm", "min_angle_deg"});
+  add_if_known(mesh, one, "relax", "result.normal_error_deg.mean", "Normals, mean error", "°");
+  add_if_known(mesh, one, "relax", "result.size_ratio", "Neighbours' size ratio");
+  add_if_known(mesh, one, "relax", "result.self_intersections", "Self-intersections");
+  add_if_known(mesh, one, "relax", "result.stopped", "Fit ended");
+  return table_of("Geometry", geometry) += table_of("Mesh", mesh);
+}
+
+Markup mechanics(const CaseReport& one) {
+  std::vector<Line> lines = lines_of(
+      one, {"stress_p99_kpa", "stress_max_kpa", "strain_p99_percent", "max_displacement_mm", "volume_change_percent"});
+  add_if_known(lines, one, "simulate", "result.strain_energy_mj", "Strain energy", "mJ");
+  add_if_known(lines, one, "simulate", "result.converged", "Converged");
+  add_if_known(lines, one, "simulate", "result.residual", "Residual");
+  add_if_known(lines, one, "simulate", "result.newton_iterations", "Newton iterations");
+  add_if_known(lines, one, "simulate", "result.steps", "Steps");
+  add_if_known(lines, one, "simulate", "result.dof", "Degrees of freedom");
+  return table_of("Mechanics", lines);
+}
+
+// The lines of the resolved scene: heads without the mesh's own path come out as they are.
+Markup inputs(const CaseReport& one) {
+  std::vector<Line> lines;
+  std::string table;
+  std::istringstream text(one.scene);
+  for (std::string line; std::getline(text, line);) {
+    const std::size_t equals = line.find(" = ");
+    if (line.starts_with("[")) {
+      const std::size_t begin = line.find_first_not_of('[');
+      table = line.substr(begin, line.find(']') - begin);
+    } else if (equals != std::string::npos && !line.starts_with("mesh = ")) {
+      std::string value = line.substr(equals + 3);
+      const bool quoted = value.size() >= 2 && value.front() == '"' && value.back() == '"';
+      lines.push_back({table + " · " + line.substr(0, equals), quoted ? value.substr(1, value.size() - 2) : value});
+    }
+  }
+  return table_of("Inputs as resolved, SI units", lines);
+}
+
+Markup costs(const CaseReport& one) {
+  Markup rows;
+  for (const char* stage : pipeline_stages) {
+    const Json seconds = one.source.at(stage, "seconds.total");
+    const Json memory = one.source.at(stage, "peak_mib");
+    const Json threads = one.source.at(stage, "threads");
+    if (seconds.is_number()) {
+      rows += html("<tr><th scope=\"row\">{}</th><td>{}</td><td>{}</td><td>{}</td></tr>\n", stage,
+                   figure(seconds.get<double>()), memory.is_number() ? figure(memory.get<double>()) : "–",
+                   threads.is_number() ? figure(threads.get<double>()) : "–");
+    }
+  }
+  return rows.text.empty() ? Markup{}
+                           : html(
+                                 "<table class=\"facts grid\"><caption>Time and memory</caption><thead><tr><th "
+                                 "scope=\"col\">Stage</th><th scope=\"col\">s</th><th scope=\"col\">MiB</th><th "
+                                 "scope=\"col\">Threads</th></tr></thead><tbody>\n{}</tbody></table>\n",
+                                 rows);
+}
+
+Markup list_section(const std::string& title, const std::vector<std::string>& texts, int level) {
+  Markup made;
+  if (!texts.empty()) {
+    made += heading(level, title);
+    made += html("<ul class=\"warnings\">\n");
+    for (const std::string& text : texts) {
+      made += html("<li>{}</li>\n", text);
+    }
+    made += html("</ul>\n");
+  }
+  return made;
+}
+
+Markup files(const CaseReport& one, int level, bool paths) {
+  Markup rows;
+  for (const char* stage : pipeline_stages) {
+    for (const char* kind : {"inputs", "outputs"}) {
+      const Json entries = one.source.at(stage, kind);
+      for (const Json& entry : entries.is_array() ? entries : Json::array()) {
+        if (!entry.is_object() || !entry.contains("path") || !entry["path"].is_string()) {
+          continue;
+        }
+        const Json hash = entry.value("sha256", Json());
+        const std::string path = entry["path"].get<std::string>();
+        rows += html("<tr><th scope=\"row\">{} {}</th><td>{}</td><td><code>{}</code></td></tr>\n", stage,
+                     std::string(kind) == "inputs" ? "read" : "wrote", paths ? path : one.redacted(path),
+                     hash.is_string() ? hash.get<std::string>() : "–");
+      }
+    }
+  }
+  if (rows.text.empty()) {
+    return {};
+  }
+  return heading(level, "Files") += html(
+             "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"Files of {}\"><table "
+             "class=\"facts grid files\"><caption>What each stage read and wrote</caption><thead><tr><th "
+             "scope=\"col\">Stage</th><th scope=\"col\">File</th><th scope=\"col\">SHA-256</th></tr></thead><tbody>\n"
+             "{}</tbody></table></div>\n",
+             one.name, rows);
+}
+
+Markup commands(const CaseReport& one, int level) {
+  std::string lines;
+  std::string version;
+  for (const char* stage : pipeline_stages) {
+    const std::string command = text_at(one.source, stage, "command");
+    lines += command.empty() ? "" : one.redacted(command) + "\n";
+    version = version.empty() ? text_at(one.source, stage, "version") : version;
+  }
+  if (lines.empty()) {
+    return {};
+  }
+  return heading(level, "Commands") +=
+         html("<p>tunica {}.</p>\n<pre tabindex=\"0\"><code>{}</code></pre>\n", version, lines);
+}
+
+}  // namespace
+
+std::string next_command(const CaseReport& one) {
+  const PipelineCase& source = one.source;
+  const std::string command = text_at(source, source.stage, "command");
+  if (command.empty()) {
+    return {};
+  }
+  const Json volumes = source.at("extract", "inputs");
+  if (source.stage == "extract" && source.exit == "3" && volumes.is_array() && !volumes.empty()) {
+    // The volume is the first word after the tool that is no flag; what is in it is what to look at.
+    const std::size_t blank = command.find(' ');
+    const std::vector<std::string> words = command_words(command);
+    const std::size_t quoted =
+        command.find(" '") == blank ? command.find("' ", blank + 2) + 1 : command.find(' ', blank + 1);
+    return words.size() > 1 && !words[1].starts_with("-") ? one.redacted(command.substr(0, quoted) + " --info")
+                                                          : one.redacted(command + " --verbose");
+  }
+  return one.redacted(command + " --verbose");
+}
+
+Markup case_section(const CaseReport& one, int level, bool paths) {
+  Markup made = verdict(one);
+  made += three_numbers(one);
+  made += organ_figure(one, level);
+  made += slices_figure(one, level);
+  made += list_section("Warnings", one.warnings, level);
+  made += list_section("Outputs that are not what the reports say", one.different, level);
+  made += list_section("Not drawn", one.missing, level);
+  made += heading(level, "Numbers");
+  made +=
+      html("<div class=\"tables\">\n{}{}{}{}</div>\n", geometry_and_mesh(one), mechanics(one), inputs(one), costs(one));
+  made += files(one, level, paths);
+  made += commands(one, level);
+  made += methods_section(one, level);
+  return made;
+}
+
+}  // namespace tunica::report

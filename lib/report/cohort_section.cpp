@@ -1,0 +1,176 @@
+#include "tunica/report/detail/measures.hpp"
+#include "tunica/report/detail/sections.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+
+namespace tunica::report {
+namespace {
+
+// Columns of the page's table: fewer than the file's.
+constexpr std::array shown_keys{"volume_ml",
+                                "shells",
+                                "distance_percent",
+                                "min_angle_deg",
+                                "stress_p99_kpa",
+                                "strain_p99_percent",
+                                "max_displacement_mm",
+                                "volume_change_percent",
+                                "pressure_kpa",
+                                "thickness_mm",
+                                "seconds"};
+
+Markup link_to(const CaseReport& one) { return html("<a href=\"#{}\"><bdi>{}</bdi></a>", one.id(), one.name); }
+
+Markup counts(const std::vector<CaseReport>& cases) {
+  const auto count = [&](const char* status) {
+    return std::ranges::count_if(cases, [&](const CaseReport& one) { return status_of(one) == status; });
+  };
+  return html(
+      "<dl class=\"counts\"><div class=\"{}\"><dt>Done</dt><dd>{}</dd></div><div class=\"{}\"><dt>Failed</dt>"
+      "<dd>{}</dd></div><div class=\"{}\"><dt>Done, with warnings</dt><dd>{}</dd></div></dl>\n",
+      "done", count("done") + count("warned"), count("failed") > 0 ? "failed" : "none", count("failed"),
+      count("warned") > 0 ? "warned" : "none", count("warned"));
+}
+
+Markup failures(const std::vector<CaseReport>& cases) {
+  Markup items;
+  for (const CaseReport& one : cases) {
+    if (one.source.done()) {
+      continue;
+    }
+    const std::string next = next_command(one);
+    items +=
+        html("<li>{}: {}{}: {}{}</li>\n", link_to(one), one.source.stage == "none" ? "not begun" : one.source.stage,
+             one.source.exit.empty() ? "" : ", exit code " + one.source.exit, one.redacted(one.source.message),
+             next.empty() ? Markup{} : html("<br>Next: <code>{}</code>", next));
+  }
+  return items.text.empty() ? Markup{} : heading(2, "Failures") += html("<ul class=\"failures\">\n{}</ul>\n", items);
+}
+
+Markup row_of(const CaseReport& one) {
+  const std::string status = status_of(one);
+  Markup row = html("<tr class=\"{}\"><td class=\"thumb\">{}</td><th scope=\"row\">{}</th><td>{}</td>", status,
+                    one.picture.empty()
+                        ? Markup{}
+                        : html("<img src=\"{}\" alt=\"\" loading=\"lazy\">", data_address("image/png", one.picture)),
+                    link_to(one), status);
+  for (const char* key : shown_keys) {
+    const Measure& what = measure(key);
+    const auto value = what.value(one.source);
+    const bool none = !value || (std::string_view(key) == "seconds" && *value == 0);
+    const bool whole = !none && what.unit.empty();
+    row += html("<td class=\"number\" data-value=\"{}\">{}</td>", none ? "" : fmt::format("{:.9g}", *value),
+                none    ? "–"
+                : whole ? fmt::format("{:.0f}", *value)
+                        : figure(*value));
+  }
+  return row += html("</tr>\n");
+}
+
+Markup table(const std::vector<CaseReport>& cases, const std::string& tsv) {
+  Markup heads = html(
+      "<th scope=\"col\"><span class=\"hidden\">Picture</span></th><th scope=\"col\">Case</th><th "
+      "scope=\"col\">Status</th>");
+  for (const char* key : shown_keys) {
+    const Measure& what = measure(key);
+    heads += html("<th scope=\"col\" title=\"{}\">{}{}</th>", what.description, what.title,
+                  what.unit.empty() ? Markup{} : html(" <small>{}</small>", what.unit));
+  }
+  Markup rows;
+  for (const CaseReport& one : cases) {
+    rows += row_of(one);
+  }
+  Markup made = heading(2, "Cases");
+  made += html(
+      "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"Table of the cases\"><table "
+      "class=\"cohort sortable\"><caption class=\"hidden\">Cases and their measures</caption><thead><tr>{}</tr></thead>"
+      "<tbody>\n{}</tbody></table></div>\n",
+      heads, rows);
+  return made += html("<p class=\"more\"><a download=\"cohort.tsv\" href=\"{}\">The whole table as TSV</a></p>\n",
+                      data_address("text/tab-separated-values", tsv));
+}
+
+Markup spread(const std::vector<CaseReport>& cases) {
+  Markup strips;
+  Markup items;
+  for (const Measure& what : measures()) {
+    std::vector<std::optional<double>> values;
+    for (const CaseReport& one : cases) {
+      values.push_back(what.compared && one.source.done() ? what.value(one.source) : std::nullopt);
+    }
+    const std::vector<Outlier> found = outliers(values);
+    std::vector<StripMark> marks;
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      if (values[i]) {
+        const bool out = std::ranges::find(found, i, &Outlier::index) != found.end();
+        marks.push_back({*values[i], cases[i].name, out});
+      }
+    }
+    strips += strip_plot(what.title, what.unit, marks);
+    for (const Outlier& outlier : found) {
+      items += html("<li>{}: {} {} {} (robust z {})</li>\n", link_to(cases[outlier.index]), what.title,
+                    figure(*values[outlier.index]), what.unit, fmt::format("{:+.1f}", outlier.z));
+    }
+  }
+  Markup made = heading(2, "Spread and outliers");
+  made += html(
+      "<p>An outlier is farther from the median than 3.5 robust standard deviations (by the median absolute "
+      "deviation), among at least five cases that are done.</p>\n");
+  made += items.text.empty() ? html("<p>None.</p>\n") : html("<ul class=\"outliers\">\n{}</ul>\n", items);
+  return made += html("<div class=\"strips\">\n{}</div>\n", strips);
+}
+
+}  // namespace
+
+Markup cohort_section(const std::vector<CaseReport>& cases, const std::string& tsv) {
+  Markup made = counts(cases);
+  made += failures(cases);
+  made += table(cases, tsv);
+  made += spread(cases);
+  return made;
+}
+
+std::string cohort_tsv(const std::vector<CaseReport>& cases) {
+  std::string text = "case\tstatus\tstage\texit\tmessage\twarnings";
+  for (const Measure& what : measures()) {
+    text += "\t" + what.key;
+  }
+  text += "\n";
+  for (const CaseReport& one : cases) {
+    for (std::string field :
+         {one.name, status_of(one), one.source.stage, one.source.exit, one.redacted(one.source.message)}) {
+      std::ranges::replace_if(
+          field, [](char sign) { return static_cast<unsigned char>(sign) < 0x20 || sign == 0x7f; }, ' ');
+      text += (field.empty() ? "n/a" : field) + "\t";
+    }
+    text += std::to_string(one.warnings.size());
+    for (const Measure& what : measures()) {
+      const auto value = what.value(one.source);
+      text += value ? fmt::format("\t{:.9g}", *value) : "\tn/a";
+    }
+    text += "\n";
+  }
+  return text;
+}
+
+std::string cohort_columns() {
+  const auto column = [](const std::string& description, const std::string& unit, const std::string& source) {
+    return Json{{"Description", description}, {"Units", unit.empty() ? Json("n/a") : Json(unit)}, {"Source", source}};
+  };
+  Json columns;
+  columns["case"] = column("Volume and label, or a number where names are left out.", "", "folder");
+  columns["status"] = column("done, warned (done, with warnings) or failed.", "", "all stages");
+  columns["stage"] = column("The last stage that was run.", "", "pipeline");
+  columns["exit"] = column("Its exit code.", "", "pipeline");
+  columns["message"] = column("done, or why it is not.", "", "error of that stage");
+  columns["warnings"] = column("Number of warnings of all stages.", "", "all stages: warnings");
+  for (const Measure& what : measures()) {
+    columns[what.key] = column(what.description, what.unit, what.source);
+  }
+  return columns.dump(2) + "\n";
+}
+
+}  // namespace tunica::report

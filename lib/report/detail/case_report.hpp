@@ -1,0 +1,34 @@
+#pragma once
+
+#include "tunica/io/result/pipeline_folder.hpp"
+#include "tunica/report/detail/redaction.hpp"
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace tunica::report {
+
+/// What a page says of one case, besides the stages' reports.
+struct CaseReport {
+  PipelineCase source;
+  std::size_t number = 0;              ///< from 1
+  std::string name;                    ///< as shown
+  Redaction redacted;                  ///< for all texts of the reports
+  std::vector<std::string> warnings;   ///< of all stages, redacted
+  std::vector<std::string> missing;    ///< what could not be drawn, and why, redacted
+  std::string scene;                   ///< as resolved, TOML; empty where there is no result
+  std::string picture;                 ///< PNG of the loaded organ; empty: none
+  double picture_top = 0;              ///< MPa, of its last colour; 0: the picture is plain
+  double magnification = 1;            ///< of the displacement in it
+  std::string slices;                  ///< PNG; empty: none
+  std::string organ;                   ///< packed for the page's script, base64; empty: none
+  std::vector<std::string> different;  ///< outputs that are not what the reports say, redacted
+
+  [[nodiscard]] std::string id() const { return "case-" + std::to_string(number); }
+};
+
+/// How a case stands: "done", "warned" (done, with warnings), or "failed".
+std::string status_of(const CaseReport& one);
+
+}  // namespace tunica::report

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <concepts>
+#include <string>
+#include <string_view>
+#include <vector>
+
+/// HTML that no name of a file can break out of: what is put into it is text, unless it is Markup already.
+namespace tunica::report {
+
+/// HTML as it stands. Only html() and what joins its results make some.
+struct Markup {
+  std::string text = {};
+
+  Markup& operator+=(const Markup& other) {
+    text += other.text;
+    return *this;
+  }
+};
+
+/// A text for elements and for attributes in quotes: the signs of HTML escaped; what is no UTF-8, no character of HTML
+/// or turns the direction of reading becomes U+FFFD.
+std::string escaped(std::string_view text);
+
+/// What stands for an argument of html().
+inline std::string shielded(const Markup& markup) { return markup.text; }
+inline std::string shielded(std::string_view text) { return escaped(text); }
+inline std::string shielded(std::integral auto number) { return std::to_string(number); }
+
+/// HTML from a format, whose literal parts are HTML, and texts that are HTML already.
+Markup filled(std::string_view format, const std::vector<std::string>& shielded_texts);
+
+/// HTML from a format as fmt::format() takes it, whose literal parts are HTML. Arguments are escaped unless they are
+/// Markup.
+template <typename... Arguments>
+Markup html(std::string_view format, const Arguments&... arguments) {
+  return filled(format, {shielded(arguments)...});
+}
+
+/// A heading of level 1 to 6.
+Markup heading(int level, std::string_view text);
+
+/// The address of bytes that stand in the page. @param kind  e.g. "image/png"
+Markup data_address(std::string_view kind, std::string_view bytes);
+
+/// A number for people: three digits, all digits before the point.
+std::string figure(double value);
+
+}  // namespace tunica::report

@@ -1,0 +1,27 @@
+#pragma once
+
+#include "tunica/report/detail/case_report.hpp"
+
+namespace tunica::report {
+
+/// How much room a page has for one case.
+struct Room {
+  std::size_t triangles = 0;  ///< of the shells as drawn in 3-D, and half as many of the segmented surface
+  std::size_t states = 0;     ///< at most
+  int picture_width = 0;      ///< pixels
+  int slice = 0;              ///< pixels of each of nine
+};
+
+/// Rooms such that a page of so many cases stays below 25 MB.
+Room room_for(std::size_t cases);
+
+/// Reads the case's result, shells and surface and fills in what is drawn: the picture, the packed organ, the resolved
+/// scene. What cannot be read is named in `missing`.
+/// Cost: some 0.2 s for a surface of 10,000 triangles and as many shells as the pipeline makes.
+void draw_organ(CaseReport& one, const Room& room);
+
+/// Fills in nine slices of the volume that the extraction read, with the shells' outline. What cannot be read is named
+/// in `missing`. Cost: that of reading the volume, twice (it has to be the one that was read then).
+void draw_slices(CaseReport& one, const Room& room);
+
+}  // namespace tunica::report

@@ -1,0 +1,211 @@
+#include "tunica/report/detail/drawn_shells.hpp"
+
+#include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
+#include "tunica/shell/patch/curved_surface.hpp"
+#include "tunica/surface/decimation/decimate.hpp"
+#include "tunica/surface/distance/closest_point.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+
+namespace tunica::report {
+namespace {
+
+constexpr Index no_point = ~Index{0};
+
+/// How a shell is cut into level² triangles: all of a result are cut alike.
+struct Cut {
+  std::vector<std::array<Index, 3>> triangles;  ///< of lattice points
+  std::vector<std::array<int, 2>> places;       ///< of the lattice points, times level
+};
+
+Cut cut_into(int level) {
+  ShellMesh one;
+  one.vertices = {Vec3::Zero(), Vec3::UnitX(), Vec3::UnitY()};
+  one.triangles = {{0, 1, 2}};
+  one.normals.assign(3, Vec3::UnitZ());
+  const Tessellation fine = tessellate_uniformly(one, level);
+  Cut cut{fine.mesh.triangles, {}};
+  for (const Vec2& b : fine.barycentric) {
+    cut.places.push_back({static_cast<int>(std::lround(b.x() * level)), static_cast<int>(std::lround(b.y() * level))});
+  }
+  return cut;
+}
+
+// The pieces of a result's shells along an edge; none where the shells are not all cut alike.
+std::optional<int> level_of(const DrawnResult& result) {
+  const std::size_t triangles = result.reference.triangles.size();
+  const double pieces = result.shells > 0 ? real(triangles) / real(result.shells) : 0;
+  const int level = static_cast<int>(std::lround(std::sqrt(pieces)));
+  const bool alike = level >= 1 && level <= 64 && narrow<std::size_t>(level * level) * result.shells == triangles;
+  return alike ? std::optional(level) : std::nullopt;
+}
+
+// For each lattice point of the coarser cut, the one of the finer cut at the same place.
+std::vector<std::size_t> shared_points(const Cut& coarse, const Cut& fine, int ratio) {
+  std::map<std::array<int, 2>, std::size_t> at;
+  for (std::size_t i = 0; i < fine.places.size(); ++i) {
+    at[fine.places[i]] = i;
+  }
+  std::vector<std::size_t> shared;
+  for (const auto& [x, y] : coarse.places) {
+    shared.push_back(at.at({x * ratio, y * ratio}));
+  }
+  return shared;
+}
+
+// Sides of a cut's triangles that only one of them has: the rim of the shell.
+std::vector<std::array<Index, 2>> rim_of(const Cut& cut) {
+  std::map<std::array<Index, 2>, int> count;
+  for (const auto& triangle : cut.triangles) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Index a = triangle[k];
+      const Index b = triangle[(k + 1) % 3];
+      ++count[{std::min(a, b), std::max(a, b)}];
+    }
+  }
+  std::vector<std::array<Index, 2>> rim;
+  for (const auto& [side, times] : count) {
+    if (times == 1) {
+      rim.push_back(side);
+    }
+  }
+  return rim;
+}
+
+// Gives the mesh only the vertices its triangles use. @return for each of them, which it was
+std::vector<Index> drop_unused(TriangleMesh& mesh, std::vector<std::array<Index, 2>>& edges) {
+  std::vector<Index> now(mesh.vertices.size(), no_point);
+  std::vector<Index> before;
+  std::vector<Vec3> vertices;
+  for (auto& triangle : mesh.triangles) {
+    for (Index& v : triangle) {
+      if (now[v] == no_point) {
+        now[v] = narrow<Index>(before.size());
+        before.push_back(v);
+        vertices.push_back(mesh.vertices[v]);
+      }
+      v = now[v];
+    }
+  }
+  for (auto& edge : edges) {
+    edge = {now[edge[0]], now[edge[1]]};
+  }
+  mesh.vertices = std::move(vertices);
+  return before;
+}
+
+// The shells cut into fewer pieces, by taking points away.
+DrawnShells with_pieces(const DrawnResult& result, int level, int pieces) {
+  const Cut fine = cut_into(level);
+  const Cut coarse = cut_into(pieces);
+  const std::vector<std::size_t> shared = shared_points(coarse, fine, level / pieces);
+  const std::vector<std::array<Index, 2>> rim = rim_of(coarse);
+  DrawnShells drawn;
+  drawn.mesh.vertices = result.reference.vertices;
+  std::vector<Index> point(fine.places.size());
+  for (std::size_t shell = 0; shell < result.shells; ++shell) {
+    for (std::size_t i = 0; i < fine.triangles.size(); ++i) {
+      const auto& corners = result.reference.triangles[shell * fine.triangles.size() + i];
+      for (std::size_t k = 0; k < 3; ++k) {
+        point[fine.triangles[i][k]] = corners[k];
+      }
+    }
+    for (const auto& [a, b, c] : coarse.triangles) {
+      drawn.mesh.triangles.push_back({point[shared[a]], point[shared[b]], point[shared[c]]});
+    }
+    for (const auto& [a, b] : rim) {
+      const auto ends = std::minmax(point[shared[a]], point[shared[b]]);
+      drawn.edges.push_back({ends.first, ends.second});
+    }
+  }
+  std::ranges::sort(drawn.edges);
+  drawn.edges.erase(std::unique(drawn.edges.begin(), drawn.edges.end()), drawn.edges.end());
+  const std::vector<Index> before = drop_unused(drawn.mesh, drawn.edges);
+  for (const DrawnResult::State& state : result.states) {
+    DrawnResult::State& kept = drawn.states.emplace_back();
+    kept.time = state.time;
+    for (const Index v : before) {
+      kept.displacement.push_back(state.displacement[v]);
+      kept.von_mises.push_back(state.von_mises[v]);
+    }
+  }
+  return drawn;
+}
+
+// A coarser mesh of the same surface; states are interpolated at the closest points.
+DrawnShells decimated(const DrawnShells& shells, std::size_t triangles) {
+  DrawnShells coarse;
+  coarse.mesh = thinned(shells.mesh, triangles);
+  const ClosestPoint tree(shells.mesh);
+  coarse.states.resize(shells.states.size());
+  for (std::size_t s = 0; s < shells.states.size(); ++s) {
+    coarse.states[s].time = shells.states[s].time;
+  }
+  for (const Vec3& p : coarse.mesh.vertices) {
+    const ClosestPoint::Hit hit = tree.closest(p);
+    const auto& corners = shells.mesh.triangles[hit.triangle];
+    const auto places = tree.corners(hit.triangle);
+    const Vec3 weights = barycentric(hit.point, places[0], places[1], places[2]);
+    for (std::size_t s = 0; s < shells.states.size(); ++s) {
+      Vec3 displacement = Vec3::Zero();
+      double stress = 0;
+      for (std::size_t k = 0; k < 3; ++k) {
+        const double weight = weights[narrow<Eigen::Index>(k)];
+        displacement += weight * shells.states[s].displacement[corners[k]];
+        stress += weight * shells.states[s].von_mises[corners[k]];
+      }
+      coarse.states[s].displacement.push_back(displacement);
+      coarse.states[s].von_mises.push_back(stress);
+    }
+  }
+  return coarse;
+}
+
+std::vector<std::string> labels_of(const DrawnResult& result) {
+  std::vector<std::string> labels;
+  for (const DrawnResult::State& state : result.states) {
+    const bool first = labels.empty();
+    labels.push_back(first ? "As imaged" : result.timed ? fmt::format("At {:.4g} s", state.time) : "Loaded");
+  }
+  return labels;
+}
+
+}  // namespace
+
+TriangleMesh thinned(const TriangleMesh& mesh, std::size_t triangles) {
+  if (mesh.triangles.size() <= triangles) {
+    return mesh;
+  }
+  DecimateOptions options;
+  options.triangles = triangles;
+  options.levelled = false;
+  return decimate(mesh, options).mesh;
+}
+
+DrawnShells thinned(DrawnResult result, std::size_t triangles) {
+  const std::vector<std::string> labels = labels_of(result);
+  DrawnShells drawn;
+  if (const auto level = level_of(result)) {
+    int pieces = *level;
+    while (pieces > 1 && (*level % pieces != 0 || narrow<std::size_t>(pieces * pieces) * result.shells > triangles)) {
+      --pieces;
+    }
+    drawn = with_pieces(result, *level, pieces);
+  } else {
+    drawn.mesh = std::move(result.reference);
+    drawn.states = std::move(result.states);
+  }
+  if (drawn.mesh.triangles.size() > triangles) {
+    drawn = decimated(drawn, triangles);
+  }
+  drawn.labels = labels;
+  return drawn;
+}
+
+}  // namespace tunica::report

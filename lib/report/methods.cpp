@@ -1,0 +1,91 @@
+#include "tunica/report/detail/command_words.hpp"
+#include "tunica/report/detail/measures.hpp"
+#include "tunica/report/detail/sections.hpp"
+
+#include <array>
+
+namespace tunica::report {
+namespace {
+
+constexpr std::array references{
+    "O. Comas, C. Duriez, S. Cotin: Shell Model for Reconstruction and Real-Time Simulation of Thin Anatomical "
+    "Structures. MICCAI 2010.",
+    "W. E. Lorensen, H. E. Cline: Marching Cubes: A High Resolution 3D Surface Construction Algorithm. SIGGRAPH 1987.",
+    "M. Garland, P. S. Heckbert: Surface Simplification Using Quadric Error Metrics. SIGGRAPH 1997."};
+
+std::vector<std::string> words_of(const CaseReport& one, const char* stage) {
+  const Json command = one.source.at(stage, "command");
+  return command_words(command.is_string() ? command.get<std::string>() : "");
+}
+
+std::string with_unit(const CaseReport& one, const char* key) {
+  const Measure& what = measure(key);
+  const auto value = what.value(one.source);
+  return value ? figure(*value) + (what.unit.empty() || what.unit == "%" ? "" : " ") + what.unit : "";
+}
+
+std::string surface_sentence(const CaseReport& one) {
+  const std::vector<std::string> words = words_of(one, "extract");
+  const Json version = one.source.at("extract", "version");
+  const auto label = flag_value(words, "--label");
+  const auto level = flag_value(words, "--isovalue");
+  const auto smoothing = flag_value(words, "--smooth");
+  std::string text = "The surface of the organ was extracted with tunica " +
+                     (version.is_string() ? version.get<std::string>() : std::string()) + " by marching cubes [2]";
+  text += label ? " from label " + *label + " of the segmentation" : level ? " at the isovalue " + *level : "";
+  return text + (smoothing == "staircase" ? " and smoothed within half a voxel. " : ". ");
+}
+
+std::string shell_sentence(const CaseReport& one) {
+  const std::string count = with_unit(one, "shells");
+  const std::string distance = with_unit(one, "distance_mm");
+  if (count.empty() || distance.empty()) {
+    return {};
+  }
+  const auto method = flag_value(words_of(one, "relax"), "--method");
+  return "It was decimated by quadric edge collapse [3] and " +
+         std::string(method == "barycentre" ? "relaxed to" : "fitted by") + " " + count +
+         " curved triangular shells with one cubic shape function each [1]; the two-sided Hausdorff distance of the "
+         "curved shells to the extracted surface is certified to be at most " +
+         distance + " (" + with_unit(one, "distance_percent") + " of its diagonal). ";
+}
+
+std::string load_sentence(const CaseReport& one) {
+  const std::string stress = with_unit(one, "stress_p99_kpa");
+  if (stress.empty()) {
+    return {};
+  }
+  const std::string young = with_unit(one, "young_mpa");
+  const std::string pressure = with_unit(one, "pressure_kpa");
+  const auto fixed = flag_value(words_of(one, "simulate"), "--fix");
+  const bool dynamic = one.scene.find("kind = \"dynamic\"") != std::string::npos;
+  const bool linear = one.scene.find("geometry = \"linear\"") != std::string::npos;
+  std::string text = "The wall was linear elastic and isotropic";
+  text += young.empty() ? "" : " (Young's modulus " + young + ", Poisson's ratio " + with_unit(one, "poisson") + ")";
+  const std::string thickness = with_unit(one, "thickness_mm");
+  text += thickness.empty() ? ". " : " and " + thickness + " thick. ";
+  text += "The image was taken as unloaded. ";
+  text += pressure.empty() ? "It was loaded" : "A pressure of " + pressure + " was put on it";
+  text += fixed ? " with " + std::string(*fixed == "boundary"        ? "the boundary held"
+                                         : *fixed == "rigid-motions" ? "only its rigid motions held"
+                                                                     : "the region '" + *fixed + "' held")
+                : "";
+  text += std::string("; the equations were solved ") +
+          (linear ? "linearly" : "with large rotations (co-rotational), by Newton's method") +
+          (dynamic ? ", in time" : ", in statics") + ". ";
+  return text + "Stresses are von Mises stresses at either face of the wall, as the 99th percentile by area.";
+}
+
+}  // namespace
+
+Markup methods_section(const CaseReport& one, int level) {
+  Markup made = heading(level, "Methods, to paste");
+  made += html("<p class=\"methods\">{}</p>\n<ol class=\"references\">\n",
+               one.redacted(surface_sentence(one)) + shell_sentence(one) + load_sentence(one));
+  for (const char* reference : references) {
+    made += html("<li>{}</li>\n", reference);
+  }
+  return made += html("</ol>\n");
+}
+
+}  // namespace tunica::report

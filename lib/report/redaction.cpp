@@ -1,0 +1,136 @@
+#include "tunica/report/detail/redaction.hpp"
+
+#include "tunica/report/detail/command_words.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <filesystem>
+
+namespace tunica::report {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool is_letter(char sign) {
+  return std::isalnum(static_cast<unsigned char>(sign)) != 0 || static_cast<unsigned char>(sign) >= 0x80;
+}
+
+// Whether [at, at + size) is a name of its own, not a part of a word.
+bool stands_alone(const std::string& text, std::size_t at, std::size_t size) {
+  const bool before = at == 0 || !is_letter(text[at - 1]) || !is_letter(text[at]);
+  const std::size_t end = at + size;
+  return before && (end == text.size() || !is_letter(text[end]) || !is_letter(text[end - 1]));
+}
+
+void replace_all(std::string& text, const std::string& name, const std::string& instead) {
+  for (std::size_t at = text.find(name); at != std::string::npos; at = text.find(name, at)) {
+    if (stands_alone(text, at, name.size())) {
+      text.replace(at, name.size(), instead);
+      at += instead.size();
+    } else {
+      ++at;
+    }
+  }
+}
+
+// What is left with a slash between two blanks or quotes.
+std::string without_paths(const std::string& text) {
+  constexpr const char* ends = " \t\n'\"(),;:=";
+  std::string left;
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t end = std::min(text.find_first_of(ends, at), text.size());
+    const std::string word = text.substr(at, end - at);
+    const std::size_t slash = word.find('/');
+    // A unit ("kg/m3") has no path's look: digits or a sign right before it, or one slash within short words.
+    const bool path = slash != std::string::npos && (slash == 0 || word.find('/', slash + 1) != std::string::npos ||
+                                                     word.find('.') != std::string::npos);
+    const bool unit = !word.empty() && std::isdigit(static_cast<unsigned char>(word[0])) != 0;
+    left += path && !unit ? "[path]" : word;
+    if (end < text.size()) {
+      left += text[end];
+    }
+    at = end + 1;
+  }
+  return left;
+}
+
+std::string stem_of_volume(const fs::path& path) {
+  const std::string name = path.filename().string();
+  for (const char* ending :
+       {".seg.nrrd", ".nii.gz", ".nii", ".nrrd", ".nhdr", ".mha", ".mhd", ".tiff", ".tif", ".png"}) {
+    if (name.ends_with(ending)) {
+      return name.substr(0, name.size() - std::string(ending).size());
+    }
+  }
+  return name;
+}
+
+}  // namespace
+
+Redaction::Redaction(const PipelineCase& one, std::size_t number) : active_(true) {
+  const std::string own = fmt::format("case {}", number);
+  const std::string stem = fs::path(one.name).parent_path().string();
+  forget(one.name, own);
+  forget(stem, own);
+  const auto path_of = [](const Json& entry) {
+    const bool told = entry.is_object() && entry.contains("path") && entry["path"].is_string();
+    return told ? entry["path"].get<std::string>() : std::string();
+  };
+  for (const auto& [stage, report] : one.reports) {
+    const Json inputs = one.at(stage, "inputs");
+    for (const Json& entry : inputs.is_array() ? inputs : Json::array()) {
+      const fs::path path = path_of(entry);
+      forget(path.string(), stage == "extract" ? "VOLUME" : path.filename().string());
+      if (stage == "extract") {
+        forget(path.filename().string(), "VOLUME");
+        forget(stem_of_volume(path), own);
+        forget(stem_of_volume(path.parent_path()), own);  // a folder of slices
+      }
+    }
+    const Json outputs = one.at(stage, "outputs");
+    for (const Json& entry : outputs.is_array() ? outputs : Json::array()) {
+      const fs::path path = path_of(entry);
+      forget(path.string(), path.filename().string());
+    }
+    const Json command = one.at(stage, "command");
+    for (const std::string& word : command_words(command.is_string() ? command.get<std::string>() : "")) {
+      if (word.starts_with("/") || word.starts_with("./") || word.starts_with("../")) {
+        const bool volume = stage == "extract" && !word.ends_with(".ply") && !word.ends_with(".json");
+        forget(word, volume ? "VOLUME" : fs::path(word).filename().string());
+      }
+    }
+  }
+  if (!one.folder.empty()) {
+    forget(one.folder.string(), own);
+    forget(fs::absolute(one.folder).string(), own);
+  }
+  std::ranges::stable_sort(names_, [](const auto& a, const auto& b) { return a.first.size() > b.first.size(); });
+}
+
+void Redaction::forget(const std::string& name, const std::string& instead) {
+  if (name.empty() || name == "." || name == "/") {
+    return;
+  }
+  names_.emplace_back(name, instead);
+  std::string quoted = name;  // as a command has it
+  for (std::size_t at = quoted.find('\''); at != std::string::npos; at = quoted.find('\'', at + 4)) {
+    quoted.replace(at, 1, "'\\''");
+  }
+  if (quoted != name) {
+    names_.emplace_back(quoted, instead);
+  }
+}
+
+std::string Redaction::operator()(std::string text) const {
+  if (!active_) {
+    return text;
+  }
+  for (const auto& [name, instead] : names_) {
+    replace_all(text, name, instead);
+  }
+  return without_paths(text);
+}
+
+}  // namespace tunica::report

@@ -1,0 +1,113 @@
+#include "tunica/report/report.hpp"
+
+#include "tunica/core/error.hpp"
+#include "tunica/io/result/report_chart.hpp"
+#include "tunica/report/detail/measures.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+
+namespace tunica::report {
+namespace {
+
+enum Column : std::size_t { name, stage, code, message, shells, error, seconds, columns };
+using Row = std::array<std::string, columns>;
+
+const Row heads{"case", "stage", "exit", "message", "shells", "error_percent", "seconds"};
+
+// In one line: each run of blanks and control characters is one blank.
+std::string in_one_line(const std::string& text) {
+  std::string line;
+  for (const char sign : text) {
+    const auto byte = static_cast<unsigned char>(sign);
+    if (byte > 0x20 && byte != 0x7f) {
+      line += sign;
+    } else if (!line.empty() && line.back() != ' ') {
+      line += ' ';
+    }
+  }
+  line.erase(line.find_last_not_of(' ') + 1);
+  return line;
+}
+
+Row row_of(const PipelineCase& one) {
+  Row row{one.name, one.stage, one.exit, one.message, "", "", ""};
+  if (const auto count = measure("shells").value(one)) {
+    row[shells] = fmt::format("{:.0f}", *count);
+  }
+  if (const auto percent = measure("distance_percent").value(one)) {
+    row[error] = fmt::format("{:.4g}", *percent);
+  }
+  row[seconds] = fmt::format("{:.2f}", measure("seconds").value(one).value_or(0));
+  std::ranges::transform(row, row.begin(), in_one_line);
+  return row;
+}
+
+std::vector<Row> rows_of(const std::vector<PipelineCase>& cases) {
+  std::vector<Row> rows{heads};
+  std::ranges::transform(cases, std::back_inserter(rows), row_of);
+  return rows;
+}
+
+}  // namespace
+
+std::string summary_tsv(const std::vector<PipelineCase>& cases) {
+  std::string text;
+  for (const Row& row : rows_of(cases)) {
+    for (std::size_t i = 0; i < columns; ++i) {
+      text += row[i] + (i + 1 < columns ? "\t" : "\n");
+    }
+  }
+  return text;
+}
+
+std::string summary_text(const std::vector<PipelineCase>& cases) {
+  const std::vector<Row> rows = rows_of(cases);
+  std::array<std::size_t, columns> widths{};
+  for (const Row& row : rows) {
+    for (std::size_t i = 0; i < columns; ++i) {
+      widths[i] = std::max(widths[i], row[i].size());
+    }
+  }
+  std::string text;
+  for (const Row& row : rows) {
+    for (const Column left : {name, stage, code}) {
+      text += row[left] + std::string(widths[left] - row[left].size() + 2, ' ');
+    }
+    for (const Column right : {shells, error, seconds}) {
+      text += std::string(widths[right] - row[right].size(), ' ') + row[right] + "  ";
+    }
+    text += row[message] + "\n";
+  }
+  for (const PipelineCase& one : cases) {
+    if (one.done()) {
+      text += fmt::format("result: {}   error map: {}\n", (one.folder / "result.hdf").string(),
+                          (one.folder / "map.png").string());
+    }
+  }
+  return text;
+}
+
+std::optional<std::string> summary_chart(const std::vector<PipelineCase>& cases) {
+  std::vector<Report> reports;
+  for (const PipelineCase& one : cases) {
+    if (one.at("relax", "ok") == true) {
+      reports.push_back({one.folder / "relax.json", "relax", one.reports.at("relax")});
+    }
+  }
+  if (reports.empty()) {
+    return std::nullopt;
+  }
+  name_apart(reports);
+  ReportChartOptions options;
+  options.label = "file";
+  try {
+    return chart_svg(chart_of_reports(reports, {}, options).chart);
+  } catch (const InputError&) {
+    return std::nullopt;  // reports of another version, that lack what is drawn
+  }
+}
+
+}  // namespace tunica::report

@@ -1,0 +1,178 @@
+#include "tunica/core/narrow.hpp"
+#include "tunica/report/detail/command_words.hpp"
+#include "tunica/report/detail/drawn_shells.hpp"
+#include "tunica/report/detail/html.hpp"
+#include "tunica/report/detail/measures.hpp"
+#include "tunica/report/detail/redaction.hpp"
+#include "tunica/shell/patch/curved_surface.hpp"
+#include "tunica/surface/distance/closest_point.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+#include <set>
+
+namespace tunica::report {
+namespace {
+
+using testing::ElementsAre;
+
+TEST(Html, TextStaysText) {
+  EXPECT_EQ(escaped("<a href=\"x\">'&`"), "&lt;a href=&quot;x&quot;&gt;&#39;&amp;&#96;");
+  EXPECT_EQ(html("<p>{}</p>", std::string("<b>")).text, "<p>&lt;b&gt;</p>");
+  EXPECT_EQ(html("<p>{}</p>", html("<b>{}</b>", "{0}")).text, "<p><b>{0}</b></p>");
+}
+
+TEST(Html, WhatIsNoUtf8OrTurnsTheTextIsReplaced) {
+  const std::string replaced = "\xef\xbf\xbd";
+  EXPECT_EQ(escaped("Gef\xc3\xa4\xc3\x9f \xf0\x9f\xab\x80"), "Gef\xc3\xa4\xc3\x9f \xf0\x9f\xab\x80");
+  EXPECT_EQ(escaped("\xff"), replaced);
+  EXPECT_EQ(escaped("\xc0\xbc"), replaced + replaced) << "an overlong '<'";
+  EXPECT_EQ(escaped("\xed\xa0\x80"), replaced + replaced + replaced) << "a surrogate";
+  EXPECT_EQ(escaped("\xe2\x82"), replaced + replaced) << "cut off";
+  EXPECT_EQ(escaped("\xe2\x80\xae"
+                    "a"),
+            replaced + "a")
+      << "right to left";
+}
+
+TEST(Html, FiguresHaveThreeDigits) {
+  EXPECT_EQ(figure(0.0123456), "0.0123");
+  EXPECT_EQ(figure(9.8765), "9.88");
+  EXPECT_EQ(figure(98.765), "98.8");
+  EXPECT_EQ(figure(987.65), "988");
+  EXPECT_EQ(figure(98765.4), "98765");
+  EXPECT_EQ(figure(1.5), "1.5");
+  EXPECT_EQ(figure(10), "10");
+  EXPECT_EQ(figure(5.38e-11), "5.38e-11");
+  EXPECT_EQ(figure(-0.5), "-0.5");
+}
+
+TEST(CommandWords, AreThoseTheShellSees) {
+  EXPECT_THAT(command_words("tunica-extract 'my scan.nii' --label 3 'it'\\''s' ''"),
+              ElementsAre("tunica-extract", "my scan.nii", "--label", "3", "it's", ""));
+  const auto words = command_words("t --label 3 --isovalue=-0.5 --label 4");
+  EXPECT_EQ(flag_value(words, "--label"), "4");
+  EXPECT_EQ(flag_value(words, "--isovalue"), "-0.5");
+  EXPECT_EQ(flag_value(words, "--inside"), std::nullopt);
+}
+
+TEST(Outliers, AreFarFromTheMedianOfFiveAtLeast) {
+  const std::vector<std::optional<double>> values{1.0, 1.1, std::nullopt, 0.9, 1.05, 0.95, 9.0};
+  const auto found = outliers(values);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found[0].index, 6U);
+  EXPECT_NEAR(found[0].z, 0.6745 * (9.0 - 1.025) / 0.075, 1e-9);
+  EXPECT_TRUE(outliers(std::vector<std::optional<double>>{1.0, 1.1, 0.9, 9.0}).empty());
+  EXPECT_TRUE(outliers(std::vector<std::optional<double>>{1.0, 1.0, 1.0, 1.0, 1.0, 9.0}).empty()) << "no spread";
+}
+
+TEST(RedactionTest, KnowsNamesAsWordsAlone) {
+  PipelineCase one{"Meyer A/1", "out/Meyer A/1", "extract", "3", "", {}, {}};
+  one.reports["extract"] = {{"inputs", {{{"path", "/data/Meyer A.nii.gz"}}}},
+                            {"command", "tunica-extract '/data/Meyer A.nii.gz' 'out/Meyer A/1/surface.ply' --label 1"}};
+  const Redaction redacted(one, 7);
+  EXPECT_EQ(redacted("/data/Meyer A.nii.gz: has no label 1"), "VOLUME: has no label 1");
+  EXPECT_EQ(redacted("Meyer A: 1.1 g/cm3, kg/m3"), "case 7: 1.1 g/cm3, kg/m3");
+  EXPECT_EQ(redacted("see /srv/other.txt"), "see [path]");
+  EXPECT_EQ(redacted(one.at("extract", "command").get<std::string>()).find("Meyer"), std::string::npos);
+  EXPECT_EQ(Redaction()("/data/Meyer A.nii.gz"), "/data/Meyer A.nii.gz");
+}
+
+/// The shells of a sphere of radius 10 as a result draws them: an octahedron split twice, four pieces per edge.
+DrawnResult sphere() {
+  ShellMesh shell;
+  shell.vertices = {{10, 0, 0}, {-10, 0, 0}, {0, 10, 0}, {0, -10, 0}, {0, 0, 10}, {0, 0, -10}};
+  shell.triangles = {{0, 2, 4}, {2, 1, 4}, {1, 3, 4}, {3, 0, 4}, {2, 0, 5}, {1, 2, 5}, {3, 1, 5}, {0, 3, 5}};
+  for (int split = 0; split < 2; ++split) {
+    std::map<std::array<Index, 2>, Index> middle;
+    const auto between = [&](Index a, Index b) {
+      const auto [entry, added] =
+          middle.try_emplace({std::min(a, b), std::max(a, b)}, narrow<Index>(shell.vertices.size()));
+      if (added) {
+        shell.vertices.emplace_back(10 * (shell.vertices[a] + shell.vertices[b]).normalized());
+      }
+      return entry->second;
+    };
+    std::vector<std::array<Index, 3>> finer;
+    for (const auto& [a, b, c] : shell.triangles) {
+      const Index ab = between(a, b);
+      const Index bc = between(b, c);
+      const Index ca = between(c, a);
+      finer.insert(finer.end(), {{a, ab, ca}, {ab, b, bc}, {ca, bc, c}, {ab, bc, ca}});
+    }
+    shell.triangles = finer;
+  }
+  for (const Vec3& p : shell.vertices) {
+    shell.normals.push_back(p.normalized());
+  }
+  shell.patch = Patch::watertight;
+  const Tessellation fine = tessellate_uniformly(shell, 4);
+  DrawnResult result;
+  result.shells = shell.triangles.size();
+  // Patches share their points, as in a result file.
+  std::map<std::array<long, 3>, Index> at;
+  std::vector<Index> shared;
+  for (const Vec3& p : fine.mesh.vertices) {
+    const std::array<long, 3> key{std::lround(1e6 * p.x()), std::lround(1e6 * p.y()), std::lround(1e6 * p.z())};
+    const auto [entry, added] = at.try_emplace(key, narrow<Index>(result.reference.vertices.size()));
+    if (added) {
+      result.reference.vertices.push_back(p);
+    }
+    shared.push_back(entry->second);
+  }
+  for (const auto& [a, b, c] : fine.mesh.triangles) {
+    result.reference.triangles.push_back({shared[a], shared[b], shared[c]});
+  }
+  result.states.resize(2);
+  for (const Vec3& p : result.reference.vertices) {
+    result.states[0].displacement.emplace_back(Vec3::Zero());
+    result.states[0].von_mises.push_back(0);
+    result.states[1].displacement.emplace_back(0.1 * p);
+    result.states[1].von_mises.push_back(1 + p.z());
+  }
+  return result;
+}
+
+void expect_the_same_field(const DrawnShells& drawn, double tolerance) {
+  ASSERT_EQ(drawn.states.size(), 2U);
+  ASSERT_EQ(drawn.states[1].displacement.size(), drawn.mesh.vertices.size());
+  for (std::size_t v = 0; v < drawn.mesh.vertices.size(); ++v) {
+    const Vec3& p = drawn.mesh.vertices[v];
+    EXPECT_LT((drawn.states[1].displacement[v] - 0.1 * p).norm(), tolerance);
+    EXPECT_NEAR(drawn.states[1].von_mises[v], 1 + p.z(), 10 * tolerance);
+  }
+}
+
+TEST(DrawnShellsTest, AreCutIntoFewerPiecesFirst) {
+  const std::size_t shells = sphere().shells;  // 128
+  for (const auto& [most, pieces] : {std::pair{100'000, 4U}, {1'000, 2U}, {200, 1U}}) {
+    const DrawnShells drawn = thinned(sphere(), narrow<std::size_t>(most));
+    EXPECT_EQ(drawn.mesh.triangles.size(), shells * pieces * pieces);
+    EXPECT_EQ(drawn.edges.size(), shells * 3 / 2 * pieces) << "every edge once";
+    // Euler's number of a closed surface: no point is there twice, none is missing.
+    EXPECT_EQ(drawn.mesh.vertices.size(), drawn.mesh.triangles.size() / 2 + 2);
+    expect_the_same_field(drawn, 1e-12);
+  }
+}
+
+TEST(DrawnShellsTest, AreDecimatedWhereTheShellsAloneAreTooMany) {
+  const DrawnShells drawn = thinned(sphere(), 60);
+  EXPECT_LE(drawn.mesh.triangles.size(), 60U);
+  EXPECT_TRUE(drawn.edges.empty());
+  expect_the_same_field(drawn, 0.2);
+}
+
+TEST(DrawnShellsTest, OfAnotherKindStayAsTheyAre) {
+  DrawnResult odd = sphere();
+  odd.reference.triangles.pop_back();
+  const std::size_t triangles = odd.reference.triangles.size();
+  const DrawnShells drawn = thinned(std::move(odd), 100'000);
+  EXPECT_EQ(drawn.mesh.triangles.size(), triangles);
+  EXPECT_THAT(drawn.labels, ElementsAre("As imaged", "Loaded"));
+}
+
+}  // namespace
+}  // namespace tunica::report

@@ -1,0 +1,101 @@
+#!/usr/bin/python3
+"""The pages of tunica-report in a browser, and the script they carry: built anew from web/ it has the same bytes."""
+
+import json
+import os
+import pathlib
+import shutil
+import subprocess
+import tempfile
+import unittest
+
+import cases
+
+SOURCE = pathlib.Path(os.environ["TUNICA_SOURCE"])
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+
+
+class WithPackages(unittest.TestCase):
+    """A copy of web/ with the packages that its lock file names."""
+
+    @classmethod
+    def setUpClass(cls):
+        if not shutil.which("npm"):
+            raise unittest.SkipTest("npm is not installed")
+        folder = tempfile.TemporaryDirectory(prefix="tunica-web-")
+        cls.addClassCleanup(folder.cleanup)
+        cls.folder = pathlib.Path(folder.name)
+        cls.web = cls.folder / "web"
+        shutil.copytree(SOURCE / "web", cls.web, ignore=shutil.ignore_patterns("node_modules", "dist"))
+        done = subprocess.run(["npm", "ci", "--ignore-scripts", "--no-audit", "--no-fund"], cwd=cls.web,
+                              capture_output=True, text=True)
+        if done.returncode != 0:
+            if "E40" in done.stderr or "ENOTFOUND" in done.stderr or "EAI_AGAIN" in done.stderr or "ECONN" in done.stderr:
+                raise unittest.SkipTest("npm reaches no registry")
+            raise AssertionError(done.stderr)
+
+
+class Bundle(WithPackages):
+    def test_built_anew_has_the_same_bytes(self):
+        subprocess.run(["node", "build.mjs", self.folder / "dist"], cwd=self.web, check=True)
+        built = {path.name: path.read_bytes() for path in (self.folder / "dist").iterdir()}
+        kept = {path.name: path.read_bytes() for path in (SOURCE / "web" / "dist").iterdir()}
+        self.assertEqual(set(built), set(kept))
+        for name in kept:
+            self.assertEqual(built[name] == kept[name], True, f"web/dist/{name}: run npm run build in web/")
+
+    def test_bundle_fits_into_a_page(self):
+        text = (SOURCE / "web" / "dist" / "report.js").read_text(encoding="ascii")
+        for end in ("</script", "<!--", "eval(", "new Function", "import("):
+            self.assertNotIn(end, text)
+        self.assertIn("Permission is hereby granted", (SOURCE / "web" / "dist" / "LICENCES.txt").read_text())
+
+
+@unittest.skipUnless(CHROMIUM, "chromium is not installed")
+class Browser(WithPackages):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.case = cases.make_case(cls.folder)
+
+    def look_at(self, out, scheme):
+        page = self.folder / "page.html"
+        cases.run("report", out, "-o", page, "--force", "--quiet")
+        with tempfile.TemporaryDirectory(prefix="tunica-profile-") as profile:
+            run = subprocess.run(["node", pathlib.Path(__file__).with_suffix(".mjs"), self.web, CHROMIUM, profile, scheme,
+                                  page], capture_output=True, text=True, timeout=300)
+        self.assertEqual(run.returncode, 0, run.stderr)
+        seen = json.loads(run.stdout)
+        self.assertEqual(seen["errors"], [])
+        self.assertEqual(seen["requests"], [], "a page loads nothing")
+        self.assertEqual(seen["violations"], [], "axe-core")
+        self.assertEqual([name for name, changed in seen["changes"].items() if not changed], [])
+        return seen
+
+    def test_case_turns(self):
+        for scheme in ("light", "dark"):
+            seen = self.look_at(self.case, scheme)
+            self.assertIn("Displacement", seen["legend"])
+            self.assertIn("As imaged", seen["legend"])
+
+    def test_cohort_sorts_and_filters(self):
+        out = self.folder / "cohort"
+        stresses = [0.03, 0.01, 0.02]
+        for i, stress in enumerate(stresses):
+            def change(reports, stress=stress):
+                reports["simulate"]["result"]["wall"]["stress_p99_mpa"] = stress
+            cases.copy_case(self.case, out, f"organ-{i:03}", change)
+
+        def fail(reports):
+            reports["simulate"].update(ok=False, error="no equilibrium <img src=x onerror=alert(1)>", result={})
+        cases.copy_case(self.case, out, "<script>alert(1)<\u2215script>", fail)
+        seen = self.look_at(out, "light")
+        self.assertEqual(seen["rows"], ["", "30", "10", "20"], "the failed case first")
+        self.assertEqual(seen["ascending"], ["ascending", ["10", "20", "30", ""]])
+        self.assertEqual(seen["descending"], ["descending", ["30", "20", "10", ""]])
+        self.assertEqual(seen["filtered"], [["10"], "1 of 4 cases"])
+        self.assertEqual(seen["opened"], ["organ-001/1"])
+
+
+if __name__ == "__main__":
+    unittest.main()

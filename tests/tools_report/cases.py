@@ -1,0 +1,49 @@
+"""Results as Makefile.pipeline leaves them, of a small phantom, and cohorts made from copies of it."""
+
+import hashlib
+import json
+import os
+import pathlib
+import shutil
+import subprocess
+
+TOOLS = pathlib.Path(os.environ["TUNICA_BIN"])
+STAGES = ["extract", "decimate", "relax", "simulate"]
+
+
+def run(verb, *words, code=0):
+    done = subprocess.run([TOOLS / f"tunica-{verb}", *map(str, words)], capture_output=True, text=True,
+                          errors="surrogateescape")
+    assert done.returncode == code, done.stderr
+    return done
+
+
+def make_case(folder, shape="aneurysm"):
+    """Runs the four stages on a phantom into folder/shape/1. @return that folder"""
+    volume, case = folder / f"{shape}.nii.gz", folder / "out" / shape / "1"
+    case.mkdir(parents=True)
+    run("phantom", shape, volume, "--size", 24, "--spacing", 2)
+    surface, coarse, shell, result = (case / name for name in ("surface.ply", "coarse.ply", "shell.ply", "result.hdf"))
+    load = ["--pressure", "1kPa", "--young", "1MPa", "--poisson", "0.45", "--thickness", "1.5mm", "--density",
+            "1100kg/m3", "--fix", "rigid-motions" if shape == "sphere" else "boundary", "--static"]
+    open_border = [] if shape == "sphere" else ["--open-border"]
+    for stage, words in (("extract", [volume, surface, "--label", 1, "--smooth", "staircase", *open_border]),
+                         ("decimate", [surface, coarse, "--triangles", 200]), ("relax", [coarse, surface, shell]),
+                         ("simulate", [shell, result, *load])):
+        run(stage, *words, "--report", case / f"{stage}.json", "--quiet")
+    return case
+
+
+def copy_case(case, out, name, change=lambda reports: None):
+    """A copy of a case under another name; `change` may alter its reports, by stage."""
+    folder = pathlib.Path(out, name, "1")
+    shutil.copytree(case, folder)
+    reports = {stage: json.loads((folder / f"{stage}.json").read_text()) for stage in STAGES}
+    change(reports)
+    for stage, report in reports.items():
+        (folder / f"{stage}.json").write_text(json.dumps(report))
+    return folder
+
+
+def sha256(path):
+    return hashlib.sha256(path.read_bytes()).hexdigest()

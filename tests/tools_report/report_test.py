@@ -1,0 +1,336 @@
+#!/usr/bin/python3
+"""tunica-report: what a page and its tables say, names that are hostile, --verify, --no-paths, size."""
+
+import base64
+import csv
+import hashlib
+import html.parser
+import json
+import os
+import pathlib
+import re
+import shutil
+import struct
+import tempfile
+import time
+import unittest
+import zlib
+
+import cases
+
+
+class Page(html.parser.HTMLParser):
+    """The elements of a page, the text outside scripts and styles, and what should not be there."""
+
+    def __init__(self, text):
+        super().__init__(convert_charrefs=True)
+        self.text, self.elements, self.scripts, self.stack = "", [], [], []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attributes):
+        self.elements.append((tag, dict(attributes)))
+        self.stack.append(tag)
+
+    def handle_endtag(self, tag):
+        while self.stack and self.stack.pop() != tag:
+            pass
+
+    def handle_data(self, data):
+        if self.stack and self.stack[-1] in ("script", "style"):
+            self.scripts.append((self.elements[-1], data))
+        else:
+            self.text += data
+
+    def of(self, tag):
+        return [attributes for name, attributes in self.elements if name == tag]
+
+
+class ReportTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        folder = tempfile.TemporaryDirectory(prefix="tunica-report-")
+        cls.addClassCleanup(folder.cleanup)
+        cls.source = pathlib.Path(folder.name)
+        cls.case = cases.make_case(cls.source)
+
+    def setUp(self):
+        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="tunica-report-"))
+        self.addCleanup(shutil.rmtree, self.folder)
+        self.out = self.folder / "out"
+        self.page = self.folder / "page.html"
+
+    def copy(self, name, change=lambda reports: None):
+        return cases.copy_case(self.case, self.out, name, change)
+
+    def cohort(self, count):
+        """Cases whose stress and volume differ a little."""
+        for i in range(count):
+            def change(reports, i=i):
+                reports["simulate"]["result"]["wall"]["stress_p99_mpa"] = 0.02 + 0.0001 * i
+                reports["extract"]["result"]["voxel_volume_mm3"] = 40000 + 100 * i
+                for report in reports.values():
+                    report["warnings"] = []
+            self.copy(f"organ-{i:03}", change)
+
+    def report(self, *words, folder=None, code=0):
+        done = cases.run("report", folder or self.out, "-o", self.page, "--force", *words, code=code)
+        text = self.page.read_text(encoding="utf-8") if self.page.exists() else ""
+        return done, text, Page(text)
+
+
+class CasePage(ReportTest):
+    def test_says_what_the_reports_say(self):
+        self.copy("aneurysm")
+        _, text, page = self.report()
+        result = json.loads((self.case / "simulate.json").read_text())["result"]
+        relax = json.loads((self.case / "relax.json").read_text())["result"]
+        numbers = re.findall(r"<dd><b>([^<]*)</b>", text)
+        for told, value in zip(numbers, (1e3 * result["wall"]["stress_p99_mpa"], result["max_displacement_mm"],
+                                         relax["hausdorff_mm"]["upper"])):
+            self.assertAlmostEqual(float(told) / value, 1, delta=0.005)
+        self.assertEqual(len(numbers), 3)
+        self.assertEqual(len(page.of("h1")), 1)
+        for needed in ("Done and converged", "Not a medical device", "Comas", "SHA-256", "Inputs as resolved",
+                       "Time and memory", "MIT", "certified to be at most", "GPL-3.0-or-later", "Young's modulus"):
+            self.assertIn(needed, page.text)
+        self.assertIn(cases.sha256(self.case / "shell.ply"), page.text)
+        self.assertIn(json.loads((self.case / "relax.json").read_text())["command"], page.text)
+        self.assertTrue(all(column.get("scope") for column in page.of("th")))
+        self.assertEqual(len(page.of("caption")), len(page.of("table")))
+        levels = [int(tag[1]) for tag, _ in page.elements if re.fullmatch("h[1-6]", tag)]
+        self.assertTrue(all(after - before <= 1 for before, after in zip(levels, levels[1:])), levels)
+
+    def test_loads_nothing_and_runs_its_own_script_alone(self):
+        self.copy("aneurysm")
+        _, text, page = self.report()
+        policy = next(meta["content"] for meta in page.of("meta") if meta.get("http-equiv"))
+        self.assertTrue(policy.startswith("default-src 'none';"))
+        run = [data for (_, attributes), data in page.scripts if attributes.get("type") != "text/plain"]
+        self.assertEqual(len(run), 2, "a style and a script")
+        for kind, code in zip(("style", "script"), run):
+            digest = base64.b64encode(hashlib.sha256(code.encode()).digest()).decode()
+            self.assertIn(f"{kind}-src 'sha256-{digest}'", policy)
+        for _, attributes in page.elements:
+            self.assertFalse([name for name in attributes if name.startswith("on") or name == "style"])
+            self.assertTrue(re.match("data:|#|$", attributes.get("src") or attributes.get("href") or ""))
+
+    def test_organ_is_packed(self):
+        self.copy("aneurysm")
+        _, _, page = self.report()
+        packed = next(data for (_, attributes), data in page.scripts if attributes.get("type") == "text/plain")
+        data = zlib.decompress(base64.b64decode(packed))
+        length, = struct.unpack("<I", data[:4])
+        header = json.loads(data[4:4 + length])
+        result = json.loads((self.case / "simulate.json").read_text())["result"]
+        self.assertEqual(header["states"], ["As imaged", "Loaded"])
+        self.assertAlmostEqual(header["tops"]["displacement"] / result["max_displacement_mm"], 1, delta=0.01)
+        points, edges = header["shell"]["points"], header["edges"]
+        self.assertEqual(header["shell"]["triangles"], 16 * result["shells"])
+        surface = header["surface"]
+        size = (6 * points + 6 * header["shell"]["triangles"] + 4 * edges + points + 2 * (6 * points + points) +
+                6 * surface["points"] + 6 * surface["triangles"])
+        self.assertEqual(len(data), 4 + length + size)
+        pictures = [image["src"] for image in page.of("img")]
+        self.assertEqual(len(pictures), 2, "the organ, and the slices")
+        self.assertTrue(all(base64.b64decode(src.split(",")[1]).startswith(b"\x89PNG") for src in pictures))
+
+    def test_case_folder_alone_and_the_same_bytes_again(self):
+        folder = self.copy("aneurysm")
+        _, first, page = self.report(folder=folder)
+        _, again, _ = self.report("--threads", 1, folder=folder)
+        self.assertEqual(first.replace(" --threads 1", ""), again.replace(" --threads 1", ""))
+        self.assertIn("The organ", page.text)
+
+    def test_what_cannot_be_drawn_is_told(self):
+        folder = self.copy("aneurysm")
+        (folder / "result.hdf").write_bytes(b"\x89HDF no more")
+        (folder / "surface.ply").write_text("ply\nno more")
+        self.copy("other", lambda reports: reports["extract"]["inputs"][0].update(path="missing.nii.gz"))
+        _, _, page = self.report()
+        for told in ("result.hdf: cannot be read as HDF5", "surface.ply: ", "missing.nii.gz: "):
+            self.assertIn(told, page.text)
+
+    def test_changed_volume_is_not_shown(self):
+        self.copy("aneurysm", lambda reports: reports["extract"]["inputs"][0].update(sha256="0" * 64))
+        _, _, page = self.report()
+        self.assertIn("is not the volume that was extracted any more", page.text)
+        self.assertEqual(len(page.of("img")), 1)
+
+
+class CohortPage(ReportTest):
+    def test_counts_failures_and_outliers(self):
+        self.cohort(8)
+
+        def fail(reports):
+            reports["relax"].update(ok=False, error="shell.ply: the tolerance cannot be held", result={})
+        failed = self.copy("zz-failed", fail)
+        (failed / "simulate.json").unlink()
+
+        def stand_out(reports):
+            for report in reports.values():
+                report["warnings"] = []
+            reports["simulate"]["result"]["wall"]["stress_p99_mpa"] = 0.05
+            reports["extract"]["result"]["voxel_volume_mm3"] = 40400
+            reports["simulate"]["warnings"] = ["shells wave"]
+        self.copy("zz-out", stand_out)
+        done, text, page = self.report()
+        self.assertRegex(done.stdout, r"zz-failed/1 +relax .*the tolerance cannot be held")
+        self.assertEqual(re.findall(r"<dd>(\d+)</dd>", text), ["9", "1", "1"])
+        self.assertRegex(page.text, r"zz-failed/1: relax: shell.ply: the tolerance cannot be held\s*Next: tunica-relax .* --verbose")
+        self.assertRegex(page.text, r"zz-out/1: Stress p99 50 kPa \(robust z \+\d+")
+        self.assertEqual(text.count("(robust z"), 1)
+        self.assertEqual(page.of("details")[0]["class"], "case failed", "failures first")
+        self.assertEqual(text.count('<svg viewBox="0 0 320 58" role="img"'), 7)
+        self.assertEqual(len(page.of("caption")), len(page.of("table")))
+
+    def test_table_and_what_its_columns_mean(self):
+        self.cohort(3)
+        self.report("--tsv", self.folder / "cohort.tsv")
+        with open(self.folder / "cohort.tsv", newline="", encoding="utf-8") as file:
+            rows = list(csv.DictReader(file, delimiter="\t", quoting=csv.QUOTE_NONE))
+        columns = json.loads((self.folder / "cohort.json").read_text())
+        self.assertEqual(list(rows[0]), list(columns))
+        for name, column in columns.items():
+            self.assertEqual(set(column), {"Description", "Units", "Source"}, name)
+        self.assertEqual([row["case"] for row in rows], [f"organ-{i:03}/1" for i in range(3)])
+        self.assertEqual([float(row["stress_p99_kpa"]) for row in rows], [20, 20.1, 20.2])
+        self.assertEqual((rows[0]["pressure_kpa"], rows[0]["poisson"], rows[0]["status"]), ("1", "0.45", "done"))
+        self.assertEqual(rows[0]["volume_change_percent"], "n/a", "an open organ has no volume")
+
+    def test_without_paths_no_name_is_told(self):
+        names = ["Mustermann_Erika", "O'Hara-Jane", "p x 19540312"]
+        for name in names:
+            def rename(reports, name=name):
+                volume = f"/data/ward 7/{name}.nii.gz"
+                text = json.dumps(reports["extract"])
+                for report in reports.values():
+                    report["warnings"] = [f"{self.out}/{name}/1/shell.ply: its normals", f"{name}.nii.gz: odd", volume]
+                    report["command"] = f"tunica-extract '{volume}' '{self.out}/{name}/1/surface.ply' --label 1"
+                self.assertTrue(text)
+                reports["extract"]["inputs"][0]["path"] = volume
+                reports["relax"].update(error=f"{self.out}/{name}/1/coarse.ply: of {volume}: no")
+            self.copy(name, rename)
+        tsv = self.folder / "c.tsv"
+        self.report("--no-paths", "--tsv", tsv)
+        for written in (self.page.read_text(), tsv.read_text()):
+            for name in [*names, "Mustermann", "Hara", "19540312", "/data", "ward 7", str(self.folder),
+                         str(self.source), "aneurysm"]:
+                for way in (name, name.replace("'", "&#39;")):
+                    self.assertNotIn(way, written)
+        self.assertIn("case 2", self.page.read_text())
+
+    def test_two_hundred_organs_within_25_mb(self):
+        folder = self.copy("organ-000")
+        for i in range(1, 10):
+            shutil.copytree(folder.parent, self.out / f"organ-{i:03}")
+        record = [f"organ-{i:03}/1\torgan-{i % 10:03}/1\tsimulate\t0\tdone\n" for i in range(200)]
+        (self.out / ".cases").write_text("".join(record))
+        start = time.monotonic()
+        self.report("--quiet")
+        self.assertLess(self.page.stat().st_size, 25e6)
+        self.assertLess(time.monotonic() - start, 300)
+
+
+class HostileNames(ReportTest):
+    NAMES = ["<script>alert(1)</script>", "\"><img src=x onerror=alert(1)>", "'-alert(1)-'", "</title><script>x</script>",
+             "a\nb\t<b>", "&lt;i&gt;", "{0} {1} %s", "\u202egnp.exe", "\u0130\u0000x".replace("\0", ""), "javascript:alert(1)",
+             "]]><!--", "`${alert(1)}`", "gro\u00dfe \u5fc3"]
+
+    def test_names_are_text(self):
+        for i, name in enumerate(self.NAMES):
+            def poison(reports, name=name):
+                for report in reports.values():
+                    report["warnings"] = [name]
+                    report["command"] = name
+                    report["version"] = name
+                reports["relax"].update(ok=False, error=name)
+                reports["extract"]["inputs"][0]["path"] = name
+            folder = self.copy(f"{i}-plain", poison)
+            folder.parent.rename(self.out / name.replace("/", "\u2215"))
+        _, text, page = self.report()
+        self.check(text, page)
+        shown = page.text.replace("\u2215", "/")
+        for name in self.NAMES:
+            self.assertIn(re.sub("[\x00-\x08\u202e]", "\ufffd", name), shown)
+
+    def check(self, text, page):
+        """Nothing of a name became an element or an attribute."""
+        known = {"html", "head", "meta", "title", "style", "body", "header", "p", "h1", "h2", "h3", "main", "dl", "div",
+                 "dt", "dd", "ul", "li", "a", "bdi", "br", "code", "pre", "table", "caption", "thead", "tbody", "tr",
+                 "th", "td", "small", "span", "img", "figure", "figcaption", "svg", "defs", "lineargradient", "stop",
+                 "rect", "line", "circle", "text", "details", "summary", "script", "strong", "b", "ol", "footer"}
+        self.assertEqual({tag for tag, _ in page.elements} - known, set())
+        run = [data for (tag, attributes), data in page.scripts if tag == "script" and "type" not in attributes]
+        self.assertEqual(len(run), 1)
+        self.assertNotIn("alert", run[0][:0] + "".join(data for (_, attributes), data in page.scripts if "id" in attributes))
+        for _, attributes in page.elements:
+            self.assertFalse([name for name in attributes if name.startswith("on")])
+        self.assertNotIn("\u202e", text)
+
+    def test_bytes_that_are_no_text(self):
+        folder = self.copy("plain")
+        os.rename(os.fsencode(folder.parent), os.path.join(os.fsencode(self.out), b"\xff\xfe<b>\xc0\xaf"))
+        self.copy("other")
+        _, text, page = self.report()
+        self.check(text, page)
+        self.assertIn("\ufffd\ufffd<b>", page.text)
+
+
+class Errors(ReportTest):
+    def refuse(self, code, *words, says, folder=None):
+        done, _, _ = self.report(*words, folder=folder, code=code)
+        self.assertEqual(done.stderr.count("\n"), 1, done.stderr)
+        self.assertTrue(done.stderr.startswith("tunica-report: "))
+        self.assertIn(says, done.stderr)
+
+    def test_verify_names_what_differs(self):
+        folder = self.copy("aneurysm")
+        self.report("--verify")
+        with open(folder / "shell.ply", "ab") as file:
+            file.write(b"x")
+        (folder / "coarse.ply").unlink()
+        # Where the outputs were first is not looked at while there are files of these names beside the report.
+        reports = json.loads((folder / "decimate.json").read_text())
+        reports["outputs"][0]["path"] = "nowhere/coarse.ply"
+        (folder / "decimate.json").write_text(json.dumps(reports))
+        self.refuse(4, "--verify", says="shell.ply: is not what relax wrote")
+        self.refuse(4, "--verify", says="coarse.ply: that decimate wrote, is missing")
+        self.assertIn("Outputs that are not what the reports say", self.page.read_text())
+
+    def test_verify_wants_hashes(self):
+        def older(reports):
+            reports["extract"]["outputs"] = [entry["path"] for entry in reports["extract"]["outputs"]]
+        self.copy("aneurysm", older)
+        self.refuse(4, "--verify", says="extract.json: tells no hashes of the outputs")
+
+    def test_folders_that_hold_no_case(self):
+        self.refuse(3, says="is not a folder")
+        self.out.mkdir()
+        self.refuse(3, says="holds no case")
+        (self.out / ".cases").write_text("a\t../b\tnone\t\tx\n")
+        self.refuse(3, says=".cases: is not what Makefile.pipeline writes")
+
+    def test_damaged_reports_are_failures(self):
+        folder = self.copy("aneurysm")
+        (folder / "simulate.json").write_text("{")
+        _, _, page = self.report()
+        self.assertIn("simulate.json: is not a JSON report", page.text)
+        self.assertIn("Failed", page.text)
+
+    def test_outputs(self):
+        self.copy("aneurysm")
+        self.page.write_text("mine")
+        done = cases.run("report", self.out, "-o", self.page, code=5)
+        self.assertIn("exists", done.stderr)
+        self.assertEqual(self.page.read_text(), "mine")
+        done = cases.run("report", self.out, "-o", self.folder / "page.txt", code=2)
+        self.assertIn(".html", done.stderr)
+        report = json.loads(cases.run("report", self.out, "-o", self.page, "--force", "--report", "-").stdout)
+        self.assertEqual(report["outputs"], [{"path": str(self.page), "sha256": cases.sha256(self.page)}])
+        self.assertEqual([pathlib.Path(entry["path"]).name for entry in report["inputs"]],
+                         ["decimate.json", "extract.json", "relax.json", "simulate.json"])
+        self.assertEqual(report["result"]["cases"], 1)
+
+
+if __name__ == "__main__":
+    unittest.main()
