@@ -32,7 +32,7 @@ import summary
 
 ENDINGS = (".seg.nrrd", ".nii.gz", ".nii", ".nrrd", ".nhdr", ".mha", ".mhd", ".tiff", ".tif", ".png")
 PRODUCTS = {"extract": ["surface.ply"], "decimate": ["coarse.ply"], "relax": ["shell.ply", "map.png"],
-            "simulate": ["result.hdf"]}
+            "simulate": ["result.hdf", "picture.png"]}
 OF_THE_RUN = (".lock", ".run", "summary.tsv", "chart.svg")
 BLANKS = re.compile(r"\s+", re.ASCII)
 CONTROL = re.compile(r"[\x00-\x1f\x7f]")
@@ -175,12 +175,12 @@ def stage_flags(label):
 
 def stage_commands(case, binaries, flags):
     """Per stage its command, as text for the shell."""
-    surface, coarse, shell, picture, result, facts = (
+    surface, coarse, shell, error_map, result, picture, facts = (
         os.path.join(case.folder, name)
-        for name in ("surface.ply", "coarse.ply", "shell.ply", "map.png", "result.hdf", "extract.json"))
+        for name in ("surface.ply", "coarse.ply", "shell.ply", "map.png", "result.hdf", "picture.png", "extract.json"))
     words = {"extract": [path_word(case.volume), surface], "decimate": [surface, coarse],
-             "relax": [coarse, surface, shell, "--picture", picture],
-             "simulate": [shell, result, *(["--target", surface] if setting("ACCURACY") else [])]}
+             "relax": [coarse, surface, shell, "--picture", error_map],
+             "simulate": [shell, result, "--picture", picture, *(["--target", surface] if setting("ACCURACY") else [])]}
     # Whether there is a boundary to hold is known once the surface is.
     is_closed = f"grep -q '\"closed\": *true' {shlex.quote(facts)}"
     chosen_fix = "" if setting("FIX") else f' --fix "$(if {is_closed}; then echo rigid-motions; else echo boundary; fi)"'
