@@ -56,7 +56,7 @@ public:
     if (chart.guide && chart.guide->y) {
       ys.push_back(*chart.guide->y);
     }
-    title_ = wrapped(chart.title, chart_width - 40, title_size);
+    title_ = wrapped(chart.title, (chart_width - 40) / bold_width, title_size);
     x_ = make_axis(chart.x.scale, xs);
     y_ = make_axis(chart.y.scale, ys);
     double widest = 0;

@@ -13,11 +13,11 @@ namespace {
 
 std::string exponent(int power) { return fmt::format("{}{}", power < 0 ? "−" : "", std::abs(power)); }
 
-// 10,000 and more with commas.
+// 1,000 and more with commas.
 std::string grouped(std::string digits) {
   const std::size_t end = std::min(digits.find('.'), digits.size());
   const std::size_t begin = digits.find_first_of("0123456789");
-  for (std::size_t at = end; end - begin > 4 && at > begin + 3; at -= 3) {
+  for (std::size_t at = end; at > begin + 3; at -= 3) {
     digits.insert(at - 3, ",");
   }
   return digits;

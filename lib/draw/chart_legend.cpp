@@ -89,7 +89,7 @@ Legend chart_legend(const Chart& chart, double top) {
   if (has_front(chart)) {
     head += (head.empty() ? "" : ". ") + better(chart);
   }
-  for (const std::string& line : wrapped(head, chart_width - 40, tick_size)) {
+  for (const std::string& line : wrapped(head, (chart_width - 40) / bold_width, tick_size)) {
     legend.svg += text_element(20, y, line, tick_size, fill(Ink::text) + " font-weight=\"bold\"");
     y += row_height;
   }

@@ -238,7 +238,7 @@ TEST(ChartSvg, long_names_and_labels_are_broken_not_cut) {
   chart.x.label = chart.y.label = chart.series.front().name = chart.title = words;
   const std::string svg = chart_svg(chart);
   EXPECT_THAT(svg, Not(HasSubstr("…")));
-  EXPECT_EQ(count(svg, "sixteen<"), 4u + 2u);  // the <title> of the picture and of its marks, too
+  EXPECT_EQ(count(svg, "sixteen<"), 5u);  // one is the <title> of the picture
 }
 
 TEST(ChartSvg, has_colours_for_the_dark) {
@@ -303,6 +303,7 @@ TEST(DescribeKey, gives_words_and_units) {
   EXPECT_EQ(describe_key("result.volume_mm3"), "Volume (mm³)");
   EXPECT_EQ(describe_key("peak_mib"), "Peak memory (MiB)");
   EXPECT_EQ(describe_key("result.frequencies_hz.0"), "Frequencies (Hz)");
+  EXPECT_EQ(describe_key("study.setting"), "Setting");
   EXPECT_EQ(describe_key(""), "");
 }
 

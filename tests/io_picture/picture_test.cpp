@@ -111,18 +111,18 @@ TEST(Picture, a_range_makes_the_colours_of_two_pictures_the_same) {
   for (std::size_t v = 0; v < small.size(); ++v) {
     large[v] = 4 * small[v];
   }
-  const auto darkest = [&](const std::vector<double>& values, const PictureOptions& options) {
+  const auto light = [&](const std::vector<double>& values, const PictureOptions& options) {
     const Image image = picture(sphere, values, options);
-    int least = 766;  // in the middle of the front view, away from outlines and the ring
+    double sum = 0;  // in the middle of the front view
     for (int y = 380; y < 560; ++y) {
       for (int x = 240; x < 440; ++x) {
-        least = std::min(least, brightness(pixel(image, x, y)));
+        sum += brightness(pixel(image, x, y));
       }
     }
-    return least;
+    return sum / (180 * 200);
   };
-  EXPECT_EQ(darkest(small, {}), darkest(large, {}));
-  EXPECT_GT(darkest(small, {.maximum = 8}), darkest(large, {.maximum = 8}) + 150);
+  EXPECT_EQ(light(small, {}), light(large, {}));
+  EXPECT_GT(light(small, {.maximum = 8}), light(large, {.maximum = 8}) + 50);
   // What is above the range is the last colour, and the bar says that it goes on.
   const Area above_bar{1432, 228, 34, 16};
   EXPECT_EQ(count_near(picture(sphere, small, {.maximum = 8}), above_bar, {88, 27, 110}, 10), 0);
@@ -146,7 +146,7 @@ TEST(Picture, a_surface_along_the_view_is_seen_from_another_side) {
   }
   const Image image = picture(rod, {});
   // Seen along x it fills the width of the picture.
-  EXPECT_LT(count_near(image, {200, 120, 1200, 200}, white, 3), 0.5 * 1200 * 200);
+  EXPECT_LT(count_near(image, {250, 200, 1100, 1}, white, 3), 200);
 }
 
 TEST(Picture, other_bodies_are_grey_and_drawn_from_outside_only) {
@@ -276,11 +276,12 @@ TEST(Picture, lines_are_hidden_behind_the_surface) {
                    {Vec3(-1, -1, -1), Vec3(-1, 1, 1)}};
   EXPECT_GT(dark_pixels(), plain + 300);
   // Without room between them they would hide the colours.
+  options.lines.clear();
   for (int i = 0; i < 4000; ++i) {
     const double height = -1 + 2 * real(i) / 4000;
     options.lines.push_back({Vec3(-1, -1, height), Vec3(1, -1, height)});
   }
-  EXPECT_LT(dark_pixels(), plain + 300);
+  EXPECT_EQ(dark_pixels(), plain);
 }
 
 }  // namespace
