@@ -7,6 +7,7 @@
 #include "tunica/shell/distance/shell_distance.hpp"
 #include "tunica/shell/distance/target.hpp"
 #include "tunica/shell/patch/curved_surface.hpp"
+#include "tunica/shell/patch/patch_edges.hpp"
 #include "tunica/surface/distance/hausdorff.hpp"
 #include "tunica/surface/mesh/measure.hpp"
 #include "tunica/surface/mesh/subdivide.hpp"
@@ -31,7 +32,7 @@ constexpr std::size_t map_triangles = 400'000;
 struct Arguments {
   fs::path a, b;
   bool shell = false;
-  std::optional<LengthTolerance> width, max;
+  std::optional<LengthTolerance> width, max, picture_range;
   std::optional<fs::path> map, picture, curved;
   std::optional<std::string> mesh_unit;
 };
@@ -48,6 +49,8 @@ void declare(cli::Tool& tool, Arguments& given) {
   tool.group("Output");
   app.add_option("--map", given.map, "error map: A with its distance to B as 'quality', mm, PLY")->type_name("OUT.ply");
   app.add_option("--picture", given.picture, "picture of the error map")->type_name("OUT.png");
+  tool.tolerance("--picture-range", given.picture_range,
+                 "where the picture's colours end, so that pictures can be compared (default: the largest distance)");
   app.add_option("--curved", given.curved, "the curved surface of A as a fine triangle mesh (needs --shell)")
       ->type_name("OUT.ply");
   tool.group("Input");
@@ -144,17 +147,8 @@ Map make_map(const Surface& a, const ClosestPoint& b, double diagonal_mm) {
     const double per_shell = real(map_triangles) / real(facets);
     const int level = std::clamp(truncated<int>(std::sqrt(per_shell)), 4, 24);
     const Tessellation fine = tessellate_uniformly(*a.shell, level);
-    const auto on_edge = [&](Index i, Index j) {
-      const Vec2& p = fine.barycentric[i];
-      const Vec2& q = fine.barycentric[j];
-      return (p[0] == 0 && q[0] == 0) || (p[1] == 0 && q[1] == 0) || (p.sum() > 1 - 1e-9 && q.sum() > 1 - 1e-9);
-    };
-    for (const auto& t : fine.mesh.triangles) {
-      for (std::size_t k = 0; k < 3; ++k) {
-        if (on_edge(t[k], t[(k + 1) % 3])) {
-          map.edges.push_back({fine.mesh.vertices[t[k]], fine.mesh.vertices[t[(k + 1) % 3]]});
-        }
-      }
+    for (const auto& [from, to] : patch_edges(fine)) {
+      map.edges.push_back({fine.mesh.vertices[from], fine.mesh.vertices[to]});
     }
     map.mesh = fine.mesh;
   } else {
@@ -190,14 +184,17 @@ void write_files(const cli::Tool& tool, const Arguments& given, const Surface& a
   }
   if (given.picture) {
     PictureOptions look;
-    look.title = fmt::format("{} against {}", given.a.filename().string(), given.b.filename().string());
-    look.caption =
-        fmt::format("two-sided Hausdorff distance {:.4g} to {:.4g} mm (at most {:.3g} %), mean {:.3g} mm",
-                    distance.both.lower, distance.both.upper, 100 * distance.both.upper / diagonal_mm, distance.mean);
-    look.quantity = "distance to " + given.b.filename().string();
+    look.title = a.shell ? "Distance of curved shells to a surface" : "Distance of a surface to another one";
+    look.caption = fmt::format("{} against {}: two-sided distance at most {:.3g} mm ({:.3g} % of the diagonal)",
+                               given.a.stem().string(), given.b.stem().string(), distance.both.upper,
+                               100 * distance.both.upper / diagonal_mm);
+    look.quantity = "Distance";
     look.diagonal = diagonal_mm;
+    if (given.picture_range) {
+      look.maximum = given.picture_range->millimetres(diagonal_mm);
+    }
     look.lines = map.edges;
-    write_file(*given.picture, error_map_picture(map.mesh, map.distances, look), tool.force());
+    write_file(*given.picture, surface_picture(map.mesh, map.distances, look), tool.force());
   }
 }
 
@@ -253,6 +250,9 @@ void run(cli::Tool& tool, const Arguments& given) {
   if (given.curved && !given.shell) {
     throw UsageError("--curved writes the curved surface of shells: it needs --shell");
   }
+  if (given.picture_range && !given.picture) {
+    throw UsageError("--picture-range belongs to --picture: give both");
+  }
   std::optional<double> unit_mm;
   if (given.mesh_unit) {
     unit_mm = parse_length_unit(*given.mesh_unit);
@@ -270,7 +270,8 @@ void run(cli::Tool& tool, const Arguments& given) {
     tool.input(given.a);
     tool.input(given.b);
     const auto in_millimetres = [](const auto& length) { return length && !length->relative; };
-    const bool require_unit = given.map || in_millimetres(given.max) || in_millimetres(given.width);
+    const bool require_unit =
+        given.map || in_millimetres(given.max) || in_millimetres(given.width) || in_millimetres(given.picture_range);
     MeshFile file_a = read_mesh(given.a, unit_mm, require_unit);
     MeshFile file_b = read_mesh(given.b, unit_mm, require_unit);
     const std::string space = common_space(file_a, given.a, file_b, given.b);

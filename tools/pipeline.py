@@ -33,7 +33,8 @@ from cases import CONTROL, Refused, find_cases
 
 STAGES = ("extract", "decimate", "relax", "simulate")
 PRODUCTS = {"extract": ["surface.ply"], "decimate": ["coarse.ply"], "relax": ["shell.ply", "map.png"],
-            "simulate": ["result.hdf"]}
+             "relax": [coarse, surface, shell, "--picture", error_map],
+             "simulate": [shell, result, "--picture", picture, *(["--target", surface] if case.setting("ACCURACY") else [])]}
 
 
 # ------------------------------------------------------------------------------------------------------ what they run
@@ -83,12 +84,12 @@ def stage_flags(case):
 
 def stage_commands(case, binaries, flags):
     """Per stage its command, as text for the shell."""
-    surface, coarse, shell, picture, result, facts = (
+    surface, coarse, shell, error_map, result, picture, facts = (
         os.path.join(case.folder, name)
-        for name in ("surface.ply", "coarse.ply", "shell.ply", "map.png", "result.hdf", "extract.json"))
+        for name in ("surface.ply", "coarse.ply", "shell.ply", "map.png", "result.hdf", "picture.png", "extract.json"))
     words = {"extract": [path_word(case.volume), surface], "decimate": [surface, coarse],
-             "relax": [coarse, surface, shell, "--picture", picture],
-             "simulate": [shell, result, *(["--target", surface] if case.setting("ACCURACY") else [])]}
+             "relax": [coarse, surface, shell, "--picture", error_map],
+             "simulate": [shell, result, "--picture", picture, *(["--target", surface] if case.setting("ACCURACY") else [])]}
     # Whether there is a boundary to hold is known once the surface is.
     is_closed = f"grep -q '\"closed\": *true' {shlex.quote(facts)}"
     chosen_fix = "" if case.setting("FIX") else f' --fix "$(if {is_closed}; then echo rigid-motions; else echo boundary; fi)"'

@@ -13,6 +13,7 @@
 #include "tunica/shell/distance/shell_crossings.hpp"
 #include "tunica/shell/distance/shell_quality.hpp"
 #include "tunica/shell/patch/curved_surface.hpp"
+#include "tunica/shell/patch/patch_edges.hpp"
 #include "tunica/surface/decimation/degenerate.hpp"
 #include "tunica/surface/distance/hausdorff.hpp"
 #include "tunica/surface/mesh/checks.hpp"
@@ -46,7 +47,7 @@ struct Arguments {
   fs::path coarse, target, out;
   std::optional<fs::path> map, picture, curved;
   std::optional<std::string> tolerance_text;
-  std::optional<LengthTolerance> tolerance;
+  std::optional<LengthTolerance> tolerance, picture_range;
   std::optional<double> thickness, mean;  ///< mm; of the distance, where it is asked for as a part of the wall
   std::optional<std::string> mid_surface;
   std::optional<fs::path> other_face;
@@ -114,6 +115,8 @@ void declare(cli::Tool& tool, Arguments& given) {
   app.add_option("--map", given.map, "error map: the curved surface with its distance to the target, PLY")
       ->type_name("OUT.ply");
   app.add_option("--picture", given.picture, "picture of the error map, PNG")->type_name("OUT.png");
+  tool.tolerance("--picture-range", given.picture_range,
+                 "where the picture's colours end, so that pictures can be compared (default: the largest distance)");
   app.add_option("--curved", given.curved, "the curved surface as a fine triangle mesh, PLY")->type_name("OUT.ply");
   tool.group("Input");
   app.add_option("--mesh-unit", given.mesh_unit, "unit of mesh files that do not state one: mm, cm, m or um")
@@ -170,6 +173,9 @@ void refuse_contradictions(const Arguments& given) {
   }
   if (given.max_shells && !given.refine && !(fit && given.tolerance)) {
     throw UsageError("--max-shells limits --refine, or a fit to a --tolerance; else the number of shells is given");
+  }
+  if (given.picture_range && !given.picture) {
+    throw UsageError("--picture-range belongs to --picture: give both");
   }
   if (given.min_angle && !fit) {
     throw UsageError("--min-angle belongs to --method fit");
@@ -291,23 +297,18 @@ void write_maps(cli::Tool& tool, const Arguments& given, const ShellMesh& shell,
   }
   if (given.picture) {
     PictureOptions options;
-    options.title = fmt::format("{}: {} shells", given.out.filename().string(), shell.triangles.size());
-    options.caption = fmt::format("two-sided Hausdorff distance at most {:.4g} mm ({:.3g} %), mean {:.3g} mm",
-                                  distance.both.upper, 100 * distance.both.upper / target.diagonal(), distance.mean);
-    options.quantity = "distance to the target";
+    options.title = "Distance of the curved shells to the surface they stand for";
+    options.caption = fmt::format(
+        "{} shells; two-sided distance at most {:.3g} mm ({:.3g} % of the diagonal), mean {:.3g} mm",
+        shell.triangles.size(), distance.both.upper, 100 * distance.both.upper / target.diagonal(), distance.mean);
     options.diagonal = target.diagonal();
-    const auto on_edge = [](const Vec2& a, const Vec2& b) {
-      return (a[0] == 0 && b[0] == 0) || (a[1] == 0 && b[1] == 0) || (a[0] + a[1] > 1 - 1e-9 && b[0] + b[1] > 1 - 1e-9);
-    };
-    for (const auto& v : fine.mesh.triangles) {
-      for (std::size_t i = 0; i < 3; ++i) {
-        const Index a = v[i], b = v[(i + 1) % 3];
-        if (on_edge(fine.barycentric[a], fine.barycentric[b])) {
-          options.lines.push_back({fine.mesh.vertices[a], fine.mesh.vertices[b]});
-        }
-      }
+    if (given.picture_range) {
+      options.maximum = given.picture_range->millimetres(target.diagonal());
     }
-    write_file(*given.picture, error_map_picture(fine.mesh, distances, options), tool.force());
+    for (const auto& [from, to] : patch_edges(fine)) {
+      options.lines.push_back({fine.mesh.vertices[from], fine.mesh.vertices[to]});
+    }
+    write_file(*given.picture, surface_picture(fine.mesh, distances, options), tool.force());
   }
 }
 

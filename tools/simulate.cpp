@@ -1,4 +1,5 @@
 #include "tunica/accuracy/accuracy.hpp"
+#include "tunica/cli/picture_flags.hpp"
 #include "tunica/cli/scene_flags.hpp"
 #include "tunica/cli/tool.hpp"
 #include "tunica/core/narrow.hpp"
@@ -8,6 +9,7 @@
 #include "tunica/io/mesh/mesh_pair.hpp"
 #include "tunica/io/result/result_export.hpp"
 #include "tunica/io/result/result_file.hpp"
+#include "tunica/io/result/result_picture.hpp"
 #include "tunica/io/result/run_journal.hpp"
 #include "tunica/io/result/run_report.hpp"
 #include "tunica/io/scene/scene.hpp"
@@ -35,6 +37,7 @@ struct Arguments {
   fs::path scene, resume;
   cli::SceneFlags flags;
   cli::AccuracyFlags accuracy;
+  cli::PictureFlags picture;
   std::optional<std::string> tessellation;
   std::vector<std::string> exports;
   std::optional<fs::path> unloaded;
@@ -69,6 +72,7 @@ void declare(cli::Tool& tool, Arguments& a) {
       ->expected(1)
       ->allow_extra_args(false)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  a.picture.declare(tool);
 }
 
 // Mechanics knows bodies, and where some of them were said: says which file a refused or unsolved model came from.
@@ -250,6 +254,9 @@ public:
     const auto* dynamic = kind<DynamicRun>();
     report_summary(tool_.result(), summary, converged,
                    dynamic != nullptr ? std::optional(dynamic->duration) : std::nullopt);
+    if (given_.picture.out) {
+      draw();
+    }
     if (exported_) {
       exported_->commit();
     }
@@ -300,7 +307,13 @@ private:
         }
         tool_.output(path);
       }
+      if (given_.picture.out) {
+        tool_.output(*given_.picture.out, {".png"});
+      }
+    } else if (given_.picture.out) {
+      throw UsageError("--check and --picture contradict each other: a picture needs a result");
     }
+    picture_ = given_.picture.options(is_modes());
     given_.accuracy.ask(tool_.arguments(), scene_);
     require_fresh();
     name_unloaded();
@@ -453,6 +466,18 @@ private:
     return accuracy_->summary;
   }
 
+  /// The last state, or the first mode.
+  void draw() const {
+    const auto* dynamic = kind<DynamicRun>();
+    ResultPictureOptions options = picture_;
+    options.when = is_modes()           ? "of the first mode (only the shape counts)"
+                   : dynamic != nullptr ? fmt::format("after {:.4g} s", drawn_->first.time)
+                   : drawn_->first.load_factor == 1
+                       ? "under the whole load"
+                       : fmt::format("under {:.4g} times the load", drawn_->first.load_factor);
+    write_file(*given_.picture.out, result_picture(model(), drawn_->first, drawn_->second, options), tool_.force());
+  }
+
   void write_shells(const fs::path& out, const ShellMesh& mesh, bool partial) const {
     PlyOptions options;
     options.comments = {"made by " + tool_.command()};
@@ -506,6 +531,9 @@ private:
     file_->append(state, of_state);
     if (const auto written = exported_ ? exported_->append(state, of_state) : std::nullopt) {
       tool_.wrote(*written);
+    }
+    if (given_.picture.out && (!is_modes() || !drawn_ || drawn_->first.time == 0)) {
+      drawn_.emplace(state, of_state);
     }
     wall_ = of_state.wall;
     unresolved_ = count_unresolved(model(), state, most_bending);
@@ -580,6 +608,8 @@ private:
   std::string space_ = "LPS";                     // of the target, for the shells that are written
   std::optional<Accuracy> accuracy_;
   Drawing drawing_;
+  ResultPictureOptions picture_;
+  std::optional<std::pair<State, ElementFields>> drawn_;  // of the picture
   std::optional<RunJournal> journal_;
   std::optional<ResultFile> file_;
   std::optional<ResultExport> exported_;

@@ -9,27 +9,30 @@
 namespace tunica {
 
 struct PictureOptions {
-  std::string title = {};               ///< empty: none; the largest value is added by error_map_picture
-  std::string caption = {};             ///< a second, smaller line below the title
-  std::string quantity = "distance";    ///< what the colours stand for, above the colour bar
-  std::optional<double> maximum = {};   ///< mm, the top of the colour bar; none: the largest value
-  std::optional<double> diagonal = {};  ///< mm, > 0; gives the colour bar a second scale in percent of it
+  std::string title = {};              ///< what is shown; empty: none
+  std::string caption = {};            ///< a second, smaller line below the title
+  std::string quantity = "Distance";   ///< what the colours stand for, above the colour bar
+  std::string unit = "mm";             ///< of the values
+  std::optional<double> maximum = {};  ///< in that unit, > 0, the top of the colour bar; none: the largest value, up to
+                                       ///< a round number
+  std::optional<double> diagonal = {};  ///< in that unit, > 0; gives the colour bar a second scale in percent of it
   std::vector<std::array<Vec3, 2>> lines =
-      {};  ///< mm, segments on the surface drawn dark, e.g. the edges of the shells
+      {};  ///< mm, segments on the surface drawn dark where there is room between them, e.g. the edges of the shells
+  TriangleMesh others = {};   ///< drawn grey and from outside only: rigid bodies
+  TriangleMesh outline = {};  ///< its outer line is drawn over everything: the unloaded shape
+  std::string outline_name = {};
 };
 
-/// Draws a surface, coloured by a value per vertex, from two opposite sides, with a colour bar. @return a PNG of 1600 x
-/// 900. The longest extent, the direction of view and the arrangement of the two views follow from the principal axes;
-/// the side with the largest value is drawn first, with a ring around that place. The same input gives the same bytes
-/// whatever the number of threads.
-/// @param surface    at least one triangle, finite positions, mm
-/// @param values_mm  #V values >= 0, mm; what is not finite is drawn grey and does not count
+/// Draws a surface, coloured by a value per vertex, from two opposite sides, with a colour bar, a scale of lengths and
+/// a ring around the largest value. @return a PNG of 1600 x 900. The views are along an axis of the frame, a little
+/// from the right and above: the front (-y) and the back (+y) with z upright, unless along another axis the surface
+/// shows larger by a quarter or more. So the same organ has the same views, whatever the values and the mesh. The same
+/// input gives the same bytes whatever the number of threads.
+/// @param surface  at least one triangle, finite positions, mm
+/// @param values   #V values >= 0; what is not finite is drawn grey and does not count. Empty: a plain surface
 /// Cost: 20,000 triangles in about 0.1 s.
-/// Limits: a pocket that neither side shows stays hidden; text other than ASCII is drawn as "?".
-std::string error_map_picture(const TriangleMesh& surface, const std::vector<double>& values_mm,
-                              const PictureOptions& options);
-
-/// The same two views of a plain surface without values: title, caption and lines of `options` are used.
-std::string surface_picture(const TriangleMesh& surface, const PictureOptions& options);
+/// Limits: a pocket that neither side shows stays hidden; the letters are Latin, Greek and Cyrillic ones.
+std::string surface_picture(const TriangleMesh& surface, const std::vector<double>& values,
+                            const PictureOptions& options);
 
 }  // namespace tunica

@@ -25,14 +25,15 @@ double twice_area(const Vec3& a, const Vec3& b, const Vec3& c) {
   return (b.x() - a.x()) * (c.y() - a.y()) - (b.y() - a.y()) * (c.x() - a.x());
 }
 
-ProjectedTriangle project_triangle(const TriangleMesh& mesh, std::size_t triangle, const Camera& camera) {
+ProjectedTriangle project_triangle(const TriangleMesh& mesh, std::size_t triangle, const Camera& camera,
+                                   bool one_sided) {
   ProjectedTriangle projected;
   for (std::size_t i = 0; i < 3; ++i) {
     projected.corner[i] = camera.project(mesh.vertices[mesh.triangles[triangle][i]]);
   }
   // Rows grow downward, so a triangle that faces the viewer turns the other way round.
   projected.area = -twice_area(projected.corner[0], projected.corner[1], projected.corner[2]);
-  projected.seen = projected.area != 0 && std::isfinite(projected.area);
+  projected.seen = (one_sided ? projected.area > 0 : projected.area != 0) && std::isfinite(projected.area);
   return projected;
 }
 
@@ -131,7 +132,7 @@ std::vector<std::array<Vec3, 3>> shading_normals(const TriangleMesh& mesh) {
 }
 
 Raster rasterise(const TriangleMesh& mesh, const std::vector<std::array<Vec3, 3>>& normals,
-                 const std::vector<double>& values, const Camera& camera) {
+                 const std::vector<double>& values, const Camera& camera, std::size_t one_sided_from) {
   TUNICA_ASSERT(camera.width > 0 && camera.height > 0);
   TUNICA_ASSERT(normals.size() == mesh.triangles.size());
   TUNICA_ASSERT(values.empty() || values.size() == mesh.vertices.size());
@@ -149,7 +150,7 @@ Raster rasterise(const TriangleMesh& mesh, const std::vector<std::array<Vec3, 3>
   std::vector<ProjectedTriangle> projected(count);
   parallel_for_blocks(count, 4096, [&](std::size_t begin, std::size_t end) {
     for (std::size_t t = begin; t < end; ++t) {
-      projected[t] = project_triangle(mesh, t, camera);
+      projected[t] = project_triangle(mesh, t, camera, t >= one_sided_from);
     }
   });
   Mat3 to_camera;

@@ -8,27 +8,6 @@
 namespace tunica {
 namespace {
 
-std::string escaped(const std::string& text) {
-  std::string out;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    const auto byte = static_cast<unsigned char>(text[i]);
-    if (byte == '&') {
-      out += "&amp;";
-    } else if (byte == '<') {
-      out += "&lt;";
-    } else if (byte == '>') {
-      out += "&gt;";
-    } else if (byte == '"') {
-      out += "&quot;";
-    } else if (byte < 0x20 || byte == 0x7f) {
-      out += ' ';  // XML knows no control characters
-    } else {
-      out += text[i];
-    }
-  }
-  return out;
-}
-
 // Replaces what is not UTF-8 (file names are any bytes), and U+FFFE, U+FFFF, which XML forbids.
 std::string valid_utf8(const std::string& text) {
   std::string out;
@@ -53,7 +32,37 @@ std::string valid_utf8(const std::string& text) {
 
 }  // namespace
 
-std::string safe(const std::string& text) { return escaped(valid_utf8(text)); }
+std::string printable(const std::string& text) {
+  std::string out = valid_utf8(text);
+  for (char& c : out) {
+    const auto byte = static_cast<unsigned char>(c);
+    c = byte < 0x20 || byte == 0x7f ? ' ' : c;
+  }
+  return out;
+}
+
+std::string safe(const std::string& text) {
+  std::string out;
+  for (const char c : printable(text)) {
+    switch (c) {
+      case '&':
+        out += "&amp;";
+        break;
+      case '<':
+        out += "&lt;";
+        break;
+      case '>':
+        out += "&gt;";
+        break;
+      case '"':
+        out += "&quot;";
+        break;
+      default:
+        out += c;
+    }
+  }
+  return out;
+}
 
 double text_width(const std::string& text, double size) {
   double units = 0;

@@ -20,10 +20,11 @@ BIN = os.path.abspath(os.environ.get("TUNICA_BIN", "build/release/bin"))
 COUNTS = (60, 120, 240, 480, 960)
 RULE = ("--method", "barycentre", "--surface", "comas")  # the paper's patch
 FIT = {"fit, comas patches": ("--surface", "comas"), "fit, watertight patches": ("--surface", "watertight")}
-# Figure, target, the paper's own mesh, shells, a unit that makes a plausible organ of it (percentages do not change).
-FIGURES = ((3, "cylinderHighRes", "cylinderLowRes", 48, "m"),
-           (4, "liverHighRes", "liverLowRes300_iteration1", 1200, "mm"),
-           (5, "aneurysmHighRes", "aneurysm800", 772, "cm"))
+# Figure, target, the paper's own mesh, shells, a unit that makes a plausible organ of it (percentages do not change), the
+# range of both pictures.
+FIGURES = ((3, "cylinderHighRes", "cylinderLowRes", 48, "m", "3%"),
+           (4, "liverHighRes", "liverLowRes300_iteration1", 1200, "mm", "2%"),
+           (5, "aneurysmHighRes", "aneurysm800", 772, "cm", "0.7%"))
 
 
 class Study:
@@ -137,18 +138,18 @@ def rule(study, paper):
 
 
 def maps(study, paper):
-    for figure, target, mesh, shells, unit in FIGURES:
+    for figure, target, mesh, shells, unit, colours in FIGURES:
         for name, file in (("target.obj", target), ("paper.obj", mesh)):
             if os.path.lexists(study.path(name)):
                 os.remove(study.path(name))
             os.symlink(os.path.join(paper, file + ".obj"), study.path(name))
         own = study.run("compare", "paper.obj", "target.obj", "--mesh-unit", unit, "--picture",
-                        os.path.join(study.out, f"figure-{figure}-paper.png"))
+                        os.path.join(study.out, f"figure-{figure}-paper.png"), "--picture-range", colours)
         print(figure, "the paper's mesh", own["result"]["triangles_a"], error_of(own), own["result"]["mean_percent"])
         fit = relaxed(study, "target.obj", "target.obj", "--shells", shells, "--min-angle", 5, out="fit.ply",
                       unit=unit)
         study.run("compare", "fit.ply", "target.obj", "--shell", "--mesh-unit", unit, "--picture",
-                  os.path.join(study.out, f"figure-{figure}-fit.png"))
+                  os.path.join(study.out, f"figure-{figure}-fit.png"), "--picture-range", colours)
         print(figure, "fit", fit["result"]["shells"], error_of(fit), fit["result"]["mean_percent"],
               fit["result"]["min_angle_deg"], fit["study"], flush=True)
 

@@ -38,12 +38,11 @@ SHARED_NOUNS = {"volume": {"surface/mesh/triangle_mesh.hpp", "surface/mesh/measu
 # Header pattern, what it belongs to, and which files may include it.
 OWNERS = [
     (r"CGAL/", "CGAL", r"lib/surface/.*\.cpp"),
-    (r"assimp/", "assimp", r"lib/io/.*\.cpp"),
-    (r"opencv2/", "OpenCV", r"lib/draw/.*\.cpp"),
+    (r"(cairo|ft2build|freetype/)", "cairo", r"lib/draw/.*\.cpp"),
     (r"(hdf5\.h|hdf5_hl\.h|H5\w*\.h|hdf5/)", "HDF5", r"lib/io/.*\.cpp"),
     (r"toml", "toml++", r"lib/io/(.*\.cpp|scene/detail/.*)"),
     (r"tiffio\.h", "libtiff", r"lib/io/.*\.cpp"),
-    (r"png\.h", "libpng", r"lib/(draw|io)/.*\.cpp"),
+    (r"png\.h", "libpng", r"lib/io/.*\.cpp"),
     (r"zlib\.h", "zlib", r"lib/io/.*\.cpp"),
     (r"expat\.h", "Expat", r"lib/io/.*\.cpp"),
     (r"openssl/", "OpenSSL", r"lib/io/.*\.cpp"),

@@ -183,8 +183,8 @@ TEST(ChartSvg, ticks_of_a_narrow_range_differ) {
       const std::string svg = chart_svg(chart_of({{base, 1}, {base * (1 + width), 2}}));
       std::set<std::string> texts;
       std::size_t ticks = 0;
-      for (std::size_t at = svg.find("\"middle\" fill=\"#333333\">"); at != std::string::npos;
-           at = svg.find("\"middle\" fill=\"#333333\">", at + 1)) {
+      const std::string tick = "\"middle\" fill=\"#333333\"";
+      for (std::size_t at = svg.find(tick); at != std::string::npos; at = svg.find(tick, at + 1)) {
         texts.insert(svg.substr(at, svg.find("</text>", at) - at));
         ++ticks;
       }
@@ -199,6 +199,54 @@ TEST(ChartSvg, zeros_have_a_lane_on_a_logarithmic_axis) {
   EXPECT_EQ(count(svg, "class=\"mark\""), 3u);
   EXPECT_THAT(svg, HasSubstr(">0<"));
   EXPECT_THAT(svg, HasSubstr(">100<"));
+}
+
+// Texts of the ticks of the x axis, raised exponents after ^.
+std::vector<std::string> x_ticks(const std::string& svg) {
+  std::vector<std::string> texts;
+  const std::string tick = "\"middle\" fill=\"#333333\"";
+  for (std::size_t at = svg.find(tick); at != std::string::npos; at = svg.find(tick, at + 1)) {
+    std::string text;
+    bool inside = false;
+    for (std::size_t i = svg.find('>', at); i < svg.find("</text>", at); ++i) {
+      if (svg[i] == '<' && svg[i + 1] == 't') {
+        text += '^';
+      }
+      inside = svg[i] == '>' || (inside && svg[i] != '<');
+      if (inside && svg[i] != '>') {
+        text += svg[i];
+      }
+    }
+    texts.push_back(text);
+  }
+  return texts;
+}
+
+TEST(ChartSvg, ticks_of_an_axis_are_written_in_one_way) {
+  EXPECT_EQ(x_ticks(chart_svg(chart_of({{1, 1}, {100'000, 2}}))),
+            (std::vector<std::string>{"1", "10", "100", "1,000", "10,000", "100,000"}));
+  EXPECT_EQ(x_ticks(chart_svg(chart_of({{1e3, 1}, {5e7, 2}}))),
+            (std::vector<std::string>{"10^3", "10^4", "10^5", "10^6", "10^7"}));
+  EXPECT_EQ(x_ticks(chart_svg(chart_of({{0, 1}, {40'000, 2}}))),
+            (std::vector<std::string>{"0", "10,000", "20,000", "30,000", "40,000"}));
+}
+
+TEST(ChartSvg, long_names_and_labels_are_broken_not_cut) {
+  Chart chart = chart_of({{1, 2}, {3, 4}});
+  const std::string words =
+      "one two three four five six seven eight nine ten eleven twelve thirteen fourteen fifteen sixteen";
+  chart.x.label = chart.y.label = chart.series.front().name = chart.title = words;
+  const std::string svg = chart_svg(chart);
+  EXPECT_THAT(svg, Not(HasSubstr("…")));
+  EXPECT_EQ(count(svg, "sixteen<"), 5u);  // one is the <title> of the picture
+}
+
+TEST(ChartSvg, has_colours_for_the_dark) {
+  const std::string svg = chart_svg(chart_of({{1, 2}}));
+  EXPECT_THAT(svg, HasSubstr("@media (prefers-color-scheme:dark)"));
+  // Every colour can change: none stands alone.
+  EXPECT_EQ(count(svg, " fill=\"#"), count(svg, "fill:var("));
+  EXPECT_EQ(count(svg, " stroke=\"#"), count(svg, "stroke:var("));
 }
 
 TEST(ChartSvg, text_is_escaped_and_utf8) {
@@ -255,6 +303,7 @@ TEST(DescribeKey, gives_words_and_units) {
   EXPECT_EQ(describe_key("result.volume_mm3"), "Volume (mm³)");
   EXPECT_EQ(describe_key("peak_mib"), "Peak memory (MiB)");
   EXPECT_EQ(describe_key("result.frequencies_hz.0"), "Frequencies (Hz)");
+  EXPECT_EQ(describe_key("study.setting"), "Setting");
   EXPECT_EQ(describe_key(""), "");
 }
 

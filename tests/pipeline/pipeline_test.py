@@ -94,7 +94,7 @@ class Rules(WithStubs):
         done = self.make(VOLUMES="a.nii.gz", LABEL=3, **LOAD)
         self.assertEqual(done.returncode, 0, done.stderr)
         present = {path.name for path in (self.out / "a" / "3").iterdir() if not path.name.startswith(".")}
-        self.assertLessEqual({"surface.ply", "coarse.ply", "shell.ply", "map.png", "result.hdf", "extract.json",
+        self.assertLessEqual({"surface.ply", "coarse.ply", "shell.ply", "map.png", "result.hdf", "picture.png", "extract.json",
                               "decimate.json", "relax.json", "simulate.json"}, present)
         row = self.summary()["a/3"]
         self.assertEqual((row["stage"], row["exit"], row["message"]), ("simulate", "0", "done"))
@@ -179,6 +179,9 @@ class Rules(WithStubs):
         (self.out / "a" / "1" / "map.png").unlink()
         self.make(**arguments)
         self.assertEqual(self.verbs(), sorted(STAGES[2:]))
+        (self.out / "a" / "1" / "picture.png").unlink()
+        self.make(**arguments)
+        self.assertEqual(self.verbs(), sorted(STAGES[3:]))
 
     def test_failed_case_is_named_and_the_others_go_on(self):
         arguments = dict(VOLUMES="a.nii.gz b.seg.nrrd", LABELS="1 2", **LOAD)
@@ -203,7 +206,7 @@ class Rules(WithStubs):
         self.make(VOLUMES="a.nii.gz", LABEL=1, **LOAD)
         done = self.make(VOLUMES="a.nii.gz", LABEL=1, SHELLS=7, environment={"STUB_FAIL": "decimate/a/1"}, **LOAD)
         self.assertNotEqual(done.returncode, 0)
-        for name in ("coarse.ply", "shell.ply", "map.png", "result.hdf"):
+        for name in ("coarse.ply", "shell.ply", "map.png", "result.hdf", "picture.png"):
             self.assertFalse((self.out / "a" / "1" / name).exists(), name)
         self.assertEqual(self.summary()["a/1"]["stage"], "decimate")
 
@@ -590,6 +593,7 @@ class WholeChain(Pipeline):
             self.assertGreater(report["result"]["max_displacement_mm"], 0)
             self.assertLessEqual(json.loads((folder / "decimate.json").read_text())["result"]["triangles"], 200)
             self.assertGreater((folder / "map.png").stat().st_size, 1000)
+            self.assertGreater((folder / "picture.png").stat().st_size, 1000)
             self.assertEqual((folder / "result.hdf").read_bytes()[:4], b"\x89HDF")
         self.assertIn("<svg", (self.out / "chart.svg").read_text())
 

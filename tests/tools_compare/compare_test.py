@@ -89,6 +89,17 @@ class Compare(WholeTool):
             with open(self.path("map.png"), "rb") as file:
                 self.assertEqual(file.read(8), b"\x89PNG\r\n\x1a\n")
 
+    def test_picture_range(self):
+        pictures = []
+        for range_of_colours in ([], ["--picture-range", "50%"], ["--picture-range", "0.01%"]):
+            self.run_tool("plane.ply", "offset.ply", "--picture", "map.png", *range_of_colours, "--force")
+            with open(self.path("map.png"), "rb") as file:
+                pictures.append(file.read())
+        self.assertEqual(len(set(pictures)), 3)
+        self.run_tool("plane.ply", "offset.ply", "--picture-range", "1%", code=2, says="belongs to --picture")
+        self.run_tool("plane.ply", "offset.ply", "--picture", "a.png", "--picture-range", "1", code=2, says="--picture-range")
+        self.run_tool("plane.ply", "offset.ply", "--picture", "a.png", "--picture-range", "0%", code=2, says="--picture-range")
+
     def test_max(self):
         self.run_tool("plane.ply", "offset.ply", "--max", "0.26mm")
         self.run_tool("plane.ply", "offset.ply", "--max", "5.0001%")

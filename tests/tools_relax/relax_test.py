@@ -345,6 +345,13 @@ class Contract(Case):
         self.relax(self.coarse, self.target, self.out, "--force")
         self.relax(self.coarse, self.target, self.path("no/such/folder.ply"), expect=5)
 
+    def test_picture_range_belongs_to_a_picture(self):
+        self.relax(self.coarse, self.target, self.out, "--picture-range", "1%", expect=2)
+        picture = self.path("map.png")
+        self.relax(self.coarse, self.target, self.out, "--max-iterations", 1, "--picture", picture, "--picture-range", "1%")
+        with open(picture, "rb") as file:
+            self.assertEqual(file.read(8), b"\x89PNG\r\n\x1a\n")
+
     def test_when_a_later_output_fails_no_finished_one_stays(self):
         names = [self.path(name) for name in ("curved.ply", "map.ply", "picture.png")]
         os.mkdir(names[2] + ".part")  # nothing can be written there

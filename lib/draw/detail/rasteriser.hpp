@@ -47,7 +47,9 @@ std::vector<std::array<Vec3, 3>> shading_normals(const TriangleMesh& mesh);
 /// Draws `mesh` as `camera` sees it, by rows in parallel; the result does not depend on the number of threads.
 /// @param normals  #F, of shading_normals()
 /// @param values   empty, or #V
+/// @param one_sided_from  triangles from this on are not there where their back is seen
 Raster rasterise(const TriangleMesh& mesh, const std::vector<std::array<Vec3, 3>>& normals,
-                 const std::vector<double>& values, const Camera& camera);
+                 const std::vector<double>& values, const Camera& camera,
+                 std::size_t one_sided_from = std::numeric_limits<std::size_t>::max());
 
 }  // namespace tunica

@@ -6,7 +6,10 @@
 /// Texts in SVG files: what XML allows, and how much room they take. Texts may hold any bytes.
 namespace tunica {
 
-/// Valid UTF-8 with the signs of XML escaped.
+/// Valid UTF-8 in one line: a question mark for what is none, a blank for a control character.
+std::string printable(const std::string& text);
+
+/// The same with the signs of XML escaped.
 std::string safe(const std::string& text);
 
 /// Pixels, from the widths of a sans-serif font; a little generous, the reader's font is unknown.

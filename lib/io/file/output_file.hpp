@@ -51,7 +51,7 @@ public:
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;
 
-  /// Where a library that opens files by name must write (HDF5, OpenCV).
+  /// Where a library that opens files by name must write (HDF5).
   [[nodiscard]] const std::filesystem::path& partial_path() const { return partial_; }
 
   /// Flushes what stands in partial_path() to the disk and renames it. Errors: OutputError.

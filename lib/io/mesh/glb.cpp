@@ -1,24 +1,19 @@
-// GLB (binary glTF 2.0) through assimp.
-//
-// assimp trusts what it reads, so it never sees the file itself: the scene is checked here, and what was checked (the
-// node tree, the triangles, their positions and indices) is written anew as a small GLB in memory. Materials, images,
-// skins, animations, morphs and references to other files do not reach it.
+// GLB (binary glTF 2.0): the triangles of the scene shown, where its nodes put them. Materials, images, skins,
+// animations, morphs and references to other files are passed over.
 // Source: Khronos, glTF 2.0 specification.
 #include "tunica/core/error.hpp"
 #include "tunica/core/json.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/io/mesh/detail/mesh_formats.hpp"
 
-#include <assimp/postprocess.h>
-#include <assimp/scene.h>
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 
-#include <assimp/Importer.hpp>
+#include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <map>
 
 namespace tunica {
 namespace {
@@ -36,13 +31,6 @@ std::uint32_t word_at(std::string_view bytes, std::size_t at) {
   std::uint32_t value = 0;
   std::memcpy(&value, bytes.data() + at, sizeof value);
   return value;
-}
-
-void append_word(std::string& bytes, std::size_t value) {
-  const auto word = narrow<std::uint32_t>(value);
-  std::array<char, sizeof word> raw;
-  std::memcpy(raw.data(), &word, sizeof word);
-  bytes.append(raw.data(), raw.size());
 }
 
 struct Chunks {
@@ -105,10 +93,17 @@ std::string shallow(std::string_view json, int deepest) {
   return kept;
 }
 
-/// Checks a scene and writes it anew, reduced to triangles.
-class SceneFilter {
+/// Whole numbers or floats that lie in the file, checked: `count` items, one every `stride` bytes.
+struct Items {
+  const char* begin = nullptr;
+  std::size_t count = 0;
+  std::size_t stride = 0;
+};
+
+/// Checks a scene while it reads it.
+class SceneReader {
 public:
-  SceneFilter(const Chunks& chunks, std::size_t file_bytes, const std::string& name)
+  SceneReader(const Chunks& chunks, std::size_t file_bytes, const std::string& name)
       : binary_(chunks.binary), budget_(file_bytes), name_(name) {
     in_ = SortedJson::parse(shallow(chunks.json, max_nesting), nullptr, false);
     if (!in_.is_object()) {
@@ -116,38 +111,16 @@ public:
     }
   }
 
-  /// A GLB of what was checked.
-  std::string filtered() {
+  /// All triangles, in the file's unit.
+  TriangleMesh read() {
     require_no_extensions();
-    out_ = SortedJson{{"asset", {{"version", "2.0"}}}, {"scene", 0}};
-    SortedJson roots = SortedJson::array();
     for (const std::size_t root : root_nodes()) {
-      roots.push_back(add_node(root, 0));
+      add_node(root, Eigen::Affine3d::Identity(), 0);
     }
-    if (out_["meshes"].empty()) {
+    if (mesh_.triangles.empty()) {
       fail("has no triangles");
     }
-    out_["scenes"] = SortedJson::array({{{"nodes", roots}}});
-    // assimp wants the last item of an interleaved view to be as long as the others: zeros follow the data.
-    const std::size_t padded = (binary_.size() + max_stride + 3) / 4 * 4;
-    out_["buffers"] = SortedJson::array({{{"byteLength", padded}}});
-    std::string json = out_.dump();
-    json.resize((json.size() + 3) / 4 * 4, ' ');
-    std::string bytes = "glTF";
-    append_word(bytes, 2);
-    const std::size_t length = 12 + 8 + json.size() + 8 + padded;
-    if (length > 0xffffffff) {
-      fail("is too large for a GLB file");
-    }
-    append_word(bytes, length);
-    append_word(bytes, json.size());
-    append_word(bytes, json_chunk);
-    bytes += json;
-    append_word(bytes, padded);
-    append_word(bytes, binary_chunk);
-    bytes += binary_;
-    bytes.append(padded - binary_.size(), '\0');
-    return bytes;
+    return std::move(mesh_);
   }
 
 private:
@@ -240,58 +213,63 @@ private:
     return roots;
   }
 
-  std::size_t add_node(std::size_t index, std::size_t depth) {
+  void add_node(std::size_t index, const Eigen::Affine3d& parent, std::size_t depth) {
     const SortedJson& node = item("nodes", index);
     if (visited_[index] || depth > max_depth) {
       fail(fmt::format("its nodes are no tree (node {})", index));
     }
     visited_[index] = true;
-    SortedJson copy = SortedJson::object();
-    for (const auto& [key, length] : {std::pair{"matrix", 16}, {"translation", 3}, {"rotation", 4}, {"scale", 3}}) {
-      const auto found = node.find(key);
-      if (found != node.end()) {
-        copy[key] = checked_numbers(*found, key, narrow<std::size_t>(length));
-      }
-    }
+    const Eigen::Affine3d placement = parent * placement_of(node);
     if (node.contains("mesh")) {
-      const std::optional<std::size_t> mesh = add_mesh(required(node, "mesh"));
-      if (mesh) {
-        copy["mesh"] = *mesh;
-      }
+      add_mesh(required(node, "mesh"), placement);
     }
-    SortedJson children = SortedJson::array();
     for (const SortedJson& child : member(node, "children", SortedJson::value_t::array)) {
-      children.push_back(add_node(number_of(child), depth + 1));
+      add_node(number_of(child), placement, depth + 1);
     }
-    if (!children.empty()) {
-      copy["children"] = children;
-    }
-    out_["nodes"].push_back(copy);
-    return out_["nodes"].size() - 1;
   }
 
-  SortedJson checked_numbers(const SortedJson& list, const char* key, std::size_t length) const {
-    if (!list.is_array() || list.size() != length) {
+  [[nodiscard]] Eigen::Affine3d placement_of(const SortedJson& node) const {
+    Eigen::Affine3d placement = Eigen::Affine3d::Identity();
+    if (const auto m = numbers(node, "matrix", 16)) {  // column by column
+      for (int i = 0; i < 12; ++i) {
+        placement(i % 3, i / 3) = (*m)[narrow<std::size_t>(i / 3 * 4 + i % 3)];
+      }
+      return placement;
+    }
+    if (const auto t = numbers(node, "translation", 3)) {
+      placement.translate(Vec3((*t)[0], (*t)[1], (*t)[2]));
+    }
+    if (const auto q = numbers(node, "rotation", 4)) {
+      const Eigen::Quaterniond rotation((*q)[3], (*q)[0], (*q)[1], (*q)[2]);
+      if (!(rotation.norm() > 0)) {
+        fail("the \"rotation\" of a node is zero");
+      }
+      placement.rotate(rotation.normalized());
+    }
+    if (const auto s = numbers(node, "scale", 3)) {
+      placement.scale(Vec3((*s)[0], (*s)[1], (*s)[2]));
+    }
+    return placement;
+  }
+
+  [[nodiscard]] std::optional<std::vector<double>> numbers(const SortedJson& node, const char* key,
+                                                           std::size_t length) const {
+    const auto found = node.find(key);
+    if (found == node.end()) {
+      return {};
+    }
+    std::vector<double> values;
+    for (const SortedJson& value : found->is_array() && found->size() == length ? *found : SortedJson::array()) {
+      values.push_back(value.is_number() ? value.get<double>() : infinity);
+    }
+    if (values.size() != length || !std::ranges::all_of(values, [](double v) { return std::abs(v) <= 1e12; })) {
       fail(fmt::format("\"{}\" of a node needs {} numbers", key, length));
     }
-    for (const SortedJson& value : list) {
-      if (!value.is_number() || !(std::abs(value.get<double>()) <= 1e12)) {
-        fail(fmt::format("\"{}\" of a node needs {} numbers", key, length));
-      }
-    }
-    return list;
+    return values;
   }
 
-  /// The number of the mesh in the output; none when it has no triangles (points, lines). Written once, paid for by
-  /// every node that shows it.
-  std::optional<std::size_t> add_mesh(std::size_t index) {
-    const auto known = meshes_.find(index);
-    if (known != meshes_.end()) {
-      spend(known->second.cost);
-      return known->second.number;
-    }
-    const std::size_t before = budget_;
-    SortedJson primitives = SortedJson::array();
+  /// What is no triangles (points, lines) is passed over.
+  void add_mesh(std::size_t index, const Eigen::Affine3d& placement) {
     for (const SortedJson& primitive : member(item("meshes", index), "primitives", SortedJson::value_t::array)) {
       if (!primitive.is_object()) {
         fail("a primitive in its JSON is no object");
@@ -302,45 +280,66 @@ private:
         fail("triangle strips and fans are not understood: export plain triangles");
       }
       if (mode == 4) {
-        primitives.push_back(checked_primitive(primitive));
+        add_triangles(primitive, placement);
       }
     }
-    std::optional<std::size_t> number;
-    if (!primitives.empty()) {
-      out_["meshes"].push_back({{"primitives", primitives}});
-      number = out_["meshes"].size() - 1;
-    }
-    meshes_[index] = {number, before - budget_};
-    return number;
   }
 
-  SortedJson checked_primitive(const SortedJson& primitive) {
+  void add_triangles(const SortedJson& primitive, const Eigen::Affine3d& placement) {
     const SortedJson& attributes = member(primitive, "attributes", SortedJson::value_t::object);
-    const SortedJson& positions = item("accessors", required(attributes, "POSITION"));
-    if (whole(positions, "componentType", 0) != 5126 || type_of(positions) != "VEC3") {
+    const SortedJson& accessor = item("accessors", required(attributes, "POSITION"));
+    if (whole(accessor, "componentType", 0) != 5126 || type_of(accessor) != "VEC3") {
       fail("its positions are no vectors of floats");
     }
-    const std::size_t vertices = required(positions, "count");
-    spend(vertices);
-    const std::size_t position_accessor = add_accessor(positions, vertices, 12);
-    std::size_t corners = vertices;
-    SortedJson copy = {{"attributes", {{"POSITION", position_accessor}}}, {"mode", 4}};
+    const Items positions = items_of(accessor, 3 * sizeof(float));
+    Items indices{nullptr, positions.count, 0};
+    std::size_t size = 0;
     if (primitive.contains("indices")) {
-      const SortedJson& indices = item("accessors", required(primitive, "indices"));
-      const std::size_t component = whole(indices, "componentType", 0);
-      const std::size_t size = component == 5121 ? 1 : component == 5123 ? 2 : component == 5125 ? 4 : 0;
-      if (size == 0 || type_of(indices) != "SCALAR") {
+      const SortedJson& list = item("accessors", required(primitive, "indices"));
+      const std::size_t component = whole(list, "componentType", 0);
+      size = component == 5121 ? 1 : component == 5123 ? 2 : component == 5125 ? 4 : 0;
+      if (size == 0 || type_of(list) != "SCALAR") {
         fail("its indices are no unsigned whole numbers");
       }
-      corners = required(indices, "count");
-      spend(corners);
-      copy["indices"] = add_accessor(indices, corners, size);
-      check_indices(out_["accessors"].back(), corners, size, vertices);
+      indices = items_of(list, size);
     }
-    if (corners == 0 || corners % 3 != 0) {
-      fail(fmt::format("{} corners are no number of triangles", corners));
+    if (indices.count == 0 || indices.count % 3 != 0) {
+      fail(fmt::format("{} corners are no number of triangles", indices.count));
     }
-    return copy;
+    const std::size_t first = mesh_.vertices.size();
+    if (first + positions.count > max_index) {
+      fail("has more vertices than are understood");
+    }
+    for (std::size_t v = 0; v < positions.count; ++v) {
+      std::array<float, 3> p;
+      std::memcpy(p.data(), positions.begin + v * positions.stride, sizeof p);
+      mesh_.vertices.emplace_back(placement * Vec3(p[0], p[1], p[2]));
+    }
+    const bool mirrored = placement.linear().determinant() < 0;
+    for (std::size_t c = 0; c < indices.count; c += 3) {
+      std::array<Index, 3> triangle;
+      for (std::size_t k = 0; k < 3; ++k) {
+        triangle[k] = narrow<Index>(first + vertex_at(indices, c + k, size, positions.count));
+      }
+      if (mirrored) {
+        std::swap(triangle[1], triangle[2]);
+      }
+      mesh_.triangles.push_back(triangle);
+    }
+  }
+
+  /// @param size  bytes of an index; 0: there are none, the corners are the vertices in their order
+  [[nodiscard]] std::size_t vertex_at(const Items& indices, std::size_t corner, std::size_t size,
+                                      std::size_t vertices) const {
+    if (size == 0) {
+      return corner;
+    }
+    std::uint32_t value = 0;
+    std::memcpy(&value, indices.begin + corner * indices.stride, size);
+    if (value >= vertices) {
+      fail(fmt::format("corner {} names vertex {}, but there are only {} (counted from 0)", corner, value, vertices));
+    }
+    return value;
   }
 
   [[nodiscard]] static std::string type_of(const SortedJson& accessor) {
@@ -356,8 +355,10 @@ private:
     budget_ -= amount;
   }
 
-  /// Copies an accessor and its view when every byte it names is there.
-  std::size_t add_accessor(const SortedJson& accessor, std::size_t count, std::size_t item_bytes) {
+  /// The items of an accessor, when every byte that it names is there.
+  Items items_of(const SortedJson& accessor, std::size_t item_bytes) {
+    const std::size_t count = required(accessor, "count");
+    spend(count);
     if (accessor.contains("sparse") || !accessor.contains("bufferView")) {
       fail("sparse accessors are not understood");
     }
@@ -375,109 +376,23 @@ private:
       fail(fmt::format("is truncated or broken: an accessor of {} items reaches beyond its {} bytes of data", count,
                        binary_.size()));
     }
-    SortedJson view_copy = {{"buffer", 0}, {"byteOffset", view_offset + offset}, {"byteLength", count * stride}};
-    if (stride != item_bytes) {
-      view_copy["byteStride"] = stride;
-    }
-    out_["bufferViews"].push_back(view_copy);
-    out_["accessors"].push_back({{"bufferView", out_["bufferViews"].size() - 1},
-                                 {"componentType", accessor["componentType"]},
-                                 {"count", count},
-                                 {"type", accessor["type"]}});
-    return out_["accessors"].size() - 1;
-  }
-
-  /// assimp drops triangles with a wrong index without a word.
-  void check_indices(const SortedJson& accessor, std::size_t count, std::size_t size, std::size_t vertices) const {
-    const SortedJson& view = out_["bufferViews"][accessor["bufferView"].get<std::size_t>()];
-    const std::size_t stride = view.value("byteStride", size);
-    const char* at = binary_.data() + view["byteOffset"].get<std::size_t>();
-    for (std::size_t i = 0; i < count; ++i) {
-      std::uint32_t value = 0;
-      std::memcpy(&value, at + i * stride, size);
-      if (value >= vertices) {
-        fail(fmt::format("corner {} names vertex {}, but there are only {} (counted from 0)", i, value, vertices));
-      }
-    }
+    return {binary_.data() + view_offset + offset, count, stride};
   }
 
   SortedJson in_;
-  SortedJson out_;
   std::string_view binary_;
   std::size_t budget_;  ///< vertices and corners that may still be read
   std::vector<bool> visited_;
-  struct Written {
-    std::optional<std::size_t> number;
-    std::size_t cost;
-  };
-  std::map<std::size_t, Written> meshes_;  ///< by their number in the file
+  TriangleMesh mesh_;
   const std::string& name_;
 };
-
-Eigen::Matrix4d matrix_of(const aiMatrix4x4& m) {
-  Eigen::Matrix4d result;
-  result << m.a1, m.a2, m.a3, m.a4, m.b1, m.b2, m.b3, m.b4, m.c1, m.c2, m.c3, m.c4, m.d1, m.d2, m.d3, m.d4;
-  return result;
-}
-
-void append_mesh(const aiMesh& mesh, const Eigen::Matrix4d& placement, TriangleMesh& result, const std::string& name) {
-  const auto first = result.vertices.size();
-  if (first + mesh.mNumVertices > max_index) {
-    throw InputError(fmt::format("{}: has more vertices than are understood", name));
-  }
-  for (unsigned v = 0; v < mesh.mNumVertices; ++v) {
-    const aiVector3D& p = mesh.mVertices[v];
-    result.vertices.emplace_back((placement * Eigen::Vector4d(p.x, p.y, p.z, 1)).head<3>());
-  }
-  const bool mirrored = placement.topLeftCorner<3, 3>().determinant() < 0;
-  for (unsigned f = 0; f < mesh.mNumFaces; ++f) {
-    const aiFace& face = mesh.mFaces[f];
-    if (face.mNumIndices != 3) {
-      throw InputError(fmt::format("{}: face {} has {} corners, 3 are expected", name, f, face.mNumIndices));
-    }
-    std::array<Index, 3> triangle;
-    for (unsigned corner = 0; corner < 3; ++corner) {
-      if (face.mIndices[corner] >= mesh.mNumVertices) {
-        throw InputError(fmt::format("{}: face {} names vertex {}, but there are only {}", name, f,
-                                     face.mIndices[corner], mesh.mNumVertices));
-      }
-      triangle[corner] = narrow<Index>(first + face.mIndices[corner]);
-    }
-    if (mirrored) {
-      std::swap(triangle[1], triangle[2]);
-    }
-    result.triangles.push_back(triangle);
-  }
-}
-
-void append_node(const aiScene& scene, const aiNode& node, const Eigen::Matrix4d& parent, TriangleMesh& result,
-                 const std::string& name) {
-  const Eigen::Matrix4d placement = parent * matrix_of(node.mTransformation);
-  for (unsigned m = 0; m < node.mNumMeshes; ++m) {
-    append_mesh(*scene.mMeshes[node.mMeshes[m]], placement, result, name);
-  }
-  for (unsigned c = 0; c < node.mNumChildren; ++c) {
-    append_node(scene, *node.mChildren[c], placement, result, name);
-  }
-}
 
 }  // namespace
 
 MeshFile read_glb(std::string_view bytes, const std::string& name) {
-  const std::string checked = SceneFilter(split_chunks(bytes, name), bytes.size(), name).filtered();
   MeshFile file;
   file.units.emplace("m");
-  Assimp::Importer importer;
-  const aiScene* scene = nullptr;
-  try {
-    scene = importer.ReadFileFromMemory(checked.data(), checked.size(), 0, "glb");
-  } catch (const std::exception& error) {
-    throw InputError(fmt::format("{}: cannot be read as GLB: {}", name, error.what()));
-  }
-  if (scene == nullptr || scene->mRootNode == nullptr) {
-    throw InputError(fmt::format("{}: cannot be read as GLB: {}", name, importer.GetErrorString()));
-  }
-  append_node(*scene, *scene->mRootNode, Eigen::Matrix4d::Identity(), file.mesh, name);
+  file.mesh = SceneReader(split_chunks(bytes, name), bytes.size(), name).read();
   weld_exactly(file.mesh);
   return file;
 }

@@ -1,9 +1,8 @@
 // Which reader takes a file, and what holds for a mesh whatever its format.
 //
-// PLY, OBJ, OFF and STL have readers of their own: assimp 5.2 keeps coordinates as floats, hangs or crashes on cut PLY
-// files and drops their further properties, and takes OBJ apart into single triangles. GLB, whose coordinates are
-// floats anyway, goes through assimp (see glb.cpp). The some 40 other formats assimp knows stay closed: every one is a
-// parser that would meet hostile files unguarded.
+// Every format has a reader of its own: assimp 5.2 keeps coordinates as floats, hangs or crashes on cut PLY files and
+// drops their further properties, takes OBJ apart into single triangles, and trusts what GLB files say of themselves,
+// as tinygltf does.
 #include "tunica/io/mesh/mesh_file.hpp"
 
 #include "tunica/core/error.hpp"

@@ -386,7 +386,7 @@ std::string describe_key(const std::string& key) {
   bool distance = false;
   for (std::size_t i = 0; i < parts.size(); ++i) {
     std::string part = parts[i];
-    if (i + 1 < parts.size() && (part == "result" || part == "iterations" || part == "probes")) {
+    if (i + 1 < parts.size() && (part == "result" || part == "iterations" || part == "probes" || part == "study")) {
       continue;
     }
     if (part == "*" || (!part.empty() && part.find_first_not_of("0123456789-") == std::string::npos)) {

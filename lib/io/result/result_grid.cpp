@@ -3,6 +3,7 @@
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/mechanics/runs/curved_displacement.hpp"
+#include "tunica/shell/patch/patch_edges.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -271,6 +272,41 @@ void ResultGrid::add_solid_values(const State& state, const ElementFields& field
     add_node_means(mesh, stress.first(mesh.tetrahedra.size()), values[2]);
     stress = stress.subspan(mesh.tetrahedra.size());
   }
+}
+
+Floats ResultGrid::at_points(const std::vector<double>& of_nodes) const {
+  TUNICA_ASSERT(of_nodes.size() == model_.node_count());
+  Floats values;
+  for (std::size_t b = 0; b < bodies_.size(); ++b) {
+    const Body& body = bodies_[b];
+    const auto& triangles = model_.shells[b].mesh.triangles;
+    add_means(
+        body,
+        [&](std::size_t v) {
+          return between(triangles[body.surface.vertex_shell[v]], body.surface.barycentric[v],
+                         of_nodes.data() + model_.first_node(b));
+        },
+        values);
+  }
+  for (std::size_t s = 0; s < model_.solids.size(); ++s) {
+    const std::size_t first = model_.first_node(model_.shells.size() + s);
+    for (std::size_t v = 0; v < model_.solids[s].mesh.vertices.size(); ++v) {
+      add(values, of_nodes[first + v]);
+    }
+  }
+  return values;
+}
+
+std::vector<std::array<std::size_t, 2>> ResultGrid::shell_edges() const {
+  std::vector<std::array<std::size_t, 2>> edges;
+  std::size_t first = 0;
+  for (const Body& body : bodies_) {
+    for (const auto& [from, to] : patch_edges(body.surface)) {
+      edges.push_back({first + body.point[from], first + body.point[to]});
+    }
+    first += body.points;
+  }
+  return edges;
 }
 
 std::vector<std::vector<float>> ResultGrid::element_values(const ElementFields& fields) const {

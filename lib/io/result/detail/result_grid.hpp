@@ -55,6 +55,10 @@ public:
   /// Fields of a state, first those of the points; the values in the same order.
   [[nodiscard]] const std::vector<GridField>& layout() const { return layout_; }
   [[nodiscard]] std::vector<std::vector<float>> values(const State& state, const ElementFields& fields) const;
+  /// At the points, of what is known at the nodes of all bodies: linear within the shells.
+  [[nodiscard]] Floats at_points(const std::vector<double>& of_nodes) const;
+  /// Points at both ends of the pieces into which the edges of the shells are cut, once or twice each.
+  [[nodiscard]] std::vector<std::array<std::size_t, 2>> shell_edges() const;
   /// The fields of cells alone, each only of what has it: #elements() x components, #tetrahedra() of tetrahedra.
   [[nodiscard]] std::vector<std::vector<float>> element_values(const ElementFields& fields) const;
 

@@ -1,0 +1,30 @@
+#pragma once
+
+#include "tunica/draw/detail/rasteriser.hpp"
+
+#include <array>
+#include <span>
+
+/// From where a surface is looked at.
+namespace tunica {
+
+/// Pixels, y downward.
+struct Box2 {
+  double left = 0, top = 0, right = 0, bottom = 0;
+  [[nodiscard]] double width() const { return right - left; }
+  [[nodiscard]] double height() const { return bottom - top; }
+};
+
+/// A camera that fills its part of the picture.
+struct View {
+  Camera camera;
+  Box2 panel;
+};
+
+/// Two views from opposite sides in the box: beside or above each other, along y, x or z, whichever draws the points
+/// largest; y counts a quarter more than x, and that more than z.
+/// @param points        mm, at least one
+/// @param oversampling  pixels of the cameras per pixel of the box
+std::array<View, 2> opposite_views(std::span<const Vec3> points, const Box2& box, int oversampling);
+
+}  // namespace tunica

@@ -1,0 +1,87 @@
+#include "tunica/draw/detail/view.hpp"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace tunica {
+namespace {
+
+constexpr double gap = 30;  // pixels
+
+struct Side {
+  Vec3 towards, up;
+  double worth;
+};
+// Along y with z upright a patient is seen from the front and the back.
+const std::array<Side, 3> sides{Side{-Vec3::UnitY(), Vec3::UnitZ(), 1}, Side{Vec3::UnitX(), Vec3::UnitZ(), 0.8},
+                                Side{Vec3::UnitZ(), -Vec3::UnitY(), 0.7}};
+
+// Looks at the side `towards`, turned a little to the right and raised, so that depth can be seen.
+Camera camera_at(const Vec3& up, const Vec3& towards) {
+  constexpr double degree = std::numbers::pi / 180;
+  constexpr double turn = 22 * degree;
+  constexpr double raise = 14 * degree;
+  const Vec3 turned = std::cos(turn) * towards + std::sin(turn) * up.cross(towards);
+  Camera camera;
+  camera.towards = std::cos(raise) * turned + std::sin(raise) * up;
+  camera.right = up.cross(turned);
+  camera.up = camera.towards.cross(camera.right);
+  return camera;
+}
+
+// Centres the camera on what it sees and returns the extent in mm.
+Vec2 centre_camera(Camera& camera, std::span<const Vec3> points) {
+  Vec3 lower = Vec3::Constant(infinity);
+  Vec3 upper = -lower;
+  for (const Vec3& p : points) {
+    const Vec3 seen(camera.right.dot(p), camera.up.dot(p), camera.towards.dot(p));
+    lower = lower.cwiseMin(seen);
+    upper = upper.cwiseMax(seen);
+  }
+  const Vec3 middle = 0.5 * (lower + upper);
+  camera.centre = middle.x() * camera.right + middle.y() * camera.up + middle.z() * camera.towards;
+  return (upper - lower).head<2>();
+}
+
+}  // namespace
+
+std::array<View, 2> opposite_views(std::span<const Vec3> points, const Box2& box, int oversampling) {
+  std::array<View, 2> best;
+  double best_score = -1;
+  for (const Side& side : sides) {
+    for (const bool beside : {true, false}) {
+      const double width = beside ? (box.width() - gap) / 2 : box.width();
+      const double height = beside ? box.height() : (box.height() - gap) / 2;
+      std::array<View, 2> views;
+      double scale = infinity;
+      for (const int i : {0, 1}) {
+        View& view = views[i];
+        view.panel.left = box.left + (beside ? i * (width + gap) : 0);
+        view.panel.top = box.top + (beside ? 0 : i * (height + gap));
+        view.panel.right = view.panel.left + width;
+        view.panel.bottom = view.panel.top + height;
+        view.camera = camera_at(side.up, i == 0 ? side.towards : Vec3(-side.towards));
+        const Vec2 extent = centre_camera(view.camera, points);
+        scale = std::min({scale, width / extent.x(), height / extent.y()});
+      }
+      if (!std::isfinite(scale)) {
+        scale = 1;
+      }
+      for (View& view : views) {
+        view.camera.scale = 0.96 * scale * oversampling;
+        view.camera.width = truncated<int>(std::round(view.panel.width())) * oversampling;
+        view.camera.height = truncated<int>(std::round(view.panel.height())) * oversampling;
+      }
+      if (scale * side.worth > best_score) {
+        best_score = scale * side.worth;
+        best = views;
+      }
+    }
+  }
+  return best;
+}
+
+}  // namespace tunica

@@ -1,0 +1,129 @@
+"""The picture of a result: what it shows, what it refuses."""
+import json
+import os
+import unittest
+
+import numpy as np
+from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkIOImage import vtkPNGReader
+
+from contact_scenes import block, contact, lengths, write_vtk
+from contact_scenes_more import held, solid
+from support import SimulateTest, grid, sphere, write_ply
+
+RADIUS = 10
+BALL = ["ball.ply", "out.hdf", "--young", "1MPa", "--poisson", "0.3", "--thickness", "0.5mm", "--pressure", "1kPa",
+        "--fix", "rigid-motions", "--static"]
+STRESS = 1e-3 * RADIUS / (2 * 0.5)  # MPa, p R / 2 t
+SAND, ORANGE, VIOLET = (243, 235, 219), (243, 122, 93), (88, 27, 110)  # of the colour bar: 0, half, all of the range
+VIEW = slice(180, 760), slice(60, 1290)
+GREY = (150, 163, 178)
+
+
+class Picture(SimulateTest):
+    def setUp(self):
+        super().setUp()
+        write_ply(self.path("ball.ply"), *sphere(2, RADIUS))
+
+    def pixels(self, name="out.png"):
+        reader = vtkPNGReader()
+        reader.SetFileName(self.path(name))
+        reader.Update()
+        image = reader.GetOutput()
+        width, height, _ = image.GetDimensions()
+        return vtk_to_numpy(image.GetPointData().GetScalars()).reshape(height, width, -1)[::-1].astype(float)
+
+    def part_near(self, colour, within=12):
+        """Part of the surface with the hue of a colour: light scales all three channels."""
+        pixels = self.pixels()[VIEW].reshape(-1, 3)
+        pixels = pixels[(pixels.min(axis=1) < 230) & (pixels.max(axis=1) > 60)]
+        light = pixels @ np.array(colour) / np.dot(colour, colour)
+        near = np.abs(pixels - light[:, None] * np.array(colour)).max(axis=1) < within
+        return near.mean()
+
+    def test_a_ball_has_the_colour_of_its_stress(self):
+        report = self.run_tool(*BALL, "--picture", "out.png", "--picture-range", f"{2 * STRESS}MPa")
+        self.assertEqual(self.pixels().shape, (900, 1600, 3))
+        self.assertGreater(self.part_near(ORANGE, 25), 0.8)
+        self.assertIn("out.png", json.dumps(report["outputs"]))
+        self.run_tool(*BALL, "--picture", "out.png", "--picture-range", f"{0.5 * STRESS}MPa", "--force")
+        self.assertGreater(self.part_near(VIOLET), 0.8)
+        self.run_tool(*BALL, "--picture", "out.png", "--picture-range", "1GPa", "--force")
+        self.assertGreater(self.part_near(SAND), 0.8)
+
+    def test_displacement_and_strain_have_their_units(self):
+        """u = p R^2 (1 - nu) / (2 E t), e = u / R."""
+        strain = 0.7 * STRESS
+        for colour, half in (("displacement", f"{2 * strain * RADIUS}mm"), ("strain", f"{200 * strain}%")):
+            self.run_tool(*BALL, "--picture", "out.png", "--colour", colour, "--picture-range", half, "--force")
+            self.assertGreater(self.part_near(ORANGE, 30), 0.8, colour)
+
+    def test_same_bytes_with_any_number_of_threads(self):
+        for threads in ("1", "2"):
+            self.run_tool(*BALL, "--picture", f"{threads}.png", "--threads", threads, "--force")
+        with open(self.path("1.png"), "rb") as one, open(self.path("2.png"), "rb") as two:
+            self.assertEqual(one.read(), two.read())
+        self.assertFalse([name for name in os.listdir(self.folder) if name.endswith(".part")])
+
+    def test_magnified_displacements_are_drawn_larger(self):
+        write_ply(self.path("strip.ply"), *grid(20, 2, 10, 1))
+        arguments = ["strip.ply", "out.hdf", "--young", "100MPa", "--poisson", "0.3", "--thickness", "0.1mm",
+                     "--pressure", "2Pa", "--fix", "below x=0mm", "--static", "--picture", "out.png", "--force"]
+        heights = []
+        for factor in ("1", "20"):
+            self.run_tool(*arguments, "--magnify", factor)
+            rows = np.where((self.pixels()[VIEW].min(axis=2) < 250).any(axis=1))[0]
+            heights.append(rows.size)
+        self.assertGreater(heights[1], 1.3 * heights[0])
+
+    def test_a_solid_on_a_rigid_ball(self):
+        points, tetrahedra = block(2, np.array([10.0, 10.0, 5.0]), np.array([-5.0, -5.0, 0.01]))
+        write_vtk(self.path("block.vtk"), points, tetrahedra)
+        top = np.where(points[:, 2] > 5)[0]
+        self.write("scene.toml", "[run]\nkind = \"static\"\n" + solid("b", "block.vtk", 1.0, 0.3) +
+                   held("b", top, "xyz", (0, 0, -0.3)) + "[[rigid]]\nname = \"p\"\nshape = \"sphere\"\n"
+                   f"centre = {lengths(0, 0, -6)}\nradius = \"6mm\"\n" + contact("b", "p"))
+        for colour in ("stress", "displacement", "strain"):
+            self.run_tool("--scene", "scene.toml", "out.hdf", "--picture", "out.png", "--colour", colour, "--force")
+            self.assertGreater(self.part_near(GREY), 0.1, "no rigid ball")
+            self.assertLess(self.part_near(GREY), 0.8, "no solid")
+
+    def test_the_first_mode_has_a_shape(self):
+        write_ply(self.path("plate.ply"), *grid(8, 8, 10, 10))
+        self.write("scene.toml", "[run]\nkind = \"frequencies\"\ncount = 2\n[[shell]]\nname = \"s\"\nmesh = \"plate.ply\"\n"
+                   "thickness = \"0.05mm\"\nyoung = \"1GPa\"\npoisson = 0.3\ndensity = \"1000kg/m3\"\n"
+                   "[[fix]]\nbody = \"s\"\nwhere = {boundary = true}\ntranslation = \"xyz\"\nrotation = \"\"\n")
+        self.run_tool("--scene", "scene.toml", "out.hdf", "--picture", "out.png", "--magnify", "10")
+        # 1 % of the side in the middle, nothing at the rim: all colours of the bar.
+        self.assertGreater(self.part_near(SAND), 0.02)
+        self.assertGreater(self.part_near(VIOLET), 0.02)
+        self.run_tool("--scene", "scene.toml", "out.hdf", "--picture", "out.png", "--colour", "stress", "--force",
+                      expect=2)
+        self.assertIn("no stress", self.done.stderr)
+
+    def test_what_is_refused(self):
+        def refused(message, *arguments, expect=2):
+            self.run_tool(*BALL, *arguments, expect=expect)
+            self.assertIn(message, self.done.stderr)
+            self.assertFalse({"out.png", "out.hdf", "out.png.part"} & set(os.listdir(self.folder)))
+
+        refused("did you mean 'stress'?", "--picture", "out.png", "--colour", "stres")
+        refused("--colour belongs to --picture", "--colour", "strain")
+        refused("--magnify belongs to --picture", "--magnify", "2")
+        refused("--picture-range belongs to --picture", "--picture-range", "1kPa")
+        refused("'0' is not a number above zero", "--picture", "out.png", "--magnify", "0")
+        refused("--picture-range: ", "--picture", "out.png", "--picture-range", "3mm")
+        refused("is not above zero", "--picture", "out.png", "--picture-range", "0kPa")
+        refused("contradict each other: a picture needs a result", "--picture", "out.png", "--check")
+        refused(".png", "--picture", "out.jpg")
+        self.write("there.png", "")
+        refused("exists", "--picture", "there.png", expect=5)
+
+    def test_a_run_that_fails_leaves_no_picture(self):
+        self.run_tool("ball.ply", "out.hdf", "--young", "1kPa", "--poisson", "0.3", "--thickness", "0.05mm",
+                      "--pressure", "1MPa", "--fix", "rigid-motions", "--static", "--picture", "out.png", expect=4)
+        self.assertFalse({"out.png", "out.png.part"} & set(os.listdir(self.folder)))
+
+
+if __name__ == "__main__":
+    unittest.main()
