@@ -24,7 +24,9 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <iterator>
 #include <numbers>
 
 namespace tunica {
@@ -67,8 +69,9 @@ void declare(cli::Tool& tool, Arguments& a) {
       ->type_name("N");
   app.add_option("--unloaded", a.unloaded, "with --imaged-at: the shells without that pressure")->type_name("OUT.ply");
   app.add_option("--export", a.exports,
-                 "write beside OUT.hdf, may repeat: pvd (OUT.pvd with a .vtu per state) | xmf (OUT.xmf, XDMF)")
-      ->type_name("pvd|xmf")
+                 "write beside OUT.hdf, may repeat: pvd (OUT.pvd with a .vtu per state) | xmf (OUT.xmf, XDMF) | "
+                 "inp (the model for CalculiX and Abaqus) | feb (the model for FEBio)")
+      ->type_name("pvd|xmf|inp|feb")
       ->expected(1)
       ->allow_extra_args(false)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
@@ -158,16 +161,20 @@ Scene read_scene_of_run(cli::Tool& tool, const Arguments& a, const std::optional
 }
 
 struct Drawing {
-  std::string tessellation = "default";
-  bool pvd = false;
-  bool xmf = false;
+  static constexpr std::array<const char*, 4> formats{"pvd", "xmf", "inp", "feb"};
 
+  std::string tessellation = "default";
+  std::array<bool, formats.size()> wanted{};
+
+  [[nodiscard]] bool has(std::string_view format) const {
+    return wanted[std::ranges::find(formats, format) - formats.begin()];
+  }
+  [[nodiscard]] bool any() const { return std::ranges::find(wanted, true) != wanted.end(); }
   [[nodiscard]] std::vector<std::pair<std::string, std::string>> as_options() const {
+    std::vector<std::string_view> names;
+    std::ranges::copy_if(formats, std::back_inserter(names), [&](std::string_view name) { return has(name); });
     return {{"--tessellation", tessellation},
-            {"--export", pvd && xmf ? "pvd, xmf"
-                         : pvd      ? "pvd"
-                         : xmf      ? "xmf"
-                                    : "nothing"}};
+            {"--export", names.empty() ? "nothing" : fmt::format("{}", fmt::join(names, ", "))}};
   }
   [[nodiscard]] int level() const { return tessellation == "default" ? 0 : std::stoi(tessellation); }
 };
@@ -179,10 +186,11 @@ Drawing drawing_of_flags(const Arguments& a) {
     drawing.tessellation = std::to_string(*pieces);
   }
   for (const std::string& format : a.exports) {
-    if (format != "pvd" && format != "xmf") {
-      throw UsageError(fmt::format("--export: '{}' is not one of pvd, xmf", format));
+    const auto* const found = std::ranges::find(Drawing::formats, format);
+    if (found == Drawing::formats.end()) {
+      throw UsageError(fmt::format("--export: '{}' is not one of {}", format, fmt::join(Drawing::formats, ", ")));
     }
-    (format == "pvd" ? drawing.pvd : drawing.xmf) = true;
+    drawing.wanted[found - Drawing::formats.begin()] = true;
   }
   return drawing;
 }
@@ -195,8 +203,8 @@ Drawing drawing_of_run(const Arguments& a, const RunIdentity& before) {
       drawing.tessellation = value;
     }
     if (flag == "--export" && a.exports.empty()) {
-      drawing.pvd = value.find("pvd") != std::string::npos;
-      drawing.xmf = value.find("xmf") != std::string::npos;
+      std::ranges::transform(Drawing::formats, drawing.wanted.begin(),
+                             [&](const char* name) { return value.find(name) != std::string::npos; });
     }
   }
   return drawing;
@@ -289,7 +297,15 @@ private:
 
   [[nodiscard]] ExportOptions exports() const {
     // A run that goes on replaces what it has exported itself.
-    return {drawing_.pvd, drawing_.xmf, is_series(), drawing_.level(), tool_.force() || !given_.resume.empty()};
+    return {.pvd = drawing_.has("pvd"),
+            .xmf = drawing_.has("xmf"),
+            .inp = drawing_.has("inp"),
+            .feb = drawing_.has("feb"),
+            .run = scene_.run,
+            .made_by = journal_ ? journal_->identity().command : tool_.command(),
+            .series = is_series(),
+            .tessellation = drawing_.level(),
+            .overwrite = tool_.force() || !given_.resume.empty()};
   }
 
   void read() {
@@ -518,7 +534,7 @@ private:
                   ResultOptions{is_series(), time_units, origin.command, origin.scene,
                                 accuracy_ ? tool_.result()["accuracy"].dump(1) : "", origin.inputs, drawing_.level(),
                                 tool_.force()});
-    if (drawing_.pvd || drawing_.xmf) {
+    if (drawing_.any()) {
       exported_.emplace(out_, model(), exports());
     }
     fields_.emplace(model());

@@ -4,6 +4,7 @@
 #include "tunica/io/file/output_file.hpp"
 #include "tunica/io/result/detail/result_grid.hpp"
 #include "tunica/io/result/detail/vtu_file.hpp"
+#include "tunica/io/result/model_deck.hpp"
 
 #include <fmt/format.h>
 
@@ -63,18 +64,21 @@ std::string attribute(const GridField& field, const std::string& data) {
 
 std::vector<fs::path> export_paths(const fs::path& result, const ExportOptions& options) {
   std::vector<fs::path> paths;
-  if (options.pvd) {
-    paths.push_back(beside(result, ".pvd"));
-  }
-  if (options.xmf) {
-    paths.push_back(beside(result, ".xmf"));
+  for (const auto& [wanted, ending] : {std::pair(options.pvd, ".pvd"), std::pair(options.xmf, ".xmf"),
+                                       std::pair(options.inp, ".inp"), std::pair(options.feb, ".feb")}) {
+    if (wanted) {
+      paths.push_back(beside(result, ending));
+    }
   }
   return paths;
 }
 
 struct ResultExport::Implementation {
-  Implementation(fs::path path, const Model& model, const ExportOptions& wanted)
-      : result(std::move(path)), options(wanted), grid(model, wanted.tessellation) {
+  Implementation(fs::path path, const Model& of, const ExportOptions& wanted)
+      : model(of), result(std::move(path)), options(wanted), grid(of, wanted.tessellation) {
+    for (const Deck deck : decks()) {
+      require_expressible(model, options.run, deck);
+    }
     for (const fs::path& file : export_paths(result, options)) {
       require_writable(file, options.overwrite);
     }
@@ -243,6 +247,25 @@ struct ResultExport::Implementation {
     }
   }
 
+  [[nodiscard]] std::vector<Deck> decks() const {
+    std::vector<Deck> wanted;
+    if (options.inp) {
+      wanted.push_back(Deck::inp);
+    }
+    if (options.feb) {
+      wanted.push_back(Deck::feb);
+    }
+    return wanted;
+  }
+
+  void write_decks() const {
+    for (const Deck deck : decks()) {
+      write_file(beside(result, deck == Deck::inp ? ".inp" : ".feb"),
+                 deck_text(model, options.run, deck, options.made_by), options.overwrite);
+    }
+  }
+
+  const Model& model;
   fs::path result;
   ExportOptions options;
   ResultGrid grid;
@@ -270,6 +293,7 @@ std::optional<fs::path> ResultExport::append(const State& state, const ElementFi
 
 void ResultExport::commit() {
   implementation_->write("", implementation_->options.overwrite);
+  implementation_->write_decks();
   for (const fs::path& file : export_paths(implementation_->result, implementation_->options)) {
     fs::path old = file;
     std::error_code ignored;

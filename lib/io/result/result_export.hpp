@@ -6,15 +6,20 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 namespace tunica {
 
 struct ExportOptions {
-  bool pvd = false;      ///< STEM.pvd and one STEM_0000.vtu per state
-  bool xmf = false;      ///< STEM.xmf, which refers to the result file
-  bool series = false;   ///< as ResultOptions
-  int tessellation = 0;  ///< as ResultOptions
+  bool pvd = false;          ///< STEM.pvd and one STEM_0000.vtu per state
+  bool xmf = false;          ///< STEM.xmf, which refers to the result file
+  bool inp = false;          ///< STEM.inp: the model for CalculiX and Abaqus, see model_deck.hpp
+  bool feb = false;          ///< STEM.feb: the model for FEBio
+  RunSettings run = {};      ///< of the model that inp and feb hold
+  std::string made_by = {};  ///< provenance
+  bool series = false;       ///< as ResultOptions
+  int tessellation = 0;      ///< as ResultOptions
   bool overwrite = false;
 };
 
@@ -22,10 +27,11 @@ struct ExportOptions {
 /// OUT.xmf. A .vtu is whole when append() returns. What refers to them comes with commit(); a run that does not get
 /// there leaves OUT.pvd.part (and OUT.xmf.part, which refers to OUT.hdf.part) with the states so far.
 /// Limits: .xmf (XDMF 2) shows what /VTKHDF holds: of a static run the last state. Shells and solids are grids of their
-/// own in it, over the same points.
+/// own in it, over the same points. The models (.inp, .feb) are written by commit() alone.
 class ResultExport {
 public:
-  /// `model` must outlive this. Errors: OutputError, also when a .vtu is there already and `overwrite` is false.
+  /// `model` must outlive this. Errors: OutputError, also when a .vtu is there already and `overwrite` is false;
+  /// UsageError where a model cannot be expressed.
   ResultExport(const std::filesystem::path& result, const Model& model, const ExportOptions& options);
   ~ResultExport();
   ResultExport(const ResultExport&) = delete;
