@@ -6,7 +6,7 @@ foreach(room ${rooms})
   list(APPEND libraries tunica_${room})
   set_target_properties(tunica_${room} PROPERTIES EXPORT_NAME ${room})
 endforeach()
-install(TARGETS ${libraries} tunica_cholmod tunica_cairo EXPORT tunicaTargets ARCHIVE DESTINATION lib)
+install(TARGETS ${libraries} tunica_cholmod tunica_cairo tunica_opencv EXPORT tunicaTargets ARCHIVE DESTINATION lib)
 install(EXPORT tunicaTargets NAMESPACE tunica:: DESTINATION ${package})
 install(DIRECTORY lib/ DESTINATION include/tunica FILES_MATCHING PATTERN "*.hpp" PATTERN detail EXCLUDE
         PATTERN cli EXCLUDE PATTERN report EXCLUDE)
