@@ -12,7 +12,7 @@
 namespace tunica {
 namespace {
 
-constexpr int gap = 4;             // pixels between panels
+constexpr int panel_gap = 4;       // pixels between panels
 constexpr int sub_pixel_bits = 4;  // of cv::line: sixteenths of a pixel
 
 // The colour of a sample, red, green, blue: what is selected keeps its grey, tinted.
@@ -60,18 +60,18 @@ std::string slice_sheet(const std::vector<SlicePanel>& panels, int columns, int 
   }
   const int count = narrow<int>(panels.size());
   const int rows = (count + columns - 1) / columns;
-  const int width = columns * (pixels + gap) - gap;
-  const int height = rows * (pixels + gap) - gap;
+  const int width = columns * (pixels + panel_gap) - panel_gap;
+  const int height = rows * (pixels + panel_gap) - panel_gap;
   cv::Mat sheet(height, width, CV_8UC3, cv::Scalar::all(16));
   for (int i = 0; i < count; ++i) {
-    const cv::Rect place((i % columns) * (pixels + gap), (i / columns) * (pixels + gap), pixels, pixels);
+    const cv::Rect place((i % columns) * (pixels + panel_gap), (i / columns) * (pixels + panel_gap), pixels, pixels);
     draw_panel(sheet(place), panels[narrow<std::size_t>(i)], pixels / longest);
   }
   std::vector<unsigned char> bytes;
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
       const auto& colour = sheet.at<cv::Vec3b>(y, x);
-      const bool between = x % (pixels + gap) >= pixels || y % (pixels + gap) >= pixels;
+      const bool between = x % (pixels + panel_gap) >= pixels || y % (pixels + panel_gap) >= pixels;
       bytes.insert(bytes.end(), {colour[0], colour[1], colour[2], static_cast<unsigned char>(between ? 0 : 255)});
     }
   }

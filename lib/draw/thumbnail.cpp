@@ -30,12 +30,12 @@ constexpr std::array<std::array<double, 3>, 9> viridis{{{68, 1, 84},
                                                         {253, 231, 37}}};
 constexpr double lift = 0.15;
 
-using Colour = std::array<double, 3>;
+using Rgb = std::array<double, 3>;
 
-Colour colour_at(double part) {
+Rgb colour_at(double part) {
   const double place = std::clamp(part, 0.0, 1.0) * real(viridis.size() - 1);
   const auto below = std::min(truncated<std::size_t>(place), viridis.size() - 2);
-  Colour colour{};
+  Rgb colour{};
   for (std::size_t c = 0; c < 3; ++c) {
     const double value = viridis[below][c] + (place - real(below)) * (viridis[below + 1][c] - viridis[below][c]);
     colour[c] = value + lift * (255 - value);
@@ -65,9 +65,9 @@ Camera camera_for(const TriangleMesh& mesh, int width, int height) {
   return camera;
 }
 
-// Colour and cover of a pixel of the finished picture: the mean over its part of the raster.
+// Rgb and cover of a pixel of the finished picture: the mean over its part of the raster.
 std::array<unsigned char, 4> pixel_at(const Raster& raster, int x, int y, double top) {
-  Colour sum{};
+  Rgb sum{};
   int covered = 0;
   for (int dy = 0; dy < thumbnail_oversampling; ++dy) {
     for (int dx = 0; dx < thumbnail_oversampling; ++dx) {
@@ -76,7 +76,7 @@ std::array<unsigned char, 4> pixel_at(const Raster& raster, int x, int y, double
         continue;
       }
       const bool plain = !(top > 0) || !std::isfinite(raster.value[at]);
-      const Colour colour = plain ? Colour{196, 200, 206} : colour_at(raster.value[at] / top);
+      const Rgb colour = plain ? Rgb{196, 200, 206} : colour_at(raster.value[at] / top);
       const double light = (0.46 + 0.58 * raster.light[at]) * (raster.inner[at] != 0 ? 0.8 : 1.0);
       for (std::size_t c = 0; c < 3; ++c) {
         sum[c] += light * colour[c];
@@ -140,7 +140,7 @@ std::array<Vec3, 3> thumbnail_axes(const TriangleMesh& surface) {
 std::vector<std::array<unsigned char, 3>> thumbnail_palette() {
   std::vector<std::array<unsigned char, 3>> palette;
   for (std::size_t i = 0; i < viridis.size(); ++i) {
-    const Colour colour = colour_at(real(i) / real(viridis.size() - 1));
+    const Rgb colour = colour_at(real(i) / real(viridis.size() - 1));
     palette.push_back({truncated<unsigned char>(colour[0]), truncated<unsigned char>(colour[1]),
                        truncated<unsigned char>(colour[2])});
   }

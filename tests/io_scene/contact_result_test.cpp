@@ -254,7 +254,7 @@ TEST_F(ContactResult, stressesBeyondSinglePrecisionAreRefused) {
 
 TEST_F(ContactResult, exportsHoldBoth) {
   for (const bool series : {false, true}) {
-    ResultExport files(out(), model_, {true, true, series, 0, true});
+    ResultExport files(out(), model_, {.pvd = true, .xmf = true, .series = series, .overwrite = true});
     for (const double time : {0.0, 1.0}) {
       EXPECT_TRUE(files.append(state(time, Vec3(time, 0, 0)), fields(time)));
     }
