@@ -36,7 +36,7 @@ std::vector<std::string> differences(const PipelineCase& one) {
       if (!hashed) {
         found.push_back((one.folder / (std::string(stage) + ".json")).string() +
                         ": tells no hashes of the outputs: it is of an older version, run the stage again");
-        continue;
+        break;
       }
       const fs::path path = place_of(one, entry["path"].get<std::string>());
       try {

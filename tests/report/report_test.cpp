@@ -76,7 +76,7 @@ TEST(RedactionTest, KnowsNamesAsWordsAlone) {
   const Redaction redacted(one, 7);
   EXPECT_EQ(redacted("/data/Meyer A.nii.gz: has no label 1"), "VOLUME: has no label 1");
   EXPECT_EQ(redacted("Meyer A: 1.1 g/cm3, kg/m3"), "case 7: 1.1 g/cm3, kg/m3");
-  EXPECT_EQ(redacted("see /srv/other.txt"), "see [path]");
+  EXPECT_EQ(redacted("see /pool/other.txt"), "see [path]");
   EXPECT_EQ(redacted(one.at("extract", "command").get<std::string>()).find("Meyer"), std::string::npos);
   EXPECT_EQ(Redaction()("/data/Meyer A.nii.gz"), "/data/Meyer A.nii.gz");
 }
