@@ -95,7 +95,7 @@ class WhatIsDrawn(ChartCase):
         self.assertEqual(len(marks(root)), 3)
         self.assertIn("Time to relax (s)", texts(root))
         self.assertIn("Hausdorff distance, upper bound (% of the diagonal)", texts(root))
-        self.assertIn("Pareto front", texts(root))
+        self.assertIn("Pareto front: no run is better in both", texts(root))
 
     def test_marks_stand_where_the_ticks_say(self):
         points = [(0.013, 7.0), (0.4, 0.3), (31.0, 0.02)]
@@ -254,7 +254,7 @@ class WhatIsDrawn(ChartCase):
         self.assertIn("as asked for", texts(root))
         root, _, _ = self.draw(run, self.write("b.json", relax(1, 100.0, 2.0)), "--guide", "1000")
         self.assertIn("y = 1000", texts(root))
-        self.assertIn("1000", texts(root), "the axis does not reach the guide")
+        self.assertIn("1,000", texts(root), "the axis does not reach the guide")
         for line in ("steep", "1e999", "nan"):
             refused = self.run_chart(run, "-o", self.folder / "none.svg", "--guide", line)
             self.assertEqual(refused.returncode, 2, line)
