@@ -5,8 +5,10 @@
 #include "tunica/core/quantity.hpp"
 #include "tunica/draw/picture.hpp"
 #include "tunica/fit/fit.hpp"
+#include "tunica/io/file/signed_file.hpp"
 #include "tunica/io/mesh/mesh_file.hpp"
 #include "tunica/io/mesh/mesh_pair.hpp"
+#include "tunica/io/mesh/surface_file.hpp"
 #include "tunica/shell/distance/boundary_distance.hpp"
 #include "tunica/shell/distance/mean_bound.hpp"
 #include "tunica/shell/distance/shell_crossings.hpp"
@@ -101,7 +103,8 @@ void declare(cli::Tool& tool, Arguments& given) {
   app.add_option("--map", given.map, "error map: the curved surface with its distance to the target, PLY")
       ->type_name("OUT.ply");
   app.add_option("--picture", given.picture, "picture of the error map, PNG")->type_name("OUT.png");
-  app.add_option("--curved", given.curved, "the curved surface as a fine triangle mesh, PLY")->type_name("OUT.ply");
+  app.add_option("--curved", given.curved, "the curved surface as a fine triangle mesh: .ply, .glb, .obj or .stl")
+      ->type_name("OUT.ply");
   tool.group("Input");
   app.add_option("--mesh-unit", given.mesh_unit, "unit of mesh files that do not state one: mm, cm, m or um")
       ->type_name("mm|cm|m|um");
@@ -249,7 +252,7 @@ ShellDistance certified_distance(const RelaxResult& relaxed, const Target& whole
 
 PlyOptions ply_options(const cli::Tool& tool, const std::string& space) {
   PlyOptions options;
-  options.comments = {"made by " + tool.command()};
+  options.comments = {"made by " + tool.made_by()};
   options.space = space;
   options.overwrite = tool.force();
   return options;
@@ -269,7 +272,7 @@ void write_maps(cli::Tool& tool, const Arguments& given, const ShellMesh& shell,
   }
   if (given.picture) {
     PictureOptions options;
-    options.title = fmt::format("{}: {} shells", given.out.filename().string(), shell.triangles.size());
+    options.title = fmt::format("{}: {} shells", tool.provenance().name_of(given.out), shell.triangles.size());
     options.caption = fmt::format("two-sided Hausdorff distance at most {:.4g} mm ({:.3g} %), mean {:.3g} mm",
                                   distance.both.upper, 100 * distance.both.upper / target.diagonal(), distance.mean);
     options.quantity = "distance to the target";
@@ -285,7 +288,8 @@ void write_maps(cli::Tool& tool, const Arguments& given, const ShellMesh& shell,
         }
       }
     }
-    write_file(*given.picture, error_map_picture(fine.mesh, distances, options), tool.force());
+    write_file(*given.picture, png_made_by(error_map_picture(fine.mesh, distances, options), tool.made_by()),
+               tool.force());
   }
 }
 
@@ -307,10 +311,11 @@ public:
 private:
   void name_outputs() {
     tool_.output(given_.out, {".ply"});
-    for (const auto& [path, ending] :
-         {std::pair(given_.map, ".ply"), {given_.picture, ".png"}, {given_.curved, ".ply"}}) {
+    for (const auto& [path, endings] : {std::pair(given_.map, std::vector<std::string>{".ply"}),
+                                        {given_.picture, {".png"}},
+                                        {given_.curved, surface_endings()}}) {
       if (path) {
-        tool_.output(*path, {ending});
+        tool_.output(*path, endings);
       }
     }
   }
@@ -538,7 +543,7 @@ private:
       write_ply(given_.out, relaxed_.shell, ply_);
       written.push_back(given_.out);
       if (given_.curved) {
-        write_ply(*given_.curved, tessellate(relaxed_.shell, curved_deviation * whole().diagonal()).mesh, ply_);
+        write_surface(*given_.curved, tessellate(relaxed_.shell, curved_deviation * whole().diagonal()).mesh, ply_);
         written.push_back(*given_.curved);
       }
       if (given_.map || given_.picture) {

@@ -2,6 +2,7 @@
 
 #include "tunica/surface/mesh/triangle_mesh.hpp"
 
+#include <array>
 #include <optional>
 #include <string>
 #include <vector>
@@ -31,5 +32,9 @@ std::string error_map_picture(const TriangleMesh& surface, const std::vector<dou
 
 /// The same two views of a plain surface without values: title, caption and lines of `options` are used.
 std::string surface_picture(const TriangleMesh& surface, const PictureOptions& options);
+
+/// The colour of a value in the pictures: red, green, blue in sRGB, 0 to 1.
+/// @param part  of the largest value, 0 to 1; grey where it is no number
+std::array<double, 3> bar_colour(double part);
 
 }  // namespace tunica
