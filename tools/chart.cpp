@@ -1,5 +1,6 @@
 #include "tunica/cli/tool.hpp"
 #include "tunica/io/file/output_file.hpp"
+#include "tunica/io/file/signed_file.hpp"
 #include "tunica/io/result/report_chart.hpp"
 
 #include <charconv>
@@ -20,6 +21,15 @@ struct Runs {
   std::vector<Report> failed;  ///< those to draw
 };
 
+// What a report says of files goes too: they are those of other runs.
+void hide_paths(const cli::Tool& tool, Report& report) {
+  report.path = tool.provenance().name_of(report.path);
+  report.name = report.path.stem().string();
+  for (const char* key : {"command", "inputs", "outputs", "error", "warnings"}) {
+    report.json.erase(key);
+  }
+}
+
 Runs read_reports(cli::Tool& tool, const std::vector<std::filesystem::path>& paths, bool draws_failed, Json& skipped) {
   Runs runs;
   for (const auto& path : paths) {
@@ -37,6 +47,11 @@ Runs read_reports(cli::Tool& tool, const std::vector<std::filesystem::path>& pat
     throw InputError(paths.front().string() + ": nothing to draw: every run failed; see the reports' key 'error'");
   }
   name_apart(runs.good);
+  if (tool.provenance().hides_paths()) {
+    for (std::vector<Report>* list : {&runs.good, &runs.failed}) {
+      std::ranges::for_each(*list, [&](Report& report) { hide_paths(tool, report); });
+    }
+  }
   return runs;
 }
 
@@ -131,6 +146,7 @@ void run(cli::Tool& tool, Arguments& given) {
   std::string svg;
   {
     const auto stage = tool.stage("draw");
+    given.options.made_by = tool.made_by();
     given.options.x_scale = scale_of(given.x_scale);
     given.options.y_scale = scale_of(given.y_scale);
     made = chart_of_reports(runs.good, runs.failed, given.options);
@@ -141,7 +157,7 @@ void run(cli::Tool& tool, Arguments& given) {
   }
   {
     const auto stage = tool.stage("write");
-    write_file(given.out, svg, tool.force());
+    write_file(given.out, svg + xml_made_by(tool.made_by()), tool.force());
     if (!given.csv.empty()) {
       write_file(given.csv, made.csv, tool.force());
     }

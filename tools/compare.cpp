@@ -1,8 +1,10 @@
 #include "tunica/cli/tool.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/draw/picture.hpp"
+#include "tunica/io/file/signed_file.hpp"
 #include "tunica/io/mesh/mesh_file.hpp"
 #include "tunica/io/mesh/mesh_pair.hpp"
+#include "tunica/io/mesh/surface_file.hpp"
 #include "tunica/shell/distance/boundary_distance.hpp"
 #include "tunica/shell/distance/shell_distance.hpp"
 #include "tunica/shell/distance/target.hpp"
@@ -167,11 +169,11 @@ Map make_map(const Surface& a, const ClosestPoint& b, double diagonal_mm) {
 void write_files(const cli::Tool& tool, const Arguments& given, const Surface& a, const Other& b,
                  const HausdorffResult& distance, double diagonal_mm, std::vector<fs::path>& written) {
   PlyOptions options;
-  options.comments = {"made by " + tool.command()};
+  options.comments = {"made by " + tool.made_by()};
   options.space = a.space;
   options.overwrite = tool.force();
   if (given.curved) {
-    write_ply(*given.curved, tessellate(*a.shell, curved_deviation * diagonal_mm).mesh, options);
+    write_surface(*given.curved, tessellate(*a.shell, curved_deviation * diagonal_mm).mesh, options);
     written.push_back(*given.curved);
   }
   if (!given.map && !given.picture) {
@@ -186,7 +188,7 @@ void write_files(const cli::Tool& tool, const Arguments& given, const Surface& a
     PictureOptions look;
     look.title = a.shell ? "Distance of curved shells to a surface" : "Distance of a surface to another one";
     look.caption = fmt::format("{} against {}: two-sided distance at most {:.3g} mm ({:.3g} % of the diagonal)",
-                               given.a.stem().string(), given.b.stem().string(), distance.both.upper,
+                               tool.provenance().name_of(given.a), tool.provenance().name_of(given.b), distance.both.upper,
                                100 * distance.both.upper / diagonal_mm);
     look.quantity = "Distance";
     look.diagonal = diagonal_mm;
@@ -194,7 +196,8 @@ void write_files(const cli::Tool& tool, const Arguments& given, const Surface& a
       look.maximum = given.picture_range->millimetres(diagonal_mm);
     }
     look.lines = map.edges;
-    write_file(*given.picture, surface_picture(map.mesh, map.distances, look), tool.force());
+    write_file(*given.picture, png_made_by(surface_picture(map.mesh, map.distances, look), tool.made_by()),
+               tool.force());
   }
 }
 
@@ -257,9 +260,11 @@ void run(cli::Tool& tool, const Arguments& given) {
   if (given.mesh_unit) {
     unit_mm = parse_length_unit(*given.mesh_unit);
   }
-  for (const auto& [path, ending] : {std::pair(given.map, ".ply"), {given.picture, ".png"}, {given.curved, ".ply"}}) {
+  for (const auto& [path, endings] : {std::pair(given.map, std::vector<std::string>{".ply"}),
+                                      {given.picture, {".png"}},
+                                      {given.curved, surface_endings()}}) {
     if (path) {
-      tool.output(*path, {ending});
+      tool.output(*path, endings);
     }
   }
 

@@ -263,7 +263,7 @@ void run(cli::Tool& tool, const Arguments& given) {
   const auto stage = tool.stage("write");
   const auto failure = what_failed(given, coarse.made, coarse.angle);
   PlyOptions options;
-  options.comments = {"made by " + tool.command()};
+  options.comments = {"made by " + tool.made_by()};
   options.space = in.space.value_or(options.space);
   options.millimetres = !in.unit_unknown;
   options.overwrite = tool.force();

@@ -3,7 +3,7 @@
 #include "tunica/cli/usage.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/core/version.hpp"
-#include "tunica/io/mesh/mesh_file.hpp"
+#include "tunica/io/mesh/surface_file.hpp"
 #include "tunica/io/volume/label_names.hpp"
 #include "tunica/io/volume/volume_file.hpp"
 #include "tunica/surface/mesh/checks.hpp"
@@ -61,7 +61,8 @@ struct Target {
 void declare(cli::Tool& tool, Arguments& arguments) {
   CLI::App& app = tool.arguments();
   app.add_option("VOLUME", arguments.volume, "segmented or grey volume: NIfTI, NRRD, MetaImage, slices")->required();
-  app.add_option("OUT.ply", arguments.out, "the surface; with --all-labels {label} in it is the label");
+  app.add_option("OUT.ply", arguments.out,
+                 "the surface (.ply, .glb, .obj or .stl); with --all-labels {label} in it is the label");
   tool.group("What is inside");
   app.add_option(
          "--label", arguments.label,
@@ -584,6 +585,11 @@ void print_info(cli::Tool& tool, const Arguments& arguments, const VolumeFile& f
   text +=
       fmt::format("spacing      {:.6g} x {:.6g} x {:.6g} mm\n", file.spacing.x(), file.spacing.y(), file.spacing.z());
   text += fmt::format("orientation  {} (from {})\n", file.orientation, file.transform);
+  for (Eigen::Index row = 0; row < 3; ++row) {
+    const auto at = volume.affine.row(row);
+    text += fmt::format("{:<12} {:10.6g} {:10.6g} {:10.6g} {:10.6g}\n", row == 0 ? "affine (LPS)" : "", at[0], at[1],
+                        at[2], at[3]);
+  }
   if (file.frames > 1) {
     text += fmt::format("frames       {}\n", file.frames);
   }
@@ -607,6 +613,11 @@ void print_info(cli::Tool& tool, const Arguments& arguments, const VolumeFile& f
   result["spacing_mm"] = {file.spacing.x(), file.spacing.y(), file.spacing.z()};
   result["orientation"] = file.orientation;
   result["transform"] = file.transform;
+  result["voxel_to_world_mm"] = Json::array();
+  for (Eigen::Index row = 0; row < 3; ++row) {
+    const auto at = volume.affine.row(row);
+    result["voxel_to_world_mm"].push_back({at[0], at[1], at[2], at[3]});
+  }
   result["frames"] = file.frames;
   result["layers"] = file.layers;
   result["values"] = {range.lower, range.upper};
@@ -653,13 +664,13 @@ Json extract_to_file(cli::Tool& tool, Selection selection, const Arguments& argu
   {
     const auto stage = tool.stage("write");
     PlyOptions options;
-    options.comments = {fmt::format("tunica-extract {}", version),
-                        printable("source " + arguments.volume.filename().string()), printable(target.name),
+    options.comments = {fmt::format("tunica-extract {}", version), printable("made by " + tool.made_by()),
+                        printable("source " + tool.provenance().name_of(arguments.volume)), printable(target.name),
                         fmt::format("voxel {:.6g} {:.6g} {:.6g} mm", voxel.x(), voxel.y(), voxel.z())};
     options.space = arguments.space == "ras" ? "RAS" : "LPS";
     options.overwrite = tool.force();
     to_space(surface.mesh, arguments.space);
-    write_ply(out, surface.mesh, options);
+    write_surface(out, surface.mesh, options);
   }
   tool.note(fmt::format("{}: {} triangles, {:.6g} mm2", out.string(), result["triangles"].get<std::size_t>(),
                         result["area_mm2"].get<double>()));
@@ -692,7 +703,7 @@ void run_all_labels(cli::Tool& tool, const Arguments& arguments, const Names& na
   std::vector<Target> targets;
   for (const Label& label : *labels) {
     targets.push_back({{Inside::Rule::label, label.value}, "label " + named(label)});
-    tool.output(output_path(arguments.out, targets.back()), {".ply"});
+    tool.output(output_path(arguments.out, targets.back()), surface_endings());
   }
   Json results;
   for (const Target& target : targets) {
@@ -720,7 +731,7 @@ bool hold_values(const Arguments& arguments, const Smoothing& smoothing, const V
 
 Json run_isovalue(cli::Tool& tool, const Arguments& arguments, const Names& names, const Smoothing& smoothing) {
   const Target target = isovalue_target(arguments);
-  tool.output(arguments.out, {".ply"});
+  tool.output(arguments.out, surface_endings());
   std::optional<VolumeFile> file;
   std::optional<Mask> mask;
   {
@@ -757,7 +768,7 @@ Json run_label(cli::Tool& tool, const Arguments& arguments, const Names& names, 
                                          mask.emplace(header.volume.dims, header.volume.affine);
                                          target = label_target(arguments.volume, names.of(header), *arguments.label);
                                          if (target) {
-                                           tool.output(output_path(arguments.out, *target), {".ply"});
+                                           tool.output(output_path(arguments.out, *target), surface_endings());
                                          }
                                        }
                                        if (target) {

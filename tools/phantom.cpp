@@ -93,10 +93,10 @@ int main(int argc, char** argv) {
     }
 
     const auto stage = tool.stage("write");
-    write_nifti(out, phantom.volume, tool.force());
+    write_nifti(out, phantom.volume, tool.force(), "made by " + tool.made_by());
     if (!truth.empty()) {
       PlyOptions ply;
-      ply.comments = {tool.command()};
+      ply.comments = {"made by " + tool.made_by()};
       ply.overwrite = tool.force();
       write_ply(truth, surface, ply);
     }

@@ -5,8 +5,10 @@
 #include "tunica/core/quantity.hpp"
 #include "tunica/draw/picture.hpp"
 #include "tunica/fit/fit.hpp"
+#include "tunica/io/file/signed_file.hpp"
 #include "tunica/io/mesh/mesh_file.hpp"
 #include "tunica/io/mesh/mesh_pair.hpp"
+#include "tunica/io/mesh/surface_file.hpp"
 #include "tunica/shell/distance/boundary_distance.hpp"
 #include "tunica/shell/distance/mean_bound.hpp"
 #include "tunica/shell/distance/mid_surface.hpp"
@@ -117,7 +119,8 @@ void declare(cli::Tool& tool, Arguments& given) {
   app.add_option("--picture", given.picture, "picture of the error map, PNG")->type_name("OUT.png");
   tool.tolerance("--picture-range", given.picture_range,
                  "where the picture's colours end, so that pictures can be compared (default: the largest distance)");
-  app.add_option("--curved", given.curved, "the curved surface as a fine triangle mesh, PLY")->type_name("OUT.ply");
+  app.add_option("--curved", given.curved, "the curved surface as a fine triangle mesh: .ply, .glb, .obj or .stl")
+      ->type_name("OUT.ply");
   tool.group("Input");
   app.add_option("--mesh-unit", given.mesh_unit, "unit of mesh files that do not state one: mm, cm, m or um")
       ->type_name("mm|cm|m|um");
@@ -277,7 +280,7 @@ ShellDistance certified_distance(const RelaxResult& relaxed, const Target& whole
 
 PlyOptions ply_options(const cli::Tool& tool, const std::string& space) {
   PlyOptions options;
-  options.comments = {"made by " + tool.command()};
+  options.comments = {"made by " + tool.made_by()};
   options.space = space;
   options.overwrite = tool.force();
   return options;
@@ -308,7 +311,7 @@ void write_maps(cli::Tool& tool, const Arguments& given, const ShellMesh& shell,
     for (const auto& [from, to] : patch_edges(fine)) {
       options.lines.push_back({fine.mesh.vertices[from], fine.mesh.vertices[to]});
     }
-    write_file(*given.picture, surface_picture(fine.mesh, distances, options), tool.force());
+    write_file(*given.picture, png_made_by(surface_picture(fine.mesh, distances, options), tool.made_by()), tool.force());
   }
 }
 
@@ -342,10 +345,11 @@ public:
 private:
   void name_outputs() {
     tool_.output(given_.out, {".ply"});
-    for (const auto& [path, ending] :
-         {std::pair(given_.map, ".ply"), {given_.picture, ".png"}, {given_.curved, ".ply"}}) {
+    for (const auto& [path, endings] : {std::pair(given_.map, std::vector<std::string>{".ply"}),
+                                        {given_.picture, {".png"}},
+                                        {given_.curved, surface_endings()}}) {
       if (path) {
-        tool_.output(*path, {ending});
+        tool_.output(*path, endings);
       }
     }
   }
@@ -609,7 +613,7 @@ private:
       write_ply(given_.out, shell, given_.other_face ? thickness : std::vector<double>(), ply_);
       written.push_back(given_.out);
       if (given_.curved) {
-        write_ply(*given_.curved, tessellate(shell, curved_deviation * whole().diagonal()).mesh, ply_);
+        write_surface(*given_.curved, tessellate(made.shell, curved_deviation * whole().diagonal()).mesh, ply_);
         written.push_back(*given_.curved);
       }
       if (given_.map || given_.picture) {

@@ -70,8 +70,9 @@ void declare(cli::Tool& tool, Arguments& a) {
   app.add_option("--unloaded", a.unloaded, "with --imaged-at: the shells without that pressure")->type_name("OUT.ply");
   app.add_option("--export", a.exports,
                  "write beside OUT.hdf, may repeat: pvd (OUT.pvd with a .vtu per state) | xmf (OUT.xmf, XDMF) | "
-                 "inp (the model for CalculiX and Abaqus) | feb (the model for FEBio)")
-      ->type_name("pvd|xmf|inp|feb")
+                 "inp (the model for CalculiX and Abaqus) | feb (the model for FEBio) | "
+                 "glb (the last state's shells, coloured by stress)")
+      ->type_name("pvd|xmf|inp|feb|glb")
       ->expected(1)
       ->allow_extra_args(false)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
@@ -161,10 +162,11 @@ Scene read_scene_of_run(cli::Tool& tool, const Arguments& a, const std::optional
 }
 
 struct Drawing {
-  static constexpr std::array<const char*, 4> formats{"pvd", "xmf", "inp", "feb"};
+  static constexpr std::array<const char*, 5> formats{"pvd", "xmf", "inp", "feb", "glb"};
 
   std::string tessellation = "default";
   std::array<bool, formats.size()> wanted{};
+  bool no_paths = false;
 
   [[nodiscard]] bool has(std::string_view format) const {
     return wanted[std::ranges::find(formats, format) - formats.begin()];
@@ -174,7 +176,8 @@ struct Drawing {
     std::vector<std::string_view> names;
     std::ranges::copy_if(formats, std::back_inserter(names), [&](std::string_view name) { return has(name); });
     return {{"--tessellation", tessellation},
-            {"--export", names.empty() ? "nothing" : fmt::format("{}", fmt::join(names, ", "))}};
+            {"--export", names.empty() ? "nothing" : fmt::format("{}", fmt::join(names, ", "))},
+            {"--no-paths", no_paths ? "yes" : "no"}};
   }
   [[nodiscard]] int level() const { return tessellation == "default" ? 0 : std::stoi(tessellation); }
 };
@@ -196,23 +199,33 @@ Drawing drawing_of_flags(const Arguments& a) {
 }
 
 // A run that goes on draws as it began where nothing else is said.
-Drawing drawing_of_run(const Arguments& a, const RunIdentity& before) {
-  Drawing drawing = drawing_of_flags(a);
+void go_on_drawing(Drawing& drawing, const Arguments& a, const RunIdentity& before) {
   for (const auto& [flag, value] : before.options) {
     if (flag == "--tessellation" && !a.tessellation) {
       drawing.tessellation = value;
     }
+    drawing.no_paths = drawing.no_paths || (flag == "--no-paths" && value == "yes");
     if (flag == "--export" && a.exports.empty()) {
       std::ranges::transform(Drawing::formats, drawing.wanted.begin(),
                              [&](const char* name) { return value.find(name) != std::string::npos; });
     }
   }
-  return drawing;
+}
+
+// How long a level took changes from run to run, and the result does not.
+Json without_times(Json accuracy) {
+  for (Json& level : accuracy["levels"]) {
+    level.erase("seconds");
+  }
+  for (Json& choice : accuracy["choices"]) {
+    choice.erase("would_cost");
+  }
+  return accuracy;
 }
 
 RunIdentity identity_of_run(const cli::Tool& tool, const Scene& scene, const std::string& asked,
                             const std::vector<fs::path>& inputs, const Drawing& drawing) {
-  RunIdentity identity{version, asked, tool.command(), {}, {}, drawing.as_options()};
+  RunIdentity identity{version, asked, tool.provenance().lasting_command(), {}, {}, drawing.as_options()};
   for (const fs::path& path : inputs) {
     identity.inputs.emplace_back(path.string(), sha256_of_file(path));
   }
@@ -297,15 +310,18 @@ private:
 
   [[nodiscard]] ExportOptions exports() const {
     // A run that goes on replaces what it has exported itself.
-    return {.pvd = drawing_.has("pvd"),
-            .xmf = drawing_.has("xmf"),
-            .inp = drawing_.has("inp"),
-            .feb = drawing_.has("feb"),
-            .run = scene_.run,
-            .made_by = journal_ ? journal_->identity().command : tool_.command(),
-            .series = is_series(),
-            .tessellation = drawing_.level(),
-            .overwrite = tool_.force() || !given_.resume.empty()};
+    return {
+        .pvd = drawing_.has("pvd"),
+        .xmf = drawing_.has("xmf"),
+        .inp = drawing_.has("inp"),
+        .feb = drawing_.has("feb"),
+        .glb = drawing_.has("glb"),
+        .run = scene_.run,
+        .made_by = fmt::format("tunica {}: {}", version,
+                               journal_ ? told(journal_->identity().command) : tool_.provenance().lasting_command()),
+        .series = is_series(),
+        .tessellation = drawing_.level(),
+        .overwrite = tool_.force() || !given_.resume.empty()};
   }
 
   void read() {
@@ -313,7 +329,17 @@ private:
     if (!given_.resume.empty()) {
       journal_.emplace(RunJournal::open(given_.resume));
     }
-    drawing_ = journal_ ? drawing_of_run(given_, journal_->identity()) : drawing_of_flags(given_);
+    drawing_ = drawing_of_flags(given_);
+    drawing_.no_paths = tool_.provenance().hides_paths();
+    if (journal_) {
+      go_on_drawing(drawing_, given_, journal_->identity());
+      if (drawing_.no_paths) {
+        tool_.provenance().hide_paths();
+        for (const auto& [path, hash] : journal_->identity().inputs) {
+          tool_.provenance().add_input(path);
+        }
+      }
+    }
     scene_ = read_scene_of_run(tool_, given_, journal_, inputs_);
     if (!given_.check) {
       tool_.output(out_);
@@ -496,7 +522,7 @@ private:
 
   void write_shells(const fs::path& out, const ShellMesh& mesh, bool partial) const {
     PlyOptions options;
-    options.comments = {"made by " + tool_.command()};
+    options.comments = {"made by " + tool_.made_by()};
     options.space = space_;
     options.overwrite = tool_.force();
     options.partial = partial;
@@ -531,13 +557,23 @@ private:
     stage("write");
     const char* const time_units = kind<DynamicRun>() != nullptr ? "s" : kind<FrequencyRun>() != nullptr ? "Hz" : "1";
     file_.emplace(out_, model(),
-                  ResultOptions{is_series(), time_units, origin.command, origin.scene,
-                                accuracy_ ? tool_.result()["accuracy"].dump(1) : "", origin.inputs, drawing_.level(),
-                                tool_.force()});
+                  ResultOptions{is_series(), time_units, told(origin.command), told(origin.scene),
+                                accuracy_ ? told(without_times(tool_.result()["accuracy"]).dump(1)) : "",
+                                shown_inputs(origin), drawing_.level(), tool_.force()});
     if (drawing_.any()) {
       exported_.emplace(out_, model(), exports());
     }
     fields_.emplace(model());
+  }
+
+  [[nodiscard]] std::string told(const std::string& text) const { return tool_.provenance().told(text); }
+
+  [[nodiscard]] std::vector<std::pair<std::string, std::string>> shown_inputs(const RunIdentity& origin) const {
+    std::vector<std::pair<std::string, std::string>> inputs = origin.inputs;
+    for (auto& [path, hash] : inputs) {
+      path = told(path);
+    }
+    return inputs;
   }
 
   void record(const State& state) {

@@ -71,24 +71,6 @@ double peak_mebibytes() {
   return real(usage.ru_maxrss) / 1024.0;
 }
 
-std::string shell_quoted(const std::string& word) {
-  const bool plain = !word.empty() && word.find_first_not_of(
-                                          "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
-                                          "0123456789_-+./,:=%@{}") == std::string::npos;
-  if (plain) {
-    return word;
-  }
-  std::string quoted = "'";
-  for (const char c : word) {
-    if (c == '\'') {
-      quoted += "'\\''";
-    } else {
-      quoted += c;
-    }
-  }
-  return quoted + "'";
-}
-
 // The report of a run whose command line could not be parsed: then no option has been stored yet.
 std::filesystem::path report_argument(const std::vector<std::string>& words) {
   for (std::size_t i = 1; i < words.size(); ++i) {
@@ -190,6 +172,8 @@ void Tool::declare_common() {
   app_.add_flag("--quiet", quiet_, "print nothing but errors");
   app_.add_flag("--verbose", verbose_, "print more detail");
   app_.add_flag("--force", force_, "overwrite an existing output");
+  app_.add_flag("--no-paths", no_paths_,
+                "keep folders and names of files, which may be patients', out of what is written, reports too");
 }
 
 void Tool::group(const std::string& name) { app_.option_defaults()->group(name); }
@@ -299,8 +283,13 @@ int Tool::run(int argc, char** argv, const std::function<void()>& body) {
   occupy_standard_descriptors();
   allow_many_files();
   words_.assign(argv, argv + argc);
-  for (int i = 0; i < argc; ++i) {
-    command_ += (i > 0 ? " " : "") + shell_quoted(i > 0 ? argv[i] : "tunica-" + verb_);
+  std::vector<std::string> said = words_;
+  said.resize(std::max<std::size_t>(said.size(), 1));
+  said[0] = "tunica-" + verb_;
+  provenance_ = Provenance(std::move(said));
+  no_paths_ = std::ranges::find(words_, "--no-paths") != words_.end();
+  if (no_paths_) {
+    provenance_.hide_paths();  // before anything fails: the report of that must not name them either
   }
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);  // writing past a limit on file sizes is then an error like a full disk
@@ -394,6 +383,19 @@ int Tool::finish(ExitCode code, const std::string& error) {
   return static_cast<int>(code);
 }
 
+Json Tool::told(const Json& json) const {
+  if (json.is_string() && provenance_.hides_paths()) {
+    return provenance_.told(json.get<std::string>());
+  }
+  Json copy = json;
+  if (json.is_structured() && provenance_.hides_paths()) {
+    for (Json& part : copy) {
+      part = told(part);
+    }
+  }
+  return copy;
+}
+
 Json Tool::describe_outputs(bool ok) const {
   Json outputs = Json::array();
   for (const std::filesystem::path& path : outputs_) {
@@ -417,7 +419,7 @@ void Tool::write_report(bool ok, const std::string& error) {
       {"ok", ok},
       {"error", error.empty() ? Json() : Json(error)},
       {"warnings", warnings_},
-      {"command", command_},
+      {"command", provenance_.command()},
       {"inputs", inputs_},
       {"outputs", describe_outputs(ok)},
       {"seconds", seconds},
@@ -426,7 +428,7 @@ void Tool::write_report(bool ok, const std::string& error) {
       {"result", result_},
   };
   // A file name need not be UTF-8; the report has to be.
-  const std::string text = report.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  const std::string text = told(report).dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
   if (report_ == standard_output) {
     tunica::print(text);
     return;
@@ -459,6 +461,7 @@ void Tool::claim(const std::filesystem::path& path, bool written) {
 const std::filesystem::path& Tool::input(const std::filesystem::path& path) {
   claim(path, false);
   at_hand_ = path.string();
+  provenance_.add_input(path);
   // A missing input or a folder is for the reader to refuse; the report still has to be written.
   inputs_.push_back({{"path", path.string()}, {"sha256", report_.empty() ? Json() : hash_if_readable(path)}});
   return path;
@@ -475,6 +478,7 @@ const std::filesystem::path& Tool::output(const std::filesystem::path& path, con
   locks_.push_back(PartLock::take(part_of(path)));
   require_writable(path, force_);  // another run may have finished it before the lock was ours
   outputs_.push_back(path);
+  provenance_.add_output(path);
   return path;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "tunica/cli/provenance.hpp"
 #include "tunica/core/clock.hpp"
 #include "tunica/core/error.hpp"
 #include "tunica/core/json.hpp"
@@ -70,7 +71,10 @@ public:
   /// From here on to the end of the run no other one can write it: the PartLock is held.
   const std::filesystem::path& output(const std::filesystem::path& path, const std::vector<std::string>& endings = {});
   /// Names in the report a file whose name follows from an output's, once it is there.
-  void wrote(const std::filesystem::path& path) { outputs_.push_back(path); }
+  void wrote(const std::filesystem::path& path) {
+    outputs_.push_back(path);
+    provenance_.add_output(path);
+  }
 
   /// Times a stage: the seconds until the returned object dies are added to report key `seconds.<name>`.
   class Stage {
@@ -112,8 +116,10 @@ public:
   [[nodiscard]] bool quiet() const { return quiet_; }
   [[nodiscard]] bool verbose() const { return verbose_; }
 
-  /// The command line as it was typed, for provenance.
-  [[nodiscard]] const std::string& command() const { return command_; }
+  /// Version and command, for what is written; and how it calls files. See Provenance.
+  [[nodiscard]] std::string made_by() const { return provenance_.made_by(); }
+  [[nodiscard]] Provenance& provenance() { return provenance_; }
+  [[nodiscard]] const Provenance& provenance() const { return provenance_; }
 
 private:
   void declare_common();
@@ -124,6 +130,7 @@ private:
   [[nodiscard]] Json describe_outputs(bool ok) const;
   void write_report(bool ok, const std::string& error);
   void parse_common();
+  [[nodiscard]] Json told(const Json& json) const;
   void claim(const std::filesystem::path& path, bool written);
   [[nodiscard]] std::string out_of_memory(const std::string& why) const;
   void say_line(const std::string& text) const;
@@ -131,10 +138,11 @@ private:
   std::string verb_;
   CLI::App app_;
   std::vector<std::string> words_;  ///< of the command line
-  std::string command_;
+  Provenance provenance_;
   std::filesystem::path report_;
   std::optional<std::string> threads_;
   bool force_ = false;
+  bool no_paths_ = false;
   bool quiet_ = false;
   bool verbose_ = false;
   mutable bool bar_open_ = false;

@@ -284,4 +284,10 @@ std::string surface_picture(const TriangleMesh& surface, const std::vector<doubl
   return PictureDrawing(surface, values, options).png();
 }
 
+std::array<double, 3> bar_colour(double part) {
+  static const Paint paint{.top = 1};
+  const cv::Vec3b colour = surface_colour(paint, static_cast<float>(part));
+  return {colour[2] / 255.0, colour[1] / 255.0, colour[0] / 255.0};  // OpenCV's begin with blue
+}
+
 }  // namespace tunica

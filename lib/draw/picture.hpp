@@ -2,6 +2,7 @@
 
 #include "tunica/surface/mesh/triangle_mesh.hpp"
 
+#include <array>
 #include <optional>
 #include <string>
 #include <vector>
@@ -34,5 +35,9 @@ struct PictureOptions {
 /// Limits: a pocket that neither side shows stays hidden; the letters are Latin, Greek and Cyrillic ones.
 std::string surface_picture(const TriangleMesh& surface, const std::vector<double>& values,
                             const PictureOptions& options);
+
+/// The colour of a value in the pictures: red, green, blue in sRGB, 0 to 1.
+/// @param part  of the largest value, 0 to 1; grey where it is no number
+std::array<double, 3> bar_colour(double part);
 
 }  // namespace tunica

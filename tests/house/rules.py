@@ -27,7 +27,7 @@ INNER_ROOMS = {
     "mechanics": {"model": set(), "algebra": set(), "elements": {"model", "algebra"}, "solids": {"model", "elements"},
                   "contact": {"model", "algebra", "elements"},
                   "runs": {"model", "algebra", "elements", "solids", "contact"}},
-    "io": {"file": set(), "volume": {"file"}, "mesh": {"file"}, "scene": {"file", "mesh"}, "result": {"file"}},
+    "io": {"file": set(), "volume": {"file"}, "mesh": {"file"}, "scene": {"file", "mesh"}, "result": {"file", "mesh"}},
 }
 
 # Marching cubes returns a mesh, and smoothing measures its volume and leaves no triangles that cross: the volume room

@@ -1,6 +1,5 @@
 """--export inp and feb: models for CalculiX, Abaqus and FEBio. CalculiX runs them where it is installed."""
 import os
-import re
 import shutil
 import subprocess
 import unittest
@@ -155,7 +154,8 @@ value = "10kPa"
         self.assertEqual({item.get("surface") for item in root.iter("surface_load")},
                          {item.get("name") for item in root.iter("Surface")})
         # FEBio's pressure pushes against the top face; both faces together make what acts on the middle.
-        loads = {item.find("shell_bottom").text: float(item.find("pressure").text) for item in root.iter("surface_load")}
+        loads = {item.find("shell_bottom").text: float(item.find("pressure").text)
+                 for item in root.iter("surface_load")}
         self.assertEqual(loads, {"0": -0.005, "1": 0.005})
         self.assertEqual({item.get("lc") for item in root.iter() if item.get("lc")},
                          {item.get("id") for item in root.iter("load_controller")})
@@ -184,7 +184,7 @@ value = "10kPa"
 
     @unittest.skipUnless(CALCULIX, "CalculiX (package calculix-ccx) is not installed")
     def test_a_clamped_plate_in_calculix(self):
-        """Deflections of a fiftieth and of two thirds of the thickness: 2 % apart at eight elements along the radius."""
+        """Deflections of a fiftieth and of two thirds of the thickness: 2 % apart at 8 elements along the radius."""
         vertices, triangles = disc(8, 10)
         write_ply(self.path("disc.ply"), vertices, triangles, np.tile((0, 0, 1.0), (len(vertices), 1)))
         wall, small = 0.8, 100 * 64 * 0.8**4 / (12 * (1 - 0.3**2) * 10**4)  # MPa that bend it by its thickness
@@ -280,7 +280,8 @@ value = ["0MPa", "0MPa", "-90MPa"]
                  "gravity", 0, 1),
                 (static, there + 'translation = "xyz"\nrotation = "x"\n' + pressed, "one rotation alone", 0, 1),
                 (static, there + 'translation = "xy"\nrotation = "xyz"\n[[fix]]\n' + body +
-                 'where = {nearest = ["0mm", "0mm", "-10mm"]}\ntranslation = "z"\nrotation = ""\n' + pressed, "displacements are free", 0, 1)):
+                 'where = {nearest = ["0mm", "0mm", "-10mm"]}\ntranslation = "z"\nrotation = ""\n' + pressed,
+                 "displacements are free", 0, 1)):
             shell = ('[[shell]]\nname = "ball"\nmesh = "ball.ply"\nyoung = "100MPa"\npoisson = 0.3\n'
                      'thickness = "0.5mm"\ndensity = "1g/cm3"\n')
             self.write("scene.toml", "[run]\n" + run + shell + more)

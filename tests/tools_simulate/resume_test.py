@@ -59,8 +59,6 @@ class Resume(SimulateTest):
         a, b = everything(self.path(a)), everything(self.path(b))
         self.assertEqual(set(a), set(b))
         for name in a:
-            if name == "tunica/command":
-                continue
             if a[name].dtype.kind == "f":
                 scale = np.nanmax(np.abs(a[name]), initial=0)
                 digits = 2e-7 if a[name].dtype == np.float32 else 1e-9

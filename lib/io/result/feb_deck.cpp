@@ -1,6 +1,7 @@
 // FEBio 4 input. Source: FEBio User Manual 4, chapter 3 (free format input): MeshDomains, Boundary, Loads; tri6 shells
 // under "Shell Elements": the nodes define the top face, the bottom follows from thickness and nodal normals.
 #include "tunica/core/narrow.hpp"
+#include "tunica/io/file/signed_file.hpp"
 #include "tunica/io/result/detail/decks.hpp"
 
 #include <fmt/format.h>
@@ -12,23 +13,6 @@
 
 namespace tunica {
 namespace {
-
-std::string xml_text(const std::string& text) {
-  std::string safe;
-  for (const char c : text) {
-    const bool special = c == '<' || c == '>' || c == '&' || c == '"';
-    safe += special ? fmt::format("&#{};", int{c}) : std::string(1, static_cast<unsigned char>(c) < ' ' ? ' ' : c);
-  }
-  return safe;
-}
-
-// A comment must not hold two hyphens, as every flag does.
-std::string xml_comment(std::string text) {
-  for (std::size_t at = text.find("--"); at != std::string::npos; at = text.find("--", at)) {
-    text.insert(at + 1, " ");
-  }
-  return "<!-- " + text + " -->\n";
-}
 
 std::string list_of(const std::vector<std::size_t>& nodes) {
   std::string text;
@@ -57,9 +41,8 @@ public:
     const std::string boundary = conditions();
     const std::string loads = this->loads();
     const std::string domains = this->domains();
-    return "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n" +
-           xml_comment("Shells of tunica: mm, N, MPa, tonne. " + made_by) +
-           "<febio_spec version=\"4.0\">\n<Module type=\"solid\"/>\n" + control(run) +
+    return "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<!-- shells of tunica: mm, N, MPa, tonne -->\n" +
+           xml_made_by(made_by) + "<febio_spec version=\"4.0\">\n<Module type=\"solid\"/>\n" + control(run) +
            "<Globals><Constants><T>0</T><R>0</R><Fc>0</Fc></Constants></Globals>\n" + materials() + mesh() + domains +
            data_ + "<Boundary>\n" + boundary + "</Boundary>\n<Loads>\n" + loads +
            "</Loads>\n<LoadData>\n<load_controller id=\"1\" name=\"load\" type=\"loadcurve\">"
@@ -104,7 +87,6 @@ private:
     }
     text += "</Nodes>\n";
     for (std::size_t b = 0; b < shells_.bodies.size(); ++b) {
-      text += xml_comment(fmt::format("body{}: {}", b + 1, xml_text(model_.shells[b].name)));
       text += fmt::format("<Elements type=\"tri6\" name=\"body{}\">\n", b + 1);
       each_element(b, [&](std::size_t e) {
         text += fmt::format("<elem id=\"{}\">{}</elem>\n", e + 1, six(shells_.elements[e]));

@@ -120,6 +120,7 @@ Handle Writer::dataset(Id parent, const std::string& name, Id type, const std::v
                            ? own(H5Screate(H5S_SCALAR), "written")
                            : own(H5Screate_simple(narrow<int>(shape.size()), shape.data(), nullptr), "written");
   const Handle creation = own(H5Pcreate(H5P_DATASET_CREATE), "written");
+  check(H5Pset_obj_track_times(creation.get(), 0), "written");  // the same run makes the same bytes
   if (!rewritten && !shape.empty() && count_of(shape) >= 1024) {
     const Size row_bytes = H5Tget_size(type) * count_of({shape.begin() + 1, shape.end()});
     std::vector<Size> chunk = shape;
@@ -195,6 +196,7 @@ Series::Series(const Writer& writer, Id parent, const std::string& name, Id type
   const int rank = narrow<int>(shape_.size());
   const Handle space = writer.own(H5Screate_simple(rank, shape_.data(), most.data()), "written");
   const Handle creation = writer.own(H5Pcreate(H5P_DATASET_CREATE), "written");
+  writer.check(H5Pset_obj_track_times(creation.get(), 0), "written");
   writer.check(H5Pset_chunk(creation.get(), rank, chunk.data()), "written");
   if (compressed) {
     writer.check(H5Pset_shuffle(creation.get()), "written");

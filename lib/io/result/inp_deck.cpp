@@ -109,7 +109,7 @@ void add_inp_loads(std::string& text, const Model& model, const QuadraticShells&
 
 std::string inp_text(const Model& model, const QuadraticShells& shells, const StaticRun& run,
                      const std::string& made_by) {
-  std::string text = "*HEADING\nShells of tunica: mm, N, MPa, tonne\n" + inp_comment(made_by);
+  std::string text = "*HEADING\nShells of tunica: mm, N, MPa, tonne\n" + inp_comment("made by " + made_by);
   text += "** S6 is CalculiX's name of the element; for Abaqus replace TYPE=S6 by TYPE=STRI65\n";
   add_inp_mesh(text, model, shells);
   add_inp_properties(text, model, shells);

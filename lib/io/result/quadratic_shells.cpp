@@ -2,6 +2,7 @@
 
 #include "tunica/core/disjoint_sets.hpp"
 #include "tunica/core/narrow.hpp"
+#include "tunica/io/result/detail/triangle_rule.hpp"
 #include "tunica/shell/patch/curved_surface.hpp"
 
 #include <fmt/format.h>
@@ -127,27 +128,22 @@ private:
     }
   }
 
-  /// Consistent with the six-node element: its shape functions times its area. Rule of 6 points, exact to degree 4:
-  /// Dunavant, Int. J. Numer. Meth. Eng. 21 (1985).
+  /// Consistent with the six-node element: its shape functions times its area.
   void add_force_per_area(const std::array<std::size_t, 6>& element, const Vec3& per_area) {
-    constexpr std::array<std::array<double, 2>, 2> rule{
-        {{0.445948490915965, 0.223381589678011}, {0.091576213509771, 0.109951743655322}}};
-    for (const auto& [a, weight] : rule) {
-      for (const Vec3& l : {Vec3(a, a, 1 - 2 * a), Vec3(a, 1 - 2 * a, a), Vec3(1 - 2 * a, a, a)}) {
-        const std::array<double, 6> shape{l[0] * (2 * l[0] - 1), l[1] * (2 * l[1] - 1), l[2] * (2 * l[2] - 1),
-                                          4 * l[0] * l[1],       4 * l[1] * l[2],       4 * l[2] * l[0]};
-        const std::array<double, 6> by_b2{1 - 4 * l[0], 4 * l[1] - 1, 0, 4 * (l[0] - l[1]), 4 * l[2], -4 * l[2]};
-        const std::array<double, 6> by_b3{1 - 4 * l[0], 0, 4 * l[2] - 1, -4 * l[1], 4 * l[1], 4 * (l[0] - l[2])};
-        Vec3 along_b2 = Vec3::Zero();
-        Vec3 along_b3 = Vec3::Zero();
-        for (std::size_t k = 0; k < 6; ++k) {
-          along_b2 += by_b2[k] * made_.nodes[element[k]];
-          along_b3 += by_b3[k] * made_.nodes[element[k]];
-        }
-        const double area = weight * along_b2.cross(along_b3).norm() / 2;
-        for (std::size_t k = 0; k < 6; ++k) {
-          made_.forces[element[k]] += area * shape[k] * per_area;
-        }
+    for (const auto& [l, weight] : triangle_rule()) {
+      const std::array<double, 6> shape{l[0] * (2 * l[0] - 1), l[1] * (2 * l[1] - 1), l[2] * (2 * l[2] - 1),
+                                        4 * l[0] * l[1],       4 * l[1] * l[2],       4 * l[2] * l[0]};
+      const std::array<double, 6> by_b2{1 - 4 * l[0], 4 * l[1] - 1, 0, 4 * (l[0] - l[1]), 4 * l[2], -4 * l[2]};
+      const std::array<double, 6> by_b3{1 - 4 * l[0], 0, 4 * l[2] - 1, -4 * l[1], 4 * l[1], 4 * (l[0] - l[2])};
+      Vec3 along_b2 = Vec3::Zero();
+      Vec3 along_b3 = Vec3::Zero();
+      for (std::size_t k = 0; k < 6; ++k) {
+        along_b2 += by_b2[k] * made_.nodes[element[k]];
+        along_b3 += by_b3[k] * made_.nodes[element[k]];
+      }
+      const double area = weight * along_b2.cross(along_b3).norm() / 2;
+      for (std::size_t k = 0; k < 6; ++k) {
+        made_.forces[element[k]] += area * shape[k] * per_area;
       }
     }
   }

@@ -271,7 +271,7 @@ std::vector<Failure> failures_of(const std::vector<Report>& failed, const std::s
 
 std::string csv_of(const std::vector<std::pair<Row, bool>>& rows, const std::vector<Failure>& failures,
                    const Coordinate& x, const Coordinate& y, const ReportChartOptions& options) {
-  std::string csv = fmt::format("report,tool,index,{},{},{},pareto_front,failed,command\n",
+  std::string csv = fmt::format("report,tool,index,{},{},{},pareto_front,failed,command,made_by\n",
                                 csv_field(options.series ? "series " + *options.series : "series"), csv_field(x.key),
                                 csv_field(y.key));
   const auto command = [](const Report& report) {
@@ -279,15 +279,15 @@ std::string csv_of(const std::vector<std::pair<Row, bool>>& rows, const std::vec
     return csv_field(found != report.json.end() ? shown(*found) : "");
   };
   for (const auto& [row, front] : rows) {
-    csv +=
-        fmt::format("{},{},{},{},{},{},{},,{}\n", csv_field(row.report->path.string()), csv_field(row.report->tool()),
-                    row.index, csv_field(row.series), row.mark.x, row.mark.y, front ? 1 : 0, command(*row.report));
+    csv += fmt::format("{},{},{},{},{},{},{},,{},{}\n", csv_field(row.report->path.string()),
+                       csv_field(row.report->tool()), row.index, csv_field(row.series), row.mark.x, row.mark.y,
+                       front ? 1 : 0, command(*row.report), csv_field(options.made_by));
   }
   for (const Failure& failure : failures) {
-    csv += fmt::format("{},{},0,{},{},,0,{},{}\n", csv_field(failure.report->path.string()),
+    csv += fmt::format("{},{},0,{},{},,0,{},{},{}\n", csv_field(failure.report->path.string()),
                        csv_field(failure.report->tool()), csv_field(failure.series),
                        failure.mark.x ? fmt::format("{}", *failure.mark.x) : "", csv_field(failure.mark.label),
-                       command(*failure.report));
+                       command(*failure.report), csv_field(options.made_by));
   }
   return csv;
 }

@@ -2,9 +2,11 @@
 
 #include "tunica/core/error.hpp"
 #include "tunica/io/file/output_file.hpp"
+#include "tunica/io/file/signed_file.hpp"
 #include "tunica/io/result/detail/result_grid.hpp"
+#include "tunica/io/result/detail/result_surface.hpp"
 #include "tunica/io/result/detail/vtu_file.hpp"
-#include "tunica/io/result/model_deck.hpp"
+#include "tunica/io/result/shell_deck.hpp"
 
 #include <fmt/format.h>
 
@@ -64,8 +66,9 @@ std::string attribute(const GridField& field, const std::string& data) {
 
 std::vector<fs::path> export_paths(const fs::path& result, const ExportOptions& options) {
   std::vector<fs::path> paths;
-  for (const auto& [wanted, ending] : {std::pair(options.pvd, ".pvd"), std::pair(options.xmf, ".xmf"),
-                                       std::pair(options.inp, ".inp"), std::pair(options.feb, ".feb")}) {
+  for (const auto& [wanted, ending] :
+       {std::pair(options.pvd, ".pvd"), std::pair(options.xmf, ".xmf"), std::pair(options.inp, ".inp"),
+        std::pair(options.feb, ".feb"), std::pair(options.glb, ".glb")}) {
     if (wanted) {
       paths.push_back(beside(result, ending));
     }
@@ -78,6 +81,9 @@ struct ResultExport::Implementation {
       : model(of), result(std::move(path)), options(wanted), grid(of, wanted.tessellation) {
     for (const Deck deck : decks()) {
       require_expressible(model, options.run, deck);
+    }
+    if (options.glb && model.shells.empty()) {
+      throw UsageError("--export glb: the scene has no shells to draw; leave it out");
     }
     for (const fs::path& file : export_paths(result, options)) {
       require_writable(file, options.overwrite);
@@ -94,6 +100,9 @@ struct ResultExport::Implementation {
     if (options.pvd) {
       write_state(state, fields);
       written = vtu(times.size());
+    }
+    if (options.glb) {
+      last = grid.values(state, fields);
     }
     times.push_back(state.time);
     return written;
@@ -122,7 +131,7 @@ struct ResultExport::Implementation {
       drawn.of_grid.push_back({name, 1, std::span(&value, 1)});
     }
     // The first one was asked about; a later one is left from a longer run of the same name.
-    write_vtu(vtu(times.size()), drawn, true);
+    write_vtu(vtu(times.size()), drawn, options.made_by, true);
   }
 
   [[nodiscard]] std::string pvd_text() const {
@@ -133,7 +142,7 @@ struct ResultExport::Implementation {
       text += fmt::format("<DataSet timestep=\"{}\" part=\"0\" file=\"{}\"/>\n", times[i],
                           escaped(vtu(i).filename().string()));
     }
-    return text + "</Collection>\n</VTKFile>\n";
+    return text + "</Collection>\n</VTKFile>\n" + xml_made_by(options.made_by);
   }
 
   /// Cells of one type, which follow each other.
@@ -233,7 +242,7 @@ struct ResultExport::Implementation {
       }
       text += only ? "" : "</Grid>\n";
     }
-    return text + "</Grid>\n</Domain>\n</Xdmf>\n";
+    return text + "</Grid>\n</Domain>\n</Xdmf>\n" + xml_made_by(options.made_by);
   }
 
   void write(const std::string& ending, bool overwrite) {
@@ -258,7 +267,10 @@ struct ResultExport::Implementation {
     return wanted;
   }
 
-  void write_decks() const {
+  void write_models_and_surface() const {
+    if (options.glb) {
+      write_result_surface(beside(result, ".glb"), grid, last, options.made_by, options.overwrite);
+    }
     for (const Deck deck : decks()) {
       write_file(beside(result, deck == Deck::inp ? ".inp" : ".feb"),
                  deck_text(model, options.run, deck, options.made_by), options.overwrite);
@@ -270,6 +282,7 @@ struct ResultExport::Implementation {
   ExportOptions options;
   ResultGrid grid;
   std::vector<double> times;
+  std::vector<std::vector<float>> last;  ///< fields of the last state, for .glb
   bool done = false;
 };
 
@@ -293,7 +306,7 @@ std::optional<fs::path> ResultExport::append(const State& state, const ElementFi
 
 void ResultExport::commit() {
   implementation_->write("", implementation_->options.overwrite);
-  implementation_->write_decks();
+  implementation_->write_models_and_surface();
   for (const fs::path& file : export_paths(implementation_->result, implementation_->options)) {
     fs::path old = file;
     std::error_code ignored;

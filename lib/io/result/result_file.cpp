@@ -7,6 +7,7 @@
 #include "tunica/io/result/detail/contact_record.hpp"
 #include "tunica/io/result/detail/hdf5_file.hpp"
 #include "tunica/io/result/detail/result_grid.hpp"
+#include "tunica/io/result/detail/triangle_rule.hpp"
 
 #include <fmt/format.h>
 #include <hdf5.h>
@@ -155,6 +156,7 @@ constexpr std::array about{
     About{"tunica/nodes/rotation", "rad", "rotation vectors by state and node, world axes"},
     About{"tunica/elements/nodes", "1", "the three nodes of each shell, rows of tunica/nodes, from 0", nullptr, true},
     About{"tunica/elements/body", "1", "the body of each shell, from 0", nullptr, true},
+    About{"tunica/elements/area", "mm2", "of each shell's curved patch, reference", nullptr, true},
     About{"tunica/history/load_factor", "1", "factor of the loads; dynamic: of the first load's ramp"},
     About{"tunica/history/volume", "mm3", "enclosed by the closed bodies' curved surfaces; NaN where one is open"},
     About{"tunica/history/strain_energy", "mJ", "elastic energy"},
@@ -205,6 +207,27 @@ constexpr std::array about_steps{About{"PartOffsets", "1", "first part of each s
                                  About{"ConnectivityIdOffsets", "1", "first entry of Connectivity of each state"},
                                  About{"NumberOfParts", "1", "parts of each state"}};
 
+std::vector<double> patch_areas(const Model& model) {
+  std::vector<double> areas;
+  for (const ShellBody& body : model.shells) {
+    for (const CubicPatch& patch : curved_patches(body.mesh)) {
+      double& area = areas.emplace_back(0);
+      for (const auto& [corners, weight] : triangle_rule()) {
+        const auto along = patch.tangents({corners[1], corners[2]});
+        area += weight * along[0].cross(along[1]).norm() / 2;
+      }
+    }
+  }
+  return areas;
+}
+
+/// What an attribute of ASCII can hold.
+std::string ascii_of(std::string text) {
+  std::ranges::replace_if(
+      text, [](char c) { return static_cast<unsigned char>(c) > '~'; }, '?');
+  return text;
+}
+
 struct ProbeSeries {
   std::size_t node = 0;
   Series displacement;
@@ -243,6 +266,8 @@ struct ResultFile::Implementation {
     }
     writer.text(tunica_group.get(), "command", options.command);
     writer.text(tunica_group.get(), "version", version);
+    writer.ascii_attribute(writer.root(), "made_by",
+                           ascii_of(fmt::format("tunica {}: {:.10000}", version, options.command)));
     const Handle inputs = writer.group(tunica_group.get(), "inputs");
     std::vector<std::string> paths;
     std::vector<std::string> hashes;
@@ -339,6 +364,7 @@ struct ResultFile::Implementation {
     }
     (void)writer.dataset(group, "nodes", H5T_NATIVE_INT64, {grid.elements(), 3}, nodes.data());
     (void)writer.dataset(group, "body", H5T_NATIVE_INT32, {grid.elements()}, bodies.data());
+    (void)writer.dataset(group, "area", H5T_NATIVE_DOUBLE, {grid.elements()}, patch_areas(model).data());
   }
 
   void write_tetrahedra(hid_t group) {

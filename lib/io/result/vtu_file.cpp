@@ -3,6 +3,7 @@
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/io/file/output_file.hpp"
+#include "tunica/io/file/signed_file.hpp"
 
 #include <fmt/format.h>
 #include <openssl/evp.h>
@@ -102,7 +103,7 @@ private:
 
 }  // namespace
 
-void write_vtu(const std::filesystem::path& path, const VtuGrid& grid, bool overwrite) {
+void write_vtu(const std::filesystem::path& path, const VtuGrid& grid, const std::string& made_by, bool overwrite) {
   Document document;
   document.line(R"(<?xml version="1.0"?>)");
   document.line(
@@ -118,7 +119,7 @@ void write_vtu(const std::filesystem::path& path, const VtuGrid& grid, bool over
                    {{"connectivity", 1, grid.connectivity}, {"offsets", 1, grid.ends}, {"types", 1, grid.types}});
   document.line("</Piece>");
   document.line("</UnstructuredGrid>");
-  write_file(path, document.str(), overwrite);
+  write_file(path, document.str() + xml_made_by(made_by), overwrite);
 }
 
 }  // namespace tunica

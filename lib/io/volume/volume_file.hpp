@@ -66,6 +66,8 @@ VolumeFile read_volume_header(const std::filesystem::path& path, const VolumeOpt
 /// Writes NIfTI-1, gzip-compressed when the name ends in ".gz". World transform as sform (float32), and as qform too
 /// where it has no shear; the same volume gives the same bytes. Errors: OutputError; InputError when a dimension is
 /// over 32767, NIfTI-1's limit.
-void write_nifti(const std::filesystem::path& path, const Volume& volume, bool overwrite);
+/// @param made_by  provenance, kept as a comment
+void write_nifti(const std::filesystem::path& path, const Volume& volume, bool overwrite,
+                 const std::string& made_by = {});
 
 }  // namespace tunica

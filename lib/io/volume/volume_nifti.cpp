@@ -218,20 +218,33 @@ Affine sform(const Header& header) {
   return affine;
 }
 
-// nifti1.h, "METHOD 2".
+// nifti1.h, "METHOD 2". In long double and in this order nibabel's affine is met to the last bit. Where the quaternion
+// leaves less than 1e-7 for the square of its first part, that is 0, as in nifti1_io.c and ITK; nibabel takes its root.
 Affine qform(const Header& header) {
-  Eigen::Vector4d q(0, header.quatern[0], header.quatern[1], header.quatern[2]);  // a, b, c, d
-  const double rest = 1 - q.squaredNorm();
-  q[0] = rest > 1e-7 ? std::sqrt(rest) : 0;
-  q /= q.norm() > 0 ? q.norm() : 1;
-  const Mat3 rotation = Eigen::Quaterniond(q[0], q[1], q[2], q[3]).toRotationMatrix();
+  using Real = long double;
+  const Real x = header.quatern[0];
+  const Real y = header.quatern[1];
+  const Real z = header.quatern[2];
+  const Real rest = 1 - (x * x + y * y + z * z);
+  const Real w = rest > 1e-7L ? std::sqrt(rest) : 0;
+  const Real s = 2 / (w * w + x * x + y * y + z * z);
+  const Real sx = x * s;
+  const Real sy = y * s;
+  const Real sz = z * s;
+  const std::array<std::array<Real, 3>, 3> rotation{{{1 - (y * sy + z * sz), x * sy - w * sz, x * sz + w * sy},
+                                                     {x * sy + w * sz, 1 - (x * sx + z * sz), y * sz - w * sx},
+                                                     {x * sz - w * sy, y * sz + w * sx, 1 - (x * sx + y * sy)}}};
   Vec3 scale = spacing_of(header);
   if (header.pixdim[0] < 0) {
     scale.z() = -scale.z();
   }
   Affine affine;
-  affine.leftCols<3>() = rotation * scale.asDiagonal();
-  affine.col(3) = Vec3(header.quatern[3], header.quatern[4], header.quatern[5]);
+  for (Eigen::Index row = 0; row < 3; ++row) {
+    for (Eigen::Index column = 0; column < 3; ++column) {
+      affine(row, column) = static_cast<double>(rotation[row][column] * scale[column]);
+    }
+    affine(row, 3) = header.quatern[3 + row];
+  }
   return affine;
 }
 

@@ -159,15 +159,33 @@ private:
   std::vector<Bytef> buffer_ = std::vector<Bytef>(std::size_t{1} << 16);
 };
 
+// Source: nifti1.h, "extensions"; code 6 is text. Their lengths are multiples of 16.
+std::string with_comment(std::string header, const std::string& text) {
+  if (text.empty()) {
+    return header;
+  }
+  constexpr std::size_t head = 8;
+  constexpr std::int32_t comment = 6;
+  const std::size_t length = (head + text.size() + 15) / 16 * 16;
+  std::string extension(length, '\0');
+  put(extension, 0, narrow<std::int32_t>(length));
+  put(extension, 4, comment);
+  extension.replace(head, text.size(), text);
+  TUNICA_ASSERT(header.size() == 352);
+  put(header, 108, static_cast<float>(header.size() + length));
+  header[348] = 1;
+  return header + extension;
+}
+
 }  // namespace
 
-void write_nifti(const fs::path& path, const Volume& volume, bool overwrite) {
+void write_nifti(const fs::path& path, const Volume& volume, bool overwrite, const std::string& made_by) {
   static_assert(std::endian::native == std::endian::little, "the header is written in the machine's byte order");
   std::visit(
       [&](const auto& values) {
         TUNICA_ASSERT(values.size() == volume.voxels());
         using T = typename std::decay_t<decltype(values)>::value_type;
-        const std::string header = header_of(path, volume, sizeof(T));
+        const std::string header = with_comment(header_of(path, volume, sizeof(T)), made_by);
         OutputFile output(path, overwrite);
         {
           Sink sink(output.partial_path(), path, path.extension() == ".gz");

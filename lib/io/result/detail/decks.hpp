@@ -4,7 +4,7 @@
 
 #include <string>
 
-/// Inside lib/io: the two files that hold a model. See model_deck.hpp.
+/// Inside lib/io: the two files that hold a model. See shell_deck.hpp.
 namespace tunica {
 
 std::string inp_text(const Model& model, const QuadraticShells& shells, const StaticRun& run,

@@ -30,7 +30,8 @@ struct VtuGrid {
 
 /// Writes a whole file: arrays compressed by zlib, appended in base64, so that any XML reader reads it.
 /// Source: VTK file formats, "XML file formats" (version 1.0, header_type UInt64, vtkZLibDataCompressor).
+/// @param made_by  provenance, a comment of the file
 /// Errors: OutputError.
-void write_vtu(const std::filesystem::path& path, const VtuGrid& grid, bool overwrite);
+void write_vtu(const std::filesystem::path& path, const VtuGrid& grid, const std::string& made_by, bool overwrite);
 
 }  // namespace tunica

@@ -1,4 +1,4 @@
-#include "tunica/io/result/model_deck.hpp"
+#include "tunica/io/result/shell_deck.hpp"
 
 #include "tunica/core/error.hpp"
 #include "tunica/io/result/detail/decks.hpp"

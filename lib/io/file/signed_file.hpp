@@ -1,0 +1,15 @@
+#pragma once
+
+#include <string>
+
+/// Pictures and texts that say what made them, in the place that their format has for that.
+namespace tunica {
+
+/// A PNG with `made_by` as its Comment (chunk iTXt, UTF-8) behind the header. Source: PNG specification, 11.3.4.5.
+/// @param png  a whole PNG
+std::string png_made_by(const std::string& png, const std::string& made_by);
+
+/// As a comment of XML, such as SVG, VTK's and XDMF files have. Two hyphens, which must not stand in one, are parted.
+std::string xml_made_by(const std::string& made_by);
+
+}  // namespace tunica

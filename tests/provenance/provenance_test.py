@@ -1,0 +1,140 @@
+"""What outputs say of what made them: the same bytes whatever the threads and the output's name; no names of patients
+with --no-paths."""
+import json
+import os
+import pathlib
+import struct
+import subprocess
+import tempfile
+import unittest
+import zlib
+
+import h5py
+import nibabel
+
+BIN = pathlib.Path(os.environ["TUNICA_BIN"])
+PATIENT = "Miller"
+
+
+def png_comment(data):
+    """The chunks of a PNG, their checksums checked; @return the text of its iTXt"""
+    at, text = 8, None
+    while at < len(data):
+        length, kind = struct.unpack(">I4s", data[at:at + 8])
+        body = data[at + 8:at + 8 + length]
+        assert struct.unpack(">I", data[at + 8 + length:at + 12 + length])[0] == zlib.crc32(kind + body)
+        if kind == b"iTXt":
+            keyword, rest = body.split(b"\0", 1)
+            assert keyword == b"Comment" and rest[:4] == b"\0\0\0\0"
+            text = rest[4:].decode()
+        at += 12 + length
+    return text
+
+
+class Provenance(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory(prefix="tunica-provenance-")
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+
+    def run_tool(self, verb, *words, folder=None, expect=0):
+        done = subprocess.run([str(BIN / f"tunica-{verb}"), *map(str, words)], cwd=folder or self.folder,
+                              capture_output=True, text=True, timeout=120, check=False)
+        self.assertEqual(done.returncode, expect, done.stderr)
+        return done
+
+    def pipeline(self, folder, case, *common):
+        """Every tool once, in `folder`; files are called by `case`."""
+        def run(verb, *words):
+            self.run_tool(verb, *words, *common, "--quiet", "--force", "--report", f"{case}-{verb}.json", folder=folder)
+
+        exports = [word for name in ("pvd", "xmf", "inp", "feb", "glb") for word in ("--export", name)]
+        run("phantom", "bladder", f"{case}.nii.gz", "--size", "24", "--spacing", "2", "--truth", f"{case}-truth.ply")
+        run("extract", f"{case}.nii.gz", f"{case}-surface.ply", "--label", "1", "--smooth", "staircase")
+        for ending in ("glb", "obj", "stl"):
+            run("extract", f"{case}.nii.gz", f"{case}-surface.{ending}", "--label", "1")
+        run("decimate", f"{case}-surface.ply", f"{case}-coarse.ply", "--triangles", "120")
+        run("relax", f"{case}-coarse.ply", f"{case}-surface.ply", f"{case}-shell.ply", "--map", f"{case}-map.ply",
+            "--picture", f"{case}-map.png", "--curved", f"{case}-curved.ply")
+        run("compare", f"{case}-shell.ply", f"{case}-surface.ply", "--shell", "--picture", f"{case}-compare.png",
+            "--map", f"{case}-compare.ply")
+        run("simulate", f"{case}-shell.ply", f"{case}-result.hdf", "--young", "1MPa", "--poisson", "0.45",
+            "--thickness", "2mm", "--pressure", "1kPa", "--fix", "rigid-motions", "--static", *exports)
+        run("chart", f"{case}-relax.json", "-o", f"{case}-chart.svg", "--csv", f"{case}-chart.csv", "--x",
+            "result.shells", "--y", "result.hausdorff_percent.upper", "--label", "file")
+
+    def made_in(self, name):
+        folder = self.folder / name
+        folder.mkdir()
+        return folder
+
+    def test_same_bytes_with_one_and_two_threads_and_every_output_says_what_made_it(self):
+        made = []
+        for threads in ("1", "2"):
+            folder = self.made_in(threads)
+            self.pipeline(folder, "case", "--threads", threads)
+            made.append({path.name: path.read_bytes() for path in folder.iterdir() if path.suffix != ".json"})
+        self.assertEqual(set(made[0]), set(made[1]))
+        self.assertGreater(len(made[0]), 18)
+        version = self.run_tool("extract", "--version").stdout.split()[1]
+        for name, data in made[0].items():
+            with self.subTest(name=name):
+                self.assertEqual(data, made[1][name])
+                if name.endswith(".png"):
+                    data = png_comment(data).encode()
+                elif name.endswith(".nii.gz"):
+                    data = nibabel.load(folder / name).header.extensions[0].get_content()
+                tool = (name.split(".")[0].split("-") + ["phantom"])[1]
+                verb = {"surface": "extract", "coarse": "decimate", "compare": "compare", "result": "simulate",
+                        "result_0000": "simulate", "result_0001": "simulate", "chart": "chart", "phantom": "phantom",
+                        "truth": "phantom"}.get(tool, "relax")
+                said = data if isinstance(data, bytes) else data.encode()
+                if not name.endswith(".stl"):  # which has 80 bytes
+                    self.assertIn(f"tunica-{verb} ".encode(), said)
+                self.assertIn(f"tunica {version}".encode(), said)
+                for word in (b"--threads", b"--report", b"--force"):
+                    self.assertNotIn(word, said)
+
+    def test_the_output_may_have_any_name(self):
+        folder = self.made_in("names")
+        self.pipeline(folder, "case")
+        for out in ("case-coarse.ply", "other.ply"):
+            self.run_tool("decimate", "case-surface.ply", out, "--triangles", "120", "--force", folder=folder)
+        self.assertEqual((folder / "other.ply").read_bytes(), (folder / "case-coarse.ply").read_bytes())
+
+    def test_no_paths(self):
+        folder = self.made_in(PATIENT)
+        self.pipeline(folder, PATIENT, "--no-paths")
+        paths = sorted(folder.iterdir())
+        self.assertGreater(len(paths), 25)
+        for path in paths:
+            data = path.read_bytes()
+            if path.name.endswith(".nii.gz"):
+                data = nibabel.load(path).header.extensions[0].get_content().encode()
+            elif path.suffix in (".pvd", ".xmf"):
+                continue  # they refer to the files beside them
+            self.assertNotIn(PATIENT.encode(), data, path.name)
+            self.assertNotIn(str(self.folder).encode(), data, path.name)
+        report = json.loads((folder / f"{PATIENT}-relax.json").read_text(encoding="utf-8"))
+        self.assertEqual([item["path"] for item in report["inputs"]], ["input1.ply", "input2.ply"])
+        self.assertTrue(all(item["sha256"] for item in report["inputs"]))
+        self.assertIn("tunica-relax", report["command"])
+        with h5py.File(folder / f"{PATIENT}-result.hdf") as file:
+            self.assertIn(b"input1.ply", file["tunica/scene"][()])
+            self.assertEqual(file["tunica/inputs/path"][0], b"input1.ply")
+
+    def test_no_paths_when_a_run_fails(self):
+        folder = self.made_in(PATIENT)
+        for words in (["missing.nii.gz", f"{PATIENT}.ply", "--label", "1"], [f"{folder}/{PATIENT}.nii.gz", "--info"],
+                      [f"{PATIENT}.nii.gz", f"{PATIENT}.ply", "--label", "one"],
+                      [f"{PATIENT}.nii.gz", f"{PATIENT}.ply", "--labell=1"]):
+            subprocess.run([BIN / "tunica-extract", *words, "--no-paths", "--report", "report.json"], cwd=folder,
+                           capture_output=True, timeout=60, check=False)
+            text = (folder / "report.json").read_text(encoding="utf-8")
+            self.assertFalse(json.loads(text)["ok"])
+            self.assertNotIn(PATIENT, text)
+            (folder / "report.json").unlink()
+
+
+if __name__ == "__main__":
+    unittest.main()

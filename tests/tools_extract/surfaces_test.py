@@ -1,0 +1,132 @@
+"""GLB, OBJ and STL: what is written is read again, to float accuracy."""
+import json
+import os
+import pathlib
+import struct
+import subprocess
+import tempfile
+import unittest
+
+import h5py
+import numpy as np
+
+from volumes import Ply
+
+BIN = pathlib.Path(os.environ["TUNICA_BIN"])
+
+
+def read_glb(data):
+    """@return positions in metres, colours or None, triangles, the JSON"""
+    length, = struct.unpack_from("<I", data, 12)
+    scene = json.loads(data[20:20 + length])
+    binary = data[20 + length + 8:]
+    types = {5126: "<f4", 5125: "<u4", 5123: "<u2", 5121: "u1"}
+    wide = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}
+
+    def array(index):
+        accessor = scene["accessors"][index]
+        view = scene["bufferViews"][accessor["bufferView"]]
+        count = accessor["count"] * wide[accessor["type"]]
+        start = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
+        return np.frombuffer(binary, types[accessor["componentType"]], count, start).reshape(accessor["count"], -1)
+
+    primitive = scene["meshes"][0]["primitives"][0]
+    node = scene["nodes"][0]
+    matrix = np.array(node.get("matrix", np.eye(4).ravel())).reshape(4, 4).T
+    scale = matrix[:3, :3] @ np.diag(node.get("scale", [1, 1, 1]))
+    colours = primitive["attributes"].get("COLOR_0")
+    return (array(primitive["attributes"]["POSITION"]).astype(float) @ scale.T,
+            None if colours is None else array(colours).astype(float),
+            array(primitive["indices"]).reshape(-1, 3), scene)
+
+
+class Surfaces(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory(prefix="tunica-surfaces-")
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+
+    def run_tool(self, verb, *words, expect=0):
+        done = subprocess.run([BIN / f"tunica-{verb}", *map(str, words), "--report", "report.json", "--force"],
+                              cwd=self.folder, capture_output=True, text=True, timeout=120, check=False)
+        self.assertEqual(done.returncode, expect, done.stderr)
+        self.error = done.stderr
+        return json.loads((self.folder / "report.json").read_text(encoding="utf-8"))["result"]
+
+    def extracted(self):
+        self.run_tool("phantom", "sphere", "v.nii.gz", "--size", "16", "--spacing", "1.7")
+        for ending in ("ply", "glb", "obj", "stl"):
+            self.run_tool("extract", "v.nii.gz", f"s.{ending}", "--label", "1", "--smooth", "staircase")
+        return Ply(self.folder / "s.ply")
+
+    def same(self, vertices, triangles, ply):
+        """Triangle by triangle, whatever became of the order of the vertices."""
+        ours, theirs = ply.vertices[ply.triangles], vertices[triangles]
+        self.assertEqual(ours.shape, theirs.shape)
+        np.testing.assert_allclose(theirs, ours, rtol=1.2e-7, atol=1e-6)
+
+    def test_what_is_written_is_what_was_extracted(self):
+        ply = self.extracted()
+        positions, colours, triangles, scene = read_glb((self.folder / "s.glb").read_bytes())
+        self.same(1000 * positions, triangles, ply)
+        self.assertIsNone(colours)
+        self.assertIn("tunica-extract v.nii.gz OUT.glb", json.dumps(scene["nodes"][0]["extras"]))
+        lines = (self.folder / "s.obj").read_text(encoding="utf-8").splitlines()
+        self.assertTrue(lines[0].startswith("# SPACE=LPS; "))
+        vertices = [[float(x) for x in line.split()[1:4]] for line in lines if line.startswith("v ")]
+        faces = [[int(corner.split("/")[0]) - 1 for corner in line.split()[1:]] for line in lines
+                 if line.startswith("f ")]
+        self.assertEqual(len(vertices), len(ply.vertices))
+        np.testing.assert_allclose(np.array(vertices)[np.array(faces)], ply.vertices[ply.triangles], rtol=1e-5)
+        stl = (self.folder / "s.stl").read_bytes()
+        count, = struct.unpack_from("<I", stl, 80)
+        self.assertEqual(len(stl), 84 + 50 * count)
+        facets = np.frombuffer(stl, [("n", "<f4", 3), ("v", "<f4", (3, 3)), ("a", "<u2")], count, 84)
+        np.testing.assert_allclose(facets["v"], ply.vertices[ply.triangles], rtol=1.2e-7, atol=1e-6)
+
+    def test_our_readers_take_them(self):
+        ply = self.extracted()
+        for ending in ("ply", "glb", "obj", "stl"):
+            read = self.run_tool("decimate", f"s.{ending}", "again.ply", "--triangles", "100000")
+            self.assertEqual(read["triangles_in"], len(ply.triangles), ending)
+            self.assertTrue(read["manifold"])
+            again = Ply(self.folder / "again.ply")
+            self.assertEqual(len(again.vertices), len(ply.vertices))
+            np.testing.assert_allclose(again.volume() / ply.volume(), 1, rtol=2e-6)
+            np.testing.assert_allclose(again.vertices.min(axis=0), ply.vertices.min(axis=0), rtol=1e-5)
+
+    def test_other_endings_are_refused(self):
+        self.run_tool("phantom", "sphere", "v.nii.gz", "--size", "16", "--spacing", "1.7")
+        for name in ("s.3mf", "s.gltf", "s"):
+            self.run_tool("extract", "v.nii.gz", name, "--label", "1", expect=2)
+            self.assertIn(".ply or .glb or .obj or .stl", self.error)
+            self.assertFalse((self.folder / name).exists())
+
+    def test_curved_surfaces_and_results(self):
+        self.extracted()
+        self.run_tool("decimate", "s.ply", "c.ply", "--triangles", "120")
+        self.run_tool("relax", "c.ply", "s.ply", "shell.ply", "--curved", "curved.glb")
+        self.run_tool("compare", "shell.ply", "s.ply", "--shell", "--curved", "curved.ply")
+        self.run_tool("compare", "shell.ply", "s.ply", "--shell", "--curved", "curved.stl")
+        curved = Ply(self.folder / "curved.ply")
+        positions, _, triangles, _ = read_glb((self.folder / "curved.glb").read_bytes())
+        self.same(1000 * positions, triangles, curved)
+        self.run_tool("simulate", "shell.ply", "r.hdf", "--young", "1MPa", "--poisson", "0.45", "--thickness", "1mm",
+                      "--pressure", "1kPa", "--fix", "rigid-motions", "--static", "--export", "glb")
+        positions, colours, triangles, scene = read_glb((self.folder / "r.glb").read_bytes())
+        with h5py.File(self.folder / "r.hdf") as file:
+            vtk = file["VTKHDF"]
+            moved = vtk["Points"][()] + vtk["PointData/displacement"][()]
+            stress = vtk["PointData/von_mises"][()]
+            corners = vtk["Connectivity"][()].reshape(-1, 3)
+        np.testing.assert_allclose(1000 * positions[triangles], moved[corners], rtol=1e-6, atol=1e-5)
+        # Viridis grows brighter, and the largest stress is its end: yellow.
+        green = colours[triangles][..., 1].ravel()
+        self.assertGreater(np.corrcoef(green, stress[corners].ravel())[0, 1], 0.9)
+        red, green, blue = colours[triangles].reshape(-1, colours.shape[1])[stress[corners].argmax(), :3]
+        self.assertTrue(red > 0.7 and green > 0.7 and blue < 0.3, (red, green, blue))
+        self.assertIn(f"{stress.max():.4g} MPa", scene["nodes"][0]["extras"]["made_by"])
+
+
+if __name__ == "__main__":
+    unittest.main()
