@@ -125,6 +125,11 @@ class WholeTools(unittest.TestCase):
                 for flag in ("--help", "--version", "--report", "--threads", "--quiet", "--verbose", "--force"):
                     self.assertEqual((flag in common, text.count(f"{flag} ") - common.count(f"{flag} ")), (True, 0), flag)
 
+    def test_version_says_which_instructions_run(self):
+        for verb in self.COMMANDS:
+            text = subprocess.run([tool(verb), "--version"], capture_output=True, text=True, check=True).stdout
+            self.assertRegex(text, rf"^tunica-{verb} \d+\.\d+\.\d+ \((x86-64|x86-64-v3|other)\)\n$")
+
     def test_a_bare_call_shows_the_short_usage(self):
         for verb in self.COMMANDS:
             run = subprocess.run([tool(verb)], capture_output=True, text=True)
