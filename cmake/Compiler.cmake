@@ -23,6 +23,7 @@ if(TUNICA_SANITIZE)
   target_link_libraries(tunica_flags INTERFACE tunica_sanitizers)
 endif()
 
+# -DTUNICA_HAS_X86_64_V3=ON: for other machines, whatever this one has.
 if(TUNICA_X86_64_V3 AND CMAKE_SYSTEM_PROCESSOR STREQUAL "x86_64")
   include(CheckCXXSourceRuns)
   check_cxx_source_runs("int main() { return __builtin_cpu_supports(\"avx2\") && __builtin_cpu_supports(\"fma\") &&
@@ -31,6 +32,21 @@ if(TUNICA_X86_64_V3 AND CMAKE_SYSTEM_PROCESSOR STREQUAL "x86_64")
     set(TUNICA_INSTRUCTIONS -march=x86-64-v3)
     target_compile_options(tunica_flags INTERFACE ${TUNICA_INSTRUCTIONS})
   endif()
+endif()
+
+# How Eigen aligns its vectors depends on the instructions. Who links static libraries needs the same ones; a shared library
+# may be another one where the program runs (debian/rules): there alignment is the same whatever the instructions.
+add_library(tunica_alignment INTERFACE)
+
+if(TUNICA_SHARED)
+  set(CMAKE_POSITION_INDEPENDENT_CODE ON)
+  # Calls within the library stay within it: no other definition takes their place, and they are inlined as in a program.
+  target_compile_options(tunica_flags INTERFACE -fno-semantic-interposition -fvisibility-inlines-hidden)
+  set(CMAKE_INSTALL_RPATH $ORIGIN/../${CMAKE_INSTALL_LIBDIR})
+  set(TUNICA_ALIGNMENT -DEIGEN_MAX_ALIGN_BYTES=32 -DEIGEN_MAX_STATIC_ALIGN_BYTES=32)
+  target_compile_options(tunica_alignment INTERFACE ${TUNICA_ALIGNMENT})
+else()
+  target_compile_options(tunica_alignment INTERFACE $<INSTALL_INTERFACE:${TUNICA_INSTRUCTIONS}>)
 endif()
 
 # Command lines compute nothing, and more takes longer to compile.
@@ -49,13 +65,13 @@ function(tunica_library name)
   target_include_directories(tunica_${name} PUBLIC
                              $<BUILD_INTERFACE:${PROJECT_BINARY_DIR}/include>
                              $<BUILD_INTERFACE:${PROJECT_BINARY_DIR}/include/generated> $<INSTALL_INTERFACE:include>)
-  target_link_libraries(tunica_${name} PUBLIC ${arg_LINKS} PRIVATE $<BUILD_INTERFACE:tunica_flags> ${arg_PRIVATE})
+  target_link_libraries(tunica_${name} PUBLIC tunica_alignment ${arg_LINKS}
+                        PRIVATE $<BUILD_INTERFACE:tunica_flags> ${arg_PRIVATE})
+  set_property(GLOBAL APPEND PROPERTY TUNICA_LIBRARIES_WITHIN ${arg_PRIVATE})
   if(TUNICA_UNITY)
     set_target_properties(tunica_${name} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 8)
   endif()
   target_compile_features(tunica_${name} PUBLIC cxx_std_20)
-  # How Eigen aligns its vectors depends on it: who links these libraries needs the same.
-  target_compile_options(tunica_${name} PUBLIC $<INSTALL_INTERFACE:${TUNICA_INSTRUCTIONS}>)
 endfunction()
 
 # tunica_test(NAME LINKS lib...): every .cpp of the current folder as one GoogleTest program.

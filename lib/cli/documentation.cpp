@@ -1,109 +1,17 @@
 #include "tunica/cli/detail/documentation.hpp"
 
+#include "tunica/cli/detail/option_value.hpp"
 #include "tunica/core/version.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <array>
 #include <sstream>
 #include <vector>
 
 namespace tunica::cli {
 namespace {
-
-// What the words after an option stand for, read from its type name: "SCALE:{auto,linear,log}", "mm|cm", "FILE", "N".
-struct Value {
-  std::string placeholder;           ///< empty for a flag
-  std::vector<std::string> choices;  ///< empty: free
-  bool described = false;            ///< the choices are named in the description
-  bool file = false;
-};
-
-std::vector<std::string> split(const std::string& text, char separator) {
-  std::vector<std::string> parts;
-  std::stringstream stream(text);
-  for (std::string part; std::getline(stream, part, separator);) {
-    parts.push_back(part);
-  }
-  return parts;
-}
-
-bool is_word(const std::string& text) {
-  return !text.empty() &&
-         std::ranges::all_of(text, [](char c) { return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '-'; });
-}
-
-// The words of a description that ends in a choice: "bending element: comas (the paper's) | dkt (default dkt)".
-std::vector<std::string> described_choices(const std::string& description) {
-  std::string plain;
-  int depth = 0;
-  for (const char c : description) {
-    depth += c == '(' ? 1 : 0;
-    if (depth == 0) {
-      plain += c;
-    }
-    depth -= c == ')' ? 1 : 0;
-  }
-  if (plain.find('|') == std::string::npos) {
-    return {};
-  }
-  const std::size_t colon = plain.rfind(": ", plain.find('|'));
-  std::vector<std::string> words;
-  for (const std::string& part : split(colon == std::string::npos ? plain : plain.substr(colon + 2), '|')) {
-    const std::size_t begin = std::min(part.find_first_not_of(' '), part.size());
-    const std::string word = part.substr(begin, part.find_last_not_of(' ') + 1 - begin);
-    if (is_word(word)) {
-      words.push_back(word);
-    }
-  }
-  return words.size() > 1 ? words : std::vector<std::string>{};
-}
-
-Value value_of(const CLI::Option& option) {
-  Value value;
-  if (option.get_items_expected_max() == 0) {
-    return value;
-  }
-  const std::string type = option.get_type_name();
-  const std::size_t colon = type.find(':');
-  value.placeholder = type.substr(0, colon);
-  const std::size_t open = type.find('{');
-  const std::size_t close = type.find('}');
-  if (open != std::string::npos && close != std::string::npos && open < close) {
-    value.choices = split(type.substr(open + 1, close - open - 1), ',');
-  } else if (value.placeholder.find('|') != std::string::npos) {
-    for (const std::string& word : split(value.placeholder, '|')) {
-      if (is_word(word)) {
-        value.choices.push_back(word);
-      }
-    }
-  }
-  if (value.choices.empty()) {
-    value.choices = described_choices(option.get_description());
-    value.described = !value.choices.empty();
-  }
-  constexpr std::array<const char*, 12> not_files{"NAME",   "WHERE",    "N",         "INT", "UINT",    "FLOAT",
-                                                  "NUMBER", "QUANTITY", "TOLERANCE", "KEY", "PERCENT", "DEG"};
-  const auto known = [&](const char* name) { return value.placeholder == name; };
-  value.file = option.get_positional() || (value.choices.empty() && std::ranges::none_of(not_files, known));
-  return value;
-}
-
-bool hidden(const CLI::Option& option) { return option.get_group().empty(); }
-
-// "-o", "--output"
-std::vector<std::string> spellings(const CLI::Option& option) {
-  std::vector<std::string> names;
-  for (const std::string& name : option.get_snames()) {
-    names.push_back("-" + name);
-  }
-  for (const std::string& name : option.get_lnames()) {
-    names.push_back("--" + name);
-  }
-  return names;
-}
 
 // Literal text for man(7): no escapes, no hyphenation of minus signs, no line that is taken for a request.
 std::string roff(const std::string& text) {
@@ -148,10 +56,6 @@ std::string first_sentence(const std::string& text) {
   return sentence;
 }
 
-std::string positional_name(const CLI::Option& option) {
-  return option.get_name(true, false) + (option.get_items_expected_max() > 1 ? "..." : "");
-}
-
 std::string synopsis(const CLI::App& tool) {
   std::string line = fmt::format(".B {}\n[\\fIOPTION\\fR]...", roff(tool.get_name()));
   for (const CLI::Option* option : tool.get_options()) {
@@ -170,7 +74,7 @@ std::string synopsis(const CLI::App& tool) {
 }
 
 std::string option_entry(const CLI::Option& option) {
-  const Value value = value_of(option);
+  const OptionValue value = value_of(option);
   std::string entry = ".TP\n";
   if (option.get_positional()) {
     entry += fmt::format("\\fI{}\\fR\n", roff(positional_name(option)));
@@ -272,58 +176,6 @@ std::string man_page(const CLI::App& tool) {
   page += closing_sections;
   page += ".SH EXAMPLE\n" + examples(tool);
   return page;
-}
-
-std::string bash_completion(const CLI::App& tool) {
-  std::vector<std::string> flags;
-  std::string cases;
-  for (const CLI::Option* option : tool.get_options()) {
-    if (hidden(*option) || option->get_positional()) {
-      continue;
-    }
-    const std::vector<std::string> names = spellings(*option);
-    flags.insert(flags.end(), names.begin(), names.end());
-    const Value value = value_of(*option);
-    if (value.placeholder.empty()) {
-      continue;
-    }
-    const std::string action =
-        !value.choices.empty()
-            ? fmt::format("mapfile -t COMPREPLY < <(compgen -W '{}' -- \"$current\")", fmt::join(value.choices, " "))
-        : value.file ? std::string("_tunica_files \"$current\"")
-                     : std::string("COMPREPLY=()");
-    cases += fmt::format("    {}) {}; return ;;\n", fmt::join(names, "|"), action);
-  }
-  std::string function = "_" + tool.get_name();
-  std::ranges::replace(function, '-', '_');
-  return fmt::format(R"(# bash completion for {0} {1}, made from its options
-
-_tunica_files() {{
-  mapfile -t COMPREPLY < <(compgen -f -- "$1")
-  compopt -o filenames 2>/dev/null
-}}
-
-{2}() {{
-  local current="${{COMP_WORDS[COMP_CWORD]}}" previous="${{COMP_WORDS[COMP_CWORD-1]}}"
-  COMPREPLY=()
-  # --flag=value arrives as three words
-  if [[ $current == '=' ]]; then
-    current=''
-  elif [[ $previous == '=' && $COMP_CWORD -ge 2 ]]; then
-    previous="${{COMP_WORDS[COMP_CWORD-2]}}"
-  fi
-  case "$previous" in
-{3}  esac
-  if [[ $current == -* ]]; then
-    mapfile -t COMPREPLY < <(compgen -W '{4}' -- "$current")
-  else
-    _tunica_files "$current"
-  fi
-}}
-
-complete -F {2} {0}
-)",
-                     tool.get_name(), version, function, cases, fmt::join(flags, " "));
 }
 
 }  // namespace tunica::cli

@@ -2,6 +2,7 @@
 
 #include "tunica/cli/detail/documentation.hpp"
 #include "tunica/cli/usage.hpp"
+#include "tunica/core/instruction_set.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/core/threads.hpp"
 #include "tunica/core/version.hpp"
@@ -155,13 +156,15 @@ Tool::Tool(std::string verb, std::string summary, std::string example)
   std::set_terminate(on_terminate);
   app_.footer("Example:\n  " + std::regex_replace(example, std::regex("\n *"), "\n  "));
   app_.set_help_flag();
+  app_.formatter(help_layout());
 }
 
 void Tool::declare_common() {
   const char* const common = "Options of every tool";
   group(common);
   app_.set_help_flag("-h,--help", "print this help and stop")->group(common);
-  app_.set_version_flag("--version", fmt::format("tunica-{} {}", verb_, version), "print name and version and stop")
+  app_.set_version_flag("--version", fmt::format("tunica-{} {} ({})", verb_, version, instruction_set()),
+                        "print name, version and instruction set, and stop")
       ->group(common);
   app_.add_option(report_flag, report_,
                   "write a JSON record of the run to FILE, also when the run fails; -: to standard output")
@@ -241,12 +244,14 @@ void Tool::parse_common() {
 
 std::optional<int> Tool::parse(int argc, char** argv) {
   try {
-    // For the build alone, so not among the options: the manual page and the completion that are installed.
+    // For the build alone, so not among the options: the manual page and the completions that are installed.
     if (argc == 3 && std::string_view(argv[1]) == "--documentation") {
-      const std::string_view kind = argv[2];
-      if (kind == "man" || kind == "bash") {
-        print(kind == "man" ? man_page(app_) : bash_completion(app_));
-        return 0;
+      for (const auto& [kind, made] : {std::pair{"man", &man_page}, std::pair{"bash", &bash_completion},
+                                       std::pair{"zsh", &zsh_completion}, std::pair{"fish", &fish_completion}}) {
+        if (std::string_view(argv[2]) == kind) {
+          print(made(app_));
+          return 0;
+        }
       }
     }
     const auto& options = app_.get_options();
@@ -416,6 +421,7 @@ void Tool::write_report(bool ok, const std::string& error) {
   const Json report{
       {"tool", "tunica-" + verb_},
       {"version", version},
+      {"instruction_set", instruction_set()},
       {"ok", ok},
       {"error", error.empty() ? Json() : Json(error)},
       {"warnings", warnings_},

@@ -1,10 +1,12 @@
 #include "tunica/cli/usage.hpp"
 
+#include "tunica/cli/detail/option_value.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/core/quantity.hpp"
 #include "tunica/io/file/suggestion.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <cmath>
 #include <string_view>
@@ -27,7 +29,57 @@ std::string unknown_flag(const CLI::App& app, const std::string& word) {
                      near.empty() ? "" : fmt::format("; did you mean {}?", near));
 }
 
+constexpr std::size_t columns = 80, descriptions_from = 30;
+
+// Lines that end before the last column; all but the first begin with `indent` blanks. @param from  where the first
+// begins
+std::string wrapped(const std::string& text, std::size_t from, std::size_t indent) {
+  std::string lines;
+  std::size_t column = from;
+  for (const std::string& word : split(text, ' ')) {
+    const bool first = lines.empty();
+    if (!first && column + 1 + word.size() > columns) {
+      lines += "\n" + std::string(indent, ' ');
+      column = indent;
+    } else if (!first) {
+      lines += ' ';
+      ++column;
+    }
+    lines += word;
+    column += word.size();
+  }
+  return lines;
+}
+
+class HelpLayout : public CLI::Formatter {
+public:
+  std::string make_description(const CLI::App* app) const override {
+    return wrapped(app->get_description(), 0, 0) + "\n";
+  }
+
+  std::string make_usage(const CLI::App* app, std::string) const override {
+    std::string usage = short_usage(*app);
+    usage.front() = 'U';
+    return wrapped(usage, 0, 7) + "\n";
+  }
+
+  std::string make_option(const CLI::Option* option, bool positional) const override {
+    const OptionValue value = value_of(*option);
+    std::string head =
+        "  " + (positional ? positional_name(*option) : fmt::format("{}", fmt::join(spellings(*option), ", ")));
+    if (!positional && !value.placeholder.empty()) {
+      head += ' ' + (value.choices.empty() || value.described ? value.placeholder
+                                                              : fmt::format("{}", fmt::join(value.choices, "|")));
+    }
+    const std::string gap = head.size() + 2 > descriptions_from ? "\n" + std::string(descriptions_from, ' ')
+                                                                : std::string(descriptions_from - head.size(), ' ');
+    return head + gap + wrapped(option->get_description(), descriptions_from, descriptions_from) + "\n";
+  }
+};
+
 }  // namespace
+
+std::shared_ptr<CLI::FormatterBase> help_layout() { return std::make_shared<HelpLayout>(); }
 
 std::string short_usage(const CLI::App& app) {
   std::string words;

@@ -92,8 +92,8 @@ TEST_F(ToolTest, AReportHoldsTheKeysOfTheContract) {
     const auto stage = tool.stage("read");
   });
   EXPECT_EQ(outcome.code, 0) << outcome.error;
-  for (const char* key : {"tool", "version", "ok", "error", "warnings", "command", "inputs", "outputs", "seconds",
-                          "peak_mib", "threads", "result"}) {
+  for (const char* key : {"tool", "version", "instruction_set", "ok", "error", "warnings", "command", "inputs",
+                          "outputs", "seconds", "peak_mib", "threads", "result"}) {
     EXPECT_TRUE(outcome.report.contains(key)) << key;
   }
   EXPECT_EQ(outcome.report["ok"], true);

@@ -118,9 +118,17 @@ class WholeTools(unittest.TestCase):
                 self.assertEqual(len(headings), len(set(headings)))
                 self.assertGreaterEqual(len(headings), 4 if verb != "phantom" else 3)
                 self.assertNotIn("\n\n\n", text)
+                lines = text[:text.index("\nExample:")].splitlines()
+                self.assertEqual([line for line in lines if len(line) > 80 or line.endswith(" ")], [])
+                self.assertNotRegex(text, r":{|\(\d*x\)")
                 common = text[text.index("Options of every tool:"):]
                 for flag in ("--help", "--version", "--report", "--threads", "--quiet", "--verbose", "--force"):
                     self.assertEqual((flag in common, text.count(f"{flag} ") - common.count(f"{flag} ")), (True, 0), flag)
+
+    def test_version_says_which_instructions_run(self):
+        for verb in self.COMMANDS:
+            text = subprocess.run([tool(verb), "--version"], capture_output=True, text=True, check=True).stdout
+            self.assertRegex(text, rf"^tunica-{verb} \d+\.\d+\.\d+ \((x86-64|x86-64-v3|other)\)\n$")
 
     def test_a_bare_call_shows_the_short_usage(self):
         for verb in self.COMMANDS:

@@ -260,7 +260,7 @@ def lengths(path, text):
 def blanks(path, text):
     """No tabs (but in makefiles), no blanks at the end of a line, one newline at the end of the file."""
     found = []
-    makefile = "Makefile" in path or path.endswith(".mk")
+    makefile = "Makefile" in path or path.endswith((".mk", "debian/rules"))
     for number, line in _lines(text):
         if "\t" in line and not makefile:
             found.append(f"{path}:{number}: tab")

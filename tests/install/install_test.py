@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""What cmake --install leaves: every tool with a manual page and a bash completion that know its flags, and the library,
-against which the examples are built as somebody else's project."""
+"""What cmake --install leaves: every tool with a manual page and completions for three shells that know its flags, manual
+pages of the files, and the library, against which the examples are built as somebody else's project."""
 
 import os
 import re
@@ -40,8 +40,10 @@ class Installed(unittest.TestCase):
         return run.stdout
 
     def flags_of(self, tool):
-        names = [name for line in re.findall(r"(?m)^  (-\S+)", self.help_of(tool)) for name in line.split(",")]
-        return sorted(name for name in names if name.startswith("--"))
+        return sorted(re.findall(r"(?m)^  (?:-\w, )?(--[\w-]+)", self.help_of(tool)))
+
+    def pages(self):
+        return sorted((self.prefix / "share" / "man").rglob("*.[157]"))
 
     def page(self, tool):
         return self.prefix / "share" / "man" / "man1" / (tool + ".1")
@@ -64,17 +66,32 @@ class Installed(unittest.TestCase):
                 self.assertRegex(plain, rf"(?m)^{tool} - \w")
                 self.assertIn(tool, plain.split(".SH EXAMPLE")[1])
 
+    def test_files_and_the_whole_have_manual_pages(self):
+        if not shutil.which("lowdown"):
+            self.skipTest("needs lowdown, which makes them from the pages of docs/")
+        text = {page.name: page.read_text() for page in self.pages()}
+        for name, words in (("tunica-scene.5", ["[[shell]]", "frequencies", "spectral_"]),
+                            ("tunica-result.5", ["VTKHDF", "von_", "iterations"]),
+                            ("tunica.7", ["Exit codes", "100mmHg", *self.tools])):
+            plain = text[name].replace("\\-", "-")
+            self.assertRegex(plain, rf"(?m)^\.SH NAME\n{name[:-2]} - \w")
+            for word in words:
+                self.assertIn(word, plain, name)
+
     def test_manual_pages_are_formatted_without_warnings(self):
-        groff = shutil.which("groff")
-        if not groff:
-            self.skipTest("needs groff")
-        for tool in self.programs:
-            run = subprocess.run([groff, "-man", "-ww", "-Kutf8", "-Tutf8", self.page(tool)], capture_output=True,
-                                 text=True)
-            if "can't find" in run.stderr or "cannot load" in run.stderr:
-                self.skipTest("this groff has no man macros: " + run.stderr.split("\n")[0])
-            self.assertEqual((run.returncode, run.stderr), (0, ""), tool)
-            self.assertIn("EXIT STATUS", re.sub(r"\x1b\[[\d;]*m|.\x08", "", run.stdout))
+        if not shutil.which("man") or not shutil.which("groff"):
+            self.skipTest("needs man and groff")
+        self.assertGreaterEqual(len(self.pages()), len(TOOLS))
+        for page in self.pages():
+            for width in ("80", "132"):
+                run = subprocess.run(["man", "-l", "--warnings", page], capture_output=True, text=True,
+                                     env={**os.environ, "MANWIDTH": width, "LC_ALL": "C.UTF-8"})
+                self.assertEqual((run.returncode, run.stderr), (0, ""), page)
+                self.assertIn("DESCRIPTION", run.stdout)
+        broken = self.prefix / "broken.1"
+        broken.write_text(".TH A 1\n.SH NAME\n.fx\n")
+        run = subprocess.run(["man", "-l", "--warnings", broken], capture_output=True, text=True)
+        self.assertIn("fx", run.stderr, "man shows no warnings, so this test shows nothing")
 
     def test_completion_knows_every_flag(self):
         for tool in self.tools:
@@ -96,6 +113,87 @@ class Installed(unittest.TestCase):
         simulate = self.completion("tunica-simulate")
         self.assertIn("comas", complete(simulate, "tunica-simulate", "--bending", "com"))
         self.assertEqual(complete(simulate, "tunica-simulate", "--solver", "d"), ["direct"])
+
+    def test_zsh_completion_knows_every_flag(self):
+        if not shutil.which("zsh"):
+            self.skipTest("needs zsh")
+        for tool in self.tools:
+            with self.subTest(tool):
+                script = self.prefix / "share" / "zsh" / "site-functions" / ("_" + tool)
+                # A shell of its own on a pseudo-terminal: what the key Tab lists, between two marks.
+                typed = fr"""
+                    zmodload zsh/zpty; zpty shell zsh -f
+                    zpty -w shell 'PS1=; stty -echo columns 1000 rows 1000; fpath=({script.parent} $fpath); autoload -U compinit; compinit -D -u'
+                    zpty -w shell 'zstyle ":completion:*" list-prompt ""; LISTMAX=1000; bindkey "^I" complete-word'
+                    zpty -w shell 'list-all() {{ zle list-choices; zle kill-whole-line }}; zle -N list-all; bindkey "^T" list-all'
+                    zpty -w shell 'print BEG""IN'
+                    zpty -r shell line '*BEGIN*'
+                    zpty -w -n shell '{tool} --'$'\x14'$'\n'
+                    zpty -w shell 'print EN""D'
+                    zpty -r shell line '*END*'; print -r -- "$line" """
+                run = subprocess.run(["zsh", "-f", "-c", typed], capture_output=True, text=True, timeout=60)
+                offered = set(re.findall(r"(?m)^ *(--[a-z][a-z-]*) +-- ", re.sub(r"\x1b\[[\d;?]*[a-zA-Z]", " ", run.stdout)))
+                self.assertEqual(sorted(offered), self.flags_of(tool), run.stdout + run.stderr)
+
+    def test_fish_completion_knows_every_flag(self):
+        if not shutil.which("fish"):
+            self.skipTest("needs fish")
+
+        def offered(tool, words):
+            script = self.prefix / "share" / "fish" / "vendor_completions.d" / (tool + ".fish")
+            # "complete -C" asks for a command that there is.
+            run = subprocess.run(["fish", "--no-config", "-c", f"source '{script}'; complete -C '{tool} {words}'"],
+                                 capture_output=True, text=True, check=True, cwd=self.prefix / "share",
+                                 env={**os.environ, "PATH": f"{self.prefix / 'bin'}:{os.environ['PATH']}"})
+            self.assertEqual(run.stderr, "")
+            return [line.split("\t")[0] for line in run.stdout.splitlines()]
+
+        for tool in self.tools:
+            with self.subTest(tool):
+                self.assertEqual(sorted(offered(tool, "--")), self.flags_of(tool))
+                self.assertIn("man/", offered(tool, "--report ma"))
+        self.assertEqual(offered("tunica-simulate", "--solver "), ["auto", "cg", "direct"])
+        self.assertEqual(offered("tunica-simulate", "--threads "), [])
+
+    def test_nothing_installed_names_the_place_it_was_built_in(self):
+        texts = [path for path in self.prefix.rglob("*") if path.suffix in (".cmake", ".pc", ".hpp")]
+        self.assertGreater(len(texts), 40)
+        for path in texts:
+            text = path.read_text()
+            for place in (os.environ["TUNICA_SOURCE"], os.environ["TUNICA_BUILD"], self.prefix.as_posix()):
+                self.assertNotIn(place, text, path)
+            if path.name == "tunicaTargets.cmake":
+                # No place of a library or a header either, that another machine may have elsewhere.
+                self.assertEqual(re.findall(r"[\";](/\w[^\";]*)", text), [])
+
+    def check_consumer(self, program):
+        run = subprocess.run([program], capture_output=True, text=True)
+        self.assertRegex(run.stdout, r"^(x86-64-v3|x86-64|other) 0.1 MPa 6 mm2\n$")
+
+    def test_a_consumer_by_cmake(self):
+        cmake = os.environ["CMAKE"]
+        build = self.prefix / "by-cmake"
+        subprocess.run([cmake, "-S", Path(os.environ["TUNICA_SOURCE"]) / "tests" / "install" / "consumer", "-B", build,
+                        f"-DCMAKE_PREFIX_PATH={self.prefix}"], check=True, capture_output=True)
+        made = subprocess.run([cmake, "--build", build], capture_output=True, text=True)
+        self.assertEqual(made.returncode, 0, made.stdout[-3000:])
+        self.check_consumer(build / "consumer")
+
+    def test_a_consumer_by_pkg_config(self):
+        if not shutil.which("pkg-config"):
+            self.skipTest("needs pkg-config")
+        moved = self.prefix / "moved"  # its prefix is where the file lies
+        shutil.copytree(self.prefix / "lib", moved / "lib")
+        shutil.copytree(self.prefix / "include", moved / "include")
+        environment = {**os.environ, "PKG_CONFIG_PATH": str(moved / "lib" / "pkgconfig")}
+        flags = subprocess.run(["pkg-config", "--cflags", "--libs", "tunica"], capture_output=True, text=True, check=True,
+                               env=environment).stdout.split()
+        self.assertTrue(all(Path(flag[2:]).resolve().is_relative_to(moved.resolve()) for flag in flags if "moved" in flag))
+        source = Path(os.environ["TUNICA_SOURCE"]) / "tests" / "install" / "consumer" / "consumer.cpp"
+        program = self.prefix / "by-pkg-config"
+        made = subprocess.run(["c++", "-std=c++20", source, "-o", program, *flags], capture_output=True, text=True)
+        self.assertEqual(made.returncode, 0, made.stderr[-3000:])
+        self.check_consumer(program)
 
     def test_examples_are_built_and_run_against_the_package(self):
         build = self.prefix / "examples"

@@ -13,4 +13,10 @@ std::string man_page(const CLI::App& tool);
 /// A bash completion script for the tool: flags, the values that an option allows, file names.
 std::string bash_completion(const CLI::App& tool);
 
+/// The same for zsh, with the beginning of each description: a file _TOOL for a folder of $fpath.
+std::string zsh_completion(const CLI::App& tool);
+
+/// The same for fish.
+std::string fish_completion(const CLI::App& tool);
+
 }  // namespace tunica::cli
