@@ -70,7 +70,7 @@ class Surfaces(unittest.TestCase):
         positions, colours, triangles, scene = read_glb((self.folder / "s.glb").read_bytes())
         self.same(1000 * positions, triangles, ply)
         self.assertIsNone(colours)
-        self.assertIn("tunica-extract v.nii.gz OUT.glb", json.dumps(scene["nodes"][0]["extras"]))
+        self.assertIn("tunica-extract v.nii.gz OUT.glb", scene["meshes"][0]["name"])
         lines = (self.folder / "s.obj").read_text(encoding="utf-8").splitlines()
         self.assertTrue(lines[0].startswith("# SPACE=LPS; "))
         vertices = [[float(x) for x in line.split()[1:4]] for line in lines if line.startswith("v ")]
@@ -125,7 +125,7 @@ class Surfaces(unittest.TestCase):
         self.assertGreater(np.corrcoef(green, stress[corners].ravel())[0, 1], 0.9)
         red, green, blue = colours[triangles].reshape(-1, colours.shape[1])[stress[corners].argmax(), :3]
         self.assertTrue(red > 0.7 and green > 0.7 and blue < 0.3, (red, green, blue))
-        self.assertIn(f"{stress.max():.4g} MPa", scene["nodes"][0]["extras"]["made_by"])
+        self.assertIn(f"{stress.max():.4g} MPa", scene["meshes"][0]["name"])
 
 
 if __name__ == "__main__":

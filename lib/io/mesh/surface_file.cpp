@@ -54,19 +54,19 @@ std::unique_ptr<aiMesh> assimp_mesh(const TriangleMesh& mesh, const SurfaceLook&
   return made;
 }
 
-// @param provenance  stands beside the node as glTF's `extras`, where the format has them
+// @param provenance  the name of the mesh: assimp 5.2 writes no other text to a GLB (of a node's metadata nothing)
 std::unique_ptr<aiScene> assimp_scene(std::unique_ptr<aiMesh> mesh, bool metres, const std::string& provenance) {
   auto scene = std::make_unique<aiScene>();
   scene->mMetaData = new aiMetadata();
   scene->mNumMaterials = 1;
   scene->mMaterials = new aiMaterial* [1] { new aiMaterial() };
+  constexpr std::size_t longest_name = 1000;  // aiString holds 1023 bytes
+  mesh->mName = aiString(provenance.substr(0, longest_name));
   scene->mNumMeshes = 1;
   scene->mMeshes = new aiMesh* [1] { mesh.release() };
   scene->mRootNode = new aiNode("surface");
   scene->mRootNode->mNumMeshes = 1;
   scene->mRootNode->mMeshes = new unsigned[1]{0};
-  scene->mRootNode->mMetaData = aiMetadata::Alloc(1);
-  scene->mRootNode->mMetaData->Set(0, "made_by", aiString(provenance.substr(0, 1000)));
   if (metres) {
     // By the node: assimp joins vertices nearer than 1e-5 of the unit, which must not be 0.01 mm.
     constexpr ai_real metres_per_mm = 1e-3F;
