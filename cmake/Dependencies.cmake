@@ -28,17 +28,17 @@ find_library(CHOLMOD_LIBRARY cholmod REQUIRED)
 find_library(SUITESPARSE_CONFIG_LIBRARY suitesparseconfig REQUIRED)
 add_library(tunica_cholmod INTERFACE)
 target_include_directories(tunica_cholmod SYSTEM INTERFACE $<BUILD_INTERFACE:${CHOLMOD_INCLUDE}>)
-target_link_libraries(tunica_cholmod INTERFACE $<BUILD_INTERFACE:${CHOLMOD_LIBRARY};${SUITESPARSE_CONFIG_LIBRARY}>
-                      $<INSTALL_INTERFACE:cholmod;suitesparseconfig>)
+target_link_libraries(tunica_cholmod INTERFACE "$<BUILD_INTERFACE:${CHOLMOD_LIBRARY};${SUITESPARSE_CONFIG_LIBRARY}>"
+                      "$<INSTALL_INTERFACE:cholmod;suitesparseconfig>")
 
 # cairo comes without a CMake package.
 find_package(Freetype REQUIRED)
 find_path(CAIRO_INCLUDE cairo-ft.h PATH_SUFFIXES cairo REQUIRED)
 find_library(CAIRO_LIBRARY cairo REQUIRED)
 add_library(tunica_cairo INTERFACE)
-target_include_directories(tunica_cairo SYSTEM INTERFACE $<BUILD_INTERFACE:${CAIRO_INCLUDE};${FREETYPE_INCLUDE_DIRS}>)
-target_link_libraries(tunica_cairo INTERFACE $<BUILD_INTERFACE:${CAIRO_LIBRARY};${FREETYPE_LIBRARIES}>
-                      $<INSTALL_INTERFACE:cairo;freetype>)
+target_include_directories(tunica_cairo SYSTEM INTERFACE "$<BUILD_INTERFACE:${CAIRO_INCLUDE};${FREETYPE_INCLUDE_DIRS}>")
+target_link_libraries(tunica_cairo INTERFACE "$<BUILD_INTERFACE:${CAIRO_LIBRARY};${FREETYPE_LIBRARIES}>"
+                      "$<INSTALL_INTERFACE:cairo;freetype>")
 
 # OpenCV's CMake package is in libopencv-dev, which pulls in a gigabyte; the two modules used here are enough.
 find_path(OPENCV_INCLUDE opencv2/core.hpp PATH_SUFFIXES opencv4 REQUIRED)

@@ -311,7 +311,8 @@ void write_maps(cli::Tool& tool, const Arguments& given, const ShellMesh& shell,
     for (const auto& [from, to] : patch_edges(fine)) {
       options.lines.push_back({fine.mesh.vertices[from], fine.mesh.vertices[to]});
     }
-    write_file(*given.picture, png_made_by(surface_picture(fine.mesh, distances, options), tool.made_by()), tool.force());
+    write_file(*given.picture, png_made_by(surface_picture(fine.mesh, distances, options), tool.made_by()),
+               tool.force());
   }
 }
 
@@ -607,10 +608,10 @@ private:
   void write() {
     const auto stage = tool_.stage("write");
     require_what_was_asked();
-    const auto [shell, thickness] = written_shell();
+    const MidSurface made = written_shell();
     std::vector<fs::path> written;
     try {
-      write_ply(given_.out, shell, given_.other_face ? thickness : std::vector<double>(), ply_);
+      write_ply(given_.out, made.shell, given_.other_face ? made.thickness : std::vector<double>(), ply_);
       written.push_back(given_.out);
       if (given_.curved) {
         write_surface(*given_.curved, tessellate(made.shell, curved_deviation * whole().diagonal()).mesh, ply_);

@@ -19,7 +19,6 @@ struct Arguments {
   std::filesystem::path summary;
   std::filesystem::path chart;
   bool verify = false;
-  bool no_paths = false;
 };
 
 void declare(cli::Tool& tool, Arguments& given) {
@@ -29,8 +28,6 @@ void declare(cli::Tool& tool, Arguments& given) {
       ->type_name("FOLDER");
   arguments.add_option("-o,--output", given.out, "the page")->required()->type_name("REPORT.html");
   tool.group("What the page says");
-  arguments.add_flag("--no-paths", given.no_paths,
-                     "leave out names of folders, volumes and cases: a case is called by its number");
   arguments.add_flag("--verify", given.verify,
                      "compare the SHA-256 of the outputs with the reports; exit code 4 names what differs");
   tool.group("Tables");
@@ -105,7 +102,8 @@ void run(cli::Tool& tool, const Arguments& given) {
   report::Page page;
   {
     const auto stage = tool.stage("draw");
-    page = report::make_page(cases, {!given.no_paths, given.verify, tool.command(), tool.progress("draw")});
+    page = report::make_page(
+        cases, {!tool.provenance().hides_paths(), given.verify, tool.provenance().command(), tool.progress("draw")});
   }
   {
     const auto stage = tool.stage("write");

@@ -285,9 +285,8 @@ std::string surface_picture(const TriangleMesh& surface, const std::vector<doubl
 }
 
 std::array<double, 3> bar_colour(double part) {
-  static const Paint paint{.top = 1};
-  const cv::Vec3b colour = surface_colour(paint, static_cast<float>(part));
-  return {colour[2] / 255.0, colour[1] / 255.0, colour[0] / 255.0};  // OpenCV's begin with blue
+  const auto& colour = surface_palette()[truncated<std::size_t>(std::clamp(part, 0.0, 1.0) * 255)];
+  return {colour[0] / 255.0, colour[1] / 255.0, colour[2] / 255.0};
 }
 
 }  // namespace tunica
