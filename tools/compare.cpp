@@ -188,8 +188,8 @@ void write_files(const cli::Tool& tool, const Arguments& given, const Surface& a
     PictureOptions look;
     look.title = a.shell ? "Distance of curved shells to a surface" : "Distance of a surface to another one";
     look.caption = fmt::format("{} against {}: two-sided distance at most {:.3g} mm ({:.3g} % of the diagonal)",
-                               tool.provenance().name_of(given.a), tool.provenance().name_of(given.b), distance.both.upper,
-                               100 * distance.both.upper / diagonal_mm);
+                               tool.provenance().name_of(given.a), tool.provenance().name_of(given.b),
+                               distance.both.upper, 100 * distance.both.upper / diagonal_mm);
     look.quantity = "Distance";
     look.diagonal = diagonal_mm;
     if (given.picture_range) {

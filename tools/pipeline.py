@@ -33,8 +33,7 @@ from cases import CONTROL, Refused, find_cases
 
 STAGES = ("extract", "decimate", "relax", "simulate")
 PRODUCTS = {"extract": ["surface.ply"], "decimate": ["coarse.ply"], "relax": ["shell.ply", "map.png"],
-             "relax": [coarse, surface, shell, "--picture", error_map],
-             "simulate": [shell, result, "--picture", picture, *(["--target", surface] if case.setting("ACCURACY") else [])]}
+            "simulate": ["result.hdf", "picture.png"]}
 
 
 # ------------------------------------------------------------------------------------------------------ what they run

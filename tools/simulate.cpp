@@ -27,6 +27,7 @@
 #include <array>
 #include <cmath>
 #include <iterator>
+#include <iterator>
 #include <numbers>
 
 namespace tunica {
@@ -235,6 +236,39 @@ RunIdentity identity_of_run(const cli::Tool& tool, const Scene& scene, const std
   return identity;
 }
 
+/// A target that cannot be what the shells were fitted to: no finer than they are, or somewhere else.
+void require_own_target(const ShellMesh& shell, const Target& target, const fs::path& path) {
+  constexpr std::size_t facets_per_shell = 2;
+  constexpr double farthest_mean = 0.02;  // of the diagonal
+  if (target.mesh().triangles.size() < facets_per_shell * shell.triangles.size()) {
+    throw InputError(
+        fmt::format("{}: has {} triangles, and the shells are {}: name the fine surface that they were fitted to",
+                    path.string(), target.mesh().triangles.size(), shell.triangles.size()));
+  }
+  if (const double mean = mean_distance(shell, target).first; mean > farthest_mean * target.diagonal()) {
+    throw InputError(
+        fmt::format("{}: lies {:.3g} mm from the shells in the mean, {:.2g} % of its diagonal: it is not the "
+                    "surface that they were fitted to",
+                    path.string(), mean, 100 * mean / target.diagonal()));
+  }
+}
+
+/// The unloaded shells as an output, where they can be one.
+void name_unloaded(cli::Tool& tool, const Arguments& given, const Scene& scene) {
+  if (!given.unloaded) {
+    return;
+  }
+  const bool imaged = std::any_of(scene.loads.begin(), scene.loads.end(), [](const SceneLoad& load) {
+    const auto* pressure = std::get_if<PressureLoad>(&load.kind);
+    return pressure != nullptr && pressure->imaged_at.has_value();
+  });
+  if (!imaged || scene.shells.size() > 1) {
+    throw UsageError(imaged ? "--unloaded: the scene has more than one body, one can be written"
+                            : "--unloaded belongs to --imaged-at, or imaged_at in a scene: give that too");
+  }
+  tool.output(*given.unloaded, {".ply"});
+}
+
 class Simulation {
 public:
   Simulation(cli::Tool& tool, const Arguments& given) : tool_(tool), given_(given) {}
@@ -266,8 +300,7 @@ public:
     }
     require_accuracy();
     if (given_.unloaded) {
-      const SceneShell& shell = scene_.shells.front();
-      space_ = read_mesh(shell.mesh, shell.unit_mm).space.value_or(space_);
+      space_ = read_mesh(scene_.shells.front().mesh, scene_.shells.front().unit_mm).space.value_or(space_);
       write_shells(*given_.unloaded, model().shells.front().mesh, false);
     }
     // A fixed count of iterations asks for no convergence, so none is claimed.
@@ -358,7 +391,7 @@ private:
     picture_ = given_.picture.options(is_modes());
     given_.accuracy.ask(tool_.arguments(), scene_);
     require_fresh();
-    name_unloaded();
+    name_unloaded(tool_, given_, scene_);
     asked_ = scene_text(scene_);
     loaded_.emplace(load_scene(scene_));
     read_targets();
@@ -391,21 +424,6 @@ private:
     }
   }
 
-  void name_unloaded() {
-    if (!given_.unloaded) {
-      return;
-    }
-    const bool imaged = std::any_of(scene_.loads.begin(), scene_.loads.end(), [](const SceneLoad& load) {
-      const auto* pressure = std::get_if<PressureLoad>(&load.kind);
-      return pressure != nullptr && pressure->imaged_at.has_value();
-    });
-    if (!imaged || scene_.shells.size() > 1) {
-      throw UsageError(imaged ? "--unloaded: the scene has more than one body, one can be written"
-                              : "--unloaded belongs to --imaged-at, or imaged_at in a scene: give that too");
-    }
-    tool_.output(*given_.unloaded, {".ply"});
-  }
-
   void read_targets() {
     targets_.resize(scene_.shells.size());
     for (std::size_t b = 0; scene_.accuracy && b < scene_.shells.size(); ++b) {
@@ -430,23 +448,6 @@ private:
       }
       targets_[b] = std::make_unique<Target>(std::move(file.mesh));
       require_own_target(model().shells[b].mesh, *targets_[b], path);
-    }
-  }
-
-  /// A target that cannot be what the shells were fitted to: no finer than they are, or somewhere else.
-  static void require_own_target(const ShellMesh& shell, const Target& target, const fs::path& path) {
-    constexpr std::size_t facets_per_shell = 2;
-    constexpr double farthest_mean = 0.02;  // of the diagonal
-    if (target.mesh().triangles.size() < facets_per_shell * shell.triangles.size()) {
-      throw InputError(
-          fmt::format("{}: has {} triangles, and the shells are {}: name the fine surface that they were fitted to",
-                      path.string(), target.mesh().triangles.size(), shell.triangles.size()));
-    }
-    if (const double mean = mean_distance(shell, target).first; mean > farthest_mean * target.diagonal()) {
-      throw InputError(
-          fmt::format("{}: lies {:.3g} mm from the shells in the mean, {:.2g} % of its diagonal: it is not the "
-                      "surface that they were fitted to",
-                      path.string(), mean, 100 * mean / target.diagonal()));
     }
   }
 
@@ -639,10 +640,9 @@ private:
     tool_.note(fmt::format("{} nodes in {} steps, {}: largest displacement {:.4g} mm", model().node_count(),
                            summary.steps, converged ? "converged" : "not asked to converge",
                            tool_.result()["max_displacement_mm"].get<double>()));
-    for (const std::string& text : run_warnings(scene_.run, summary, wall_, unresolved_)) {
-      tool_.warn(fmt::format("{}: {}", subject().string(), text));
-    }
-    for (const std::string& text : contact_warnings(tool_.result())) {
+    std::vector<std::string> texts = run_warnings(scene_.run, summary, wall_, unresolved_);
+    std::ranges::copy(contact_warnings(tool_.result()), std::back_inserter(texts));
+    for (const std::string& text : texts) {
       tool_.warn(fmt::format("{}: {}", subject().string(), text));
     }
   }

@@ -66,10 +66,29 @@ def cost(bench):
                   f"| {result['newton_iterations']} |", flush=True)
 
 
+def candidates(bench):
+    """Two clamped plates a wall apart, at rest: what is done for all faces, found near or not."""
+    print("\n| triangles of both plates | ms per step, contact | without |\n|---|---|---|")
+    for cells in (16, 50, 158):
+        rows, columns = np.meshgrid(np.arange(cells + 1), np.arange(cells + 1), indexing="ij")
+        points = np.stack([rows.ravel() / cells, columns.ravel() / cells, 0 * rows.ravel()], axis=1) * 100
+        corner = (np.arange(cells)[:, None] * (cells + 1) + np.arange(cells)[None]).ravel()
+        triangles = np.concatenate([np.stack([corner, corner + cells + 1, corner + cells + 2], axis=1),
+                                    np.stack([corner, corner + cells + 2, corner + 1], axis=1)])
+        scene, rim = run_lines(kind="dynamic", duration="0.2s", step="40ms"), range(len(points))
+        for name, height in (("s", 0.0), ("t", 2.2)):
+            write_ply(bench.path(name + ".ply"), points + [0, 0, height], triangles, np.tile([0, 0, 1.0], (len(points), 1)))
+            scene += (shell(name + ".ply", 1.0, 1.0, 0.45, density="1100kg/m3") + fix(rim)).replace('"s"', f'"{name}"')
+        scene += '[[load]]\nbody = "s"\nkind = "pressure"\nvalue = "1Pa"\n'
+        times = [bench.run(scene + more)["ms_per_step"]["median"] for more in (contact("s", "t"), "")]
+        print(f"| {4 * cells**2} | {times[0]:.1f} | {times[1]:.1f} |", flush=True)
+
+
 def main():
     with tempfile.TemporaryDirectory() as folder:
         exactness(Bench(folder))
         cost(Bench(folder))
+        candidates(Bench(folder))
 
 
 if __name__ == "__main__":

@@ -42,7 +42,7 @@ OWNERS = [
     (r"(hdf5\.h|hdf5_hl\.h|H5\w*\.h|hdf5/)", "HDF5", r"lib/io/.*\.cpp"),
     (r"toml", "toml++", r"lib/io/(.*\.cpp|scene/detail/.*)"),
     (r"tiffio\.h", "libtiff", r"lib/io/.*\.cpp"),
-    (r"png\.h", "libpng", r"lib/io/.*\.cpp"),
+    (r"png\.h", "libpng", r"lib/(io|draw)/.*\.cpp"),
     (r"zlib\.h", "zlib", r"lib/io/.*\.cpp"),
     (r"expat\.h", "Expat", r"lib/io/.*\.cpp"),
     (r"openssl/", "OpenSSL", r"lib/io/.*\.cpp"),

@@ -156,7 +156,8 @@ class Installed(unittest.TestCase):
         self.assertEqual(offered("tunica-simulate", "--threads "), [])
 
     def test_nothing_installed_names_the_place_it_was_built_in(self):
-        texts = [path for path in self.prefix.rglob("*") if path.suffix in (".cmake", ".pc", ".hpp")]
+        texts = [path for folder in ("lib", "include", "share") for path in (self.prefix / folder).rglob("*")
+                 if path.suffix in (".cmake", ".pc", ".hpp")]
         self.assertGreater(len(texts), 40)
         for path in texts:
             text = path.read_text()

@@ -3,6 +3,7 @@ with --no-paths."""
 import json
 import os
 import pathlib
+import shutil
 import struct
 import subprocess
 import tempfile
@@ -71,15 +72,18 @@ class Provenance(unittest.TestCase):
     def test_same_bytes_with_one_and_two_threads_and_every_output_says_what_made_it(self):
         made = []
         for threads in ("1", "2"):
-            folder = self.made_in(threads)
+            folder = self.made_in("run")  # a scene holds where its meshes lie
             self.pipeline(folder, "case", "--threads", threads)
             made.append({path.name: path.read_bytes() for path in folder.iterdir() if path.suffix != ".json"})
+            if threads == "1":
+                shutil.rmtree(folder)
         self.assertEqual(set(made[0]), set(made[1]))
         self.assertGreater(len(made[0]), 18)
         version = self.run_tool("extract", "--version").stdout.split()[1]
         for name, data in made[0].items():
             with self.subTest(name=name):
-                self.assertEqual(data, made[1][name])
+                if not name.endswith(".csv"):  # which tells the whole command of every run
+                    self.assertEqual(data, made[1][name])
                 if name.endswith(".png"):
                     data = png_comment(data).encode()
                 elif name.endswith(".nii.gz"):
@@ -110,7 +114,8 @@ class Provenance(unittest.TestCase):
         for path in paths:
             data = path.read_bytes()
             if path.name.endswith(".nii.gz"):
-                data = nibabel.load(path).header.extensions[0].get_content().encode()
+                data = nibabel.load(path).header.extensions[0].get_content()
+                data = data.encode() if isinstance(data, str) else data
             elif path.suffix in (".pvd", ".xmf"):
                 continue  # they refer to the files beside them
             self.assertNotIn(PATIENT.encode(), data, path.name)

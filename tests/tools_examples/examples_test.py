@@ -12,7 +12,7 @@ import unittest
 from pathlib import Path
 
 TOOLS = Path(os.environ["TUNICA_BIN"])
-CHAIN = ["phantom", "extract", "decimate", "relax", "compare", "simulate", "chart"]
+CHAIN = ["phantom", "extract", "decimate", "relax", "compare", "simulate", "chart", "report"]
 LONGEST_SECONDS = 20  # of one processor, whatever else the machine does
 
 
@@ -24,11 +24,21 @@ def examples_of(verb):
 
 
 class Examples(unittest.TestCase):
+    def make_case(self, folder, environment):
+        """A case as the pipeline leaves it, for tunica-report."""
+        case = folder / "out" / "sample" / "1"
+        case.mkdir(parents=True)
+        volume = sorted(folder.glob("*.nii.gz"))[0]
+        subprocess.run(["tunica-extract", volume, case / "surface.ply", "--label", "1", "--report", case / "extract.json"], check=True,
+                       env=environment, capture_output=True)
+
     def test_all_in_the_order_of_the_chain(self):
         self.assertEqual(sorted(path.name for path in TOOLS.glob("tunica-*")), sorted(f"tunica-{verb}" for verb in CHAIN))
         environment = {**os.environ, "PATH": f"{TOOLS}:{os.environ['PATH']}"}
         with tempfile.TemporaryDirectory(prefix="tunica-test-") as folder:
             for verb in CHAIN:
+                if verb == "report":
+                    self.make_case(Path(folder), environment)
                 examples = examples_of(verb)
                 self.assertGreater(len(examples), 0, verb)
                 for example in examples:

@@ -106,7 +106,7 @@ value = "10kPa"
 """
         self.write("scene.toml", scene)
         report = self.run_tool("--scene", "scene.toml", "out.hdf", "--export", "inp", "--export", "feb")
-        self.assertEqual(report["outputs"], ["out.hdf", "out.inp", "out.feb"])
+        self.assertEqual([output["path"] for output in report["outputs"]], ["out.hdf", "out.inp", "out.feb"])
         blocks, comments = read_inp(self.path("out.inp"))
         self.assertTrue(any("tunica-simulate" in line and "--export inp" in line for line in comments))
         nodes = np.array(rows_of(blocks, "NODE"))[:, 1:].astype(float)

@@ -272,7 +272,7 @@ nearest = ["0mm", "0mm", "{RADIUS}mm"]
             self.assertEqual((u.shape, u.dtype), ((4, len(self.vertices), 3), np.float64))
             self.assertEqual(tunica["nodes/rotation"].shape, u.shape)
             elements = tunica["elements"]  # every state of the path, though only the last is drawn
-            self.assertEqual(set(elements), {"nodes", "body", *ELEMENT_FIELDS})
+            self.assertEqual(set(elements), {"nodes", "body", "area", *ELEMENT_FIELDS})
             count = len(self.triangles)
             for name, components in ELEMENT_FIELDS.items():
                 self.assertEqual(elements[name].shape, (4, count) if components == 1 else (4, count, components))

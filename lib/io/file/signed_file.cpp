@@ -1,6 +1,7 @@
 #include "tunica/io/file/signed_file.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/core/json.hpp"
 #include "tunica/core/narrow.hpp"
 
 #include <zlib.h>
@@ -31,7 +32,8 @@ std::string png_made_by(const std::string& png, const std::string& made_by) {
 }
 
 std::string xml_made_by(const std::string& made_by) {
-  std::string text = made_by;
+  // File names need not be UTF-8; XML has to be.
+  std::string text = Json::parse(Json(made_by).dump(-1, ' ', false, Json::error_handler_t::replace)).get<std::string>();
   for (std::size_t at = text.find("--"); at != std::string::npos; at = text.find("--", at)) {
     text.insert(at + 1, " ");
   }

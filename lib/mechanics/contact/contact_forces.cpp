@@ -1,5 +1,6 @@
 #include "tunica/core/threads.hpp"
 #include "tunica/mechanics/contact/detail/contact_parts.hpp"
+#include "tunica/mechanics/elements/rotation.hpp"
 #include "tunica/shell/patch/shape_function.hpp"
 
 #include <algorithm>

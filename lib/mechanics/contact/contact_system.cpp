@@ -1,10 +1,12 @@
 #include "tunica/core/error.hpp"
-#include "tunica/mechanics/contact/detail/contact_parts.hpp"
+#include "tunica/core/threads.hpp"
+#include "tunica/mechanics/contact/detail/box_tree.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <set>
 
 namespace tunica {
@@ -311,27 +313,20 @@ bool ContactSystem::is_carried(const SurfaceFace& face, std::size_t body) const 
 }
 
 std::vector<std::vector<std::size_t>> ContactSystem::near_faces(const FaceMaps& maps, double more) const {
+  constexpr std::size_t groups_per_task = 256;
   std::vector<std::vector<std::size_t>> near(groups_.size());
-  std::map<std::size_t, std::vector<std::size_t>> sorted;  // faces of a body, by their lower x
+  std::map<std::size_t, BoxTree> trees;  // of a body
   std::vector<Bounds> bounds(surfaces_.faces.size());
-  std::map<std::size_t, double> widest, thickest;  // half walls
+  std::map<std::size_t, double> thickest;  // half walls
+  std::set<std::size_t> prepared;
   const auto prepare = [&](std::size_t body) {
-    auto& faces = sorted[body];
-    if (!faces.empty()) {
-      return;
-    }
-    for (std::size_t f = surfaces_.first[body]; f < surfaces_.first[body + 1]; ++f) {
+    for (std::size_t f = surfaces_.first[body]; prepared.count(body) == 0 && f < surfaces_.first[body + 1]; ++f) {
       bounds[f] = maps.bounds(f);
-      widest[body] = std::max(widest[body], bounds[f].upper.x() - bounds[f].lower.x());
       thickest[body] = std::max(thickest[body], surfaces_.faces[f].half_thickness);
-      faces.push_back(f);
     }
-    std::sort(faces.begin(), faces.end(), [&](std::size_t a, std::size_t b) {
-      return std::pair(bounds[a].lower.x(), a) < std::pair(bounds[b].lower.x(), b);
-    });
+    prepared.insert(body);
   };
-  for (std::size_t g = 0; g < groups_.size(); ++g) {
-    const Group& group = groups_[g];
+  for (const Group& group : groups_) {
     if (group.other.rigid) {
       continue;
     }
@@ -339,20 +334,27 @@ std::vector<std::vector<std::size_t>> ContactSystem::near_faces(const FaceMaps& 
     if (!group.point) {
       prepare(surfaces_.faces[group.face].body);
     }
-    const auto& faces = sorted[group.other.index];
-    const Vec3 point = group.point ? shapes_[group.rigid].of_mesh(*group.point) : Vec3(Vec3::Zero());
-    const Bounds own = group.point ? Bounds{point, point} : bounds[group.face];
-    const double walls = (group.point ? 0 : surfaces_.faces[group.face].half_thickness) + thickest[group.other.index];
-    const double reach =
-        std::max(group.resolution, thickest[group.other.index] == 0 ? group.wall / 4 : 0) + group.sag + walls + more;
-    auto place = std::lower_bound(faces.begin(), faces.end(), own.lower.x() - reach - widest[group.other.index],
-                                  [&](std::size_t f, double x) { return bounds[f].lower.x() < x; });
-    for (; place != faces.end() && bounds[*place].lower.x() <= own.upper.x() + reach; ++place) {
-      if (own.meets(bounds[*place], reach) && !excluded(group, *place)) {
-        near[g].push_back(*place);
-      }
+    if (trees.count(group.other.index) == 0) {
+      std::vector<std::size_t> faces(surfaces_.first[group.other.index + 1] - surfaces_.first[group.other.index]);
+      std::iota(faces.begin(), faces.end(), surfaces_.first[group.other.index]);
+      trees.emplace(group.other.index, BoxTree(std::move(faces), bounds));
     }
   }
+  parallel_for_blocks(groups_.size(), groups_per_task, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t g = begin; g < end; ++g) {
+      const Group& group = groups_[g];
+      if (group.other.rigid) {
+        continue;
+      }
+      const double thick = thickest.at(group.other.index);
+      const Vec3 point = group.point ? shapes_[group.rigid].of_mesh(*group.point) : Vec3(Vec3::Zero());
+      const Bounds own = group.point ? Bounds{point, point} : bounds[group.face];
+      const double walls = (group.point ? 0 : surfaces_.faces[group.face].half_thickness) + thick;
+      const double reach = std::max(group.resolution, thick == 0 ? group.wall / 4 : 0) + group.sag + walls + more;
+      trees.at(group.other.index).find(own, reach, near[g]);
+      std::erase_if(near[g], [&](std::size_t f) { return excluded(group, f); });
+    }
+  });
   return near;
 }
 

@@ -2,6 +2,7 @@
 
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
+#include "tunica/mechanics/algebra/block_matrix.hpp"
 #include "tunica/mechanics/elements/rotation.hpp"
 
 #include <fmt/format.h>
