@@ -27,7 +27,6 @@
 #include <array>
 #include <cmath>
 #include <iterator>
-#include <iterator>
 #include <numbers>
 
 namespace tunica {

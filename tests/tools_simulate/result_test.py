@@ -87,7 +87,7 @@ class Result(SimulateTest):
 
     def test_the_script_of_the_page_runs_beside_a_result_of_either_ending(self):
         with open(os.path.join(os.environ["TUNICA_SOURCE"], "docs", "results.md"), encoding="utf-8") as page:
-            script = re.search(r"### A script\n\n```python\n(.*?)```", page.read(), re.DOTALL).group(1)
+            script = re.search(r"## A script\n\n```python\n(.*?)```", page.read(), re.DOTALL).group(1)
         self.assertLessEqual(len(script.splitlines()), 15)
         with open(self.path("ball.ply"), "rb") as file:
             data = file.read()
