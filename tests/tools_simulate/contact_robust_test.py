@@ -67,7 +67,7 @@ class Robust(SimulateTest):
         tool = '[[rigid]]\nname = "t"\nmesh = "cone.ply"\n' + moved((0, (0.7, 0.4, 0.3)), (1, (0.7, 0.4, -0.5)))
         record, _ = self.touched(run("static", 4) + self.plate + tool + contact("t", "p"))
         self.assertGreater(record["force_n"][-1][2], 1e-3)
-        self.assertGreater(record["smallest_gap_mm"][-1]["upper"], 0)
+        self.assertGreater(record["smallest_gap_mm"][-1]["lower"], 0)
         pierced = tool.replace('"0.3mm"', '"-1mm"')
         self.write("scene.toml", run("static", 4) + self.plate + pierced + contact("t", "p"))
         self.run_tool("--scene", "scene.toml", "pierced.hdf", expect=3)

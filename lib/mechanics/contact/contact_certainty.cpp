@@ -43,6 +43,19 @@ std::array<Vec3, 12> separating_directions(const std::array<Vec3, 3>& p, const s
   return directions;
 }
 
+/// A lower bound of the distance of two triangles, mm.
+double distance_bound(const std::array<Vec3, 3>& p, const std::array<Vec3, 3>& q) {
+  double bound = 0;
+  for (const Vec3& n : separating_directions(p, q)) {
+    const std::array<double, 3> own{n.dot(p[0]), n.dot(p[1]), n.dot(p[2])};
+    const std::array<double, 3> theirs{n.dot(q[0]), n.dot(q[1]), n.dot(q[2])};
+    bound =
+        std::max({bound, *std::min_element(own.begin(), own.end()) - *std::max_element(theirs.begin(), theirs.end()),
+                  *std::min_element(theirs.begin(), theirs.end()) - *std::max_element(own.begin(), own.end())});
+  }
+  return bound;
+}
+
 /// Whether two faces certainly stay apart on straight lines: some plane has them on either side at both ends.
 bool stay_apart(const SurfaceFace& face, const PatchMap& a0, const PatchMap& a1, const SurfaceFace& other,
                 const PatchMap& b0, const PatchMap& b1, double slack) {
@@ -165,6 +178,10 @@ double ContactSystem::lower_gap(const Group& group, const std::vector<std::size_
   const double close = 0.5 * upper;
   if (group.other.rigid) {
     const RigidShape& shape = shapes_[group.other.index];
+    const Bounds& box = maps.bounds(group.face);
+    const auto triangles = shape.convex()
+                               ? std::vector<std::array<Vec3, 3>>()
+                               : shape.triangles_near(box.lower, box.upper, std::max(upper, 0.0) + offset(group, 0));
     // What bounds a part bounds its parts.
     const std::function<void(const Part&, int, double)> visit = [&](const Part& part, int level, double known) {
       const Vec3 c = a.point(patch_weights(face, middle(part)));
@@ -179,6 +196,12 @@ double ContactSystem::lower_gap(const Group& group, const std::vector<std::size_
           reach = std::max(reach, (a.point(patch_weights(face, b)) - c).norm());
         }
         bound = at.distance - reach - bend;
+        if (at.distance > 0 && bound - offset(group, 0) < lower) {  // outside: by the triangles themselves
+          bound = upper + offset(group, 0);
+          for (const auto& triangle : triangles) {
+            bound = std::min(bound, distance_bound(corners_of(face, a, part), triangle) - bend);
+          }
+        }
       }
       bound = std::max(bound - offset(group, 0), known);
       if (bound >= lower) {

@@ -191,6 +191,21 @@ bool RigidShape::moves_to(const RigidShape& then) const {
 
 double RigidShape::deepest() const { return std::holds_alternative<RigidPlane>(body_->shape) ? infinity : radius_ / 2; }
 
+std::vector<std::array<Vec3, 3>> RigidShape::triangles_near(const Vec3& lower, const Vec3& upper, double reach) const {
+  std::vector<std::array<Vec3, 3>> near;
+  for (const auto& v : std::get<RigidMesh>(body_->shape).surface.triangles) {
+    std::array<Vec3, 3> x;
+    for (std::size_t k = 0; k < 3; ++k) {
+      x[k] = from_mesh(surface_->vertices()[v[k]]);
+    }
+    const Vec3 least = x[0].cwiseMin(x[1]).cwiseMin(x[2]), most = x[0].cwiseMax(x[1]).cwiseMax(x[2]);
+    if ((least.array() - reach <= upper.array()).all() && (lower.array() - reach <= most.array()).all()) {
+      near.push_back(x);
+    }
+  }
+  return near;
+}
+
 std::optional<Vec3> RigidShape::inner_point() const {
   if (std::holds_alternative<RigidPlane>(body_->shape)) {
     return {};

@@ -61,6 +61,10 @@ public:
   /// Where a point of the mesh is, given as the mesh is given.
   [[nodiscard]] Vec3 of_mesh(const Vec3& p) const { return from_mesh(expanded(p, factor_)); }
 
+  /// Triangles of the mesh, where they are, with a corner box within `reach` (mm, along each axis) of a box.
+  [[nodiscard]] std::vector<std::array<Vec3, 3>> triangles_near(const Vec3& lower, const Vec3& upper,
+                                                                double reach) const;
+
   /// Some point of the body; none of a plane.
   [[nodiscard]] std::optional<Vec3> inner_point() const;
 
