@@ -56,6 +56,33 @@ double distance_bound(const std::array<Vec3, 3>& p, const std::array<Vec3, 3>& q
   return bound;
 }
 
+/// A lower bound of the distance of a part of a face from a rigid body, mm.
+/// @param part  and its level; triangles  of a mesh that may be near; wanted  less than the first must be exact, more
+/// than the second is of no interest
+double bound_to_rigid(const RigidShape& shape, const SurfaceFace& face, const PatchMap& map,
+                      const std::pair<Part, int>& part, const std::vector<std::array<Vec3, 3>>& triangles,
+                      const std::array<double, 2>& wanted) {
+  const Vec3 c = map.point(patch_weights(face, middle(part.first)));
+  const RigidDistance at = shape.at(c);
+  const double bend = bend_of(face, map, part.second);
+  if (shape.convex()) {  // the tangent of a convex function lies below it
+    return at.distance + extent(face, map, part.first, at.normal)[0] - at.normal.dot(c) - bend;
+  }
+  const auto corners = corners_of(face, map, part.first);
+  double reach = 0;
+  for (const Vec3& corner : corners) {
+    reach = std::max(reach, (corner - c).norm());
+  }
+  double bound = at.distance - reach - bend;
+  if (at.distance > 0 && bound < wanted[0]) {  // outside: by the triangles themselves
+    bound = wanted[1];
+    for (const auto& triangle : triangles) {
+      bound = std::min(bound, distance_bound(corners, triangle) - bend);
+    }
+  }
+  return bound;
+}
+
 /// Whether two faces certainly stay apart on straight lines: some plane has them on either side at both ends.
 bool stay_apart(const SurfaceFace& face, const PatchMap& a0, const PatchMap& a1, const SurfaceFace& other,
                 const PatchMap& b0, const PatchMap& b1, double slack) {
@@ -184,26 +211,9 @@ double ContactSystem::lower_gap(const Group& group, const std::vector<std::size_
                                : shape.triangles_near(box.lower, box.upper, std::max(upper, 0.0) + offset(group, 0));
     // What bounds a part bounds its parts.
     const std::function<void(const Part&, int, double)> visit = [&](const Part& part, int level, double known) {
-      const Vec3 c = a.point(patch_weights(face, middle(part)));
-      const RigidDistance at = shape.at(c);
-      const double bend = bend_of(face, a, level);
-      double bound = 0;
-      if (shape.convex()) {  // the tangent of a convex function lies below it
-        bound = at.distance + extent(face, a, part, at.normal)[0] - at.normal.dot(c) - bend;
-      } else {
-        double reach = 0;
-        for (const Vec2& b : part.at) {
-          reach = std::max(reach, (a.point(patch_weights(face, b)) - c).norm());
-        }
-        bound = at.distance - reach - bend;
-        if (at.distance > 0 && bound - offset(group, 0) < lower) {  // outside: by the triangles themselves
-          bound = upper + offset(group, 0);
-          for (const auto& triangle : triangles) {
-            bound = std::min(bound, distance_bound(corners_of(face, a, part), triangle) - bend);
-          }
-        }
-      }
-      bound = std::max(bound - offset(group, 0), known);
+      const double walls = offset(group, 0);
+      double bound = bound_to_rigid(shape, face, a, {part, level}, triangles, {lower + walls, upper + walls});
+      bound = std::max(bound - walls, known);
       if (bound >= lower) {
         return;
       }
