@@ -181,18 +181,6 @@ void Tool::declare_common() {
 
 void Tool::group(const std::string& name) { app_.option_defaults()->group(name); }
 
-void Tool::not_yet(const std::string& name) {
-  app_.add_option_function<std::string>(
-          name,
-          [this, name](const std::string&) {
-            after_parse_.insert(after_parse_.begin(),
-                                [name] { throw UsageError(fmt::format("{}: not available yet", name)); });
-          },
-          "not available yet")
-      ->expected(0, 1)
-      ->group("");
-}
-
 CLI::Option* Tool::quantity(const std::string& name, std::optional<double>& value, Dimension dimension,
                             const std::string& help) {
   auto text = std::make_shared<std::optional<std::string>>();

@@ -48,9 +48,6 @@ public:
   /// The heading in --help under which the options declared from here on stand.
   void group(const std::string& name);
 
-  /// Declares a flag or option that a later step of the roadmap brings: using it is a UsageError "not available yet".
-  void not_yet(const std::string& name);
-
   /// Declares an option that may be given at most once and that is a quantity with a unit; after parsing `value` holds
   /// it in tunica's units.
   CLI::Option* quantity(const std::string& name, std::optional<double>& value, Dimension dimension,

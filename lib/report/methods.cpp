@@ -64,7 +64,13 @@ std::string load_sentence(const CaseReport& one) {
   text += young.empty() ? "" : " (Young's modulus " + young + ", Poisson's ratio " + with_unit(one, "poisson") + ")";
   const std::string thickness = with_unit(one, "thickness_mm");
   text += thickness.empty() ? ". " : " and " + thickness + " thick. ";
-  text += "The image was taken as unloaded. ";
+  const std::string_view key = "imaged_at = \"";
+  const std::size_t said = one.scene.find(key);
+  const std::size_t begin = said + key.size();
+  text += said == std::string::npos ? "The image was taken as unloaded. "
+                                    : "The image was taken under a pressure of " +
+                                          one.scene.substr(begin, one.scene.find('"', begin) - begin) +
+                                          "; the shape without it was found first. ";
   text += pressure.empty() ? "It was loaded" : "A pressure of " + pressure + " was put on it";
   text += fixed ? " with " + std::string(*fixed == "boundary"        ? "the boundary held"
                                          : *fixed == "rigid-motions" ? "only its rigid motions held"

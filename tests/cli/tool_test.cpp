@@ -51,7 +51,6 @@ protected:
     Tool tool("test", "A tool.", "tunica-test a b");
     std::optional<double> pressure;
     tool.quantity("--pressure", pressure, dimension::pressure, "a pressure");
-    tool.not_yet("--later");
     std::vector<char*> argv;
     arguments.insert(arguments.begin(), "tunica-test");
     for (auto& argument : arguments) {
@@ -156,8 +155,6 @@ TEST_F(ToolTest, OutOfMemorySaysWhereAndWhatToDo) {
 
 TEST_F(ToolTest, UsageErrors) {
   EXPECT_EQ(run({"--nonsense"}).code, 2);
-  EXPECT_EQ(run({"--later"}).code, 2);
-  EXPECT_THAT(run({"--later", "7"}).error, HasSubstr("not available yet"));
   EXPECT_THAT(run({"--pressure", "13"}).error, HasSubstr("13kPa"));
   EXPECT_EQ(run({"--pressure", "13"}).code, 2);
   EXPECT_EQ(run({"--pressure", "13mm"}).code, 2);
