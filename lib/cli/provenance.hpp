@@ -26,8 +26,8 @@ public:
   [[nodiscard]] std::string command() const;
 
   /// The command for what is written: OUT.ply in place of an output's name, and without what does not shape an output
-  /// (--threads, --slab, --report, --force, --quiet, --verbose). The same input, options and version then make the same bytes,
-  /// whatever the output is called.
+  /// (--threads, --slab, --report, --force, --quiet, --verbose). The same input, options and version then make the same
+  /// bytes, whatever the output is called.
   [[nodiscard]] std::string lasting_command() const;
   /// "tunica VERSION: " and that command.
   [[nodiscard]] std::string made_by() const;
