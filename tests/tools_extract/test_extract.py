@@ -206,7 +206,7 @@ class Choices(ExtractTest):
             with self.subTest(arguments):
                 self.refuse(2, path, self.out, *arguments, saying=saying)
         self.run_tool(path, "--label", 1, code=2)
-        self.run_tool(path, self.folder / "out.stl", "--label", 1, code=2)
+        self.run_tool(path, self.folder / "out.xyz", "--label", 1, code=2)
 
     def test_labels_that_are_not_there(self):
         path = self.nifti(self.two_labels())
