@@ -1,6 +1,6 @@
-#include "tunica/cli/case_memory.hpp"
 #include "tunica/cli/tool.hpp"
 #include "tunica/cli/usage.hpp"
+#include "tunica/cli/volume_contents.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/core/version.hpp"
 #include "tunica/io/mesh/surface_file.hpp"
@@ -25,6 +25,10 @@
 namespace {
 
 using namespace tunica;
+using cli::are_labels;
+using cli::named;
+using cli::printable;
+using cli::VolumeContents;
 namespace fs = std::filesystem;
 
 struct Arguments {
@@ -183,33 +187,6 @@ void refuse_contradictions(const Arguments& arguments) {
   }
 }
 
-// One line of printable text, whatever a file says or is called.
-std::string printable(std::string text) {
-  std::replace_if(
-      text.begin(), text.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, '?');
-  return text;
-}
-
-std::string named(const Label& label) {
-  return label.name.empty() ? fmt::format("{}", label.value)
-                            : fmt::format("{} ({})", label.value, printable(label.name));
-}
-
-std::string list_of(const std::vector<Label>& labels) {
-  constexpr std::size_t shown = 80;
-  std::string text;
-  for (std::size_t i = 0; i < std::min(labels.size(), shown); ++i) {
-    text += (i > 0 ? ", " : "") + named(labels[i]);
-  }
-  return labels.size() > shown ? fmt::format("{}, and {} more", text, labels.size() - shown) : text;
-}
-
-// A volume that is a segmentation has whole numbers for values, and not too many of them.
-bool are_labels(const std::optional<std::vector<Label>>& labels) {
-  return labels && std::all_of(labels->begin(), labels->end(),
-                               [](const Label& label) { return label.value == std::floor(label.value); });
-}
-
 // The names of a volume's labels: those of --names, else the volume's own, else those of a table beside it.
 class Names {
 public:
@@ -236,15 +213,6 @@ public:
 private:
   LabelNames given_;
   LabelNames beside_;
-};
-
-// What the messages about a choice need, of a volume that may not be at hand.
-struct Contents {
-  std::vector<std::string> warnings;
-  std::optional<std::vector<Label>> labels;   // none: a grey volume
-  std::vector<std::size_t> surface_vertices;  // per label
-  LabelNames names;
-  Interval values{infinity, -infinity};
 };
 
 void widen(Interval& range, const Volume& volume) {
@@ -292,8 +260,8 @@ VolumeFile read_slabs(cli::Tool& tool, const Arguments& arguments, const char* d
   return read;
 }
 
-Contents contents_of(cli::Tool& tool, const Arguments& arguments, const Names& names) {
-  Contents contents;
+VolumeContents contents_of(cli::Tool& tool, const Arguments& arguments, const Names& names) {
+  VolumeContents contents;
   std::optional<LabelIndex> index;
   const VolumeFile file =
       read_slabs(tool, arguments, "read", [&](const VolumeFile& header, const Volume& slab, std::size_t first_slice) {
@@ -316,48 +284,9 @@ Contents contents_of(cli::Tool& tool, const Arguments& arguments, const Names& n
   return contents;
 }
 
-[[noreturn]] void throw_choice(const fs::path& path, const Contents& contents) {
-  const auto& labels = contents.labels;
-  if (!labels || labels->size() > 100) {
-    throw UsageError(
-        fmt::format("{}: is a grey volume with values from {:.6g} to {:.6g}: pass --isovalue V, with --inside "
-                    "below where the organ is darker",
-                    path.string(), contents.values.lower, contents.values.upper));
-  }
-  if (labels->empty()) {
-    throw InputError(fmt::format("{}: holds no label: every voxel is 0", path.string()));
-  }
-  throw UsageError(fmt::format("{}: pass --label N, --all-labels or --isovalue V; its labels are {}", path.string(),
-                               list_of(*labels)));
-}
-
-[[noreturn]] void throw_no_label(const fs::path& path, const Contents& contents, const std::string& text) {
-  const auto& labels = contents.labels;
-  if (!parse_number(text) && !find_label(contents.names, text)) {
-    const std::string near = nearest_label(contents.names, text);
-    const std::string hint =
-        !near.empty() ? fmt::format("did you mean '{}'?", printable(near))
-        : labels && !labels->empty()
-            ? fmt::format("{}its labels are {}",
-                          contents.names.empty() ? "nothing names its labels (--names FILE); " : "", list_of(*labels))
-            : std::string(labels ? "every voxel is 0" : "it is a grey volume; pass --isovalue V");
-    throw InputError(fmt::format("{}: has no label of the name '{}': {}", path.string(), printable(text), hint));
-  }
-  throw InputError(
-      labels && !labels->empty()
-          ? fmt::format("{}: has no voxel with label {}; its labels are {}", path.string(), text, list_of(*labels))
-          : fmt::format("{}: has no voxel with label {}: {}", path.string(), text,
-                        labels ? "every voxel is 0" : "it is a grey volume; pass --isovalue V"));
-}
-
 // The label asked for, by value or by name; none where there is none of that name, or the background.
 std::optional<Target> label_target(const fs::path& path, const LabelNames& names, const std::string& text) {
-  std::optional<double> value;
-  try {
-    value = find_label(names, text);
-  } catch (const InputError& error) {
-    throw InputError(fmt::format("{}: {}", path.string(), error.what()));
-  }
+  const auto value = naming(path.string(), [&] { return find_label(names, text); });
   if (!value || *value == 0) {
     return {};
   }
@@ -456,9 +385,9 @@ Surface extract(cli::Tool& tool, Selection selection, const Arguments& arguments
   }
   const Target target = selection.target;
   if (voxel_volume == 0) {
-    const Contents contents = contents_of(tool, arguments, names);
+    const VolumeContents contents = contents_of(tool, arguments, names);
     if (arguments.label) {
-      throw_no_label(arguments.volume, contents, *arguments.label);
+      cli::throw_no_label(arguments.volume, contents, *arguments.label);
     }
     throw InputError(fmt::format("{}: no voxel is {}; its values are {:.6g} to {:.6g}", arguments.volume.string(),
                                  target.name, contents.values.lower, contents.values.upper));
@@ -548,81 +477,6 @@ void to_space(TriangleMesh& mesh, const std::string& space) {
       vertex = {-vertex.x(), -vertex.y(), vertex.z()};
     }
   }
-}
-
-// The labels as lines of text, and for the report.
-std::pair<std::string, Json> list_labels(const VolumeFile& file, const Contents& contents, std::size_t shells) {
-  std::string text = fmt::format("labels       {}, with MiB of memory of extract and of the chain to {} shells\n",
-                                 contents.labels->size(), shells);
-  Json list = Json::array();
-  const std::size_t voxel_bytes = std::visit([](const auto& values) { return sizeof(values[0]); }, file.volume.data);
-  for (std::size_t i = 0; i < contents.labels->size(); ++i) {
-    const Label& label = (*contents.labels)[i];
-    const auto memory = cli::estimate_memory(contents.surface_vertices[i], shells, file.volume.voxels(), voxel_bytes);
-    text += fmt::format("  {:<8} {:>12} voxels {:>14.1f} mm3 {:>7.0f} {:>7.0f} MiB  {}\n", label.value, label.voxels,
-                        label.volume_mm3, memory.extract, memory.chain(), printable(label.name));
-    list.push_back({{"label", label.value},
-                    {"voxels", label.voxels},
-                    {"volume_mm3", label.volume_mm3},
-                    {"name", label.name.empty() ? Json() : Json(label.name)},
-                    {"memory_mib",
-                     {{"extract", memory.extract},
-                      {"decimate", memory.decimate},
-                      {"relax", memory.relax},
-                      {"simulate", memory.simulate},
-                      {"chain", memory.chain()}}}});
-  }
-  return {std::move(text), std::move(list)};
-}
-
-void print_info(cli::Tool& tool, const Arguments& arguments, const VolumeFile& file, const Contents& contents) {
-  const Volume& volume = file.volume;
-  const auto& labels = contents.labels;
-  const Interval& range = contents.values;
-  std::string text = arguments.volume.string() + "\n";
-  text += fmt::format("format       {}, {}\n", file.format, file.datatype);
-  text += fmt::format("dims         {} x {} x {}\n", volume.dims[0], volume.dims[1], volume.dims[2]);
-  text +=
-      fmt::format("spacing      {:.6g} x {:.6g} x {:.6g} mm\n", file.spacing.x(), file.spacing.y(), file.spacing.z());
-  text += fmt::format("orientation  {} (from {})\n", file.orientation, file.transform);
-  for (Eigen::Index row = 0; row < 3; ++row) {
-    const auto at = volume.affine.row(row);
-    text += fmt::format("{:<12} {:10.6g} {:10.6g} {:10.6g} {:10.6g}\n", row == 0 ? "affine (LPS)" : "", at[0], at[1],
-                        at[2], at[3]);
-  }
-  if (file.frames > 1) {
-    text += fmt::format("frames       {}\n", file.frames);
-  }
-  if (file.layers > 1) {
-    text += fmt::format("layers       {}\n", file.layers);
-  }
-  text += fmt::format("values       {:.6g} .. {:.6g}\n", range.lower, range.upper);
-  Json list;
-  if (labels) {
-    auto [lines, entries] = list_labels(file, contents, arguments.shells.value_or(800));
-    text += lines;
-    list = std::move(entries);
-  } else {
-    text += fmt::format("labels       none: a grey volume\n");
-  }
-  Json& result = tool.result();
-  result = undefined_result();
-  result["format"] = file.format;
-  result["datatype"] = file.datatype;
-  result["dims"] = volume.dims;
-  result["spacing_mm"] = {file.spacing.x(), file.spacing.y(), file.spacing.z()};
-  result["orientation"] = file.orientation;
-  result["transform"] = file.transform;
-  result["voxel_to_world_mm"] = Json::array();
-  for (Eigen::Index row = 0; row < 3; ++row) {
-    const auto at = volume.affine.row(row);
-    result["voxel_to_world_mm"].push_back({at[0], at[1], at[2], at[3]});
-  }
-  result["frames"] = file.frames;
-  result["layers"] = file.layers;
-  result["values"] = {range.lower, range.upper};
-  result["labels"] = list;
-  tool.print(text);
 }
 
 void note_file(cli::Tool& tool, const VolumeFile& file) {
@@ -777,7 +631,7 @@ Json run_label(cli::Tool& tool, const Arguments& arguments, const Names& names, 
                                      });
   note_file(tool, file);
   if (!target) {
-    throw_no_label(arguments.volume, contents_of(tool, arguments, names), *arguments.label);
+    cli::throw_no_label(arguments.volume, contents_of(tool, arguments, names), *arguments.label);
   }
   return extract_to_file(tool, {*target, std::move(*mask), {}, nullptr}, arguments, names, smoothing);
 }
@@ -793,10 +647,13 @@ void run(cli::Tool& tool, Arguments& arguments) {
   names.read(tool, arguments);
   if (arguments.info) {
     VolumeFile header = read_volume_header(arguments.volume, arguments.volume_options);
-    const Contents contents = contents_of(tool, arguments, names);
+    const VolumeContents contents = contents_of(tool, arguments, names);
     header.warnings = contents.warnings;
+    const auto [text, info] = cli::volume_info(arguments.volume, header, contents, arguments.shells.value_or(800));
+    tool.result() = undefined_result();
+    tool.result().update(info);
     note_file(tool, header);
-    print_info(tool, arguments, header, contents);
+    tool.print(text);
   } else if (arguments.label) {
     set_result(tool, run_label(tool, arguments, names, smoothing));
   } else if (arguments.isovalue) {
@@ -804,7 +661,7 @@ void run(cli::Tool& tool, Arguments& arguments) {
   } else if (arguments.all_labels) {
     run_all_labels(tool, arguments, names, smoothing);
   } else {
-    throw_choice(arguments.volume, contents_of(tool, arguments, names));
+    cli::throw_choice(arguments.volume, contents_of(tool, arguments, names));
   }
 }
 

@@ -316,18 +316,6 @@ void write_maps(cli::Tool& tool, const Arguments& given, const ShellMesh& shell,
   }
 }
 
-/// Says which file a refused mid-surface belongs to.
-template <typename Work>
-auto naming(const fs::path& file, const Work& work) {
-  try {
-    return work();
-  } catch (const InputError& error) {
-    throw InputError(fmt::format("{}: {}", file.string(), error.what()));
-  } catch (const RequirementError& error) {
-    throw RequirementError(fmt::format("{}: {}", file.string(), error.what()));
-  }
-}
-
 /// One run: read, relax, measure, write.
 class Run {
 public:
@@ -587,10 +575,10 @@ private:
     Json& said = tool_.result()["mid_surface"];
     MidSurface middle;
     if (other_) {
-      middle = naming(*given_.other_face, [&] { return mid_surface_between(relaxed_.shell, which, *other_); });
+      middle = naming(given_.other_face->string(), [&] { return mid_surface_between(relaxed_.shell, which, *other_); });
       said["error_mm"] = nullptr;
     } else {
-      middle = naming(given_.out, [&] { return mid_surface(relaxed_.shell, which, *given_.thickness); });
+      middle = naming(given_.out.string(), [&] { return mid_surface(relaxed_.shell, which, *given_.thickness); });
       const auto [mean, largest] = half_wall_error(middle.shell, whole(), *given_.thickness);
       said["error_mm"] = {{"mean", mean}, {"max", largest}};
     }

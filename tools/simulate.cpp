@@ -79,19 +79,6 @@ void declare(cli::Tool& tool, Arguments& a) {
   a.picture.declare(tool);
 }
 
-// Mechanics knows bodies, and where some of them were said: says which file a refused or unsolved model came from.
-template <typename Work>
-auto naming(const fs::path& file, const Work& work) {
-  try {
-    return work();
-  } catch (const InputError& error) {
-    const std::string what = error.what();
-    throw InputError(what.starts_with(file.string() + ":") ? what : fmt::format("{}: {}", file.string(), what));
-  } catch (const RequirementError& error) {
-    throw RequirementError(fmt::format("{}: {}", file.string(), error.what()));
-  }
-}
-
 // OUT.hdf of a run that goes on.
 fs::path resumed_output(const Arguments& a) {
   fs::path out = a.resume;
@@ -277,7 +264,7 @@ public:
     read();
     stage("setup");
     prepare_result(tool_.result(), model());
-    naming(subject(), [&] { check_model(model(), scene_.run); });
+    naming(subject().string(), [&] { check_model(model(), scene_.run); });
     if (scene_.accuracy && !given_.check) {
       choose_model();
     }
@@ -464,7 +451,7 @@ private:
     for (const auto& target : targets_) {
       targets.push_back(target.get());
     }
-    accuracy_ = naming(subject(), [&] {
+    accuracy_ = naming(subject().string(), [&] {
       return solve_within(
           model().shells, targets, request, scene_.run,
           [&](std::vector<ShellBody> bodies) { return resolve_scene(scene_, std::move(bodies)); },
@@ -482,7 +469,7 @@ private:
   /// Takes the shells back to what they are without the pressure under which they were imaged.
   void unload() {
     stage("solve");
-    Unloaded found = naming(subject(), [&] {
+    Unloaded found = naming(subject().string(), [&] {
       return find_unloaded(model(), scene_.run, [&](double part, double distance) {
         tool_.detail(fmt::format("unloaded shape: {:.3g} of the pressure, loaded {:.3g} mm from the image in the mean",
                                  part, distance));
@@ -612,7 +599,7 @@ private:
       stage("solve");
     };
     try {
-      return naming(subject(),
+      return naming(subject().string(),
                     [&] { return solve(model(), scene_.run, on_state, tool_.progress("solve"), resumption); });
     } catch (const InputError&) {
       journal_->remove();

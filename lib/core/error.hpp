@@ -58,6 +58,23 @@ public:
   explicit MemoryError(const std::string& message) : Error(ExitCode::memory, message) {}
 };
 
+/// Runs work that does not know the file its input came from: the message of its InputError or RequirementError starts
+/// with that file's name. @return what the work returns
+template <typename Work>
+auto naming(const std::string& file, const Work& work) {
+  const auto named = [&](const Error& error) {
+    const std::string what = error.what();
+    return what.starts_with(file + ":") ? what : file + ": " + what;
+  };
+  try {
+    return work();
+  } catch (const InputError& error) {
+    throw InputError(named(error));
+  } catch (const RequirementError& error) {
+    throw RequirementError(named(error));
+  }
+}
+
 /// SIGHUP, SIGINT or SIGTERM arrived; thrown by check_interrupt() at a place where the state is consistent.
 class Interrupted : public std::exception {
 public:

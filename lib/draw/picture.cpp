@@ -285,7 +285,7 @@ std::string surface_picture(const TriangleMesh& surface, const std::vector<doubl
 }
 
 std::array<double, 3> bar_colour(double part) {
-  const auto& colour = surface_palette()[truncated<std::size_t>(std::clamp(part, 0.0, 1.0) * 255)];
+  const auto colour = surface_colour({.top = 1}, static_cast<float>(part));
   return {colour[0] / 255.0, colour[1] / 255.0, colour[2] / 255.0};
 }
 

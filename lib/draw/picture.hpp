@@ -3,7 +3,9 @@
 #include "tunica/surface/mesh/triangle_mesh.hpp"
 
 #include <array>
+#include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -26,7 +28,7 @@ struct PictureOptions {
 
 /// Draws a surface, coloured by a value per vertex, from two opposite sides, with a colour bar, a scale of lengths and
 /// a ring around the largest value. @return a PNG of 1600 x 900. The views are along an axis of the frame, a little
-/// from the right and above: the front (-y) and the back (+y) with z upright, unless along another axis the surface
+/// from the right and above: the front (-y) and the back (+y) with z up, unless along another axis the surface
 /// shows larger by a quarter or more. So the same organ has the same views, whatever the values and the mesh. The same
 /// input gives the same bytes whatever the number of threads.
 /// @param surface  at least one triangle, finite positions, mm
@@ -35,6 +37,10 @@ struct PictureOptions {
 /// Limits: a pocket that neither side shows stays hidden; the letters are Latin, Greek and Cyrillic ones.
 std::string surface_picture(const TriangleMesh& surface, const std::vector<double>& values,
                             const PictureOptions& options);
+
+/// The colours of surfaces, evenly spaced from zero to the largest value: red, green, blue in sRGB, linear between
+/// them.
+std::span<const std::array<std::uint8_t, 3>> surface_colours();
 
 /// The colour of a value in the pictures: red, green, blue in sRGB, 0 to 1.
 /// @param part  of the largest value, 0 to 1; grey where it is no number

@@ -27,17 +27,6 @@ Bytes mixed(const Bytes& a, const Bytes& b, double part) {
   return colour;
 }
 
-Bytes surface_colour(const Paint& paint, float value) {
-  if (paint.plain && std::isfinite(value)) {
-    return plain_colour;
-  }
-  if (!std::isfinite(value)) {
-    return no_value;
-  }
-  const double level = paint.top > 0 ? 255 * value / paint.top : 0;
-  return surface_palette()[truncated<std::size_t>(std::round(std::clamp(level, 0.0, 255.0)))];
-}
-
 bool is_inside(const Raster& raster, int x, int y) { return x >= 0 && y >= 0 && x < raster.width && y < raster.height; }
 
 // Whether the surface ends here before another one, or before none: the depth jumps by more than `step`, and by far
@@ -102,6 +91,8 @@ double cover_lines(std::vector<std::uint8_t>& cover, const Raster& raster, const
 
 }  // namespace
 
+std::span<const Bytes> surface_colours() { return control_colours; }
+
 const Palette& surface_palette() {
   static const Palette colours = [] {
     Palette made;
@@ -113,6 +104,17 @@ const Palette& surface_palette() {
     return made;
   }();
   return colours;
+}
+
+Bytes surface_colour(const Paint& paint, float value) {
+  if (paint.plain && std::isfinite(value)) {
+    return plain_colour;
+  }
+  if (!std::isfinite(value)) {
+    return no_value;
+  }
+  const double level = paint.top > 0 ? 255 * value / paint.top : 0;
+  return surface_palette()[truncated<std::size_t>(std::round(std::clamp(level, 0.0, 255.0)))];
 }
 
 Image shaded(const Raster& raster, const Paint& paint, double jump) {

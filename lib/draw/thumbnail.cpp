@@ -4,6 +4,8 @@
 #include "tunica/core/narrow.hpp"
 #include "tunica/draw/detail/png.hpp"
 #include "tunica/draw/detail/rasteriser.hpp"
+#include "tunica/draw/detail/shading.hpp"
+#include "tunica/draw/detail/view.hpp"
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
@@ -17,48 +19,13 @@ namespace {
 
 constexpr int thumbnail_oversampling = 2;
 
-// Viridis at nine places, lifted towards white as in the error maps: shading on its darkest colours would hide the
-// shape.
-constexpr std::array<std::array<double, 3>, 9> viridis{{{68, 1, 84},
-                                                        {71, 45, 123},
-                                                        {59, 82, 139},
-                                                        {44, 114, 142},
-                                                        {33, 145, 140},
-                                                        {40, 174, 128},
-                                                        {94, 201, 98},
-                                                        {173, 220, 48},
-                                                        {253, 231, 37}}};
-constexpr double lift = 0.15;
-
-using Rgb = std::array<double, 3>;
-
-Rgb colour_at(double part) {
-  const double place = std::clamp(part, 0.0, 1.0) * real(viridis.size() - 1);
-  const auto below = std::min(truncated<std::size_t>(place), viridis.size() - 2);
-  Rgb colour{};
-  for (std::size_t c = 0; c < 3; ++c) {
-    const double value = viridis[below][c] + (place - real(below)) * (viridis[below + 1][c] - viridis[below][c]);
-    colour[c] = value + lift * (255 - value);
-  }
-  return colour;
-}
-
 Camera camera_for(const TriangleMesh& mesh, int width, int height) {
   Camera camera;
   const std::array<Vec3, 3> axes = thumbnail_axes(mesh);
   camera.right = axes[0];
   camera.up = axes[1];
   camera.towards = axes[2];
-  Vec3 lower = Vec3::Constant(infinity);
-  Vec3 upper = -lower;
-  for (const Vec3& p : mesh.vertices) {
-    const Vec3 seen(camera.right.dot(p), camera.up.dot(p), camera.towards.dot(p));
-    lower = lower.cwiseMin(seen);
-    upper = upper.cwiseMax(seen);
-  }
-  const Vec3 middle = 0.5 * (lower + upper);
-  const Vec3 extent = upper - lower;
-  camera.centre = middle.x() * camera.right + middle.y() * camera.up + middle.z() * camera.towards;
+  const Vec2 extent = centre_camera(camera, mesh.vertices);
   camera.width = width;
   camera.height = height;
   camera.scale = 0.94 * std::min(width / std::max(extent.x(), 1e-12), height / std::max(extent.y(), 1e-12));
@@ -66,8 +33,8 @@ Camera camera_for(const TriangleMesh& mesh, int width, int height) {
 }
 
 // Rgb and cover of a pixel of the finished picture: the mean over its part of the raster.
-std::array<unsigned char, 4> pixel_at(const Raster& raster, int x, int y, double top) {
-  Rgb sum{};
+std::array<unsigned char, 4> pixel_at(const Raster& raster, int x, int y, const Paint& paint) {
+  std::array<double, 3> sum{};
   int covered = 0;
   for (int dy = 0; dy < thumbnail_oversampling; ++dy) {
     for (int dx = 0; dx < thumbnail_oversampling; ++dx) {
@@ -75,8 +42,7 @@ std::array<unsigned char, 4> pixel_at(const Raster& raster, int x, int y, double
       if (raster.depth[at] == Raster::empty) {
         continue;
       }
-      const bool plain = !(top > 0) || !std::isfinite(raster.value[at]);
-      const Rgb colour = plain ? Rgb{196, 200, 206} : colour_at(raster.value[at] / top);
+      const auto colour = surface_colour(paint, raster.value[at]);
       const double light = (0.46 + 0.58 * raster.light[at]) * (raster.inner[at] != 0 ? 0.8 : 1.0);
       for (std::size_t c = 0; c < 3; ++c) {
         sum[c] += light * colour[c];
@@ -100,11 +66,12 @@ std::string thumbnail(const TriangleMesh& surface, const std::vector<double>& va
   const Camera camera =
       camera_for(surface, options.width * thumbnail_oversampling, options.height * thumbnail_oversampling);
   const Raster raster = rasterise(surface, shading_normals(surface), values, camera);
+  const Paint paint{.top = options.top, .plain = values.empty() || !(options.top > 0)};
   std::vector<unsigned char> pixels;
   pixels.reserve(narrow<std::size_t>(4 * options.width * options.height));
   for (int y = 0; y < options.height; ++y) {
     for (int x = 0; x < options.width; ++x) {
-      const auto pixel = pixel_at(raster, x, y, values.empty() ? 0 : options.top);
+      const auto pixel = pixel_at(raster, x, y, paint);
       pixels.insert(pixels.end(), pixel.begin(), pixel.end());
     }
   }
@@ -135,16 +102,6 @@ std::array<Vec3, 3> thumbnail_axes(const TriangleMesh& surface) {
   const Vec3 raised = std::cos(0.25) * turned + std::sin(0.25) * up;
   const Vec3 across = up.cross(turned);
   return {across, raised.cross(across), raised};
-}
-
-std::vector<std::array<unsigned char, 3>> thumbnail_palette() {
-  std::vector<std::array<unsigned char, 3>> palette;
-  for (std::size_t i = 0; i < viridis.size(); ++i) {
-    const Rgb colour = colour_at(real(i) / real(viridis.size() - 1));
-    palette.push_back({truncated<unsigned char>(colour[0]), truncated<unsigned char>(colour[1]),
-                       truncated<unsigned char>(colour[2])});
-  }
-  return palette;
 }
 
 }  // namespace tunica

@@ -14,16 +14,13 @@ struct ThumbnailOptions {
   double top = 0;  ///< value of the last colour; 0: the surface is plain
 };
 
-/// A surface alone, seen as in error_map_picture(), on nothing: a PNG that stands on a light page and on a dark one.
-/// The longest extent lies level. The same input gives the same bytes whatever the number of threads.
+/// A surface alone, in the colours of surface_picture(), on nothing: a PNG that stands on a light page and on a dark
+/// one. The longest extent lies level. The same input gives the same bytes whatever the number of threads.
 /// @param surface  at least one triangle, finite positions, mm
 /// @param values   empty, or #V values >= 0; what is not finite is drawn grey
 std::string thumbnail(const TriangleMesh& surface, const std::vector<double>& values, const ThumbnailOptions& options);
 
 /// To the right, upward, and towards the viewer of thumbnail(): unit vectors.
 std::array<Vec3, 3> thumbnail_axes(const TriangleMesh& surface);
-
-/// The colours of thumbnail(), from 0 to top, red, green, blue.
-std::vector<std::array<unsigned char, 3>> thumbnail_palette();
 
 }  // namespace tunica

@@ -15,7 +15,7 @@ struct Side {
   Vec3 towards, up;
   double worth;
 };
-// Along y with z upright a patient is seen from the front and the back.
+// Along y with z up a patient is seen from the front and the back.
 const std::array<Side, 3> sides{Side{-Vec3::UnitY(), Vec3::UnitZ(), 1}, Side{Vec3::UnitX(), Vec3::UnitZ(), 0.8},
                                 Side{Vec3::UnitZ(), -Vec3::UnitY(), 0.7}};
 
@@ -32,7 +32,8 @@ Camera camera_at(const Vec3& up, const Vec3& towards) {
   return camera;
 }
 
-// Centres the camera on what it sees and returns the extent in mm.
+}  // namespace
+
 Vec2 centre_camera(Camera& camera, std::span<const Vec3> points) {
   Vec3 lower = Vec3::Constant(infinity);
   Vec3 upper = -lower;
@@ -45,8 +46,6 @@ Vec2 centre_camera(Camera& camera, std::span<const Vec3> points) {
   camera.centre = middle.x() * camera.right + middle.y() * camera.up + middle.z() * camera.towards;
   return (upper - lower).head<2>();
 }
-
-}  // namespace
 
 std::array<View, 2> opposite_views(std::span<const Vec3> points, const Box2& box, int oversampling) {
   std::array<View, 2> best;

@@ -1,5 +1,5 @@
 #include "tunica/core/narrow.hpp"
-#include "tunica/draw/thumbnail.hpp"
+#include "tunica/draw/picture.hpp"
 #include "tunica/report/detail/command_words.hpp"
 #include "tunica/report/detail/measures.hpp"
 #include "tunica/report/detail/sections.hpp"
@@ -67,10 +67,10 @@ Markup legend(const CaseReport& one) {
     return {};
   }
   Markup stops;
-  const auto palette = thumbnail_palette();
-  for (std::size_t i = 0; i < palette.size(); ++i) {
-    const auto [red, green, blue] = palette[i];
-    stops += html("<stop offset=\"{}\" stop-color=\"{}\"/>", fmt::format("{:.4g}", real(i) / real(palette.size() - 1)),
+  const auto colours = surface_colours();
+  for (std::size_t i = 0; i < colours.size(); ++i) {
+    const auto [red, green, blue] = colours[i];
+    stops += html("<stop offset=\"{}\" stop-color=\"{}\"/>", fmt::format("{:.4g}", real(i) / real(colours.size() - 1)),
                   fmt::format("#{:02x}{:02x}{:02x}", red, green, blue));
   }
   const bool loaded = one.picture_top > 0;

@@ -171,7 +171,7 @@ std::vector<std::string> labels_of(const DrawnResult& result) {
   std::vector<std::string> labels;
   for (const DrawnResult::State& state : result.states) {
     const bool first = labels.empty();
-    labels.push_back(first ? "As imaged" : result.timed ? fmt::format("At {:.4g} s", state.time) : "Loaded");
+    labels.push_back(first ? "Unloaded" : result.timed ? fmt::format("At {:.4g} s", state.time) : "Loaded");
   }
   return labels;
 }

@@ -2,6 +2,7 @@
 
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
+#include "tunica/draw/picture.hpp"
 #include "tunica/draw/thumbnail.hpp"
 #include "tunica/io/file/encoding.hpp"
 #include "tunica/io/mesh/mesh_file.hpp"
@@ -149,7 +150,7 @@ Json header_of(const DrawnShells& shells, const TriangleMesh& surface, const Top
         {"distance", "Distance to the segmented surface"}}},
       {"units", {{"stress", "kPa"}, {"displacement", "mm"}, {"distance", "mm"}}},
       {"surface", nullptr},
-      {"palette", thumbnail_palette()},
+      {"palette", surface_colours()},
   };
   if (!surface.triangles.empty()) {
     header["surface"] = {{"points", surface.vertices.size()}, {"triangles", surface.triangles.size()}};

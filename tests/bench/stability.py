@@ -52,12 +52,18 @@ def shortened(value):
 
 
 def by_lines(report):
-    """JSON with a line for every key of the report and of its result."""
+    """JSON with a line for every key of the report and of its result, and for every part of a long list."""
     def listed(values, indent, deeper):
         lines = [f'{indent} {json.dumps(key)}: ' +
-                 (listed(value, indent + " ", False) if deeper and isinstance(value, dict)
-                  else json.dumps(value, ensure_ascii=False)) for key, value in values.items()]
+                 (listed(value, indent + " ", False) if deeper and isinstance(value, dict) else text(value, indent + " "))
+                 for key, value in values.items()]
         return "{\n" + ",\n".join(lines) + "\n" + indent + "}"
+
+    def text(value, indent):
+        whole = json.dumps(value, ensure_ascii=False)
+        if not isinstance(value, list) or len(whole) < 160:
+            return whole
+        return "[\n" + ",\n".join(f"{indent} {json.dumps(part, ensure_ascii=False)}" for part in value) + "\n" + indent + "]"
     return listed(report, "", True)
 
 

@@ -98,8 +98,8 @@ class Chroot(unittest.TestCase):
         output("debootstrap", "--variant=minbase", "bookworm", cls.root, MIRROR)
         shutil.copy("/etc/resolv.conf", cls.root / "etc")
         for package in PACKAGES:
-            shutil.copy(package, cls.root / "root")
-        cls.inside("apt-get update -q && apt-get install -y -q --no-install-recommends /root/*.deb")
+            shutil.copy(package, cls.root / "srv")
+        cls.inside("apt-get update -q && apt-get install -y -q --no-install-recommends /srv/*.deb")
 
     @classmethod
     def inside(cls, script):

@@ -76,7 +76,7 @@ class Browser(WithPackages):
         for scheme in ("light", "dark"):
             seen = self.look_at(self.case, scheme)
             self.assertIn("Displacement", seen["legend"])
-            self.assertIn("As imaged", seen["legend"])
+            self.assertIn("Unloaded", seen["legend"])
 
     def test_cohort_sorts_and_filters(self):
         out = self.folder / "cohort"

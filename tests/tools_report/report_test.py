@@ -122,7 +122,7 @@ class CasePage(ReportTest):
         length, = struct.unpack("<I", data[:4])
         header = json.loads(data[4:4 + length])
         result = json.loads((self.case / "simulate.json").read_text())["result"]
-        self.assertEqual(header["states"], ["As imaged", "Loaded"])
+        self.assertEqual(header["states"], ["Unloaded", "Loaded"])
         self.assertAlmostEqual(header["tops"]["displacement"] / result["max_displacement_mm"], 1, delta=0.01)
         points, edges = header["shell"]["points"], header["edges"]
         self.assertEqual(header["shell"]["triangles"], 16 * result["shells"])

@@ -21,6 +21,9 @@ struct Paint {
   bool inside_out = false;  ///< what faces the viewer is the inner side
 };
 
+/// Red, green and blue of a value; what is not finite is grey.
+std::array<std::uint8_t, 3> surface_colour(const Paint& paint, float value);
+
 /// The raster in colours on white: diffuse light that leaves the hues readable, dark outlines where the depth jumps by
 /// more than `jump` (mm).
 Image shaded(const Raster& raster, const Paint& paint, double jump);

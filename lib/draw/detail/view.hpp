@@ -21,6 +21,9 @@ struct View {
   Box2 panel;
 };
 
+/// Centres the camera on the points (mm, at least one) it sees; their extent to its right and upward, mm.
+Vec2 centre_camera(Camera& camera, std::span<const Vec3> points);
+
 /// Two views from opposite sides in the box: beside or above each other, along y, x or z, whichever draws the points
 /// largest; y counts a quarter more than x, and that more than z.
 /// @param points        mm, at least one

@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::string_view states_magic = "TUNICA STATES 2\n";
-constexpr std::string_view checkpoint_magic = "TUNICA CHECKPOINT 1\n";
+constexpr std::string_view checkpoint_magic = "TUNICA CHECKPOINT 2\n";
 /// Time between checkpoints, as a multiple of what the last one took.
 constexpr int spacing = 20;
 constexpr std::uint64_t largest_record = std::uint64_t{1} << 40;
@@ -187,11 +187,11 @@ template <typename Archive, typename AnyCheckpoint>
 void checkpoint_members(Archive& archive, AnyCheckpoint& checkpoint) {
   auto& [summary, position, displacement, rotation, memory] = checkpoint;
   auto& [dof, steps, parts, converged, residual, newton_iterations, cg_iterations, error, error_is_bound, volume_before,
-         volume_after, strain, largest, seconds_per_step, frequencies, factors, stiffened, energy, snaps, limits,
-         branches] = summary;
+         volume_after, strain, largest, seconds_per_step, frequencies, factors, stiffened, energy, step_error, motion,
+         snaps, limits, branches] = summary;
   each(archive, dof, steps, parts, converged, residual, newton_iterations, cg_iterations, error, error_is_bound,
-       volume_before, volume_after, strain, largest, seconds_per_step, frequencies, factors, stiffened, energy, snaps,
-       limits, branches);
+       volume_before, volume_after, strain, largest, seconds_per_step, frequencies, factors, stiffened, energy,
+       step_error, motion, snaps, limits, branches);
   each(archive, position, displacement, rotation, memory);
 }
 

@@ -321,6 +321,13 @@ std::vector<std::string> run_warnings(const RunSettings& run, const Summary& sum
                     "of rest is not: for the motion take shorter steps, or integrator = \"generalised-alpha\"",
                     1e2 * summary.energy->lost / summary.energy->largest));
   }
+  constexpr double notable_step = 0.1;
+  if (summary.step_error > notable_step * summary.largest_motion) {
+    warnings.push_back(
+        fmt::format("the steps are long for what swings: one of them left out {:.2g} % of the largest motion: take "
+                    "shorter ones, or error control (adaptive)",
+                    1e2 * summary.step_error / summary.largest_motion));
+  }
   if (summary.stiffened_from) {
     warnings.push_back(
         fmt::format("the mesh is coarse for so thin a curved shell (h^2 > 3 R t): from {} {:.4g} on, where it "

@@ -133,7 +133,7 @@ bool ContactSystem::is_certain(const Configuration& configuration) {
   const auto near = near_faces(now, 2 * farthest);
   for (std::size_t g = 0; g < groups_.size(); ++g) {
     if (groups_[g].point) {
-      continue;  // its surface passes nothing where none of the other's samples passes it
+      continue;  // whether the mesh passes the other body is told by that one's faces
     }
     const std::size_t f = groups_[g].face;
     if (groups_[g].other.rigid && !passes_rigid(groups_[g], before[f], now[f])) {

@@ -136,9 +136,10 @@ void ContactSystem::add_points(const Contact& contact, std::size_t number, std::
   }
   const double mean =
       edges / real(std::max<std::size_t>(1, surfaces_.first[other.index + 1] - surfaces_.first[other.index]));
-  for (const MeshPoint& point : shapes_[rigid].corners_and_edges(spacing_of_edge * mean)) {
+  const double spacing = spacing_of_edge * mean;
+  for (const Vec3& point : shapes_[rigid].corners_and_edges(spacing)) {
     Group group;
-    group.point = point.at;
+    group.point = point;
     group.rigid = rigid;
     group.contact = number;
     group.other = other;
@@ -150,7 +151,7 @@ void ContactSystem::add_points(const Contact& contact, std::size_t number, std::
     group.samples.emplace_back();
     group.samples.back().weights.setZero();
     group.samples.back().at.setZero();
-    group.samples.back().area = point.area;
+    group.samples.back().area = spacing * spacing;
     groups_.push_back(std::move(group));
   }
 }

@@ -215,13 +215,11 @@ std::optional<Vec3> RigidShape::inner_point() const {
 
 Vec3 RigidShape::position() const { return convex() ? Vec3((first_ + second_) / 2) : shift_; }
 
-std::vector<MeshPoint> corners_and_edges(const TriangleMesh& mesh, double spacing) {
+std::vector<Vec3> RigidShape::corners_and_edges(double spacing) const {
+  const TriangleMesh& mesh = std::get<RigidMesh>(body_->shape).surface;
   constexpr double sharp = 0.94;  // cosine of 20 degrees
   constexpr std::size_t most_per_edge = 64;
-  std::vector<MeshPoint> points;
-  for (const Vec3& x : mesh.vertices) {
-    points.push_back({x, spacing * spacing});
-  }
+  std::vector<Vec3> points = mesh.vertices;
   const auto normal = [&](std::size_t t) {
     const auto& v = mesh.triangles[t];
     const auto& x = mesh.vertices;
@@ -238,7 +236,7 @@ std::vector<MeshPoint> corners_and_edges(const TriangleMesh& mesh, double spacin
       const auto pieces =
           std::min<std::size_t>(most_per_edge, truncated<std::size_t>(std::ceil((b - a).norm() / spacing)));
       for (std::size_t i = 1; i < pieces; ++i) {
-        points.push_back({a + (b - a) * (real(i) / real(pieces)), spacing * spacing});
+        points.emplace_back(a + (b - a) * (real(i) / real(pieces)));
       }
     }
   }

@@ -15,14 +15,6 @@ struct RigidDistance {
   Mat3 curvature;       ///< second derivative of the distance, 1 / mm
 };
 
-/// Points that stand for the corners and the sharp edges of a rigid mesh, with the area that each stands for (mm^2).
-/// @param spacing  mm, of points along sharp edges
-struct MeshPoint {
-  Vec3 at;
-  double area = 0;
-};
-std::vector<MeshPoint> corners_and_edges(const TriangleMesh& mesh, double spacing);
-
 /// A rigid body at a time. All shapes but the mesh are convex: their distance is a convex function, so that the plane
 /// across `normal` through the body's nearest point has the whole body below it.
 class RigidShape {
@@ -54,10 +46,10 @@ public:
 
   [[nodiscard]] Vec3 position() const;
 
-  /// Of a mesh, see below.
-  [[nodiscard]] std::vector<MeshPoint> corners_and_edges(double spacing) const {
-    return tunica::corners_and_edges(std::get<RigidMesh>(body_->shape).surface, spacing);
-  }
+  /// Of a mesh, as it is given: its corners, and points along its sharp edges.
+  /// @param spacing  mm, of points along an edge at most, but for edges longer than 64 of them. Cost: linear.
+  [[nodiscard]] std::vector<Vec3> corners_and_edges(double spacing) const;
+
   /// Where a point of the mesh is, given as the mesh is given.
   [[nodiscard]] Vec3 of_mesh(const Vec3& p) const { return from_mesh(expanded(p, factor_)); }
 

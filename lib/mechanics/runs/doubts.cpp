@@ -24,8 +24,9 @@ constexpr double thickest = 0.05;
 constexpr double thickest_curved = 0.25;
 // Of the wall, in the mean: where they are no features of the surface a displacement is off by up to thirty times that.
 constexpr double highest_waves = 0.003;
-// Of bow_share(), from where bending is some 20 % too stiff: h^2 = 4 R t on a cylinder.
+// Of bow_share(), from where bending is some 20 % too stiff.
 constexpr double largest_bow = 0.5;
+constexpr double bow_at_one = 8;  // h^2 / (R t) on a cylinder
 
 std::string at(const std::string& said_at, const std::string& otherwise) {
   return said_at.empty() ? otherwise : said_at + ": " + otherwise;
@@ -117,11 +118,29 @@ double bow_share(const ShellBody& body, const CornerNormals& normal, std::size_t
   return largest / (4 * across.norm() * thickness_of(body, triangle));
 }
 
-/// An edge whose ends lean alike against it, by a, is an S: its mean height is a sixteenth of a times its length. On a
-/// smooth surface normals lean against each other, so that an S is what noise of normals leaves.
-void doubt_waves(const ShellBody& body, std::vector<std::string>& found) {
+/// Of the triangles, the share of bending that over half of the area is exceeded: one crease or branch says nothing.
+double median_bow_share(const ShellBody& body) {
+  const CornerNormals normals(body.mesh, body.curved);
+  std::vector<std::pair<double, double>> shares;  // with the areas
+  double left = 0;
+  for (std::size_t t = 0; t < body.mesh.triangles.size(); ++t) {
+    shares.emplace_back(bow_share(body, normals, t), area_of(body.mesh, t));
+    left += most_of_it * shares.back().second;
+  }
+  std::sort(shares.begin(), shares.end());
+  const auto median = std::find_if(shares.begin(), shares.end(), [&](const auto& share) {
+    left -= share.second;
+    return left <= 0;
+  });
+  return median == shares.end() ? 0 : median->first;
+}
+
+/// Mean height of the waves that normals leave, over the wall. An edge whose ends lean alike against it, by a, is an S:
+/// its mean height is a sixteenth of a times its length. On a smooth surface normals lean against each other, so that
+/// an S is what noise of normals leaves.
+double waves_of(const ShellBody& body) {
   if (!body.curved || body.mesh.normals.size() != body.mesh.vertices.size()) {
-    return;
+    return 0;
   }
   constexpr double mean_height = 1.0 / 16;
   double waves = 0;
@@ -137,29 +156,20 @@ void doubt_waves(const ShellBody& body, std::vector<std::string>& found) {
       waves += area / 3 * mean_height * std::abs(lean) / thickness_of(body, t);
     }
   }
-  if (waves > highest_waves * whole) {
-    found.push_back(fmt::format(
-        "{}: its normals do not fit its nodes: the shells between them wave by {:.2g} % of the wall in the "
-        "mean; where these are no features of the surface the answer is off by up to thirty times that: refine "
-        "or fit it again (tunica-relax)",
-        at(body.said_at, body.name), 100 * waves / whole));
-  }
+  return whole > 0 ? waves / whole : 0;
 }
 
+/// What long shells and what waves leave of an answer adds up, so both take from one allowance.
 void doubt_coarseness(const ShellBody& body, std::vector<std::string>& found) {
-  const CornerNormals normals(body.mesh, body.curved);
-  double coarse = 0;
-  double whole = 0;
-  for (std::size_t t = 0; t < body.mesh.triangles.size(); ++t) {
-    const double area = area_of(body.mesh, t);
-    coarse += bow_share(body, normals, t) > largest_bow ? area : 0;
-    whole += area;
-  }
-  if (coarse > most_of_it * whole) {
-    found.push_back(
-        fmt::format("{}: over {:.0f} % of its area the shells are too long for so thin a curved wall (h^2 > 4 R t), or "
-                    "too narrow: they bend too little, and uneven pressure moves single nodes too far: refine the mesh",
-                    at(body.said_at, body.name), 100 * coarse / whole));
+  const double bow = median_bow_share(body);
+  const double waves = waves_of(body);
+  if (bow / largest_bow + waves / highest_waves > 1) {
+    found.push_back(fmt::format(
+        "{}: its shells are coarse for so thin a curved wall: h^2 = {:.2g} R t in the median (at 4 they bend some 20 % "
+        "too little, and uneven pressure moves single nodes too far), and their normals leave waves of {:.2f} % of the "
+        "wall in the mean (the answer is off by up to thirty times that where these are no features of the surface): "
+        "refine the mesh or fit it again (tunica-relax)",
+        at(body.said_at, body.name), bow_at_one * bow, 100 * waves));
   }
 }
 
@@ -350,7 +360,6 @@ std::vector<std::string> doubts(const Model& model, const RunSettings& settings)
     const ShellBody& body = model.shells[b];
     doubt_thickness(body, found);
     doubt_coarseness(body, found);
-    doubt_waves(body, found);
     held.push_back(held_freedoms(model, b));
     if (cannot_move(model, b, held.back())) {
       found.push_back(at(body.said_at, body.name) + ": all its nodes are held, so nothing of it can move");

@@ -251,6 +251,18 @@ public:
     }
   }
 
+  /// What a step of a second-order scheme left out, where no error control looks.
+  void look_for_left_out(double length, const Motion& before, const Motion& after, Summary& summary) const {
+    if (!scheme_.second_order() || tolerance_ > 0) {
+      return;
+    }
+    VectorX moved;
+    find_change(reference_configuration(system_), after.configuration, moved);
+    summary.largest_motion = std::max(summary.largest_motion, increment_size(system_, moved));
+    summary.step_error =
+        std::max(summary.step_error, increment_size(system_, scheme_.local_error(length, before.rates, after.rates)));
+  }
+
   [[nodiscard]] std::size_t freedom_count() const { return solver_->freedom_count(); }
   void tell_direct_error(bool tell) { solver_->tell_direct_error(tell); }
   [[nodiscard]] double tolerance() const { return tolerance_; }
@@ -548,8 +560,9 @@ private:
     if (!is_solved(settings_, result)) {
       fail(step, before, end);
     }
-    time_ = end;
+    const double before_time = std::exchange(time_, end);
     stepper_.balance_energy(summary_.steps + 1, end, motion_, *summary_.energy);
+    stepper_.look_for_left_out(end - before_time, before, motion_, summary_);
     summary_.parts += step.parts;
     State state = wants_state() ? state_now() : State();
     state.residual = result.residual;

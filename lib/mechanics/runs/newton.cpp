@@ -41,21 +41,27 @@ public:
       seen_.erase(seen_.begin());
     }
     seen_.push_back(std::move(unbalanced));
+    mean_ = least_mean();
   }
 
-  [[nodiscard]] bool known() const { return !seen_.empty(); }
-
   /// Contact follows another law from here.
-  void forget() { seen_.clear(); }
+  void forget() {
+    seen_.clear();
+    mean_.resize(0);
+  }
 
-  /// What an increment is expected to mend, on all sides.
-  void take(const VectorX& mended) {
+  /// The weighted mean of the last sides that is nearest to zero; of size zero where none is known.
+  [[nodiscard]] const VectorX& mean() const { return mean_; }
+
+  /// An increment is expected to mend the mean, on all sides.
+  void mend() {
     for (VectorX& side : seen_) {
-      side -= mended;
+      side -= mean_;
     }
   }
 
-  /// The weighted mean that is nearest to zero, by Frank and Wolfe's method with exact line searches.
+private:
+  /// By Frank and Wolfe's method with exact line searches.
   [[nodiscard]] VectorX least_mean() const {
     constexpr int iterations = 100;
     VectorX mean = seen_.back();
@@ -72,8 +78,8 @@ public:
     return mean;
   }
 
-private:
   std::vector<VectorX> seen_;
+  VectorX mean_;
 };
 
 }  // namespace
@@ -252,19 +258,25 @@ private:
   }
 
   /// The last sides cancel for the most part.
-  [[nodiscard]] bool is_on_kink() const { return has_kinks() && between_sides_ <= canceled * result_.residual; }
+  [[nodiscard]] bool is_on_kink() const { return between_sides() <= canceled * result_.residual; }
+
+  /// The residual of what the last sides of a kink have in common.
+  [[nodiscard]] double between_sides() const {
+    return sides_.mean().size() > 0 && now_.scale > 0 ? force_norm(system_, sides_.mean()) / now_.scale : infinity;
+  }
   [[nodiscard]] bool has_kinks() const { return system_.contact && system_.contact->has_kinks(); }
 
   /// At rest on a kink: the last increments move next to nothing.
   [[nodiscard]] bool swings_at_kinks() {
-    const double most = has_kinks() ? largest_swing * system_.contact->resolution() : 0;
-    if (!is_on_kink() || between_sides_ > largest_residual_at_kinks || !result_.stable || last_shift_ > most ||
-        previous_shift_ > most) {
+    if (!is_on_kink() || between_sides() > largest_residual_at_kinks || !result_.stable || !is_small(last_shift_) ||
+        !is_small(previous_shift_)) {
       return false;
     }
-    result_.residual = std::min(result_.residual, between_sides_);
+    result_.residual = std::min(result_.residual, between_sides());
     return true;
   }
+
+  [[nodiscard]] bool is_small(double shift) const { return shift <= largest_swing * system_.contact->resolution(); }
 
   /// Whether an increment leads back to where the last one came from.
   [[nodiscard]] bool turns_back() const {
@@ -315,11 +327,11 @@ private:
     }
     mask(solver_.free(), right);
     // Near enough to a kink, what both sides have in common is left to be mended.
-    const bool by_mean =
-        sides_.known() && is_on_kink() && !is_moving() && last_shift_ <= largest_swing * system_.contact->resolution();
+    const bool on_kink = is_on_kink() && !is_moving();
+    const bool by_mean = on_kink && is_small(last_shift_);
     if (by_mean) {
-      right = sides_.least_mean();
-      sides_.take(right);
+      right = sides_.mean();
+      sides_.mend();
     }
     const TangentSolver::Result solved = solver_.solve(matrix_, right, increment_);
     result_.cg_iterations += solved.cg_iterations;
@@ -335,7 +347,7 @@ private:
       return false;  // nothing holds some body
     }
     work_ = right.dot(increment_);
-    longest_ = !is_on_kink() || is_moving() || by_mean ? 1 : turns_back() ? length_ / 2 : length_;
+    longest_ = !on_kink || by_mean ? 1 : turns_back() ? length_ / 2 : length_;
     const double turn = largest_rotation(system_, increment_);
     if (left_ > 0) {
       increment_ += left_ * held_increment_;
@@ -402,7 +414,6 @@ private:
       VectorX free = now_.unbalanced;
       mask(solver_.free(), free);
       sides_.look(std::move(free));
-      between_sides_ = now_.scale > 0 ? force_norm(system_, sides_.least_mean()) / now_.scale : 0;
     }
     return now_.valid && std::isfinite(result_.residual);
   }
@@ -429,7 +440,6 @@ private:
   double last_shift_ = infinity;      ///< mm, of the node that it moved farthest
   double previous_shift_ = infinity;  ///< by the one before
   Sides sides_;
-  double between_sides_ = infinity;  ///< residual of the least mean of the last sides
   double largest_solution_ = 0;
   double previous_residual_ = 0;
 };

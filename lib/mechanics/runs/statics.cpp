@@ -349,8 +349,10 @@ private:
   SettleResult leave_path(double beyond, const NewtonResult& failed) {
     Configuration attempt = configuration_;
     const SettleResult settled = step_.let_go(beyond, factor_, thickness_, attempt);
-    if (!settled.settled || !is_apart(attempt)) {
-      fail(failed, settled, settled.ran_away ? loose_body(attempt) : "");
+    NewtonResult told = failed;
+    told.apart = failed.apart && (!settled.settled || is_apart(attempt));
+    if (!settled.settled || !told.apart) {
+      fail(told, settled, settled.ran_away ? loose_body(attempt) : "");
     }
     const bool unstable = !failed.stable || settled.lost_stability;
     if (unstable && distance(attempt, configuration_) > largest_branch * thickness_) {

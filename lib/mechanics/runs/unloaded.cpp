@@ -21,7 +21,7 @@ constexpr double farthest = 1e-2;          // the same: more is no such shape
 constexpr std::size_t most_iterations = 40;
 constexpr std::size_t remembered = 5;  // iterates that the acceleration combines
 constexpr double smallest_part = 1.0 / 32;
-constexpr std::string_view held_by = "imaged_at";
+constexpr std::string_view key = "imaged_at";
 
 /// Displacements and rotation vectors (times a length) of all nodes from the reference to the image, one after the
 /// other.
@@ -192,7 +192,7 @@ void require_shells_only(const Model& model) {
       throw InputError(
           fmt::format("{}{}: the unloaded shape is found for shells alone: leave out solids, rigid bodies, "
                       "contacts and attachments",
-                      load.said_at.empty() ? "" : load.said_at + ": ", held_by));
+                      load.said_at.empty() ? "" : load.said_at + ": ", key));
     }
   }
 }
@@ -256,7 +256,7 @@ Unloaded find_unloaded(const Model& imaged, const RunSettings& settings,
     if (step < smallest_part) {
       throw RequirementError(fmt::format(
           "no unloaded shape was found that lies where the image shows it under {:.4g} times the pressure {}{}{}", next,
-          held_by, map.reason.empty() ? ": the iterations do not converge" : ": ", map.reason));
+          key, map.reason.empty() ? ": the iterations do not converge" : ": ", map.reason));
     }
   }
   Unloaded unloaded{map.reference(found), map.volume, distance[0], distance[1], map.iterations};

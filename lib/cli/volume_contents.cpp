@@ -1,0 +1,152 @@
+#include "tunica/cli/volume_contents.hpp"
+
+#include "tunica/cli/case_memory.hpp"
+#include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
+#include "tunica/core/quantity.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace tunica::cli {
+namespace {
+
+std::string list_of(const std::vector<Label>& labels) {
+  constexpr std::size_t shown = 80;
+  std::string text;
+  for (std::size_t i = 0; i < std::min(labels.size(), shown); ++i) {
+    text += (i > 0 ? ", " : "") + named(labels[i]);
+  }
+  return labels.size() > shown ? fmt::format("{}, and {} more", text, labels.size() - shown) : text;
+}
+
+// The labels as lines of text, and for the report.
+std::pair<std::string, Json> list_labels(const VolumeFile& file, const VolumeContents& contents, std::size_t shells) {
+  std::string text = fmt::format("labels       {}, with MiB of memory of extract and of the chain to {} shells\n",
+                                 contents.labels->size(), shells);
+  Json list = Json::array();
+  const std::size_t voxel_bytes = std::visit([](const auto& values) { return sizeof(values[0]); }, file.volume.data);
+  for (std::size_t i = 0; i < contents.labels->size(); ++i) {
+    const Label& label = (*contents.labels)[i];
+    const auto memory = estimate_memory(contents.surface_vertices[i], shells, file.volume.voxels(), voxel_bytes);
+    text += fmt::format("  {:<8} {:>12} voxels {:>14.1f} mm3 {:>7.0f} {:>7.0f} MiB  {}\n", label.value, label.voxels,
+                        label.volume_mm3, memory.extract, memory.chain(), printable(label.name));
+    list.push_back({{"label", label.value},
+                    {"voxels", label.voxels},
+                    {"volume_mm3", label.volume_mm3},
+                    {"name", label.name.empty() ? Json() : Json(label.name)},
+                    {"memory_mib",
+                     {{"extract", memory.extract},
+                      {"decimate", memory.decimate},
+                      {"relax", memory.relax},
+                      {"simulate", memory.simulate},
+                      {"chain", memory.chain()}}}});
+  }
+  return {std::move(text), std::move(list)};
+}
+
+}  // namespace
+
+bool are_labels(const std::optional<std::vector<Label>>& labels) {
+  return labels && std::all_of(labels->begin(), labels->end(),
+                               [](const Label& label) { return label.value == std::floor(label.value); });
+}
+
+std::string printable(std::string text) {
+  std::replace_if(
+      text.begin(), text.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, '?');
+  return text;
+}
+
+std::string named(const Label& label) {
+  return label.name.empty() ? fmt::format("{}", label.value)
+                            : fmt::format("{} ({})", label.value, printable(label.name));
+}
+
+void throw_choice(const std::filesystem::path& path, const VolumeContents& contents) {
+  const auto& labels = contents.labels;
+  if (!labels || labels->size() > 100) {
+    throw UsageError(
+        fmt::format("{}: is a grey volume with values from {:.6g} to {:.6g}: pass --isovalue V, with --inside "
+                    "below where the organ is darker",
+                    path.string(), contents.values.lower, contents.values.upper));
+  }
+  if (labels->empty()) {
+    throw InputError(fmt::format("{}: holds no label: every voxel is 0", path.string()));
+  }
+  throw UsageError(fmt::format("{}: pass --label N, --all-labels or --isovalue V; its labels are {}", path.string(),
+                               list_of(*labels)));
+}
+
+void throw_no_label(const std::filesystem::path& path, const VolumeContents& contents, const std::string& text) {
+  const auto& labels = contents.labels;
+  if (!parse_number(text) && !find_label(contents.names, text)) {
+    const std::string near = nearest_label(contents.names, text);
+    const std::string hint =
+        !near.empty() ? fmt::format("did you mean '{}'?", printable(near))
+        : labels && !labels->empty()
+            ? fmt::format("{}its labels are {}",
+                          contents.names.empty() ? "nothing names its labels (--names FILE); " : "", list_of(*labels))
+            : std::string(labels ? "every voxel is 0" : "it is a grey volume; pass --isovalue V");
+    throw InputError(fmt::format("{}: has no label of the name '{}': {}", path.string(), printable(text), hint));
+  }
+  throw InputError(
+      labels && !labels->empty()
+          ? fmt::format("{}: has no voxel with label {}; its labels are {}", path.string(), text, list_of(*labels))
+          : fmt::format("{}: has no voxel with label {}: {}", path.string(), text,
+                        labels ? "every voxel is 0" : "it is a grey volume; pass --isovalue V"));
+}
+
+std::pair<std::string, Json> volume_info(const std::filesystem::path& path, const VolumeFile& file,
+                                         const VolumeContents& contents, std::size_t shells) {
+  const Volume& volume = file.volume;
+  const auto& labels = contents.labels;
+  const Interval& range = contents.values;
+  std::string text = path.string() + "\n";
+  text += fmt::format("format       {}, {}\n", file.format, file.datatype);
+  text += fmt::format("dims         {} x {} x {}\n", volume.dims[0], volume.dims[1], volume.dims[2]);
+  text +=
+      fmt::format("spacing      {:.6g} x {:.6g} x {:.6g} mm\n", file.spacing.x(), file.spacing.y(), file.spacing.z());
+  text += fmt::format("orientation  {} (from {})\n", file.orientation, file.transform);
+  for (Eigen::Index row = 0; row < 3; ++row) {
+    const auto at = volume.affine.row(row);
+    text += fmt::format("{:<12} {:10.6g} {:10.6g} {:10.6g} {:10.6g}\n", row == 0 ? "affine (LPS)" : "", at[0], at[1],
+                        at[2], at[3]);
+  }
+  if (file.frames > 1) {
+    text += fmt::format("frames       {}\n", file.frames);
+  }
+  if (file.layers > 1) {
+    text += fmt::format("layers       {}\n", file.layers);
+  }
+  text += fmt::format("values       {:.6g} .. {:.6g}\n", range.lower, range.upper);
+  Json list;
+  if (labels) {
+    auto [lines, entries] = list_labels(file, contents, shells);
+    text += lines;
+    list = std::move(entries);
+  } else {
+    text += fmt::format("labels       none: a grey volume\n");
+  }
+  Json result;
+  result["format"] = file.format;
+  result["datatype"] = file.datatype;
+  result["dims"] = volume.dims;
+  result["spacing_mm"] = {file.spacing.x(), file.spacing.y(), file.spacing.z()};
+  result["orientation"] = file.orientation;
+  result["transform"] = file.transform;
+  result["voxel_to_world_mm"] = Json::array();
+  for (Eigen::Index row = 0; row < 3; ++row) {
+    const auto at = volume.affine.row(row);
+    result["voxel_to_world_mm"].push_back({at[0], at[1], at[2], at[3]});
+  }
+  result["frames"] = file.frames;
+  result["layers"] = file.layers;
+  result["values"] = {range.lower, range.upper};
+  result["labels"] = list;
+  return {std::move(text), std::move(result)};
+}
+
+}  // namespace tunica::cli

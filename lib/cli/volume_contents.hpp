@@ -1,0 +1,47 @@
+#pragma once
+
+#include "tunica/core/json.hpp"
+#include "tunica/io/volume/label_names.hpp"
+#include "tunica/io/volume/volume_file.hpp"
+#include "tunica/volume/cubes/label_index.hpp"
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+/// What is in a volume, told to who chooses from it.
+namespace tunica::cli {
+
+struct VolumeContents {
+  std::vector<std::string> warnings;
+  std::optional<std::vector<Label>> labels;   ///< none: a grey volume
+  std::vector<std::size_t> surface_vertices;  ///< per label, of its surface before decimation
+  LabelNames names;
+  Interval values{infinity, -infinity};  ///< of all voxels
+};
+
+/// Whether a volume of these values is a segmentation: whole numbers, and not too many of them.
+bool are_labels(const std::optional<std::vector<Label>>& labels);
+
+/// One line of printable text, whatever a file says or is called: '?' for each control character.
+std::string printable(std::string text);
+
+/// "3 (aorta)".
+std::string named(const Label& label);
+
+/// Says what can be chosen. Errors: UsageError always; InputError where a segmentation holds no label.
+[[noreturn]] void throw_choice(const std::filesystem::path& volume, const VolumeContents& contents);
+
+/// Says what there is in the place of the label asked for. Errors: InputError always.
+/// @param asked  a value or a name
+[[noreturn]] void throw_no_label(const std::filesystem::path& volume, const VolumeContents& contents,
+                                 const std::string& asked);
+
+/// What `tunica-extract --info` prints of a volume and adds to its report (`docs/command-line.md`).
+/// @param shells  of the chain whose memory is estimated per label
+std::pair<std::string, Json> volume_info(const std::filesystem::path& volume, const VolumeFile& file,
+                                         const VolumeContents& contents, std::size_t shells);
+
+}  // namespace tunica::cli
