@@ -172,6 +172,9 @@ void Tool::declare_common() {
   app_.add_option("--threads", threads_,
                   "at most N threads (default: TUNICA_THREADS, else SLURM_CPUS_PER_TASK, else all cores)")
       ->type_name("N");
+  app_.add_option("--memory-limit", memory_,
+                  "take at most SIZE of memory, such as 4GB or 500MiB: what needs more ends with exit code 6")
+      ->type_name("SIZE");
   app_.add_flag("--quiet", quiet_, "print nothing but errors");
   app_.add_flag("--verbose", verbose_, "print more detail");
   app_.add_flag("--force", force_, "overwrite an existing output");
@@ -222,6 +225,13 @@ void Tool::parse_common() {
     count = default_thread_count();
   }
   set_thread_count(count);
+  if (memory_) {
+    try {
+      memory_limit_.set(*memory_);
+    } catch (const UsageError& error) {
+      throw UsageError(fmt::format("--memory-limit: {}", error.what()));
+    }
+  }
   if (quiet_ && verbose_) {
     throw UsageError("--quiet and --verbose contradict each other: give one");
   }
@@ -329,13 +339,18 @@ int Tool::perform(const std::function<void()>& body) {
 }
 
 // With the file and the stage at hand, and what limits it.
-std::string Tool::out_of_memory(const std::string& why) const {
+std::string Tool::out_of_memory(const std::string& why) {
+  memory_limit_.lift();
   rlimit limit{};
-  const bool limited = ::getrlimit(RLIMIT_AS, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY;
+  std::string limits;
+  if (!memory_limit_.text().empty()) {
+    limits = fmt::format("limit {} by --memory-limit, ", memory_limit_.text());
+  }
+  if (::getrlimit(RLIMIT_AS, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY) {
+    limits += fmt::format("limit {} MiB by ulimit -v, ", limit.rlim_cur >> 20U);
+  }
   return fmt::format("{}{} ({}{}at most {:.0f} MiB were in use)", at_hand_.empty() ? "" : at_hand_ + ": ", why,
-                     running_.empty() ? "" : "stage " + running_ + ", ",
-                     limited ? fmt::format("limit {} MiB by ulimit -v, ", limit.rlim_cur >> 20U) : "",
-                     peak_mebibytes());
+                     running_.empty() ? "" : "stage " + running_ + ", ", limits, peak_mebibytes());
 }
 
 void Tool::register_report() {
@@ -361,6 +376,7 @@ void Tool::register_report() {
 }
 
 int Tool::finish(ExitCode code, const std::string& error) {
+  memory_limit_.lift();
   locks_.clear();
   const std::string message = one_line(error);
   say_line(message.empty() ? "" : fmt::format("tunica-{}: {}\n", verb_, message));

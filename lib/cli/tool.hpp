@@ -1,5 +1,6 @@
 #pragma once
 
+#include "tunica/cli/memory_limit.hpp"
 #include "tunica/cli/provenance.hpp"
 #include "tunica/core/clock.hpp"
 #include "tunica/core/error.hpp"
@@ -129,7 +130,7 @@ private:
   void parse_common();
   [[nodiscard]] Json told(const Json& json) const;
   void claim(const std::filesystem::path& path, bool written);
-  [[nodiscard]] std::string out_of_memory(const std::string& why) const;
+  [[nodiscard]] std::string out_of_memory(const std::string& why);
   void say_line(const std::string& text) const;
 
   std::string verb_;
@@ -138,6 +139,8 @@ private:
   Provenance provenance_;
   std::filesystem::path report_;
   std::optional<std::string> threads_;
+  std::optional<std::string> memory_;
+  MemoryLimit memory_limit_;
   bool force_ = false;
   bool no_paths_ = false;
   bool quiet_ = false;
