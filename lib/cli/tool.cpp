@@ -12,6 +12,7 @@
 #include <fmt/ranges.h>
 
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -465,7 +466,7 @@ void Tool::claim(const std::filesystem::path& path, bool written) {
                            : fmt::format("{}: is an input and an output, name another output", path.string()));
     }
   }
-  claimed_.push_back({place, part, written});
+  claimed_.push_back({place, part, written, path, state_of(path)});
 }
 
 const std::filesystem::path& Tool::input(const std::filesystem::path& path) {
@@ -475,6 +476,24 @@ const std::filesystem::path& Tool::input(const std::filesystem::path& path) {
   // A missing input or a folder is for the reader to refuse; the report still has to be written.
   inputs_.push_back({{"path", path.string()}, {"sha256", report_.empty() ? Json() : hash_if_readable(path)}});
   return path;
+}
+
+Tool::FileState Tool::state_of(const std::filesystem::path& path) {
+  struct stat file {};
+  if (::stat(path.c_str(), &file) != 0 || !S_ISREG(file.st_mode)) {  // an output in a folder of slices changes that
+    return {};
+  }
+  return {narrow<std::int64_t>(file.st_dev), narrow<std::int64_t>(file.st_ino), file.st_size, file.st_mtim.tv_sec,
+          file.st_mtim.tv_nsec};
+}
+
+void Tool::require_unchanged_inputs() const {
+  for (const Claim& claim : claimed_) {
+    if (!claim.written && state_of(claim.name) != claim.state) {
+      throw InputError(fmt::format("{}: was changed or removed while it was read: run again when it stays as it is",
+                                   claim.name.string()));
+    }
+  }
 }
 
 const std::filesystem::path& Tool::output(const std::filesystem::path& path, const std::vector<std::string>& endings) {

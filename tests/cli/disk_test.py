@@ -43,7 +43,8 @@ def make_inputs(folder):
              ["relax", "coarse.ply", "surface.ply", "shell.ply", "--tolerance", "2%", "--refine"])
     for verb, *words in chain:
         subprocess.run([BIN / f"tunica-{verb}", *words, "--quiet", "--report", case / f"{verb}.json"], cwd=folder, check=True)
-        shutil.copy(pathlib.Path(folder, words[0] if verb != "relax" else "shell.ply"), case)
+        if words[1].endswith(".ply"):
+            shutil.copy(pathlib.Path(folder, words[1 if verb != "relax" else 2]), case)
     shutil.copy(case / "relax.json", folder)
 
 
@@ -158,7 +159,7 @@ class Disk(unittest.TestCase):
 
     def open_files(self, process):
         try:
-            return [os.readlink(entry.path) for entry in os.scandir(f"/proc/{process.pid}/fd")]
+            return [os.readlink(f"/proc/{process.pid}/fd/{name}") for name in os.listdir(f"/proc/{process.pid}/fd")]
         except OSError:
             return []
 

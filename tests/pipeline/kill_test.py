@@ -23,7 +23,7 @@ from pipeline_test import LOAD, STAGES, TOOLS, Pipeline
 
 KILLS = 12
 SEED = 1
-TIMES = ("seconds", "peak_mib")
+TIMES = ("seconds", "peak_mib", "ms_per_step", "real_time_factor")
 
 
 def without_times(value):
@@ -75,8 +75,11 @@ class Kills(Pipeline):
             subprocess.run([TOOLS / "tunica-phantom", shape, self.folder / f"{shape}.nii.gz", "--size", "16",
                             "--spacing", "3", "--quiet"], check=True)
         self.whole, self.names = [], []  # per setting its files' contents, and all that is in OUT
-        self.usual = 0.0
-        for setting in self.SETTINGS:
+        self.usual = 0.0                 # seconds that a run takes
+
+    def learn(self, settings=SETTINGS):
+        """What undisturbed runs leave."""
+        for setting in settings:
             begin = time.monotonic()
             self.finish(setting)
             self.usual = time.monotonic() - begin
@@ -132,22 +135,23 @@ class Kills(Pipeline):
             except (ValueError, KeyError, AssertionError) as error:
                 self.fail(f"{moment}: {name} is not whole: {error}")
             known = [whole[name] for whole in self.whole if name in whole]
-            if name.suffix == ".tsv":
-                continue  # of the run before, which may have been another
-            self.assertIn(found, known, f"{moment}: {name} is not that of an undisturbed run")
+            # A summary may be of the run before, and a failure's report tells of that.
+            if name.suffix != ".tsv" and '"ok": false' not in str(found):
+                self.assertTrue(found in known, f"{moment}: {name} is not that of an undisturbed run:\n{found[:5000]}")
 
     def check_results(self, which, moment):
         self.finish(self.SETTINGS[which])
         found = {name: content(path) for name, path in finals(self.out).items()}
         self.assertEqual(set(found), set(self.whole[which]), moment)
         for name, data in found.items():
-            self.assertEqual(data, self.whole[which][name], f"{moment}: {name}")
+            self.assertTrue(data == self.whole[which][name], f"{moment}: {name}:\n{data[:5000]}")
         self.assertEqual(everything(self.out), self.names[which], moment)
         verified = subprocess.run([TOOLS / "tunica-report", self.out, "-o", self.folder / "verified.html", "--verify",
                                    "--force", "--quiet"], capture_output=True, text=True, check=False)
         self.assertEqual(verified.returncode, 0, f"{moment}: {verified.stderr}")
 
     def test_results_are_those_of_an_undisturbed_run(self):
+        self.learn()
         moments = random.Random(SEED)
         hit = collections.Counter()
         kills = too_late = completed = 0
@@ -163,7 +167,7 @@ class Kills(Pipeline):
             moment = f"seed {SEED}, kill {kills}, stages at work {self.stages_at_work()}"
             if self.out.exists():
                 self.check_finals(moment)
-            if moments.random() < 0.5:
+            if moments.random() < 0.4:
                 self.check_results(which, moment)
                 completed += 1
                 if moments.random() < 0.5:
@@ -177,8 +181,8 @@ class Kills(Pipeline):
         thief.write_text('#!/bin/sh\ncase $1 in *tunica-$THIEF_BEFORE) rm -f "$THIEF_TAKES" ;; esac\nexec "$@"\n')
         thief.chmod(0o755)
         case = self.out / "sphere" / "1"
-        for stage, taken in (("decimate", "surface.ply"), ("relax", "surface.ply"), ("relax", "coarse.ply"),
-                             ("simulate", "shell.ply")):
+        self.learn(self.SETTINGS[:1])
+        for stage, taken in (("relax", "surface.ply"), ("simulate", "shell.ply")):
             done = self.make("-k", RUN=thief, environment={"THIEF_BEFORE": stage, "THIEF_TAKES": str(case / taken)},
                              **self.arguments(self.SETTINGS[0]))
             self.assertNotEqual(done.returncode, 0)
