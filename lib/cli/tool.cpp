@@ -24,6 +24,7 @@
 #include <cstring>
 #include <exception>
 #include <fstream>
+#include <functional>
 #include <memory>
 #include <new>
 #include <regex>
@@ -45,13 +46,23 @@ extern "C" void on_signal(int signal) {
 
 const std::terminate_handler print_and_abort = std::get_terminate();
 
-/// Memory may end before run() can catch it, while a tool's options are declared, or where a library lets nothing out.
+/// How the tool that runs ends when its memory does. @return the exit code
+std::function<int()> end_without_memory;
+
+/// Memory may end before run() can catch it, while a tool's options are declared, or where nothing may be thrown:
+/// values of nlohmann::json need memory to be destroyed.
 [[noreturn]] void on_terminate() {
   try {
     if (std::current_exception()) {
       throw;
     }
   } catch (const std::bad_alloc&) {
+    if (const auto end = std::exchange(end_without_memory, nullptr)) {
+      try {
+        std::_Exit(end());
+      } catch (...) {  // there is not even enough for the report
+      }
+    }
     std::fprintf(stderr, "%s: %s\n", program_invocation_short_name, no_memory);
     std::_Exit(static_cast<int>(ExitCode::memory));
   } catch (...) {
@@ -311,7 +322,10 @@ int Tool::run(int argc, char** argv, const std::function<void()>& body) {
   if (std::signal(SIGHUP, on_signal) == SIG_IGN) {
     std::signal(SIGHUP, SIG_IGN);  // as nohup has it
   }
-  return perform(body);
+  end_without_memory = [this] { return finish(ExitCode::memory, out_of_memory(no_memory)); };
+  const int code = perform(body);
+  end_without_memory = nullptr;
+  return code;
 }
 
 int Tool::perform(const std::function<void()>& body) {

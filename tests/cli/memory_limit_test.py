@@ -40,7 +40,7 @@ class MemoryLimit(unittest.TestCase):
             whole = self.outputs()
             self.setUp()
             ended = 0
-            for mebibytes in (0.01, 1, 2, 4, *range(6, 600, 8)):
+            for mebibytes in (0.01, 1, 3, 6, *range(10, 600, 12)):
                 with self.subTest(verb=verb, mebibytes=mebibytes):
                     done = self.run_tool(verb, "--memory-limit", f"{mebibytes}MiB")
                     if done.returncode == 0:
@@ -49,7 +49,8 @@ class MemoryLimit(unittest.TestCase):
                     self.assertEqual(done.returncode, 6, done.stderr)
                     self.assertRegex(done.stderr, rf"^tunica-{verb}: [^\n]*memory[^\n]*limit {mebibytes}MiB by "
                                                   rf"--memory-limit, at most \d+ MiB were in use\)\n$")
-                    self.assertEqual(self.outputs(), {})
+                    for name, data in self.outputs().items():  # whole states, and what a run can go on with
+                        self.assertTrue(".part" in name or data == whole.get(name), name)
                     report = self.report()
                     self.assertEqual((report["ok"], f"tunica-{verb}: {report['error']}\n"), (False, done.stderr))
             self.assertEqual(done.returncode, 0, verb)
