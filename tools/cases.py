@@ -57,6 +57,10 @@ def setting(name):
     return one_line(os.environ.get(name, ""))
 
 
+def is_megabytes(text):
+    return re.fullmatch(r"[0-9]{0,10}", text, re.ASCII) is not None
+
+
 def shown(name):
     """A name in one line."""
     return CONTROL.sub(lambda sign: repr(sign.group())[1:-1], name)
@@ -216,7 +220,7 @@ def own_settings(row, folder):
                 own.update({name: "" for name in other if name != "LABEL"})
     if "NAMES" in own:
         own["NAMES"] = os.path.join(folder, os.path.expanduser(own["NAMES"]))
-    if not re.fullmatch(r"[0-9]*", own.get("MEM", ""), re.ASCII):
+    if not is_megabytes(own.get("MEM", "")):
         problems.append(f"mem: '{shown(own['MEM'])}' is no number of megabytes")
     for name in FURTHER:
         try:
@@ -280,6 +284,8 @@ def cases_of_table(path, out):
 
 def find_cases(out):
     """All cases of the run. Errors: Refused."""
+    if not is_megabytes(setting("MEM")):
+        raise Refused(f"MEM: '{shown(setting('MEM'))}' is no number of megabytes")
     if setting("CASES"):
         return cases_of_table(os.path.expanduser(os.environ["CASES"].strip()), out)
     labels = find_labels()

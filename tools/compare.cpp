@@ -284,6 +284,7 @@ void run(cli::Tool& tool, const Arguments& given) {
     a = surface_of(std::move(file_a), given);
     a.space = space;
     target = std::move(file_b.mesh);
+    tool.require_unchanged_inputs();
   }
   const double diagonal_mm = diagonal(target);
   if (!(diagonal_mm > 0)) {

@@ -250,6 +250,7 @@ void run(cli::Tool& tool, const Arguments& given) {
     const auto stage = tool.stage("read");
     const bool in_millimetres = given.max_error && !given.max_error->relative;
     in = read_surface(tool.input(given.in), unit_mm, in_millimetres, coarse.repairs);
+    tool.require_unchanged_inputs();
   }
   coarse.diagonal = diagonal(in.mesh);
   coarse.made = decimated(tool, given, in.mesh, coarse.diagonal);

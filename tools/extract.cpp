@@ -515,6 +515,7 @@ Json extract_to_file(cli::Tool& tool, Selection selection, const Arguments& argu
   Json result = measured(surface, arguments.open_border);
   warn_of_few_voxels(tool, surface, result, target.name);
   const fs::path out = output_path(arguments.out, target);
+  tool.require_unchanged_inputs();
   {
     const auto stage = tool.stage("write");
     PlyOptions options;

@@ -4,7 +4,7 @@
 make and the shell cannot hold any name a file may have, so they see none. For every case there is a folder in OUT/.run,
 called by a harmless name, with
   out              a link to the case's own folder, OUT/<volume stem>/<label>
-  mem              its MEM
+  mem              its MEM, or what stands for it in RUN
   STAGE.command    the command of the stage, its words quoted for the shell
   STAGE.flags      what its result depends on besides the files make sees; as old as can be when that has not changed
   STAGE.exit       the exit code of the stage in this run; empty while it runs
@@ -92,12 +92,14 @@ def stage_commands(case, binaries, flags):
     # Whether there is a boundary to hold is known once the surface is.
     is_closed = f"grep -q '\"closed\": *true' {shlex.quote(facts)}"
     chosen_fix = "" if case.setting("FIX") else f' --fix "$(if {is_closed}; then echo rigid-motions; else echo boundary; fi)"'
+    # No megabytes are all there are, as Slurm has it.
+    limit = ["--memory-limit", case.setting("MEM") + "MiB"] if case.setting("MEM").strip("0") else []
     commands = {}
     for stage, stage_words in words.items():
         tool = os.path.join(binaries, f"tunica-{stage}")
         report = ["--force", "--report", os.path.join(case.folder, f"{stage}.json")]
         fix = chosen_fix if stage == "simulate" else ""
-        commands[stage] = f"{shlex.join([tool, *stage_words, *report])}{fix} {flags[stage]}"
+        commands[stage] = f"{shlex.join([tool, *stage_words, *report, *limit])}{fix} {flags[stage]}"
     return commands
 
 
@@ -171,7 +173,7 @@ def plan_case(case, binaries, dry):
     os.makedirs(os.path.dirname(case.plan), exist_ok=True)
     os.mkdir(case.plan)
     os.symlink(os.path.abspath(case.folder), os.path.join(case.plan, "out"))
-    write_text(os.path.join(case.plan, "mem"), case.setting("MEM"))
+    write_text(os.path.join(case.plan, "mem"), case.setting("MEM") or "4000")
     flags = stage_flags(case)
     commands = stage_commands(case, binaries, flags)
     for stage in STAGES:

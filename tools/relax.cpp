@@ -363,6 +363,7 @@ private:
       common_space(surface.file, given_.target, other.file, *given_.other_face);
       other_.emplace(std::move(other.file.mesh));
     }
+    tool_.require_unchanged_inputs();
     coarse_ = std::move(start.file.mesh);
     target_.emplace(std::move(surface.file.mesh));
     if (surface.with_spikes) {

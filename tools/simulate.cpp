@@ -535,6 +535,7 @@ private:
   /// Opens what the run writes: its journal, the result, what other programs draw.
   void begin() {
     const RunIdentity identity = identity_of_run(tool_, scene_, asked_, inputs_, drawing_);
+    tool_.require_unchanged_inputs();  // its hashes are of what was read
     if (!journal_) {
       journal_.emplace(RunJournal::create(part_of(out_), identity));
     } else if (const std::string differs = difference(journal_->identity(), identity); !differs.empty()) {

@@ -72,7 +72,7 @@ OptionValue value_of(const CLI::Option& option) {
     value.choices = described_choices(option.get_description());
     value.described = !value.choices.empty();
   }
-  constexpr std::array<const char*, 12> not_files{"NAME",   "WHERE",    "N",         "INT", "UINT",    "FLOAT",
+  constexpr std::array<const char*, 13> not_files{"NAME",   "WHERE",    "N",         "INT", "UINT",    "FLOAT", "SIZE",
                                                   "NUMBER", "QUANTITY", "TOLERANCE", "KEY", "PERCENT", "DEG"};
   const auto known = [&](const char* name) { return value.placeholder == name; };
   value.file = option.get_positional() || (value.choices.empty() && std::ranges::none_of(not_files, known));

@@ -149,7 +149,7 @@ std::string Provenance::command() const {
 
 std::string Provenance::lasting_command() const {
   constexpr std::array<std::string_view, 4> flags{"--force", "--quiet", "--verbose", "--no-paths"};
-  constexpr std::array<std::string_view, 3> with_value{"--threads", "--report", "--slab"};
+  constexpr std::array<std::string_view, 4> with_value{"--threads", "--memory-limit", "--report", "--slab"};
   std::string text;
   for (std::size_t i = 0; i < words_.size(); ++i) {
     const auto& [flag, value] = split_word(words_[i]);

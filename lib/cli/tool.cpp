@@ -12,6 +12,7 @@
 #include <fmt/ranges.h>
 
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -23,6 +24,7 @@
 #include <cstring>
 #include <exception>
 #include <fstream>
+#include <functional>
 #include <memory>
 #include <new>
 #include <regex>
@@ -44,13 +46,23 @@ extern "C" void on_signal(int signal) {
 
 const std::terminate_handler print_and_abort = std::get_terminate();
 
-/// Memory may end before run() can catch it, while a tool's options are declared, or where a library lets nothing out.
+/// How the tool that runs ends when its memory does. @return the exit code
+std::function<int()> end_without_memory;
+
+/// Memory may end before run() can catch it, while a tool's options are declared, or where nothing may be thrown:
+/// values of nlohmann::json need memory to be destroyed.
 [[noreturn]] void on_terminate() {
   try {
     if (std::current_exception()) {
       throw;
     }
   } catch (const std::bad_alloc&) {
+    if (const auto end = std::exchange(end_without_memory, nullptr)) {
+      try {
+        std::_Exit(end());
+      } catch (...) {  // there is not even enough for the report
+      }
+    }
     std::fprintf(stderr, "%s: %s\n", program_invocation_short_name, no_memory);
     std::_Exit(static_cast<int>(ExitCode::memory));
   } catch (...) {
@@ -172,6 +184,9 @@ void Tool::declare_common() {
   app_.add_option("--threads", threads_,
                   "at most N threads (default: TUNICA_THREADS, else SLURM_CPUS_PER_TASK, else all cores)")
       ->type_name("N");
+  app_.add_option("--memory-limit", memory_,
+                  "take at most SIZE of memory, such as 4GB or 500MiB: what needs more ends with exit code 6")
+      ->type_name("SIZE");
   app_.add_flag("--quiet", quiet_, "print nothing but errors");
   app_.add_flag("--verbose", verbose_, "print more detail");
   app_.add_flag("--force", force_, "overwrite an existing output");
@@ -222,6 +237,13 @@ void Tool::parse_common() {
     count = default_thread_count();
   }
   set_thread_count(count);
+  if (memory_) {
+    try {
+      memory_limit_.set(*memory_);
+    } catch (const UsageError& error) {
+      throw UsageError(fmt::format("--memory-limit: {}", error.what()));
+    }
+  }
   if (quiet_ && verbose_) {
     throw UsageError("--quiet and --verbose contradict each other: give one");
   }
@@ -300,7 +322,10 @@ int Tool::run(int argc, char** argv, const std::function<void()>& body) {
   if (std::signal(SIGHUP, on_signal) == SIG_IGN) {
     std::signal(SIGHUP, SIG_IGN);  // as nohup has it
   }
-  return perform(body);
+  end_without_memory = [this] { return finish(ExitCode::memory, out_of_memory(no_memory)); };
+  const int code = perform(body);
+  end_without_memory = nullptr;
+  return code;
 }
 
 int Tool::perform(const std::function<void()>& body) {
@@ -329,13 +354,18 @@ int Tool::perform(const std::function<void()>& body) {
 }
 
 // With the file and the stage at hand, and what limits it.
-std::string Tool::out_of_memory(const std::string& why) const {
+std::string Tool::out_of_memory(const std::string& why) {
+  memory_limit_.lift();
   rlimit limit{};
-  const bool limited = ::getrlimit(RLIMIT_AS, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY;
+  std::string limits;
+  if (!memory_limit_.text().empty()) {
+    limits = fmt::format("limit {} by --memory-limit, ", memory_limit_.text());
+  }
+  if (::getrlimit(RLIMIT_AS, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY) {
+    limits += fmt::format("limit {} MiB by ulimit -v, ", limit.rlim_cur >> 20U);
+  }
   return fmt::format("{}{} ({}{}at most {:.0f} MiB were in use)", at_hand_.empty() ? "" : at_hand_ + ": ", why,
-                     running_.empty() ? "" : "stage " + running_ + ", ",
-                     limited ? fmt::format("limit {} MiB by ulimit -v, ", limit.rlim_cur >> 20U) : "",
-                     peak_mebibytes());
+                     running_.empty() ? "" : "stage " + running_ + ", ", limits, peak_mebibytes());
 }
 
 void Tool::register_report() {
@@ -361,6 +391,7 @@ void Tool::register_report() {
 }
 
 int Tool::finish(ExitCode code, const std::string& error) {
+  memory_limit_.lift();
   locks_.clear();
   const std::string message = one_line(error);
   say_line(message.empty() ? "" : fmt::format("tunica-{}: {}\n", verb_, message));
@@ -449,7 +480,7 @@ void Tool::claim(const std::filesystem::path& path, bool written) {
                            : fmt::format("{}: is an input and an output, name another output", path.string()));
     }
   }
-  claimed_.push_back({place, part, written});
+  claimed_.push_back({place, part, written, path, state_of(path)});
 }
 
 const std::filesystem::path& Tool::input(const std::filesystem::path& path) {
@@ -459,6 +490,24 @@ const std::filesystem::path& Tool::input(const std::filesystem::path& path) {
   // A missing input or a folder is for the reader to refuse; the report still has to be written.
   inputs_.push_back({{"path", path.string()}, {"sha256", report_.empty() ? Json() : hash_if_readable(path)}});
   return path;
+}
+
+Tool::FileState Tool::state_of(const std::filesystem::path& path) {
+  struct stat file {};
+  if (::stat(path.c_str(), &file) != 0 || !S_ISREG(file.st_mode)) {  // an output in a folder of slices changes that
+    return {};
+  }
+  return {narrow<std::int64_t>(file.st_dev), narrow<std::int64_t>(file.st_ino), file.st_size, file.st_mtim.tv_sec,
+          file.st_mtim.tv_nsec};
+}
+
+void Tool::require_unchanged_inputs() const {
+  for (const Claim& claim : claimed_) {
+    if (!claim.written && state_of(claim.name) != claim.state) {
+      throw InputError(fmt::format("{}: was changed or removed while it was read: run again when it stays as it is",
+                                   claim.name.string()));
+    }
+  }
 }
 
 const std::filesystem::path& Tool::output(const std::filesystem::path& path, const std::vector<std::string>& endings) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "tunica/cli/memory_limit.hpp"
 #include "tunica/cli/provenance.hpp"
 #include "tunica/core/clock.hpp"
 #include "tunica/core/error.hpp"
@@ -10,6 +11,8 @@
 
 #include <CLI/CLI.hpp>
 
+#include <array>
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <map>
@@ -62,6 +65,10 @@ public:
   /// Registers an input, with its hash, for the report and returns it. Errors: UsageError when it is also an output, or
   /// one of the names under which an output is kept until it is whole (NAME.part, NAME.part.states, ...).
   const std::filesystem::path& input(const std::filesystem::path& path);
+
+  /// For when the inputs have been read. Errors: InputError naming one that has become another file since it was
+  /// registered: what was read need not be what the hash is of.
+  void require_unchanged_inputs() const;
 
   /// Registers an output for the report; OutputError when it exists and --force was not given, or cannot be written;
   /// UsageError when it is also an input, another output or the report, or ends with none of `endings`, where given.
@@ -129,7 +136,7 @@ private:
   void parse_common();
   [[nodiscard]] Json told(const Json& json) const;
   void claim(const std::filesystem::path& path, bool written);
-  [[nodiscard]] std::string out_of_memory(const std::string& why) const;
+  [[nodiscard]] std::string out_of_memory(const std::string& why);
   void say_line(const std::string& text) const;
 
   std::string verb_;
@@ -138,15 +145,21 @@ private:
   Provenance provenance_;
   std::filesystem::path report_;
   std::optional<std::string> threads_;
+  std::optional<std::string> memory_;
+  MemoryLimit memory_limit_;
   bool force_ = false;
   bool no_paths_ = false;
   bool quiet_ = false;
   bool verbose_ = false;
   mutable bool bar_open_ = false;
+  using FileState = std::array<std::int64_t, 5>;  ///< place on the disk, size and time of change; zeros for no file
+  [[nodiscard]] static FileState state_of(const std::filesystem::path& path);
   struct Claim {
     std::filesystem::path place;  ///< resolved
     std::filesystem::path part;   ///< under which it is kept until it is whole
     bool written = false;         ///< or read
+    std::filesystem::path name;   ///< as the user has it
+    FileState state;              ///< when it was registered
   };
   std::vector<Claim> claimed_;                    ///< files of the run
   std::vector<std::shared_ptr<PartLock>> locks_;  ///< of the outputs

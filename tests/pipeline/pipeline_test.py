@@ -8,6 +8,7 @@ import json
 import os
 import pathlib
 import random
+import re
 import shutil
 import signal
 import stat
@@ -225,6 +226,29 @@ class Rules(WithStubs):
         wrapped = [line.split() for line in (self.folder / "wrapped").read_text().splitlines()]
         self.assertEqual([words[:2] for words in wrapped], [["-c2", "--mem=500M"]] * 4)
         self.assertEqual([pathlib.Path(words[2]).name for words in wrapped], [f"tunica-{stage}" for stage in STAGES])
+
+    def test_mem_is_the_limit_of_each_command(self):
+        arguments = dict(VOLUMES="a.nii.gz", LABEL=1, **LOAD)
+        self.make(**arguments)
+        self.assertFalse([line for line in self.calls() if "--memory-limit" in line])
+        self.assertEqual(self.make(MEM=900, **arguments).returncode, 0)
+        self.assertEqual(self.calls(), [], "no other result")
+        self.make(MEM=900, SMOOTH="none", **arguments)
+        self.assertEqual(["--memory-limit 900MiB " in line for line in self.calls()], [True] * 4)
+        self.make(MEM=0, SMOOTH="staircase", **arguments)
+        self.assertEqual(["--memory-limit" in line for line in self.calls()], [False] * 4)
+        shutil.rmtree(self.out)
+        for wrong in ("4G", "-1", "$(shell touch pwned)", "1e3"):
+            self.assertIn(f"MEM: '{wrong}' is no number of megabytes", self.refusal(MEM=wrong, **arguments))
+        self.assertFalse(list(self.folder.rglob("pwned*")))
+
+    def test_every_variable_of_the_help_can_be_given(self):
+        text = self.make("help").stdout
+        names = {name for line in text.splitlines() if not line.startswith(" ")
+                 for name in re.findall(r"\b[A-Z_]{2,}\b", line[:line.index("  ")] if "  " in line else "")}
+        self.assertLessEqual({"VOLUMES", "MEM", "STEP", "REPORTS", "PAPER", "FACTOR"}, names)
+        for name in names - {"BIN", "OUT"}:
+            self.assertNotIn("no such variable", self.make("help", **{name: "1"}).stderr)
 
     def test_a_killed_command_is_a_failed_case(self):
         killer = self.folder / "killer"
@@ -619,6 +643,39 @@ class WholeChain(Pipeline):
             self.assertEqual((rows[name]["stage"], rows[name]["exit"]), ("extract", "3"), name)
             self.assertFalse((self.out / name / "surface.ply").exists())
         self.assertIn("missing.nii.gz", rows["missing/1"]["message"])
+
+    def test_a_limit_on_memory_ends_the_case_that_needs_more(self):
+        self.phantom("sphere")
+        table = self.folder / "cases.tsv"
+        table.write_text("case\tvolume\tlabel\tmem\nenough\tsphere.nii.gz\t1\t900\nless\tsphere.nii.gz\t1\t2\n")
+        done = self.make("-k", CASES=table, SHELLS=100, **LOAD)
+        self.assertNotEqual(done.returncode, 0)
+        rows = self.summary()
+        self.assertEqual(rows["enough/1"]["message"], "done")
+        self.assertEqual((rows["less/1"]["stage"], rows["less/1"]["exit"]), ("extract", "6"))
+        self.assertIn("limit 2MiB by --memory-limit", rows["less/1"]["message"])
+        self.assertEqual({path.name for path in (self.out / "less" / "1").iterdir() if not path.name.startswith(".")},
+                         {"extract.json", "extract.log"})
+
+    def test_names_that_nobody_means(self):
+        """The real tools take what the stubs of Names took, and the page of the run tells of it."""
+        shape = self.phantom("sphere", 16)
+        signs = "".join(chr(code) for code in range(0x20, 0x7f) if chr(code) != "/")
+        names = [signs, "-rf", "--help", "it's \"a\" name", "gro\u00dfe Gef\u00e4\u00dfe \u5fc3", os.fsdecode(b"\xff\xfe")]
+        scans = self.folder / "scans of 'all'"
+        scans.mkdir()
+        for name in names:
+            shutil.copy(shape, scans / f"{name}.nii.gz")
+        arguments = dict(VOLUMES=f"{scans.name}/*", LABELS=1, SHELLS=60, **LOAD)
+        done = self.make("-k", "-j2", **arguments)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        results = [self.out / name / "1" / "result.hdf" for name in names]
+        times = [path.stat().st_mtime_ns for path in results]
+        verified = subprocess.run([TOOLS / "tunica-report", self.out, "-o", self.folder / "page.html", "--verify", "--quiet"],
+                                  capture_output=True, text=True, errors="surrogateescape", check=False)
+        self.assertEqual((verified.returncode, verified.stderr), (0, ""))
+        self.assertEqual(self.make("-k", "-j2", **arguments).returncode, 0)
+        self.assertEqual([path.stat().st_mtime_ns for path in results], times, "nothing is out of date")
 
 
 if __name__ == "__main__":

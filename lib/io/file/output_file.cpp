@@ -243,8 +243,11 @@ std::string read_file(const fs::path& path, std::size_t limit) {
   }
   std::string bytes(narrow<std::size_t>(size), '\0');
   const std::size_t got = std::fread(bytes.data(), 1, bytes.size(), file.get());
-  if (got != bytes.size() || std::ferror(file.get()) != 0) {
+  if (std::ferror(file.get()) != 0) {
     throw InputError(fmt::format("{}: cannot be read to its end: {}", path.string(), reason()));
+  }
+  if (got != bytes.size()) {
+    throw InputError(fmt::format("{}: became shorter while it was read: get the whole file again", path.string()));
   }
   return bytes;
 }

@@ -3,6 +3,7 @@
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/io/file/output_file.hpp"
+#include "tunica/io/file/signed_file.hpp"
 
 #include <assimp/scene.h>
 #include <fmt/format.h>
@@ -60,8 +61,8 @@ std::unique_ptr<aiScene> assimp_scene(std::unique_ptr<aiMesh> mesh, bool metres,
   scene->mMetaData = new aiMetadata();
   scene->mNumMaterials = 1;
   scene->mMaterials = new aiMaterial* [1] { new aiMaterial() };
-  constexpr std::size_t longest_name = 1000;  // aiString holds 1023 bytes
-  mesh->mName = aiString(provenance.substr(0, longest_name));
+  constexpr std::size_t longest_name = 1000;                                     // aiString holds 1023 bytes
+  mesh->mName = aiString(as_utf8(as_utf8(provenance).substr(0, longest_name)));  // a sign that is cut in two is none
   scene->mNumMeshes = 1;
   scene->mMeshes = new aiMesh* [1] { mesh.release() };
   scene->mRootNode = new aiNode("surface");

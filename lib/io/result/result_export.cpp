@@ -10,6 +10,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <limits>
 
 namespace tunica {
@@ -84,6 +85,14 @@ struct ResultExport::Implementation {
     }
     if (options.glb && model.shells.empty()) {
       throw UsageError("--export glb: the scene has no shells to draw; leave it out");
+    }
+    const std::string name = result.filename().string();
+    const bool in_xml =
+        name == as_utf8(name) && std::ranges::none_of(name, [](char c) { return static_cast<unsigned char>(c) < ' '; });
+    if ((options.pvd || options.xmf) && !in_xml) {
+      throw UsageError(
+          fmt::format("--export {}: would name '{}', which has signs that no XML can hold: name it otherwise",
+                      options.pvd ? "pvd" : "xmf", name));
     }
     for (const fs::path& file : export_paths(result, options)) {
       require_writable(file, options.overwrite);
