@@ -90,6 +90,17 @@ std::size_t move_onto(const Level& level, TriangleMesh& mesh) {
   return crossing;
 }
 
+/// Without the triangles that cross others: at the cut, where a jagged rim folds it.
+TriangleMesh without_crossings(TriangleMesh mesh) {
+  std::vector<bool> crosses(mesh.triangles.size(), false);
+  for (const auto& [a, b] : find_self_intersections(mesh)) {
+    crosses[a] = crosses[b] = true;
+  }
+  std::size_t t = 0;
+  std::erase_if(mesh.triangles, [&](const auto&) { return crosses[t++]; });
+  return without_unused(std::move(mesh));
+}
+
 /// The largest `count` pieces; what is left out is told.
 TriangleMesh largest_pieces(TriangleMesh mesh, std::size_t count, HalfWaySurface& told) {
   DisjointSets pieces(mesh.vertices.size());
@@ -153,7 +164,11 @@ HalfWaySurface with_cells(const Target& face, std::size_t pieces, WallFace which
   TriangleMesh mesh = marched_level(level, cell, progress);
   surface.crossing = move_onto(level, mesh);
   if (!continued.is_closed()) {
-    mesh = cut_at_rims(mesh, level, cell);
+    mesh = without_crossings(cut_at_rims(mesh, level, cell));
+    surface.crossing = 0;
+  }
+  if (!mesh.triangles.empty() && why_unfit(examine(mesh))) {
+    mesh = repaired(mesh).mesh;
   }
   mesh = largest_pieces(std::move(mesh), pieces, surface);
   if (mesh.triangles.empty()) {
@@ -162,7 +177,7 @@ HalfWaySurface with_cells(const Target& face, std::size_t pieces, WallFace which
                     "smaller thickness",
                     half));
   }
-  surface.mesh = why_unfit(examine(mesh)) ? repaired(mesh).mesh : std::move(mesh);
+  surface.mesh = std::move(mesh);
   surface.error = error_of(surface.mesh, level);
   return surface;
 }
