@@ -78,8 +78,8 @@ void declare(cli::Tool& tool, Arguments& given) {
                 "of the wall, for a --tolerance such as 5%t, and for --mid-surface");
   tool.group("Wall");
   app.add_option("--mid-surface", given.mid_surface,
-                 "TARGET is the outer or the inner face of the wall: the shells end up in its middle, half of the "
-                 "--thickness away, or half way to --other-face")
+                 "TARGET is the outer or the inner face of the wall: the shells are fitted to its middle, half of the "
+                 "--thickness away, or lie half way to --other-face")
       ->check(CLI::IsMember({"inner", "outer"}));
   app.add_option("--other-face", given.other_face,
                  "the wall's other face: the thickness is measured, and written as the vertices' property thickness")

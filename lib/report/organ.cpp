@@ -242,7 +242,9 @@ DrawnResult unloaded(const fs::path& path) {
   drawn.reference = tessellate_uniformly(shell, pieces).mesh;
   drawn.shells = shell.triangles.size();
   const std::size_t points = drawn.reference.vertices.size();
-  drawn.states = {{0, std::vector<Vec3>(points, Vec3::Zero()), std::vector<double>(points, 0)}};
+  DrawnResult::State& rest = drawn.states.emplace_back();
+  rest.displacement.assign(points, Vec3::Zero());
+  rest.von_mises.assign(points, 0);
   return drawn;
 }
 

@@ -78,7 +78,7 @@ def _product(path):
 
 
 def order_of_rooms(path, text):
-    """core < volume; core < surface < shell < fit; shell < mechanics; core < draw; all < io < cli < tools."""
+    """core < volume; core < surface < shell < fit; volume, shell < wall; shell < mechanics; core < draw; all < io < cli < tools."""
     room, inner = _rooms(path)
     found = []
     if path.endswith(CODE) and _product(path):

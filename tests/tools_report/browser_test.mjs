@@ -64,6 +64,16 @@ seen.changes = {
   state: await changes(() => page.getByRole("slider", { name: "State" }).press("ArrowLeft")),
   reset: await changes(() => page.getByRole("button", { name: "Reset view" }).click()),
 };
+const solids = page.getByRole("checkbox", { name: "solids" });
+if (await solids.count() > 0) {
+  seen.changes.solids = await changes(() => solids.uncheck());
+}
+const slider = page.getByRole("slider", { name: "State" });
+seen.states = [];
+for (let i = Number(await slider.getAttribute("max")); i >= 0; --i) {
+  await slider.fill(String(i));
+  seen.states.unshift(await slider.getAttribute("aria-valuetext"));
+}
 seen.legend = (await page.locator(".legend").filter({ has: page.locator(":visible") }).allTextContents()).join(" ");
 
 const scan = require("node:fs").readFileSync(require.resolve("axe-core/axe.min.js"), "utf8");

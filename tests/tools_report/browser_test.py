@@ -77,6 +77,15 @@ class Browser(WithPackages):
             seen = self.look_at(self.case, scheme)
             self.assertIn("Displacement", seen["legend"])
             self.assertIn("As imaged", seen["legend"])
+            self.assertNotIn("solids", seen["changes"])
+
+    def test_solids_and_all_states(self):
+        with tempfile.TemporaryDirectory() as folder:
+            case = cases.make_case(pathlib.Path(folder), "sphere")
+            cases.add_solid(case)
+            seen = self.look_at(case, "light")
+        self.assertIn("solids", seen["changes"])
+        self.assertEqual(seen["states"], ["As imaged", *(f"Load \u00d7 {part}" for part in (0.25, 0.5, 0.75)), "Loaded"])
 
     def test_cohort_sorts_and_filters(self):
         out = self.folder / "cohort"

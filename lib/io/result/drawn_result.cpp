@@ -258,6 +258,7 @@ public:
     }
     find_points(drawn);
     take_normals();
+    take_patch(drawn);
   }
 
   [[nodiscard]] DrawnResult::State operator()(std::size_t number, bool linear) const {
@@ -339,6 +340,29 @@ private:
       if (!(normal_agreement(mesh, t) >= least_normal_agreement)) {
         mesh.normals.clear();
         return;
+      }
+    }
+  }
+
+  /// The kind of patch whose points are those of the grid.
+  void take_patch(const DrawnResult& drawn) {
+    ShellMesh& mesh = model_.shells[0].mesh;
+    if (mesh.normals.empty()) {
+      return;
+    }
+    double least = infinity;
+    for (const Patch kind : {Patch::watertight, Patch::comas}) {
+      ShellMesh tried = mesh;
+      tried.patch = kind;
+      const auto patches = curved_patches(tried);
+      double off = 0;
+      for (std::size_t v = 0; v < point_.size(); ++v) {
+        const Vec3& there = drawn.reference.vertices[point_[v]];
+        off += (patches[surface_.vertex_shell[v]].point(surface_.barycentric[v]) - there).norm();
+      }
+      if (off < least) {
+        least = off;
+        mesh.patch = kind;
       }
     }
   }
