@@ -458,6 +458,9 @@ private:
                       "closes a gap of TARGET or parts it there",
                       middle.left_out, middle.left_out_area));
     }
+    if (middle.crossing > 0) {
+      tool_.warn(fmt::format("the middle of the wall crosses itself at {} pair(s) of its triangles", middle.crossing));
+    }
     const MeshFacts before = examine(face_->mesh()), after = examine(middle.mesh), coarse = examine(coarse_);
     if (before.euler != after.euler || before.boundary_loops != after.boundary_loops + face_->point_loops()) {
       tool_.warn(

@@ -54,7 +54,7 @@ Vec3 area_vector(const TriangleMesh& mesh, const std::array<Index, 3>& v) {
 
 /// Moves the vertices onto the level; those of triangles that fold or cross by it stay where marching cubes put them.
 /// @return pairs of triangles that cross all the same
-std::size_t move_onto(const Level& level, TriangleMesh& mesh) {
+std::size_t move_onto(const HalfWayLevel& level, TriangleMesh& mesh) {
   const TriangleMesh before = mesh;
   parallel_for_blocks(mesh.vertices.size(), 256, [&](std::size_t begin, std::size_t end) {
     check_interrupt();
@@ -129,7 +129,7 @@ TriangleMesh largest_pieces(TriangleMesh mesh, std::size_t count, HalfWaySurface
 }
 
 /// Mean and largest distance of the triangles' middles from the level.
-std::array<double, 2> error_of(const TriangleMesh& mesh, const Level& level) {
+std::array<double, 2> error_of(const TriangleMesh& mesh, const HalfWayLevel& level) {
   std::vector<double> off(mesh.triangles.size());
   parallel_for_blocks(off.size(), 256, [&](std::size_t begin, std::size_t end) {
     Index guess = 0;
@@ -152,7 +152,7 @@ std::array<double, 2> error_of(const TriangleMesh& mesh, const Level& level) {
 HalfWaySurface with_cells(const Target& face, std::size_t pieces, WallFace which, double half, double cell,
                           const Progress& progress) {
   const ContinuedFace continued(face, half, strip_of_half * half + strip_of_cell * cell);
-  const Level level{continued, half, which == WallFace::inner ? 1 : -1};
+  const HalfWayLevel level{continued, half, which == WallFace::inner ? 1 : -1};
   if (const double points = grid_points(level, cell); points > most_points) {
     throw RequirementError(fmt::format(
         "the middle of the wall would take a grid of {:.3g} million points, {:.3g} mm apart; at most {:.0f} "

@@ -1,3 +1,4 @@
+// io/result: result files, reports, journals of runs, and what is drawn from reports.
 #pragma once
 
 #include "tunica/surface/mesh/triangle_mesh.hpp"

@@ -22,7 +22,7 @@ struct Grid {
   std::array<std::size_t, 3> dims;
 };
 
-Grid grid_around(const Level& level, double cell) {
+Grid grid_around(const HalfWayLevel& level, double cell) {
   const Box box = bounding_box(level.face.mesh());
   const double around = (level.side > 0 ? level.half : 0) + margin * cell;
   Grid grid{box.lower - Vec3::Constant(around), {}};
@@ -39,7 +39,7 @@ using Place = std::array<std::size_t, 3>;
 /// Samples the distance where it is near the level; elsewhere only its sign is right.
 class Sampling {
 public:
-  Sampling(const Level& level, double cell, const Grid& grid, std::vector<float>& values)
+  Sampling(const HalfWayLevel& level, double cell, const Grid& grid, std::vector<float>& values)
       : level_(level), cell_(cell), grid_(grid), values_(values) {}
 
   /// A box of samples, [from, from + size) as far as the grid goes.
@@ -88,7 +88,7 @@ private:
     }
   }
 
-  const Level& level_;
+  const HalfWayLevel& level_;
   double cell_;
   const Grid& grid_;
   std::vector<float>& values_;
@@ -97,14 +97,14 @@ private:
 
 }  // namespace
 
-Vec3 Level::foot_on(const Vec3& p, const ContinuedFace::Hit& hit) const {
+Vec3 HalfWayLevel::foot_on(const Vec3& p, const ContinuedFace::Hit& hit) const {
   const Vec3 way = p - hit.point;
   const bool told = std::abs(hit.distance) > 1e-3 * half;
   const Vec3 outward = told ? Vec3(way / hit.distance) : hit.pseudo_normal.stableNormalized();
   return hit.point + side * half * outward;
 }
 
-Vec3 Level::moved_onto(Vec3 p) const {
+Vec3 HalfWayLevel::moved_onto(Vec3 p) const {
   Index guess = 0;
   for (int step = 0; step < most_steps; ++step) {
     const ContinuedFace::Hit hit = face.at(p, guess);
@@ -117,7 +117,7 @@ Vec3 Level::moved_onto(Vec3 p) const {
   return p;
 }
 
-double grid_points(const Level& level, double cell) {
+double grid_points(const HalfWayLevel& level, double cell) {
   const Box box = bounding_box(level.face.mesh());
   const double around = 2 * (level.side > 0 ? level.half : 0) + 2 * margin * cell;
   double points = 1;
@@ -127,7 +127,7 @@ double grid_points(const Level& level, double cell) {
   return points;
 }
 
-TriangleMesh marched_level(const Level& level, double cell, const Progress& progress) {
+TriangleMesh marched_level(const HalfWayLevel& level, double cell, const Progress& progress) {
   const Grid grid = grid_around(level, cell);
   Volume volume;
   volume.dims = grid.dims;

@@ -8,7 +8,7 @@
 namespace tunica {
 
 /// A distance from a face of a wall to one of its sides.
-struct Level {
+struct HalfWayLevel {
   const ContinuedFace& face;
   double half;  ///< mm, greater than zero
   int side;     ///< 1: outside, -1: inside
@@ -22,10 +22,10 @@ struct Level {
 };
 
 /// How many points a grid with cells so large needs.
-double grid_points(const Level& level, double cell);
+double grid_points(const HalfWayLevel& level, double cell);
 
 /// The level as marching cubes find it, normals outward, vertices within a cell of it. At a face with rims there is
 /// more: what bounds the continued face's inside beyond the strips' ends.
-TriangleMesh marched_level(const Level& level, double cell, const Progress& progress);
+TriangleMesh marched_level(const HalfWayLevel& level, double cell, const Progress& progress);
 
 }  // namespace tunica

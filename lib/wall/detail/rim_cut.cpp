@@ -24,7 +24,7 @@ struct Beyond {
 
 class RimCut {
 public:
-  RimCut(const TriangleMesh& mesh, const Level& level, double cell)
+  RimCut(const TriangleMesh& mesh, const HalfWayLevel& level, double cell)
       : mesh_(mesh), level_(level), cell_(cell), at_(mesh.vertices.size()), out_(mesh) {}
 
   TriangleMesh operator()() {
@@ -111,7 +111,7 @@ private:
   }
 
   const TriangleMesh& mesh_;
-  const Level& level_;
+  const HalfWayLevel& level_;
   double cell_;
   std::vector<Beyond> at_;
   TriangleMesh out_;
@@ -120,7 +120,7 @@ private:
 
 }  // namespace
 
-TriangleMesh cut_at_rims(const TriangleMesh& mesh, const Level& level, double cell) {
+TriangleMesh cut_at_rims(const TriangleMesh& mesh, const HalfWayLevel& level, double cell) {
   return RimCut(mesh, level, cell)();
 }
 

@@ -7,6 +7,6 @@ namespace tunica {
 /// Ends a level of a face with rims where the face ends: in a flat rim's plane, else half of the wall beside the rim.
 /// What lies beyond is cut away, and what marching cubes made where there is no level.
 /// @param cell  of the grid that made the mesh
-TriangleMesh cut_at_rims(const TriangleMesh& mesh, const Level& level, double cell);
+TriangleMesh cut_at_rims(const TriangleMesh& mesh, const HalfWayLevel& level, double cell);
 
 }  // namespace tunica
