@@ -69,6 +69,8 @@ class Browser(WithPackages):
         self.assertEqual(seen["errors"], [])
         self.assertEqual(seen["requests"], [], "a page loads nothing")
         self.assertEqual(seen["violations"], [], "axe-core")
+        for place in seen["middle"]:
+            self.assertAlmostEqual(place, 0.5, delta=0.05, msg="what is drawn is in the middle of the canvas")
         self.assertEqual([name for name, changed in seen["changes"].items() if not changed], [])
         return seen
 

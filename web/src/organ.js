@@ -223,6 +223,7 @@ class Stage {
     organ.onChange = () => this.#draw();
     this.orbit = new OrbitControls(organ.camera, this.canvas);
     this.orbit.target.copy(organ.centre);
+    this.orbit.update(); // made, it looked at the origin
     this.orbit.enableDamping = false;
     this.orbit.addEventListener("change", () => this.#draw());
     this.#resize();
