@@ -21,8 +21,9 @@
 namespace tunica {
 namespace {
 
-constexpr double error_of_wall = 1e-3;      // of the thickness: mean error
-constexpr double error_of_diagonal = 1e-5;  // or of the diagonal
+constexpr double error_of_diagonal = 1e-4;  // mean error
+constexpr double error_of_wall = 1e-3;      // of the thickness: or this, if that is more
+constexpr double most_of_wall = 1e-2;       // of the thickness, at most
 constexpr double cells_across = 32;         // of the diagonal, at least
 constexpr double most_points = 1.5e8;       // of a grid
 constexpr double coarsest = 2;              // times the detail that the grid should show: no surface from coarser ones
@@ -90,15 +91,26 @@ std::size_t move_onto(const HalfWayLevel& level, TriangleMesh& mesh) {
   return crossing;
 }
 
-/// Without the triangles that cross others: at the cut, where a jagged rim folds it.
+/// Without the triangles that cross or touch others: at the cut, where a jagged rim folds it, and where vertices were
+/// parted.
 TriangleMesh without_crossings(TriangleMesh mesh) {
-  std::vector<bool> crosses(mesh.triangles.size(), false);
-  for (const auto& [a, b] : find_self_intersections(mesh)) {
-    crosses[a] = crosses[b] = true;
+  for (int round = 0; round < most_partings; ++round) {
+    const auto pairs = find_self_intersections(mesh);
+    if (pairs.empty()) {
+      break;
+    }
+    std::vector<bool> crosses(mesh.triangles.size(), false);
+    for (const auto& [a, b] : pairs) {
+      crosses[a] = crosses[b] = true;
+    }
+    std::size_t t = 0;
+    std::erase_if(mesh.triangles, [&](const auto&) { return crosses[t++]; });
+    mesh = without_unused(std::move(mesh));
+    if (!mesh.triangles.empty() && why_unfit(examine(mesh))) {
+      mesh = repaired(mesh).mesh;
+    }
   }
-  std::size_t t = 0;
-  std::erase_if(mesh.triangles, [&](const auto&) { return crosses[t++]; });
-  return without_unused(std::move(mesh));
+  return mesh;
 }
 
 /// The largest `count` pieces; what is left out is told.
@@ -164,11 +176,14 @@ HalfWaySurface with_cells(const Target& face, std::size_t pieces, WallFace which
   TriangleMesh mesh = marched_level(level, cell, progress);
   surface.crossing = move_onto(level, mesh);
   if (!continued.is_closed()) {
-    mesh = without_crossings(cut_at_rims(mesh, level, cell));
+    mesh = cut_at_rims(mesh, level, cell);
     surface.crossing = 0;
   }
   if (!mesh.triangles.empty() && why_unfit(examine(mesh))) {
     mesh = repaired(mesh).mesh;
+  }
+  if (!continued.is_closed()) {
+    mesh = without_crossings(std::move(mesh));
   }
   mesh = largest_pieces(std::move(mesh), pieces, surface);
   if (mesh.triangles.empty()) {
@@ -187,7 +202,8 @@ HalfWaySurface with_cells(const Target& face, std::size_t pieces, WallFace which
 HalfWaySurface half_way_surface(const Target& face, WallFace which, double thickness, const Progress& progress) {
   TUNICA_ASSERT(thickness > 0);
   const double half = thickness / 2;
-  const double allowed = std::max(error_of_wall * thickness, error_of_diagonal * face.diagonal());
+  const double allowed =
+      std::clamp(error_of_diagonal * face.diagonal(), error_of_wall * thickness, most_of_wall * thickness);
   const std::size_t pieces = examine(face.mesh()).components;
   const Vec3 sides = [&] {
     const Box box = bounding_box(face.mesh());

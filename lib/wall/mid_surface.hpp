@@ -25,8 +25,8 @@ struct HalfWaySurface {
 /// such points, and the surface has an edge there instead of a fold.
 /// The signed distance is sampled where it is near half the thickness, marching cubes give a surface, and its vertices
 /// move along the way to their nearest point of the face until they are half the thickness from it. The grid is as fine
-/// as the face's triangles and its body, and finer until the mean error is below a thousandth of the thickness
-/// (or 0.001 % of the diagonal).
+/// as the face's triangles and its body, and finer until the mean error is below 0.01 % of the diagonal, but at least
+/// 0.1 % and at most 1 % of the thickness.
 /// An open face is first continued beyond its rims. At a rim in a plane the surface ends in that plane; at another one
 /// beside the rim. Of its pieces the largest are kept, as many as the face has.
 /// @param face  an oriented manifold, normals outward; thickness  mm, of the whole wall
