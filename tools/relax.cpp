@@ -11,15 +11,16 @@
 #include "tunica/io/mesh/surface_file.hpp"
 #include "tunica/shell/distance/boundary_distance.hpp"
 #include "tunica/shell/distance/mean_bound.hpp"
-#include "tunica/shell/distance/mid_surface.hpp"
 #include "tunica/shell/distance/shell_crossings.hpp"
 #include "tunica/shell/distance/shell_quality.hpp"
 #include "tunica/shell/patch/curved_surface.hpp"
 #include "tunica/shell/patch/patch_edges.hpp"
+#include "tunica/surface/decimation/decimate.hpp"
 #include "tunica/surface/decimation/degenerate.hpp"
 #include "tunica/surface/distance/hausdorff.hpp"
 #include "tunica/surface/mesh/checks.hpp"
 #include "tunica/surface/mesh/measure.hpp"
+#include "tunica/wall/mid_surface.hpp"
 
 #include <fmt/core.h>
 
@@ -77,8 +78,8 @@ void declare(cli::Tool& tool, Arguments& given) {
                 "of the wall, for a --tolerance such as 5%t, and for --mid-surface");
   tool.group("Wall");
   app.add_option("--mid-surface", given.mid_surface,
-                 "TARGET is the outer or the inner face of the wall: the shells end up in its middle, half of the "
-                 "--thickness away, or half way to --other-face")
+                 "TARGET is the outer or the inner face of the wall: the shells are fitted to its middle, half of the "
+                 "--thickness away, or lie half way to --other-face")
       ->check(CLI::IsMember({"inner", "outer"}));
   app.add_option("--other-face", given.other_face,
                  "the wall's other face: the thickness is measured, and written as the vertices' property thickness")
@@ -316,6 +317,11 @@ void write_maps(cli::Tool& tool, const Arguments& given, const ShellMesh& shell,
   }
 }
 
+std::size_t handles(const MeshFacts& facts) {
+  const long without = 2 * narrow<long>(facts.components) - narrow<long>(facts.boundary_loops);
+  return narrow<std::size_t>(std::max(0L, without - facts.euler) / 2);
+}
+
 /// One run: read, relax, measure, write.
 class Run {
 public:
@@ -365,16 +371,21 @@ private:
     }
     tool_.require_unchanged_inputs();
     coarse_ = std::move(start.file.mesh);
-    target_.emplace(std::move(surface.file.mesh));
-    if (surface.with_spikes) {
+    const bool looks_for_middle = given_.mid_surface && !other_;
+    Target& face = (looks_for_middle ? face_ : target_).emplace(std::move(surface.file.mesh));
+    if (surface.with_spikes && !looks_for_middle) {
       with_spikes_.emplace(*std::move(surface.with_spikes));
       moved_ = surface.moved;
     }
     if (start.facts.boundary_loops != surface.facts.boundary_loops) {
-      surface.facts.boundary_loops -= target_->point_loops();  // decimation closes them
+      surface.facts.boundary_loops -= face.point_loops();  // decimation closes them
     }
     warn_of_mismatch(tool_, start.facts, surface.facts);
-    if (faces_other_way(coarse_, *target_)) {
+    if (looks_for_middle && faces_inward(face)) {
+      face_.emplace(turned_around(face.mesh()));
+      tool_.warn("TARGET's triangles face inward; they were turned around");
+    }
+    if (faces_other_way(coarse_, looks_for_middle ? *face_ : *target_)) {
       coarse_ = turned_around(std::move(coarse_));
       tool_.warn("COARSE faces the other way than TARGET; its triangles were turned around");
     }
@@ -417,9 +428,54 @@ private:
     return out;
   }
 
+  [[nodiscard]] WallFace which_face() const {
+    return given_.mid_surface == "outer" ? WallFace::outer : WallFace::inner;
+  }
+
+  /// The surface half of the wall away becomes the target, and COARSE a mesh on it.
+  void go_half_way() {
+    HalfWaySurface middle = naming(given_.target.string(), [&] {
+      return half_way_surface(*face_, which_face(), *given_.thickness, tool_.progress("find the middle of the wall"));
+    });
+    tool_.detail(
+        fmt::format("the middle of the wall: {} triangles by cells of {:.3g} mm; {:.3g} mm in the mean and "
+                    "{:.3g} mm at most from half a wall away",
+                    middle.mesh.triangles.size(), middle.cell, middle.error[0], middle.error[1]));
+    if (middle.left_out > 0) {
+      tool_.warn(
+          fmt::format("{} piece(s) of the middle of the wall, {:.3g} mm2 together, are left out: half of the wall "
+                      "closes a gap of TARGET or parts it there",
+                      middle.left_out, middle.left_out_area));
+    }
+    if (middle.crossing > 0) {
+      tool_.warn(fmt::format("the middle of the wall crosses itself at {} pair(s) of its triangles", middle.crossing));
+    }
+    const MeshFacts before = examine(face_->mesh()), after = examine(middle.mesh), coarse = examine(coarse_);
+    if (before.euler != after.euler || before.boundary_loops != after.boundary_loops + face_->point_loops()) {
+      tool_.warn(
+          fmt::format("the middle of the wall has {} rim(s) and {} handle(s), TARGET has {} and {}: half of the "
+                      "wall closes a gap, or a branch is too narrow for it",
+                      after.boundary_loops, handles(after), before.boundary_loops, handles(before)));
+    }
+    Json& said = tool_.result()["mid_surface"];
+    said["grid_mm"] = middle.cell;
+    said["left_out"] = {{"pieces", middle.left_out}, {"area_mm2", middle.left_out_area}};
+    target_.emplace(std::move(middle.mesh));
+    if (coarse.euler == after.euler && coarse.boundary_loops == after.boundary_loops) {
+      coarse_ = moved_half_way(std::move(coarse_), *face_, which_face(), *given_.thickness, *target_);
+    } else {
+      DecimateOptions few;
+      few.triangles = coarse_.triangles.size();
+      coarse_ = decimate(target_->mesh(), few).mesh;
+    }
+  }
+
   void relax() {
-    FitOptions how = options();
     const auto stage = tool_.stage("relax");
+    if (face_) {
+      go_half_way();
+    }
+    FitOptions how = options();
     try {
       relaxed_ = fits_ ? fit(coarse_, *target_, how) : relax_by_barycentre(coarse_, *target_, how);
       // A largest distance of the mean asked for serves for certain.
@@ -567,30 +623,30 @@ private:
     require_fit(relaxed_.shell, out);
   }
 
-  /// The shells as they are written: those on the target, or half of the wall away.
+  /// The shells as they are written: those on the target, or half way to the other face.
   MidSurface written_shell() {
     if (!given_.mid_surface) {
       return {relaxed_.shell, {}};
     }
-    const WallFace which = given_.mid_surface == "outer" ? WallFace::outer : WallFace::inner;
     Json& said = tool_.result()["mid_surface"];
-    MidSurface middle;
+    MidSurface middle{relaxed_.shell, {}};
     if (other_) {
-      middle = naming(given_.other_face->string(), [&] { return mid_surface_between(relaxed_.shell, which, *other_); });
+      middle = naming(given_.other_face->string(),
+                      [&] { return mid_surface_between(relaxed_.shell, which_face(), *other_); });
+      const std::size_t crossings = crossing_patches(middle.shell).size();
+      tool_.result()["self_intersections"] = crossings;
+      if (crossings > 0) {
+        tool_.warn(fmt::format("{} pair(s) of curved shells cross in the middle of the wall", crossings));
+      }
       said["error_mm"] = nullptr;
+      const auto [thinnest, thickest] = std::minmax_element(middle.thickness.begin(), middle.thickness.end());
+      said["thickness_mm"] = {{"min", *thinnest}, {"max", *thickest}};
     } else {
-      middle = naming(given_.out.string(), [&] { return mid_surface(relaxed_.shell, which, *given_.thickness); });
-      const auto [mean, largest] = half_wall_error(middle.shell, whole(), *given_.thickness);
+      const auto [mean, largest] = half_wall_error(middle.shell, *face_, *given_.thickness);
       said["error_mm"] = {{"mean", mean}, {"max", largest}};
+      said["thickness_mm"] = {{"min", *given_.thickness}, {"max", *given_.thickness}};
     }
-    const auto [thinnest, thickest] = std::minmax_element(middle.thickness.begin(), middle.thickness.end());
     said["target"] = *given_.mid_surface;
-    said["thickness_mm"] = {{"min", *thinnest}, {"max", *thickest}};
-    const std::size_t crossings = crossing_patches(middle.shell).size();
-    tool_.result()["self_intersections"] = crossings;
-    if (crossings > 0) {
-      tool_.warn(fmt::format("{} pair(s) of curved shells cross in the middle of the wall", crossings));
-    }
     return middle;
   }
 
@@ -624,6 +680,7 @@ private:
   bool fits_;
   std::optional<double> min_angle_;  // degrees
   TriangleMesh coarse_;
+  std::optional<Target> face_;  // TARGET, where the middle of the wall takes its place
   std::optional<Target> target_, with_spikes_;
   std::optional<Target> other_;  // the wall's other face
   double moved_ = 0;             // of the target, mm: by taking its spikes

@@ -47,6 +47,11 @@ Markup big_number(const char* key, const std::string& label, const CaseReport& o
               value ? what.unit : "", aside);
 }
 
+// Whether shells were fitted to the surface half of a wall away.
+bool is_fitted_to_middle(const CaseReport& one) {
+  return one.source.at("relax", "result.mid_surface.error_mm").is_object();
+}
+
 Markup three_numbers(const CaseReport& one) {
   const auto maximum = measure("stress_max_kpa").value(one.source);
   const auto percent = measure("distance_percent").value(one.source);
@@ -56,8 +61,10 @@ Markup three_numbers(const CaseReport& one) {
                      maximum ? "von Mises, at either face; largest " + figure(*maximum) + " kPa" : "not computed");
   list += big_number("max_displacement_mm", "Largest displacement", one,
                      pressure ? "under " + figure(*pressure) + " kPa" : "of the curved surface");
-  list += big_number("distance_mm", "Shells to surface, at most", one,
-                     percent ? "certified, both ways; " + figure(*percent) + " % of the diagonal" : "not certified");
+  const bool in_middle = is_fitted_to_middle(one);
+  list +=
+      big_number("distance_mm", in_middle ? "Shells to middle of the wall, at most" : "Shells to surface, at most", one,
+                 percent ? "certified, both ways; " + figure(*percent) + " % of the diagonal" : "not certified");
   return list += html("</dl>\n");
 }
 

@@ -129,7 +129,7 @@ DrawnShells with_pieces(const DrawnResult& result, int level, int pieces) {
   const std::vector<Index> before = drop_unused(drawn.mesh, drawn.edges);
   for (const DrawnResult::State& state : result.states) {
     DrawnResult::State& kept = drawn.states.emplace_back();
-    kept.time = state.time;
+    kept.of_solids = state.of_solids;
     for (const Index v : before) {
       kept.displacement.push_back(state.displacement[v]);
       kept.von_mises.push_back(state.von_mises[v]);
@@ -138,40 +138,80 @@ DrawnShells with_pieces(const DrawnResult& result, int level, int pieces) {
   return drawn;
 }
 
-// A coarser mesh of the same surface; states are interpolated at the closest points.
-DrawnShells decimated(const DrawnShells& shells, std::size_t triangles) {
-  DrawnShells coarse;
-  coarse.mesh = thinned(shells.mesh, triangles);
-  const ClosestPoint tree(shells.mesh);
-  coarse.states.resize(shells.states.size());
-  for (std::size_t s = 0; s < shells.states.size(); ++s) {
-    coarse.states[s].time = shells.states[s].time;
-  }
-  for (const Vec3& p : coarse.mesh.vertices) {
-    const ClosestPoint::Hit hit = tree.closest(p);
-    const auto& corners = shells.mesh.triangles[hit.triangle];
-    const auto places = tree.corners(hit.triangle);
-    const Vec3 weights = barycentric(hit.point, places[0], places[1], places[2]);
-    for (std::size_t s = 0; s < shells.states.size(); ++s) {
-      Vec3 displacement = Vec3::Zero();
-      double stress = 0;
-      for (std::size_t k = 0; k < 3; ++k) {
-        const double weight = weights[narrow<Eigen::Index>(k)];
-        displacement += weight * shells.states[s].displacement[corners[k]];
-        stress += weight * shells.states[s].von_mises[corners[k]];
-      }
-      coarse.states[s].displacement.push_back(displacement);
-      coarse.states[s].von_mises.push_back(stress);
+/// Where a coarser mesh of a surface has its vertices, and what the surface has there.
+class Coarser {
+public:
+  Coarser(const TriangleMesh& fine, std::size_t triangles) : fine_(fine), mesh_(thinned(fine, triangles)) {
+    const ClosestPoint tree(fine);
+    for (const Vec3& p : mesh_.vertices) {
+      const ClosestPoint::Hit hit = tree.closest(p);
+      const auto places = tree.corners(hit.triangle);
+      at_.push_back({hit.triangle, barycentric(hit.point, places[0], places[1], places[2])});
     }
   }
-  return coarse;
+
+  [[nodiscard]] const TriangleMesh& mesh() const { return mesh_; }
+
+  /// Linear between the corners of the fine triangles.
+  template <typename Value>
+  [[nodiscard]] std::vector<Value> values(const std::vector<Value>& of_fine) const {
+    std::vector<Value> values;
+    for (const auto& [triangle, weights] : at_) {
+      const auto& v = fine_.triangles[triangle];
+      values.push_back(weights[0] * of_fine[v[0]] + weights[1] * of_fine[v[1]] + weights[2] * of_fine[v[2]]);
+    }
+    return values;
+  }
+
+private:
+  struct At {
+    Index triangle;
+    Vec3 weights;
+  };
+  const TriangleMesh& fine_;
+  TriangleMesh mesh_;
+  std::vector<At> at_;
+};
+
+void decimate_shells(DrawnShells& shells, std::size_t triangles) {
+  const Coarser coarse(shells.mesh, triangles);
+  for (DrawnResult::State& state : shells.states) {
+    state.displacement = coarse.values(state.displacement);
+    state.von_mises = coarse.values(state.von_mises);
+  }
+  shells.edges.clear();
+  shells.mesh = coarse.mesh();
+}
+
+void decimate_solids(DrawnShells& shells, std::size_t triangles) {
+  const Coarser coarse(shells.solids, triangles);
+  for (DrawnResult::State& state : shells.states) {
+    state.of_solids = coarse.values(state.of_solids);
+  }
+  shells.solids = coarse.mesh();
+}
+
+std::string label_of(const DrawnResult& result, const DrawnResult::State& state) {
+  if (state.number == 0) {
+    return result.is_unloaded ? "Without load" : "As imaged";
+  }
+  switch (result.kind) {
+    case DrawnResult::Kind::motion:
+      return fmt::format("At {:.4g} s", state.time);
+    case DrawnResult::Kind::frequencies:
+      return fmt::format("Mode {}, {:.4g} Hz", state.number, state.time);
+    case DrawnResult::Kind::buckling:
+      return fmt::format("Mode {}, load × {:.4g}", state.number, state.time);
+    default:
+      const bool is_whole = state.load_factor == 1 && &state == &result.states.back();
+      return is_whole ? "Loaded" : fmt::format("Load × {:.4g}", state.load_factor);
+  }
 }
 
 std::vector<std::string> labels_of(const DrawnResult& result) {
   std::vector<std::string> labels;
   for (const DrawnResult::State& state : result.states) {
-    const bool first = labels.empty();
-    labels.push_back(first ? "Unloaded" : result.timed ? fmt::format("At {:.4g} s", state.time) : "Loaded");
+    labels.push_back(label_of(result, state));
   }
   return labels;
 }
@@ -190,6 +230,8 @@ TriangleMesh thinned(const TriangleMesh& mesh, std::size_t triangles) {
 
 DrawnShells thinned(DrawnResult result, std::size_t triangles) {
   const std::vector<std::string> labels = labels_of(result);
+  const bool is_unloaded = result.is_unloaded;
+  TriangleMesh solids = std::move(result.solids);
   DrawnShells drawn;
   if (const auto level = level_of(result)) {
     int pieces = *level;
@@ -201,11 +243,33 @@ DrawnShells thinned(DrawnResult result, std::size_t triangles) {
     drawn.mesh = std::move(result.reference);
     drawn.states = std::move(result.states);
   }
-  if (drawn.mesh.triangles.size() > triangles) {
-    drawn = decimated(drawn, triangles);
-  }
   drawn.labels = labels;
+  drawn.is_unloaded = is_unloaded;
+  drawn.solids = std::move(solids);
+  if (drawn.mesh.triangles.size() > triangles) {
+    decimate_shells(drawn, triangles);
+  }
+  if (drawn.solids.triangles.size() > triangles) {
+    decimate_solids(drawn, triangles);
+  }
   return drawn;
+}
+
+DrawnShells with_fewer_states(DrawnShells shells, std::size_t most) {
+  const std::size_t there = shells.states.size();
+  if (there <= most) {
+    return shells;
+  }
+  std::vector<DrawnResult::State> states;
+  std::vector<std::string> labels;
+  for (std::size_t i = 0; i < most; ++i) {
+    const std::size_t kept = i * (there - 1) / (most - 1);
+    states.push_back(std::move(shells.states[kept]));
+    labels.push_back(std::move(shells.labels[kept]));
+  }
+  shells.states = std::move(states);
+  shells.labels = std::move(labels);
+  return shells;
 }
 
 }  // namespace tunica::report

@@ -43,11 +43,18 @@ std::string shell_sentence(const CaseReport& one) {
     return {};
   }
   const auto method = flag_value(words_of(one, "relax"), "--method");
+  const Json middle = one.source.at("relax", "result.mid_surface");
+  const bool in_middle = middle.is_object() && middle.value("error_mm", Json()).is_object();
+  const std::string target = in_middle ? "surface half of the wall's thickness " +
+                                             std::string(middle.value("target", "") == "inner" ? "outside" : "inside") +
+                                             " of the extracted one"
+                                       : "extracted surface";
   return "It was decimated by quadric edge collapse [3] and " +
          std::string(method == "barycentre" ? "relaxed to" : "fitted by") + " " + count +
          " curved triangular shells with one cubic shape function each [1]; the two-sided Hausdorff distance of the "
-         "curved shells to the extracted surface is certified to be at most " +
-         distance + " (" + with_unit(one, "distance_percent") + " of its diagonal). ";
+         "curved shells to the " +
+         target + " is certified to be at most " + distance + " (" + with_unit(one, "distance_percent") +
+         " of its diagonal). ";
 }
 
 std::string load_sentence(const CaseReport& one) {

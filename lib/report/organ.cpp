@@ -19,6 +19,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr std::size_t bytes_of_states = 12'000'000;  // of all cases together, before they are packed
+constexpr std::size_t bytes_of_point = 7;            // shells: displacement and stress; of solids without the stress
+
 struct Box {
   Vec3 lower = Vec3::Constant(infinity);
   Vec3 upper = Vec3::Constant(-infinity);
@@ -95,6 +98,10 @@ Tops tops_of(const DrawnShells& shells, bool loaded) {
       tops.displacement = std::max(tops.displacement, u.norm());
       tops.component = std::max(tops.component, u.cwiseAbs().maxCoeff());
     }
+    for (const Vec3& u : state.of_solids) {
+      tops.displacement = std::max(tops.displacement, u.norm());
+      tops.component = std::max(tops.component, u.cwiseAbs().maxCoeff());
+    }
     if (loaded) {
       tops.stress = std::max(tops.stress.value_or(0), largest(state.von_mises));
     }
@@ -117,13 +124,16 @@ Json header_of(const DrawnShells& shells, const TriangleMesh& surface, const Top
   Box box;
   box.add(shells.mesh.vertices);
   box.add(surface.vertices);
+  box.add(shells.solids.vertices);
   const auto [right, up, towards] = thumbnail_axes(shells.mesh);
   Vec3 lower = Vec3::Constant(infinity);
   Vec3 upper = -lower;
-  for (const Vec3& p : shells.mesh.vertices) {
-    const Vec3 seen(right.dot(p), up.dot(p), towards.dot(p));
-    lower = lower.cwiseMin(seen);
-    upper = upper.cwiseMax(seen);
+  for (const std::vector<Vec3>* points : {&shells.mesh.vertices, &shells.solids.vertices}) {
+    for (const Vec3& p : *points) {
+      const Vec3 seen(right.dot(p), up.dot(p), towards.dot(p));
+      lower = lower.cwiseMin(seen);
+      upper = upper.cwiseMax(seen);
+    }
   }
   const Vec3 middle = 0.5 * (lower + upper);
   const bool moves = tops.displacement > 0;
@@ -150,10 +160,15 @@ Json header_of(const DrawnShells& shells, const TriangleMesh& surface, const Top
         {"distance", "Distance to the segmented surface"}}},
       {"units", {{"stress", "kPa"}, {"displacement", "mm"}, {"distance", "mm"}}},
       {"surface", nullptr},
+      {"solids", nullptr},
+      {"rest", shells.is_unloaded ? "without load" : "as imaged"},
       {"palette", surface_colours()},
   };
   if (!surface.triangles.empty()) {
     header["surface"] = {{"points", surface.vertices.size()}, {"triangles", surface.triangles.size()}};
+  }
+  if (!shells.solids.triangles.empty()) {
+    header["solids"] = {{"points", shells.solids.vertices.size()}, {"triangles", shells.solids.triangles.size()}};
   }
   return header;
 }
@@ -178,14 +193,21 @@ std::string packed(const DrawnShells& shells, const TriangleMesh& surface, const
   if (!shells.distance.empty()) {
     pack_levels(bytes, shells.distance, largest(shells.distance));
   }
+  const auto shift = [&](double value, Eigen::Index) { return 32768 + 32767 * value / tops.component; };
   for (const DrawnResult::State& state : shells.states) {
-    pack_vectors(bytes, state.displacement,
-                 [&](double value, Eigen::Index) { return 32768 + 32767 * value / tops.component; });
+    pack_vectors(bytes, state.displacement, shift);
     pack_levels(bytes, state.von_mises, tops.stress.value_or(0));
   }
   if (!surface.triangles.empty()) {
     pack_vectors(bytes, surface.vertices, place);
     pack_indices(bytes, surface.triangles, surface.vertices.size());
+  }
+  if (!shells.solids.triangles.empty()) {
+    pack_vectors(bytes, shells.solids.vertices, place);
+    pack_indices(bytes, shells.solids.triangles, shells.solids.vertices.size());
+    for (const DrawnResult::State& state : shells.states) {
+      pack_vectors(bytes, state.of_solids, shift);
+    }
   }
   return base64(deflated(bytes));
 }
@@ -221,7 +243,9 @@ DrawnResult unloaded(const fs::path& path) {
   drawn.reference = tessellate_uniformly(shell, pieces).mesh;
   drawn.shells = shell.triangles.size();
   const std::size_t points = drawn.reference.vertices.size();
-  drawn.states = {{0, std::vector<Vec3>(points, Vec3::Zero()), std::vector<double>(points, 0)}};
+  DrawnResult::State& rest = drawn.states.emplace_back();
+  rest.displacement.assign(points, Vec3::Zero());
+  rest.von_mises.assign(points, 0);
   return drawn;
 }
 
@@ -231,7 +255,8 @@ void take_picture(CaseReport& one, const TriangleMesh& mesh, const std::vector<d
 
 void draw_shells(CaseReport& one, const Room& room, DrawnShells shells, const std::optional<TriangleMesh>& surface,
                  bool loaded) {
-  if (surface) {
+  // Without its load the organ is not where it was imaged.
+  if (surface && !shells.is_unloaded) {
     const ClosestPoint tree(*surface);
     for (const Vec3& p : shells.mesh.vertices) {
       shells.distance.push_back(std::sqrt(tree.closest(p).squared_distance));
@@ -264,7 +289,8 @@ Room room_for(std::size_t cases) {
   const std::size_t count = std::max<std::size_t>(cases, 1);
   Room room;
   room.triangles = std::clamp<std::size_t>(600'000 / count, 1'000, 60'000);
-  room.states = std::clamp<std::size_t>(400 / count, 2, 41);
+  room.states = std::clamp<std::size_t>(4000 / count, 2, 41);
+  room.bytes = bytes_of_states / count;
   room.picture_width = count == 1 ? 1080 : count <= 12 ? 720 : count <= 60 ? 400 : 200;
   room.slice = count == 1 ? 220 : count <= 12 ? 150 : count <= 60 ? 100 : 60;
   return room;
@@ -283,7 +309,10 @@ void draw_organ(CaseReport& one, const Room& room) {
   if (result) {
     one.scene = one.redacted(result->scene);
     try {
-      draw_shells(one, room, thinned(std::move(*result), room.triangles), surface, loaded);
+      DrawnShells shells = thinned(std::move(*result), room.triangles);
+      const std::size_t of_state = bytes_of_point * (shells.mesh.vertices.size() + shells.solids.vertices.size());
+      const std::size_t states = std::max<std::size_t>(2, room.bytes / std::max<std::size_t>(of_state, 1));
+      draw_shells(one, room, with_fewer_states(std::move(shells), states), surface, loaded);
     } catch (const InputError& error) {
       one.missing.push_back(one.redacted(error.what()));
     }

@@ -9,13 +9,14 @@ ROOMS = {
     "volume": {"core", "volume"},
     "surface": {"core", "surface"},
     "shell": {"core", "surface", "shell"},
+    "wall": {"core", "volume", "surface", "shell", "wall"},
     "fit": {"core", "surface", "shell", "fit"},
     "mechanics": {"core", "surface", "shell", "mechanics"},
     "accuracy": {"core", "surface", "shell", "fit", "mechanics", "accuracy"},
     "draw": {"core", "surface", "draw"},
     "io": {"core", "volume", "surface", "shell", "fit", "mechanics", "accuracy", "draw", "io"},
     "report": {"core", "volume", "surface", "shell", "draw", "io", "report"},
-    "cli": {"core", "volume", "surface", "shell", "fit", "mechanics", "accuracy", "draw", "io", "cli"},
+    "cli": {"core", "volume", "surface", "shell", "wall", "fit", "mechanics", "accuracy", "draw", "io", "cli"},
 }
 
 # Rooms of the second level, and which of their own floor they may include.
@@ -77,7 +78,7 @@ def _product(path):
 
 
 def order_of_rooms(path, text):
-    """core < volume; core < surface < shell < fit; shell < mechanics; core < draw; all < io < cli < tools."""
+    """core < volume; core < surface < shell < fit; volume, shell < wall; shell < mechanics; core < draw; all < io < cli < tools."""
     room, inner = _rooms(path)
     found = []
     if path.endswith(CODE) and _product(path):

@@ -633,6 +633,21 @@ class WholeChain(Pipeline):
         grown = (result["volume_after_mm3"] * 3 / 4 / 3.141592653589793) ** (1 / 3) - radius
         self.assertAlmostEqual(grown / expected, 1, delta=0.1)
 
+    def test_a_lumen_is_loaded_in_the_middle_of_its_wall(self):
+        # The phantom is an open vessel with an aneurysm, whose neck is sharper than half of this wall.
+        self.phantom("aneurysm")
+        wall = dict(LOAD, THICKNESS="4mm")
+        done = self.make(VOLUMES="aneurysm.nii.gz", LABEL=1, OPEN=1, TOLERANCE="1%", MID_SURFACE="inner", **wall)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        folder = self.out / "aneurysm" / "1"
+        relaxed, solved = (json.loads((folder / f"{stage}.json").read_text())["result"] for stage in ("relax", "simulate"))
+        self.assertEqual((relaxed["mid_surface"]["target"], relaxed["self_intersections"]), ("inner", 0))
+        self.assertLess(relaxed["mid_surface"]["error_mm"]["mean"], relaxed["hausdorff_mm"]["upper"])
+        self.assertTrue(solved["converged"])
+        page = (self.out / "report.html").read_text()
+        self.assertIn("Shells to middle of the wall, at most", page)
+        self.assertIn("surface half of the wall&#39;s thickness outside of the extracted one", page)
+
     def test_one_impossible_case_among_good_ones(self):
         self.phantom("sphere")
         done = self.make("-k", VOLUMES="sphere.nii.gz missing.nii.gz", LABELS="1 9", SHELLS=100, **LOAD)

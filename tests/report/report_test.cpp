@@ -171,7 +171,7 @@ TEST(DrawnShellsTest, OfAnotherKindStayAsTheyAre) {
   const std::size_t triangles = odd.reference.triangles.size();
   const DrawnShells drawn = thinned(std::move(odd), 100'000);
   EXPECT_EQ(drawn.mesh.triangles.size(), triangles);
-  EXPECT_THAT(drawn.labels, ElementsAre("Unloaded", "Loaded"));
+  EXPECT_THAT(drawn.labels, ElementsAre("As imaged", "Loaded"));
 }
 
 }  // namespace

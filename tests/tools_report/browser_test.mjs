@@ -42,6 +42,21 @@ if (await page.locator("table.sortable").count() > 0) {
 const canvas = page.locator("canvas");
 await canvas.waitFor({ timeout: 20000 });
 const look = () => canvas.evaluate((element) => element.toDataURL());
+seen.middle = await canvas.evaluate((element) => {
+  const flat = Object.assign(document.createElement("canvas"), { width: element.width, height: element.height });
+  const context = flat.getContext("2d");
+  context.drawImage(element, 0, 0);
+  const { data } = context.getImageData(0, 0, flat.width, flat.height);
+  const least = [flat.width, flat.height], most = [0, 0];
+  for (let i = 0; i < flat.width * flat.height; ++i) {
+    const at = [i % flat.width, Math.floor(i / flat.width)];
+    for (const k of data[4 * i + 3] > 0 ? [0, 1] : []) {
+      least[k] = Math.min(least[k], at[k]);
+      most[k] = Math.max(most[k], at[k]);
+    }
+  }
+  return [(least[0] + most[0]) / (2 * flat.width), (least[1] + most[1]) / (2 * flat.height)];
+});
 const changes = async (act) => {
   const before = await look();
   await act();
@@ -64,6 +79,16 @@ seen.changes = {
   state: await changes(() => page.getByRole("slider", { name: "State" }).press("ArrowLeft")),
   reset: await changes(() => page.getByRole("button", { name: "Reset view" }).click()),
 };
+const solids = page.getByRole("checkbox", { name: "solids" });
+if (await solids.count() > 0) {
+  seen.changes.solids = await changes(() => solids.uncheck());
+}
+const slider = page.getByRole("slider", { name: "State" });
+seen.states = [];
+for (let i = Number(await slider.getAttribute("max")); i >= 0; --i) {
+  await slider.fill(String(i));
+  seen.states.unshift(await slider.getAttribute("aria-valuetext"));
+}
 seen.legend = (await page.locator(".legend").filter({ has: page.locator(":visible") }).allTextContents()).join(" ");
 
 const scan = require("node:fs").readFileSync(require.resolve("axe-core/axe.min.js"), "utf8");

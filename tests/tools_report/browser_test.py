@@ -69,6 +69,8 @@ class Browser(WithPackages):
         self.assertEqual(seen["errors"], [])
         self.assertEqual(seen["requests"], [], "a page loads nothing")
         self.assertEqual(seen["violations"], [], "axe-core")
+        for place in seen["middle"]:
+            self.assertAlmostEqual(place, 0.5, delta=0.05, msg="what is drawn is in the middle of the canvas")
         self.assertEqual([name for name, changed in seen["changes"].items() if not changed], [])
         return seen
 
@@ -76,7 +78,16 @@ class Browser(WithPackages):
         for scheme in ("light", "dark"):
             seen = self.look_at(self.case, scheme)
             self.assertIn("Displacement", seen["legend"])
-            self.assertIn("Unloaded", seen["legend"])
+            self.assertIn("As imaged", seen["legend"])
+            self.assertNotIn("solids", seen["changes"])
+
+    def test_solids_and_all_states(self):
+        with tempfile.TemporaryDirectory() as folder:
+            case = cases.make_case(pathlib.Path(folder), "sphere")
+            cases.add_solid(case)
+            seen = self.look_at(case, "light")
+        self.assertIn("solids", seen["changes"])
+        self.assertEqual(seen["states"], ["As imaged", *(f"Load \u00d7 {part}" for part in (0.25, 0.5, 0.75)), "Loaded"])
 
     def test_cohort_sorts_and_filters(self):
         out = self.folder / "cohort"

@@ -7,6 +7,9 @@ import pathlib
 import shutil
 import subprocess
 
+import contact_scenes
+import numpy as np
+
 TOOLS = pathlib.Path(os.environ["TUNICA_BIN"])
 STAGES = ["extract", "decimate", "relax", "simulate"]
 
@@ -18,20 +21,36 @@ def run(verb, *words, code=0):
     return done
 
 
-def make_case(folder, shape="aneurysm"):
-    """Runs the four stages on a phantom into folder/shape/1. @return that folder"""
+def make_case(folder, shape="aneurysm", pressure="1kPa", solve=()):
+    """Runs the four stages on a phantom into folder/shape/1. @param solve  further words of the last. @return that folder"""
     volume, case = folder / f"{shape}.nii.gz", folder / "out" / shape / "1"
     case.mkdir(parents=True)
     run("phantom", shape, volume, "--size", 24, "--spacing", 2)
     surface, coarse, shell, result = (case / name for name in ("surface.ply", "coarse.ply", "shell.ply", "result.hdf"))
-    load = ["--pressure", "1kPa", "--young", "1MPa", "--poisson", "0.45", "--thickness", "1.5mm", "--density",
-            "1100kg/m3", "--fix", "rigid-motions" if shape == "sphere" else "boundary", "--static"]
+    load = ["--pressure", pressure, "--young", "1MPa", "--poisson", "0.45", "--thickness", "1.5mm", "--density",
+            "1100kg/m3", "--fix", "rigid-motions" if shape == "sphere" else "boundary", "--static", *solve]
     open_border = [] if shape == "sphere" else ["--open-border"]
     for stage, words in (("extract", [volume, surface, "--label", 1, "--smooth", "staircase", *open_border]),
                          ("decimate", [surface, coarse, "--triangles", 200]), ("relax", [coarse, surface, shell]),
                          ("simulate", [shell, result, *load])):
         run(stage, *words, "--report", case / f"{stage}.json", "--quiet")
     return case
+
+
+def add_solid(case):
+    """Solves a case anew in four steps, with a block of tetrahedra beside the organ that bends under its weight."""
+    points, tetrahedra = contact_scenes.block(2, np.array([20.0, 20.0, 20.0]), np.array([60.0, 0, 0]))
+    contact_scenes.write_vtk(case / "block.vtk", points, tetrahedra)
+    wall = "young = \"1MPa\"\npoisson = 0.3\n"
+    (case / "scene.toml").write_text(
+        "[run]\nkind = \"static\"\nload_steps = 4\n"
+        f"[[shell]]\nname = \"organ\"\nmesh = \"shell.ply\"\nthickness = \"1.5mm\"\n{wall}"
+        "[[fix]]\nbody = \"organ\"\nwhere = {rigid_motions = true}\n"
+        f"[[solid]]\nname = \"block\"\nmesh = \"block.vtk\"\nunit = \"mm\"\n{wall}"
+        "density = \"1000kg/m3\"\n[[fix]]\nbody = \"block\"\nwhere = {below = {axis = \"x\", at = \"61mm\"}}\ntranslation = \"xyz\"\n"
+        "[[load]]\nbody = \"organ\"\nkind = \"pressure\"\nvalue = \"1kPa\"\n"
+        "[[load]]\nbody = \"block\"\nkind = \"gravity\"\nvalue = [\"0mm/s2\", \"0mm/s2\", \"-9810mm/s2\"]\n")
+    run("simulate", "--scene", case / "scene.toml", case / "result.hdf", "--report", case / "simulate.json", "--quiet", "--force")
 
 
 def copy_case(case, out, name, change=lambda reports: None):

@@ -16,6 +16,8 @@ import time
 import unittest
 import zlib
 
+import numpy as np
+
 import cases
 
 
@@ -43,6 +45,34 @@ class Page(html.parser.HTMLParser):
 
     def of(self, tag):
         return [attributes for name, attributes in self.elements if name == tag]
+
+
+def unpacked(page):
+    """The organ of a page: its header, and the bytes of its arrays."""
+    packed = next(data for (_, attributes), data in page.scripts if attributes.get("type") == "text/plain")
+    data = zlib.decompress(base64.b64decode(packed))
+    length, = struct.unpack("<I", data[:4])
+    return json.loads(data[4:4 + length]), data[4 + length:]
+
+
+def numbers(data, count):
+    """What is packed as 16 bits, low bytes first, each the difference to the one before."""
+    low, high = np.frombuffer(data[:2 * count], np.uint8).reshape(2, count).astype(np.uint16)
+    return np.cumsum(low + 256 * high, dtype=np.uint16)
+
+
+def moves(header, arrays):
+    """Displacement and level of stress of the shells' points, state by state."""
+    points, at = header["shell"]["points"], 0
+    at += 6 * points + 6 * header["shell"]["triangles"] + 4 * header["edges"]
+    at += points if header["tops"]["distance"] is not None else 0
+    states = []
+    for _ in header["states"]:
+        shift = numbers(arrays[at:], 3 * points).reshape(3, points).T
+        states.append(((shift.astype(float) - 32768) / 32767 * header["displacement"],
+                       np.frombuffer(arrays[at + 6 * points:at + 7 * points], np.uint8)))
+        at += 7 * points
+    return states, arrays[at:]
 
 
 class ReportTest(unittest.TestCase):
@@ -117,22 +147,64 @@ class CasePage(ReportTest):
     def test_organ_is_packed(self):
         self.copy("aneurysm")
         _, _, page = self.report()
-        packed = next(data for (_, attributes), data in page.scripts if attributes.get("type") == "text/plain")
-        data = zlib.decompress(base64.b64decode(packed))
-        length, = struct.unpack("<I", data[:4])
-        header = json.loads(data[4:4 + length])
+        header, arrays = unpacked(page)
         result = json.loads((self.case / "simulate.json").read_text())["result"]
-        self.assertEqual(header["states"], ["Unloaded", "Loaded"])
+        self.assertEqual(header["states"], ["As imaged", "Loaded"])
         self.assertAlmostEqual(header["tops"]["displacement"] / result["max_displacement_mm"], 1, delta=0.01)
         points, edges = header["shell"]["points"], header["edges"]
         self.assertEqual(header["shell"]["triangles"], 16 * result["shells"])
         surface = header["surface"]
         size = (6 * points + 6 * header["shell"]["triangles"] + 4 * edges + points + 2 * (6 * points + points) +
                 6 * surface["points"] + 6 * surface["triangles"])
-        self.assertEqual(len(data), 4 + length + size)
+        self.assertEqual(len(arrays), size)
         pictures = [image["src"] for image in page.of("img")]
         self.assertEqual(len(pictures), 2, "the organ, and the slices")
         self.assertTrue(all(base64.b64decode(src.split(",")[1]).startswith(b"\x89PNG") for src in pictures))
+
+    def test_every_state_of_a_static_path_is_drawn(self):
+        # Small loads: the states of a path are the last one times their load.
+        with tempfile.TemporaryDirectory() as folder:
+            path = cases.make_case(pathlib.Path(folder), pressure="1Pa", solve=["--load-steps", "4"])
+            _, text, page = self.report(folder=path)
+            header, arrays = unpacked(page)
+            self.assertEqual(header["states"], ["As imaged", "Load \u00d7 0.25", "Load \u00d7 0.5", "Load \u00d7 0.75", "Loaded"])
+            states, _ = moves(header, arrays)
+            last, stress = states[-1]
+            self.assertGreater(stress.max(), 250)
+            for part, (displacement, level) in zip((0, 0.25, 0.5, 0.75), states):
+                np.testing.assert_allclose(displacement, part * last, atol=2e-3 * header["displacement"])
+                np.testing.assert_allclose(level.astype(float), part * stress, atol=1.6)
+            self.assertIn("Loaded; displacement drawn", text)
+
+    def test_states_of_a_bending_path_agree_with_those_that_the_grid_has(self):
+        # What the nodes say of the last state but one, against the grid of a run that ends there.
+        with tempfile.TemporaryDirectory() as folder:
+            folder = pathlib.Path(folder)
+            (folder / "path").mkdir()
+            (folder / "half").mkdir()
+            drawn = []
+            for name, pressure, steps in (("path", "8kPa", 2), ("half", "4kPa", 1)):
+                case = cases.make_case(folder / name, pressure=pressure, solve=["--load-steps", str(steps)])
+                header, arrays = unpacked(self.report(folder=case)[2])
+                drawn.append((header, moves(header, arrays)[0][1]))
+            (long, (moved, stress)), (short, (expected, expected_stress)) = drawn
+            self.assertEqual(long["shell"], short["shell"])
+            np.testing.assert_allclose(moved, expected, atol=1e-3 * long["displacement"])
+            np.testing.assert_allclose(stress * long["tops"]["stress"], expected_stress * short["tops"]["stress"],
+                                       atol=0.01 * 255 * long["tops"]["stress"])
+
+    def test_solids_are_drawn_by_their_outer_faces(self):
+        with tempfile.TemporaryDirectory() as folder:
+            case = cases.make_case(pathlib.Path(folder), "sphere")
+            cases.add_solid(case)
+            header, arrays = unpacked(self.report(folder=case)[2])
+            self.assertEqual(header["solids"], {"points": 26, "triangles": 48}, "not the point in its middle")
+            states, rest = moves(header, arrays)
+            surface, points = header["surface"], 26
+            rest = rest[6 * surface["points"] + 6 * surface["triangles"] + 6 * points + 6 * 48:]
+            self.assertEqual((len(rest), len(states)), (5 * 6 * points, 5))
+            shift = (numbers(rest[-6 * points:], 3 * points).astype(float) - 32768) / 32767 * header["displacement"]
+            self.assertGreater(np.abs(shift).max(), 0)
 
     def test_case_folder_alone_and_the_same_bytes_again(self):
         folder = self.copy("aneurysm")

@@ -66,5 +66,9 @@ export async function readOrgan(base64) {
     stress: reader.small(header.shell.points),
   }));
   organ.surface = header.surface && mesh(header.surface);
+  organ.solids = header.solids && {
+    ...mesh(header.solids),
+    displacements: header.states.map(() => reader.vectors(header.solids.points, shift)),
+  };
   return organ;
 }

@@ -7,6 +7,7 @@ import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { readOrgan } from "./data.js";
 
 const PLAIN = new Color(0xc4c8ce);
+const SOLID = new Color(0x9a9186);
 const MAGNIFICATIONS = [0, 1, 2, 5, 10, 20, 50, 100];
 
 function element(name, properties = {}, ...children) {
@@ -28,6 +29,14 @@ function number(value) {
   return value >= 1000 ? value.toFixed(0) : String(Number(value.toPrecision(3)));
 }
 
+function moving(mesh) {
+  const geometry = new BufferGeometry();
+  geometry.setIndex(new BufferAttribute(mesh.triangles, 1));
+  geometry.setAttribute("position", new BufferAttribute(mesh.positions.slice(), 3));
+  geometry.setAttribute("color", new BufferAttribute(new Float32Array(mesh.positions.length), 3));
+  return geometry;
+}
+
 class Organ {
   constructor(figure, organ) {
     this.figure = figure;
@@ -43,11 +52,8 @@ class Organ {
   }
 
   #makeScene() {
-    const { header, shell, edges, surface } = this.organ;
-    this.geometry = new BufferGeometry();
-    this.geometry.setIndex(new BufferAttribute(shell.triangles, 1));
-    this.geometry.setAttribute("position", new BufferAttribute(shell.positions.slice(), 3));
-    this.geometry.setAttribute("color", new BufferAttribute(new Float32Array(shell.positions.length), 3));
+    const { header, shell, edges, surface, solids } = this.organ;
+    this.geometry = moving(shell);
     const material = new MeshLambertMaterial({
       vertexColors: true, side: DoubleSide, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1,
     });
@@ -67,6 +73,12 @@ class Organ {
         color: 0x8fa3b8, transparent: true, opacity: 0.35, depthWrite: false, side: DoubleSide,
       }));
       this.layers.surface.visible = false;
+    }
+    if (solids) {
+      this.solids = moving(solids);
+      this.layers.solids = new Mesh(this.solids, new MeshLambertMaterial({
+        vertexColors: true, side: DoubleSide, polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 2,
+      }));
     }
     this.scene = new Scene();
     this.scene.add(new Group().add(...Object.values(this.layers)));
@@ -135,34 +147,45 @@ class Organ {
       this.#slider("Displacement drawn", MAGNIFICATIONS.length - 1, at, (i) => `× ${MAGNIFICATIONS[i]}`,
         (i) => (this.magnification = MAGNIFICATIONS[i])),
       ...this.#checkbox("curved shells", "shells"), ...this.#checkbox("edges of the shells", "edges"),
-      ...this.#checkbox("segmented surface", "surface"), reset);
+      ...this.#checkbox("solids", "solids"), ...this.#checkbox("segmented surface", "surface"), reset);
+  }
+
+  #displacementAt(i, displacement) {
+    const [x, y, z] = displacement.subarray(3 * i, 3 * i + 3);
+    return (255 * Math.hypot(x, y, z)) / this.organ.header.tops.displacement;
   }
 
   #valueAt(i, state) {
     if (this.colour === "stress") {
       return state.stress[i];
     }
-    if (this.colour === "distance") {
-      return this.organ.distance[i];
+    return this.colour === "distance" ? this.organ.distance[i] : this.#displacementAt(i, state.displacement);
+  }
+
+  // Vertices to where the displacement leads them; colours by levels from 0 to 255, or the plain one.
+  #move(geometry, mesh, displacement, plain, levelAt) {
+    const positions = geometry.getAttribute("position");
+    const colours = geometry.getAttribute("color");
+    for (let i = 0; i < mesh.positions.length; ++i) {
+      positions.array[i] = mesh.positions[i] + this.magnification * displacement[i];
     }
-    const [x, y, z] = state.displacement.subarray(3 * i, 3 * i + 3);
-    return (255 * Math.hypot(x, y, z)) / this.organ.header.tops.displacement;
+    for (let i = 0; i < positions.count; ++i) {
+      const level = levelAt && Math.round(levelAt(i));
+      (levelAt ? this.palette[Math.max(0, Math.min(255, level || 0))] : plain).toArray(colours.array, 3 * i);
+    }
+    positions.needsUpdate = colours.needsUpdate = true;
+    geometry.computeVertexNormals();
   }
 
   update() {
-    const { header, shell, states } = this.organ;
+    const { header, shell, states, solids } = this.organ;
     const state = states[this.state];
-    const positions = this.geometry.getAttribute("position");
-    const colours = this.geometry.getAttribute("color");
-    for (let i = 0; i < shell.positions.length; ++i) {
-      positions.array[i] = shell.positions[i] + this.magnification * state.displacement[i];
+    this.#move(this.geometry, shell, state.displacement, PLAIN, this.colour && ((i) => this.#valueAt(i, state)));
+    if (solids) {
+      const displacement = solids.displacements[this.state];
+      this.#move(this.solids, solids, displacement, SOLID,
+        this.colour === "displacement" && ((i) => this.#displacementAt(i, displacement)));
     }
-    for (let i = 0; i < header.shell.points; ++i) {
-      const level = this.colour ? Math.round(this.#valueAt(i, state)) : 0;
-      (this.colour ? this.palette[Math.max(0, Math.min(255, level || 0))] : PLAIN).toArray(colours.array, 3 * i);
-    }
-    positions.needsUpdate = colours.needsUpdate = true;
-    this.geometry.computeVertexNormals();
     const legend = this.figure.querySelector(".legend");
     legend.querySelector(".scale").hidden = !this.colour;
     if (this.colour) {
@@ -170,7 +193,7 @@ class Organ {
       legend.querySelector(".top").textContent = `${number(header.tops[this.colour])} ${header.units[this.colour]}`;
     }
     legend.querySelector(".drawn").textContent = this.magnification === 0
-      ? "Drawn as imaged." : `${header.states[this.state]}; displacement drawn × ${this.magnification}.`;
+      ? `Drawn ${header.rest}.` : `${header.states[this.state]}; displacement drawn × ${this.magnification}.`;
     this.changed();
   }
 
@@ -200,6 +223,7 @@ class Stage {
     organ.onChange = () => this.#draw();
     this.orbit = new OrbitControls(organ.camera, this.canvas);
     this.orbit.target.copy(organ.centre);
+    this.orbit.update(); // made, it looked at the origin
     this.orbit.enableDamping = false;
     this.orbit.addEventListener("change", () => this.#draw());
     this.#resize();

@@ -3,12 +3,16 @@
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/io/result/detail/hdf5_file.hpp"
+#include "tunica/mechanics/model/wall.hpp"
+#include "tunica/mechanics/runs/curved_displacement.hpp"
+#include "tunica/surface/mesh/tet_checks.hpp"
 
 #include <fmt/format.h>
 #include <hdf5.h>
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 namespace tunica {
@@ -81,6 +85,33 @@ public:
     return values;
   }
 
+  /// All that a data set says of one row of its first dimension.
+  [[nodiscard]] std::vector<double> row(const std::string& dataset, std::size_t number) const {
+    const std::vector<std::size_t> whole = shape(dataset);
+    if (whole.empty() || number >= whole[0]) {
+      fail(dataset + " has no shape of a result");
+    }
+    std::vector<hsize_t> start(whole.size(), 0), extent(whole.begin(), whole.end());
+    start[0] = number;
+    extent[0] = 1;
+    std::size_t count = 1;
+    for (const hsize_t length : extent) {
+      if (length == 0 || length > most_numbers / count) {
+        fail(dataset + " is too large to be drawn");
+      }
+      count *= length;
+    }
+    const hdf5::Handle data = open(dataset);
+    const hdf5::Handle space(H5Dget_space(data.get()));
+    const hdf5::Handle memory(H5Screate_simple(narrow<int>(extent.size()), extent.data(), nullptr));
+    std::vector<double> values(count);
+    if (H5Sselect_hyperslab(space.get(), H5S_SELECT_SET, start.data(), nullptr, extent.data(), nullptr) < 0 ||
+        H5Dread(data.get(), H5T_NATIVE_DOUBLE, memory.get(), space.get(), H5P_DEFAULT, values.data()) < 0) {
+      fail(dataset + " cannot be read: the file is damaged");
+    }
+    return values;
+  }
+
   template <typename Number>
   [[nodiscard]] std::vector<Number> all(const std::string& dataset) const {
     const std::vector<std::size_t> whole = shape(dataset);
@@ -130,30 +161,238 @@ std::vector<Vec3> vectors_of(const Reader& reader, const std::vector<double>& nu
   return vectors;
 }
 
-// The triangles of the shells, which come before the solids' tetrahedra.
-void read_triangles(const Reader& reader, DrawnResult& result) {
-  const auto types = reader.all<std::int64_t>("VTKHDF/Types");
-  const auto count =
-      narrow<std::size_t>(std::ranges::find_if(types, [](auto type) { return type != 5; }) - types.begin());
-  const auto corners = reader.rows<std::int64_t>("VTKHDF/Connectivity", 0, 3 * count);
-  const std::size_t points = result.reference.vertices.size();
-  result.reference.triangles.resize(count);
+/// Corners of cells [first, first + count) of so many corners, which lie one after the other from `begin` on.
+template <std::size_t Corners>
+std::vector<std::array<Index, Corners>> read_cells(const Reader& reader, std::size_t begin, std::size_t count,
+                                                   std::size_t points) {
+  const auto corners = reader.rows<std::int64_t>("VTKHDF/Connectivity", begin, Corners * count);
+  std::vector<std::array<Index, Corners>> cells(count);
   for (std::size_t i = 0; i < corners.size(); ++i) {
     if (corners[i] < 0 || narrow<std::size_t>(corners[i]) >= points) {
       reader.fail("VTKHDF/Connectivity names a point that is not there");
     }
-    result.reference.triangles[i / 3][i % 3] = narrow<Index>(corners[i]);
+    cells[i / Corners][i % Corners] = narrow<Index>(corners[i]);
+  }
+  return cells;
+}
+
+/// The outer faces of the solids, with the points of the grid that they have.
+struct OuterFaces {
+  TriangleMesh mesh;
+  std::vector<Index> points;  ///< #V
+};
+
+OuterFaces outer_faces(const TetMesh& solids) {
+  OuterFaces outer;
+  outer.mesh.triangles = boundary_triangles(solids);
+  std::vector<Index> number(solids.vertices.size(), narrow<Index>(max_index));
+  for (auto& triangle : outer.mesh.triangles) {
+    for (Index& v : triangle) {
+      if (number[v] == max_index) {
+        number[v] = narrow<Index>(outer.points.size());
+        outer.points.push_back(v);
+        outer.mesh.vertices.push_back(solids.vertices[v]);
+      }
+      v = number[v];
+    }
+  }
+  return outer;
+}
+
+// The triangles of the shells, which come before the solids' tetrahedra. @return of these the outer faces
+OuterFaces read_geometry(const Reader& reader, DrawnResult& result) {
+  result.reference.vertices = vectors_of(reader, reader.all<double>("VTKHDF/Points"));
+  const std::size_t points = result.reference.vertices.size();
+  const auto types = reader.all<std::int64_t>("VTKHDF/Types");
+  const auto count =
+      narrow<std::size_t>(std::ranges::find_if(types, [](auto type) { return type != 5; }) - types.begin());
+  result.reference.triangles = read_cells<3>(reader, 0, count, points);
+  const auto shells =
+      reader.has("tunica/elements/nodes") ? reader.shape("tunica/elements/nodes") : std::vector<std::size_t>();
+  result.shells = shells.empty() ? 0 : shells[0];
+  if (points == 0 || result.reference.triangles.empty()) {
+    reader.fail("has no shells to draw");
+  }
+  const TetMesh solids{result.reference.vertices, read_cells<4>(reader, 3 * count, types.size() - count, points)};
+  OuterFaces outer = outer_faces(solids);
+  result.solids = outer.mesh;
+  return outer;
+}
+
+void take_solids(const std::vector<Vec3>& displacement, const OuterFaces& outer, DrawnResult::State& state) {
+  for (const Index point : outer.points) {
+    state.of_solids.push_back(displacement[point]);
   }
 }
 
-DrawnResult::State read_state(const Reader& reader, std::size_t points, std::size_t row) {
+/// What the grid says of a state. @param row  of its rows, not of the states
+DrawnResult::State read_state(const Reader& reader, std::size_t points, const OuterFaces& outer, std::size_t row) {
   DrawnResult::State state;
   state.displacement = vectors_of(reader, reader.rows<double>("VTKHDF/PointData/displacement", row * points, points));
   state.von_mises = reader.rows<double>("VTKHDF/PointData/von_mises", row * points, points);
   if (state.displacement.size() != points || state.von_mises.size() != points) {
     reader.fail("VTKHDF/PointData has not one value per point");
   }
+  take_solids(state.displacement, outer, state);
   return state;
+}
+
+/// The states of a static run, of which the grid has the last alone, from displacements and rotations of the nodes.
+class StatesOfNodes {
+public:
+  StatesOfNodes(const Reader& reader, const DrawnResult& drawn, const OuterFaces& outer)
+      : reader_(reader), outer_(outer), points_(drawn.reference.vertices.size()) {
+    ShellBody& body = model_.shells.emplace_back();
+    ShellMesh& mesh = body.mesh;
+    mesh.vertices = vectors_of(reader, reader.all<double>("tunica/nodes/position"));
+    const auto corners = reader.all<std::int64_t>("tunica/elements/nodes");
+    if (corners.size() != 3 * drawn.shells || points_ < mesh.vertices.size()) {
+      reader.fail("its shells are not those that are drawn");
+    }
+    mesh.triangles.resize(drawn.shells);
+    for (std::size_t i = 0; i < corners.size(); ++i) {
+      if (corners[i] < 0 || narrow<std::size_t>(corners[i]) >= mesh.vertices.size()) {
+        reader.fail("tunica/elements/nodes names a node that is not there");
+      }
+      mesh.triangles[i / 3][i % 3] = narrow<Index>(corners[i]);
+    }
+    find_points(drawn);
+    take_normals();
+    take_patch(drawn);
+  }
+
+  [[nodiscard]] DrawnResult::State operator()(std::size_t number, bool linear) const {
+    State moved;
+    moved.linear = linear;
+    moved.displacement = vectors_of(reader_, reader_.row("tunica/nodes/displacement", number));
+    moved.rotation = vectors_of(reader_, reader_.row("tunica/nodes/rotation", number));
+    const std::size_t nodes = model_.node_count();
+    if (moved.displacement.size() != nodes || moved.rotation.size() != nodes) {
+      reader_.fail("tunica/nodes has not one value per node");
+    }
+    const std::vector<double> top = stress_of_nodes("tunica/elements/von_mises_top", number);
+    const std::vector<double> bottom = stress_of_nodes("tunica/elements/von_mises_bottom", number);
+    DrawnResult::State state;
+    state.displacement.assign(points_, Vec3::Zero());
+    state.von_mises.assign(points_, 0);
+    const std::vector<Vec3> drawn = curved_displacement(model_, 0, moved, surface_);
+    for (std::size_t v = 0; v < point_.size(); ++v) {
+      state.displacement[point_[v]] = drawn[v];
+      const auto& corners = model_.shells[0].mesh.triangles[surface_.vertex_shell[v]];
+      const Vec2& b = surface_.barycentric[v];
+      const auto at = [&](std::size_t k) { return std::max(top[corners[k]], bottom[corners[k]]); };
+      state.von_mises[point_[v]] = (1 - b.x() - b.y()) * at(0) + b.x() * at(1) + b.y() * at(2);
+    }
+    // The nodes of solids are the last, of the grid's points and of all nodes.
+    for (const Index point : outer_.points) {
+      if (point + nodes < points_) {
+        reader_.fail("its solids are not those that are drawn");
+      }
+      state.of_solids.push_back(moved.displacement[point + nodes - points_]);
+    }
+    return state;
+  }
+
+private:
+  /// The grid's point at each vertex of the shells as they are cut. Where a vertex lies in its shell is the same for
+  /// all of them, whatever their shape.
+  void find_points(const DrawnResult& drawn) {
+    const std::size_t pieces = drawn.reference.triangles.size() / std::max<std::size_t>(drawn.shells, 1);
+    const int level = truncated<int>(std::clamp(std::round(std::sqrt(real(pieces))), 1.0, 64.0));
+    if (narrow<std::size_t>(level * level) * drawn.shells != drawn.reference.triangles.size()) {
+      reader_.fail("its shells are not those that are drawn");
+    }
+    ShellMesh flat;
+    for (Index t = 0; t < drawn.shells; ++t) {
+      flat.vertices.insert(flat.vertices.end(), {Vec3::Zero(), Vec3::UnitX(), Vec3::UnitY()});
+      flat.triangles.push_back({3 * t, 3 * t + 1, 3 * t + 2});
+    }
+    flat.normals.assign(flat.vertices.size(), Vec3::UnitZ());
+    surface_ = tessellate_uniformly(flat, level);
+    point_.resize(surface_.mesh.vertices.size());
+    for (std::size_t t = 0; t < surface_.mesh.triangles.size(); ++t) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        point_[surface_.mesh.triangles[t][k]] = drawn.reference.triangles[t][k];
+      }
+    }
+  }
+
+  /// Where the nodes' normals make no curved surface, as at creases, the facets' own take their place.
+  void take_normals() {
+    ShellMesh& mesh = model_.shells[0].mesh;
+    const auto normals = reader_.all<double>("VTKHDF/PointData/normal");
+    if (normals.size() != 3 * points_) {
+      reader_.fail("VTKHDF/PointData/normal has not one value per point");
+    }
+    mesh.normals.assign(mesh.vertices.size(), Vec3::Zero());
+    for (std::size_t v = 0; v < point_.size(); ++v) {
+      const Vec2& b = surface_.barycentric[v];
+      const auto& corners = mesh.triangles[surface_.vertex_shell[v]];
+      const std::array weights{1 - b.sum(), b.x(), b.y()};
+      for (std::size_t k = 0; k < 3; ++k) {
+        if (weights[k] > 0.999) {
+          const double* normal = normals.data() + 3 * std::size_t{point_[v]};
+          mesh.normals[corners[k]] = Vec3(normal[0], normal[1], normal[2]);
+        }
+      }
+    }
+    for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+      if (!(normal_agreement(mesh, t) >= least_normal_agreement)) {
+        mesh.normals.clear();
+        return;
+      }
+    }
+  }
+
+  /// The kind of patch whose points are those of the grid.
+  void take_patch(const DrawnResult& drawn) {
+    ShellMesh& mesh = model_.shells[0].mesh;
+    if (mesh.normals.empty()) {
+      return;
+    }
+    double least = infinity;
+    for (const Patch kind : {Patch::watertight, Patch::comas}) {
+      ShellMesh tried = mesh;
+      tried.patch = kind;
+      const auto patches = curved_patches(tried);
+      double off = 0;
+      for (std::size_t v = 0; v < point_.size(); ++v) {
+        const Vec3& there = drawn.reference.vertices[point_[v]];
+        off += (patches[surface_.vertex_shell[v]].point(surface_.barycentric[v]) - there).norm();
+      }
+      if (off < least) {
+        least = off;
+        mesh.patch = kind;
+      }
+    }
+  }
+
+  [[nodiscard]] std::vector<double> stress_of_nodes(const std::string& dataset, std::size_t number) const {
+    const std::vector<double> of_shells = reader_.row(dataset, number);
+    if (of_shells.size() != model_.shells[0].mesh.triangles.size()) {
+      reader_.fail(dataset + " has not one value per shell");
+    }
+    return averaged_at_nodes(model_, of_shells);
+  }
+
+  const Reader& reader_;
+  const OuterFaces& outer_;
+  std::size_t points_;
+  Model model_;
+  Tessellation surface_;      // of triangles of another shape, see find_points()
+  std::vector<Index> point_;  // #V of the surface
+};
+
+DrawnResult::Kind kind_of(const std::string& scene, bool has_steps) {
+  const auto says = [&](const char* text) { return scene.find(text) != std::string::npos; };
+  using enum DrawnResult::Kind;
+  if (!has_steps) {
+    return statics;
+  }
+  return says("kind = \"frequencies\"")     ? frequencies
+         : says("kind = \"buckling\"")      ? buckling
+         : says("control = \"arc-length\"") ? path
+                                            : motion;
 }
 
 }  // namespace
@@ -163,32 +402,33 @@ DrawnResult read_drawn_result(const std::filesystem::path& path, std::size_t mos
   const Reader reader(path);
   DrawnResult result;
   result.scene = reader.text("tunica/scene");
-  result.reference.vertices = vectors_of(reader, reader.all<double>("VTKHDF/Points"));
+  result.is_unloaded = result.scene.find("\nimaged_at = ") != std::string::npos;
+  const OuterFaces outer = read_geometry(reader, result);
   const std::size_t points = result.reference.vertices.size();
-  read_triangles(reader, result);
-  const auto shells = reader.shape("tunica/elements/nodes");
-  result.shells = shells.empty() ? 0 : shells[0];
-  if (points == 0 || result.reference.triangles.empty()) {
-    reader.fail("has no shells to draw");
-  }
-  const std::size_t written = reader.shape("VTKHDF/PointData/displacement").at(0) / points;
+  const std::size_t drawn = reader.shape("VTKHDF/PointData/displacement").at(0) / points;
   const auto times = reader.all<double>("tunica/history/time");
-  if (written == 0 || times.empty()) {
+  const auto factors = reader.all<double>("tunica/history/load_factor");
+  if (drawn == 0 || times.empty() || factors.size() != times.size()) {
     reader.fail("holds no state");
   }
-  result.timed = reader.has("VTKHDF/Steps");
-  if (!result.timed) {
-    result.states = {{0, std::vector<Vec3>(points, Vec3::Zero()), std::vector<double>(points, 0)},
-                     read_state(reader, points, 0)};
-    result.states.back().time = times.back();
-    return result;
-  }
-  const std::size_t there = std::min(written, times.size());
+  const bool has_steps = reader.has("VTKHDF/Steps");
+  result.kind = kind_of(result.scene, has_steps);
+  const std::size_t there = has_steps ? std::min(drawn, times.size()) : times.size();
   const std::size_t chosen = std::min(there, most_states);
+  std::optional<StatesOfNodes> of_nodes;
   for (std::size_t i = 0; i < chosen; ++i) {
-    const std::size_t row = chosen > 1 ? i * (there - 1) / (chosen - 1) : 0;
-    result.states.push_back(read_state(reader, points, row));
-    result.states.back().time = times[row];
+    const std::size_t number = chosen > 1 ? i * (there - 1) / (chosen - 1) : 0;
+    if (has_steps || number + 1 == there) {
+      result.states.push_back(read_state(reader, points, outer, has_steps ? number : 0));
+    } else {
+      if (!of_nodes) {
+        of_nodes.emplace(reader, result, outer);
+      }
+      result.states.push_back((*of_nodes)(number, result.scene.find("geometry = \"linear\"") != std::string::npos));
+    }
+    result.states.back().number = number;
+    result.states.back().time = times[number];
+    result.states.back().load_factor = factors[number];
   }
   return result;
 }

@@ -10,25 +10,34 @@
 
 namespace tunica {
 
-/// The shells of a result file as they are drawn: each cut into level² triangles whose points neighbours share.
+/// The shells and solids of a result file as they are drawn: each shell cut into level² triangles whose points
+/// neighbours share, of solids the outer faces.
 struct DrawnResult {
   struct State {
-    double time = 0;                 ///< s; in a static result the load factor
+    std::size_t number = 0;  ///< among the written ones; 0 is the reference
+    double time = 0;         ///< s; of a mode its frequency, Hz, or its factor; else as the load factor
+    double load_factor = 0;
     std::vector<Vec3> displacement;  ///< #V, mm
     std::vector<double> von_mises;   ///< #V, MPa
+    std::vector<Vec3> of_solids;     ///< displacement, mm, of each vertex of `solids`
   };
+  enum class Kind { statics, path, motion, frequencies, buckling };
+
   TriangleMesh reference;  ///< mm; the triangles of a shell are consecutive
   std::size_t shells = 0;
-  std::vector<State> states;  ///< the written ones, evenly chosen; of a static result the reference and the last
-  bool timed = false;         ///< the states' times are seconds
-  std::string scene;          ///< resolved, SI, TOML; empty where the file does not say
+  TriangleMesh solids;        ///< mm; no triangles where there are none
+  std::vector<State> states;  ///< the written ones, evenly chosen
+  Kind kind = Kind::statics;
+  bool is_unloaded = false;  ///< the reference is not what was imaged, but the shape without the pressure of then
+  std::string scene;         ///< resolved, SI, TOML; empty where the file does not say
 };
 
-/// Reads what tunica-simulate drew. Solids' tetrahedra are left out.
+/// Reads what tunica-simulate drew. Of a static run, which draws its last state alone, the others come from the nodes,
+/// by the same curved displacements and means.
 /// @param most_states  at most this many states, the first and the last among them; at least 2
 /// Errors: InputError naming the file: missing, not a result of tunica, damaged, inconsistent.
-/// Cost: memory for the states that are read. Limits: 2^31 - 1 points; a static result of many load steps gives the
-/// last state alone.
+/// Cost: memory for the states that are read. Limits: 2^31 - 1 points; between the last state of a static run and
+/// others, normals of creases are those of their mean.
 DrawnResult read_drawn_result(const std::filesystem::path& path, std::size_t most_states);
 
 }  // namespace tunica

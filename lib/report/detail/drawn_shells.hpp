@@ -15,12 +15,16 @@ struct DrawnShells {
   std::vector<DrawnResult::State> states;   ///< at least one
   std::vector<std::string> labels;          ///< of the states
   std::vector<double> distance;             ///< #V, mm, to the segmented surface; empty: not known
+  TriangleMesh solids;                      ///< outer faces; no triangles where there are none
+  bool is_unloaded = false;                 ///< `mesh` is not what was imaged, but the shape without its load
 };
 
-/// What a result draws, with at most `triangles`: fewer pieces per shell first, and where the shells alone are too
-/// many, decimated.
-/// Errors: InputError where the surface cannot be decimated.
+/// What a result draws, with at most `triangles` of the shells, and as many of the solids: fewer pieces per shell
+/// first, and where the shells alone are too many, decimated. Errors: InputError where the surface cannot be decimated.
 DrawnShells thinned(DrawnResult result, std::size_t triangles);
+
+/// The same with at most so many states, evenly chosen, the first and the last among them. @param most  at least 2
+DrawnShells with_fewer_states(DrawnShells shells, std::size_t most);
 
 /// The same surface with at most so many triangles. Errors: InputError as decimate().
 TriangleMesh thinned(const TriangleMesh& mesh, std::size_t triangles);

@@ -33,8 +33,7 @@ SignedDistance::SignedDistance(const TriangleMesh& closed)
   }
 }
 
-SignedDistance::Hit SignedDistance::at(const Vec3& p) const {
-  const ClosestPoint::Hit hit = surface_.closest(p);
+SignedDistance::Hit SignedDistance::with_sign(const Vec3& p, const ClosestPoint::Hit& hit) const {
   const auto corners = surface_.corners(hit.triangle);
   // Which part of the triangle the nearest point lies on says which normal has the right sign.
   const Vec3 b = barycentric(hit.point, corners[0], corners[1], corners[2]);
@@ -52,7 +51,7 @@ SignedDistance::Hit SignedDistance::at(const Vec3& p) const {
   }
   const Vec3& pseudo = pseudo_normals_[hit.triangle][part];
   const double sign = (p - hit.point).dot(pseudo) >= 0 ? 1 : -1;
-  return {sign * (p - hit.point).norm(), hit.point, pseudo};
+  return {sign * (p - hit.point).norm(), hit.point, pseudo, hit.triangle, part};
 }
 
 }  // namespace tunica

@@ -1,4 +1,4 @@
-#include "tunica/shell/distance/mid_surface.hpp"
+#include "tunica/wall/mid_surface.hpp"
 
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
+#include <Eigen/Geometry>
 
 #include <algorithm>
 #include <cmath>
@@ -17,36 +17,7 @@ namespace {
 
 constexpr int pieces_per_edge = 4;   // where distances are sampled
 constexpr double least_stand = 0.2;  // of a normal on its facet: less is no shell
-
-/// The normals that a vertex has in its triangles; one where they agree.
-std::vector<std::vector<Vec3>> normals_at_vertices(const ShellMesh& mesh) {
-  std::vector<std::vector<Vec3>> normals(mesh.vertices.size());
-  if (mesh.corner_normals.empty()) {
-    for (std::size_t v = 0; v < normals.size(); ++v) {
-      normals[v].push_back(mesh.normals[v]);
-    }
-    return normals;
-  }
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      auto& at = normals[mesh.triangles[t][k]];
-      const Vec3& n = mesh.corner_normals[t][k];
-      if (std::none_of(at.begin(), at.end(), [&](const Vec3& known) { return (known - n).norm() < 1e-9; })) {
-        at.push_back(n);
-      }
-    }
-  }
-  return normals;
-}
-
-/// The shortest way that leads as far along each normal, by least squares.
-Vec3 offset_along(const std::vector<Vec3>& normals, double distance) {
-  Eigen::MatrixXd rows(narrow<Eigen::Index>(normals.size()), 3);
-  for (std::size_t k = 0; k < normals.size(); ++k) {
-    rows.row(narrow<Eigen::Index>(k)) = normals[k].transpose();
-  }
-  return rows.completeOrthogonalDecomposition().solve(Eigen::VectorXd::Constant(rows.rows(), distance));
-}
+constexpr double small_rims = 0.3;   // of the area: what closes them
 
 void require_unfolded(const ShellMesh& before, const ShellMesh& after) {
   for (std::size_t t = 0; t < after.triangles.size(); ++t) {
@@ -68,15 +39,31 @@ void require_unfolded(const ShellMesh& before, const ShellMesh& after) {
 
 }  // namespace
 
-MidSurface mid_surface(const ShellMesh& face, WallFace which, double thickness) {
-  MidSurface middle{face, std::vector<double>(face.vertices.size(), thickness)};
-  const auto normals = normals_at_vertices(face);
-  const double distance = which == WallFace::outer ? -thickness / 2 : thickness / 2;
-  for (std::size_t v = 0; v < normals.size(); ++v) {
-    middle.shell.vertices[v] += offset_along(normals[v], distance);
+bool faces_inward(const Target& face) {
+  TriangleMesh closed = face.mesh();
+  for (const auto& rim : face.boundary_vertices()) {
+    Vec3 middle = Vec3::Zero();
+    for (const Index v : rim) {
+      middle += closed.vertices[v] / real(rim.size());
+    }
+    const auto centre = narrow<Index>(closed.vertices.size());
+    closed.vertices.push_back(middle);
+    for (std::size_t i = 0; i < rim.size(); ++i) {
+      closed.triangles.push_back({rim[(i + 1) % rim.size()], rim[i], centre});
+    }
   }
-  require_unfolded(face, middle.shell);
-  return middle;
+  const double open = area(face.mesh());
+  return area(closed) - open <= small_rims * open && signed_volume(closed) < 0;
+}
+
+TriangleMesh moved_half_way(TriangleMesh coarse, const Target& face, WallFace which, double thickness,
+                            const Target& half_way) {
+  const double way = which == WallFace::inner ? thickness / 2 : -thickness / 2;
+  for (Vec3& p : coarse.vertices) {
+    const Target::Foot foot = face.closest(p);
+    p = half_way.tree().closest(foot.point + way * foot.normal).point;
+  }
+  return coarse;
 }
 
 MidSurface mid_surface_between(const ShellMesh& face, WallFace which, const Target& other) {
