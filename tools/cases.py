@@ -239,6 +239,8 @@ def missing_of(case):
         needed += MOTION
     elif kind != "static":
         return [f"kind: '{shown(kind)}' is not understood: static or dynamic"]
+    if case.setting("ACCURACY") and case.setting("MID_SURFACE"):
+        return ["accuracy refits the shells to the face that mid_surface leaves: give shells or tolerance instead"]
     missing = [name for name in needed if not case.setting(name)]
     if not missing:
         return []

@@ -130,6 +130,9 @@ class Rules(WithStubs):
         done = self.make(VOLUMES="a.nii.gz", LABEL=3, ACCURACY="2%", SHELLS=300, **LOAD)
         self.assertEqual(done.returncode, 2)
         self.assertIn("leave out SHELLS and TOLERANCE", done.stderr)
+        done = self.make(VOLUMES="a.nii.gz", LABEL=3, ACCURACY="2%", MID_SURFACE="inner", **LOAD)
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("give SHELLS or TOLERANCE instead", done.stderr)
 
     def test_defaults(self):
         self.make(VOLUMES="a.nii.gz", ISOVALUE=-0.5, **LOAD)
