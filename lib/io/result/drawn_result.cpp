@@ -171,7 +171,8 @@ DrawnResult read_drawn_result(const std::filesystem::path& path, std::size_t mos
   if (points == 0 || result.reference.triangles.empty()) {
     reader.fail("has no shells to draw");
   }
-  const std::size_t written = reader.shape("VTKHDF/PointData/displacement").at(0) / points;
+  const auto displacements = reader.shape("VTKHDF/PointData/displacement");
+  const std::size_t written = displacements.empty() ? 0 : displacements[0] / points;
   const auto times = reader.all<double>("tunica/history/time");
   if (written == 0 || times.empty()) {
     reader.fail("holds no state");

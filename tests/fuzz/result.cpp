@@ -1,0 +1,25 @@
+#include "fuzz/target.hpp"
+
+#include "tunica/io/result/drawn_result.hpp"
+
+// Results of tunica-simulate, as reports read them.
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace tunica;
+  const std::filesystem::path path = fuzz::file("a.hdf", fuzz::text_of(data, size));
+  fuzz::accepted(
+      [&] {
+        const DrawnResult result = read_drawn_result(path, 4);
+        const std::size_t points = result.reference.vertices.size();
+        fuzz::require(!result.states.empty() && result.states.size() <= 4, "as many states as asked for");
+        for (const auto& triangle : result.reference.triangles) {
+          for (const Index corner : triangle) {
+            fuzz::require(corner < points, "corners are there");
+          }
+        }
+        for (const DrawnResult::State& state : result.states) {
+          fuzz::require(state.displacement.size() == points && state.von_mises.size() == points, "a value each");
+        }
+      },
+      path.string());
+  return 0;
+}
