@@ -215,6 +215,14 @@ void journals(const Seeds& seeds) {
   seeds.put("without checkpoint", length + states);
 }
 
+void quantities(const Seeds& seeds) {
+  int number = 0;
+  for (const char* text :
+       {"100mmHg", "-90 MPa", "2.5e-07N", "1.1g/cm3", "0.1/s", "1kN*mm", "1e-3kg*m^-3", "0.5%", "0.2mm", "um"}) {
+    seeds.put(std::to_string(++number), text);
+  }
+}
+
 // A folder of the pipeline as its harness takes it apart: the reports of tests/fuzz/seeds/report, and what they name.
 void folders(const Seeds& seeds, const fs::path& all, const fs::path& texts) {
   std::string bundle = "=== .cases\nvessel/1\tcase\tsimulate\t0\tdone\nother\tcase\trelax\t4\t\n";
@@ -248,6 +256,7 @@ int main(int count, char** arguments) {
   tetrahedra(all);
   results({all, "result"});
   journals({all, "journal"});
+  quantities({all, "quantity"});
   folders({all, "pipeline"}, all, texts);
   return 0;
 }
