@@ -61,8 +61,10 @@ std::vector<fs::path> files_in(const fs::path& folder) {
 
 }  // namespace
 
-// As __asan_default_options of the manual: nothing of a reader's size is worth more memory than libFuzzer allows.
-extern "C" const char* __asan_default_options() { return "max_allocation_size_mb=2048:hard_rss_limit_mb=2048"; }
+// As much memory as libFuzzer allows; a harness may say otherwise.
+extern "C" __attribute__((weak)) const char* __asan_default_options() {
+  return "max_allocation_size_mb=2048:hard_rss_limit_mb=2048";
+}
 
 // usage: fuzz_PARSER COPIES FOLDER...
 int main(int count, char** arguments) {
