@@ -7,18 +7,27 @@ if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_L
 endif()
 if(TUNICA_UNITY)
   # A .cpp counts as a header there, and what is local to one is seen by others; the check preset looks at each alone.
-  target_compile_options(tunica_flags INTERFACE -Wno-subobject-linkage -Wshadow=local)
+  target_compile_options(tunica_flags INTERFACE $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage;-Wshadow=local>)
 else()
   target_compile_options(tunica_flags INTERFACE -Wshadow)
 endif()
 if(TUNICA_WERROR)
   target_compile_options(tunica_flags INTERFACE -Werror)
 endif()
+# Threads are watched by a sanitizer that goes with no other. With libFuzzer, what is sanitized also tells it which
+# branches were taken.
+if(TUNICA_SANITIZE STREQUAL "thread")
+  set(TUNICA_SANITIZERS thread)
+elseif(TUNICA_FUZZ)
+  set(TUNICA_SANITIZERS fuzzer-no-link,address,undefined)
+else()
+  set(TUNICA_SANITIZERS address,undefined)
+endif()
 # -O1: at -O0 Eigen is so slow that the sanitizer run would need an hour.
 add_library(tunica_sanitizers INTERFACE)
-target_compile_options(tunica_sanitizers INTERFACE -O1 -UNDEBUG -fsanitize=address,undefined
+target_compile_options(tunica_sanitizers INTERFACE -O1 -UNDEBUG -fsanitize=${TUNICA_SANITIZERS}
                        -fno-sanitize-recover=undefined -fno-omit-frame-pointer)
-target_link_options(tunica_sanitizers INTERFACE -fsanitize=address,undefined)
+target_link_options(tunica_sanitizers INTERFACE -fsanitize=${TUNICA_SANITIZERS})
 if(TUNICA_SANITIZE)
   target_link_libraries(tunica_flags INTERFACE tunica_sanitizers)
 endif()

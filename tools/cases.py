@@ -130,7 +130,7 @@ def unfit(volume, name):
     """Why no case can be made of a volume, or None."""
     if CONTROL.search(volume):
         return f"{shown(volume)}: has a control character in its name: rename the file or link to it"
-    if name in ("", *OF_THE_RUN):
+    if name in ("", ".", "..", *OF_THE_RUN):
         return f"{volume}: its results cannot be called '{name}' in OUT: rename the file or link to it"
     return None
 

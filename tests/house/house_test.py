@@ -13,7 +13,8 @@ import rules
 SOURCE = Path(os.environ.get("TUNICA_SOURCE", Path(__file__).resolve().parents[2]))
 TEXT = (".hpp", ".cpp", ".h", ".in", ".py", ".cmake", ".txt", ".md", ".json", ".toml", ".cff", ".sh", ".mk", "")
 TOOLS = ["phantom", "extract", "decimate", "relax", "compare", "simulate", "chart", "report"]
-SKIPPED_FOLDERS = {"build", ".git", "__pycache__", "data-samples", ".cache", "out", "node_modules", "dist"}
+# `found`: bytes that a reader once stumbled over.
+SKIPPED_FOLDERS = {"build", ".git", "__pycache__", "data-samples", ".cache", "out", "node_modules", "dist", "found"}
 
 
 def text_files():

@@ -405,7 +405,8 @@ DrawnResult read_drawn_result(const std::filesystem::path& path, std::size_t mos
   result.is_unloaded = result.scene.find("\nimaged_at = ") != std::string::npos;
   const OuterFaces outer = read_geometry(reader, result);
   const std::size_t points = result.reference.vertices.size();
-  const std::size_t drawn = reader.shape("VTKHDF/PointData/displacement").at(0) / points;
+  const auto displacements = reader.shape("VTKHDF/PointData/displacement");
+  const std::size_t drawn = displacements.empty() ? 0 : displacements[0] / points;
   const auto times = reader.all<double>("tunica/history/time");
   const auto factors = reader.all<double>("tunica/history/load_factor");
   if (drawn == 0 || times.empty() || factors.size() != times.size()) {

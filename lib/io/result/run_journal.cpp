@@ -89,7 +89,14 @@ public:
 
   template <typename T>
   void operator()(T& value) {
-    if constexpr (std::is_arithmetic_v<T>) {
+    if constexpr (std::is_same_v<T, bool>) {
+      unsigned char byte = 0;
+      raw(&byte, 1);
+      if (byte > 1) {
+        throw Damaged();  // no bool may hold it
+      }
+      value = byte == 1;
+    } else if constexpr (std::is_arithmetic_v<T>) {
       raw(&value, sizeof value);
     } else {
       get(value);

@@ -62,7 +62,7 @@ public:
     });
   }
   [[nodiscard]] Table<double> radius() {
-    constexpr std::string_view key = "radius";
+    static constexpr std::string_view key = "radius";
     return read_table<double>(table_, key, R"("1mm")", dynamic_, scene_, [this](const toml::node& node) {
       const double radius = table_.quantity_of(node, key, dimension::length);
       table_.at(node.source()).require(radius >= 0, "radius must not be negative");

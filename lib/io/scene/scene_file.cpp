@@ -88,7 +88,7 @@ void read_arc_length(const SceneTable& run, Scene& scene) {
     const SceneTable until(run.table("until", R"({probe = "tip", axis = "z", reaches = "30mm"})"), run.file(), "until",
                            keys);
     scene.until_probe = until.text("probe");
-    ArcLengthRun::Until& goal = settings.until.emplace();
+    ArcLengthRun::Until& goal = settings.until.emplace(ArcLengthRun::Until{});
     (void)until.required("axis");
     until.choice<int>("axis", goal.axis, {{"x", 0}, {"y", 1}, {"z", 2}});
     goal.reaches = until.quantity("reaches", dimension::length);
