@@ -136,14 +136,21 @@ def sha256(path):
     return digest.hexdigest()
 
 
-def changed_since(entry, start_ns):
+def file_told(told, case):
+    """The file that a report names: one whose name is no UTF-8 stands there with U+FFFD for its bytes."""
+    known = [case.volume, *(os.path.join(case.folder, name) for names in PRODUCTS.values() for name in names)]
+    return next((path for path in known if os.fsencode(path).decode("utf-8", "replace") == told), told)
+
+
+def changed_since(entry, case, start_ns):
     """Whether an input named in a report is another one than at that time. A file that was moved here keeps its age, so
     where only its entry is younger its content decides."""
     try:
-        info = os.stat(entry["path"])
+        path = file_told(entry["path"], case)
+        info = os.stat(path)
         if info.st_mtime_ns >= start_ns:
             return True
-        return info.st_ctime_ns >= start_ns and sha256(entry["path"]) != entry["sha256"]
+        return info.st_ctime_ns >= start_ns and sha256(path) != entry["sha256"]
     except IsADirectoryError:
         return False  # the report names its files, too
     except (OSError, KeyError, TypeError, ValueError):
@@ -163,7 +170,7 @@ def is_up_to_date(case, stage, remembered):
     if read_text(os.path.join(case.folder, f".{stage}.flags")) != remembered or report.get("ok") is not True:
         return False
     inputs = report.get("inputs") or []
-    return isinstance(inputs, list) and not any(changed_since(entry, start_ns) for entry in inputs)
+    return isinstance(inputs, list) and not any(changed_since(entry, case, start_ns) for entry in inputs)
 
 
 def plan_case(case, binaries, dry):

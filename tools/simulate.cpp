@@ -210,6 +210,7 @@ Json without_times(Json accuracy) {
   return accuracy;
 }
 
+/// Its hashes are of what was read.
 RunIdentity identity_of_run(const cli::Tool& tool, const Scene& scene, const std::string& asked,
                             const std::vector<fs::path>& inputs, const Drawing& drawing) {
   RunIdentity identity{version, asked, tool.provenance().lasting_command(), {}, {}, drawing.as_options()};
@@ -219,6 +220,7 @@ RunIdentity identity_of_run(const cli::Tool& tool, const Scene& scene, const std
   for (const fs::path& mesh : mesh_files(scene)) {
     identity.meshes.emplace_back(mesh.string(), sha256_of_file(mesh));
   }
+  tool.require_unchanged_inputs();
   return identity;
 }
 
@@ -535,7 +537,6 @@ private:
   /// Opens what the run writes: its journal, the result, what other programs draw.
   void begin() {
     const RunIdentity identity = identity_of_run(tool_, scene_, asked_, inputs_, drawing_);
-    tool_.require_unchanged_inputs();  // its hashes are of what was read
     if (!journal_) {
       journal_.emplace(RunJournal::create(part_of(out_), identity));
     } else if (const std::string differs = difference(journal_->identity(), identity); !differs.empty()) {

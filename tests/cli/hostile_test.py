@@ -89,7 +89,7 @@ class Soups(Hostile):
 
     def test_triangles_apart(self):
         write_soup(self.folder / "soup.ply", *apart(MILLION, 1.0))
-        self.expect("decimate", "soup.ply", "out.ply", "--triangles", "800", code=4)
+        self.expect("decimate", "soup.ply", "out.ply", "--triangles", "800", code=4, memory="4GB")
         self.expect("relax", "soup.ply", "ball.ply", "out.ply", code=3, says="soup.ply: ")
         self.expect("relax", "ball.ply", "soup.ply", "out.ply", code=3, says="soup.ply: ")
         self.expect("compare", "soup.ply", "ball.ply", code=0)

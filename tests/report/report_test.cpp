@@ -127,6 +127,8 @@ DrawnResult sphere() {
     result.reference.triangles.push_back({shared[a], shared[b], shared[c]});
   }
   result.states.resize(2);
+  result.states[1].number = 1;
+  result.states[1].load_factor = 1;
   for (const Vec3& p : result.reference.vertices) {
     result.states[0].displacement.emplace_back(Vec3::Zero());
     result.states[0].von_mises.push_back(0);

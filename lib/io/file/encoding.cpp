@@ -38,8 +38,10 @@ std::string base64(std::string_view bytes) {
 std::string sha256_base64(std::string_view bytes) {
   std::string digest(EVP_MAX_MD_SIZE, '\0');
   unsigned length = 0;
-  TUNICA_ASSERT(EVP_Digest(bytes.data(), bytes.size(), reinterpret_cast<unsigned char*>(digest.data()), &length,
-                           EVP_sha256(), nullptr) == 1);
+  if (EVP_Digest(bytes.data(), bytes.size(), reinterpret_cast<unsigned char*>(digest.data()), &length, EVP_sha256(),
+                 nullptr) != 1) {
+    throw std::bad_alloc();  // it fails at SHA-256 only where memory ends
+  }
   digest.resize(length);
   return base64(digest);
 }

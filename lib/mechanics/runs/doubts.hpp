@@ -15,10 +15,10 @@ bool is_loaded(const Model& model);
 
 /// What of a model can be solved but hardly be meant, a sentence each that begins with where it was said: walls thicker
 /// than a quarter of a vessel's radius or an eighth of a ball's over most of a body, or than a twentieth of its
-/// diagonal; shells that are coarse for a curved wall so thin, long or narrow, or with normals that do not fit the nodes;
-/// bodies that cannot move; forces and moments that only held nodes bear;
-/// loads that are zero or stay so during the run, or jump within a step; nothing that loads at all (static and dynamic
-/// runs). The model must have passed check_model(). Cost: linear.
+/// diagonal; shells that are coarse for a curved wall so thin, long or narrow, or with normals that do not fit the
+/// nodes; bodies that cannot move; forces and moments that only held nodes bear; loads that are zero or stay so during
+/// the run, or jump within a step; nothing that loads at all (static and dynamic runs). The model must have passed
+/// check_model(). Cost: linear.
 std::vector<std::string> doubts(const Model& model, const RunSettings& settings);
 
 struct Curvature {

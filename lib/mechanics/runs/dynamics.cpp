@@ -91,6 +91,16 @@ void stop_rigid_motion(const ShellSystem& system, const Piece& piece, double len
   }
 }
 
+void find_change(const Configuration& start, const Configuration& end, VectorX& change) {
+  change.resize(first_freedom(start.displacement.size()));
+  for (std::size_t i = 0; i < start.displacement.size(); ++i) {
+    change.segment<3>(first_freedom(i)) = end.displacement[i] - start.displacement[i];
+    change.segment<3>(first_freedom(i) + 3) = logarithm(end.rotation[i] * start.rotation[i].conjugate());  // 0: solids
+  }
+}
+
+bool acceptable(const NewtonResult& result) { return result.converged && result.valid && result.stable; }
+
 /// M a1 + alpha M v1 + f_int(x1) = f_ext(x1, t1), with velocity and acceleration at the end of a step as the scheme
 /// says. Masses are lumped; rotary inertia is rho t^3 / 12 per area about every axis (that of a plate about the axes in
 /// its plane), so it needs no gyroscopic term. Damping is alpha M and, in each element's own frame, beta K times the
@@ -253,14 +263,13 @@ public:
 
   /// What a step of a second-order scheme left out, where no error control looks.
   void look_for_left_out(double length, const Motion& before, const Motion& after, Summary& summary) const {
-    if (!scheme_.second_order() || tolerance_ > 0) {
-      return;
+    if (scheme_.second_order() && tolerance_ == 0) {
+      VectorX moved;
+      find_change(reference_configuration(system_), after.configuration, moved);
+      summary.largest_motion = std::max(summary.largest_motion, increment_size(system_, moved));
+      const VectorX error = scheme_.local_error(length, before.rates, after.rates);
+      summary.step_error = std::max(summary.step_error, increment_size(system_, error));
     }
-    VectorX moved;
-    find_change(reference_configuration(system_), after.configuration, moved);
-    summary.largest_motion = std::max(summary.largest_motion, increment_size(system_, moved));
-    summary.step_error =
-        std::max(summary.step_error, increment_size(system_, scheme_.local_error(length, before.rates, after.rates)));
   }
 
   [[nodiscard]] std::size_t freedom_count() const { return solver_->freedom_count(); }
@@ -368,8 +377,6 @@ private:
     }
   }
 
-  static bool acceptable(const NewtonResult& result) { return result.converged && result.valid && result.stable; }
-
   /// Balance of the step with a part of its change; 1: the equation of the step itself.
   Balance balance(Step& s, double part, const Configuration& c, BlockMatrix* tangent,
                   const std::vector<ElementState>& predicted) {
@@ -463,15 +470,6 @@ private:
     result.newton.residual = settled.residual;
     result.newton.iterations += settled.iterations;
     result.newton.cg_iterations += settled.cg_iterations;
-  }
-
-  static void find_change(const Configuration& start, const Configuration& end, VectorX& change) {
-    change.resize(first_freedom(start.displacement.size()));
-    for (std::size_t i = 0; i < start.displacement.size(); ++i) {
-      change.segment<3>(first_freedom(i)) = end.displacement[i] - start.displacement[i];
-      change.segment<3>(first_freedom(i) + 3) =
-          logarithm(end.rotation[i] * start.rotation[i].conjugate());  // 0: solids
-    }
   }
 
   void add_inertia(const VectorX& change, double length, BlockMatrix& tangent) const {

@@ -116,9 +116,9 @@ struct Summary {
   /// largest motion so far; root mean squares over the nodes, mm, turns times the body's length.
   double step_error = 0;
   double largest_motion = 0;
-  std::vector<Snap> snaps;              ///< under load control, in order
-  std::vector<double> limit_factors;    ///< load factors at which a path by arc length turns, in its order
-  std::vector<double> branch_factors;   ///< and near which other paths leave it
+  std::vector<Snap> snaps;             ///< under load control, in order
+  std::vector<double> limit_factors;   ///< load factors at which a path by arc length turns, in its order
+  std::vector<double> branch_factors;  ///< and near which other paths leave it
 };
 
 /// Everything a run needs to go on after a step as if nothing had happened: the numbers as they stand in memory, so
