@@ -232,6 +232,7 @@ RunIdentity identity_of_run(const cli::Tool& tool, const Scene& scene, const std
   for (const fs::path& mesh : mesh_files(scene)) {
     identity.meshes.emplace_back(mesh.string(), sha256_of_file(mesh));
   }
+  tool.require_unchanged_inputs();  // the hashes are of what was read
   return identity;
 }
 
@@ -548,7 +549,6 @@ private:
   /// Opens what the run writes: its journal, the result, what other programs draw.
   void begin() {
     const RunIdentity identity = identity_of_run(tool_, scene_, asked_, inputs_, drawing_);
-    tool_.require_unchanged_inputs();  // its hashes are of what was read
     if (!journal_) {
       journal_.emplace(RunJournal::create(part_of(out_), identity));
     } else if (const std::string differs = difference(journal_->identity(), identity); !differs.empty()) {
