@@ -210,7 +210,6 @@ Json without_times(Json accuracy) {
   return accuracy;
 }
 
-/// Its hashes are of what was read.
 RunIdentity identity_of_run(const cli::Tool& tool, const Scene& scene, const std::string& asked,
                             const std::vector<fs::path>& inputs, const Drawing& drawing) {
   RunIdentity identity{version, asked, tool.provenance().lasting_command(), {}, {}, drawing.as_options()};
@@ -220,7 +219,7 @@ RunIdentity identity_of_run(const cli::Tool& tool, const Scene& scene, const std
   for (const fs::path& mesh : mesh_files(scene)) {
     identity.meshes.emplace_back(mesh.string(), sha256_of_file(mesh));
   }
-  tool.require_unchanged_inputs();
+  tool.require_unchanged_inputs();  // the hashes are of what was read
   return identity;
 }
 

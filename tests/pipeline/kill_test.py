@@ -58,6 +58,14 @@ def finals(out):
             and ".part." not in name.name}
 
 
+def size_of(path):
+    """None of a file that is gone."""
+    try:
+        return path.stat().st_size
+    except FileNotFoundError:
+        return 0
+
+
 def everything(out):
     return {str(path.relative_to(out)) for path in out.rglob("*")}
 
@@ -112,20 +120,25 @@ class Kills(Pipeline):
         return at_work
 
     def wait(self, moments, run):
-        """To any moment of a run, or to one at which something is being written."""
-        if moments.random() < 0.6:
-            time.sleep(moments.uniform(0, 1.05 * self.usual))
-            return
-        time.sleep(moments.uniform(0, self.usual))
-        while run.poll() is None and not any(path.stat().st_size for path in self.parts()):
+        """To any moment of a run, of one of its stages, or to one at which something is being written."""
+        begin = time.monotonic()
+        aim, stage = moments.choice(("run", "stage", "stage", "writing")), moments.choice(STAGES)
+        end = begin + moments.uniform(0, self.usual)
+        while run.poll() is None:
+            if aim == "run" and time.monotonic() > end:
+                break
+            if aim != "run" and stage in self.stages_at_work() and (aim == "stage" or self.is_writing()):
+                time.sleep(moments.uniform(0, self.usual / 8) if aim == "stage" else moments.uniform(0, 0.003))
+                break
             time.sleep(0.001)
-        time.sleep(moments.uniform(0, 0.003))
+        if run.poll() is not None:
+            self.usual = time.monotonic() - begin  # the machine is less busy than it was
 
-    def parts(self):
-        return [path for path in self.out.rglob("*.part") if path.exists()]
+    def is_writing(self):
+        return any(size_of(path) > 0 for path in self.out.rglob("*.part"))
 
     def stages_at_work(self):
-        return sorted({path.stem for path in self.out.glob(".run/*/*/*.exit") if path.stat().st_size == 0})
+        return sorted({path.stem for path in self.out.glob(".run/*/*/*.exit") if path.exists() and size_of(path) == 0})
 
     def check_finals(self, moment):
         for name, path in finals(self.out).items():
@@ -162,6 +175,8 @@ class Kills(Pipeline):
                 too_late += 1
             else:
                 kills += 1
+                if kills % 20 == 0:
+                    print(f"{kills} kills", file=sys.stderr)
                 hit.update(self.stages_at_work() or ["between stages"])
             moment = f"seed {SEED}, kill {kills}, stages at work {self.stages_at_work()}"
             if self.out.exists():
