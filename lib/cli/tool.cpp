@@ -310,20 +310,19 @@ int Tool::run(int argc, char** argv, const std::function<void()>& body) {
   std::signal(SIGXFSZ, SIG_IGN);  // writing past a limit on file sizes is then an error like a full disk
   declare_common();
   tidy_options(app_);
-  try {
-    if (const auto code = parse(argc, argv)) {
-      return *code;
-    }
-  } catch (const std::bad_alloc&) {
-    return finish(ExitCode::memory, out_of_memory(no_memory));
-  }
   std::signal(SIGINT, on_signal);
   std::signal(SIGTERM, on_signal);
   if (std::signal(SIGHUP, on_signal) == SIG_IGN) {
     std::signal(SIGHUP, SIG_IGN);  // as nohup has it
   }
   end_without_memory = [this] { return finish(ExitCode::memory, out_of_memory(no_memory)); };
-  const int code = perform(body);
+  int code = 0;
+  try {
+    const auto ended = parse(argc, argv);
+    code = ended ? *ended : perform(body);
+  } catch (const std::bad_alloc&) {
+    code = end_without_memory();
+  }
   end_without_memory = nullptr;
   return code;
 }
