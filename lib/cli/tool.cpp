@@ -315,7 +315,10 @@ int Tool::run(int argc, char** argv, const std::function<void()>& body) {
   if (std::signal(SIGHUP, on_signal) == SIG_IGN) {
     std::signal(SIGHUP, SIG_IGN);  // as nohup has it
   }
-  end_without_memory = [this] { return finish(ExitCode::memory, out_of_memory(no_memory)); };
+  end_without_memory = [this] {
+    memory_limit_.lift();  // else there may not even be memory for the message
+    return finish(ExitCode::memory, out_of_memory(no_memory));
+  };
   int code = 0;
   try {
     const auto ended = parse(argc, argv);
