@@ -10,7 +10,7 @@ ROOT = Path(os.environ["TUNICA_SOURCE"])
 sys.path.insert(0, str(ROOT / "tests" / "bench"))
 
 import stability  # noqa: E402  (from the folder above)
-from atlas.judge import RIGHT, WRONG  # noqa: E402
+from atlas.judge import DOUBTFUL, RIGHT, WRONG  # noqa: E402
 
 AGAIN = 5  # cells of every map that are run again
 # Runs of seconds each.
@@ -33,9 +33,9 @@ class Stored(unittest.TestCase):
                     self.assertTrue((stability.PAGES / f"{name}.{end}").exists())
                 self.assertIn(f"stability/{name}.svg", page)
 
-    def test_no_cell_of_the_default_is_wrong(self):
+    def test_no_cell_of_the_default_or_of_the_second_order_scheme_is_wrong(self):
         wrong = {name: [place for place, (verdict, _) in stability.stored(name).items() if verdict.letter == WRONG]
-                 for name, (_, method) in stability.charts().items() if method.name == "default"}
+                 for name, (_, method) in stability.charts().items() if method.name in ("default", "second-order")}
         self.assertEqual({name: cells for name, cells in wrong.items() if cells}, {})
 
 
@@ -52,6 +52,14 @@ class Again(unittest.TestCase):
                         tempfile.TemporaryDirectory(prefix="tunica-stability-") as folder:
                     verdict, _ = stability.run_cell(chart, method, place, seed, folder)
                     self.assertEqual(verdict.letter, RIGHT, verdict)
+
+
+    def test_long_steps_of_the_second_order_scheme_are_told(self):
+        chart, method = stability.charts()["oscillator-second-order"]
+        for step, letter in ((2, RIGHT), (3, DOUBTFUL)):
+            with self.subTest(step=chart.x.name(step)), tempfile.TemporaryDirectory(prefix="tunica-stability-") as folder:
+                verdict, _ = stability.run_cell(chart, method, (step, 2), 2, folder)
+                self.assertEqual(verdict.letter, letter, verdict)
 
 
 class Verdicts(unittest.TestCase):
