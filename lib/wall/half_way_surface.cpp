@@ -26,6 +26,7 @@ constexpr double error_of_wall = 1e-3;      // of the thickness: or this, if tha
 constexpr double most_of_wall = 1e-2;       // of the thickness, at most
 constexpr double cells_across = 32;         // of the diagonal, at least
 constexpr double most_points = 1.5e8;       // of a grid
+constexpr double thinnest = 1e-4;           // of the diagonal
 constexpr double coarsest = 2;              // times the detail that the grid should show: no surface from coarser ones
 constexpr int finer_grids = 3;              // at most
 constexpr double least_turned = 0.2;        // cosine: a triangle that turns by more while its corners move is folded
@@ -201,6 +202,12 @@ HalfWaySurface with_cells(const Target& face, std::size_t pieces, WallFace which
 
 HalfWaySurface half_way_surface(const Target& face, WallFace which, double thickness, const Progress& progress) {
   TUNICA_ASSERT(thickness > 0);
+  if (thickness < thinnest * face.diagonal()) {
+    throw RequirementError(fmt::format(
+        "the wall, {:.3g} mm thick, is thinner than a ten-thousandth of the diagonal, {:.4g} mm: its face is "
+        "its middle, as far as shells can tell; is the unit right?",
+        thickness, face.diagonal()));
+  }
   const double half = thickness / 2;
   const double allowed =
       std::clamp(error_of_diagonal * face.diagonal(), error_of_wall * thickness, most_of_wall * thickness);

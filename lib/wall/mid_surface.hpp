@@ -30,11 +30,11 @@ struct HalfWaySurface {
 /// An open face is first continued beyond its rims. At a rim in a plane the surface ends in that plane; at another one
 /// beside the rim. Of its pieces the largest are kept, as many as the face has.
 /// @param face  an oriented manifold, normals outward; thickness  mm, of the whole wall
-/// Errors: RequirementError: nothing is so far inside; or the grid would be too large. Interrupted.
-/// Source: distance as Baerentzen, Aanaes 2005; crossings next to samples are moved onto them as in Raman, Wenger 2008.
-/// Cost: some 10 us per triangle of the result; 4 bytes per point of the grid, of which there are at most 150 million.
-/// Limits: parts thinner than a cell may be lost; a rim that is cut at less than 30 degrees to the wall counts as one
-/// that lies in no plane.
+/// Errors: RequirementError: nothing is so far inside; the wall is thinner than a ten-thousandth of the diagonal; or
+/// the grid would be too large. Interrupted. Source: distance as Baerentzen, Aanaes 2005; crossings next to samples are
+/// moved onto them as in Raman, Wenger 2008. Cost: some 10 us per triangle of the result; 4 bytes per point of the
+/// grid, of which there are at most 150 million. Limits: parts thinner than a cell may be lost; a rim that is cut at
+/// less than 30 degrees to the wall counts as one that lies in no plane.
 HalfWaySurface half_way_surface(const Target& face, WallFace which, double thickness, const Progress& progress = {});
 
 /// Whether a face that is closed, but for rims that are small beside it, has its normals inward.

@@ -202,6 +202,7 @@ TEST(HalfWay, WhatIsCutOffIsTold) {
 TEST(HalfWay, Refusals) {
   const Target face(surface_of(ball(10), Vec3::Constant(-12), Vec3::Constant(12), 1));
   EXPECT_THROW((void)half_way_surface(face, WallFace::outer, 21), RequirementError);
+  EXPECT_THROW((void)half_way_surface(face, WallFace::inner, 1e-9), RequirementError);  // of another unit
   TriangleMesh two = face.mesh();
   const auto first = static_cast<Index>(two.vertices.size());
   for (const Vec3& p : face.mesh().vertices) {
