@@ -1,5 +1,6 @@
 """Where elements, solvers and integrators fail: every row of docs/limits.md is reproduced here, and what tunica does
 instead stands beside it. The names of the tests are the rows' names."""
+import json
 import math
 import os
 import re
@@ -255,6 +256,19 @@ class Integrators(Limit):
         self.assertLess(amplitude_left(20), 0.45)
         self.assertGreater(amplitude_left(320), 0.85)
         self.assertAlmostEqual(amplitude_left(40, integrator="generalised-alpha"), 1, delta=0.1)
+
+    def test_long_steps_of_a_second_order_scheme_leave_out_the_swing(self):
+        """A strip under a load let in at once reaches twice its rest; a step of .7 periods goes past that, and it is said."""
+        write_ply(self.bench.path("mesh.ply"), *grid(20, 2, lambda u, v: (100 * u, 10 * v, 0 * u)))
+        omega = 1.8751**2 / 100**2 * math.sqrt(1000 / 12 / 1.1e-9)
+        for part, told in ((0.05, False), (0.7, True)):
+            period = 2 * math.pi / omega
+            self.bench.run(run_lines(kind="dynamic", duration=f"{1.4 * period!r}s", step=f"{part * period!r}s",
+                                     integrator="generalised-alpha") + shell("mesh.ply", 1.0, 1000.0, 0.0, density="1100kg/m3") +
+                           fix([0, 1, 2]) + load("area", (0.0, 0.0, 1e-9), "MPa"))
+            with open(self.bench.path("run.json"), encoding="utf-8") as file:
+                said = any("the steps are long for what swings" in warning for warning in json.load(file)["warnings"])
+            self.assertEqual(said, told, part)
 
 
 class Coupling(Limit):

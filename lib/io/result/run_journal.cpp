@@ -194,11 +194,11 @@ template <typename Archive, typename AnyCheckpoint>
 void checkpoint_members(Archive& archive, AnyCheckpoint& checkpoint) {
   auto& [summary, position, displacement, rotation, memory] = checkpoint;
   auto& [dof, steps, parts, converged, residual, newton_iterations, cg_iterations, error, error_is_bound, volume_before,
-         volume_after, strain, largest, seconds_per_step, frequencies, factors, stiffened, energy, step_error, motion,
-         snaps, limits, branches] = summary;
+         volume_after, strain, largest, seconds_per_step, frequencies, factors, stiffened, energy, bend, motion, snaps,
+         limits, branches] = summary;
   each(archive, dof, steps, parts, converged, residual, newton_iterations, cg_iterations, error, error_is_bound,
-       volume_before, volume_after, strain, largest, seconds_per_step, frequencies, factors, stiffened, energy,
-       step_error, motion, snaps, limits, branches);
+       volume_before, volume_after, strain, largest, seconds_per_step, frequencies, factors, stiffened, energy, bend,
+       motion, snaps, limits, branches);
   each(archive, position, displacement, rotation, memory);
 }
 

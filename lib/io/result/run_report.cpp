@@ -321,12 +321,12 @@ std::vector<std::string> run_warnings(const RunSettings& run, const Summary& sum
                     "of rest is not: for the motion take shorter steps, or integrator = \"generalised-alpha\"",
                     1e2 * summary.energy->lost / summary.energy->largest));
   }
-  constexpr double notable_step = 0.1;
-  if (summary.step_error > notable_step * summary.largest_motion) {
+  constexpr double notable_bend = 0.25;  // of what swings with half of the largest motion: a ninth of its period
+  if (summary.largest_bend > notable_bend * summary.largest_motion) {
     warnings.push_back(
-        fmt::format("the steps are long for what swings: one of them left out {:.2g} % of the largest motion: take "
-                    "shorter ones, or error control (adaptive)",
-                    1e2 * summary.step_error / summary.largest_motion));
+        fmt::format("the steps are long for what swings: from one to the next the motion bends by {:.2g} % of its "
+                    "largest value: take shorter ones, or error control (adaptive)",
+                    1e2 * summary.largest_bend / summary.largest_motion));
   }
   if (summary.stiffened_from) {
     warnings.push_back(

@@ -261,17 +261,8 @@ public:
     }
   }
 
-  /// What a step of a second-order scheme left out, where no error control looks.
-  void look_for_left_out(double length, const Motion& before, const Motion& after, Summary& summary) const {
-    if (scheme_.second_order() && tolerance_ == 0) {
-      VectorX moved;
-      find_change(reference_configuration(system_), after.configuration, moved);
-      summary.largest_motion = std::max(summary.largest_motion, increment_size(system_, moved));
-      const VectorX error = scheme_.local_error(length, before.rates, after.rates);
-      summary.step_error = std::max(summary.step_error, increment_size(system_, error));
-    }
-  }
-
+  /// Displacements and rotations of the last step.
+  [[nodiscard]] const VectorX& change() const { return change_; }
   [[nodiscard]] std::size_t freedom_count() const { return solver_->freedom_count(); }
   void tell_direct_error(bool tell) { solver_->tell_direct_error(tell); }
   [[nodiscard]] double tolerance() const { return tolerance_; }
@@ -535,10 +526,17 @@ private:
     time_ = from.position;
     motion_.configuration = recall(from);
     stepper_.recall(from.memory, motion_);
+    if (const auto found = from.memory.find("last_change"); found != from.memory.end()) {
+      last_change_ = Eigen::Map<const VectorX>(found->second.data(), narrow<Eigen::Index>(found->second.size()));
+    }
   }
 
   [[nodiscard]] Checkpoint checkpoint() const override {
-    return keep(time_, motion_.configuration, stepper_.memory(motion_));
+    auto memory = stepper_.memory(motion_);
+    if (last_change_.size() > 0) {
+      memory["last_change"].assign(last_change_.begin(), last_change_.end());
+    }
+    return keep(time_, motion_.configuration, std::move(memory));
   }
 
   State take_step() override {
@@ -558,9 +556,9 @@ private:
     if (!is_solved(settings_, result)) {
       fail(step, before, end);
     }
-    const double before_time = std::exchange(time_, end);
+    time_ = end;
     stepper_.balance_energy(summary_.steps + 1, end, motion_, *summary_.energy);
-    stepper_.look_for_left_out(end - before_time, before, motion_, summary_);
+    look_for_swing();
     summary_.parts += step.parts;
     State state = wants_state() ? state_now() : State();
     state.residual = result.residual;
@@ -569,6 +567,20 @@ private:
     set_algebraic_error(result.algebraic_error, state);
     state.converged = settings_.newton_max == 1 ? result.linear_converged : result.converged;
     return state;
+  }
+
+  /// How far a step of a second-order scheme bends the motion, where no error control looks: a mode of which it is x
+  /// radians turns by 4 sin^2(x / 2) of its amplitude, however small its share in the motion is.
+  void look_for_swing() {
+    if (run_.integrator == Integrator::backward_euler || run_.adaptive) {
+      return;
+    }
+    VectorX moved;
+    find_change(reference_configuration(system_), motion_.configuration, moved);
+    summary_.largest_motion = std::max(summary_.largest_motion, increment_size(system_, moved));
+    const VectorX bend = last_change_.size() > 0 ? VectorX(stepper_.change() - last_change_) : stepper_.change();
+    summary_.largest_bend = std::max(summary_.largest_bend, increment_size(system_, bend));
+    last_change_ = stepper_.change();
   }
 
   /// A step that fails is taken again with its short waves made stiff, where the mesh is coarse for the thickness.
@@ -646,6 +658,7 @@ private:
   const DynamicRun& run_;
   TimeStepper stepper_;
   Motion motion_;
+  VectorX last_change_;  ///< of the step before, where look_for_swing() looks
   const bool soft_waves_ = has_soft_waves(system_);
   double time_ = 0;
 };

@@ -112,9 +112,9 @@ struct Summary {
   /// would have buckled in them (shell_element.hpp).
   std::optional<double> stiffened_from;
   std::optional<EnergyBalance> energy;  ///< of a dynamic run
-  /// Of a second-order scheme, which shows no loss of energy: the most that one step added to the error, and the
-  /// largest motion so far; root mean squares over the nodes, mm, turns times the body's length.
-  double step_error = 0;
+  /// Of a second-order scheme, which shows no loss of energy: the largest second difference of the motion over its
+  /// steps, and the largest motion; root mean squares over the nodes, mm, turns times the body's length.
+  double largest_bend = 0;
   double largest_motion = 0;
   std::vector<Snap> snaps;             ///< under load control, in order
   std::vector<double> limit_factors;   ///< load factors at which a path by arc length turns, in its order
