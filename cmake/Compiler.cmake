@@ -66,9 +66,10 @@ file(MAKE_DIRECTORY ${PROJECT_BINARY_DIR}/include)
 file(CREATE_LINK ${PROJECT_SOURCE_DIR}/lib ${PROJECT_BINARY_DIR}/include/tunica SYMBOLIC)
 
 # tunica_library(NAME LINKS lib... PRIVATE lib...): the .cpp files of lib/NAME and its rooms as the static library tunica_NAME. LINKS are the
-# rooms it may include: the link lines are the architecture.
+# rooms it may include: the link lines are the architecture. SANITIZED: with the tests also tunica_NAME_sanitized, which
+# runs under the sanitizers whatever the rest is built with, on those of LINKS that are there as such, too.
 function(tunica_library name)
-  cmake_parse_arguments(arg "" "" "LINKS;PRIVATE" ${ARGN})
+  cmake_parse_arguments(arg "SANITIZED" "" "LINKS;PRIVATE" ${ARGN})
   file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*.cpp)
   add_library(tunica_${name} STATIC ${sources})
   target_include_directories(tunica_${name} PUBLIC
@@ -81,6 +82,17 @@ function(tunica_library name)
     set_target_properties(tunica_${name} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 8)
   endif()
   target_compile_features(tunica_${name} PUBLIC cxx_std_20)
+  if(arg_SANITIZED AND TUNICA_TESTS)
+    set(links ${arg_LINKS})
+    foreach(link ${arg_LINKS})
+      if(TARGET ${link}_sanitized)
+        list(TRANSFORM links REPLACE "^${link}$" "${link}_sanitized")
+      endif()
+    endforeach()
+    tunica_library(${name}_sanitized LINKS ${links} PRIVATE ${arg_PRIVATE})
+    target_link_libraries(tunica_${name}_sanitized PUBLIC tunica_sanitizers)
+    set_target_properties(tunica_${name}_sanitized PROPERTIES EXCLUDE_FROM_ALL ON)
+  endif()
 endfunction()
 
 # tunica_test(NAME LINKS lib...): every .cpp of the current folder as one GoogleTest program.

@@ -55,7 +55,7 @@ class Hostile(unittest.TestCase):
         self.addCleanup(shutil.rmtree, self.folder, ignore_errors=True)
         meshes.write_ply(self.folder / "ball.ply", *meshes.sphere(3, 40.0, (50.0, 50.0, 50.0)), comments=["units mm"])
 
-    def run_tool(self, verb, *words, seconds=100):
+    def run_tool(self, verb, *words, seconds=300):
         """@return the exit code and what was said, which is an answer or one line. Time is that of the processor, so that
         a busy machine does not matter"""
         def limit():
@@ -75,7 +75,7 @@ class Hostile(unittest.TestCase):
 class Soups(Hostile):
     """A million triangles that are no surface: bounded time and memory, and an answer or a refusal that says why."""
 
-    def expect(self, verb, *words, code, says="", seconds=100, memory="4GB"):
+    def expect(self, verb, *words, code, says="", seconds=300, memory="4GB"):
         found, said = self.run_tool(verb, *words, "--memory-limit", memory, seconds=seconds)
         self.assertIn(found, code if isinstance(code, tuple) else (code,), said)
         self.assertIn(says, said)

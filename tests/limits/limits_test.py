@@ -233,21 +233,27 @@ class Integrators(Limit):
         static = self.vessel(1, "13kPa", kind="static")["max_displacement_mm"]
         self.assertAlmostEqual(moving / static, 1, delta=1e-4)
 
+    def strip(self):
+        """A cantilever. @return the period of its first mode, s, and where swing()'s load brings it to rest, mm"""
+        length, thickness, young, density = 100.0, 1.0, 1000.0, 1.1e-9
+        write_ply(self.bench.path("mesh.ply"), *grid(20, 2, lambda u, v: (length * u, 10 * v, 0 * u)))
+        omega = 1.8751**2 / length**2 * math.sqrt(young * thickness**2 / 12 / density)
+        return 2 * math.pi / omega, 1e-9 * length**4 / (8 * young * thickness**3 / 12)
+
+    def swing(self, duration, step, **integrator):
+        """The strip under a load let in at once."""
+        return self.bench.run(run_lines(kind="dynamic", duration=f"{duration!r}s", step=f"{step!r}s", **integrator) +
+                              shell("mesh.ply", 1.0, 1000.0, 0.0, density="1100kg/m3") + fix([0, 1, 2]) +
+                              load("area", (0.0, 0.0, 1e-9), "MPa") + probe("tip", (100.0, 5.0, 0.0)))
+
     def test_backward_euler_eats_the_energy_of_a_vibration(self):
         """A strip let go: with 20 steps per period 39 % of the amplitude is left after one period, as the scheme's own
         damping 1 / sqrt(1 + (w h)^2) per step says; with 320 steps 94 %. The second-order scheme keeps it."""
-        length, thickness, young, density = 100.0, 1.0, 1000.0, 1.1e-9
-        write_ply(self.bench.path("mesh.ply"), *grid(20, 2, lambda u, v: (length * u, 10 * v, 0 * u)))
-        # The first mode of a cantilever, under a load let in at once: it swings about the rest.
-        omega = 1.8751**2 / length**2 * math.sqrt(young * thickness**2 / 12 / density)
-        period = 2 * math.pi / omega
-        rest = 1e-9 * length**4 / (8 * young * thickness**3 / 12)
+        period, rest = self.strip()
+        omega = 2 * math.pi / period
 
         def amplitude_left(steps, **integrator):
-            scene = (run_lines(kind="dynamic", duration=f"{period!r}s", step=f"{period / steps!r}s", **integrator) +
-                     shell("mesh.ply", thickness, young, 0.0, density="1100kg/m3") + fix([0, 1, 2]) +
-                     load("area", (0.0, 0.0, 1e-9), "MPa") + probe("tip", (length, 5.0, 0.0)))
-            path = np.array(self.bench.run(scene)["probes"]["tip"]["displacement_mm"])[:, 2]
+            path = np.array(self.swing(period, period / steps, **integrator)["probes"]["tip"]["displacement_mm"])[:, 2]
             return (rest - path[-1]) / rest  # without damping it is back at zero
 
         for steps in (20, 80, 320):
@@ -259,13 +265,9 @@ class Integrators(Limit):
 
     def test_long_steps_of_a_second_order_scheme_leave_out_the_swing(self):
         """A strip under a load let in at once reaches twice its rest; a step of .7 periods goes past that, and it is said."""
-        write_ply(self.bench.path("mesh.ply"), *grid(20, 2, lambda u, v: (100 * u, 10 * v, 0 * u)))
-        omega = 1.8751**2 / 100**2 * math.sqrt(1000 / 12 / 1.1e-9)
+        period, _ = self.strip()
         for part, told in ((0.05, False), (0.7, True)):
-            period = 2 * math.pi / omega
-            self.bench.run(run_lines(kind="dynamic", duration=f"{1.4 * period!r}s", step=f"{part * period!r}s",
-                                     integrator="generalised-alpha") + shell("mesh.ply", 1.0, 1000.0, 0.0, density="1100kg/m3") +
-                           fix([0, 1, 2]) + load("area", (0.0, 0.0, 1e-9), "MPa"))
+            self.swing(1.4 * period, part * period, integrator="generalised-alpha")
             with open(self.bench.path("run.json"), encoding="utf-8") as file:
                 said = any("the steps are long for what swings" in warning for warning in json.load(file)["warnings"])
             self.assertEqual(said, told, part)

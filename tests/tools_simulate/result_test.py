@@ -84,6 +84,10 @@ class Result(SimulateTest):
                 self.assertEqual(file["tunica/history/time"].attrs["units"], b"1" if arguments is STATIC else b"s")
                 np.testing.assert_array_equal(file["tunica/nodes/position"], self.vertices)
                 np.testing.assert_array_equal(file["tunica/elements/nodes"], self.triangles)
+                normals = file["tunica/elements/normals"][()].reshape(-1, 3)
+                directions = self.vertices[self.triangles.ravel()] / RADIUS
+                np.testing.assert_allclose(normals, directions, atol=1e-12)  # of a ball
+                self.assertEqual(set(file["tunica/elements/patch"]), {0})
 
     def test_the_script_of_the_page_runs_beside_a_result_of_either_ending(self):
         with open(os.path.join(os.environ["TUNICA_SOURCE"], "docs", "results.md"), encoding="utf-8") as page:
@@ -272,7 +276,7 @@ nearest = ["0mm", "0mm", "{RADIUS}mm"]
             self.assertEqual((u.shape, u.dtype), ((4, len(self.vertices), 3), np.float64))
             self.assertEqual(tunica["nodes/rotation"].shape, u.shape)
             elements = tunica["elements"]  # every state of the path, though only the last is drawn
-            self.assertEqual(set(elements), {"nodes", "body", "area", *ELEMENT_FIELDS})
+            self.assertEqual(set(elements), {"nodes", "body", "area", "normals", "patch", *ELEMENT_FIELDS})
             count = len(self.triangles)
             for name, components in ELEMENT_FIELDS.items():
                 self.assertEqual(elements[name].shape, (4, count) if components == 1 else (4, count, components))

@@ -64,49 +64,29 @@ public:
   template <typename Number>
   [[nodiscard]] std::vector<Number> rows(const std::string& dataset, std::size_t first, std::size_t count) const {
     const std::vector<std::size_t> whole = shape(dataset);
-    const std::size_t width = whole.size() == 2 ? whole[1] : 1;
-    if (whole.empty() || whole.size() > 2 || first > whole[0] || count > whole[0] - first || width == 0 || width > 9) {
+    if (whole.empty() || first > whole[0] || count > whole[0] - first) {
       fail(dataset + " has no shape of a result");
     }
-    if (count > most_numbers / width) {
+    std::vector<hsize_t> start(whole.size(), 0), extent(whole.begin(), whole.end());
+    start[0] = first;
+    extent[0] = count;
+    std::size_t numbers = count;
+    for (std::size_t k = 1; k < whole.size(); ++k) {
+      if (whole[k] == 0 || numbers > most_numbers / whole[k]) {
+        fail(dataset + " is too large to be drawn, or empty");
+      }
+      numbers *= whole[k];
+    }
+    if (numbers > most_numbers) {
       fail(dataset + " is too large to be drawn");
     }
     const hdf5::Handle data = open(dataset);
     const hdf5::Handle space(H5Dget_space(data.get()));
-    const std::array<hsize_t, 2> start{first, 0};
-    const std::array<hsize_t, 2> extent{count, width};
-    const hdf5::Handle memory(H5Screate_simple(narrow<int>(whole.size()), extent.data(), nullptr));
-    std::vector<Number> values(count * width);
+    const hdf5::Handle memory(H5Screate_simple(narrow<int>(extent.size()), extent.data(), nullptr));
+    std::vector<Number> values(numbers);
     const hid_t type = std::is_floating_point_v<Number> ? H5T_NATIVE_DOUBLE : H5T_NATIVE_INT64;
     if (H5Sselect_hyperslab(space.get(), H5S_SELECT_SET, start.data(), nullptr, extent.data(), nullptr) < 0 ||
         H5Dread(data.get(), type, memory.get(), space.get(), H5P_DEFAULT, values.data()) < 0) {
-      fail(dataset + " cannot be read: the file is damaged");
-    }
-    return values;
-  }
-
-  /// All that a data set says of one row of its first dimension.
-  [[nodiscard]] std::vector<double> row(const std::string& dataset, std::size_t number) const {
-    const std::vector<std::size_t> whole = shape(dataset);
-    if (whole.empty() || number >= whole[0]) {
-      fail(dataset + " has no shape of a result");
-    }
-    std::vector<hsize_t> start(whole.size(), 0), extent(whole.begin(), whole.end());
-    start[0] = number;
-    extent[0] = 1;
-    std::size_t count = 1;
-    for (const hsize_t length : extent) {
-      if (length == 0 || length > most_numbers / count) {
-        fail(dataset + " is too large to be drawn");
-      }
-      count *= length;
-    }
-    const hdf5::Handle data = open(dataset);
-    const hdf5::Handle space(H5Dget_space(data.get()));
-    const hdf5::Handle memory(H5Screate_simple(narrow<int>(extent.size()), extent.data(), nullptr));
-    std::vector<double> values(count);
-    if (H5Sselect_hyperslab(space.get(), H5S_SELECT_SET, start.data(), nullptr, extent.data(), nullptr) < 0 ||
-        H5Dread(data.get(), H5T_NATIVE_DOUBLE, memory.get(), space.get(), H5P_DEFAULT, values.data()) < 0) {
       fail(dataset + " cannot be read: the file is damaged");
     }
     return values;
@@ -256,16 +236,15 @@ public:
       }
       mesh.triangles[i / 3][i % 3] = narrow<Index>(corners[i]);
     }
-    find_points(drawn);
     take_normals();
-    take_patch(drawn);
+    find_points(drawn);
   }
 
   [[nodiscard]] DrawnResult::State operator()(std::size_t number, bool linear) const {
     State moved;
     moved.linear = linear;
-    moved.displacement = vectors_of(reader_, reader_.row("tunica/nodes/displacement", number));
-    moved.rotation = vectors_of(reader_, reader_.row("tunica/nodes/rotation", number));
+    moved.displacement = vectors_of(reader_, reader_.rows<double>("tunica/nodes/displacement", number, 1));
+    moved.rotation = vectors_of(reader_, reader_.rows<double>("tunica/nodes/rotation", number, 1));
     const std::size_t nodes = model_.node_count();
     if (moved.displacement.size() != nodes || moved.rotation.size() != nodes) {
       reader_.fail("tunica/nodes has not one value per node");
@@ -294,21 +273,32 @@ public:
   }
 
 private:
-  /// The grid's point at each vertex of the shells as they are cut. Where a vertex lies in its shell is the same for
-  /// all of them, whatever their shape.
+  void take_normals() {
+    ShellMesh& mesh = model_.shells[0].mesh;
+    const std::vector<Vec3> normals = vectors_of(reader_, reader_.all<double>("tunica/elements/normals"));
+    const auto patches = reader_.all<std::int64_t>("tunica/elements/patch");
+    if (normals.size() != 3 * mesh.triangles.size() || patches.size() != mesh.triangles.size()) {
+      reader_.fail("tunica/elements has not one row per shell");
+    }
+    mesh.patch =
+        !patches.empty() && patches[0] == static_cast<int>(Patch::watertight) ? Patch::watertight : Patch::comas;
+    for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+      mesh.corner_normals.push_back({normals[3 * t], normals[3 * t + 1], normals[3 * t + 2]});
+      if (!(normal_agreement(mesh, t) >= least_normal_agreement)) {
+        reader_.fail("tunica/elements/normals make no curved surface");
+      }
+    }
+  }
+
+  /// The grid's point at each vertex of the shells as they are cut.
   void find_points(const DrawnResult& drawn) {
+    const ShellMesh& mesh = model_.shells[0].mesh;
     const std::size_t pieces = drawn.reference.triangles.size() / std::max<std::size_t>(drawn.shells, 1);
     const int level = truncated<int>(std::clamp(std::round(std::sqrt(real(pieces))), 1.0, 64.0));
     if (narrow<std::size_t>(level * level) * drawn.shells != drawn.reference.triangles.size()) {
       reader_.fail("its shells are not those that are drawn");
     }
-    ShellMesh flat;
-    for (Index t = 0; t < drawn.shells; ++t) {
-      flat.vertices.insert(flat.vertices.end(), {Vec3::Zero(), Vec3::UnitX(), Vec3::UnitY()});
-      flat.triangles.push_back({3 * t, 3 * t + 1, 3 * t + 2});
-    }
-    flat.normals.assign(flat.vertices.size(), Vec3::UnitZ());
-    surface_ = tessellate_uniformly(flat, level);
+    surface_ = tessellate_uniformly(mesh, level);
     point_.resize(surface_.mesh.vertices.size());
     for (std::size_t t = 0; t < surface_.mesh.triangles.size(); ++t) {
       for (std::size_t k = 0; k < 3; ++k) {
@@ -317,58 +307,8 @@ private:
     }
   }
 
-  /// Where the nodes' normals make no curved surface, as at creases, the facets' own take their place.
-  void take_normals() {
-    ShellMesh& mesh = model_.shells[0].mesh;
-    const auto normals = reader_.all<double>("VTKHDF/PointData/normal");
-    if (normals.size() != 3 * points_) {
-      reader_.fail("VTKHDF/PointData/normal has not one value per point");
-    }
-    mesh.normals.assign(mesh.vertices.size(), Vec3::Zero());
-    for (std::size_t v = 0; v < point_.size(); ++v) {
-      const Vec2& b = surface_.barycentric[v];
-      const auto& corners = mesh.triangles[surface_.vertex_shell[v]];
-      const std::array weights{1 - b.sum(), b.x(), b.y()};
-      for (std::size_t k = 0; k < 3; ++k) {
-        if (weights[k] > 0.999) {
-          const double* normal = normals.data() + 3 * std::size_t{point_[v]};
-          mesh.normals[corners[k]] = Vec3(normal[0], normal[1], normal[2]);
-        }
-      }
-    }
-    for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-      if (!(normal_agreement(mesh, t) >= least_normal_agreement)) {
-        mesh.normals.clear();
-        return;
-      }
-    }
-  }
-
-  /// The kind of patch whose points are those of the grid.
-  void take_patch(const DrawnResult& drawn) {
-    ShellMesh& mesh = model_.shells[0].mesh;
-    if (mesh.normals.empty()) {
-      return;
-    }
-    double least = infinity;
-    for (const Patch kind : {Patch::watertight, Patch::comas}) {
-      ShellMesh tried = mesh;
-      tried.patch = kind;
-      const auto patches = curved_patches(tried);
-      double off = 0;
-      for (std::size_t v = 0; v < point_.size(); ++v) {
-        const Vec3& there = drawn.reference.vertices[point_[v]];
-        off += (patches[surface_.vertex_shell[v]].point(surface_.barycentric[v]) - there).norm();
-      }
-      if (off < least) {
-        least = off;
-        mesh.patch = kind;
-      }
-    }
-  }
-
   [[nodiscard]] std::vector<double> stress_of_nodes(const std::string& dataset, std::size_t number) const {
-    const std::vector<double> of_shells = reader_.row(dataset, number);
+    const std::vector<double> of_shells = reader_.rows<double>(dataset, number, 1);
     if (of_shells.size() != model_.shells[0].mesh.triangles.size()) {
       reader_.fail(dataset + " has not one value per shell");
     }
@@ -379,20 +319,20 @@ private:
   const OuterFaces& outer_;
   std::size_t points_;
   Model model_;
-  Tessellation surface_;      // of triangles of another shape, see find_points()
+  Tessellation surface_;
   std::vector<Index> point_;  // #V of the surface
 };
 
+/// Whether a line of a resolved scene begins so. No name of a body holds the end of a line.
+bool says(const std::string& scene, const std::string& line) { return scene.find("\n" + line) != std::string::npos; }
+
 DrawnResult::Kind kind_of(const std::string& scene, bool has_steps) {
-  const auto says = [&](const char* text) { return scene.find(text) != std::string::npos; };
   using enum DrawnResult::Kind;
-  if (!has_steps) {
-    return statics;
-  }
-  return says("kind = \"frequencies\"")     ? frequencies
-         : says("kind = \"buckling\"")      ? buckling
-         : says("control = \"arc-length\"") ? path
-                                            : motion;
+  return !has_steps                                ? statics
+         : says(scene, "kind = \"frequencies\"")   ? frequencies
+         : says(scene, "kind = \"buckling\"")      ? buckling
+         : says(scene, "control = \"arc-length\"") ? path
+                                                   : motion;
 }
 
 }  // namespace
@@ -402,7 +342,7 @@ DrawnResult read_drawn_result(const std::filesystem::path& path, std::size_t mos
   const Reader reader(path);
   DrawnResult result;
   result.scene = reader.text("tunica/scene");
-  result.is_unloaded = result.scene.find("\nimaged_at = ") != std::string::npos;
+  result.is_unloaded = says(result.scene, "imaged_at = ");
   const OuterFaces outer = read_geometry(reader, result);
   const std::size_t points = result.reference.vertices.size();
   const auto displacements = reader.shape("VTKHDF/PointData/displacement");
@@ -425,7 +365,7 @@ DrawnResult read_drawn_result(const std::filesystem::path& path, std::size_t mos
       if (!of_nodes) {
         of_nodes.emplace(reader, result, outer);
       }
-      result.states.push_back((*of_nodes)(number, result.scene.find("geometry = \"linear\"") != std::string::npos));
+      result.states.push_back((*of_nodes)(number, says(result.scene, "geometry = \"linear\"")));
     }
     result.states.back().number = number;
     result.states.back().time = times[number];

@@ -36,8 +36,8 @@ struct DrawnResult {
 /// by the same curved displacements and means.
 /// @param most_states  at most this many states, the first and the last among them; at least 2
 /// Errors: InputError naming the file: missing, not a result of tunica, damaged, inconsistent.
-/// Cost: memory for the states that are read. Limits: 2^31 - 1 points; between the last state of a static run and
-/// others, normals of creases are those of their mean.
+/// Cost: memory for the states that are read. Limits: 2^31 - 1 points; all shells of a static run are drawn by the kind
+/// of patch of the first one.
 DrawnResult read_drawn_result(const std::filesystem::path& path, std::size_t most_states);
 
 }  // namespace tunica

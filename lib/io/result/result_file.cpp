@@ -8,6 +8,7 @@
 #include "tunica/io/result/detail/hdf5_file.hpp"
 #include "tunica/io/result/detail/result_grid.hpp"
 #include "tunica/io/result/detail/triangle_rule.hpp"
+#include "tunica/shell/distance/target.hpp"
 
 #include <fmt/format.h>
 #include <hdf5.h>
@@ -157,6 +158,10 @@ constexpr std::array about{
     About{"tunica/elements/nodes", "1", "the three nodes of each shell, rows of tunica/nodes, from 0", nullptr, true},
     About{"tunica/elements/body", "1", "the body of each shell, from 0", nullptr, true},
     About{"tunica/elements/area", "mm2", "of each shell's curved patch, reference", nullptr, true},
+    About{"tunica/elements/normals", "1", "unit normals at the corners of each shell, one after the other; reference",
+          nullptr, true},
+    About{"tunica/elements/patch", "1", "which patch nodes and normals stand for, 0: comas, 1: watertight", nullptr,
+          true},
     About{"tunica/history/load_factor", "1", "factor of the loads; dynamic: of the first load's ramp"},
     About{"tunica/history/volume", "mm3", "enclosed by the closed bodies' curved surfaces; NaN where one is open"},
     About{"tunica/history/strain_energy", "mJ", "elastic energy"},
@@ -353,17 +358,26 @@ struct ResultFile::Implementation {
 
   void write_elements(hid_t group) {
     std::vector<std::int64_t> nodes;
-    std::vector<std::int32_t> bodies;
+    std::vector<std::int32_t> bodies, patches;
+    std::vector<double> normals;
     for (std::size_t b = 0; b < model.shells.size(); ++b) {
-      for (const auto& triangle : model.shells[b].mesh.triangles) {
-        for (const Index node : triangle) {
-          nodes.push_back(narrow<std::int64_t>(model.first_node(b) + node));
+      const ShellMesh& mesh = model.shells[b].mesh;
+      const bool curved = !mesh.normals.empty() || !mesh.corner_normals.empty();
+      const std::vector<Vec3> facets = facet_normals(flat_facets(mesh));
+      for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+        for (std::size_t k = 0; k < 3; ++k) {
+          nodes.push_back(narrow<std::int64_t>(model.first_node(b) + mesh.triangles[t][k]));
+          const Vec3& normal = curved ? mesh.normal(t, k) : facets[t];
+          normals.insert(normals.end(), normal.begin(), normal.end());
         }
         bodies.push_back(narrow<std::int32_t>(b));
+        patches.push_back(static_cast<std::int32_t>(mesh.patch));
       }
     }
     (void)writer.dataset(group, "nodes", H5T_NATIVE_INT64, {grid.elements(), 3}, nodes.data());
     (void)writer.dataset(group, "body", H5T_NATIVE_INT32, {grid.elements()}, bodies.data());
+    (void)writer.dataset(group, "patch", H5T_NATIVE_INT32, {grid.elements()}, patches.data());
+    (void)writer.dataset(group, "normals", H5T_NATIVE_DOUBLE, {grid.elements(), 9}, normals.data());
     (void)writer.dataset(group, "area", H5T_NATIVE_DOUBLE, {grid.elements()}, patch_areas(model).data());
   }
 
