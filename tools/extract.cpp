@@ -66,7 +66,7 @@ void declare(cli::Tool& tool, Arguments& arguments) {
   CLI::App& app = tool.arguments();
   app.add_option("VOLUME", arguments.volume, "segmented or grey volume: NIfTI, NRRD, MetaImage, slices")->required();
   app.add_option("OUT.ply", arguments.out,
-                 "the surface (.ply, .glb, .obj or .stl); with --all-labels {label} in it is the label");
+                 "the surface (.ply, .glb, .obj, .stl or .3mf); with --all-labels {label} in it is the label");
   tool.group("What is inside");
   app.add_option(
          "--label", arguments.label,

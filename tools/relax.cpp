@@ -120,7 +120,7 @@ void declare(cli::Tool& tool, Arguments& given) {
   app.add_option("--picture", given.picture, "picture of the error map, PNG")->type_name("OUT.png");
   tool.tolerance("--picture-range", given.picture_range,
                  "where the picture's colours end, so that pictures can be compared (default: the largest distance)");
-  app.add_option("--curved", given.curved, "the curved surface as a fine triangle mesh: .ply, .glb, .obj or .stl")
+  app.add_option("--curved", given.curved, "the curved surface as a fine triangle mesh: .ply, .glb, .obj, .stl or .3mf")
       ->type_name("OUT.ply");
   tool.group("Input");
   app.add_option("--mesh-unit", given.mesh_unit, "unit of mesh files that do not state one: mm, cm, m or um")

@@ -71,8 +71,8 @@ void declare(cli::Tool& tool, Arguments& a) {
   app.add_option("--export", a.exports,
                  "write beside OUT.hdf, may repeat: pvd (OUT.pvd with a .vtu per state) | xmf (OUT.xmf, XDMF) | "
                  "inp (the model for CalculiX and Abaqus) | feb (the model for FEBio) | "
-                 "glb (the last state's shells, coloured by stress)")
-      ->type_name("pvd|xmf|inp|feb|glb")
+                 "glb, obj, stl, 3mf (the last state's shells; glb and obj coloured by stress)")
+      ->type_name("pvd|xmf|inp|feb|glb|obj|stl|3mf")
       ->expected(1)
       ->allow_extra_args(false)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
@@ -149,7 +149,8 @@ Scene read_scene_of_run(cli::Tool& tool, const Arguments& a, const std::optional
 }
 
 struct Drawing {
-  static constexpr std::array<const char*, 5> formats{"pvd", "xmf", "inp", "feb", "glb"};
+  static constexpr std::array<const char*, 8> formats{"pvd", "xmf", "inp", "feb", "glb", "obj", "stl", "3mf"};
+  static constexpr std::size_t first_surface = 4;
 
   std::string tessellation = "default";
   std::array<bool, formats.size()> wanted{};
@@ -157,6 +158,15 @@ struct Drawing {
 
   [[nodiscard]] bool has(std::string_view format) const {
     return wanted[std::ranges::find(formats, format) - formats.begin()];
+  }
+  [[nodiscard]] std::vector<std::string> surface_endings() const {
+    std::vector<std::string> endings;
+    for (std::size_t i = first_surface; i < formats.size(); ++i) {
+      if (wanted[i]) {
+        endings.push_back(fmt::format(".{}", formats[i]));
+      }
+    }
+    return endings;
   }
   [[nodiscard]] bool any() const { return std::ranges::find(wanted, true) != wanted.end(); }
   [[nodiscard]] std::vector<std::pair<std::string, std::string>> as_options() const {
@@ -335,7 +345,7 @@ private:
         .xmf = drawing_.has("xmf"),
         .inp = drawing_.has("inp"),
         .feb = drawing_.has("feb"),
-        .glb = drawing_.has("glb"),
+        .surfaces = drawing_.surface_endings(),
         .run = scene_.run,
         .made_by = fmt::format("tunica {}: {}", version,
                                journal_ ? told(journal_->identity().command) : tool_.provenance().lasting_command()),

@@ -1,5 +1,6 @@
 """What outputs say of what made them: the same bytes whatever the threads and the output's name; no names of patients
 with --no-paths."""
+import io
 import json
 import os
 import pathlib
@@ -8,6 +9,7 @@ import struct
 import subprocess
 import tempfile
 import unittest
+import zipfile
 import zlib
 
 import h5py
@@ -32,6 +34,11 @@ def png_comment(data):
     return text
 
 
+def model_of_3mf(data):
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        return archive.read("3D/3DModel.model")
+
+
 class Provenance(unittest.TestCase):
     def setUp(self):
         folder = tempfile.TemporaryDirectory(prefix="tunica-provenance-")
@@ -49,10 +56,11 @@ class Provenance(unittest.TestCase):
         def run(verb, *words):
             self.run_tool(verb, *words, *common, "--quiet", "--force", "--report", f"{case}-{verb}.json", folder=folder)
 
-        exports = [word for name in ("pvd", "xmf", "inp", "feb", "glb") for word in ("--export", name)]
+        exports = [word for name in ("pvd", "xmf", "inp", "feb", "glb", "obj", "stl", "3mf")
+                   for word in ("--export", name)]
         run("phantom", "bladder", f"{case}.nii.gz", "--size", "24", "--spacing", "2", "--truth", f"{case}-truth.ply")
         run("extract", f"{case}.nii.gz", f"{case}-surface.ply", "--label", "1", "--smooth", "staircase")
-        for ending in ("glb", "obj", "stl"):
+        for ending in ("glb", "obj", "stl", "3mf"):
             run("extract", f"{case}.nii.gz", f"{case}-surface.{ending}", "--label", "1")
         run("decimate", f"{case}-surface.ply", f"{case}-coarse.ply", "--triangles", "120")
         run("relax", f"{case}-coarse.ply", f"{case}-surface.ply", f"{case}-shell.ply", "--map", f"{case}-map.ply",
@@ -88,6 +96,8 @@ class Provenance(unittest.TestCase):
                     data = png_comment(data).encode()
                 elif name.endswith(".nii.gz"):
                     data = nibabel.load(folder / name).header.extensions[0].get_content()
+                elif name.endswith(".3mf"):
+                    data = model_of_3mf(data)
                 tool = (name.split(".")[0].split("-") + ["phantom"])[1]
                 verb = {"surface": "extract", "coarse": "decimate", "compare": "compare", "result": "simulate",
                         "result_0000": "simulate", "result_0001": "simulate", "chart": "chart", "phantom": "phantom",
@@ -116,6 +126,8 @@ class Provenance(unittest.TestCase):
             if path.name.endswith(".nii.gz"):
                 data = nibabel.load(path).header.extensions[0].get_content()
                 data = data.encode() if isinstance(data, str) else data
+            elif path.suffix == ".3mf":
+                data = model_of_3mf(data)
             elif path.suffix in (".pvd", ".xmf"):
                 continue  # they refer to the files beside them
             self.assertNotIn(PATIENT.encode(), data, path.name)

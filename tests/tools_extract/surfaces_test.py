@@ -1,4 +1,4 @@
-"""GLB, OBJ and STL: what is written is read again, to float accuracy."""
+"""GLB, OBJ, STL and 3MF: what is written is read again, to float accuracy."""
 import json
 import os
 import pathlib
@@ -6,6 +6,8 @@ import struct
 import subprocess
 import tempfile
 import unittest
+import xml.etree.ElementTree
+import zipfile
 
 import h5py
 import numpy as np
@@ -31,13 +33,30 @@ def read_glb(data):
         return np.frombuffer(binary, types[accessor["componentType"]], count, start).reshape(accessor["count"], -1)
 
     primitive = scene["meshes"][0]["primitives"][0]
-    node = scene["nodes"][0]
+    node = next(node for node in scene["nodes"] if "mesh" in node)
     matrix = np.array(node.get("matrix", np.eye(4).ravel())).reshape(4, 4).T
     scale = matrix[:3, :3] @ np.diag(node.get("scale", [1, 1, 1]))
     colours = primitive["attributes"].get("COLOR_0")
     return (array(primitive["attributes"]["POSITION"]).astype(float) @ scale.T,
             None if colours is None else array(colours).astype(float),
             array(primitive["indices"]).reshape(-1, 3), scene)
+
+
+def read_3mf(path):
+    """@return positions in the unit of the model, triangles, the unit, what made it. Of an archive whose members are whole
+    and say nothing of the time"""
+    with zipfile.ZipFile(path) as archive:
+        assert archive.testzip() is None
+        assert {member.date_time for member in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
+        root = xml.etree.ElementTree.fromstring(archive.read("3D/3DModel.model"))
+        relations = xml.etree.ElementTree.fromstring(archive.read("_rels/.rels"))
+        assert [relation.get("Target") for relation in relations] == ["/3D/3DModel.model"]
+    space = {"": "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"}
+    built, = root.findall("build/item", space)
+    mesh = next(part for part in root.findall("resources/object", space) if part.get("id") == built.get("objectid"))
+    vertices = [[float(v.get(axis)) for axis in "xyz"] for v in mesh.findall("mesh/vertices/vertex", space)]
+    triangles = [[int(t.get(f"v{k}")) for k in (1, 2, 3)] for t in mesh.findall("mesh/triangles/triangle", space)]
+    return np.array(vertices), np.array(triangles), root.get("unit"), root.find("resources/basematerials/base", space).get("name")
 
 
 class Surfaces(unittest.TestCase):
@@ -55,7 +74,7 @@ class Surfaces(unittest.TestCase):
 
     def extracted(self):
         self.run_tool("phantom", "sphere", "v.nii.gz", "--size", "16", "--spacing", "1.7")
-        for ending in ("ply", "glb", "obj", "stl"):
+        for ending in ("ply", "glb", "obj", "stl", "3mf"):
             self.run_tool("extract", "v.nii.gz", f"s.{ending}", "--label", "1", "--smooth", "staircase")
         return Ply(self.folder / "s.ply")
 
@@ -83,6 +102,11 @@ class Surfaces(unittest.TestCase):
         self.assertEqual(len(stl), 84 + 50 * count)
         facets = np.frombuffer(stl, [("n", "<f4", 3), ("v", "<f4", (3, 3)), ("a", "<u2")], count, 84)
         np.testing.assert_allclose(facets["v"], ply.vertices[ply.triangles], rtol=1.2e-7, atol=1e-6)
+        vertices, triangles, unit, made_by = read_3mf(self.folder / "s.3mf")
+        self.assertEqual(len(vertices), len(ply.vertices))
+        np.testing.assert_allclose(vertices[triangles], ply.vertices[ply.triangles], rtol=1e-5)
+        self.assertEqual(unit, "millimeter")
+        self.assertIn("tunica-extract v.nii.gz OUT.3mf", made_by)
 
     def test_our_readers_take_them(self):
         ply = self.extracted()
@@ -97,10 +121,17 @@ class Surfaces(unittest.TestCase):
 
     def test_other_endings_are_refused(self):
         self.run_tool("phantom", "sphere", "v.nii.gz", "--size", "16", "--spacing", "1.7")
-        for name in ("s.3mf", "s.gltf", "s"):
+        for name in ("s.gltf", "s.3ds", "s"):
             self.run_tool("extract", "v.nii.gz", name, "--label", "1", expect=2)
-            self.assertIn(".ply or .glb or .obj or .stl", self.error)
+            self.assertIn(".ply or .glb or .obj or .stl or .3mf", self.error)
             self.assertFalse((self.folder / name).exists())
+
+    def test_names_that_are_markup(self):
+        self.run_tool("phantom", "sphere", "v.nii.gz", "--size", "16", "--spacing", "1.7")
+        name = "<b> & \"'" + 200 * "&" + ".nii.gz"
+        (self.folder / "v.nii.gz").rename(self.folder / name)
+        self.run_tool("extract", name, "s.3mf", "--label", "1")
+        self.assertIn("<b> & \"", read_3mf(self.folder / "s.3mf")[3])  # cut where assimp's strings end, and still XML
 
     def test_curved_surfaces_and_results(self):
         self.extracted()
@@ -112,7 +143,8 @@ class Surfaces(unittest.TestCase):
         positions, _, triangles, _ = read_glb((self.folder / "curved.glb").read_bytes())
         self.same(1000 * positions, triangles, curved)
         self.run_tool("simulate", "shell.ply", "r.hdf", "--young", "1MPa", "--poisson", "0.45", "--thickness", "1mm",
-                      "--pressure", "1kPa", "--fix", "rigid-motions", "--static", "--export", "glb")
+                      "--pressure", "1kPa", "--fix", "rigid-motions", "--static",
+                      *(word for kind in ("glb", "obj", "stl", "3mf") for word in ("--export", kind)))
         positions, colours, triangles, scene = read_glb((self.folder / "r.glb").read_bytes())
         with h5py.File(self.folder / "r.hdf") as file:
             vtk = file["VTKHDF"]
@@ -120,6 +152,12 @@ class Surfaces(unittest.TestCase):
             stress = vtk["PointData/von_mises"][()]
             corners = vtk["Connectivity"][()].reshape(-1, 3)
         np.testing.assert_allclose(1000 * positions[triangles], moved[corners], rtol=1e-6, atol=1e-5)
+        vertices, faces, _, made_by = read_3mf(self.folder / "r.3mf")
+        np.testing.assert_allclose(vertices[faces], moved[corners], rtol=1e-5, atol=1e-4)
+        self.assertIn("tunica-simulate", made_by)
+        self.assertEqual((self.folder / "r.stl").stat().st_size, 84 + 50 * len(corners))
+        lines = (self.folder / "r.obj").read_text(encoding="utf-8").splitlines()
+        self.assertTrue(all(len(line.split()) == 7 for line in lines if line.startswith("v ")))  # colours, too
         # The palette grows darker, and the largest stress is its end: violet.
         green = colours[triangles][..., 1].ravel()
         self.assertLess(np.corrcoef(green, stress[corners].ravel())[0, 1], -0.9)

@@ -35,6 +35,29 @@ std::string png_made_by(const std::string& png, const std::string& made_by) {
          big_endian(narrow<std::uint32_t>(sum)) + png.substr(behind_header);
 }
 
+std::string xml_escaped(const std::string& text) {
+  std::string result;
+  for (const char c : text) {
+    switch (c) {
+      case '&':
+        result += "&amp;";
+        break;
+      case '<':
+        result += "&lt;";
+        break;
+      case '>':
+        result += "&gt;";
+        break;
+      case '"':
+        result += "&quot;";
+        break;
+      default:
+        result += c;
+    }
+  }
+  return result;
+}
+
 std::string xml_made_by(const std::string& made_by) {
   std::string text = as_utf8(made_by);
   for (std::size_t at = text.find("--"); at != std::string::npos; at = text.find("--", at)) {

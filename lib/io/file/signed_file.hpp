@@ -12,6 +12,9 @@ std::string as_utf8(const std::string& text);
 /// @param png  a whole PNG
 std::string png_made_by(const std::string& png, const std::string& made_by);
 
+/// The text with the signs of XML escaped, for elements and for attributes in double quotes.
+std::string xml_escaped(const std::string& text);
+
 /// As a comment of XML, such as SVG, VTK's and XDMF files have. Two hyphens, which must not stand in one, are parted.
 std::string xml_made_by(const std::string& made_by);
 

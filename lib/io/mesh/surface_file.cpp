@@ -5,6 +5,7 @@
 #include "tunica/io/file/output_file.hpp"
 #include "tunica/io/file/signed_file.hpp"
 
+#include <assimp/material.h>
 #include <assimp/scene.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -12,7 +13,9 @@
 #include <algorithm>
 #include <assimp/Exporter.hpp>
 #include <cmath>
+#include <cstdint>
 #include <memory>
+#include <string_view>
 
 namespace tunica {
 namespace {
@@ -55,24 +58,35 @@ std::unique_ptr<aiMesh> assimp_mesh(const TriangleMesh& mesh, const SurfaceLook&
   return made;
 }
 
+// As much of a text as an aiString holds when it is written that way.
+aiString in_short(std::string text, std::string (*written)(const std::string&)) {
+  constexpr std::size_t longest = sizeof(aiString::data) - 1;
+  text.resize(std::min(text.size(), longest));
+  while (written(text).size() > longest) {
+    text.pop_back();
+  }
+  return aiString(written(text));
+}
+
 // @param provenance  the name of the mesh: assimp 5.2 writes no other text to a GLB (of a node's metadata nothing)
 std::unique_ptr<aiScene> assimp_scene(std::unique_ptr<aiMesh> mesh, bool metres, const std::string& provenance) {
   auto scene = std::make_unique<aiScene>();
   scene->mMetaData = new aiMetadata();
   scene->mNumMaterials = 1;
   scene->mMaterials = new aiMaterial* [1] { new aiMaterial() };
-  constexpr std::size_t longest_name = 1000;                                     // aiString holds 1023 bytes
-  mesh->mName = aiString(as_utf8(as_utf8(provenance).substr(0, longest_name)));  // a sign that is cut in two is none
+  mesh->mName = in_short(provenance, as_utf8);
   scene->mNumMeshes = 1;
   scene->mMeshes = new aiMesh* [1] { mesh.release() };
-  scene->mRootNode = new aiNode("surface");
-  scene->mRootNode->mNumMeshes = 1;
-  scene->mRootNode->mMeshes = new unsigned[1]{0};
+  auto* node = new aiNode("surface");
+  node->mNumMeshes = 1;
+  node->mMeshes = new unsigned[1]{0};
   if (metres) {
     // By the node: assimp joins vertices nearer than 1e-5 of the unit, which must not be 0.01 mm.
     constexpr ai_real metres_per_mm = 1e-3F;
-    aiMatrix4x4::Scaling(aiVector3D(metres_per_mm), scene->mRootNode->mTransformation);
+    aiMatrix4x4::Scaling(aiVector3D(metres_per_mm), node->mTransformation);
   }
+  scene->mRootNode = new aiNode("scene");
+  scene->mRootNode->addChildren(1, &node);  // 3MF holds what hangs below the root
   return scene;
 }
 
@@ -83,10 +97,66 @@ std::string joined(const PlyOptions& options) {
   return text;
 }
 
+std::uint32_t number_at(std::string_view bytes, std::size_t at, std::size_t width) {
+  TUNICA_ASSERT(at + width <= bytes.size());
+  std::uint32_t number = 0;
+  for (std::size_t i = width; i-- > 0;) {
+    number = number << 8U | static_cast<unsigned char>(bytes[at + i]);
+  }
+  return number;
+}
+
+// The same surface makes the same bytes: no member of the archive keeps the time of its making. @return false when the
+// archive is not whole. Source: APPNOTE.TXT 6.3 (PKWARE), 4.3.7, 4.3.12, 4.3.16.
+bool clear_times(std::string& zip) {
+  constexpr std::size_t end_size = 22;  // of the record at the end, which has no comment
+  constexpr std::size_t entry_size = 46;
+  constexpr std::size_t member_size = 30;
+  const std::string_view first_day("\0\0\x21\0", 4);  // midnight, and 1 January 1980: there is no earlier one
+  const auto is = [&](std::size_t at, std::size_t size, std::string_view signature) {
+    return at + size <= zip.size() && zip.compare(at, signature.size(), signature) == 0;
+  };
+  const std::size_t end = std::max(zip.size(), end_size) - end_size;
+  if (!is(end, end_size, "PK\5\6")) {
+    return false;
+  }
+  std::size_t entry = number_at(zip, end + 16, 4);
+  for (std::uint32_t left = number_at(zip, end + 10, 2); left > 0; --left) {
+    if (!is(entry, entry_size, "PK\1\2")) {
+      return false;
+    }
+    const std::size_t member = number_at(zip, entry + 42, 4);
+    if (!is(member, member_size, "PK\3\4")) {
+      return false;
+    }
+    zip.replace(entry + 12, first_day.size(), first_day);
+    zip.replace(member + 10, first_day.size(), first_day);
+    entry += entry_size + number_at(zip, entry + 28, 2) + number_at(zip, entry + 30, 2) + number_at(zip, entry + 32, 2);
+  }
+  return entry == end;
+}
+
+// assimp writes this archive into a file alone, and passes over the errors of its archiver. What made the surface is
+// the name of its material: metadata would come where 3MF allows none, and of a mesh's name assimp writes nothing.
+std::string bytes_of_3mf(const aiScene& scene, const std::string& provenance, const std::filesystem::path& path) {
+  const aiString name = in_short(provenance, [](const std::string& text) { return xml_escaped(as_utf8(text)); });
+  scene.mMaterials[0]->AddProperty(&name, AI_MATKEY_NAME);
+  const OutputFile file(path, true);
+  Assimp::Exporter exporter;
+  if (exporter.Export(&scene, "3mf", file.partial_path().string()) != aiReturn_SUCCESS) {
+    throw OutputError(fmt::format("{}: cannot be made: {}", path.string(), exporter.GetErrorString()));
+  }
+  std::string bytes = read_file(file.partial_path());
+  if (!clear_times(bytes)) {
+    throw OutputError(fmt::format("{}: cannot be written as a whole: is the disk full?", path.string()));
+  }
+  return bytes;
+}
+
 }  // namespace
 
 const std::vector<std::string>& surface_endings() {
-  static const std::vector<std::string> endings{".ply", ".glb", ".obj", ".stl"};
+  static const std::vector<std::string> endings{".ply", ".glb", ".obj", ".stl", ".3mf"};
   return endings;
 }
 
@@ -102,6 +172,10 @@ void write_surface(const std::filesystem::path& path, const TriangleMesh& mesh, 
   const bool glb = ending == ".glb";
   const std::string provenance = joined(options);
   const auto scene = assimp_scene(assimp_mesh(mesh, look, glb), glb, provenance);
+  if (ending == ".3mf") {
+    write_file(path, bytes_of_3mf(*scene, provenance, path), options.overwrite);
+    return;
+  }
   Assimp::Exporter exporter;
   const aiExportDataBlob* blob = exporter.ExportToBlob(scene.get(), glb                ? "glb2"
                                                                     : ending == ".obj" ? "objnomtl"

@@ -23,30 +23,6 @@ fs::path beside(const fs::path& result, const std::string& ending) {
   return path += ending;
 }
 
-// Names go into XML.
-std::string escaped(const std::string& text) {
-  std::string result;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        result += "&amp;";
-        break;
-      case '<':
-        result += "&lt;";
-        break;
-      case '>':
-        result += "&gt;";
-        break;
-      case '"':
-        result += "&quot;";
-        break;
-      default:
-        result += c;
-    }
-  }
-  return result;
-}
-
 std::string heavy(std::string_view number, std::size_t rows, std::size_t components, const std::string& place) {
   return fmt::format(R"(<DataItem Dimensions="{}{}" {} Format="HDF">{}</DataItem>)", rows,
                      components > 1 ? fmt::format(" {}", components) : "", number, place);
@@ -67,12 +43,14 @@ std::string attribute(const GridField& field, const std::string& data) {
 
 std::vector<fs::path> export_paths(const fs::path& result, const ExportOptions& options) {
   std::vector<fs::path> paths;
-  for (const auto& [wanted, ending] :
-       {std::pair(options.pvd, ".pvd"), std::pair(options.xmf, ".xmf"), std::pair(options.inp, ".inp"),
-        std::pair(options.feb, ".feb"), std::pair(options.glb, ".glb")}) {
+  for (const auto& [wanted, ending] : {std::pair(options.pvd, ".pvd"), std::pair(options.xmf, ".xmf"),
+                                       std::pair(options.inp, ".inp"), std::pair(options.feb, ".feb")}) {
     if (wanted) {
       paths.push_back(beside(result, ending));
     }
+  }
+  for (const std::string& ending : options.surfaces) {
+    paths.push_back(beside(result, ending));
   }
   return paths;
 }
@@ -83,8 +61,9 @@ struct ResultExport::Implementation {
     for (const Deck deck : decks()) {
       require_expressible(model, options.run, deck);
     }
-    if (options.glb && model.shells.empty()) {
-      throw UsageError("--export glb: the scene has no shells to draw; leave it out");
+    if (!options.surfaces.empty() && model.shells.empty()) {
+      throw UsageError(fmt::format("--export {}: the scene has no shells to draw; leave it out",
+                                   options.surfaces.front().substr(1)));
     }
     const std::string name = result.filename().string();
     const bool in_xml =
@@ -110,7 +89,7 @@ struct ResultExport::Implementation {
       write_state(state, fields);
       written = vtu(times.size());
     }
-    if (options.glb) {
+    if (!options.surfaces.empty()) {
       last = grid.values(state, fields);
     }
     times.push_back(state.time);
@@ -149,7 +128,7 @@ struct ResultExport::Implementation {
         "<Collection>\n";
     for (std::size_t i = 0; i < times.size(); ++i) {
       text += fmt::format("<DataSet timestep=\"{}\" part=\"0\" file=\"{}\"/>\n", times[i],
-                          escaped(vtu(i).filename().string()));
+                          xml_escaped(vtu(i).filename().string()));
     }
     return text + "</Collection>\n</VTKFile>\n" + xml_made_by(options.made_by);
   }
@@ -226,7 +205,7 @@ struct ResultExport::Implementation {
   }
 
   [[nodiscard]] std::string xmf_text(const fs::path& heavy_file) const {
-    const std::string vtk = escaped(heavy_file.filename().string()) + ":/VTKHDF/";
+    const std::string vtk = xml_escaped(heavy_file.filename().string()) + ":/VTKHDF/";
     const std::vector<XmfPart> parts = xmf_parts();
     std::vector<std::string> meshes;
     for (const XmfPart& part : parts) {
@@ -276,9 +255,9 @@ struct ResultExport::Implementation {
     return wanted;
   }
 
-  void write_models_and_surface() const {
-    if (options.glb) {
-      write_result_surface(beside(result, ".glb"), grid, last, options.made_by, options.overwrite);
+  void write_models_and_surfaces() const {
+    for (const std::string& ending : options.surfaces) {
+      write_result_surface(beside(result, ending), grid, last, options.made_by, options.overwrite);
     }
     for (const Deck deck : decks()) {
       write_file(beside(result, deck == Deck::inp ? ".inp" : ".feb"),
@@ -291,7 +270,7 @@ struct ResultExport::Implementation {
   ExportOptions options;
   ResultGrid grid;
   std::vector<double> times;
-  std::vector<std::vector<float>> last;  ///< fields of the last state, for .glb
+  std::vector<std::vector<float>> last;  ///< fields of the last state, for surfaces
   bool done = false;
 };
 
@@ -315,7 +294,7 @@ std::optional<fs::path> ResultExport::append(const State& state, const ElementFi
 
 void ResultExport::commit() {
   implementation_->write("", implementation_->options.overwrite);
-  implementation_->write_models_and_surface();
+  implementation_->write_models_and_surfaces();
   for (const fs::path& file : export_paths(implementation_->result, implementation_->options)) {
     fs::path old = file;
     std::error_code ignored;

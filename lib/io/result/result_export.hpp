@@ -16,7 +16,8 @@ struct ExportOptions {
   bool xmf = false;          ///< STEM.xmf, which refers to the result file
   bool inp = false;          ///< STEM.inp: the model for CalculiX and Abaqus, see shell_deck.hpp
   bool feb = false;          ///< STEM.feb: the model for FEBio
-  bool glb = false;          ///< STEM.glb: the last state's shells, coloured by stress
+  /// The last state's shells, coloured by stress, for each ending of write_surface() here: STEM.glb
+  std::vector<std::string> surfaces = {};
   RunSettings run = {};      ///< of the model that inp and feb hold
   std::string made_by = {};  ///< provenance
   bool series = false;       ///< as ResultOptions
@@ -29,11 +30,11 @@ struct ExportOptions {
 /// there leaves OUT.pvd.part (and OUT.xmf.part, which refers to OUT.hdf.part) with the states so far.
 /// Limits: .xmf (XDMF 2) shows what /VTKHDF holds: of a static run the last state. Shells and solids are grids of their
 /// own in it, over the same points. The models (.inp, .feb) and the
-/// last state (.glb) are written by commit() alone.
+/// surfaces of the last state are written by commit() alone.
 class ResultExport {
 public:
   /// `model` must outlive this. Errors: OutputError, also when a .vtu is there already and `overwrite` is false;
-  /// UsageError where a model cannot be expressed, or has no shells to draw (glb).
+  /// UsageError where a model cannot be expressed, or has no shells to draw.
   ResultExport(const std::filesystem::path& result, const Model& model, const ExportOptions& options);
   ~ResultExport();
   ResultExport(const ResultExport&) = delete;

@@ -69,7 +69,7 @@ void write_result_surface(const std::filesystem::path& path, const ResultGrid& g
   std::ranges::transform(of_vertex, std::back_inserter(look.colours),
                          [&](double value) { return bar_colour(largest > 0 ? value / largest : 0); });
   PlyOptions options;
-  options.comments = {fmt::format("colours: von Mises stress from 0 to {:.4g} MPa", largest), "made by " + made_by};
+  options.comments = {"made by " + made_by, fmt::format("colours: von Mises stress from 0 to {:.4g} MPa", largest)};
   options.overwrite = overwrite;
   write_surface(path, mesh, options, look);
 }
