@@ -5,16 +5,21 @@
 #include "tunica/io/file/output_file.hpp"
 #include "tunica/io/file/signed_file.hpp"
 
+#include <assimp/DefaultIOSystem.h>
 #include <assimp/material.h>
 #include <assimp/scene.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <sys/mman.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <assimp/Exporter.hpp>
 #include <cmath>
 #include <cstdint>
+#include <fstream>
 #include <memory>
+#include <sstream>
 #include <string_view>
 
 namespace tunica {
@@ -136,21 +141,31 @@ bool clear_times(std::string& zip) {
   return entry == end;
 }
 
-// assimp writes this archive into a file alone, and passes over the errors of its archiver. What made the surface is
-// the name of its material: metadata would come where 3MF allows none, and of a mesh's name assimp writes nothing.
+// assimp removes a file that is there.
+struct NothingThere : Assimp::DefaultIOSystem {
+  bool Exists(const char* /*file*/) const override { return false; }
+};
+
+// What made the surface is the name of its material: metadata would come where 3MF allows none, and of a mesh's name
+// assimp writes nothing.
 std::string bytes_of_3mf(const aiScene& scene, const std::string& provenance, const std::filesystem::path& path) {
   const aiString name = in_short(provenance, [](const std::string& text) { return xml_escaped(as_utf8(text)); });
   scene.mMaterials[0]->AddProperty(&name, AI_MATKEY_NAME);
-  const OutputFile file(path, true);
+  // assimp writes this archive into a file alone, and passes over the errors of its archiver: one of memory has no full
+  // disk.
+  const int descriptor = ::memfd_create("tunica", MFD_CLOEXEC);
+  const std::string file = fmt::format("/proc/self/fd/{}", descriptor);
   Assimp::Exporter exporter;
-  if (exporter.Export(&scene, "3mf", file.partial_path().string()) != aiReturn_SUCCESS) {
+  exporter.SetIOHandler(new NothingThere);  // which it deletes
+  const bool made = descriptor >= 0 && exporter.Export(&scene, "3mf", file) == aiReturn_SUCCESS;
+  std::stringstream bytes;
+  bytes << std::ifstream(file, std::ios::binary).rdbuf();
+  ::close(descriptor);
+  std::string archive = std::move(bytes).str();
+  if (!made || !clear_times(archive)) {
     throw OutputError(fmt::format("{}: cannot be made: {}", path.string(), exporter.GetErrorString()));
   }
-  std::string bytes = read_file(file.partial_path());
-  if (!clear_times(bytes)) {
-    throw OutputError(fmt::format("{}: cannot be written as a whole: is the disk full?", path.string()));
-  }
-  return bytes;
+  return archive;
 }
 
 }  // namespace
