@@ -509,10 +509,10 @@ private:
     const auto stage = tool_.stage("measure");
     ShellDistanceOptions measuring;
     measuring.width = interval_width * whole().diagonal();
-    if (tolerance_) {
-      measuring.width = std::min(measuring.width, *tolerance_ / 20);
-    }
     const ShellDistance flat = flat_distance(relaxed_.shell, whole(), measuring);
+    if (tolerance_) {
+      measuring.width = std::min(measuring.width, std::max(*tolerance_, relaxed_.distance.both.lower) / 20);
+    }
     measuring.progress = tool_.progress("measure");
     distance_ = certified_distance(relaxed_, whole(), moved_, measuring);
     const double farthest = relaxed_.distance.boundary ? distance_.upper() : distance_.both.upper;
