@@ -38,7 +38,9 @@ if(TUNICA_X86_64_V3 AND CMAKE_SYSTEM_PROCESSOR STREQUAL "x86_64")
   check_cxx_source_runs("int main() { return __builtin_cpu_supports(\"avx2\") && __builtin_cpu_supports(\"fma\") &&
                                        __builtin_cpu_supports(\"bmi2\") ? 0 : 1; }" TUNICA_HAS_X86_64_V3)
   if(TUNICA_HAS_X86_64_V3)
-    set(TUNICA_INSTRUCTIONS -march=x86-64-v3)
+    # No fused multiply-add: it rounds once where other processors round twice, and one bit makes the greedy searches of
+    # decimation and fit take another path.
+    set(TUNICA_INSTRUCTIONS -march=x86-64-v3 -mno-fma)
     target_compile_options(tunica_flags INTERFACE ${TUNICA_INSTRUCTIONS})
   endif()
 endif()
