@@ -15,6 +15,8 @@ CONTROL = re.compile(r"[\x00-\x1f\x7f]")
 WALL = ("PRESSURE", "YOUNG", "POISSON", "THICKNESS", "DENSITY")
 IMAGE = ("IMAGED_AT", "MID_SURFACE")
 MOTION = ("DURATION", "STEP")
+EXAMPLES = {"PRESSURE": "80mmHg", "YOUNG": "1MPa", "THICKNESS": "1.5mm", "DENSITY": "1100kg/m3", "IMAGED_AT": "80mmHg",
+            "DURATION": "1s", "STEP": "10ms"}
 FURTHER = ("EXTRACT", "DECIMATE", "RELAX", "SIMULATE")
 # Variables that a case may have of its own, and those that a run has.
 OF_A_CASE = ("LABEL", "ISOVALUE", "NAMES", "SMOOTH", "LARGEST", "FILL", "OPEN", "SHELLS", "TOLERANCE", "ACCURACY", "OF",
@@ -231,8 +233,17 @@ def own_settings(row, folder):
     return own, problems
 
 
+def misstated(case):
+    """What is given without its unit, or is no word that is understood, by words."""
+    wrong = [f"{name.lower()}: '{case.setting(name)}' has no unit: write one, as in {example}"
+            for name, example in EXAMPLES.items() if re.fullmatch(r"[-+]?[0-9.]+(e[-+]?[0-9]+)?", case.setting(name), re.I)]
+    if case.setting("MID_SURFACE") not in ("", "outer", "inner"):
+        wrong.append(f"mid_surface: '{shown(case.setting('MID_SURFACE'))}' is not understood: outer or inner")
+    return wrong
+
+
 def missing_of(case):
-    """What a case still needs, by words."""
+    """What a case still needs, or has without its unit, by words."""
     needed = list(WALL)
     kind = case.setting("KIND")
     if kind == "dynamic":
@@ -243,7 +254,7 @@ def missing_of(case):
         return ["accuracy refits the shells to the face that mid_surface leaves: give shells or tolerance instead"]
     missing = [name for name in needed if not case.setting(name)]
     if not missing:
-        return []
+        return misstated(case)
     return [f"{', '.join(missing).lower()} not given: fill the cell, or give {missing[0]} to make for all such cases"]
 
 
@@ -295,4 +306,7 @@ def find_cases(out):
     if not volumes:
         raise Refused("VOLUMES is empty: name segmented volumes, or leave it out to see a shipped sample")
     volumes = list(reversed(volumes.values()))
-    return [Case(out, volume, name, label) for volume, name in zip(volumes, name_volumes(volumes)) for label in labels]
+    cases = [Case(out, volume, name, label) for volume, name in zip(volumes, name_volumes(volumes)) for label in labels]
+    if cases and (wrong := misstated(cases[0])):
+        raise Refused(*wrong)
+    return cases

@@ -73,6 +73,9 @@ void require_verified(const std::vector<std::string>& different) {
 }
 
 void run(cli::Tool& tool, const Arguments& given) {
+  if (tool.provenance().hides_paths() && !(given.summary.empty() && given.chart.empty())) {
+    throw UsageError("--summary and --chart name the cases: leave them out with --no-paths");
+  }
   std::vector<PipelineCase> cases;
   {
     const auto stage = tool.stage("read");

@@ -372,7 +372,7 @@ private:
     }
     scene_ = read_scene_of_run(tool_, given_, journal_, inputs_);
     if (!given_.check) {
-      tool_.output(out_);
+      tool_.output(out_, {".hdf", ".vtkhdf", ".h5", ".hdf5"});
       for (const fs::path& path : export_paths(out_, exports())) {
         if (journal_) {
           fs::remove(path);  // of the same run, stopped between its renames

@@ -19,6 +19,32 @@ namespace {
 
 constexpr int thumbnail_oversampling = 2;
 
+// The longest extent level, the shortest towards the viewer; turned and raised a little, so that depth can be seen.
+std::array<Vec3, 3> thumbnail_axes(const TriangleMesh& surface) {
+  Vec3 mean = Vec3::Zero();
+  for (const Vec3& p : surface.vertices) {
+    mean += p / real(surface.vertices.size());
+  }
+  Mat3 spread = Mat3::Zero();
+  for (const Vec3& p : surface.vertices) {
+    spread += (p - mean) * (p - mean).transpose();
+  }
+  spread.diagonal() += 1e-3 * spread.trace() * Vec3(1, 0, 0.5);  // a round body has no axes: this decides
+  const Mat3 axes = Eigen::SelfAdjointEigenSolver<Mat3>(spread).eigenvectors();
+  const auto positive = [](Vec3 axis) {
+    Eigen::Index largest = 0;
+    axis.cwiseAbs().maxCoeff(&largest);
+    return axis[largest] < 0 ? Vec3(-axis) : axis;
+  };
+  const Vec3 right = positive(axes.col(2));
+  const Vec3 up = positive(axes.col(1));
+  const Vec3 towards = right.cross(up);
+  const Vec3 turned = std::cos(0.4) * towards + std::sin(0.4) * right;
+  const Vec3 raised = std::cos(0.25) * turned + std::sin(0.25) * up;
+  const Vec3 across = up.cross(turned);
+  return {across, raised.cross(across), raised};
+}
+
 Camera camera_for(const TriangleMesh& mesh, int width, int height) {
   Camera camera;
   const std::array<Vec3, 3> axes = thumbnail_axes(mesh);
@@ -76,32 +102,6 @@ std::string thumbnail(const TriangleMesh& surface, const std::vector<double>& va
     }
   }
   return png_of(pixels, options.width, options.height);
-}
-
-// The longest extent level, the shortest towards the viewer; turned and raised a little, so that depth can be seen.
-std::array<Vec3, 3> thumbnail_axes(const TriangleMesh& surface) {
-  Vec3 mean = Vec3::Zero();
-  for (const Vec3& p : surface.vertices) {
-    mean += p / real(surface.vertices.size());
-  }
-  Mat3 spread = Mat3::Zero();
-  for (const Vec3& p : surface.vertices) {
-    spread += (p - mean) * (p - mean).transpose();
-  }
-  spread.diagonal() += 1e-3 * spread.trace() * Vec3(1, 0, 0.5);  // a round body has no axes: this decides
-  const Mat3 axes = Eigen::SelfAdjointEigenSolver<Mat3>(spread).eigenvectors();
-  const auto positive = [](Vec3 axis) {
-    Eigen::Index largest = 0;
-    axis.cwiseAbs().maxCoeff(&largest);
-    return axis[largest] < 0 ? Vec3(-axis) : axis;
-  };
-  const Vec3 right = positive(axes.col(2));
-  const Vec3 up = positive(axes.col(1));
-  const Vec3 towards = right.cross(up);
-  const Vec3 turned = std::cos(0.4) * towards + std::sin(0.4) * right;
-  const Vec3 raised = std::cos(0.25) * turned + std::sin(0.25) * up;
-  const Vec3 across = up.cross(turned);
-  return {across, raised.cross(across), raised};
 }
 
 }  // namespace tunica

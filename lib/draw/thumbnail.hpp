@@ -20,7 +20,8 @@ struct ThumbnailOptions {
 /// @param values   empty, or #V values >= 0; what is not finite is drawn grey
 std::string thumbnail(const TriangleMesh& surface, const std::vector<double>& values, const ThumbnailOptions& options);
 
-/// To the right, upward, and towards the viewer of thumbnail(): unit vectors.
-std::array<Vec3, 3> thumbnail_axes(const TriangleMesh& surface);
+/// To the right, upward, and towards the viewer of the first of a picture's two views of the points, at least one: unit
+/// vectors.
+std::array<Vec3, 3> picture_axes(const std::vector<Vec3>& points);
 
 }  // namespace tunica

@@ -1,5 +1,7 @@
 #include "tunica/draw/detail/view.hpp"
 
+#include "tunica/draw/thumbnail.hpp"
+
 #include <Eigen/Geometry>
 
 #include <algorithm>
@@ -81,6 +83,12 @@ std::array<View, 2> opposite_views(std::span<const Vec3> points, const Box2& box
     }
   }
   return best;
+}
+
+std::array<Vec3, 3> picture_axes(const std::vector<Vec3>& points) {
+  constexpr double side = 1000;
+  const Camera camera = opposite_views(points, {0, 0, 2 * side + gap, side}, 1)[0].camera;
+  return {camera.right, camera.up, camera.towards};
 }
 
 }  // namespace tunica

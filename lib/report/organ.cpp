@@ -125,7 +125,7 @@ Json header_of(const DrawnShells& shells, const TriangleMesh& surface, const Top
   box.add(shells.mesh.vertices);
   box.add(surface.vertices);
   box.add(shells.solids.vertices);
-  const auto [right, up, towards] = thumbnail_axes(shells.mesh);
+  const auto [right, up, towards] = picture_axes(shells.mesh.vertices);
   Vec3 lower = Vec3::Constant(infinity);
   Vec3 upper = -lower;
   for (const std::vector<Vec3>* points : {&shells.mesh.vertices, &shells.solids.vertices}) {

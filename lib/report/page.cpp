@@ -75,6 +75,7 @@ CaseReport report_of(PipelineCase source, std::size_t number, const PageOptions&
     one.missing.push_back(one.redacted(unreadable));
   }
   if (options.verify) {
+    one.different = one.missing;
     std::ranges::transform(differences(one.source), std::back_inserter(one.different), one.redacted);
   }
   return one;

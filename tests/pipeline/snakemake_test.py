@@ -46,6 +46,11 @@ class Snakefile(unittest.TestCase):
         again = self.snakemake("out/p1/result.hdf")
         self.assertIn("Nothing to be done", again.stdout + again.stderr)
 
+    def test_ends_with_a_report(self):
+        done = self.snakemake("report.html")
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        self.assertIn("p2", (self.folder / "report.html").read_text())
+
 
 if __name__ == "__main__":
     unittest.main(argv=sys.argv[:1] + ["-v"] + sys.argv[1:])

@@ -290,6 +290,9 @@ class CohortPage(ReportTest):
                 for way in (name, name.replace("'", "&#39;")):
                     self.assertNotIn(way, written)
         self.assertIn("case 2", self.page.read_text())
+        for flag in ("--summary", "--chart"):
+            done, _, _ = self.report("--no-paths", flag, self.folder / "names.tsv", code=2)
+            self.assertIn("name the cases", done.stderr)
 
     def test_two_hundred_organs_within_25_mb(self):
         folder = self.copy("organ-000")
@@ -368,6 +371,15 @@ class Errors(ReportTest):
         self.refuse(4, "--verify", says="shell.ply: is not what relax wrote")
         self.refuse(4, "--verify", says="coarse.ply: that decimate wrote, is missing")
         self.assertIn("Outputs that are not what the reports say", self.page.read_text())
+
+    def test_a_report_that_has_gone_is_no_case_that_is_done(self):
+        folder = self.copy("aneurysm")
+        (self.out / ".cases").write_text(f"aneurysm/1\t{folder.relative_to(self.out)}\tsimulate\t0\tdone\n")
+        self.report("--verify")
+        (folder / "simulate.json").unlink()
+        self.refuse(4, "--verify", says="simulate.json: is missing")
+        _, _, page = self.report()
+        self.assertIn("Failed", page.text)
 
     def test_verify_wants_hashes(self):
         def older(reports):

@@ -174,6 +174,12 @@ std::vector<PipelineCase> read_pipeline_folder(const fs::path& folder) {
   for (PipelineCase& one : cases) {
     if (recorded) {
       read_reports_of(one);
+      if (one.done() && !one.reports.contains(one.stage)) {
+        if (one.unreadable.empty()) {
+          one.unreadable.push_back(report_of(one.folder, one.stage).string() + ": is missing");
+        }
+        one.message = one.unreadable.back();
+      }
     }
     one.message = one.message.empty() ? reason_of(one) : one.message;
   }

@@ -19,6 +19,7 @@ constexpr double close_enough = 1e-3;      // of the mean displacement: the load
 constexpr double close_on_the_way = 1e-2;  // the same, under a part of the pressure
 constexpr double farthest = 1e-2;          // the same: more is no such shape
 constexpr std::size_t most_iterations = 40;
+constexpr std::size_t patience = 8;    // iterations in a row that come no nearer
 constexpr std::size_t remembered = 5;  // iterates that the acceleration combines
 constexpr double smallest_part = 1.0 / 32;
 constexpr std::string_view key = "imaged_at";
@@ -219,7 +220,8 @@ Unloaded find_unloaded(const Model& imaged, const RunSettings& settings,
     VectorX best = y;
     std::array<double, 2> least{infinity, infinity};
     double size = 0;
-    for (std::size_t iteration = 0; iteration < most_iterations; ++iteration) {
+    std::size_t in_vain = 0;
+    for (std::size_t iteration = 0; iteration < most_iterations && in_vain < patience; ++iteration) {
       const auto image = map.solved(y, part);
       if (!image) {
         break;
@@ -228,7 +230,9 @@ Unloaded find_unloaded(const Model& imaged, const RunSettings& settings,
       if (on_iteration) {
         on_iteration(part, off[0]);
       }
+      ++in_vain;
       if (off[0] < least[0]) {
+        in_vain = 0;
         least = off;
         best = y;
         size = map.lengths(*image)[0];
