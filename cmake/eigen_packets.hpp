@@ -1,5 +1,8 @@
-// Included before all else (cmake/Compiler.cmake). Eigen adds up the numbers of a vector as many at a time as a register
-// holds: with AVX four, else two, and in another order. With two everywhere sums have the same bits on every processor.
+// Included before all else (cmake/Compiler.cmake). Eigen adds up the numbers of a vector as many at a time as a
+// register holds: with AVX four, else two, and in another order. With two everywhere sums have the same bits on every
+// processor.
+#pragma once
+
 #pragma push_macro("__AVX__")
 #pragma push_macro("__AVX2__")
 #undef __AVX__

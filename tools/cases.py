@@ -233,17 +233,18 @@ def own_settings(row, folder):
     return own, problems
 
 
-def misstated(case):
-    """What is given without its unit, or is no word that is understood, by words."""
-    wrong = [f"{name.lower()}: '{case.setting(name)}' has no unit: write one, as in {example}"
-            for name, example in EXAMPLES.items() if re.fullmatch(r"[-+]?[0-9.]+(e[-+]?[0-9]+)?", case.setting(name), re.I)]
-    if case.setting("MID_SURFACE") not in ("", "outer", "inner"):
-        wrong.append(f"mid_surface: '{shown(case.setting('MID_SURFACE'))}' is not understood: outer or inner")
+def misstated():
+    """What make is given without its unit, or is no word that is understood, by words. A line of a table that is wrong is a
+    failed case, and no other one's."""
+    wrong = [f"{name}: '{setting(name)}' has no unit: write one, as in {example}" for name, example in EXAMPLES.items()
+             if re.fullmatch(r"[-+]?[0-9.]+(e[-+]?[0-9]+)?", setting(name), re.I)]
+    if setting("MID_SURFACE") not in ("", "outer", "inner"):
+        wrong.append(f"MID_SURFACE: '{shown(setting('MID_SURFACE'))}' is not understood: outer or inner")
     return wrong
 
 
 def missing_of(case):
-    """What a case still needs, or has without its unit, by words."""
+    """What a case still needs, by words."""
     needed = list(WALL)
     kind = case.setting("KIND")
     if kind == "dynamic":
@@ -254,7 +255,7 @@ def missing_of(case):
         return ["accuracy refits the shells to the face that mid_surface leaves: give shells or tolerance instead"]
     missing = [name for name in needed if not case.setting(name)]
     if not missing:
-        return misstated(case)
+        return []
     return [f"{', '.join(missing).lower()} not given: fill the cell, or give {missing[0]} to make for all such cases"]
 
 
@@ -299,6 +300,8 @@ def find_cases(out):
     """All cases of the run. Errors: Refused."""
     if not is_megabytes(setting("MEM")):
         raise Refused(f"MEM: '{shown(setting('MEM'))}' is no number of megabytes")
+    if wrong := misstated():
+        raise Refused(*wrong)
     if setting("CASES"):
         return cases_of_table(os.path.expanduser(os.environ["CASES"].strip()), out)
     labels = find_labels()
@@ -306,7 +309,4 @@ def find_cases(out):
     if not volumes:
         raise Refused("VOLUMES is empty: name segmented volumes, or leave it out to see a shipped sample")
     volumes = list(reversed(volumes.values()))
-    cases = [Case(out, volume, name, label) for volume, name in zip(volumes, name_volumes(volumes)) for label in labels]
-    if cases and (wrong := misstated(cases[0])):
-        raise Refused(*wrong)
-    return cases
+    return [Case(out, volume, name, label) for volume, name in zip(volumes, name_volumes(volumes)) for label in labels]

@@ -127,7 +127,7 @@ std::vector<fs::path> folders_in(const fs::path& folder) {
 }
 
 std::vector<PipelineCase> find_cases(const fs::path& folder) {
-  const fs::path place = fs::absolute(folder / ".").parent_path();
+  const fs::path place = (fs::absolute(folder) / "").lexically_normal().parent_path();
   if (auto own = case_in(folder, (place.parent_path().filename() / place.filename()).string())) {
     return {*own};
   }

@@ -12,10 +12,10 @@
 namespace tunica {
 
 struct ExportOptions {
-  bool pvd = false;          ///< STEM.pvd and one STEM_0000.vtu per state
-  bool xmf = false;          ///< STEM.xmf, which refers to the result file
-  bool inp = false;          ///< STEM.inp: the model for CalculiX and Abaqus, see shell_deck.hpp
-  bool feb = false;          ///< STEM.feb: the model for FEBio
+  bool pvd = false;  ///< STEM.pvd and one STEM_0000.vtu per state
+  bool xmf = false;  ///< STEM.xmf, which refers to the result file
+  bool inp = false;  ///< STEM.inp: the model for CalculiX and Abaqus, see shell_deck.hpp
+  bool feb = false;  ///< STEM.feb: the model for FEBio
   /// The last state's shells, coloured by stress, for each ending of write_surface() here: STEM.glb
   std::vector<std::string> surfaces = {};
   RunSettings run = {};      ///< of the model that inp and feb hold
