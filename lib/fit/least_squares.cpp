@@ -189,21 +189,22 @@ private:
     Equations out;
     const Jacobian control = jacobian(piece_, p, of_, out.unknowns);
     const Eigen::Index n = out.unknowns.size();
-    out.matrix = Eigen::MatrixXd::Zero(n, n);
-    out.side = Eigen::VectorXd::Zero(n);
-    Eigen::VectorXd row(n);
+    const Eigen::Index count = p.residuals.size();
+    Eigen::MatrixXd rows(n, count);
+    Eigen::VectorXd weighted(count);
     Eigen::Matrix<double, 30, 1> reach;
-    // One after the other: in a product of all rows Eigen's order depends on the processor's caches.
-    for (const Residual& r : p.residuals) {
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const Residual& r = p.residuals[i];
       const auto basis = bernstein(r.at);
       for (std::size_t j = 0; j < 10; ++j) {
         reach.segment<3>(3 * j) = basis[j] * r.direction;
       }
       const double root = std::sqrt(weight(r));
-      row.noalias() = root * (control.transpose() * reach);
-      out.matrix.noalias() += row * row.transpose();
-      out.side -= root * r.distance * row;
+      rows.col(i).noalias() = root * (control.transpose() * reach);
+      weighted[i] = root * r.distance;
     }
+    out.matrix.noalias() = rows * rows.transpose();
+    out.side.noalias() = -(rows * weighted);
     return out;
   }
 

@@ -149,7 +149,7 @@ class Flags(SimulateTest):
         refused(*io, *HELD, "--resume", "out.hdf.part", "--check", says="contradict")
         refused(*io, *HELD, "--frobnicate", says="--frobnicate")
         refused("ball.ply", *HELD, says="OUT.hdf is missing")
-        refused("ball.ply", "ball.ply", *HELD, "--force", says="is an input")
+        refused("ball.ply", "ball.ply", *HELD, "--force", says="written is .hdf or .vtkhdf")
         refused("--scene", "a.toml", says="OUT.hdf is missing")
         refused("--scene", "a.toml", "out.hdf", "--young", "1MPa", says="contradict")
         refused("--scene", "a.toml", "out.hdf", "--static", says="contradict")
