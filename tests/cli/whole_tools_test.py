@@ -282,6 +282,8 @@ class WholeTools(unittest.TestCase):
                 ended += 1
                 self.assertEqual(done.returncode, 6, (verb, mebibytes, done.stderr))
                 error = [line for line in done.stderr.splitlines() if "memory" in line]
+                if error == [f"tunica-{verb}: out of memory: give it more, or a smaller input"]:
+                    continue  # it ended before the options were known, and with them the report
                 self.assertRegex(error[-1] if error else "", rf"^tunica-{verb}: .*memory.*limit {mebibytes} MiB")
                 self.assertFalse(self.report()["ok"])
                 self.assertFalse(os.path.exists(self.path(output + ".part")), verb)
