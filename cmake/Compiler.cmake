@@ -40,10 +40,11 @@ if(TUNICA_X86_64_V3 AND CMAKE_SYSTEM_PROCESSOR STREQUAL "x86_64")
   if(TUNICA_HAS_X86_64_V3)
     set(TUNICA_INSTRUCTIONS -march=x86-64-v3)
     target_compile_options(tunica_flags INTERFACE ${TUNICA_INSTRUCTIONS})
-  elseif(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
-    # False alarms on Eigen's vectors of two numbers.
-    target_compile_options(tunica_flags INTERFACE -Wno-maybe-uninitialized)
   endif()
+endif()
+if(NOT TUNICA_INSTRUCTIONS)
+  # False alarms on Eigen's vectors of two numbers.
+  target_compile_options(tunica_flags INTERFACE $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
 endif()
 
 # How Eigen aligns its vectors depends on the instructions. Who links static libraries needs the same ones; a shared library

@@ -15,8 +15,8 @@ CONTROL = re.compile(r"[\x00-\x1f\x7f]")
 WALL = ("PRESSURE", "YOUNG", "POISSON", "THICKNESS", "DENSITY")
 IMAGE = ("IMAGED_AT", "MID_SURFACE")
 MOTION = ("DURATION", "STEP")
-EXAMPLES = {"PRESSURE": "80mmHg", "YOUNG": "1MPa", "THICKNESS": "1.5mm", "DENSITY": "1100kg/m3", "IMAGED_AT": "80mmHg",
-            "DURATION": "1s", "STEP": "10ms"}
+WITH_UNIT = {"PRESSURE": "80mmHg", "YOUNG": "1MPa", "THICKNESS": "1.5mm", "DENSITY": "1100kg/m3", "IMAGED_AT": "80mmHg",
+             "DURATION": "1s", "STEP": "10ms"}
 FURTHER = ("EXTRACT", "DECIMATE", "RELAX", "SIMULATE")
 # Variables that a case may have of its own, and those that a run has.
 OF_A_CASE = ("LABEL", "ISOVALUE", "NAMES", "SMOOTH", "LARGEST", "FILL", "OPEN", "SHELLS", "TOLERANCE", "ACCURACY", "OF",
@@ -236,7 +236,7 @@ def own_settings(row, folder):
 def misstated():
     """What make is given without its unit, or is no word that is understood, by words. A line of a table that is wrong is a
     failed case, and no other one's."""
-    wrong = [f"{name}: '{setting(name)}' has no unit: write one, as in {example}" for name, example in EXAMPLES.items()
+    wrong = [f"{name}: '{setting(name)}' has no unit: write one, as in {example}" for name, example in WITH_UNIT.items()
              if re.fullmatch(r"[-+]?[0-9.]+(e[-+]?[0-9]+)?", setting(name), re.I)]
     if setting("MID_SURFACE") not in ("", "outer", "inner"):
         wrong.append(f"MID_SURFACE: '{shown(setting('MID_SURFACE'))}' is not understood: outer or inner")

@@ -24,10 +24,10 @@ std::string whole_ending(const fs::path& path) {
 
 /// Whether a word of the command line names a file, also one that the run does not get to.
 bool is_file_word(const std::string& word) {
-  static constexpr std::array<std::string_view, 32> endings{
-      ".ply", ".obj", ".stl",  ".off", ".glb", ".3mf", ".hdf",  ".vtkhdf", ".json", ".toml", ".nii",
-      ".gz",  ".hdr", ".img",  ".mha", ".mhd", ".raw", ".nrrd", ".nhdr",   ".tif",  ".tiff", ".png",
-      ".svg", ".csv", ".html", ".tsv", ".msh", ".vtk", ".vtu",  ".pvd",    ".xmf",  ".part"};
+  static constexpr std::array<std::string_view, 34> endings{
+      ".ply", ".obj", ".stl",  ".off", ".glb", ".3mf", ".hdf", ".h5",   ".hdf5", ".vtkhdf", ".json", ".toml",
+      ".nii", ".gz",  ".hdr",  ".img", ".mha", ".mhd", ".raw", ".nrrd", ".nhdr", ".tif",    ".tiff", ".png",
+      ".svg", ".csv", ".html", ".tsv", ".msh", ".vtk", ".vtu", ".pvd",  ".xmf",  ".part"};
   std::error_code ignored;
   if (word.empty() || word.front() == '-') {
     return false;

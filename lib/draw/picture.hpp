@@ -38,6 +38,10 @@ struct PictureOptions {
 std::string surface_picture(const TriangleMesh& surface, const std::vector<double>& values,
                             const PictureOptions& options);
 
+/// To the right, upward, and towards the viewer of the first of surface_picture()'s two views, of points in mm, at
+/// least one: unit vectors.
+std::array<Vec3, 3> picture_axes(const std::vector<Vec3>& points);
+
 /// The colours of surfaces, evenly spaced from zero to the largest value: red, green, blue in sRGB, linear between
 /// them.
 std::span<const std::array<std::uint8_t, 3>> surface_colours();

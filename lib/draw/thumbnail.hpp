@@ -2,7 +2,6 @@
 
 #include "tunica/surface/mesh/triangle_mesh.hpp"
 
-#include <array>
 #include <string>
 #include <vector>
 
@@ -19,9 +18,5 @@ struct ThumbnailOptions {
 /// @param surface  at least one triangle, finite positions, mm
 /// @param values   empty, or #V values >= 0; what is not finite is drawn grey
 std::string thumbnail(const TriangleMesh& surface, const std::vector<double>& values, const ThumbnailOptions& options);
-
-/// To the right, upward, and towards the viewer of the first of a picture's two views of the points, at least one: unit
-/// vectors.
-std::array<Vec3, 3> picture_axes(const std::vector<Vec3>& points);
 
 }  // namespace tunica

@@ -163,7 +163,9 @@ std::string bytes_of_3mf(const aiScene& scene, const std::string& provenance, co
   ::close(descriptor);
   std::string archive = std::move(bytes).str();
   if (!made || !clear_times(archive)) {
-    throw OutputError(fmt::format("{}: cannot be made: {}", path.string(), exporter.GetErrorString()));
+    throw OutputError(
+        fmt::format("{}: cannot be made: {}", path.string(),
+                    made ? "the archive is not whole; is there no /proc here?" : exporter.GetErrorString()));
   }
   return archive;
 }
