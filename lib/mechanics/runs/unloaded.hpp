@@ -21,7 +21,8 @@ struct Unloaded {
 /// afterwards. Source: Sellier 2011, "An iterative method for the inverse elasto-static problem". Errors: InputError:
 /// the model has solids, rigid bodies or attachments, or as check_model(). RequirementError: there is no such shape
 /// within 1 % of the mean displacement (beyond a limit load, or the unloaded shell would buckle on the way), with the
-/// reason. Cost: some ten static solutions of few iterations each.
+/// reason. Cost: some ten static solutions of few iterations each; where there is
+/// no such shape up to some two hundred before that is told.
 /// @param on_iteration  part of the pressure, mean distance so far in mm
 Unloaded find_unloaded(const Model& imaged, const RunSettings& settings,
                        const std::function<void(double part, double mean_distance)>& on_iteration = {});
