@@ -258,9 +258,9 @@ TEST(Shaping, PinnedVerticesStay) {
   state.measure_all();
   const Index inner = 6, neighbour = 7, rim = 1;  // (1/4, 1/4), (1/2, 1/4) and (1/4, 0)
   const Vec3 place(0.3, 0.05, 0);
-  ASSERT_FALSE(state.pin(inner, {0.3, -0.1, 0}));  // that would fold
+  ASSERT_FALSE(state.pin(inner, {0.3, -0.1, 0}, 0));  // that would fold
   EXPECT_FALSE(state.is_pinned(inner));
-  ASSERT_TRUE(state.pin(inner, place));
+  ASSERT_TRUE(state.pin(inner, place, 0));
   EXPECT_EQ(state.mesh().positions[inner], place);
   PatchTrial trial;
   state.make_move(inner, {0.25, 0.25, 0}, trial);
@@ -287,14 +287,18 @@ TEST(Shaping, PinnedVerticesStay) {
 }
 
 TEST(Shaping, CornersOfTeethTooSmallForTheResultAreNoExcuse) {
-  // A rim of teeth, 17 degrees sharp, a third as wide as the result's edges are long.
+  // A rim of teeth, 17 degrees sharp, a third as wide as the result's edges are long. All else is flat: the few
+  // triangles at the rim have all of the error.
   TriangleMesh sheet = shapes::plane(160, 40);
   for (Index i = 1; i < 160; i += 2) {
     sheet.vertices[i].y() -= 0.04;
   }
-  const DecimateResult result = decimated_to(sheet, 120, 20);
-  EXPECT_TRUE(result.angle_held);
-  EXPECT_GE(min_angle_degrees(result.mesh), 20);
+  for (const std::size_t count : {100, 120, 160}) {
+    const DecimateResult result = decimated_to(sheet, count, 20);
+    EXPECT_TRUE(result.angle_held);
+    EXPECT_GE(min_angle_degrees(result.mesh), 20);
+    EXPECT_LE(distance(result.mesh, sheet), 0.06);
+  }
 }
 
 TEST(Shaping, AMeshThatHoldsTheAngleIsTheLastResortForAnError) {
@@ -323,12 +327,16 @@ TEST(Shaping, WhereTheAngleIsOutOfReachTheBestWithinTheErrorComesBack) {
 }
 
 TEST(Shaping, AnAngleThatCannotBeHeldIsSaid) {
-  // Two triangles cannot fill a narrow strip well.
-  const TriangleMesh strip = shapes::plane(40, 2, 1, 0.02);
-  const DecimateResult result = decimated_to(strip, 2, 20);
-  EXPECT_LT(result.smallest_angle, 20);
-  EXPECT_FALSE(result.angle_held);
-  EXPECT_LT(distance(result.mesh, strip), 0.05);
+  // So few triangles cannot fill a narrow strip well, and do not leave a part of it for the sake of their shape.
+  for (const double width : {0.02, 0.05}) {
+    const TriangleMesh strip = shapes::plane(40, 2, 1, width);
+    for (const std::size_t count : {2, 4, 8}) {
+      const DecimateResult result = decimated_to(strip, count, 20);
+      EXPECT_LT(result.smallest_angle, 20);
+      EXPECT_FALSE(result.angle_held);
+      EXPECT_LT(distance(result.mesh, strip), 0.5 * std::sqrt(width / static_cast<double>(count)));
+    }
+  }
 }
 
 TEST(Shaping, CornersSharperThanAskedForAreExempt) {
@@ -338,6 +346,10 @@ TEST(Shaping, CornersSharperThanAskedForAreExempt) {
   EXPECT_EQ(smallest_free_angle(wedge, sharp_corners(wedge, 20), 20), 60);
   // The same triangle within a plane has no such excuse.
   EXPECT_NEAR(smallest_free_angle(wedge, sharp_corners(shapes::plane(4, 4), 20), 20), 10, 1e-9);
+  // Nor has one that is much narrower than the corner.
+  TriangleMesh sliver = wedge;
+  sliver.vertices[2] = {std::cos(tip / 3), std::sin(tip / 3), 0};
+  EXPECT_NEAR(smallest_free_angle(sliver, sharp_corners(wedge, 20), 20), 10.0 / 3, 1e-9);
 }
 
 TEST(Shaping, TheSameMeshEveryTime) {

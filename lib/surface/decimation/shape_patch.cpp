@@ -86,7 +86,7 @@ ShapedMesh::ShapedMesh(const TriangleMesh& mesh, const TriangleMesh& target, Nea
       sample_(std::move(samples.points)),
       on_target_(std::move(samples.on_target)),
       states_(mesh.triangles.size()),
-      is_pinned_(mesh.vertices.size(), 0),
+      least_angle_(mesh.vertices.size(), not_pinned),
       shape_cost_(mesh.triangles.size(), unknown),
       middle_(mesh.triangles.size(), no_middles) {
   for (std::size_t t = 0; t < states_.size(); ++t) {
@@ -163,21 +163,22 @@ double ShapedMesh::smallest_angle(const std::array<Index, 3>& triangle, const st
   }
   double smallest = 180;
   for (std::size_t k = 0; k < 3; ++k) {
-    if (!is_pinned(triangle[k])) {
-      smallest = std::min(smallest, angle_degrees(c[k], c[(k + 1) % 3], c[(k + 2) % 3]));
+    const double angle = angle_degrees(c[k], c[(k + 1) % 3], c[(k + 2) % 3]);
+    if (!is_pinned(triangle[k]) || angle < least_angle_[triangle[k]]) {
+      smallest = std::min(smallest, angle);
     }
   }
   return smallest;
 }
 
-bool ShapedMesh::pin(Index vertex, const Vec3& position) {
+bool ShapedMesh::pin(Index vertex, const Vec3& position, double least_angle) {
   PatchTrial trial;
   make_move(vertex, position, trial);
   if (!(evaluate(trial, infinity) < infinity)) {
     return false;
   }
   commit(trial);
-  is_pinned_[vertex] = 1;
+  least_angle_[vertex] = least_angle;
   for (const Index t : mesh_.around[vertex]) {
     shape_cost_[t] = unknown;
   }
@@ -575,7 +576,7 @@ void ShapedMesh::commit(const PatchTrial& trial) {
     // Of a boundary edge only one triangle was cut, in two.
     const bool boundary = trial.removed.size() == 1 && trial.corners.size() == 2;
     mesh_.add_vertex(trial.position, boundary);
-    is_pinned_.push_back(0);
+    least_angle_.push_back(not_pinned);
     vertex_error_.push_back(trial.moved_error);
     BoundaryCurves::Place place;
     if (boundary) {

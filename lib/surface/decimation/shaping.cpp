@@ -21,6 +21,10 @@ constexpr double large_error = 0.85;  // quantile of the triangles' errors that 
 constexpr double safe_angle = 1.04;   // of the angle asked for: what is worked towards
 /// Of these, what a change may leave: as much as an edge of twice the length sags, which shape may ask for.
 constexpr double most_large_errors = 4;
+/// Of the square root of a triangle's area, about a third of an edge: what is farther off has lost a part of the
+/// target.
+constexpr double most_for_size = 0.5;
+constexpr double negligible_error = 1e-6;  // of the diagonal: what is flat has no errors to weigh but those of rounding
 constexpr double least_shaping_gain = 1e-4;  // smaller ones are not worth another look at the neighbours
 constexpr double good_quality = 0.875;       // mean radius ratio that is worked towards
 constexpr double least_quality = 0.86;       // below it there are further rounds
@@ -28,9 +32,9 @@ constexpr int further_rounds = 6;            // each weighs shape twice as much 
 constexpr double most_loss = 4;              // that a collapse may cost so that a split elsewhere may win more
 constexpr double crease_cosine = 0.5;        // of 60 degrees, as in lib/fit: the angle there is the input's own
 
-// Whether the surface around a vertex has a sector between boundary or crease edges that is narrower than `limit`.
-bool has_sharp_sector(const TriangleMesh& mesh, Index v, std::span<const Index> triangles,
-                      const std::vector<std::array<Index, 3>>& across, double limit) {
+// The narrowest sector around a vertex between boundary or crease edges, degrees; 360 if there is none.
+double narrowest_sector(const TriangleMesh& mesh, Index v, std::span<const Index> triangles,
+                        const std::vector<std::array<Index, 3>>& across) {
   const auto normal = [&](Index t) {
     const auto& [i, j, k] = mesh.triangles[t];
     const Vec3& a = mesh.vertices[i];
@@ -43,6 +47,7 @@ bool has_sharp_sector(const TriangleMesh& mesh, Index v, std::span<const Index> 
   const auto is_feature = [&](Index t, Index other) {
     return other == no_neighbour || normal(t).dot(normal(other)) < crease_cosine;
   };
+  double narrowest = 360;
   for (const Index first : triangles) {
     // A sector begins at a triangle behind a feature edge, and runs counter-clockwise to the next one.
     if (!is_feature(first, across[first][corner(first)])) {
@@ -62,11 +67,9 @@ bool has_sharp_sector(const TriangleMesh& mesh, Index v, std::span<const Index> 
       }
       t = other;
     }
-    if (angle < limit) {
-      return true;
-    }
+    narrowest = std::min(narrowest, angle);
   }
-  return false;
+  return narrowest;
 }
 
 // Where the target has a corner sharper than the angle asked for, and the mesh has it too, the vertex there is put
@@ -95,8 +98,9 @@ void pin_sharp_corners(TriangleMesh coarse, const ShapingOptions& options, Shape
       continue;
     }
     const Vec3 before = std::exchange(coarse.vertices[*closest], corner.at);
-    const bool has_it = has_sharp_sector(coarse, *closest, around.of(*closest), across, options.min_angle);
-    if (!has_it || !state.pin(*closest, corner.at)) {
+    const double sector = narrowest_sector(coarse, *closest, around.of(*closest), across);
+    const bool has_it = sector < options.min_angle && sector >= corner.least_angle();
+    if (!has_it || !state.pin(*closest, corner.at, corner.least_angle())) {
       coarse.vertices[*closest] = before;
     }
   }
@@ -151,6 +155,7 @@ public:
         options_(options) {
     state_.measure_all();
     pin_sharp_corners(mesh, options, state_);
+    most_error_ = most_for_size * std::sqrt(area(target) / real(options.triangles));
     weights_.error = 1e-3 * diagonal(target);
     weights_.angle_wanted = safe_angle * options.min_angle;
   }
@@ -185,17 +190,26 @@ private:
     }
   }
 
-  // What counts as a large error, what no change may leave, and how much shape weighs, follow from the state.
+  // What counts as a large error, what no change may leave, and how much shape weighs, follow from the state. Where
+  // most of a surface is flat the quantile is that of nothing, and the mean square tells.
   void adapt() {
     std::vector<double> errors;
-    for_each_triangle(mesh(), [&](Index t) { errors.push_back(state_.error(t)); });
+    double squares = 0;
+    for_each_triangle(mesh(), [&](Index t) {
+      errors.push_back(state_.error(t));
+      squares += state_.error(t) * state_.error(t);
+    });
     const auto at = errors.begin() + truncated<std::size_t>(large_error * real(errors.size() - 1));
     std::nth_element(errors.begin(), at, errors.end());
-    weights_.error = std::max(*at, 1e-9 * weights_.error);
-    weights_.most_error = most_large_errors * weights_.error;
+    set_large_error(std::max({*at, std::sqrt(squares / real(errors.size())), negligible_error * diagonal(target_)}));
     weights_.quality *= std::clamp(std::exp(40 * (good_quality - mean_quality(mesh().mesh()))), 0.5, 2.0);
     state_.set_weights(weights_);
     dirty_.assign(mesh().positions.size(), 1);
+  }
+
+  void set_large_error(double error) {
+    weights_.error = error;
+    weights_.most_error = std::min(most_large_errors * error, most_error_);
   }
 
   void accept(const PatchTrial& trial) {
@@ -452,8 +466,7 @@ private:
         return;
       }
       weights_.angle *= 1.6;
-      weights_.error *= round < 12 ? 1.15 : 1;
-      weights_.most_error = most_large_errors * weights_.error;
+      set_large_error(weights_.error * (round < 12 ? 1.15 : 1));
       state_.set_weights(weights_);
       dirty_.assign(mesh().positions.size(), 0);
       if (round % 6 == 3 && mesh().alive + 2 * bad.size() > options_.triangles) {
@@ -524,6 +537,7 @@ private:
   const NearestPoint& nearest_;
   const ShapingOptions& options_;
   ShapeWeights weights_;
+  double most_error_;
   PatchTrial trial_, best_;
   std::vector<Vec3> candidates_;
   std::vector<std::uint8_t> dirty_, touched_;
@@ -544,12 +558,13 @@ std::vector<SharpCorner> sharp_corners(const TriangleMesh& mesh, double limit) {
   std::vector<SharpCorner> found;
   for (Index v = 0; v < mesh.vertices.size(); ++v) {
     const auto triangles = around.of(v);
-    if (has_sharp_sector(mesh, v, triangles, across, limit)) {
+    const double sector = narrowest_sector(mesh, v, triangles, across);
+    if (sector < limit) {
       const bool on_boundary = std::any_of(triangles.begin(), triangles.end(), [&](Index t) {
         const auto& c = mesh.triangles[t];
         return across[t][std::find(c.begin(), c.end(), v) - c.begin()] == no_neighbour;
       });
-      found.push_back({mesh.vertices[v], on_boundary});
+      found.push_back({mesh.vertices[v], on_boundary, sector});
     }
   }
   return found;
@@ -576,8 +591,9 @@ double smallest_free_angle(const TriangleMesh& mesh, std::span<const SharpCorner
     }
   }
   for (const Small& s : small) {
-    if (std::none_of(sharp.begin(), sharp.end(),
-                     [&](const SharpCorner& c) { return (c.at - s.at).norm() <= s.reach; })) {
+    if (std::none_of(sharp.begin(), sharp.end(), [&](const SharpCorner& c) {
+          return (c.at - s.at).norm() <= s.reach && s.angle >= c.least_angle();
+        })) {
       least = std::min(least, s.angle);
     }
   }

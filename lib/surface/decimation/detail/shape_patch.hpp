@@ -80,15 +80,17 @@ public:
   /// The point of the target that is farthest from triangle t, of those that belong to it.
   [[nodiscard]] std::optional<Vec3> farthest_sample(Index t) const;
   [[nodiscard]] double cost(Index t) const;
-  /// Degrees, but for the corner at the pinned vertex where there is one.
+  /// Degrees, but for the corner at the pinned vertex where there is one, as long as that has its least angle.
   [[nodiscard]] double smallest_angle(Index t) const;
   [[nodiscard]] const BoundaryCurves::Place& place(Index vertex) const { return places_[vertex]; }
 
   /// Moves a vertex to where it stays from here on, at a sharp corner of the target's boundary or creases: its angle in
-  /// a triangle is not charged for, since the target leaves no choice. Once measure_all() is done. @return false where
-  /// that would fold
-  bool pin(Index vertex, const Vec3& position);
-  [[nodiscard]] bool is_pinned(Index vertex) const { return vertex < is_pinned_.size() && is_pinned_[vertex] != 0; }
+  /// a triangle is not charged for from `least_angle` (degrees) on, since the target leaves no choice. Once
+  /// measure_all() is done. @return false where that would fold
+  bool pin(Index vertex, const Vec3& position, double least_angle);
+  [[nodiscard]] bool is_pinned(Index vertex) const {
+    return vertex < least_angle_.size() && least_angle_[vertex] != not_pinned;
+  }
 
   /// Measures a triangle also at its centre and in the middle of its edges. @param nearest may be quick and too far
   void measure_middle(Index t, const NearestPoint& nearest);
@@ -133,6 +135,7 @@ public:
 private:
   static constexpr double exact = -1;  // no distance is near enough
   static constexpr double unknown = -1;
+  static constexpr double not_pinned = -1;
   static constexpr std::array<double, 3> no_middles{unknown, unknown, unknown};
   struct State {
     std::vector<Index> samples;
@@ -170,7 +173,7 @@ private:
   std::vector<std::uint8_t> on_target_;  // #V of the mesh as given, see TargetSamples
   std::vector<double> vertex_error_;     // #V distance of each vertex to the target
   std::vector<State> states_;
-  std::vector<std::uint8_t> is_pinned_;        // #V
+  std::vector<double> least_angle_;            // #V that a triangle may have there, if it is pinned
   mutable std::vector<double> shape_cost_;     // #T as far as known
   std::vector<std::array<double, 3>> middle_;  // #T squared distances in the middle of each edge, as far as known
   std::vector<BoundaryCurves::Place> places_;

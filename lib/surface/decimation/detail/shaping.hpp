@@ -11,6 +11,9 @@ namespace tunica {
 struct SharpCorner {
   Vec3 at;
   bool on_boundary;
+  double angle;  ///< degrees, of its narrowest sector
+  /// What a triangle there may have, so that two can share the sector; narrower ones are faults of a mesh.
+  [[nodiscard]] double least_angle() const { return 0.5 * angle; }
 };
 
 /// The vertices of a surface with a sector between edges of its boundary or creases that is narrower than `limit`,
@@ -38,7 +41,8 @@ struct ShapingOptions {
 TriangleMesh shaped(const TriangleMesh& mesh, const TriangleMesh& target, const ClosestPoint& tree,
                     const ShapingOptions& options);
 
-/// The smallest angle of a mesh, degrees, but for those below `limit` at sharp corners of its target.
+/// The smallest angle of a mesh, degrees, but for those below `limit` at sharp corners of its target that are not
+/// narrower than such a corner makes them (SharpCorner::least_angle).
 /// @param sharp  sharp_corners() of the target for the same limit
 double smallest_free_angle(const TriangleMesh& mesh, std::span<const SharpCorner> sharp, double limit);
 
