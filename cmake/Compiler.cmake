@@ -3,7 +3,8 @@ add_library(tunica_flags INTERFACE)
 target_compile_options(tunica_flags INTERFACE -Wall -Wextra -Wpedantic -Wnon-virtual-dtor
                        -Woverloaded-virtual -Wcast-qual -Wformat=2 -Wfloat-conversion)
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
-  target_compile_options(tunica_flags INTERFACE -Wno-restrict)  # false alarms on string + string (GCC bug 105651)
+  # False alarms on string + string (GCC bug 105651) and on Eigen's vectors of two numbers.
+  target_compile_options(tunica_flags INTERFACE -Wno-restrict -Wno-maybe-uninitialized)
 endif()
 if(TUNICA_UNITY)
   # A .cpp counts as a header there, and what is local to one is seen by others; the check preset looks at each alone.
@@ -38,8 +39,12 @@ if(TUNICA_X86_64_V3 AND CMAKE_SYSTEM_PROCESSOR STREQUAL "x86_64")
   check_cxx_source_runs("int main() { return __builtin_cpu_supports(\"avx2\") && __builtin_cpu_supports(\"fma\") &&
                                        __builtin_cpu_supports(\"bmi2\") ? 0 : 1; }" TUNICA_HAS_X86_64_V3)
   if(TUNICA_HAS_X86_64_V3)
-    set(TUNICA_INSTRUCTIONS -march=x86-64-v3)
-    target_compile_options(tunica_flags INTERFACE ${TUNICA_INSTRUCTIONS})
+    # No fused multiply-add: it rounds once where other processors round twice, and one bit makes the greedy searches of
+    # decimation and fit take another path.
+    set(TUNICA_INSTRUCTIONS -march=x86-64-v3 -mno-fma)
+    target_compile_options(tunica_flags INTERFACE ${TUNICA_INSTRUCTIONS}
+                           "SHELL:-include ${PROJECT_SOURCE_DIR}/cmake/eigen_packets.hpp")
+    target_link_libraries(tunica_flags INTERFACE Eigen3::Eigen)
   endif()
 endif()
 if(NOT TUNICA_INSTRUCTIONS)
@@ -47,19 +52,17 @@ if(NOT TUNICA_INSTRUCTIONS)
   target_compile_options(tunica_flags INTERFACE $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
 endif()
 
-# How Eigen aligns its vectors depends on the instructions. Who links static libraries needs the same ones; a shared library
-# may be another one where the program runs (debian/rules): there alignment is the same whatever the instructions.
+# How Eigen aligns its vectors depends on the instructions, and has to be the same in programs of others: as four doubles
+# of std::experimental::simd need it, which are numbers of some of its matrices.
+set(TUNICA_ALIGNMENT -DEIGEN_MAX_ALIGN_BYTES=32 -DEIGEN_MAX_STATIC_ALIGN_BYTES=32)
 add_library(tunica_alignment INTERFACE)
+target_compile_options(tunica_alignment INTERFACE ${TUNICA_ALIGNMENT})
 
 if(TUNICA_SHARED)
   set(CMAKE_POSITION_INDEPENDENT_CODE ON)
   # Calls within the library stay within it: no other definition takes their place, and they are inlined as in a program.
   target_compile_options(tunica_flags INTERFACE -fno-semantic-interposition -fvisibility-inlines-hidden)
   set(CMAKE_INSTALL_RPATH $ORIGIN/../${CMAKE_INSTALL_LIBDIR})
-  set(TUNICA_ALIGNMENT -DEIGEN_MAX_ALIGN_BYTES=32 -DEIGEN_MAX_STATIC_ALIGN_BYTES=32)
-  target_compile_options(tunica_alignment INTERFACE ${TUNICA_ALIGNMENT})
-else()
-  target_compile_options(tunica_alignment INTERFACE $<INSTALL_INTERFACE:${TUNICA_INSTRUCTIONS}>)
 endif()
 
 # Command lines compute nothing, and more takes longer to compile.

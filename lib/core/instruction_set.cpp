@@ -3,7 +3,7 @@
 namespace tunica {
 
 const char* instruction_set() {
-#if defined(__AVX2__) && defined(__FMA__) && defined(__BMI2__)
+#if defined(__AVX2__) && defined(__BMI2__)
   return "x86-64-v3";
 #elif defined(__x86_64__)
   return "x86-64";

@@ -189,22 +189,21 @@ private:
     Equations out;
     const Jacobian control = jacobian(piece_, p, of_, out.unknowns);
     const Eigen::Index n = out.unknowns.size();
-    const Eigen::Index count = p.residuals.size();
-    Eigen::MatrixXd rows(n, count);
-    Eigen::VectorXd weighted(count);
+    out.matrix = Eigen::MatrixXd::Zero(n, n);
+    out.side = Eigen::VectorXd::Zero(n);
+    Eigen::VectorXd row(n);
     Eigen::Matrix<double, 30, 1> reach;
-    for (Eigen::Index i = 0; i < count; ++i) {
-      const Residual& r = p.residuals[i];
+    // One after the other: in a product of all rows Eigen's order depends on the processor's caches.
+    for (const Residual& r : p.residuals) {
       const auto basis = bernstein(r.at);
       for (std::size_t j = 0; j < 10; ++j) {
         reach.segment<3>(3 * j) = basis[j] * r.direction;
       }
       const double root = std::sqrt(weight(r));
-      rows.col(i).noalias() = root * (control.transpose() * reach);
-      weighted[i] = root * r.distance;
+      row.noalias() = root * (control.transpose() * reach);
+      out.matrix.noalias() += row * row.transpose();
+      out.side -= root * r.distance * row;
     }
-    out.matrix.noalias() = rows * rows.transpose();
-    out.side.noalias() = -(rows * weighted);
     return out;
   }
 
