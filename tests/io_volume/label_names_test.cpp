@@ -77,6 +77,8 @@ TEST_F(LabelTables, are_told_by_their_content) {
   EXPECT_THAT(read(slicer), ElementsAre(Pair(0, "Background"), Pair(1, "aorta"), Pair(52, "left atrium")));
   EXPECT_THAT(read(freesurfer), ElementsAre(Pair(0, "Unknown"), Pair(2, "Left-Cerebral-White-Matter")));
   EXPECT_THAT(read(slicer_csv), ElementsAre(Pair(1, "aorta")));
+  EXPECT_THAT(read("name,index\n \"aorta, \"\"arch\"\"\" ,1\r\n\"open,2\n"),
+              ElementsAre(Pair(1, "aorta, \"arch\""), Pair(2, "\"open")));
   EXPECT_THAT(read("7 colon\n-8 Area 4 255 0 0 0"), ElementsAre(Pair(7, "colon"), Pair(-8, "Area 4")));
 }
 

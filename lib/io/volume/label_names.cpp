@@ -55,22 +55,36 @@ void add(LabelNames& names, const fs::path& path, std::size_t line, std::int64_t
   }
 }
 
-std::vector<std::string_view> cells(std::string_view line, char separator) {
-  std::vector<std::string_view> found;
-  for (std::size_t begin = 0; begin <= line.size();) {
-    const std::size_t end = std::min(line.find(separator, begin), line.size());
-    std::string_view cell = trimmed(line.substr(begin, end - begin));
-    if (cell.size() > 1 && cell.front() == '"' && cell.back() == '"') {
-      cell = cell.substr(1, cell.size() - 2);
+// The text of a cell in quotes, where a separator may stand and "" is a quote (RFC 4180), and what follows it; none
+// where the quotes do not close.
+std::optional<std::pair<std::string, std::string_view>> quoted_cell(std::string_view rest) {
+  std::string text;
+  for (std::size_t at = 1; at < rest.size(); ++at) {
+    if (rest[at] == '"' && !rest.substr(at + 1).starts_with('"')) {
+      return std::pair(text, rest.substr(at + 1));
     }
-    found.push_back(cell);
-    begin = end + 1;
+    at += rest[at] == '"' ? 1 : 0;
+    text += rest[at];
+  }
+  return {};
+}
+
+std::vector<std::string> cells(std::string_view line, char separator) {
+  std::vector<std::string> found;
+  for (bool more = true; more;) {
+    std::string_view rest = line.substr(std::min(line.find_first_not_of(' '), line.size()));
+    const auto quoted = rest.starts_with('"') ? quoted_cell(rest) : std::nullopt;
+    rest = quoted ? quoted->second : rest;
+    const std::size_t end = std::min(rest.find(separator), rest.size());
+    found.push_back(quoted ? quoted->first : std::string(trimmed(rest.substr(0, end))));
+    more = end < rest.size();
+    line = rest.substr(std::min(end + 1, rest.size()));
   }
   return found;
 }
 
 // The column whose heading is one of these.
-std::optional<std::size_t> column(const std::vector<std::string_view>& heads,
+std::optional<std::size_t> column(const std::vector<std::string>& heads,
                                   std::initializer_list<std::string_view> known) {
   for (const std::string_view name : known) {
     const auto at = std::ranges::find_if(heads, [&](std::string_view head) { return lower_case(head) == name; });
