@@ -373,6 +373,18 @@ SmoothedField smoothed_field(cli::Tool& tool, const Selection& selection, double
              : smooth_mask(selection.mask, sigma, progress);
 }
 
+// Smoothing keeps the volume, so that only the voxels tell what it did to the shape.
+void warn_of_smoothing(const cli::Tool& tool, const Selection& selection, const Mask& smoothed) {
+  constexpr double notable = 0.1;
+  const double changed = real(count_differing(selection.mask, smoothed)) / real(count_voxels(selection.mask));
+  if (changed > notable) {
+    tool.warn(
+        fmt::format("{}: smoothing changes the shape: it moves as many voxels in or out as {:.3g} % of its own; pass a "
+                    "smaller sigma",
+                    selection.target.name, 1e2 * changed));
+  }
+}
+
 Surface extract(cli::Tool& tool, Selection selection, const Arguments& arguments, const Names& names,
                 const Smoothing& smoothing) {
   double voxel_volume = 0;
@@ -402,6 +414,7 @@ Surface extract(cli::Tool& tool, Selection selection, const Arguments& arguments
     const auto stage = tool.stage("extract");
     Mask mask = select(smoothed.field, smoothed.rule);
     keep_wanted_pieces(mask, arguments);
+    warn_of_smoothing(tool, selection, mask);
     TriangleMesh mesh = marching_cubes(smoothed.field, smoothed.rule, mask, options);
     surface.emplace(Surface{std::move(mesh), std::move(mask), voxel_volume, false, {}});
   } else {
@@ -506,6 +519,15 @@ void warn_of_few_voxels(const cli::Tool& tool, const Surface& surface, const Jso
   }
 }
 
+void warn_of_cut(const cli::Tool& tool, const Surface& surface, const std::string& name) {
+  if (const std::size_t cut = count_at_border(surface.mask); cut > 0) {
+    tool.warn(
+        fmt::format("{}: the image's border cuts it ({} voxels), and flat lids close it there; --open-border, OPEN=1 "
+                    "of the pipeline, leaves it open, as a vessel is",
+                    name, cut));
+  }
+}
+
 // Extracts one surface, writes it and returns what the report says of it.
 Json extract_to_file(cli::Tool& tool, Selection selection, const Arguments& arguments, const Names& names,
                      const Smoothing& smoothing) {
@@ -514,6 +536,9 @@ Json extract_to_file(cli::Tool& tool, Selection selection, const Arguments& argu
   Surface surface = extract(tool, std::move(selection), arguments, names, smoothing);
   Json result = measured(surface, arguments.open_border);
   warn_of_few_voxels(tool, surface, result, target.name);
+  if (!arguments.open_border) {
+    warn_of_cut(tool, surface, target.name);
+  }
   const fs::path out = output_path(arguments.out, target);
   tool.require_unchanged_inputs();
   {

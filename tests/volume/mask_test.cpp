@@ -97,5 +97,24 @@ TEST(Mask, CountsVoxelsAndTheirVolume) {
   EXPECT_DOUBLE_EQ(mask.voxel_volume(), 3);
 }
 
+TEST(Mask, CountsWhatTheBorderCutsAndWhatDiffers) {
+  Mask mask({130, 5, 4}, Volume().affine);
+  mask.set(64, 2, 1, true);
+  EXPECT_EQ(count_at_border(mask), 0U);
+  const Mask before = mask;
+  for (const auto& [i, j, k] :
+       {std::array<std::size_t, 3>{0, 2, 1}, {129, 2, 2}, {64, 0, 1}, {64, 4, 2}, {3, 2, 0}, {129, 4, 3}}) {
+    mask.set(i, j, k, true);
+  }
+  EXPECT_EQ(count_at_border(mask), 6U);
+  EXPECT_EQ(count_differing(mask, before), 6U);
+  EXPECT_EQ(count_differing(mask, mask), 0U);
+  Mask slice({3, 3, 1}, Volume().affine);  // its middle is not at a border, though there is but one slice
+  slice.set(1, 1, 0, true);
+  EXPECT_EQ(count_at_border(slice), 0U);
+  slice.set(2, 1, 0, true);
+  EXPECT_EQ(count_at_border(slice), 1U);
+}
+
 }  // namespace
 }  // namespace tunica

@@ -11,7 +11,9 @@
 #include <atomic>
 #include <bit>
 #include <cmath>
+#include <functional>
 #include <limits>
+#include <numeric>
 #include <optional>
 #include <type_traits>
 
@@ -207,6 +209,30 @@ std::size_t count_voxels(const Mask& mask) {
     count += std::popcount(mask.row(0, 0)[word]);
   }
   return count;
+}
+
+std::size_t count_at_border(const Mask& mask) {
+  const auto [width, height, depth] = mask.dims();
+  const auto is_end = [](std::size_t at, std::size_t size) { return size > 1 && (at == 0 || at + 1 == size); };
+  std::size_t count = 0;
+  for (std::size_t k = 0; k < depth; ++k) {
+    for (std::size_t j = 0; j < height; ++j) {
+      if (is_end(k, depth) || is_end(j, height)) {
+        const std::uint64_t* row = mask.row(j, k);
+        count = std::accumulate(row, row + mask.words_per_row(), count,
+                                [](std::size_t sum, std::uint64_t word) { return sum + std::popcount(word); });
+      } else if (width > 1) {
+        count += std::size_t{mask(0, j, k)} + std::size_t{mask(width - 1, j, k)};
+      }
+    }
+  }
+  return count;
+}
+
+std::size_t count_differing(const Mask& a, const Mask& b) {
+  const std::size_t words = a.words_per_row() * a.dims()[1] * a.dims()[2];
+  return std::transform_reduce(a.row(0, 0), a.row(0, 0) + words, b.row(0, 0), std::size_t{0}, std::plus{},
+                               [](std::uint64_t l, std::uint64_t r) { return std::popcount(l ^ r); });
 }
 
 }  // namespace tunica
