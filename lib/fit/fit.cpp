@@ -112,7 +112,8 @@ public:
         like_target_(same_topology(coarse_, target)),
         best_(target, options, like_target_) {
     limits_.shape.min_angle = options.min_angle;
-    most_ = options.max_shells.value_or(options.tolerance ? options.shells.value_or(max_index) : max_index);
+    const bool is_limit = options.tolerance || options.refine;
+    most_ = options.max_shells.value_or(is_limit ? options.shells.value_or(max_index) : max_index);
     rounds_ = options.max_iterations.value_or(default_rounds);
   }
 

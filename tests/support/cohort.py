@@ -21,7 +21,7 @@ BROKEN = {
     "huge": ("extract", "3", "truncated"),
     "missing": ("extract", "3", "missing.nii.gz"),
     "no-slices": ("extract", "3", "no-slices"),
-    "held-wrongly": ("simulate", "3", "its rigid motions may only be held when"),
+    "held-wrongly": ("simulate", "3", "the body is closed and has no boundary"),
     "no-unit": ("simulate", "2", "'1' has no unit"),
     "too-close": ("relax", "4", "tolerance"),
 }
@@ -77,7 +77,7 @@ def make_cohort(folder, tools, count, sizes, seed=1):
     (scans / "no-slices.nii.gz").unlink()
     (scans / "no-slices.nii.gz").mkdir()
     cells = {"absent-label": {"label": "9"}, "misspelt-label": {"label": "vesel"}, "no-unit": {"pressure": "1"},
-             "held-wrongly": {"open": "1", "fix": "rigid-motions"}, "too-close": {"tolerance": "1e-7%"}}
+             "held-wrongly": {"open": "0", "fix": "boundary"}, "too-close": {"tolerance": "1e-7%"}}
     for name in BROKEN:
         line(name, f"scans/{name}.nii.gz", **cells.get(name, {}))
     choice.shuffle(lines)
