@@ -3,8 +3,7 @@ add_library(tunica_flags INTERFACE)
 target_compile_options(tunica_flags INTERFACE -Wall -Wextra -Wpedantic -Wnon-virtual-dtor
                        -Woverloaded-virtual -Wcast-qual -Wformat=2 -Wfloat-conversion)
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
-  # False alarms on string + string (GCC bug 105651) and on Eigen's vectors of two numbers.
-  target_compile_options(tunica_flags INTERFACE -Wno-restrict -Wno-maybe-uninitialized)
+  target_compile_options(tunica_flags INTERFACE -Wno-restrict)  # false alarms on string + string (GCC bug 105651)
 endif()
 if(TUNICA_UNITY)
   # A .cpp counts as a header there, and what is local to one is seen by others; the check preset looks at each alone.
@@ -47,10 +46,8 @@ if(TUNICA_X86_64_V3 AND CMAKE_SYSTEM_PROCESSOR STREQUAL "x86_64")
     target_link_libraries(tunica_flags INTERFACE Eigen3::Eigen)
   endif()
 endif()
-if(NOT TUNICA_INSTRUCTIONS)
-  # False alarms on Eigen's vectors of two numbers.
-  target_compile_options(tunica_flags INTERFACE $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
-endif()
+# False alarms on Eigen's vectors of two numbers.
+target_compile_options(tunica_flags INTERFACE $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
 
 # How Eigen aligns its vectors depends on the instructions, and has to be the same in programs of others: as four doubles
 # of std::experimental::simd need it, which are numbers of some of its matrices.

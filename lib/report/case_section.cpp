@@ -312,10 +312,10 @@ std::string next_command(const CaseReport& one) {
 Markup case_section(const CaseReport& one, int level, bool paths) {
   Markup made = verdict(one);
   made += three_numbers(one);
-  made += organ_figure(one, level);
-  made += slices_figure(one, level);
   made += list_section("Warnings", one.warnings, level);
   made += list_section("Outputs that are not what the reports say", one.different, level);
+  made += organ_figure(one, level);
+  made += slices_figure(one, level);
   made += list_section("Not drawn", one.missing, level);
   made += heading(level, "Numbers");
   made +=

@@ -272,17 +272,22 @@ TEST(Shaping, PinnedVerticesStay) {
     EXPECT_EQ(trial.moved, inner);
     EXPECT_EQ(trial.position, place);
   }
-  // The triangle below it is flat there; what it has beside the rim is charged for.
-  for (const Index t : state.mesh().around[inner]) {
-    const auto& c = state.mesh().triangles[t];
-    double smallest = 180;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const auto& at = state.mesh().positions;
-      if (c[k] != inner) {
-        smallest = std::min(smallest, angle_degrees(at[c[k]], at[c[(k + 1) % 3]], at[c[(k + 2) % 3]]));
+  // The triangle below it is flat there; what it has beside the rim is charged for, and below its least angle all of
+  // it.
+  for (const double least : {0.0, 90.0}) {
+    ASSERT_TRUE(state.pin(inner, place, least));
+    for (const Index t : state.mesh().around[inner]) {
+      const auto& c = state.mesh().triangles[t];
+      double smallest = 180;
+      for (std::size_t k = 0; k < 3; ++k) {
+        const auto& at = state.mesh().positions;
+        const double angle = angle_degrees(at[c[k]], at[c[(k + 1) % 3]], at[c[(k + 2) % 3]]);
+        if (c[k] != inner || angle < least) {
+          smallest = std::min(smallest, angle);
+        }
       }
+      EXPECT_DOUBLE_EQ(state.smallest_angle(t), smallest);
     }
-    EXPECT_DOUBLE_EQ(state.smallest_angle(t), smallest);
   }
 }
 

@@ -268,8 +268,10 @@ class Choices(ExtractTest):
         array = numpy.zeros((8, 9, 10), numpy.uint8)
         array[2:6, 2:6, 0:7] = 1
         path = self.nifti(array)
-        self.extract_and_check(path, array == 1, LPS, "--label", 1)
+        _, closed = self.extract_and_check(path, array == 1, LPS, "--label", 1)
+        self.assertIn("the image's border cuts it (16 voxels)", closed["warnings"][-1])
         record, _ = self.run_tool(path, self.out, "--label", 1, "--open-border")
+        self.assertEqual(record["warnings"], [])
         ply = Ply(self.out)
         self.assertIs(record["result"]["closed"], False)
         self.assertIs(record["result"]["manifold"], True)
@@ -415,6 +417,13 @@ class Choices(ExtractTest):
         self.assertLess(radius.std(), 0.1)
         self.assertIsNotNone(record["seconds"]["smooth"])
         self.assertEqual(record["result"]["voxel_volume_mm3"], mask.sum())
+        self.assertEqual(record["warnings"], [])
+
+    def test_a_gaussian_that_changes_the_shape_is_warned_of(self):
+        plate = numpy.zeros((40, 40, 16), numpy.uint8)
+        plate[4:36, 4:36, 6:10] = 1
+        record, _ = self.run_tool(self.nifti(plate), self.out, "--label", 1, "--smooth", "4mm")
+        self.assertIn("smoothing changes the shape", " ".join(record["warnings"]))
 
     def test_staircase_stays_within_half_a_voxel(self):
         mask = ball((40, 41, 42), 12.0)

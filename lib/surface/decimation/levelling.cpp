@@ -23,7 +23,6 @@ constexpr double beside_share = 0.3;     // of the largest error, at least, that
 constexpr double renew_share = 0.8;      // of the error that costs refer to, below which they are computed anew
 constexpr double certain_share = 0.5;  // of the largest squared error: points that look farther off are looked at again
 constexpr std::array<double, 3> may_be_larger{3, 1.3, 1};  // than known, is a triangle's error: see Leveller::Known
-constexpr double negligible = 1e-6;                        // of the diagonal
 constexpr double least_angle = 3;                          // degrees: thinner triangles cost something
 constexpr double large_triangle = 1.5;                     // steps: longer ones of the target are cut
 constexpr double most_parts = 8;           // into which the edges of a large triangle of the target are cut
@@ -225,7 +224,7 @@ public:
         measure(t);
         continue;
       }
-      if (!(error > negligible * plan_.diagonal)) {
+      if (!(error > negligible_error * plan_.diagonal)) {
         break;
       }
       if (error < renew_share * weights_.error || error > weights_.error) {

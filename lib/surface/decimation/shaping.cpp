@@ -24,7 +24,6 @@ constexpr double most_large_errors = 4;
 /// Of the square root of a triangle's area, about a third of an edge: what is farther off has lost a part of the
 /// target.
 constexpr double most_for_size = 0.5;
-constexpr double negligible_error = 1e-6;  // of the diagonal: what is flat has no errors to weigh but those of rounding
 constexpr double least_shaping_gain = 1e-4;  // smaller ones are not worth another look at the neighbours
 constexpr double good_quality = 0.875;       // mean radius ratio that is worked towards
 constexpr double least_quality = 0.86;       // below it there are further rounds

@@ -133,6 +133,13 @@ void select_row(const T* values, std::size_t count, const Range<T>& range, std::
   }
 }
 
+std::size_t word_count(const Mask& mask) { return mask.words_per_row() * mask.dims()[1] * mask.dims()[2]; }
+
+std::size_t count_bits(const std::uint64_t* words, std::size_t count) {
+  return std::transform_reduce(words, words + count, std::size_t{0}, std::plus{},
+                               [](std::uint64_t word) { return std::popcount(word); });
+}
+
 }  // namespace
 
 Mask::Mask(const std::array<std::size_t, 3>& dims, const Eigen::Matrix<double, 3, 4>& affine)
@@ -202,14 +209,7 @@ std::size_t count_not_finite(const Volume& volume) {
       volume.data);
 }
 
-std::size_t count_voxels(const Mask& mask) {
-  const std::size_t words = mask.words_per_row() * mask.dims()[1] * mask.dims()[2];
-  std::size_t count = 0;
-  for (std::size_t word = 0; word < words; ++word) {
-    count += std::popcount(mask.row(0, 0)[word]);
-  }
-  return count;
-}
+std::size_t count_voxels(const Mask& mask) { return count_bits(mask.row(0, 0), word_count(mask)); }
 
 std::size_t count_at_border(const Mask& mask) {
   const auto [width, height, depth] = mask.dims();
@@ -218,9 +218,7 @@ std::size_t count_at_border(const Mask& mask) {
   for (std::size_t k = 0; k < depth; ++k) {
     for (std::size_t j = 0; j < height; ++j) {
       if (is_end(k, depth) || is_end(j, height)) {
-        const std::uint64_t* row = mask.row(j, k);
-        count = std::accumulate(row, row + mask.words_per_row(), count,
-                                [](std::size_t sum, std::uint64_t word) { return sum + std::popcount(word); });
+        count += count_bits(mask.row(j, k), mask.words_per_row());
       } else if (width > 1) {
         count += std::size_t{mask(0, j, k)} + std::size_t{mask(width - 1, j, k)};
       }
@@ -230,8 +228,7 @@ std::size_t count_at_border(const Mask& mask) {
 }
 
 std::size_t count_differing(const Mask& a, const Mask& b) {
-  const std::size_t words = a.words_per_row() * a.dims()[1] * a.dims()[2];
-  return std::transform_reduce(a.row(0, 0), a.row(0, 0) + words, b.row(0, 0), std::size_t{0}, std::plus{},
+  return std::transform_reduce(a.row(0, 0), a.row(0, 0) + word_count(a), b.row(0, 0), std::size_t{0}, std::plus{},
                                [](std::uint64_t l, std::uint64_t r) { return std::popcount(l ^ r); });
 }
 

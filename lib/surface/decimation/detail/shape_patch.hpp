@@ -11,6 +11,9 @@
 
 namespace tunica {
 
+/// Of the target's diagonal: smaller errors are those of rounding, and nothing is weighed against them.
+inline constexpr double negligible_error = 1e-6;
+
 /// What a triangle is charged for. Errors and shapes are weighed against each other by `error` and the two weights.
 struct ShapeWeights {
   /// mm: no triangle may get a larger error than this, unless one that it replaces had it.
