@@ -68,6 +68,26 @@ Markup three_numbers(const CaseReport& one) {
   return list += html("</dl>\n");
 }
 
+// What is known of the error that the shells' number makes in the answer.
+Markup discretisation(const CaseReport& one) {
+  if (!measure("max_displacement_mm").value(one.source)) {
+    return {};
+  }
+  const Json accuracy = one.source.at("simulate", "result.accuracy");
+  if (!accuracy.is_object()) {
+    return html(
+        "<p>How far stress and displacement depend on the number of shells was not estimated: <code>--accuracy</code> "
+        "(<code>ACCURACY=5% OF=stress</code> in the pipeline) does that.</p>\n");
+  }
+  const Json of = accuracy.value("of", Json());
+  const Json estimate = accuracy.value("estimate_percent", Json());
+  const std::string quantity = of.is_string() ? of.get<std::string>() : "asked-for displacement";
+  return accuracy.value("credible", Json()) == true && estimate.is_number()
+             ? html("<p>The error of the {} by the number of shells is credibly below {} %.</p>\n", quantity,
+                    figure(estimate.get<double>()))
+             : html("<p>The error of the {} by the number of shells is not credibly known.</p>\n", quantity);
+}
+
 // The colour bar, whose texts the page's script changes with the colours.
 Markup legend(const CaseReport& one) {
   if (one.organ.empty()) {
@@ -312,6 +332,7 @@ std::string next_command(const CaseReport& one) {
 Markup case_section(const CaseReport& one, int level, bool paths) {
   Markup made = verdict(one);
   made += three_numbers(one);
+  made += discretisation(one);
   made += list_section("Warnings", one.warnings, level);
   made += list_section("Outputs that are not what the reports say", one.different, level);
   made += organ_figure(one, level);

@@ -1,3 +1,4 @@
+#include "tunica/report/detail/command_words.hpp"
 #include "tunica/report/detail/measures.hpp"
 #include "tunica/report/detail/sections.hpp"
 
@@ -5,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <map>
 
 namespace tunica::report {
 namespace {
@@ -93,34 +95,60 @@ Markup table(const std::vector<CaseReport>& cases, const std::string& tsv) {
                       data_address("text/tab-separated-values", tsv));
 }
 
-Markup spread(const std::vector<CaseReport>& cases) {
+using CaseGroup = std::vector<const CaseReport*>;
+
+// The label that was extracted as the command names it; empty: at an isovalue, or not known.
+std::string label_of(const CaseReport& one) {
+  const Json command = one.source.at("extract", "command");
+  const std::vector<std::string> words = command_words(command.is_string() ? command.get<std::string>() : "");
+  return one.redacted(flag_value(words, "--label").value_or(""));
+}
+
+Markup spread_of(const CaseGroup& cases) {
   Markup strips;
   Markup items;
   for (const Measure& what : measures()) {
     std::vector<std::optional<double>> values;
-    for (const CaseReport& one : cases) {
-      values.push_back(what.compared && one.source.done() ? what.value(one.source) : std::nullopt);
+    for (const CaseReport* one : cases) {
+      values.push_back(what.compared ? what.value(one->source) : std::nullopt);
     }
     const std::vector<Outlier> found = outliers(values);
     std::vector<StripMark> marks;
     for (std::size_t i = 0; i < values.size(); ++i) {
       if (values[i]) {
         const bool out = std::ranges::find(found, i, &Outlier::index) != found.end();
-        marks.push_back({*values[i], cases[i].name, out});
+        marks.push_back({*values[i], cases[i]->name, out});
       }
     }
     strips += strip_plot(what.title, what.unit, marks);
     for (const Outlier& outlier : found) {
-      items += html("<li>{}: {} {} {} (robust z {})</li>\n", link_to(cases[outlier.index]), what.title,
+      items += html("<li>{}: {} {} {} (robust z {})</li>\n", link_to(*cases[outlier.index]), what.title,
                     figure(*values[outlier.index]), what.unit, fmt::format("{:+.1f}", outlier.z));
+    }
+  }
+  Markup made = items.text.empty() ? html("<p>No outlier.</p>\n") : html("<ul class=\"outliers\">\n{}</ul>\n", items);
+  return made += html("<div class=\"strips\">\n{}</div>\n", strips);
+}
+
+// One organ is compared with its like: cases of a label by themselves.
+Markup spread(const std::vector<CaseReport>& cases) {
+  std::map<std::string, CaseGroup> labels;
+  for (const CaseReport& one : cases) {
+    if (one.source.done()) {
+      labels[label_of(one)].push_back(&one);
     }
   }
   Markup made = heading(2, "Spread and outliers");
   made += html(
       "<p>An outlier is farther from the median than 3.5 robust standard deviations (by the median absolute "
-      "deviation), among at least five cases that are done.</p>\n");
-  made += items.text.empty() ? html("<p>None.</p>\n") : html("<ul class=\"outliers\">\n{}</ul>\n", items);
-  return made += html("<div class=\"strips\">\n{}</div>\n", strips);
+      "deviation, taken as 1 % of the median at least), among at least five cases of a label that are done.</p>\n");
+  for (const auto& [label, group] : labels) {
+    if (labels.size() > 1) {
+      made += heading(3, label.empty() ? "No label" : "Label " + label);
+    }
+    made += spread_of(group);
+  }
+  return made;
 }
 
 }  // namespace

@@ -146,6 +146,7 @@ std::vector<Outlier> outliers(std::span<const std::optional<double>> values) {
   constexpr std::size_t fewest = 5;
   constexpr double normal_quartile = 0.6745;  // MAD of a standard normal distribution
   constexpr double farthest = 3.5;
+  constexpr double least_spread = 0.01;
   std::vector<double> defined;
   for (const auto& value : values) {
     if (value) {
@@ -157,7 +158,7 @@ std::vector<Outlier> outliers(std::span<const std::optional<double>> values) {
   }
   const double middle = median(defined);
   std::ranges::for_each(defined, [&](double& value) { value = std::abs(value - middle); });
-  const double spread = median(defined);
+  const double spread = std::max(median(defined), least_spread * std::abs(middle));
   std::vector<Outlier> found;
   for (std::size_t i = 0; i < values.size() && spread > 0; ++i) {
     const double z = values[i] ? normal_quartile * (*values[i] - middle) / spread : 0;

@@ -20,8 +20,6 @@ using ::testing::StartsWith;
 
 // Lines 1 to 8: a run and the plate, 10 x 10 x 0.1 mm, its middle at z = 0.
 constexpr const char* quasi_static = "[run]\nkind = \"static\"\n";
-constexpr const char* plate =
-    "[[shell]]\nname = \"plate\"\nmesh = \"plate.ply\"\nthickness = \"0.1mm\"\nyoung = \"1MPa\"\npoisson = 0.3\n";
 
 // Six lines.
 std::string solid(const std::string& name = "cube", const std::string& mesh = "cube.msh") {
@@ -55,8 +53,8 @@ std::string fix(const std::string& body, const std::string& where, const std::st
   return fmt::format("[[fix]]\nbody = \"{}\"\nwhere = {}\ntranslation = \"xyz\"\n{}", body, where, keys);
 }
 
-std::string basic(const std::string& more) { return std::string(quasi_static) + plate + more; }
-std::string with_solid(const std::string& more) { return basic(solid() + more); }  // `more` begins in line 15
+std::string with_plate(const std::string& more) { return std::string(quasi_static) + plate + more; }
+std::string with_solid(const std::string& more) { return with_plate(solid() + more); }  // `more` begins in line 15
 
 /// With cube.msh (10 mm, from the origin, in six tetrahedra around its diagonal), lifted.msh (the same, half a wall of
 /// the plate higher), inward.ply (a ball whose triangles face inward).
@@ -118,7 +116,7 @@ TEST_F(BodiesTest, aSceneMayHaveNoShell) { EXPECT_EQ(load(quasi_static + solid()
 TEST_F(BodiesTest, aSurfaceIsFilled) {
   const std::string text =
       "[[solid]]\nname = \"stuffed\"\nfill = \"ball.ply\"\nsize = \"5mm\"\nyoung = \"60kPa\"\npoisson = 0.4999\n";
-  const Scene scene = read(basic(text));
+  const Scene scene = read(with_plate(text));
   EXPECT_DOUBLE_EQ(scene.solids.at(0).fill_size.value(), 5);
   EXPECT_EQ(again(scene).solids.at(0).fill_size, scene.solids.at(0).fill_size);
   EXPECT_FALSE(load_scene(scene).model.solids.at(0).mesh.tetrahedra.empty());
@@ -203,10 +201,10 @@ TEST_F(BodiesTest, everyShapeOfARigidBodyArrives) {
 }
 
 TEST_F(BodiesTest, inAStaticRunTablesAreOverTheLoadFactor) {
-  const Scene scene = read(basic(rigid("sphere",
-                                       "centre = [[0.0, [\"0mm\", \"0mm\", \"9mm\"]], [1.0, [\"0mm\", \"0mm\", "
-                                       "\"8mm\"]]]\nradius = [[\"0s\", \"1mm\"], [\"1s\", \"3mm\"]]") +
-                                 contact("stone", "plate")));
+  const Scene scene = read(with_plate(rigid("sphere",
+                                            "centre = [[0.0, [\"0mm\", \"0mm\", \"9mm\"]], [1.0, [\"0mm\", \"0mm\", "
+                                            "\"8mm\"]]]\nradius = [[\"0s\", \"1mm\"], [\"1s\", \"3mm\"]]") +
+                                      contact("stone", "plate")));
   ASSERT_EQ(scene.notes.size(), 1U);
   EXPECT_THAT(scene.notes[0], StartsWith(path().string() + ":13:10: "));
   EXPECT_THAT(scene.notes[0], HasSubstr("radius is read over the load factor"));
@@ -216,7 +214,7 @@ TEST_F(BodiesTest, inAStaticRunTablesAreOverTheLoadFactor) {
 
 TEST_F(BodiesTest, rigidMeshesAreTurnedOutwardAndIdleBodiesNoted) {
   const LoadedScene loaded =
-      load(basic("[[rigid]]\nname = \"in\"\nmesh = \"inward.ply\"\n" + sphere("idle") + contact("in", "plate")));
+      load(with_plate("[[rigid]]\nname = \"in\"\nmesh = \"inward.ply\"\n" + sphere("idle") + contact("in", "plate")));
   const auto& surface = std::get<RigidMesh>(loaded.model.rigids.at(0).shape).surface;
   EXPECT_GT(signed_volume(surface), 0);
   EXPECT_THAT(loaded.notes, Contains(HasSubstr("face inward")));
@@ -258,7 +256,7 @@ TEST_F(BodiesTest, touchingNodesLieOnTheChosenFace) {
   const auto attached = [&](const std::string& mesh, const std::string& distance, const std::string& side) {
     try {
       const Scene scene =
-          read(basic(solid("cube", mesh) + attach("cube", "{touching = \"" + distance + "\"}", "plate", side)));
+          read(with_plate(solid("cube", mesh) + attach("cube", "{touching = \"" + distance + "\"}", "plate", side)));
       const Model model = load_scene(again(scene)).model;
       EXPECT_EQ(model.attachments.at(0).body, 1U);
       EXPECT_EQ(model.attachments.at(0).to, 0U);
@@ -314,15 +312,6 @@ TEST_F(BodiesTest, filesOfMeshesAreListedOnce) {
   EXPECT_THAT(mesh_files(scene), ElementsAre(folder_ / "plate.ply", folder_ / "cube.msh", folder_ / "inward.ply"));
 }
 
-struct Wrong {
-  const char* name;
-  std::string text;
-  const char* place;  // ":line:column: "
-  const char* says;
-};
-
-void PrintTo(const Wrong& wrong, std::ostream* out) { *out << wrong.name; }
-
 class WrongBodies : public BodiesTest, public ::testing::WithParamInterface<Wrong> {
 protected:
   void expect(ExitCode code) {
@@ -341,19 +330,19 @@ protected:
 TEST_P(WrongBodies, isAnErrorWithItsPlace) { expect(ExitCode::input); }
 
 std::string solid_with(const std::string& lines) {
-  return basic("[[solid]]\nname = \"cube\"\n" + lines + "\n");  // `lines` begin in line 11
+  return with_plate("[[solid]]\nname = \"cube\"\n" + lines + "\n");  // `lines` begin in line 11
 }
 // `keys` begin in line 12.
-std::string rigid_with(const std::string& shape, const std::string& keys) { return basic(rigid(shape, keys)); }
+std::string rigid_with(const std::string& shape, const std::string& keys) { return with_plate(rigid(shape, keys)); }
 std::string stent_with(const std::string& line) {
-  return basic("[[rigid]]\nname = \"stent\"\nmesh = \"ball.ply\"\n" + line + "\n");  // `line` is line 12
+  return with_plate("[[rigid]]\nname = \"stent\"\nmesh = \"ball.ply\"\n" + line + "\n");  // `line` is line 12
 }
 // `keys` begin in line 16.
-std::string contact_with(const std::string& keys) { return basic(sphere() + contact("stone", "plate", keys)); }
+std::string contact_with(const std::string& keys) { return with_plate(sphere() + contact("stone", "plate", keys)); }
 
 constexpr const char* soft = "\nyoung = \"1kPa\"\npoisson = 0.3";
 
-const std::vector<Wrong> wrongs{
+const std::vector<Wrong> wrong_bodies{
     {"noBodyAtAll", quasi_static + sphere(), ":1:1: ", "no [[shell]] and no [[solid]]"},
     {"solidMeshMissing", solid_with(std::string("unit = \"mm\"") + soft), ":9:1: ", "no 'mesh' (nor fill)"},
     {"solidMeshAndFill", solid_with(std::string("mesh = \"a.msh\"\nfill = \"b.ply\"\nsize = \"1mm\"") + soft),
@@ -375,22 +364,22 @@ const std::vector<Wrong> wrongs{
      ":14:7: ", "did you mean 'neo-hookean'?"},
     {"solidKey", solid_with(std::string("mesh = \"cube.msh\"") + soft + "\nthickness = \"1mm\""),
      ":14:1: ", "unknown key"},
-    {"solidName", basic(solid("a/b")), ":10:8: ", "cannot name a solid"},
+    {"solidName", with_plate(solid("a/b")), ":10:8: ", "cannot name a solid"},
     {"solidWithoutDensity", "[run]\nkind = \"dynamic\"\nduration = \"1s\"\nstep = \"1s\"\n" + solid(),
      ":5:1: ", "has no density"},
     {"solidGravityWithoutDensity",
      with_solid("[[load]]\nbody = \"cube\"\nkind = \"gravity\"\nvalue = [\"0m/s2\", \"0m/s2\", \"1m/s2\"]\n"),
      ":9:1: ", "its gravity load"},
-    {"solidNamedAsShell", basic(solid("plate")), ":10:8: ", "two bodies"},
+    {"solidNamedAsShell", with_plate(solid("plate")), ":10:8: ", "two bodies"},
     {"rigidNamedAsSolid", with_solid(sphere("cube")), ":16:8: ", "two bodies"},
     {"contactNamedAsBody", contact_with("name = \"plate\"\n"), ":16:8: ", "bodies or contacts named \"plate\""},
     {"contactsOfOneName", contact_with("name = \"x\"\n" + contact("plate", "plate", "name = \"x\"\n")),
      ":19:8: ", "bodies or contacts named \"x\""},
     {"fixOnSolidHoldsRotation", with_solid(fix("cube", "{all = true}", "rotation = \"z\"\n")),
      ":19:12: ", "have no rotation"},
-    {"fixOnShellNeedsRotation", basic(fix("plate", "{all = true}")), ":9:1: ", "no 'rotation'"},
-    {"fixOnRigid", basic(sphere() + fix("stone", "{all = true}", "rotation = \"\"\n")), ":15:8: ", "is rigid"},
-    {"fixTouching", basic(fix("plate", "{touching = \"1mm\"}", "rotation = \"\"\n")), ":11:10: ", "unknown key"},
+    {"fixOnShellNeedsRotation", with_plate(fix("plate", "{all = true}")), ":9:1: ", "no 'rotation'"},
+    {"fixOnRigid", with_plate(sphere() + fix("stone", "{all = true}", "rotation = \"\"\n")), ":15:8: ", "is rigid"},
+    {"fixTouching", with_plate(fix("plate", "{touching = \"1mm\"}", "rotation = \"\"\n")), ":11:10: ", "unknown key"},
     {"momentOnSolid",
      with_solid("[[load]]\nbody = \"cube\"\nkind = \"moment\"\nwhere = {all = true}\n"
                 "value = [\"1N*mm\", \"0N*mm\", \"0N*mm\"]\n"),
@@ -402,7 +391,7 @@ const std::vector<Wrong> wrongs{
     {"solidHasNoSuchNode", with_solid(fix("cube", "{nodes = [8]}")), ":17:9: ", "no node 8"},
     {"solidNothingBelow", with_solid(fix("cube", "{below = {axis = \"z\", at = \"-1mm\"}}")),
      ":17:9: ", "to (10, 10, 10) mm"},
-    {"shapeMissing", basic("[[rigid]]\nname = \"stone\"\n"), ":9:1: ", "no 'shape' (nor mesh)"},
+    {"shapeMissing", with_plate("[[rigid]]\nname = \"stone\"\n"), ":9:1: ", "no 'shape' (nor mesh)"},
     {"shapeUnknown", rigid_with("spere", ""), ":11:9: ", "did you mean 'sphere'?"},
     {"shapeAndMesh", rigid_with("sphere", "mesh = \"ball.ply\""), ":11:9: ", "contradict"},
     {"centreMissing", rigid_with("sphere", "radius = \"1mm\""), ":9:1: ", "no 'centre'"},
@@ -424,7 +413,7 @@ const std::vector<Wrong> wrongs{
      ":13:10: ", "a text with a number and a unit"},
     {"centreShort", rigid_with("sphere", "centre = [\"0mm\", \"0mm\"]\nradius = \"1mm\""), ":12:10: ", "three"},
     {"motionTimesFall",
-     basic(sphere() + "motion = [[1, [\"0mm\", \"0mm\", \"0mm\"]], [0.5, [\"0mm\", \"0mm\", \"0mm\"]]]\n"),
+     with_plate(sphere() + "motion = [[1, [\"0mm\", \"0mm\", \"0mm\"]], [0.5, [\"0mm\", \"0mm\", \"0mm\"]]]\n"),
      ":14:40: ", "times of motion must increase"},
     {"normalZero", rigid_with("plane", "point = [\"0mm\", \"0mm\", \"0mm\"]\nnormal = [0, 0, 0]"), ":13:10: ", "zero"},
     {"normalWithUnits",
@@ -440,9 +429,9 @@ const std::vector<Wrong> wrongs{
                 "radius = \"1mm\"\nfrom = [\"0mm\", \"0mm\", \"0mm\"]\nto = [[0, [\"0mm\", \"0mm\", "
                 "\"1mm\"]], [1, [\"0mm\", \"0mm\", \"-1mm\"]]]"),
      ":14:6: ", "turns over"},
-    {"stentOpen", basic("[[rigid]]\nname = \"stent\"\nmesh = \"plate.ply\"\n"), ":11:8: ", "closed"},
-    {"stentMissing", basic("[[rigid]]\nname = \"stent\"\nmesh = \"no.ply\"\n"), ":11:8: ", "no such file"},
-    {"stentWithoutUnit", basic("[[rigid]]\nname = \"stent\"\nmesh = \"plate.off\"\n"), ":11:8: ", "unit = \"mm\""},
+    {"stentOpen", with_plate("[[rigid]]\nname = \"stent\"\nmesh = \"plate.ply\"\n"), ":11:8: ", "closed"},
+    {"stentMissing", with_plate("[[rigid]]\nname = \"stent\"\nmesh = \"no.ply\"\n"), ":11:8: ", "no such file"},
+    {"stentWithoutUnit", with_plate("[[rigid]]\nname = \"stent\"\nmesh = \"plate.off\"\n"), ":11:8: ", "unit = \"mm\""},
     {"stentScale", stent_with("scale = 0"), ":12:9: ", "greater than zero"},
     {"turnAxis", stent_with("turn = {point = [\"0mm\", \"0mm\", \"0mm\"], axis = [0, 0, 0], angle = 1.0}"),
      ":12:47: ", "zero"},
@@ -453,11 +442,11 @@ const std::vector<Wrong> wrongs{
     {"expandFactor",
      stent_with("expand = {point = [\"0mm\", \"0mm\", \"0mm\"], axis = [0, 0, 1], factor = [[0, 1.0], [1, 0.0]]}"),
      ":12:84: ", "greater than zero"},
-    {"turnOfSphere", basic(sphere() + "turn = {}\n"), ":14:8: ", "belongs to a rigid body of the shape mesh"},
+    {"turnOfSphere", with_plate(sphere() + "turn = {}\n"), ":14:8: ", "belongs to a rigid body of the shape mesh"},
     {"attachUnknownBody", with_solid(attach("cub", "{all = true}", "plate")), ":16:8: ", "no body \"cub\""},
     {"attachUnknownCarrier", with_solid(attach("cube", "{all = true}", "plat")), ":18:6: ", "no body \"plat\""},
-    {"attachToRigid", basic(sphere() + attach("plate", "{all = true}", "stone")), ":17:6: ", "is rigid"},
-    {"attachRigid", basic(sphere() + attach("stone", "{all = true}", "plate")), ":15:8: ", "is rigid"},
+    {"attachToRigid", with_plate(sphere() + attach("plate", "{all = true}", "stone")), ":17:6: ", "is rigid"},
+    {"attachRigid", with_plate(sphere() + attach("stone", "{all = true}", "plate")), ":15:8: ", "is rigid"},
     {"attachToItself", with_solid(attach("cube", "{all = true}", "cube")), ":18:6: ", "itself"},
     {"attachWhereMissing", with_solid("[[attach]]\nbody = \"cube\"\nto = \"plate\"\n"), ":15:1: ", "no 'where'"},
     {"attachSide", with_solid(attach("cube", "{all = true}", "plate", "side = \"top\"\n")),
@@ -466,7 +455,8 @@ const std::vector<Wrong> wrongs{
      ":19:8: ", "has no side"},
     {"attachRigidMotions", with_solid(attach("cube", "{rigid_motions = true}", "plate")), ":17:9: ", "select nodes"},
     {"attachTouchingNegative", with_solid(attach("cube", "{touching = \"-1mm\"}", "plate")), ":17:21: ", "negative"},
-    {"attachTouchingNothing", basic(solid("cube", "lifted.msh") + attach("cube", "{touching = \"0.01mm\"}", "plate")),
+    {"attachTouchingNothing",
+     with_plate(solid("cube", "lifted.msh") + attach("cube", "{touching = \"0.01mm\"}", "plate")),
      ":17:9: ", "the closest lies 0.05 mm"},
     {"attachNothing", with_solid(attach("cube", "{above = {axis = \"x\", at = \"11mm\"}}", "plate")),
      ":17:9: ", "selects no node"},
@@ -485,14 +475,14 @@ const std::vector<Wrong> wrongs{
      with_solid("[[fix]]\nbody = \"plate\"\nwhere = {rigid_motions = true}\n" +
                 attach("plate", "{nodes = [0]}", "cube")),
      ":17:9: ", "held already"},
-    {"contactUnknown", basic(contact("plate", "balloon")), ":10:11: ", "no body \"balloon\""},
-    {"contactOfThree", basic("[[contact]]\nbetween = [\"a\", \"b\", \"c\"]\n"), ":10:11: ", "names of two bodies"},
-    {"contactOfNumbers", basic("[[contact]]\nbetween = [1, 2]\n"), ":10:12: ", "text"},
-    {"contactBetweenMissing", basic("[[contact]]\nfriction = 0.1\n"), ":9:1: ", "no 'between'"},
-    {"contactBothRigid", basic(sphere() + sphere("other") + contact("stone", "other")), ":20:11: ", "both rigid"},
-    {"contactRigidItself", basic(sphere() + contact("stone", "stone")), ":15:11: ", "cannot touch itself"},
+    {"contactUnknown", with_plate(contact("plate", "balloon")), ":10:11: ", "no body \"balloon\""},
+    {"contactOfThree", with_plate("[[contact]]\nbetween = [\"a\", \"b\", \"c\"]\n"), ":10:11: ", "names of two bodies"},
+    {"contactOfNumbers", with_plate("[[contact]]\nbetween = [1, 2]\n"), ":10:12: ", "text"},
+    {"contactBetweenMissing", with_plate("[[contact]]\nfriction = 0.1\n"), ":9:1: ", "no 'between'"},
+    {"contactBothRigid", with_plate(sphere() + sphere("other") + contact("stone", "other")), ":20:11: ", "both rigid"},
+    {"contactRigidItself", with_plate(sphere() + contact("stone", "stone")), ":15:11: ", "cannot touch itself"},
     {"contactTwice", contact_with(contact("plate", "stone", "name = \"x\"\n")), ":17:11: ", "two contacts"},
-    {"contactSelfTwice", basic(contact("plate", "plate") + contact("plate", "plate", "name = \"x\"\n")),
+    {"contactSelfTwice", with_plate(contact("plate", "plate") + contact("plate", "plate", "name = \"x\"\n")),
      ":12:11: ", "two contacts"},
     {"frictionNegative", contact_with("friction = -0.1\n"), ":16:12: ", "negative"},
     {"frictionText", contact_with("friction = \"0.1\"\n"), ":16:12: ", "number"},
@@ -504,7 +494,7 @@ const std::vector<Wrong> wrongs{
     {"contactName", contact_with("name = \"a.b\"\n"), ":16:8: ", "cannot name a contact"},
 };
 
-INSTANTIATE_TEST_SUITE_P(all, WrongBodies, ::testing::ValuesIn(wrongs),
+INSTANTIATE_TEST_SUITE_P(all, WrongBodies, ::testing::ValuesIn(wrong_bodies),
                          [](const auto& test) { return std::string(test.param.name); });
 
 class LaterBodies : public WrongBodies {};
@@ -514,22 +504,22 @@ TEST_P(LaterBodies, saysNotAvailableYet) { expect(ExitCode::usage); }
 std::string modes(const std::string& kind, const std::string& more) {
   return "[run]\nkind = \"" + kind + "\"\n" + plate + "density = \"1g/cm3\"\n" + more;  // `more` begins in line 10
 }
-std::string path_with(const std::string& more) {
+std::string arc_length_with(const std::string& more) {
   return "[run]\nkind = \"static\"\ncontrol = \"arc-length\"\n" + std::string(plate) + more;  // in line 10
 }
-std::string accurate(const std::string& more) { return basic("[accuracy]\nwithin = \"2%\"\n" + more); }
+std::string accurate(const std::string& more) { return with_plate("[accuracy]\nwithin = \"2%\"\n" + more); }
 
 constexpr const char* later = "not available yet";
 const std::vector<Wrong> laters{
     {"solidInFrequencies", modes("frequencies", solid()), ":10:1: ", later},
     {"solidInBuckling", modes("buckling", solid()), ":10:1: ", later},
-    {"solidByArcLength", path_with(solid()), ":10:1: ", later},
+    {"solidByArcLength", arc_length_with(solid()), ":10:1: ", later},
     {"contactInFrequencies", modes("frequencies", contact("plate", "plate")), ":10:1: ", later},
     {"contactInBuckling", modes("buckling", contact("plate", "plate")), ":10:1: ", later},
-    {"contactByArcLength", path_with(contact("plate", "plate")), ":10:1: ", later},
+    {"contactByArcLength", arc_length_with(contact("plate", "plate")), ":10:1: ", later},
     {"attachInFrequencies", modes("frequencies", attach("plate", "{all = true}", "plate")), ":10:1: ", later},
     {"attachInBuckling", modes("buckling", attach("plate", "{all = true}", "plate")), ":10:1: ", later},
-    {"attachByArcLength", path_with(attach("plate", "{all = true}", "plate")), ":10:1: ", later},
+    {"attachByArcLength", arc_length_with(attach("plate", "{all = true}", "plate")), ":10:1: ", later},
     {"contactLinear",
      "[run]\nkind = \"static\"\ngeometry = \"linear\"\n" + std::string(plate) + contact("plate", "plate"),
      ":10:1: ", later},

@@ -13,9 +13,6 @@ using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
 constexpr const char* run = "[run]\nkind = \"static\"\n";  // lines 1 and 2
-// Lines 3 to 8.
-constexpr const char* plate =
-    "[[shell]]\nname = \"plate\"\nmesh = \"plate.ply\"\nthickness = \"0.1mm\"\nyoung = \"1MPa\"\npoisson = 0.3\n";
 constexpr const char* ball =
     "[[shell]]\nname = \"ball\"\nmesh = \"ball.ply\"\nthickness = \"0.1mm\"\nyoung = \"1MPa\"\npoisson = 0.3\n";
 constexpr const char* clamped =
@@ -291,15 +288,6 @@ TEST_F(SceneTest, AKeyOfVeryManyPartsIsRefusedNotACrash) {
   }
 }
 
-struct Wrong {
-  const char* name;
-  std::string text;
-  const char* place;  // ":line:column: "
-  const char* says;
-};
-
-void PrintTo(const Wrong& wrong, std::ostream* out) { *out << wrong.name; }
-
 class WrongScene : public SceneTest, public ::testing::WithParamInterface<Wrong> {};
 
 TEST_P(WrongScene, isAnErrorWithItsPlace) {
@@ -331,7 +319,7 @@ std::string path_with(const std::string& line) {
   return run_with("control = \"arc-length\"\n" + line);  // `line` is line 4
 }
 
-const std::vector<Wrong> wrongs{
+const std::vector<Wrong> wrong_scenes{
     {"maxStepsUnderLoadControl", run_with("max_steps = 3"), ":3:13: ", "arc-length"},
     {"maxFactorOfBuckling", modes_with("buckling", "max_factor = 3"), ":3:14: ", "arc-length"},
     {"linearPath", path_with("geometry = \"linear\""), ":4:12: ", "no path"},
@@ -540,7 +528,7 @@ TEST_F(SceneTest, thicknessOfEveryVertexComesFromTheMesh) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(all, WrongScene, ::testing::ValuesIn(wrongs),
+INSTANTIATE_TEST_SUITE_P(all, WrongScene, ::testing::ValuesIn(wrong_scenes),
                          [](const auto& test) { return std::string(test.param.name); });
 
 TEST_F(SceneTest, damagedTextNeverCrashes) {

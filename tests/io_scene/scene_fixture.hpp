@@ -6,6 +6,20 @@
 
 namespace tunica::test {
 
+/// The plate of plate.ply, six lines.
+inline constexpr const char* plate =
+    "[[shell]]\nname = \"plate\"\nmesh = \"plate.ply\"\nthickness = \"0.1mm\"\nyoung = \"1MPa\"\npoisson = 0.3\n";
+
+/// A scene that is refused.
+struct Wrong {
+  const char* name;
+  std::string text;
+  const char* place;  ///< ":line:column: "
+  const char* says;
+};
+
+inline void PrintTo(const Wrong& wrong, std::ostream* out) { *out << wrong.name; }
+
 /// A square of 10 mm in n x n cells, each cut in two; nodes row by row from (0, 0).
 inline TriangleMesh square(Index n) {
   TriangleMesh mesh;

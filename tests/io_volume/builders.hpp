@@ -205,6 +205,14 @@ inline std::string nifti_header(const NiftiOptions& options, int datatype, int b
   return h;
 }
 
+inline const std::string voxels = encoded(sample_values<std::uint8_t>(60), Endian::little);
+
+inline std::string replaced(std::string text, const std::string& from, const std::string& to) {
+  const auto at = text.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  return text.replace(at, from.size(), to);
+}
+
 /// A 3 x 4 x 5 uint8 volume (60 voxels) unless told otherwise.
 inline std::string nifti_file(const NiftiOptions& options = {}) {
   std::size_t count = 1;

@@ -17,6 +17,7 @@
 namespace tunica::benchmarks {
 
 inline constexpr double pi = std::numbers::pi;
+inline constexpr double eps = 1e-9;  ///< how far from a plane a node may lie that lies in it
 
 enum class Diagonals { one, alternating, random, other };
 

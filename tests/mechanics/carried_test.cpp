@@ -1,5 +1,6 @@
 // Nodes that another body carries.
 
+#include "random.hpp"
 #include "tets.hpp"
 #include "tunica/mechanics/elements/rotation.hpp"
 #include "tunica/mechanics/runs/detail/shell_system.hpp"
@@ -11,18 +12,6 @@ namespace tunica {
 namespace {
 
 using namespace benchmarks;
-
-constexpr double eps = 1e-9;
-
-class Random {
-public:
-  double operator()(double most) { return most * uniform_(engine_); }
-  Vec3 vector(double most) { return {(*this)(most), (*this)(most), (*this)(most)}; }
-
-private:
-  std::mt19937 engine_{13};
-  std::uniform_real_distribution<double> uniform_{-1, 1};
-};
 
 TetMesh box(std::size_t nx, std::size_t ny, std::size_t nz, const Vec3& low, const Vec3& high) {
   return make_block(nx, ny, nz, [&](const Vec3& u) { return Vec3(low + u.cwiseProduct(high - low)); });
@@ -146,7 +135,7 @@ TEST(Carried, RigidMotionsGiveNoForce) {
 TEST(Carried, CondensedForcesKeepTheirSumAndMoment) {
   for (const Model& model : {shell_on_solid(), solid_on_shell()}) {
     const ShellSystem system = make_system(model);
-    Random random;
+    Random random(13);
     Configuration moved = reference_configuration(system);
     VectorX step = VectorX::NullaryExpr(first_freedom(system.node_count()), [&](Eigen::Index) { return random(0.02); });
     advance_configuration(system, step, moved);
@@ -182,7 +171,7 @@ TEST(Carried, CondensedForcesKeepTheirSumAndMoment) {
 TEST(Carried, TheCondensedTangentIsTheDerivativeOfTheCondensedForces) {
   for (const Model& model : {shell_on_solid(), solid_on_shell()}) {
     const ShellSystem system = make_system(model);
-    Random random;
+    Random random(13);
     const Eigen::Index size = first_freedom(system.node_count());
     Configuration at = reference_configuration(system);
     VectorX away = VectorX::NullaryExpr(size, [&](Eigen::Index) { return random(0.02); });
@@ -226,7 +215,7 @@ double stacked_error(std::size_t coarse, std::size_t fine, SolidLaw law, bool li
   Model model;
   model.solids.push_back({"lower", box(coarse, coarse, 2, Vec3(0, 0, 0), Vec3(2, 2, 1)), {1, 0.3, std::nullopt}, law});
   model.solids.push_back({"upper", box(fine, fine, 2, Vec3(0, 0, 1), Vec3(2, 2, 2)), {1, 0.3, std::nullopt}, law});
-  Random random;
+  Random random(13);
   for (SolidBody& body : model.solids) {  // distorted inside
     for (Vec3& x : body.mesh.vertices) {
       const bool inside = x.x() > eps && x.x() < 2 - eps && x.y() > eps && x.y() < 2 - eps && x.z() > eps &&

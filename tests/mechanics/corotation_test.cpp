@@ -1,5 +1,7 @@
 // The co-rotational element: forces are the gradient of the energy, the tangent is the gradient of the forces.
 
+#include "random.hpp"
+
 #include "tunica/mechanics/elements/element_lanes.hpp"
 #include "tunica/mechanics/elements/pressure.hpp"
 #include "tunica/mechanics/elements/rotation.hpp"
@@ -10,26 +12,15 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <random>
 
 namespace tunica {
 namespace {
-
-class Random {
-public:
-  double operator()(double scale) { return scale * uniform_(engine_); }
-  Vec3 vector(double scale) { return {(*this)(scale), (*this)(scale), (*this)(scale)}; }
-
-private:
-  std::mt19937 engine_{7};
-  std::uniform_real_distribution<double> uniform_{-1, 1};
-};
 
 /// A triangle of a surface that curves.
 ShellElement some_element(Membrane membrane = Membrane::opt, Bending bending = Bending::dkt) {
   const std::array<Vec3, 3> corners{Vec3(0.1, 0.2, 0.3), Vec3(1.3, 0.1, 0.5), Vec3(0.4, 1.1, -0.2)};
   const Vec3 n = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalized();
-  Random random;
+  Random random(7);
   ShellSurface surface{{}, true};
   for (Vec3& normal : surface.normals) {
     normal = (n + random.vector(0.3)).normalized();
@@ -64,7 +55,7 @@ CornerMotion moved(const CornerMotion& motion, int freedom, double amount) {
 }
 
 TEST(Corotation, ForceIsTheGradientOfTheEnergy) {
-  Random random;
+  Random random(7);
   const ShellElement element = some_element();
   const CornerMotion motion = large_motion(element, random);
   ElementResponse response, plus, minus;
@@ -78,7 +69,7 @@ TEST(Corotation, ForceIsTheGradientOfTheEnergy) {
 }
 
 TEST(Corotation, TangentIsTheGradientOfTheForce) {
-  Random random;
+  Random random(7);
   const ShellElement element = some_element();
   const CornerMotion motion = large_motion(element, random);
   ElementResponse response, plus, minus;
@@ -125,7 +116,7 @@ TEST(Corotation, RigidMotionGivesNoForces) {
 }
 
 TEST(Corotation, ForcesAreInBalance) {
-  Random random;
+  Random random(7);
   const ShellElement element = some_element();
   const CornerMotion motion = large_motion(element, random);
   ElementResponse response;
@@ -145,7 +136,7 @@ TEST(Corotation, ForcesAreInBalance) {
 // Four at once against one after the other. One lane turns far, so that all take the formulas for large rotations where
 // each alone takes series; one has collapsed, and must not spoil the others.
 TEST(Lanes, DoNotSeeEachOther) {
-  Random random;
+  Random random(7);
   const ShellElement one = some_element();
   const ShellElement other = some_element(Membrane::cst, Bending::comas);
   const std::array<const ShellElement*, lane_count> elements{&one, &other, &one, &other};
@@ -203,14 +194,14 @@ TEST(Corotation, CollapsedTriangleIsReported) {
   EXPECT_FALSE(corotational_response(element, motion, {}, response, nullptr));
 }
 
-struct Patch {
+struct MovedPatch {
   std::array<Vec3, 3> corners{Vec3(0.1, 0.2, 0.3), Vec3(1.3, 0.1, 0.5), Vec3(0.4, 1.1, -0.2)};
   std::array<Vec3, 3> normals;
 };
 
-Patch some_patch() {
-  Random random;
-  Patch patch;
+MovedPatch some_patch() {
+  Random random(7);
+  MovedPatch patch;
   const Vec3 n = (patch.corners[1] - patch.corners[0]).cross(patch.corners[2] - patch.corners[0]).normalized();
   for (Vec3& normal : patch.normals) {
     normal = (n + random.vector(0.4)).normalized();
@@ -219,8 +210,8 @@ Patch some_patch() {
 }
 
 /// Corners after a large motion with strains of some 20 %.
-std::array<Vec3, 3> moved_corners(const Patch& patch) {
-  Random random;
+std::array<Vec3, 3> moved_corners(const MovedPatch& patch) {
+  Random random(7);
   std::array<Vec3, 3> corners = patch.corners;
   for (Vec3& corner : corners) {
     corner = exponential(Vec3(0.3, 1.1, -0.4)) * corner + random.vector(0.2) + Vec3(1, 2, 3);
@@ -229,7 +220,7 @@ std::array<Vec3, 3> moved_corners(const Patch& patch) {
 }
 
 TEST(Pressure, HeightIsThatOfTheCurvedPatch) {
-  const Patch patch = some_patch();
+  const MovedPatch patch = some_patch();
   const Deflection deflection = comas_deflection(patch.corners, patch.normals);
   double mean = 0;
   for (const double ordinate : deflection.ordinates) {
@@ -240,7 +231,7 @@ TEST(Pressure, HeightIsThatOfTheCurvedPatch) {
 }
 
 TEST(Pressure, ForceIsTheGradientOfTheVolumeWithTheFacetsShare) {
-  const Patch patch = some_patch();
+  const MovedPatch patch = some_patch();
   const PatchHeight height = patch_height(patch.corners, patch.normals);
   const auto corners = moved_corners(patch);
   Vector9 force, flat;
@@ -261,7 +252,7 @@ TEST(Pressure, ForceIsTheGradientOfTheVolumeWithTheFacetsShare) {
 }
 
 TEST(Pressure, StiffnessIsTheGradientOfTheForce) {
-  const Patch patch = some_patch();
+  const MovedPatch patch = some_patch();
   const PatchHeight height = patch_height(patch.corners, patch.normals);
   const auto corners = moved_corners(patch);
   Vector9 force;
@@ -280,7 +271,7 @@ TEST(Pressure, StiffnessIsTheGradientOfTheForce) {
 }
 
 TEST(Pressure, PartOfThePatchIsInBalanceByItself) {
-  const Patch patch = some_patch();
+  const MovedPatch patch = some_patch();
   const PatchHeight height = patch_height(patch.corners, patch.normals);
   const auto corners = moved_corners(patch);
   Vector9 curved, flat;
@@ -306,7 +297,7 @@ double volume_of(const ShellElement& element, const CornerMotion& motion) {
 }
 
 TEST(Pressure, OnSlopesThatCountForceIsTheGradientOfTheVolume) {
-  Random random;
+  Random random(7);
   const ShellElement element = some_element();
   const CornerMotion motion = large_motion(element, random);
   Vector18 force;
@@ -322,7 +313,7 @@ TEST(Pressure, OnSlopesThatCountForceIsTheGradientOfTheVolume) {
 }
 
 TEST(Pressure, OnSlopesThatCountStiffnessIsTheGradientOfTheForce) {
-  Random random;
+  Random random(7);
   const ShellElement element = some_element();
   const CornerMotion motion = large_motion(element, random);
   Vector18 force, plus, minus;
@@ -337,7 +328,7 @@ TEST(Pressure, OnSlopesThatCountStiffnessIsTheGradientOfTheForce) {
 }
 
 TEST(Pressure, OnSlopesThatCountIsInBalance) {
-  Random random;
+  Random random(7);
   const ShellElement element = some_element();
   const CornerMotion motion = large_motion(element, random);
   Vector18 force;

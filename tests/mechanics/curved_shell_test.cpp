@@ -8,7 +8,6 @@ namespace tunica {
 namespace {
 
 using namespace benchmarks;
-constexpr double eps = 1e-9;
 
 /// A closed bumpy organ over a geodesic sphere: 20 x frequency^2 triangles with the surface's normals, mean radius 10.
 ShellMesh bumpy_organ(std::size_t frequency) {

@@ -14,18 +14,18 @@ namespace {
 
 using namespace benchmarks;
 
-struct Problem {
+struct Factorable {
   BlockMatrix matrix;
   FreeMask free;
   VectorX right;
 };
 
 /// The stiffness of a sphere's shell minus `shift` times its own diagonal, with freedoms held here and there.
-Problem sphere_problem(int levels, double shift) {
+Factorable sphere_problem(int levels, double shift) {
   Model model;
   model.shells.push_back(flat_body(make_sphere(10, levels), 1, 0.3, 0.5));
   const ShellSystem system = make_system(model);
-  Problem problem{system.pattern, FreeMask(6 * system.node_count(), true), {}};
+  Factorable problem{system.pattern, FreeMask(6 * system.node_count(), true), {}};
   linear_stiffness(system, problem.matrix);
   for (std::size_t i = 0; i < system.node_count(); ++i) {
     auto block = problem.matrix.block(problem.matrix.find(static_cast<Index>(i), static_cast<Index>(i)));
@@ -51,7 +51,7 @@ std::vector<Eigen::Index> free_freedoms(const FreeMask& free) {
   return result;
 }
 
-Eigen::MatrixXd dense(const Problem& problem) {
+Eigen::MatrixXd dense(const Factorable& problem) {
   const auto size = static_cast<Eigen::Index>(problem.free.size());
   Eigen::MatrixXd full = Eigen::MatrixXd::Zero(size, size);
   for (std::size_t i = 0; i < problem.matrix.node_count(); ++i) {
@@ -66,7 +66,7 @@ Eigen::MatrixXd dense(const Problem& problem) {
 
 TEST(DirectSolver, SolvesAndCountsWhatDenseAlgebraDoes) {
   for (const double shift : {0.0, 0.02, 0.3}) {
-    const Problem problem = sphere_problem(2, shift);
+    const Factorable problem = sphere_problem(2, shift);
     DirectSolver solver(problem.matrix, problem.free);
     const DirectSolver::Factored factored = solver.factor(problem.matrix);
     const Eigen::MatrixXd matrix = dense(problem);
@@ -88,7 +88,7 @@ TEST(DirectSolver, FactorsAgainAndIsTheSameToTheBitOnMoreThreads) {
   std::vector<VectorX> solutions;
   for (const std::size_t threads : {1U, 4U, 4U}) {
     set_thread_count(threads);
-    const Problem problem = sphere_problem(4, 0.05);
+    const Factorable problem = sphere_problem(4, 0.05);
     DirectSolver solver(problem.matrix, problem.free);
     for (const double factor : {2.0, 1.0}) {  // what an earlier factor left must not show
       BlockMatrix scaled = problem.matrix;
@@ -106,7 +106,7 @@ TEST(DirectSolver, FactorsAgainAndIsTheSameToTheBitOnMoreThreads) {
 }
 
 TEST(DirectSolver, SaysThatAPivotVanishes) {
-  Problem problem = sphere_problem(1, 0);
+  Factorable problem = sphere_problem(1, 0);
   auto block = problem.matrix.block(problem.matrix.find(8, 8));
   for (std::size_t k = problem.matrix.row_start[8]; k < problem.matrix.row_start[9]; ++k) {
     problem.matrix.block(k).row(1).setZero();

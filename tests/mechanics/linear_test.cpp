@@ -38,8 +38,6 @@ Model one_shell(ShellBody body, const Elements& elements, std::function<Vec3(con
   return model;
 }
 
-constexpr double eps = 1e-9;
-
 /// Ratio of the deflection at the middle of the free edge to the thin-shell limit.
 double scordelis_lo(std::size_t n, const Elements& elements, Diagonals diagonals = Diagonals::one) {
   const double half = 40 * pi / 180;

@@ -13,7 +13,6 @@ namespace tunica {
 namespace {
 
 using namespace benchmarks;
-constexpr double eps = 1e-9;
 
 RunSettings frequency_run(std::size_t count) {
   RunSettings settings;

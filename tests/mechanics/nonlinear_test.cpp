@@ -10,7 +10,6 @@ namespace tunica {
 namespace {
 
 using namespace benchmarks;
-constexpr double eps = 1e-9;
 
 std::vector<double> equal_steps(std::size_t count) {
   std::vector<double> factors;

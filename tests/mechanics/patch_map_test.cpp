@@ -1,6 +1,7 @@
 // From the nodes to the points of the curved surface, and back with forces.
 
 #include "benchmarks.hpp"
+#include "random.hpp"
 #include "tunica/mechanics/contact/surface_faces.hpp"
 #include "tunica/mechanics/elements/rotation.hpp"
 #include "tunica/shell/patch/shape_function.hpp"
@@ -18,11 +19,10 @@ using Points = PatchMap::Points;
 using Matrix27 = PatchMap::Matrix27;
 using Vector27 = Eigen::Matrix<double, 27, 1>;
 
-class Random {
+class RandomSample : public Random {
 public:
-  double operator()(double most) { return most * uniform_(engine_); }
-  Vec3 vector(double most) { return {(*this)(most), (*this)(most), (*this)(most)}; }
-  Eigen::Quaterniond rotation(double most) { return exponential(vector(most)); }
+  RandomSample() : Random(5) {}
+
   Points points(double most) {
     return Points::NullaryExpr([&](Eigen::Index, Eigen::Index) { return (*this)(most); });
   }
@@ -30,10 +30,6 @@ public:
     const double u = std::abs((*this)(1)), v = std::abs((*this)(1));
     return u + v > 1 ? Vec2(1 - u, 1 - v) : Vec2(u, v);
   }
-
-private:
-  std::mt19937 engine_{5};
-  std::uniform_real_distribution<double> uniform_{-1, 1};
 };
 
 Configuration at_rest(std::size_t nodes) {
@@ -53,7 +49,7 @@ struct Sample {
   Configuration configuration;
 };
 
-Sample random_sample(Random& random, Edges edges, double spin = 0.3) {
+Sample random_sample(RandomSample& random, Edges edges, double spin = 0.3) {
   Sample s;
   const Eigen::Quaterniond turn = random.rotation(1.7);
   const Vec3 place = random.vector(3);
@@ -109,7 +105,7 @@ Sample advanced(const Sample& s, const Vector18& step) {
 
 template <typename Check>
 void for_all(const Check& check) {
-  Random random;
+  RandomSample random;
   for (const Edges edges : all_edges) {
     SCOPED_TRACE("edges: " + std::to_string(static_cast<int>(edges)));
     for (int i = 0; i < 40; ++i) {
@@ -123,7 +119,7 @@ CubicPatch patch_at(const std::vector<Vec3>& x, const std::array<Vec3, 3>& norma
 }
 
 TEST(PatchMap, AtTheReferenceItIsTheWatertightPatch) {
-  for_all([](const Sample& s, Random& random) {
+  for_all([](const Sample& s, RandomSample& random) {
     const PatchMap map(s.face, s.reference, at_rest(3));
     const CubicPatch patch = patch_at(s.reference, s.face.normals, s.face.across);
     for (int i = 0; i < 9; ++i) {
@@ -138,7 +134,7 @@ TEST(PatchMap, AtTheReferenceItIsTheWatertightPatch) {
 
 /// Edge points follow the watertight rule with the normals that the nodes carry, wherever they have gone.
 TEST(PatchMap, MovedItHasTheEdgesOfTheWatertightPatchOfTheMovedNormals) {
-  for_all([](const Sample& s, Random&) {
+  for_all([](const Sample& s, RandomSample&) {
     const PatchMap map = map_of(s);
     std::vector<Vec3> x = s.reference;
     std::array<Vec3, 3> normals;
@@ -157,7 +153,7 @@ TEST(PatchMap, MovedItHasTheEdgesOfTheWatertightPatchOfTheMovedNormals) {
 }
 
 TEST(PatchMap, WeightDerivativesAreThoseOfTheWeights) {
-  for_all([](const Sample& s, Random& random) {
+  for_all([](const Sample& s, RandomSample& random) {
     const Vec2 b = random.barycentric();
     const auto derivatives = patch_weight_derivatives(s.face, b);
     for (int along = 0; along < 2; ++along) {
@@ -171,7 +167,7 @@ TEST(PatchMap, WeightDerivativesAreThoseOfTheWeights) {
 }
 
 TEST(PatchMap, ChangeIsTheDerivativeOfThePoints) {
-  for_all([](const Sample& s, Random& random) {
+  for_all([](const Sample& s, RandomSample& random) {
     constexpr double step = 1e-6;
     const PatchMap map = map_of(s);
     const PatchWeights weights = patch_weights(s.face, random.barycentric());
@@ -187,7 +183,7 @@ TEST(PatchMap, ChangeIsTheDerivativeOfThePoints) {
 }
 
 TEST(PatchMap, WorkIsTheSameOnBothSides) {
-  for_all([](const Sample& s, Random& random) {
+  for_all([](const Sample& s, RandomSample& random) {
     const PatchMap map = map_of(s);
     const Points forces = random.points(1);
     const Vector18 motion = Vector18::NullaryExpr([&](Eigen::Index) { return random(1); });
@@ -196,7 +192,7 @@ TEST(PatchMap, WorkIsTheSameOnBothSides) {
 }
 
 TEST(PatchMap, ForcesAndMomentsAreInBalance) {
-  for_all([](const Sample& s, Random& random) {
+  for_all([](const Sample& s, RandomSample& random) {
     const PatchMap map = map_of(s);
     const PatchWeights weights = patch_weights(s.face, random.barycentric());
     const Vec3 force = random.vector(1), point = map.point(weights);
@@ -214,7 +210,7 @@ TEST(PatchMap, ForcesAndMomentsAreInBalance) {
 
 /// For forces that the points' places change (of_points), and for the change of the map itself.
 TEST(PatchMap, StiffnessIsTheDerivativeOfTheForcesOnTheNodes) {
-  for_all([](const Sample& s, Random& random) {
+  for_all([](const Sample& s, RandomSample& random) {
     constexpr double step = 1e-5;
     const PatchMap map = map_of(s);
     const Matrix27 any = Matrix27::NullaryExpr([&](Eigen::Index, Eigen::Index) { return random(1); });
@@ -238,7 +234,7 @@ TEST(PatchMap, StiffnessIsTheDerivativeOfTheForcesOnTheNodes) {
 
 /// Spins do not commute: what is not symmetric is half the moments on the nodes, and nothing else.
 TEST(PatchMap, StiffnessIsSymmetricButForTheMoments) {
-  for_all([](const Sample& s, Random& random) {
+  for_all([](const Sample& s, RandomSample& random) {
     const PatchMap map = map_of(s);
     const Points forces = random.points(1);
     Matrix18 stiffness = map.stiffness(Matrix27::Zero(), forces);
@@ -251,7 +247,7 @@ TEST(PatchMap, StiffnessIsSymmetricButForTheMoments) {
 }
 
 TEST(PatchMap, RigidMotionsMoveAllPointsRigidly) {
-  for_all([](const Sample& s, Random& random) {
+  for_all([](const Sample& s, RandomSample& random) {
     const Eigen::Quaterniond turn = random.rotation(1.7);
     const Vec3 shift = random.vector(5);
     Sample moved = s;
@@ -266,7 +262,7 @@ TEST(PatchMap, RigidMotionsMoveAllPointsRigidly) {
 }
 
 TEST(PatchMap, FlatFacesAreBarycentric) {
-  Random random;
+  RandomSample random;
   Sample s = random_sample(random, Edges::smooth);
   s.face.curved = false;
   const PatchMap map = map_of(s);
@@ -303,7 +299,7 @@ Model shell_model(const ShellMesh& mesh) {
 
 /// The largest gap between neighbours along their edges, after nodes have moved and turned as they like.
 double largest_gap(const ShellMesh& mesh, double spin) {
-  Random random;
+  RandomSample random;
   const Surfaces surfaces = surface_faces(shell_model(mesh));
   Configuration moved = at_rest(mesh.vertices.size());
   for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {

@@ -8,7 +8,6 @@ namespace tunica {
 namespace {
 
 using namespace benchmarks;
-constexpr double eps = 1e-9;
 
 /// Rings of n, 2 n ... segments: 6 rings^2 triangles on the unit disc; the centre is node 0.
 ShellMesh disc(double radius, std::size_t rings) {

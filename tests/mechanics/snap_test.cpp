@@ -11,7 +11,6 @@ namespace tunica {
 namespace {
 
 using namespace benchmarks;
-constexpr double eps = 1e-6;
 
 std::vector<double> equal_steps(std::size_t count) {
   std::vector<double> factors(count);

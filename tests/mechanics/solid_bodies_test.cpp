@@ -10,8 +10,6 @@ namespace {
 
 using namespace benchmarks;
 
-constexpr double eps = 1e-9;
-
 /// Tip deflection of a cantilever of square section, length 6, over Timoshenko's; Poisson's ratio 0.3, n cells through
 /// the thickness.
 double cantilever(std::size_t n, SolidLaw law, bool linear) {

@@ -66,7 +66,10 @@ TEST(Outliers, AreFarFromTheMedianOfFiveAtLeast) {
   EXPECT_EQ(found[0].index, 6U);
   EXPECT_NEAR(found[0].z, 0.6745 * (9.0 - 1.025) / 0.075, 1e-9);
   EXPECT_TRUE(outliers(std::vector<std::optional<double>>{1.0, 1.1, 0.9, 9.0}).empty());
-  EXPECT_TRUE(outliers(std::vector<std::optional<double>>{1.0, 1.0, 1.0, 1.0, 1.0, 9.0}).empty()) << "no spread";
+  using Values = std::vector<std::optional<double>>;
+  EXPECT_TRUE(outliers(Values{20.0, 20.0, 20.001, 20.0, 20.0, 21.0}).empty()) << "5 % beside a spread of 1 %";
+  EXPECT_EQ(outliers(Values{1.0, 1.0, 1.0, 1.0, 1.0, 9.0}).size(), 1U);
+  EXPECT_TRUE(outliers(Values{0.0, 0.0, 0.0, 0.0, 0.0, 9.0}).empty()) << "no spread";
 }
 
 TEST(RedactionTest, KnowsNamesAsWordsAlone) {

@@ -271,7 +271,7 @@ class Choices(ExtractTest):
         _, closed = self.extract_and_check(path, array == 1, LPS, "--label", 1)
         self.assertIn("the image's border cuts it (16 voxels)", closed["warnings"][-1])
         record, _ = self.run_tool(path, self.out, "--label", 1, "--open-border")
-        self.assertEqual(record["warnings"], [])
+        self.assertNotIn("border", " ".join(record["warnings"]))
         ply = Ply(self.out)
         self.assertIs(record["result"]["closed"], False)
         self.assertIs(record["result"]["manifold"], True)
@@ -417,7 +417,7 @@ class Choices(ExtractTest):
         self.assertLess(radius.std(), 0.1)
         self.assertIsNotNone(record["seconds"]["smooth"])
         self.assertEqual(record["result"]["voxel_volume_mm3"], mask.sum())
-        self.assertEqual(record["warnings"], [])
+        self.assertNotIn("smoothing", " ".join(record["warnings"]))
 
     def test_a_gaussian_that_changes_the_shape_is_warned_of(self):
         plate = numpy.zeros((40, 40, 16), numpy.uint8)

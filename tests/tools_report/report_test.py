@@ -123,6 +123,7 @@ class CasePage(ReportTest):
         for needed in ("Done and converged", "Not a medical device", "Comas", "SHA-256", "Inputs as resolved",
                        "Time and memory", "MIT", "certified to be at most", "GPL-3.0-or-later", "Young's modulus"):
             self.assertIn(needed, page.text)
+        self.assertIn("was not estimated: --accuracy", page.text)
         self.assertIn(cases.sha256(self.case / "shell.ply"), page.text)
         self.assertIn(json.loads((self.case / "relax.json").read_text())["command"], page.text)
         self.assertTrue(all(column.get("scope") for column in page.of("th")))
@@ -254,6 +255,33 @@ class CohortPage(ReportTest):
         self.assertEqual(page.of("details")[0]["class"], "case failed", "failures first")
         self.assertEqual(text.count('<svg viewBox="0 0 320 58" role="img"'), 7)
         self.assertEqual(len(page.of("caption")), len(page.of("table")))
+
+    def test_labels_are_compared_apart(self):
+        self.cohort(10)
+        _, text, _ = self.report()
+        self.assertEqual((text.count("(robust z"), text.count('<svg viewBox="0 0 320 58" role="img"')), (0, 7))
+        self.assertNotIn("<h3>Label", text)
+
+        def liver(reports):
+            for report in reports.values():
+                report["warnings"] = []
+            reports["extract"]["command"] = reports["extract"]["command"].replace("--label 1", "--label '<i>liver'")
+            reports["extract"]["result"]["voxel_volume_mm3"] = 1600000
+        self.assertIn("--label 1", json.loads((self.case / "extract.json").read_text())["command"])
+        self.copy("zz-liver", liver)
+        _, text, _ = self.report()
+        self.assertEqual((text.count("(robust z"), text.count('<svg viewBox="0 0 320 58" role="img"')), (0, 14))
+        self.assertEqual(re.findall("<h3>(Label .*)</h3>", text), ["Label 1", "Label &lt;i&gt;liver"])
+
+    def test_error_of_an_accuracy_is_told(self):
+        def asked(credible):
+            return lambda reports: reports["simulate"]["result"].update(
+                accuracy={"of": "stress", "estimate_percent": 4.2, "credible": credible})
+        self.copy("known", asked(True))
+        self.copy("vain", asked(False))
+        _, _, page = self.report()
+        self.assertIn("The error of the stress by the number of shells is credibly below 4.2 %.", page.text)
+        self.assertIn("The error of the stress by the number of shells is not credibly known.", page.text)
 
     def test_table_and_what_its_columns_mean(self):
         self.cohort(3)

@@ -22,14 +22,14 @@ namespace {
 
 using test::label_one;
 
-struct Case {
+struct Shape {
   std::string name;
   bool open;
 };
 
-void PrintTo(const Case& shape, std::ostream* out) { *out << shape.name; }
+void PrintTo(const Shape& shape, std::ostream* out) { *out << shape.name; }
 
-class PhantomOf : public testing::TestWithParam<Case> {
+class PhantomOf : public testing::TestWithParam<Shape> {
 protected:
   static PhantomOptions options(std::size_t size) {
     PhantomOptions result;
@@ -40,8 +40,8 @@ protected:
 };
 
 INSTANTIATE_TEST_SUITE_P(Shapes, PhantomOf,
-                         testing::Values(Case{"sphere", false}, Case{"tube", true}, Case{"aneurysm", true},
-                                         Case{"capsule", false}, Case{"bladder", false}, Case{"colon", false}),
+                         testing::Values(Shape{"sphere", false}, Shape{"tube", true}, Shape{"aneurysm", true},
+                                         Shape{"capsule", false}, Shape{"bladder", false}, Shape{"colon", false}),
                          [](const auto& shape) { return shape.param.name; });
 
 TEST_P(PhantomOf, TheTruthIsAnOrientedManifoldThatEndsOnTheImageBorder) {

@@ -50,33 +50,33 @@ double mean_distance(const TriangleMesh& mesh, const ClosestPoint& truth) {
   return sum / weights;
 }
 
-struct Case {
+struct Smoothed {
   std::string shape;
   std::size_t size;
   Vec3 spacing;
   double gain;  ///< error of the smoothed surface over that of the staircase, at most
 };
 
-void PrintTo(const Case& phantom, std::ostream* out) { *out << phantom.shape; }
+void PrintTo(const Smoothed& phantom, std::ostream* out) { *out << phantom.shape; }
 
-class StaircaseOf : public testing::TestWithParam<Case> {};
+class StaircaseOf : public testing::TestWithParam<Smoothed> {};
 
 INSTANTIATE_TEST_SUITE_P(
     Phantoms, StaircaseOf,
-    testing::Values(Case{"sphere", 48, Vec3(1, 1, 1), 0.2}, Case{"aneurysm", 96, Vec3(1, 1, 1), 0.3},
-                    Case{"tube", 64, Vec3(0.7, 0.7, 2), 0.3}, Case{"capsule", 64, Vec3(1, 1, 1), 0.25},
-                    Case{"bladder", 64, Vec3(0.8, 0.8, 3), 0.4}, Case{"colon", 80, Vec3(1, 1, 1), 0.5},
-                    Case{"sphere", 32, Vec3(1, 1, 1), 0.2}, Case{"sphere", 96, Vec3(0.78, 0.78, 5), 0.3},
-                    Case{"tube", 32, Vec3(1, 1, 1), 0.35}, Case{"tube", 128, Vec3(1, 1, 1), 0.2},
-                    Case{"tube", 128, Vec3(1, 1, 5), 0.3}, Case{"aneurysm", 48, Vec3(1, 1, 1), 0.5},
-                    Case{"aneurysm", 64, Vec3(1, 1, 2), 0.3}, Case{"aneurysm", 64, Vec3(1, 1, 1), 0.5},
-                    Case{"aneurysm", 128, Vec3(1, 1, 1), 0.22}, Case{"aneurysm", 128, Vec3(1, 1, 5), 0.35},
-                    Case{"capsule", 128, Vec3(1, 1, 1), 0.22}, Case{"capsule", 96, Vec3(0.78, 0.78, 5), 0.35},
-                    Case{"bladder", 128, Vec3(1, 1, 1), 0.22}, Case{"bladder", 128, Vec3(1, 1, 5), 0.35},
-                    Case{"bladder", 48, Vec3(0.8, 0.8, 3), 0.5}, Case{"tube", 48, Vec3(0.78, 0.78, 5), 0.5},
-                    Case{"colon", 128, Vec3(1, 1, 1), 0.37}, Case{"colon", 64, Vec3(1, 1, 1), 0.5},
-                    Case{"colon", 48, Vec3(1, 1, 1), 0.6}, Case{"colon", 96, Vec3(0.8, 0.8, 3), 0.55},
-                    Case{"colon", 128, Vec3(0.8, 0.8, 3), 0.5}));
+    testing::Values(Smoothed{"sphere", 48, Vec3(1, 1, 1), 0.2}, Smoothed{"aneurysm", 96, Vec3(1, 1, 1), 0.3},
+                    Smoothed{"tube", 64, Vec3(0.7, 0.7, 2), 0.3}, Smoothed{"capsule", 64, Vec3(1, 1, 1), 0.25},
+                    Smoothed{"bladder", 64, Vec3(0.8, 0.8, 3), 0.4}, Smoothed{"colon", 80, Vec3(1, 1, 1), 0.5},
+                    Smoothed{"sphere", 32, Vec3(1, 1, 1), 0.2}, Smoothed{"sphere", 96, Vec3(0.78, 0.78, 5), 0.3},
+                    Smoothed{"tube", 32, Vec3(1, 1, 1), 0.35}, Smoothed{"tube", 128, Vec3(1, 1, 1), 0.2},
+                    Smoothed{"tube", 128, Vec3(1, 1, 5), 0.3}, Smoothed{"aneurysm", 48, Vec3(1, 1, 1), 0.5},
+                    Smoothed{"aneurysm", 64, Vec3(1, 1, 2), 0.3}, Smoothed{"aneurysm", 64, Vec3(1, 1, 1), 0.5},
+                    Smoothed{"aneurysm", 128, Vec3(1, 1, 1), 0.22}, Smoothed{"aneurysm", 128, Vec3(1, 1, 5), 0.35},
+                    Smoothed{"capsule", 128, Vec3(1, 1, 1), 0.22}, Smoothed{"capsule", 96, Vec3(0.78, 0.78, 5), 0.35},
+                    Smoothed{"bladder", 128, Vec3(1, 1, 1), 0.22}, Smoothed{"bladder", 128, Vec3(1, 1, 5), 0.35},
+                    Smoothed{"bladder", 48, Vec3(0.8, 0.8, 3), 0.5}, Smoothed{"tube", 48, Vec3(0.78, 0.78, 5), 0.5},
+                    Smoothed{"colon", 128, Vec3(1, 1, 1), 0.37}, Smoothed{"colon", 64, Vec3(1, 1, 1), 0.5},
+                    Smoothed{"colon", 48, Vec3(1, 1, 1), 0.6}, Smoothed{"colon", 96, Vec3(0.8, 0.8, 3), 0.55},
+                    Smoothed{"colon", 128, Vec3(0.8, 0.8, 3), 0.5}));
 
 TEST_P(StaircaseOf, StaysWithinHalfAVoxelKeepsTheVolumeAndComesCloserToTheTruth) {
   PhantomOptions options;

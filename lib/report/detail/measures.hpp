@@ -33,8 +33,9 @@ struct Outlier {
   double z = 0;           ///< robust, signed
 };
 
-/// Values whose robust z, 0.6745 (x - median) / MAD, is beyond 3.5 either way. Undefined values take no part.
-/// @return none for fewer than five values, or where more than half of them are equal (MAD = 0)
+/// Values whose robust z, 0.6745 (x - median) / MAD, is beyond 3.5 either way. Undefined values take no part. The MAD
+/// counts as 1 % of the median at least: values of one target, such as least angles, differ by less for no reason.
+/// @return none for fewer than five values, or where more than half of them are 0 (MAD = 0)
 /// Source: Iglewicz, Hoaglin, How to detect and handle outliers, 1993.
 std::vector<Outlier> outliers(std::span<const std::optional<double>> values);
 
