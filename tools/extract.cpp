@@ -330,13 +330,18 @@ struct Surface {
   std::optional<StaircaseResult> staircase;  // what that smoothing did
 };
 
-void keep_wanted_pieces(Mask& mask, const Arguments& arguments) {
+// @return the share of the voxels that pieces had which are left out
+double keep_wanted_pieces(Mask& mask, const Arguments& arguments) {
+  double left_out = 0;
   if (arguments.largest) {
+    const std::size_t selected = count_voxels(mask);
     keep_largest_piece(mask);
+    left_out = selected > 0 ? 1 - real(count_voxels(mask)) / real(selected) : 0;
   }
   if (arguments.fill_cavities) {
     fill_cavities(mask);
   }
+  return left_out;
 }
 
 // Voxels that were selected, and how their surface is made of them.
@@ -385,6 +390,16 @@ void warn_of_smoothing(const cli::Tool& tool, const Selection& selection, const 
   }
 }
 
+void warn_of_pieces(const cli::Tool& tool, const std::string& name, double left_out) {
+  constexpr double notable = 0.01;
+  if (left_out > notable) {
+    tool.warn(fmt::format(
+        "{}: only its largest piece is taken: {:.3g} % of its voxels lie in others, which are left out; without "
+        "--largest, LARGEST=0 of the pipeline, they stay",
+        name, 1e2 * left_out));
+  }
+}
+
 Surface extract(cli::Tool& tool, Selection selection, const Arguments& arguments, const Names& names,
                 const Smoothing& smoothing) {
   double voxel_volume = 0;
@@ -392,7 +407,7 @@ Surface extract(cli::Tool& tool, Selection selection, const Arguments& arguments
     const auto stage = tool.stage("extract");
     voxel_volume = real(count_voxels(selection.mask)) * selection.mask.voxel_volume();
     if (voxel_volume > 0) {
-      keep_wanted_pieces(selection.mask, arguments);
+      warn_of_pieces(tool, selection.target.name, keep_wanted_pieces(selection.mask, arguments));
     }
   }
   const Target target = selection.target;

@@ -103,6 +103,44 @@ def stage_commands(case, binaries, flags):
     return commands
 
 
+# --------------------------------------------------------------------------------------------------- what is refused
+
+ENDINGS_READ = {"extract": ("nii",), "decimate": ("ply",), "relax": ("ply", "ply"), "simulate": ("ply",)}
+
+
+def misused(stage, flags, case, run, binaries):
+    """What a tool says of flags that it does not take; "" when it takes them all. It reads them before its inputs, and is
+    given inputs that are not there."""
+    absent = os.path.join(run, "absent")
+    output = f"{absent}-output.{'hdf' if stage == 'simulate' else 'ply'}"
+    words = [os.path.join(binaries, f"tunica-{stage}"), *(f"{absent}.{ending}" for ending in ENDINGS_READ[stage]), output,
+             *(["--fix", "boundary"] if stage == "simulate" and not case.setting("FIX") else []),
+             *(["--target", f"{absent}.ply"] if stage == "simulate" and case.setting("ACCURACY") else []),
+             *(flag("--threads", os.environ["THREADS"]) if os.environ.get("THREADS", "").strip() else [])]
+    done = subprocess.run(["/bin/sh", "-c", f"{shlex.join(words)} {flags}"], stdin=subprocess.DEVNULL, check=False,
+                          stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+    said = os.fsdecode(done.stderr).strip().splitlines()
+    return said[-1] if done.returncode == 2 and said else ""
+
+
+def refuse_cases(cases, run, binaries):
+    """Refuses cases whose flags a tool does not take, and those that have results but no volume any more: a slip of the
+    pen or a drive that is not there costs no result."""
+    answers = {}
+    for case in cases:
+        if case.refused:
+            continue
+        products = (os.path.join(case.folder, name) for names in PRODUCTS.values() for name in names)
+        if not os.path.exists(case.volume) and any(os.path.isfile(path) for path in products):
+            case.refused = f"{case.volume}: no such file: the results in {case.folder} stay as they are"
+            continue
+        for stage, flags in stage_flags(case).items():
+            asked = (stage, flags, case.setting("FIX") != "", case.setting("ACCURACY") != "")
+            if asked not in answers:
+                answers[asked] = misused(stage, flags, case, run, binaries)
+            case.refused = case.refused or answers[asked] or None
+
+
 # ------------------------------------------------------------------------------------------------ what is up to date
 
 def read_report(path):
@@ -206,6 +244,8 @@ def plan_cases(cases, run, binaries, dry):
     """Plans all cases that are not refused, and says which are; one whose folder cannot be made is refused, too."""
     os.symlink(os.path.abspath(binaries), os.path.join(run, "bin"))
     used = set()
+    if not dry:
+        refuse_cases(cases, run, binaries)
     for case in cases:
         if case.refused:
             continue
@@ -222,9 +262,8 @@ def plan_cases(cases, run, binaries, dry):
         except OSError as error:
             shutil.rmtree(case.plan, ignore_errors=True)
             case.refused = f"{case.folder}: cannot be written: {error.strerror}"
-    for case in cases:
-        if case.refused:
-            say(case.refused)
+    for refusal in dict.fromkeys(case.refused for case in cases if case.refused):
+        say(refusal)
     planned = [os.path.relpath(case.plan, run) for case in cases if not case.refused]
     write_text(os.path.join(run, "cases"), "\n".join(planned))
 

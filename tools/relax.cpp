@@ -26,6 +26,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <tuple>
 #include <utility>
 
@@ -623,6 +624,19 @@ private:
     require_fit(relaxed_.shell, out);
   }
 
+  /// Two faces that are no farther apart than the shells lie from one of them have no wall between them.
+  void require_wall(const std::vector<double>& thickness) const {
+    constexpr double least = 2;
+    const double mean = std::accumulate(thickness.begin(), thickness.end(), 0.0) / real(thickness.size());
+    const double off = tool_.result()["mean_distance_mm"].get<double>();
+    if (mean < least * off) {
+      throw InputError(
+          fmt::format("{}: lies {:.3g} mm from the shells in the mean, no farther than their own error ({:.3g} mm from "
+                      "{}): is it the other face of the wall?",
+                      given_.other_face->string(), mean, off, given_.target.string()));
+    }
+  }
+
   /// The shells as they are written: those on the target, or half way to the other face.
   MidSurface written_shell() {
     if (!given_.mid_surface) {
@@ -639,6 +653,7 @@ private:
         tool_.warn(fmt::format("{} pair(s) of curved shells cross in the middle of the wall", crossings));
       }
       said["error_mm"] = nullptr;
+      require_wall(middle.thickness);
       const auto [thinnest, thickest] = std::minmax_element(middle.thickness.begin(), middle.thickness.end());
       said["thickness_mm"] = {{"min", *thinnest}, {"max", *thickest}};
     } else {

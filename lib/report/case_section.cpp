@@ -137,10 +137,11 @@ Markup slices_figure(const CaseReport& one, int level) {
   Markup made = heading(level, "Shells on the image");
   return made += html(
              "<figure class=\"slices\"><img src=\"{}\" alt=\"Nine slices of the image with the outline of the "
-             "shells\"><figcaption>Blue: the segmented organ; amber: the shells. Rows: axial, coronal, sagittal; "
+             "shells\"><figcaption>Blue: the segmented organ; amber: the {}shells{}. Rows: axial, coronal, sagittal; "
              "columns: at a quarter, half and three quarters of the organ. The patient's left is on the right, "
              "the front on top or on the left.</figcaption></figure>\n",
-             data_address("image/png", one.slices));
+             data_address("image/png", one.slices), is_refitted(one.source) ? "first " : "",
+             is_refitted(one.source) ? ", which were refined for the accuracy asked for" : "");
 }
 
 struct Line {
@@ -194,10 +195,12 @@ Markup geometry_and_mesh(const CaseReport& one) {
   add_if_known(geometry, one, "extract", "result.closed", "Closed");
   std::vector<Line> mesh =
       lines_of(one, {"shells", "distance_mm", "distance_percent", "mean_distance_mm", "min_angle_deg"});
-  add_if_known(mesh, one, "relax", "result.normal_error_deg.mean", "Normals, mean error", "°");
-  add_if_known(mesh, one, "relax", "result.size_ratio", "Neighbours' size ratio");
-  add_if_known(mesh, one, "relax", "result.self_intersections", "Self-intersections");
-  add_if_known(mesh, one, "relax", "result.stopped", "Fit ended");
+  if (!is_refitted(one.source)) {
+    add_if_known(mesh, one, "relax", "result.normal_error_deg.mean", "Normals, mean error", "°");
+    add_if_known(mesh, one, "relax", "result.size_ratio", "Neighbours' size ratio");
+    add_if_known(mesh, one, "relax", "result.self_intersections", "Self-intersections");
+    add_if_known(mesh, one, "relax", "result.stopped", "Fit ended");
+  }
   return table_of("Geometry", geometry) += table_of("Mesh", mesh);
 }
 

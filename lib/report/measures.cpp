@@ -43,6 +43,28 @@ std::optional<double> shells(const PipelineCase& one) {
   return simulated ? simulated : number(one.at("relax", "result.shells"));
 }
 
+// Of the shells that relax left; none where others, which an accuracy asked for, carry the load.
+Value fitted(const char* key) {
+  return [=](const PipelineCase& one) { return is_refitted(one) ? std::nullopt : number(one.at("relax", key)); };
+}
+
+std::optional<double> mean_distance(const PipelineCase& one) {
+  if (!is_refitted(one)) {
+    return number(one.at("relax", "result.mean_distance_mm"));
+  }
+  const Json levels = one.at("simulate", "result.accuracy.levels");
+  const bool told = levels.is_array() && !levels.empty() && levels.back().is_object();
+  return told ? number(levels.back().value("mean_distance_mm", Json())) : std::nullopt;
+}
+
+// What was meshed; the report's volume of voxels is that of the whole label, with pieces that were left out.
+std::optional<double> volume(const PipelineCase& one) {
+  const auto enclosed = number(one.at("extract", "result.volume_mm3"));
+  const auto voxels = number(one.at("extract", "result.voxel_volume_mm3"));
+  const auto known = enclosed ? enclosed : voxels;
+  return known ? std::optional(*known * 1e-3) : std::nullopt;
+}
+
 std::optional<double> volume_change(const PipelineCase& one) {
   const auto before = number(one.at("simulate", "result.volume_before_mm3"));
   const auto after = number(one.at("simulate", "result.volume_after_mm3"));
@@ -66,24 +88,28 @@ std::optional<double> memory(const PipelineCase& one) {
 }
 
 std::vector<Measure> make_geometry() {
-  return {{"volume_ml", "Volume", "ml", "Volume of the label's voxels.", "extract: result.voxel_volume_mm3 / 1000",
-           true, reported("extract", "result.voxel_volume_mm3", 1e-3)},
-          {"area_cm2", "Area", "cm²", "Area of the extracted surface.", "extract: result.area_mm2 / 100", true,
-           reported("extract", "result.area_mm2", 1e-2)},
-          {"diagonal_mm", "Diagonal", "mm", "Diagonal of the bounding box of the extracted surface.",
-           "extract: result.diagonal_mm", false, reported("extract", "result.diagonal_mm")},
-          {"shells", "Shells", "", "Number of curved triangles that carry the load.",
-           "simulate: result.shells, or else relax: result.shells", false, shells},
-          {"distance_mm", "Distance", "mm",
-           "Certified upper bound of the two-sided Hausdorff distance between the curved shells and the extracted "
-           "surface.",
-           "relax: result.hausdorff_mm.upper", false, reported("relax", "result.hausdorff_mm.upper")},
-          {"distance_percent", "Distance", "%", "The same, in percent of the surface's diagonal.",
-           "relax: result.hausdorff_percent.upper", true, reported("relax", "result.hausdorff_percent.upper")},
-          {"mean_distance_mm", "Mean distance", "mm", "Mean distance of the curved shells to the surface.",
-           "relax: result.mean_distance_mm", false, reported("relax", "result.mean_distance_mm")},
-          {"min_angle_deg", "Least angle", "°", "Smallest angle of a shell.", "relax: result.min_angle_deg", true,
-           reported("relax", "result.min_angle_deg")}};
+  return {
+      {"volume_ml", "Volume", "ml",
+       "Volume that the extracted surface encloses; where it is open, that of the label's voxels.",
+       "extract: result.volume_mm3 / 1000, or else result.voxel_volume_mm3 / 1000", true, volume},
+      {"area_cm2", "Area", "cm²", "Area of the extracted surface.", "extract: result.area_mm2 / 100", true,
+       reported("extract", "result.area_mm2", 1e-2)},
+      {"diagonal_mm", "Diagonal", "mm", "Diagonal of the bounding box of the extracted surface.",
+       "extract: result.diagonal_mm", false, reported("extract", "result.diagonal_mm")},
+      {"shells", "Shells", "", "Number of curved triangles that carry the load.",
+       "simulate: result.shells, or else relax: result.shells", false, shells},
+      {"distance_mm", "Distance", "mm",
+       "Certified upper bound of the two-sided Hausdorff distance between the curved shells and the extracted "
+       "surface; not known of shells that an accuracy refined.",
+       "relax: result.hausdorff_mm.upper", false, fitted("result.hausdorff_mm.upper")},
+      {"distance_percent", "Distance", "%", "The same, in percent of the surface's diagonal.",
+       "relax: result.hausdorff_percent.upper", true, fitted("result.hausdorff_percent.upper")},
+      {"mean_distance_mm", "Mean distance", "mm", "Mean distance of the curved shells to the surface.",
+       "relax: result.mean_distance_mm; with an accuracy simulate: mean_distance_mm of the last of "
+       "result.accuracy.levels",
+       false, mean_distance},
+      {"min_angle_deg", "Least angle", "°", "Smallest angle of a shell; not known of shells that an accuracy refined.",
+       "relax: result.min_angle_deg", true, fitted("result.min_angle_deg")}};
 }
 
 std::vector<Measure> make_mechanics() {
@@ -133,6 +159,11 @@ const Measure& measure(const std::string& key) {
   const auto found = std::ranges::find(measures(), key, &Measure::key);
   TUNICA_ASSERT(found != measures().end());
   return *found;
+}
+
+bool is_refitted(const PipelineCase& one) {
+  return one.at("simulate", "result.accuracy").is_object() &&
+         one.at("simulate", "result.shells") != one.at("relax", "result.shells");
 }
 
 double median(std::vector<double> values) {

@@ -1,3 +1,5 @@
+#include "tunica/core/error.hpp"
+#include "tunica/core/quantity.hpp"
 #include "tunica/report/detail/command_words.hpp"
 #include "tunica/report/detail/measures.hpp"
 #include "tunica/report/detail/sections.hpp"
@@ -39,7 +41,7 @@ std::string surface_sentence(const CaseReport& one) {
 std::string shell_sentence(const CaseReport& one) {
   const std::string count = with_unit(one, "shells");
   const std::string distance = with_unit(one, "distance_mm");
-  if (count.empty() || distance.empty()) {
+  if (count.empty()) {
     return {};
   }
   const auto method = flag_value(words_of(one, "relax"), "--method");
@@ -49,12 +51,32 @@ std::string shell_sentence(const CaseReport& one) {
                                              std::string(middle.value("target", "") == "inner" ? "outside" : "inside") +
                                              " of the extracted one"
                                        : "extracted surface";
-  return "It was decimated by quadric edge collapse [3] and " +
-         std::string(method == "barycentre" ? "relaxed to" : "fitted by") + " " + count +
-         " curved triangular shells with one cubic shape function each [1]; the two-sided Hausdorff distance of the "
-         "curved shells to the " +
-         target + " is certified to be at most " + distance + " (" + with_unit(one, "distance_percent") +
-         " of its diagonal). ";
+  const std::string text = "It was decimated by quadric edge collapse [3] and " +
+                           std::string(method == "barycentre" ? "relaxed to" : "fitted by") + " " + count +
+                           " curved triangular shells with one cubic shape function each [1]";
+  const std::string mean = with_unit(one, "mean_distance_mm");
+  if (!distance.empty()) {
+    return text + "; the two-sided Hausdorff distance of the curved shells to the " + target +
+           " is certified to be at most " + distance + " (" + with_unit(one, "distance_percent") +
+           " of its diagonal). ";
+  }
+  return text + (mean.empty() ? ". " : ", " + mean + " from the " + target + " in the mean. ");
+}
+
+// As the resolved scene states it; empty: unloaded.
+std::string imaging_pressure(const CaseReport& one) {
+  const std::string_view key = "imaged_at = \"";
+  const std::size_t said = one.scene.find(key);
+  if (said == std::string::npos) {
+    return {};
+  }
+  const std::size_t begin = said + key.size();
+  const std::string stated = one.scene.substr(begin, one.scene.find('"', begin) - begin);
+  try {
+    return figure(parse_quantity(stated, dimension::pressure) * 1e3) + " kPa";
+  } catch (const UsageError&) {
+    return stated;
+  }
 }
 
 std::string load_sentence(const CaseReport& one) {
@@ -71,13 +93,10 @@ std::string load_sentence(const CaseReport& one) {
   text += young.empty() ? "" : " (Young's modulus " + young + ", Poisson's ratio " + with_unit(one, "poisson") + ")";
   const std::string thickness = with_unit(one, "thickness_mm");
   text += thickness.empty() ? ". " : " and " + thickness + " thick. ";
-  const std::string_view key = "imaged_at = \"";
-  const std::size_t said = one.scene.find(key);
-  const std::size_t begin = said + key.size();
-  text += said == std::string::npos ? "The image was taken as unloaded. "
-                                    : "The image was taken under a pressure of " +
-                                          one.scene.substr(begin, one.scene.find('"', begin) - begin) +
-                                          "; the shape without it was found first. ";
+  const std::string imaged = imaging_pressure(one);
+  text += imaged.empty()
+              ? "The image was taken as unloaded. "
+              : "The image was taken under a pressure of " + imaged + "; the shape without it was found first. ";
   text += pressure.empty() ? "It was loaded" : "A pressure of " + pressure + " was put on it";
   text += fixed ? " with " + std::string(*fixed == "boundary"        ? "the boundary held"
                                          : *fixed == "rigid-motions" ? "only its rigid motions held"

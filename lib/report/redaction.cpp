@@ -1,10 +1,13 @@
 #include "tunica/report/detail/redaction.hpp"
 
+#include "tunica/core/error.hpp"
+#include "tunica/core/quantity.hpp"
 #include "tunica/report/detail/command_words.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <filesystem>
 
@@ -35,6 +38,20 @@ void replace_all(std::string& text, const std::string& name, const std::string& 
   }
 }
 
+// Whether a word with a slash is a number with its unit.
+bool is_quantity(const std::string& word) {
+  constexpr std::array with_slash{dimension::density, dimension::acceleration, dimension::force_per_length,
+                                  dimension::rate, dimension::pressure};
+  return std::ranges::any_of(with_slash, [&](const Dimension& expected) {
+    try {
+      (void)parse_quantity(word, expected);
+      return true;
+    } catch (const UsageError&) {
+      return false;
+    }
+  });
+}
+
 // What is left with a slash between two blanks or quotes.
 std::string without_paths(const std::string& text) {
   constexpr const char* ends = " \t\n'\"(),;:=";
@@ -43,11 +60,11 @@ std::string without_paths(const std::string& text) {
     const std::size_t end = std::min(text.find_first_of(ends, at), text.size());
     const std::string word = text.substr(at, end - at);
     const std::size_t slash = word.find('/');
-    // A unit ("kg/m3") has no path's look: digits or a sign right before it, or one slash within short words.
-    const bool path = slash != std::string::npos && (slash == 0 || word.find('/', slash + 1) != std::string::npos ||
-                                                     word.find('.') != std::string::npos);
-    const bool unit = !word.empty() && std::isdigit(static_cast<unsigned char>(word[0])) != 0;
-    left += path && !unit ? "[path]" : word;
+    // A unit by itself ("kg/m3") has no path's look.
+    const bool path = slash != std::string::npos &&
+                      (slash == 0 || word.find('/', slash + 1) != std::string::npos ||
+                       word.find('.') != std::string::npos || std::isdigit(static_cast<unsigned char>(word[0])) != 0);
+    left += path && !is_quantity(word) ? "[path]" : word;
     if (end < text.size()) {
       left += text[end];
     }
@@ -96,7 +113,7 @@ Redaction::Redaction(const PipelineCase& one, std::size_t number) : active_(true
     }
     const Json command = one.at(stage, "command");
     for (const std::string& word : command_words(command.is_string() ? command.get<std::string>() : "")) {
-      if (word.starts_with("/") || word.starts_with("./") || word.starts_with("../")) {
+      if (word.find('/') != std::string::npos && !is_quantity(word)) {
         const bool volume = stage == "extract" && !word.ends_with(".ply") && !word.ends_with(".json");
         forget(word, volume ? "VOLUME" : fs::path(word).filename().string());
       }

@@ -245,10 +245,9 @@ class WholeCohort(Pipeline):
         self.assertEqual(cohort.wrong_rows(self.run_cohort(), good), [])
         self.assertEqual(self.done.returncode, 2)
         before = self.state()
-        self.assertEqual(sorted(before), sorted([*good, "held-wrongly", "no-unit", "too-close"]))
+        self.assertEqual(sorted(before), sorted([*good, "held-wrongly", "too-close"]))
         for name in good:
             self.assertEqual(sorted(before[name]), ["coarse.ply", "map.png", "picture.png", "result.hdf", "shell.ply", "surface.ply"])
-        self.assertEqual(sorted(before["no-unit"]), ["coarse.ply", "map.png", "shell.ply", "surface.ply"])
         self.assertEqual(sorted(before["too-close"]), ["coarse.ply", "surface.ply"])
         self.assertEqual(cohort.wrong_rows(self.run_cohort(), good), [], "the broken ones are tried again, and named again")
         self.assertEqual(self.redone(before), [])

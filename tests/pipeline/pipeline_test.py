@@ -269,6 +269,32 @@ class Rules(WithStubs):
         self.assertIn("LABELS not given", self.refusal(VOLUMES="a.nii.gz", **LOAD))
         self.assertIn("DURATION STEP not given", self.refusal(VOLUMES="a.nii.gz", LABEL=1, KIND="dynamic", **LOAD))
 
+    def test_flags_that_a_tool_does_not_take_cost_no_result(self):
+        self.make(VOLUMES="a.nii.gz b.seg.nrrd", LABEL=3, **LOAD)
+        before = {path: path.stat().st_mtime_ns for path in self.out.glob("*/*/*")}
+        self.calls()
+        done = self.make(VOLUMES="a.nii.gz b.seg.nrrd", LABEL=3, TOLERANCE="1", **LOAD,
+                         environment={"STUB_MISUSED": "relax: --tolerance: '1' has no unit"})
+        self.assertNotEqual(done.returncode, 0)
+        self.assertEqual(done.stderr.count("pipeline: tunica-relax: --tolerance: '1' has no unit"), 1)
+        for row in self.summary().values():
+            self.assertEqual((row["stage"], row["exit"]), ("none", "2"))
+            self.assertIn("'1' has no unit", row["message"])
+        self.assertEqual({path: path.stat().st_mtime_ns for path in self.out.glob("*/*/*")}, before)
+        self.make(VOLUMES="a.nii.gz b.seg.nrrd", LABEL=3, **LOAD)
+        self.assertEqual(self.calls(), [])
+
+    def test_a_volume_that_is_not_there_any_more_costs_no_result(self):
+        self.make(VOLUMES="a.nii.gz b.seg.nrrd", LABEL=3, **LOAD)
+        before = sorted(path.name for path in self.out.glob("a/*/*"))
+        (self.folder / "a.nii.gz").unlink()
+        self.calls()
+        done = self.make(VOLUMES="a.nii.gz b.seg.nrrd", LABEL=3, **LOAD)
+        self.assertNotEqual(done.returncode, 0)
+        self.assertIn("a.nii.gz: no such file: the results in", self.summary()["a/3"]["message"])
+        self.assertEqual(self.summary()["b/3"]["message"], "done")
+        self.assertEqual((sorted(path.name for path in self.out.glob("a/*/*")), self.calls()), (before, []))
+
     def test_a_number_without_its_unit_is_refused_before_any_work(self):
         for name in ("PRESSURE", "YOUNG", "THICKNESS", "DENSITY", "IMAGED_AT"):
             said = self.refusal(VOLUMES="a.nii.gz", LABEL=1, **{**LOAD, name: "1.5e3"})

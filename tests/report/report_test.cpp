@@ -75,12 +75,16 @@ TEST(Outliers, AreFarFromTheMedianOfFiveAtLeast) {
 TEST(RedactionTest, KnowsNamesAsWordsAlone) {
   PipelineCase one{"Meyer A/1", "out/Meyer A/1", "extract", "3", "", {}, {}};
   one.reports["extract"] = {{"inputs", {{{"path", "/data/Meyer A.nii.gz"}}}},
-                            {"command", "tunica-extract '/data/Meyer A.nii.gz' 'out/Meyer A/1/surface.ply' --label 1"}};
+                            {"command",
+                             "tunica-extract '/data/Meyer A.nii.gz' 'out/Meyer A/1/surface.ply' --label 1 "
+                             "--report 'Meyer A_Anna_1950/res/1/extract.json' --names 1950_Anna/t.tsv"}};
   const Redaction redacted(one, 7);
   EXPECT_EQ(redacted("/data/Meyer A.nii.gz: has no label 1"), "VOLUME: has no label 1");
   EXPECT_EQ(redacted("Meyer A: 1.1 g/cm3, kg/m3"), "case 7: 1.1 g/cm3, kg/m3");
-  EXPECT_EQ(redacted("see /pool/other.txt"), "see [path]");
-  EXPECT_EQ(redacted(one.at("extract", "command").get<std::string>()).find("Meyer"), std::string::npos);
+  EXPECT_EQ(redacted("see /pool/other.txt, 1950/x and 1100kg/m3"), "see [path], [path] and 1100kg/m3");
+  for (const char* name : {"Meyer", "Anna", "1950"}) {
+    EXPECT_EQ(redacted(one.at("extract", "command").get<std::string>()).find(name), std::string::npos) << name;
+  }
   EXPECT_EQ(Redaction()("/data/Meyer A.nii.gz"), "/data/Meyer A.nii.gz");
 }
 

@@ -22,7 +22,7 @@ BROKEN = {
     "missing": ("extract", "3", "missing.nii.gz"),
     "no-slices": ("extract", "3", "no-slices"),
     "held-wrongly": ("simulate", "3", "the body is closed and has no boundary"),
-    "no-unit": ("simulate", "2", "'1' has no unit"),
+    "no-unit": ("none", "2", "'1' has no unit"),
     "too-close": ("relax", "4", "tolerance"),
 }
 

@@ -248,6 +248,8 @@ class Choices(ExtractTest):
             result = dict(record["result"], voxel_volume_mm3=float(mask.sum()))
             self.check_surface(Ply(self.out), result, mask, LPS)
             self.assertEqual(record["result"]["voxel_volume_mm3"], whole)
+            share = 1 - largest.sum() / (array == 1).sum()
+            self.assertIn(f"only its largest piece is taken: {100 * share:.3g} % of its voxels", " ".join(record["warnings"]))
 
     def test_all_labels(self):
         array = self.two_labels()

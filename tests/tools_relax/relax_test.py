@@ -697,6 +697,9 @@ class MidSurface(Case):
         _, error = self.relax(self.ball, self.ball, self.out, "--shells", 300, "--mid-surface", "inner", "--other-face", inner,
                               "--force", expect=3)
         self.assertIn("the wall's other face lies inside the target", error)
+        _, error = self.relax(self.ball, self.ball, self.out, "--shells", 300, "--mid-surface", "outer", "--other-face", self.ball,
+                              "--force", expect=3)
+        self.assertIn("is it the other face of the wall?", error)
 
     def test_a_wall_thicker_than_its_body_is_refused(self):
         _, error = self.relax(self.ball, self.ball, self.out, "--shells", 300, "--mid-surface", "outer", "--thickness", "21mm",

@@ -276,12 +276,17 @@ class CohortPage(ReportTest):
     def test_error_of_an_accuracy_is_told(self):
         def asked(credible):
             return lambda reports: reports["simulate"]["result"].update(
-                accuracy={"of": "stress", "estimate_percent": 4.2, "credible": credible})
+                shells=4 * reports["relax"]["result"]["shells"],
+                accuracy={"of": "stress", "estimate_percent": 4.2, "credible": credible,
+                          "levels": [{"mean_distance_mm": 0.5}, {"mean_distance_mm": 0.125}]})
         self.copy("known", asked(True))
         self.copy("vain", asked(False))
         _, _, page = self.report()
         self.assertIn("The error of the stress by the number of shells is credibly below 4.2 %.", page.text)
         self.assertIn("The error of the stress by the number of shells is not credibly known.", page.text)
+        self.assertNotIn("certified to be at most", page.text, "that is known of the shells before")
+        self.assertIn(", 0.125 mm from the extracted surface in the mean", page.text)
+        self.assertNotIn("Normals, mean error", page.text)
 
     def test_table_and_what_its_columns_mean(self):
         self.cohort(3)

@@ -1,5 +1,6 @@
 #include "tunica/mechanics/runs/doubts.hpp"
 
+#include "tunica/mechanics/runs/unloaded.hpp"
 #include "tunica/shell/distance/target.hpp"
 #include "tunica/surface/mesh/measure.hpp"
 
@@ -377,7 +378,7 @@ std::vector<std::string> doubts(const Model& model, const RunSettings& settings)
   }
   const bool needs_load =
       std::holds_alternative<StaticRun>(settings.kind) || std::holds_alternative<DynamicRun>(settings.kind);
-  if (needs_load && !is_loaded(model)) {
+  if (needs_load && !is_loaded(model) && !is_imaged_under_pressure(model)) {
     const std::string& place = model.shells.empty() ? model.solids.front().said_at : model.shells.front().said_at;
     found.push_back(at(place, "nothing loads the model, so it stays as it is: add a load"));
   }

@@ -110,7 +110,9 @@ public:
       if (from.isZero(0)) {
         throw;  // of the image itself
       }
-      reason = error.what();
+      // Shells that were good in the image: what is said of them names the fold, and what it advises is for images.
+      const std::string fault = error.what();
+      reason = "on the way to it the wall folds (" + fault.substr(0, fault.find("; ")) + ")";
       return {};
     }
     VectorX to(size());
@@ -259,8 +261,9 @@ Unloaded find_unloaded(const Model& imaged, const RunSettings& settings,
     step /= 2;
     if (step < smallest_part) {
       throw RequirementError(fmt::format(
-          "no unloaded shape was found that lies where the image shows it under {:.4g} times the pressure {}{}{}", next,
-          key, map.reason.empty() ? ": the iterations do not converge" : ": ", map.reason));
+          "no unloaded shape was found that lies where the image shows it under {:.4g} times the pressure {}: {}; was "
+          "the wall as thick and as stiff, and the pressure as high, when the image was taken?",
+          next, key, map.reason.empty() ? "the iterations do not converge" : map.reason));
     }
   }
   Unloaded unloaded{map.reference(found), map.volume, distance[0], distance[1], map.iterations};

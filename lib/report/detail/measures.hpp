@@ -27,6 +27,9 @@ const std::vector<Measure>& measures();
 /// By its key. Errors: TUNICA_ASSERT where there is none.
 const Measure& measure(const std::string& key);
 
+/// Whether an accuracy that was asked for put other shells in the place of those that relax left.
+bool is_refitted(const PipelineCase& one);
+
 /// A value among those of a cohort that does not belong to them.
 struct Outlier {
   std::size_t index = 0;  ///< of the value
