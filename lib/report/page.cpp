@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <filesystem>
 
 namespace tunica::report {
@@ -27,14 +28,21 @@ fs::path place_of(const PipelineCase& one, const fs::path& told) {
 }
 
 std::vector<std::string> differences(const PipelineCase& one) {
+  constexpr std::array<const char*, pipeline_stages.size()> products{"surface.ply", "coarse.ply", "shell.ply",
+                                                                     "result.hdf"};
   std::vector<std::string> found;
-  for (const char* stage : pipeline_stages) {
+  for (std::size_t i = 0; i < pipeline_stages.size(); ++i) {
+    const std::string stage = pipeline_stages[i];
+    std::error_code error;
+    if (!one.reports.contains(stage) && fs::exists(one.folder / products[i], error)) {
+      found.push_back((one.folder / products[i]).string() + ": no report of " + stage + " tells what it wrote");
+    }
     const Json outputs = one.at(stage, "outputs");
     for (const Json& entry : outputs.is_array() ? outputs : Json::array()) {
       const bool hashed = entry.is_object() && entry.contains("path") && entry["path"].is_string() &&
                           entry.contains("sha256") && entry["sha256"].is_string();
       if (!hashed) {
-        found.push_back((one.folder / (std::string(stage) + ".json")).string() +
+        found.push_back((one.folder / (stage + ".json")).string() +
                         ": tells no hashes of the outputs: it is of an older version, run the stage again");
         break;
       }

@@ -413,6 +413,8 @@ class Errors(ReportTest):
         self.refuse(4, "--verify", says="simulate.json: is missing")
         _, _, page = self.report()
         self.assertIn("Failed", page.text)
+        (self.out / ".cases").unlink()
+        self.refuse(4, "--verify", says="result.hdf: no report of simulate tells what it wrote")
 
     def test_verify_wants_hashes(self):
         def older(reports):
