@@ -16,6 +16,7 @@ ended: runs on one OUT come one after the other, also after a kill that left som
 """
 
 import argparse
+import copy
 import errno
 import fcntl
 import hashlib
@@ -105,19 +106,10 @@ def stage_commands(case, binaries, flags):
 
 # --------------------------------------------------------------------------------------------------- what is refused
 
-ENDINGS_READ = {"extract": ("nii",), "decimate": ("ply",), "relax": ("ply", "ply"), "simulate": ("ply",)}
-
-
-def misused(stage, flags, case, run, binaries):
-    """What a tool says of flags that it does not take; "" when it takes them all. It reads them before its inputs, and is
-    given inputs that are not there."""
-    absent = os.path.join(run, "absent")
-    output = f"{absent}-output.{'hdf' if stage == 'simulate' else 'ply'}"
-    words = [os.path.join(binaries, f"tunica-{stage}"), *(f"{absent}.{ending}" for ending in ENDINGS_READ[stage]), output,
-             *(["--fix", "boundary"] if stage == "simulate" and not case.setting("FIX") else []),
-             *(["--target", f"{absent}.ply"] if stage == "simulate" and case.setting("ACCURACY") else []),
-             *(flag("--threads", os.environ["THREADS"]) if os.environ.get("THREADS", "").strip() else [])]
-    done = subprocess.run(["/bin/sh", "-c", f"{shlex.join(words)} {flags}"], stdin=subprocess.DEVNULL, check=False,
+def misused(command):
+    """What a tool says of flags that it does not take; "" when it takes them all."""
+    threads = flag("--threads", os.environ["THREADS"]) if os.environ.get("THREADS", "").strip() else []
+    done = subprocess.run(["/bin/sh", "-c", f"{command} {shlex.join(threads)}"], stdin=subprocess.DEVNULL, check=False,
                           stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
     said = os.fsdecode(done.stderr).strip().splitlines()
     return said[-1] if done.returncode == 2 and said else ""
@@ -125,8 +117,11 @@ def misused(stage, flags, case, run, binaries):
 
 def refuse_cases(cases, run, binaries):
     """Refuses cases whose flags a tool does not take, and those that have results but no volume any more: a slip of the
-    pen or a drive that is not there costs no result."""
+    pen or a drive that is not there costs no result. Tools read their flags before their files: they are given an empty
+    folder."""
     answers = {}
+    empty = os.path.join(run, ".empty")  # no case's plan is called so
+    os.mkdir(empty)
     for case in cases:
         if case.refused:
             continue
@@ -134,11 +129,13 @@ def refuse_cases(cases, run, binaries):
         if not os.path.exists(case.volume) and any(os.path.isfile(path) for path in products):
             case.refused = f"{case.volume}: no such file: the results in {case.folder} stay as they are"
             continue
-        for stage, flags in stage_flags(case).items():
-            asked = (stage, flags, case.setting("FIX") != "", case.setting("ACCURACY") != "")
-            if asked not in answers:
-                answers[asked] = misused(stage, flags, case, run, binaries)
-            case.refused = case.refused or answers[asked] or None
+        nowhere = copy.copy(case)
+        nowhere.folder = empty
+        nowhere.volume = os.path.join(empty, "volume.nii")
+        for command in stage_commands(nowhere, binaries, stage_flags(case)).values():
+            if command not in answers:
+                answers[command] = misused(command)
+            case.refused = case.refused or answers[command] or None
 
 
 # ------------------------------------------------------------------------------------------------ what is up to date

@@ -626,14 +626,14 @@ private:
 
   /// Two faces that are no farther apart than the shells lie from one of them have no wall between them.
   void require_wall(const std::vector<double>& thickness) const {
-    constexpr double least = 2;
+    constexpr double least = 2;  // below it half of what is measured is the shells' own error
     const double mean = std::accumulate(thickness.begin(), thickness.end(), 0.0) / real(thickness.size());
     const double off = tool_.result()["mean_distance_mm"].get<double>();
     if (mean < least * off) {
       throw InputError(
-          fmt::format("{}: lies {:.3g} mm from the shells in the mean, no farther than their own error ({:.3g} mm from "
-                      "{}): is it the other face of the wall?",
-                      given_.other_face->string(), mean, off, given_.target.string()));
+          fmt::format("{}: lies {:.3g} mm from the shells in the mean, hardly farther than they from "
+                      "{} ({:.3g} mm): is it the other face of the wall?",
+                      given_.other_face->string(), mean, given_.target.string(), off));
     }
   }
 

@@ -99,9 +99,7 @@ using CaseGroup = std::vector<const CaseReport*>;
 
 // The label that was extracted as the command names it; empty: at an isovalue, or not known.
 std::string label_of(const CaseReport& one) {
-  const Json command = one.source.at("extract", "command");
-  const std::vector<std::string> words = command_words(command.is_string() ? command.get<std::string>() : "");
-  return one.redacted(flag_value(words, "--label").value_or(""));
+  return one.redacted(flag_value(words_of(one.source, "extract"), "--label").value_or(""));
 }
 
 Markup spread_of(const CaseGroup& cases) {

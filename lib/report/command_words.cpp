@@ -27,6 +27,11 @@ std::vector<std::string> command_words(const std::string& command) {
   return words;
 }
 
+std::vector<std::string> words_of(const PipelineCase& one, const std::string& stage) {
+  const Json command = one.at(stage, "command");
+  return command_words(command.is_string() ? command.get<std::string>() : "");
+}
+
 std::optional<std::string> flag_value(const std::vector<std::string>& words, const std::string& name) {
   std::optional<std::string> value;
   for (std::size_t i = 1; i < words.size(); ++i) {

@@ -28,8 +28,7 @@ Value reported(const char* stage, const char* key, double scale = 1) {
 // A quantity that the command of tunica-simulate states.
 Value stated(const char* flag, Dimension dimension, double scale = 1) {
   return [=](const PipelineCase& one) -> std::optional<double> {
-    const Json command = one.at("simulate", "command");
-    const auto text = command.is_string() ? flag_value(command_words(command.get<std::string>()), flag) : std::nullopt;
+    const auto text = flag_value(words_of(one, "simulate"), flag);
     try {
       return text ? std::optional(parse_quantity(*text, dimension) * scale) : std::nullopt;
     } catch (const UsageError&) {
@@ -135,9 +134,7 @@ std::vector<Measure> make_mechanics() {
       {"poisson", "Poisson's ratio", "", "Poisson's ratio of the wall, as stated.", "simulate: command, --poisson",
        false,
        [](const PipelineCase& one) -> std::optional<double> {
-         const Json command = one.at("simulate", "command");
-         const auto text =
-             command.is_string() ? flag_value(command_words(command.get<std::string>()), "--poisson") : std::nullopt;
+         const auto text = flag_value(words_of(one, "simulate"), "--poisson");
          return text ? parse_number(*text) : std::nullopt;
        }},
       {"seconds", "Time", "s", "Seconds of all stages.", "all stages: seconds.total", false, seconds},

@@ -15,11 +15,6 @@ constexpr std::array references{
     "W. E. Lorensen, H. E. Cline: Marching Cubes: A High Resolution 3D Surface Construction Algorithm. SIGGRAPH 1987.",
     "M. Garland, P. S. Heckbert: Surface Simplification Using Quadric Error Metrics. SIGGRAPH 1997."};
 
-std::vector<std::string> words_of(const CaseReport& one, const char* stage) {
-  const Json command = one.source.at(stage, "command");
-  return command_words(command.is_string() ? command.get<std::string>() : "");
-}
-
 std::string with_unit(const CaseReport& one, const char* key) {
   const Measure& what = measure(key);
   const auto value = what.value(one.source);
@@ -27,7 +22,7 @@ std::string with_unit(const CaseReport& one, const char* key) {
 }
 
 std::string surface_sentence(const CaseReport& one) {
-  const std::vector<std::string> words = words_of(one, "extract");
+  const std::vector<std::string> words = words_of(one.source, "extract");
   const Json version = one.source.at("extract", "version");
   const auto label = flag_value(words, "--label");
   const auto level = flag_value(words, "--isovalue");
@@ -44,7 +39,7 @@ std::string shell_sentence(const CaseReport& one) {
   if (count.empty()) {
     return {};
   }
-  const auto method = flag_value(words_of(one, "relax"), "--method");
+  const auto method = flag_value(words_of(one.source, "relax"), "--method");
   const Json middle = one.source.at("relax", "result.mid_surface");
   const bool in_middle = middle.is_object() && middle.value("error_mm", Json()).is_object();
   const std::string target = in_middle ? "surface half of the wall's thickness " +
@@ -86,7 +81,7 @@ std::string load_sentence(const CaseReport& one) {
   }
   const std::string young = with_unit(one, "young_mpa");
   const std::string pressure = with_unit(one, "pressure_kpa");
-  const auto fixed = flag_value(words_of(one, "simulate"), "--fix");
+  const auto fixed = flag_value(words_of(one.source, "simulate"), "--fix");
   const bool dynamic = one.scene.find("kind = \"dynamic\"") != std::string::npos;
   const bool linear = one.scene.find("geometry = \"linear\"") != std::string::npos;
   std::string text = "The wall was linear elastic and isotropic";

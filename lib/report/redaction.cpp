@@ -111,8 +111,7 @@ Redaction::Redaction(const PipelineCase& one, std::size_t number) : active_(true
       const fs::path path = path_of(entry);
       forget(path.string(), path.filename().string());
     }
-    const Json command = one.at(stage, "command");
-    for (const std::string& word : command_words(command.is_string() ? command.get<std::string>() : "")) {
+    for (const std::string& word : words_of(one, stage)) {
       if (word.find('/') != std::string::npos && !is_quantity(word)) {
         const bool volume = stage == "extract" && !word.ends_with(".ply") && !word.ends_with(".json");
         forget(word, volume ? "VOLUME" : fs::path(word).filename().string());

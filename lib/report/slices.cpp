@@ -57,8 +57,7 @@ std::optional<Inside> rule_of(const std::vector<std::string>& words, const Volum
 
 // Errors: InputError that says why the volume cannot be shown.
 Image read_image(const PipelineCase& one) {
-  const Json command = one.at("extract", "command");
-  const auto words = command_words(command.is_string() ? command.get<std::string>() : "");
+  const auto words = words_of(one, "extract");
   const Json inputs = one.at("extract", "inputs");
   const bool told = inputs.is_array() && !inputs.empty() && inputs[0].is_object() && inputs[0].contains("path") &&
                     inputs[0]["path"].is_string();

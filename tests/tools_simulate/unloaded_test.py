@@ -115,6 +115,16 @@ class Unloaded(SimulateTest):
         self.imaged("image.ply", pressure, "--thickness", "0.2mm", "--fix", "rigid-motions", expect=4)
         self.assertIn("no unloaded shape was found", self.done.stderr)
         self.assertIn("times the pressure imaged_at: ", self.done.stderr)
+        self.assertIn("was the wall as thick and as stiff", self.done.stderr)
+
+    def test_unloading_alone(self):
+        write_ply(self.path("image.ply"), *sphere(2, 10))
+        pressure = 0.1 * 2 * YOUNG * 0.2 / (10 * (1 - POISSON))
+        report = self.run_tool("image.ply", "out.hdf", *WALL, "--pressure", "0MPa", "--imaged-at", f"{pressure!r}MPa", "--thickness",
+                               "0.2mm", "--fix", "rigid-motions")
+        self.assertNotIn("nothing loads the model", " ".join(report["warnings"]))
+        result = report["result"]
+        self.assertAlmostEqual(result["volume_after_mm3"] / result["unloaded"]["volume_mm3"], 1, delta=1e-6)
 
     def test_a_wall_that_buckles_on_the_way_is_refused(self):
         """Under an outer pressure well above the classical one."""
