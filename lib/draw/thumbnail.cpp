@@ -6,9 +6,7 @@
 #include "tunica/draw/detail/rasteriser.hpp"
 #include "tunica/draw/detail/shading.hpp"
 #include "tunica/draw/detail/view.hpp"
-
-#include <Eigen/Eigenvalues>
-#include <Eigen/Geometry>
+#include "tunica/draw/picture.hpp"
 
 #include <algorithm>
 #include <array>
@@ -19,42 +17,15 @@ namespace {
 
 constexpr int thumbnail_oversampling = 2;
 
-// The longest extent level, the shortest towards the viewer; turned and raised a little, so that depth can be seen.
-std::array<Vec3, 3> thumbnail_axes(const TriangleMesh& surface) {
-  Vec3 mean = Vec3::Zero();
-  for (const Vec3& p : surface.vertices) {
-    mean += p / real(surface.vertices.size());
-  }
-  Mat3 spread = Mat3::Zero();
-  for (const Vec3& p : surface.vertices) {
-    spread += (p - mean) * (p - mean).transpose();
-  }
-  spread.diagonal() += 1e-3 * spread.trace() * Vec3(1, 0, 0.5);  // a round body has no axes: this decides
-  const Mat3 axes = Eigen::SelfAdjointEigenSolver<Mat3>(spread).eigenvectors();
-  const auto positive = [](Vec3 axis) {
-    Eigen::Index largest = 0;
-    axis.cwiseAbs().maxCoeff(&largest);
-    return axis[largest] < 0 ? Vec3(-axis) : axis;
-  };
-  const Vec3 right = positive(axes.col(2));
-  const Vec3 up = positive(axes.col(1));
-  const Vec3 towards = right.cross(up);
-  const Vec3 turned = std::cos(0.4) * towards + std::sin(0.4) * right;
-  const Vec3 raised = std::cos(0.25) * turned + std::sin(0.25) * up;
-  const Vec3 across = up.cross(turned);
-  return {across, raised.cross(across), raised};
-}
-
-Camera camera_for(const TriangleMesh& mesh, int width, int height) {
-  Camera camera;
-  const std::array<Vec3, 3> axes = thumbnail_axes(mesh);
-  camera.right = axes[0];
-  camera.up = axes[1];
-  camera.towards = axes[2];
-  const Vec2 extent = centre_camera(camera, mesh.vertices);
-  camera.width = width;
-  camera.height = height;
-  camera.scale = 0.94 * std::min(width / std::max(extent.x(), 1e-12), height / std::max(extent.y(), 1e-12));
+Camera camera_for(const std::vector<Vec3>& points, int longest) {
+  const auto [right, up, towards] = picture_axes(points);
+  Camera camera{.right = right, .up = up, .towards = towards};
+  const Vec2 extent = centre_camera(camera, points);
+  camera.scale = longest / std::max(extent.maxCoeff(), 1e-12);
+  const auto pixels = [&](double length) { return std::max(1, narrow<int>(std::lround(length * camera.scale))); };
+  camera.width = pixels(extent.x()) * thumbnail_oversampling;
+  camera.height = pixels(extent.y()) * thumbnail_oversampling;
+  camera.scale *= 0.98 * thumbnail_oversampling;  // its outline stays clear of the border
   return camera;
 }
 
@@ -89,19 +60,20 @@ std::array<unsigned char, 4> pixel_at(const Raster& raster, int x, int y, const 
 std::string thumbnail(const TriangleMesh& surface, const std::vector<double>& values, const ThumbnailOptions& options) {
   TUNICA_ASSERT(!surface.triangles.empty());
   TUNICA_ASSERT(values.empty() || values.size() == surface.vertices.size());
-  const Camera camera =
-      camera_for(surface, options.width * thumbnail_oversampling, options.height * thumbnail_oversampling);
+  const Camera camera = camera_for(surface.vertices, options.longest);
+  const int width = camera.width / thumbnail_oversampling;
+  const int height = camera.height / thumbnail_oversampling;
   const Raster raster = rasterise(surface, shading_normals(surface), values, camera);
   const Paint paint{.top = options.top, .plain = values.empty() || !(options.top > 0)};
   std::vector<unsigned char> pixels;
-  pixels.reserve(narrow<std::size_t>(4 * options.width * options.height));
-  for (int y = 0; y < options.height; ++y) {
-    for (int x = 0; x < options.width; ++x) {
+  pixels.reserve(narrow<std::size_t>(4 * width * height));
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
       const auto pixel = pixel_at(raster, x, y, paint);
       pixels.insert(pixels.end(), pixel.begin(), pixel.end());
     }
   }
-  return png_of(pixels, options.width, options.height);
+  return png_of(pixels, width, height);
 }
 
 }  // namespace tunica

@@ -8,13 +8,13 @@
 namespace tunica {
 
 struct ThumbnailOptions {
-  int width = 240;  ///< pixels
-  int height = 160;
-  double top = 0;  ///< value of the last colour; 0: the surface is plain
+  int longest = 240;  ///< pixels, its longer side
+  double top = 0;     ///< value of the last colour; 0: the surface is plain
 };
 
 /// A surface alone, in the colours of surface_picture(), on nothing: a PNG that stands on a light page and on a dark
-/// one. The longest extent lies level. The same input gives the same bytes whatever the number of threads.
+/// one. The organ stands as in the first view of surface_picture() and fills the picture. The same input gives the same
+/// bytes whatever the number of threads.
 /// @param surface  at least one triangle, finite positions, mm
 /// @param values   empty, or #V values >= 0; what is not finite is drawn grey
 std::string thumbnail(const TriangleMesh& surface, const std::vector<double>& values, const ThumbnailOptions& options);

@@ -21,6 +21,20 @@ struct Side {
 const std::array<Side, 3> sides{Side{-Vec3::UnitY(), Vec3::UnitZ(), 1}, Side{Vec3::UnitX(), Vec3::UnitZ(), 0.8},
                                 Side{Vec3::UnitZ(), -Vec3::UnitY(), 0.7}};
 
+// The side that shows most of the points' bounding box.
+const Side& side_of(std::span<const Vec3> points) {
+  Vec3 lower = Vec3::Constant(infinity);
+  Vec3 upper = -lower;
+  for (const Vec3& p : points) {
+    lower = lower.cwiseMin(p);
+    upper = upper.cwiseMax(p);
+  }
+  const Vec3 extent = upper - lower;
+  return *std::ranges::max_element(sides, {}, [&](const Side& side) {
+    return side.worth * std::abs(extent.dot(side.up)) * std::abs(extent.dot(side.up.cross(side.towards)));
+  });
+}
+
 // Looks at the side `towards`, turned a little to the right and raised, so that depth can be seen.
 Camera camera_at(const Vec3& up, const Vec3& towards) {
   constexpr double degree = std::numbers::pi / 180;
@@ -50,36 +64,35 @@ Vec2 centre_camera(Camera& camera, std::span<const Vec3> points) {
 }
 
 std::array<View, 2> opposite_views(std::span<const Vec3> points, const Box2& box, int oversampling) {
+  const Side& side = side_of(points);
   std::array<View, 2> best;
-  double best_score = -1;
-  for (const Side& side : sides) {
-    for (const bool beside : {true, false}) {
-      const double width = beside ? (box.width() - gap) / 2 : box.width();
-      const double height = beside ? box.height() : (box.height() - gap) / 2;
-      std::array<View, 2> views;
-      double scale = infinity;
-      for (const int i : {0, 1}) {
-        View& view = views[i];
-        view.panel.left = box.left + (beside ? i * (width + gap) : 0);
-        view.panel.top = box.top + (beside ? 0 : i * (height + gap));
-        view.panel.right = view.panel.left + width;
-        view.panel.bottom = view.panel.top + height;
-        view.camera = camera_at(side.up, i == 0 ? side.towards : Vec3(-side.towards));
-        const Vec2 extent = centre_camera(view.camera, points);
-        scale = std::min({scale, width / extent.x(), height / extent.y()});
-      }
-      if (!std::isfinite(scale)) {
-        scale = 1;
-      }
-      for (View& view : views) {
-        view.camera.scale = 0.96 * scale * oversampling;
-        view.camera.width = truncated<int>(std::round(view.panel.width())) * oversampling;
-        view.camera.height = truncated<int>(std::round(view.panel.height())) * oversampling;
-      }
-      if (scale * side.worth > best_score) {
-        best_score = scale * side.worth;
-        best = views;
-      }
+  double best_scale = -1;
+  for (const bool beside : {true, false}) {
+    const double width = beside ? (box.width() - gap) / 2 : box.width();
+    const double height = beside ? box.height() : (box.height() - gap) / 2;
+    std::array<View, 2> views;
+    double scale = infinity;
+    for (const int i : {0, 1}) {
+      View& view = views[i];
+      view.panel.left = box.left + (beside ? i * (width + gap) : 0);
+      view.panel.top = box.top + (beside ? 0 : i * (height + gap));
+      view.panel.right = view.panel.left + width;
+      view.panel.bottom = view.panel.top + height;
+      view.camera = camera_at(side.up, i == 0 ? side.towards : Vec3(-side.towards));
+      const Vec2 extent = centre_camera(view.camera, points);
+      scale = std::min({scale, width / extent.x(), height / extent.y()});
+    }
+    if (!std::isfinite(scale)) {
+      scale = 1;
+    }
+    for (View& view : views) {
+      view.camera.scale = 0.96 * scale * oversampling;
+      view.camera.width = truncated<int>(std::round(view.panel.width())) * oversampling;
+      view.camera.height = truncated<int>(std::round(view.panel.height())) * oversampling;
+    }
+    if (scale > best_scale) {
+      best_scale = scale;
+      best = views;
     }
   }
   return best;

@@ -249,8 +249,8 @@ DrawnResult unloaded(const fs::path& path) {
   return drawn;
 }
 
-void take_picture(CaseReport& one, const TriangleMesh& mesh, const std::vector<double>& values, int width) {
-  one.picture = thumbnail(mesh, values, {width, 2 * width / 3, one.picture_top});
+void take_picture(CaseReport& one, const TriangleMesh& mesh, const std::vector<double>& values, int longest) {
+  one.picture = thumbnail(mesh, values, {longest, one.picture_top});
 }
 
 void draw_shells(CaseReport& one, const Room& room, DrawnShells shells, const std::optional<TriangleMesh>& surface,
@@ -271,7 +271,7 @@ void draw_shells(CaseReport& one, const Room& room, DrawnShells shells, const st
   for (std::size_t v = 0; v < seen.vertices.size(); ++v) {
     seen.vertices[v] += one.magnification * shells.states.back().displacement[v];
   }
-  take_picture(one, seen, shells.states.back().von_mises, room.picture_width);
+  take_picture(one, seen, shells.states.back().von_mises, room.picture_longest);
   TriangleMesh coarse;
   if (surface) {
     try {
@@ -291,7 +291,7 @@ Room room_for(std::size_t cases) {
   room.triangles = std::clamp<std::size_t>(600'000 / count, 1'000, 60'000);
   room.states = std::clamp<std::size_t>(4000 / count, 2, 41);
   room.bytes = bytes_of_states / count;
-  room.picture_width = count == 1 ? 1080 : count <= 12 ? 720 : count <= 60 ? 400 : 200;
+  room.picture_longest = count == 1 ? 1080 : count <= 12 ? 720 : count <= 60 ? 400 : 160;
   room.slice = count == 1 ? 220 : count <= 12 ? 150 : count <= 60 ? 100 : 60;
   return room;
 }
@@ -317,7 +317,7 @@ void draw_organ(CaseReport& one, const Room& room) {
       one.missing.push_back(one.redacted(error.what()));
     }
   } else if (surface && !surface->triangles.empty()) {
-    take_picture(one, *surface, {}, room.picture_width);
+    take_picture(one, *surface, {}, room.picture_longest);
   }
 }
 

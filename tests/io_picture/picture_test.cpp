@@ -4,6 +4,7 @@
 #include "tunica/core/narrow.hpp"
 #include "tunica/core/threads.hpp"
 #include "tunica/draw/detail/canvas.hpp"
+#include "tunica/draw/thumbnail.hpp"
 
 #include <gtest/gtest.h>
 #include <png.h>
@@ -22,11 +23,11 @@ struct Area {
   [[nodiscard]] int pixels() const { return width * height; }
 };
 
-Image read_png(const std::string& bytes) {
+Image read_png(const std::string& bytes, unsigned format = PNG_FORMAT_RGB) {
   png_image header{};
   header.version = PNG_IMAGE_VERSION;
   EXPECT_NE(png_image_begin_read_from_memory(&header, bytes.data(), bytes.size()), 0) << header.message;
-  EXPECT_EQ(header.format, PNG_FORMAT_RGB);
+  EXPECT_EQ(header.format, format);
   Image image{narrow<int>(header.width), narrow<int>(header.height), {}};
   image.bytes.resize(PNG_IMAGE_SIZE(header));
   EXPECT_NE(png_image_finish_read(&header, nullptr, image.bytes.data(), 0, nullptr), 0) << header.message;
@@ -248,6 +249,49 @@ TEST(Picture, surface_without_extent_or_of_one_triangle_is_drawn) {
     vertex = 1e-6 * vertex + Vec3(1e5, -1e5, 1e5);
   }
   EXPECT_NO_THROW(picture(far, std::vector<double>(8, 1)));
+}
+
+// What lies on the see-through ground of a thumbnail.
+Area covered(const Image& image) {
+  int left = image.width, right = -1, top = image.height, bottom = -1;
+  for (int y = 0; y < image.height; ++y) {
+    for (int x = 0; x < image.width; ++x) {
+      if (image.bytes[narrow<std::size_t>(4 * (y * image.width + x) + 3)] != 0) {
+        left = std::min(left, x);
+        right = std::max(right, x);
+        top = std::min(top, y);
+        bottom = std::max(bottom, y);
+      }
+    }
+  }
+  return {left, top, right - left + 1, bottom - top + 1};
+}
+
+TEST(Thumbnail, the_organ_stands_as_in_the_picture_and_fills_the_longer_side) {
+  TriangleMesh rod = make_sphere(20, 3);
+  for (Vec3& vertex : rod.vertices) {
+    vertex.z() *= 3;
+  }
+  const Image upright = read_png(thumbnail(rod, {}, {.longest = 120}), PNG_FORMAT_RGBA);
+  EXPECT_EQ(upright.height, 120);
+  EXPECT_NEAR(upright.width, 40, 4);
+  const Area organ = covered(upright);
+  EXPECT_GE(organ.height, 115);
+  EXPECT_LT(organ.height, 120);
+  EXPECT_GE(organ.width, upright.width - 3);
+  for (Vec3& vertex : rod.vertices) {
+    std::swap(vertex.x(), vertex.z());
+  }
+  EXPECT_EQ(read_png(thumbnail(rod, {}, {.longest = 120}), PNG_FORMAT_RGBA).width, 120);
+}
+
+TEST(Thumbnail, surface_without_extent_is_drawn) {
+  TriangleMesh point;
+  point.vertices = {{1, 2, 3}, {1, 2, 3}, {1, 2, 3}};
+  point.triangles = {{0, 1, 2}};
+  EXPECT_EQ(read_png(thumbnail(point, {}, {.longest = 120}), PNG_FORMAT_RGBA).width, 1);
+  point.vertices[1] = {5, 2, 3};
+  EXPECT_EQ(read_png(thumbnail(point, {0, 1, 2}, {.longest = 120, .top = 2}), PNG_FORMAT_RGBA).width, 120);
 }
 
 TEST(Picture, title_of_any_bytes_and_any_length_leaves_the_picture_whole) {

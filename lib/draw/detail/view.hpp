@@ -24,8 +24,8 @@ struct View {
 /// Centres the camera on the points (mm, at least one) it sees; their extent to its right and upward, mm.
 Vec2 centre_camera(Camera& camera, std::span<const Vec3> points);
 
-/// Two views from opposite sides in the box: beside or above each other, along y, x or z, whichever draws the points
-/// largest; y counts a quarter more than x, and that more than z.
+/// Two views from opposite sides in the box: along y, x or z, whichever sees the largest side of the points' bounding
+/// box (y counts a quarter more than x, and that more than z); beside or above each other, whichever draws them larger.
 /// @param points        mm, at least one
 /// @param oversampling  pixels of the cameras per pixel of the box
 std::array<View, 2> opposite_views(std::span<const Vec3> points, const Box2& box, int oversampling);

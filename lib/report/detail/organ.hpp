@@ -9,7 +9,7 @@ struct Room {
   std::size_t triangles = 0;  ///< of shells and of solids as drawn in 3-D, and half as many of the segmented surface
   std::size_t states = 0;     ///< at most
   std::size_t bytes = 0;      ///< of what moves in them, before it is packed; two states are drawn in any case
-  int picture_width = 0;      ///< pixels
+  int picture_longest = 0;    ///< pixels
   int slice = 0;              ///< pixels of each of nine
 };
 
