@@ -20,7 +20,7 @@ bin/%: ;
 files_extract := surface.ply
 files_decimate := coarse.ply
 files_relax := shell.ply map.png
-files_simulate := result.hdf picture.png
+files_simulate := result.hdf picture.png refined.ply
 from_simulate := simulate
 from_relax := relax $(from_simulate)
 from_decimate := decimate $(from_relax)

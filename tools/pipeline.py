@@ -35,6 +35,7 @@ from cases import CONTROL, Refused, find_cases
 STAGES = ("extract", "decimate", "relax", "simulate")
 PRODUCTS = {"extract": ["surface.ply"], "decimate": ["coarse.ply"], "relax": ["shell.ply", "map.png"],
             "simulate": ["result.hdf", "picture.png"]}
+REFINED = "refined.ply"  # with ACCURACY: the shells that carried the load
 
 
 # ------------------------------------------------------------------------------------------------------ what they run
@@ -84,12 +85,13 @@ def stage_flags(case):
 
 def stage_commands(case, binaries, flags):
     """Per stage its command, as text for the shell."""
-    surface, coarse, shell, error_map, result, picture, facts = (
-        os.path.join(case.folder, name)
-        for name in ("surface.ply", "coarse.ply", "shell.ply", "map.png", "result.hdf", "picture.png", "extract.json"))
+    surface, coarse, shell, error_map, result, picture, refined, facts = (
+        os.path.join(case.folder, name) for name in ("surface.ply", "coarse.ply", "shell.ply", "map.png", "result.hdf",
+                                                     "picture.png", REFINED, "extract.json"))
+    refinement = ["--target", surface, "--shell-out", refined] if case.setting("ACCURACY") else []
     words = {"extract": [path_word(case.volume), surface], "decimate": [surface, coarse],
              "relax": [coarse, surface, shell, "--picture", error_map],
-             "simulate": [shell, result, "--picture", picture, *(["--target", surface] if case.setting("ACCURACY") else [])]}
+             "simulate": [shell, result, "--picture", picture, *refinement]}
     # Whether there is a boundary to hold is known once the surface is.
     is_closed = f"grep -q '\"closed\": *true' {shlex.quote(facts)}"
     chosen_fix = "" if case.setting("FIX") else f' --fix "$(if {is_closed}; then echo rigid-motions; else echo boundary; fi)"'
@@ -199,7 +201,8 @@ def is_up_to_date(case, stage, remembered):
         start_ns = os.stat(os.path.join(case.folder, f".{stage}.flags")).st_mtime_ns
     except OSError:
         return False
-    if not all(os.path.isfile(os.path.join(case.folder, name)) for name in PRODUCTS[stage]):
+    products = PRODUCTS[stage] + ([REFINED] if stage == "simulate" and case.setting("ACCURACY") else [])
+    if not all(os.path.isfile(os.path.join(case.folder, name)) for name in products):
         return False
     report = read_report(os.path.join(case.folder, f"{stage}.json"))
     if read_text(os.path.join(case.folder, f".{stage}.flags")) != remembered or report.get("ok") is not True:

@@ -19,6 +19,8 @@
 #include "tunica/mechanics/runs/solve.hpp"
 #include "tunica/mechanics/runs/unloaded.hpp"
 #include "tunica/shell/distance/shell_distance.hpp"
+#include "tunica/shell/patch/curved_surface.hpp"
+#include "tunica/surface/mesh/measure.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -220,6 +222,21 @@ Json without_times(Json accuracy) {
   return accuracy;
 }
 
+/// Of shells that leave the run as relax's do the report says what relax's says.
+void certify(const ShellMesh& shell, const Target* target, const Progress& progress, Json& told) {
+  told["min_angle_deg"] = min_angle_degrees(flat_facets(shell));
+  if (target != nullptr) {
+    const double diagonal = target->diagonal();
+    ShellDistanceOptions measuring;
+    measuring.width = 1e-4 * diagonal;
+    measuring.progress = progress;
+    const Interval distance = shell_distance(shell, *target, measuring).both;
+    told["hausdorff_mm"] = {{"lower", distance.lower}, {"upper", distance.upper}};
+    told["hausdorff_percent"] = {{"lower", 100 * distance.lower / diagonal},
+                                 {"upper", 100 * distance.upper / diagonal}};
+  }
+}
+
 RunIdentity identity_of_run(const cli::Tool& tool, const Scene& scene, const std::string& asked,
                             const std::vector<fs::path>& inputs, const Drawing& drawing) {
   RunIdentity identity{version, asked, tool.provenance().lasting_command(), {}, {}, drawing.as_options()};
@@ -293,6 +310,8 @@ public:
     const Summary summary = accuracy_ ? recorded() : solved();
     stage("write");
     if (given_.accuracy.shell_out) {
+      certify(model().shells.front().mesh, targets_.front().get(), tool_.progress("certify"),
+              tool_.result()["accuracy"]);
       write_shells(*given_.accuracy.shell_out, model().shells.front().mesh, !accuracy_->reasons.empty());
     }
     require_accuracy();
@@ -487,9 +506,7 @@ private:
       });
     });
     loaded_->model = std::move(found.model);
-    tool_.result()["unloaded"] = {{"volume_mm3", found.volume ? Json(*found.volume) : Json()},
-                                  {"distance_mm", {{"mean", found.mean_distance}, {"max", found.largest_distance}}},
-                                  {"iterations", found.iterations}};
+    tool_.result()["unloaded"] = unloaded_report(found);
     tool_.note(
         fmt::format("the unloaded shape is found: under the pressure of the image it lies {:.2g} mm from the "
                     "image, {:.2g} mm at most",

@@ -137,11 +137,10 @@ Markup slices_figure(const CaseReport& one, int level) {
   Markup made = heading(level, "Shells on the image");
   return made += html(
              "<figure class=\"slices\"><img src=\"{}\" alt=\"Nine slices of the image with the outline of the "
-             "shells\"><figcaption>Blue: the segmented organ; amber: the {}shells{}. Rows: axial, coronal, sagittal; "
+             "shells\"><figcaption>Blue: the segmented organ; amber: the shells. Rows: axial, coronal, sagittal; "
              "columns: at a quarter, half and three quarters of the organ. The patient's left is on the right, "
              "the front on top or on the left.</figcaption></figure>\n",
-             data_address("image/png", one.slices), is_refitted(one.source) ? "first " : "",
-             is_refitted(one.source) ? ", which were refined for the accuracy asked for" : "");
+             data_address("image/png", one.slices));
 }
 
 struct Line {

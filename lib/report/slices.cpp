@@ -8,6 +8,7 @@
 #include "tunica/io/mesh/mesh_file.hpp"
 #include "tunica/io/volume/volume_file.hpp"
 #include "tunica/report/detail/command_words.hpp"
+#include "tunica/report/detail/measures.hpp"
 #include "tunica/shell/patch/curved_surface.hpp"
 #include "tunica/volume/labels/mask.hpp"
 
@@ -229,11 +230,11 @@ std::string sheet_of(const Image& image, const TriangleMesh& shells, int pixels)
 }  // namespace
 
 void draw_slices(CaseReport& one, const Room& room) {
-  const fs::path shells = one.source.folder / "shell.ply";
   std::error_code error;
-  if (one.source.folder.empty() || !fs::exists(shells, error)) {
+  if (one.source.folder.empty() || !fs::exists(one.source.folder / "shell.ply", error)) {
     return;
   }
+  const fs::path shells = one.source.folder / (is_refitted(one.source) ? "refined.ply" : "shell.ply");
   try {
     const Image image = read_image(one.source);
     one.slices = sheet_of(image, shells_in_voxels(shells, image.volume), room.slice);

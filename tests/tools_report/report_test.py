@@ -274,19 +274,27 @@ class CohortPage(ReportTest):
         self.assertEqual(re.findall("<h3>(Label .*)</h3>", text), ["Label 1", "Label &lt;i&gt;liver"])
 
     def test_error_of_an_accuracy_is_told(self):
-        def asked(credible):
+        def asked(credible, **distance):
             return lambda reports: reports["simulate"]["result"].update(
                 shells=4 * reports["relax"]["result"]["shells"],
-                accuracy={"of": "stress", "estimate_percent": 4.2, "credible": credible,
+                accuracy={"of": "stress", "estimate_percent": 4.2, "credible": credible, **distance,
                           "levels": [{"mean_distance_mm": 0.5}, {"mean_distance_mm": 0.125}]})
-        self.copy("known", asked(True))
+        known = self.copy("known", asked(True))
+        shutil.copy(known / "shell.ply", known / "refined.ply")
         self.copy("vain", asked(False))
         _, _, page = self.report()
+        self.assertEqual([image["alt"] for image in page.of("img") if "slices" in image["alt"]],
+                         ["Nine slices of the image with the outline of the shells"])
+        self.assertIn("vain/1/refined.ply: ", page.text, "the shells before are not those that the page is about")
         self.assertIn("The error of the stress by the number of shells is credibly below 4.2 %.", page.text)
         self.assertIn("The error of the stress by the number of shells is not credibly known.", page.text)
         self.assertNotIn("certified to be at most", page.text, "that is known of the shells before")
         self.assertIn(", 0.125 mm from the extracted surface in the mean", page.text)
         self.assertNotIn("Normals, mean error", page.text)
+        self.copy("certified", asked(True, hausdorff_mm={"upper": 0.625}, hausdorff_percent={"upper": 1.375}))
+        done, _, page = self.report()
+        self.assertIn("is certified to be at most 0.625 mm (1.38% of its diagonal)", page.text)
+        self.assertRegex(done.stdout, r"certified/1 .* 1.375 ")
 
     def test_table_and_what_its_columns_mean(self):
         self.cohort(3)

@@ -1,12 +1,14 @@
 """tunica-simulate --accuracy: mesh and model chosen, the claim reported, what is not credible refused."""
 import json
 import os
+import subprocess
 import unittest
 
 import h5py
 
 from support import SimulateTest, grid, sphere, write_ply
 
+COMPARE = os.path.join(os.environ["TUNICA_BIN"], "tunica-compare")
 WALL = ["--young", "1MPa", "--poisson", "0.3", "--thickness", "0.5mm", "--pressure", "100Pa"]
 HELD = WALL + ["--fix", "rigid-motions", "--static"]
 EXACT = 100e-6 * 100 * 0.7 / (2 * 1 * 0.5)  # mm: p r^2 (1 - nu) / (2 E t)
@@ -35,6 +37,13 @@ class AccuracyTest(SimulateTest):
         with h5py.File(self.path("out.hdf")) as file:
             self.assertEqual(json.loads(file["tunica/accuracy"][()])["of"], "displacement")
             self.assertEqual(len(file["tunica/elements/nodes"]), result["shells"])
+        subprocess.run([COMPARE, "fine.ply", "target.ply", "--shell", "--report", "compare.json"], cwd=self.folder, check=True,
+                       capture_output=True)
+        with open(self.path("compare.json"), encoding="utf-8") as file:
+            distance = json.load(file)["result"]["hausdorff_percent"]
+        self.assertLessEqual(distance["lower"], claim["hausdorff_percent"]["upper"])
+        self.assertGreaterEqual(distance["upper"], claim["hausdorff_percent"]["lower"])
+        self.assertLessEqual(claim["hausdorff_percent"]["upper"] - claim["hausdorff_percent"]["lower"], 0.01 + 1e-9)
         again = self.run_tool("fine.ply", "again.hdf", *HELD)["result"]
         self.assertAlmostEqual(again["max_displacement_mm"] / claim["value"], 1, places=2)
         self.assertEqual([entry["path"] for entry in report["outputs"]], ["out.hdf", "fine.ply"])

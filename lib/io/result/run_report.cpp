@@ -239,6 +239,12 @@ Json accuracy_report(const Accuracy& accuracy) {
           {"not_included", accuracy.not_included}};
 }
 
+Json unloaded_report(const Unloaded& unloaded) {
+  return {{"volume_mm3", or_null(unloaded.volume)},
+          {"distance_mm", {{"mean", unloaded.mean_distance}, {"max", unloaded.largest_distance}}},
+          {"iterations", unloaded.iterations}};
+}
+
 std::string level_note(const AccuracyLevel& level, const AccuracyRequest& request) {
   return fmt::format("{:>7} shells: {} {:.5g} {}, {:.2g} s", level.shells, name_of(request.of), level.value,
                      unit_of(request.of), level.seconds);

@@ -3,6 +3,7 @@
 #include "tunica/accuracy/accuracy.hpp"
 #include "tunica/core/json.hpp"
 #include "tunica/mechanics/runs/solve.hpp"
+#include "tunica/mechanics/runs/unloaded.hpp"
 
 /// What a report says of a simulation, key by key as the contract names them (mm, MPa, mJ, s).
 namespace tunica {
@@ -24,6 +25,9 @@ void report_modes(Json& result, const Summary& summary);
 
 /// What a run for an accuracy claims, and how it got there.
 Json accuracy_report(const Accuracy& accuracy);
+
+/// The shape without the pressure under which the organ was imaged.
+Json unloaded_report(const Unloaded& unloaded);
 
 /// A level on a line.
 std::string level_note(const AccuracyLevel& level, const AccuracyRequest& request);

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <limits>
 #include <map>
@@ -25,7 +26,7 @@ struct Header {
 Header read_header(const fs::path& path) {
   Header header;
   ByteStream stream(path, 0, Coding::plain);
-  std::string text(largest_header, '\0');
+  std::string text(std::min<std::uint64_t>(largest_header, stream.most_bytes()), '\0');
   text.resize(stream.read(text.data(), text.size()));
   std::size_t begin = 0;
   while (begin < text.size()) {
