@@ -133,6 +133,16 @@ class Unloaded(SimulateTest):
         self.imaged("image.ply", -4 * classical, "--thickness", "0.1mm", "--fix", "rigid-motions", expect=4)
         self.assertIn("no unloaded shape was found", self.done.stderr)
 
+    def test_a_wall_that_folds_on_the_way_is_refused(self):
+        """A cushion, far too full: without its pressure its rim would have to lie within itself."""
+        vertices, triangles, normals = sphere(1, 10)
+        flat = np.array([3, 1, 0.3])
+        normals = np.array(normals) / flat
+        write_ply(self.path("image.ply"), vertices * flat, triangles, normals / np.linalg.norm(normals, axis=1)[:, None])
+        self.imaged("image.ply", 0.2, "--thickness", "0.5mm", "--fix", "rigid-motions", expect=4)
+        self.assertIn("on the way to it the wall folds (image.ply: shell: triangle ", self.done.stderr)
+        self.assertNotIn("tunica-relax", self.done.stderr.splitlines()[-1], "another mesh would fold as well")
+
     def test_misuse(self):
         write_ply(self.path("image.ply"), *sphere(1, 10))
         held = ("--thickness", "0.2mm", "--fix", "rigid-motions", "--pressure", "1kPa")
