@@ -253,6 +253,8 @@ def missing_of(case):
         return [f"kind: '{shown(kind)}' is not understood: static or dynamic"]
     if case.setting("ACCURACY") and case.setting("MID_SURFACE"):
         return ["accuracy refits the shells to the face that mid_surface leaves: give shells or tolerance instead"]
+    if case.setting("ACCURACY") and case.setting("IMAGED_AT"):
+        return ["accuracy loads the shells as imaged, imaged_at unloads them first: give shells or tolerance instead"]
     missing = [name for name in needed if not case.setting(name)]
     if not missing:
         return []

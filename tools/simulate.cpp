@@ -296,7 +296,7 @@ public:
     if (scene_.accuracy && !given_.check) {
       choose_model();
     }
-    for (const std::string& doubt : doubts(model(), scene_.run)) {
+    for (const std::string& doubt : doubts(model(), scene_.run, accuracy_.has_value())) {
       tool_.warn(doubt);
     }
     if (given_.check) {
@@ -314,16 +314,16 @@ public:
               tool_.result()["accuracy"]);
       write_shells(*given_.accuracy.shell_out, model().shells.front().mesh, !accuracy_->reasons.empty());
     }
-    require_accuracy();
-    if (given_.unloaded) {
-      space_ = read_mesh(scene_.shells.front().mesh, scene_.shells.front().unit_mm).space.value_or(space_);
-      write_shells(*given_.unloaded, model().shells.front().mesh, false);
-    }
     // A fixed count of iterations asks for no convergence, so none is claimed.
     const bool converged = summary.converged && !scene_.run.cg_fixed_count;
     const auto* dynamic = kind<DynamicRun>();
     report_summary(tool_.result(), summary, converged,
                    dynamic != nullptr ? std::optional(dynamic->duration) : std::nullopt);
+    require_accuracy();
+    if (given_.unloaded) {
+      space_ = read_mesh(scene_.shells.front().mesh, scene_.shells.front().unit_mm).space.value_or(space_);
+      write_shells(*given_.unloaded, model().shells.front().mesh, false);
+    }
     if (given_.picture.out) {
       draw();
     }

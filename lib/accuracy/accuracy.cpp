@@ -104,21 +104,25 @@ private:
     return answer_of(std::move(model), run, request_, is_static ? near_ : std::nullopt);
   }
 
-  /// A mesh may be too coarse for any state; the next finer one begins anew.
+  /// The coarsest mesh may be too coarse for any state; of a finer one the model is to blame.
   std::optional<Answer> tried() {
     try {
       if (std::holds_alternative<DynamicRun>(settings_.kind) && !motion_) {
         choose_run();
       }
       return solved(settings_);
-    } catch (const RequirementError&) {
-      if (4 * level_.shell_count() > request_.max_shells) {
+    } catch (const RequirementError& error) {
+      const bool is_finer = begins_anew_ || !out_.levels.empty();
+      if (is_finer || 4 * level_.shell_count() > request_.max_shells) {
         throw;
       }
-      out_.levels.clear();
-      out_.estimate.reset();
-      last_.reset();
-      near_.reset();
+      begins_anew_ = true;
+      if (on_level_) {
+        AccuracyLevel level;
+        level.shells = level_.shell_count();
+        level.failure = error.what();
+        on_level_(level);
+      }
       return std::nullopt;
     }
   }
@@ -318,7 +322,8 @@ private:
   std::vector<AccuracyChoice> choices_;
   double model_error_ = 0;  // of the cheaper models that were chosen
   std::optional<Checkpoint> near_;
-  bool near_serves_ = true;  // as a start of Newton's method
+  bool begins_anew_ = false;  // from a finer mesh than the coarsest
+  bool near_serves_ = true;   // as a start of Newton's method
   std::optional<Answer> last_;
   double field_change_ = infinity;
   double other_state_ = 0;  // relative distance of another answer of the second level

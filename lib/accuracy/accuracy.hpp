@@ -42,6 +42,7 @@ struct AccuracyLevel {
   double seconds = 0;                   ///< of splits, fit and solve
   std::optional<double> mean_distance;  ///< mm, to the targets, the largest of all bodies
   std::size_t newton_iterations = 0;
+  std::string failure{};  ///< of the coarsest, which on_level is told of: why it has no value
 };
 
 /// A decision, the error it leaves (relative), and what was not chosen.
@@ -87,10 +88,10 @@ using ModelOf = std::function<Model(std::vector<ShellBody>)>;
 /// @param bodies   the coarsest level; all of the model
 /// @param targets  one for each body; null: splits lie on the body's own patches, and its geometry's error is not seen
 /// @param settings  a static run in one load step, or a dynamic run without error control
-/// Errors: InputError: no volume is enclosed, the quantity is zero; RequirementError: no level could be solved.
-/// Source: Roache, "Perspective: a method for uniform reporting of grid refinement studies", 1994 (convergence index
-/// with a factor of 3 for two grids). Cost: the last level's, times about 1.4. Limits: no difference of levels sees
-/// what no level resolves, beyond the doubts above. All states of a motion are kept in memory.
+/// Errors: InputError: no volume is enclosed, the quantity is zero; RequirementError: a level has no answer, unless the
+/// coarsest alone. Source: Roache, "Perspective: a method for uniform reporting of grid refinement studies", 1994
+/// (convergence index with a factor of 3 for two grids). Cost: the last level's, times about 1.4. Limits: no difference
+/// of levels sees what no level resolves, beyond the doubts above. All states of a motion are kept in memory.
 Accuracy solve_within(std::vector<ShellBody> bodies, const std::vector<const Target*>& targets,
                       const AccuracyRequest& request, const RunSettings& settings, const ModelOf& model_of,
                       const std::function<void(const AccuracyLevel&)>& on_level = {});

@@ -6,7 +6,6 @@
 #include "tunica/draw/detail/rasteriser.hpp"
 #include "tunica/draw/detail/shading.hpp"
 #include "tunica/draw/detail/view.hpp"
-#include "tunica/draw/picture.hpp"
 
 #include <algorithm>
 #include <array>
@@ -17,9 +16,8 @@ namespace {
 
 constexpr int thumbnail_oversampling = 2;
 
-Camera camera_for(const std::vector<Vec3>& points, int longest) {
-  const auto [right, up, towards] = picture_axes(points);
-  Camera camera{.right = right, .up = up, .towards = towards};
+Camera camera_for(const std::vector<Vec3>& points, const std::array<Vec3, 3>& axes, int longest) {
+  Camera camera{.right = axes[0], .up = axes[1], .towards = axes[2]};
   const Vec2 extent = centre_camera(camera, points);
   camera.scale = longest / std::max(extent.maxCoeff(), 1e-12);
   const auto pixels = [&](double length) { return std::max(1, narrow<int>(std::lround(length * camera.scale))); };
@@ -60,7 +58,7 @@ std::array<unsigned char, 4> pixel_at(const Raster& raster, int x, int y, const 
 std::string thumbnail(const TriangleMesh& surface, const std::vector<double>& values, const ThumbnailOptions& options) {
   TUNICA_ASSERT(!surface.triangles.empty());
   TUNICA_ASSERT(values.empty() || values.size() == surface.vertices.size());
-  const Camera camera = camera_for(surface.vertices, options.longest);
+  const Camera camera = camera_for(surface.vertices, options.axes, options.longest);
   const int width = camera.width / thumbnail_oversampling;
   const int height = camera.height / thumbnail_oversampling;
   const Raster raster = rasterise(surface, shading_normals(surface), values, camera);

@@ -2,6 +2,7 @@
 
 #include "tunica/surface/mesh/triangle_mesh.hpp"
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -10,11 +11,11 @@ namespace tunica {
 struct ThumbnailOptions {
   int longest = 240;  ///< pixels, its longer side
   double top = 0;     ///< value of the last colour; 0: the surface is plain
+  std::array<Vec3, 3> axes{Vec3::UnitX(), Vec3::UnitZ(), -Vec3::UnitY()};  ///< as of picture_axes()
 };
 
 /// A surface alone, in the colours of surface_picture(), on nothing: a PNG that stands on a light page and on a dark
-/// one. The organ stands as in the first view of surface_picture() and fills the picture. The same input gives the same
-/// bytes whatever the number of threads.
+/// one. The organ fills the picture. The same input gives the same bytes whatever the number of threads.
 /// @param surface  at least one triangle, finite positions, mm
 /// @param values   empty, or #V values >= 0; what is not finite is drawn grey
 std::string thumbnail(const TriangleMesh& surface, const std::vector<double>& values, const ThumbnailOptions& options);

@@ -43,7 +43,7 @@ Markup verdict(const CaseReport& one) {
 Markup big_number(const char* key, const std::string& label, const CaseReport& one, const std::string& aside) {
   const Measure& what = measure(key);
   const auto value = what.value(one.source);
-  return html("<div><dt>{}</dt><dd><b>{}</b> {}<small>{}</small></dd></div>\n", label, value ? figure(*value) : "–",
+  return html("<div><dt>{}</dt><dd><b>{}</b> {}<small>{}</small></dd></div>\n", label, value ? what.text(*value) : "–",
               value ? what.unit : "", aside);
 }
 
@@ -56,15 +56,18 @@ Markup three_numbers(const CaseReport& one) {
   const auto maximum = measure("stress_max_kpa").value(one.source);
   const auto percent = measure("distance_percent").value(one.source);
   const auto pressure = measure("pressure_kpa").value(one.source);
+  const bool unloaded = one.source.at("simulate", "result.unloaded").is_object();
+  const std::string whence = unloaded ? ", from the shape without load" : "";
   Markup list = html("<dl class=\"three\">\n");
   list += big_number("stress_p99_kpa", "Wall stress, 99th percentile", one,
                      maximum ? "von Mises, at either face; largest " + figure(*maximum) + " kPa" : "not computed");
   list += big_number("max_displacement_mm", "Largest displacement", one,
-                     pressure ? "under " + figure(*pressure) + " kPa" : "of the curved surface");
+                     pressure ? "under " + figure(*pressure) + " kPa" + whence : "of the curved surface");
   const bool in_middle = is_fitted_to_middle(one);
   list +=
       big_number("distance_mm", in_middle ? "Shells to middle of the wall, at most" : "Shells to surface, at most", one,
-                 percent ? "certified, both ways; " + figure(*percent) + " % of the diagonal" : "not certified");
+                 percent ? "certified, both ways; " + measure("distance_percent").text(*percent) + " % of the diagonal"
+                         : "not certified");
   return list += html("</dl>\n");
 }
 
@@ -84,7 +87,7 @@ Markup discretisation(const CaseReport& one) {
   const std::string quantity = of.is_string() ? of.get<std::string>() : "asked-for displacement";
   return accuracy.value("credible", Json()) == true && estimate.is_number()
              ? html("<p>The error of the {} by the number of shells is credibly below {} %.</p>\n", quantity,
-                    figure(estimate.get<double>()))
+                    figure_above(estimate.get<double>()))
              : html("<p>The error of the {} by the number of shells is not credibly known.</p>\n", quantity);
 }
 
@@ -165,8 +168,7 @@ std::vector<Line> lines_of(const CaseReport& one, const std::vector<const char*>
   for (const char* key : keys) {
     const Measure& what = measure(key);
     if (const auto value = what.value(one.source)) {
-      const bool whole = what.unit.empty() && *value == std::floor(*value);
-      lines.push_back({what.title, (whole ? fmt::format("{:.0f}", *value) : figure(*value)) + " " + what.unit});
+      lines.push_back({what.title, what.text(*value) + " " + what.unit});
     }
   }
   return lines;
@@ -206,6 +208,9 @@ Markup geometry_and_mesh(const CaseReport& one) {
 Markup mechanics(const CaseReport& one) {
   std::vector<Line> lines = lines_of(
       one, {"stress_p99_kpa", "stress_max_kpa", "strain_p99_percent", "max_displacement_mm", "volume_change_percent"});
+  add_if_known(lines, one, "simulate", "result.unloaded.volume_mm3", "Volume without load", "mm³");
+  add_if_known(lines, one, "simulate", "result.unloaded.distance_mm.mean", "Off the image under its pressure, mean",
+               "mm");
   add_if_known(lines, one, "simulate", "result.strain_energy_mj", "Strain energy", "mJ");
   add_if_known(lines, one, "simulate", "result.converged", "Converged");
   add_if_known(lines, one, "simulate", "result.residual", "Residual");

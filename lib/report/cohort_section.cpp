@@ -63,11 +63,8 @@ Markup row_of(const CaseReport& one) {
     const Measure& what = measure(key);
     const auto value = what.value(one.source);
     const bool none = !value || (std::string_view(key) == "seconds" && *value == 0);
-    const bool whole = !none && what.unit.empty();
     row += html("<td class=\"number\" data-value=\"{}\">{}</td>", none ? "" : fmt::format("{:.9g}", *value),
-                none    ? "–"
-                : whole ? fmt::format("{:.0f}", *value)
-                        : figure(*value));
+                none ? "–" : what.text(*value));
   }
   return row += html("</tr>\n");
 }
@@ -121,8 +118,11 @@ Markup spread_of(const CaseGroup& cases) {
     strips += strip_plot(what.title, what.unit, marks);
     for (const Outlier& outlier : found) {
       items += html("<li>{}: {} {} {} (robust z {})</li>\n", link_to(*cases[outlier.index]), what.title,
-                    figure(*values[outlier.index]), what.unit, fmt::format("{:+.1f}", outlier.z));
+                    what.text(*values[outlier.index]), what.unit, fmt::format("{:+.1f}", outlier.z));
     }
+  }
+  if (cases.size() < fewest_compared) {
+    return html("<p>Too few cases to tell outliers.</p>\n");
   }
   Markup made = items.text.empty() ? html("<p>No outlier.</p>\n") : html("<ul class=\"outliers\">\n{}</ul>\n", items);
   return made += html("<div class=\"strips\">\n{}</div>\n", strips);

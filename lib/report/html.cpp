@@ -113,4 +113,13 @@ std::string figure(double value) {
   return text;
 }
 
+std::string figure_above(double value) {
+  if (!std::isfinite(value) || !(value > 0)) {
+    return figure(value);
+  }
+  const int after = std::max(0, 2 - static_cast<int>(std::floor(std::log10(value))));  // digits after the point
+  const double step = std::pow(10, -after);
+  return figure(std::max(value, std::ceil(value / step * (1 - 1e-12)) * step));
+}
+
 }  // namespace tunica::report

@@ -4,6 +4,9 @@
 #include "tunica/core/narrow.hpp"
 #include "tunica/core/quantity.hpp"
 #include "tunica/report/detail/command_words.hpp"
+#include "tunica/report/detail/html.hpp"
+
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
@@ -38,8 +41,7 @@ Value stated(const char* flag, Dimension dimension, double scale = 1) {
 }
 
 std::optional<double> shells(const PipelineCase& one) {
-  const auto simulated = number(one.at("simulate", "result.shells"));  // --accuracy may have taken finer ones
-  return simulated ? simulated : number(one.at("relax", "result.shells"));
+  return number(one.at(is_refitted(one) ? "simulate" : "relax", "result.shells"));
 }
 
 // Of the shells that carry the load: those that relax left, or finer ones that an accuracy asked for.
@@ -97,15 +99,15 @@ std::vector<Measure> make_geometry() {
           {"diagonal_mm", "Diagonal", "mm", "Diagonal of the bounding box of the extracted surface.",
            "extract: result.diagonal_mm", false, reported("extract", "result.diagonal_mm")},
           {"shells", "Shells", "", "Number of curved triangles that carry the load.",
-           "simulate: result.shells, or else relax: result.shells", false, shells},
+           "relax: result.shells; with an accuracy simulate: result.shells", false, shells},
           {"distance_mm", "Distance", "mm",
            "Certified upper bound of the two-sided Hausdorff distance between the curved shells and the extracted "
-           "surface.",
+           "surface, or with a mid-surface and a thickness the middle of the wall.",
            "relax: result.hausdorff_mm.upper; with an accuracy simulate: result.accuracy.hausdorff_mm.upper", false,
-           of_shells("hausdorff_mm.upper")},
+           of_shells("hausdorff_mm.upper"), true},
           {"distance_percent", "Distance", "%", "The same, in percent of the surface's diagonal.",
            "relax: result.hausdorff_percent.upper; with an accuracy simulate: result.accuracy.hausdorff_percent.upper",
-           true, of_shells("hausdorff_percent.upper")},
+           true, of_shells("hausdorff_percent.upper"), true},
           {"mean_distance_mm", "Mean distance", "mm", "Mean distance of the curved shells to the surface.",
            "relax: result.mean_distance_mm; with an accuracy simulate: mean_distance_mm of the last of "
            "result.accuracy.levels",
@@ -162,8 +164,13 @@ const Measure& measure(const std::string& key) {
   return *found;
 }
 
+std::string Measure::text(double of) const {
+  return is_bound ? figure_above(of) : unit.empty() && of == std::floor(of) ? fmt::format("{:.0f}", of) : figure(of);
+}
+
 bool is_refitted(const PipelineCase& one) {
-  return one.at("simulate", "result.accuracy").is_object() &&
+  // A run that did not come to its accuracy leaves no shells under their own name.
+  return one.at("simulate", "ok") == true && one.at("simulate", "result.accuracy").is_object() &&
          one.at("simulate", "result.shells") != one.at("relax", "result.shells");
 }
 
@@ -175,7 +182,6 @@ double median(std::vector<double> values) {
 }
 
 std::vector<Outlier> outliers(std::span<const std::optional<double>> values) {
-  constexpr std::size_t fewest = 5;
   constexpr double normal_quartile = 0.6745;  // MAD of a standard normal distribution
   constexpr double farthest = 3.5;
   constexpr double least_spread = 0.01;
@@ -185,7 +191,7 @@ std::vector<Outlier> outliers(std::span<const std::optional<double>> values) {
       defined.push_back(*value);
     }
   }
-  if (defined.size() < fewest) {
+  if (defined.size() < fewest_compared) {
     return {};
   }
   const double middle = median(defined);

@@ -18,7 +18,7 @@ constexpr std::array references{
 std::string with_unit(const CaseReport& one, const char* key) {
   const Measure& what = measure(key);
   const auto value = what.value(one.source);
-  return value ? figure(*value) + (what.unit.empty() || what.unit == "%" ? "" : " ") + what.unit : "";
+  return value ? what.text(*value) + (what.unit.empty() || what.unit == "%" ? "" : " ") + what.unit : "";
 }
 
 std::string surface_sentence(const CaseReport& one) {

@@ -249,8 +249,10 @@ DrawnResult unloaded(const fs::path& path) {
   return drawn;
 }
 
-void take_picture(CaseReport& one, const TriangleMesh& mesh, const std::vector<double>& values, int longest) {
-  one.picture = thumbnail(mesh, values, {longest, one.picture_top});
+// As it stands in 3-D, which is decided by the shape without load.
+void take_picture(CaseReport& one, const TriangleMesh& mesh, const std::vector<double>& values,
+                  const TriangleMesh& reference, int longest) {
+  one.picture = thumbnail(mesh, values, {longest, one.picture_top, picture_axes(reference.vertices)});
 }
 
 void draw_shells(CaseReport& one, const Room& room, DrawnShells shells, const std::optional<TriangleMesh>& surface,
@@ -271,7 +273,7 @@ void draw_shells(CaseReport& one, const Room& room, DrawnShells shells, const st
   for (std::size_t v = 0; v < seen.vertices.size(); ++v) {
     seen.vertices[v] += one.magnification * shells.states.back().displacement[v];
   }
-  take_picture(one, seen, shells.states.back().von_mises, room.picture_longest);
+  take_picture(one, seen, shells.states.back().von_mises, shells.mesh, room.picture_longest);
   TriangleMesh coarse;
   if (surface) {
     try {
@@ -317,7 +319,7 @@ void draw_organ(CaseReport& one, const Room& room) {
       one.missing.push_back(one.redacted(error.what()));
     }
   } else if (surface && !surface->triangles.empty()) {
-    take_picture(one, *surface, {}, room.picture_longest);
+    take_picture(one, *surface, {}, *surface, room.picture_longest);
   }
 }
 

@@ -14,18 +14,12 @@
 #include <algorithm>
 #include <array>
 #include <filesystem>
+#include <optional>
 
 namespace tunica::report {
 namespace {
 
 namespace fs = std::filesystem;
-
-// An output of a stage: where the case lies now, or else where it was written.
-fs::path place_of(const PipelineCase& one, const fs::path& told) {
-  const fs::path here = one.folder / told.filename();
-  std::error_code error;
-  return fs::exists(here, error) ? here : told;
-}
 
 std::vector<std::string> differences(const PipelineCase& one) {
   constexpr std::array<const char*, pipeline_stages.size()> products{"surface.ply", "coarse.ply", "shell.ply",
@@ -38,6 +32,7 @@ std::vector<std::string> differences(const PipelineCase& one) {
       found.push_back((one.folder / products[i]).string() + ": no report of " + stage + " tells what it wrote");
     }
     const Json outputs = one.at(stage, "outputs");
+    std::optional<fs::path> folder;  // of the case when the first file, the stage's product, was written
     for (const Json& entry : outputs.is_array() ? outputs : Json::array()) {
       const bool hashed = entry.is_object() && entry.contains("path") && entry["path"].is_string() &&
                           entry.contains("sha256") && entry["sha256"].is_string();
@@ -46,7 +41,10 @@ std::vector<std::string> differences(const PipelineCase& one) {
                         ": tells no hashes of the outputs: it is of an older version, run the stage again");
         break;
       }
-      const fs::path path = place_of(one, entry["path"].get<std::string>());
+      // A file of the case lies where the case lies now; a user's own flag may have named another place.
+      const fs::path told = entry["path"].get<std::string>();
+      folder = folder.value_or(told.parent_path());
+      const fs::path path = told.parent_path() == *folder ? one.folder / told.filename() : told;
       try {
         if (sha256_of_file(path) != entry["sha256"].get<std::string>()) {
           found.push_back(path.string() + ": is not what " + stage + " wrote");

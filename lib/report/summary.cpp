@@ -83,8 +83,9 @@ std::string summary_text(const std::vector<PipelineCase>& cases) {
   }
   for (const PipelineCase& one : cases) {
     if (one.done()) {
-      text += fmt::format("result: {}   error map: {}\n", (one.folder / "result.hdf").string(),
-                          (one.folder / "map.png").string());
+      // Of shells that an accuracy refined there is no map.
+      const std::string map = is_refitted(one) ? "" : "   error map: " + (one.folder / "map.png").string();
+      text += fmt::format("result: {}{}\n", (one.folder / "result.hdf").string(), map);
     }
   }
   return text;

@@ -110,6 +110,8 @@ class Table(WithStubs):
         self.assertIn(":3: b: kind: 'slow' is not understood: static or dynamic", stderr)
         stderr = self.complaints("volume\tlabel\tmid_surface", "a.nii.gz\t1\tinner", ACCURACY="2%", **LOAD)
         self.assertIn(":2: a: accuracy refits the shells to the face", stderr)
+        stderr = self.complaints("volume\tlabel\timaged_at", "a.nii.gz\t1\t1kPa", ACCURACY="2%", **LOAD)
+        self.assertIn(":2: a: accuracy loads the shells as imaged", stderr)
         many = self.complaints("volume\tlabel", *(f"{i}.nii\t1" for i in range(30)))
         self.assertEqual(many.count("pressure, young, poisson, thickness, density not given"), 20)
         self.assertIn("and 10 problems more", many)

@@ -141,6 +141,9 @@ class Rules(WithStubs):
         done = self.make(VOLUMES="a.nii.gz", LABEL=3, ACCURACY="2%", MID_SURFACE="inner", **LOAD)
         self.assertEqual(done.returncode, 2)
         self.assertIn("give SHELLS or TOLERANCE instead", done.stderr)
+        done = self.make(VOLUMES="a.nii.gz", LABEL=3, ACCURACY="2%", IMAGED_AT="1kPa", **LOAD)
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("IMAGED_AT unloads them first", done.stderr)
 
     def test_defaults(self):
         self.make(VOLUMES="a.nii.gz", ISOVALUE=-0.5, **LOAD)

@@ -50,6 +50,24 @@ TEST(Html, FiguresHaveThreeDigits) {
   EXPECT_EQ(figure(-0.5), "-0.5");
 }
 
+TEST(Html, BoundsAreRoundedUp) {
+  EXPECT_EQ(figure_above(0.18606), "0.187");
+  EXPECT_EQ(figure_above(1.1001), "1.11");
+  EXPECT_EQ(figure_above(0.0123401), "0.0124");
+  EXPECT_EQ(figure_above(99.91), "100");
+  EXPECT_EQ(figure_above(1234.1), "1235");
+  EXPECT_EQ(figure_above(1.5), "1.5");
+  EXPECT_EQ(figure_above(0.3), "0.3");
+  EXPECT_EQ(figure_above(0.07), "0.07");
+  EXPECT_EQ(figure_above(10), "10");
+  EXPECT_EQ(figure_above(0), "0");
+  EXPECT_EQ(figure_above(-1), "-1");
+  for (double value = 1e-9; value < 1e5; value *= 1.37) {
+    EXPECT_GE(std::stod(figure_above(value)), value * (1 - 1e-12));
+    EXPECT_LE(std::stod(figure_above(value)), value * 1.0101 + 1e-12);
+  }
+}
+
 TEST(CommandWords, AreThoseTheShellSees) {
   EXPECT_THAT(command_words("tunica-extract 'my scan.nii' --label 3 'it'\\''s' ''"),
               ElementsAre("tunica-extract", "my scan.nii", "--label", "3", "it's", ""));

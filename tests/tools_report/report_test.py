@@ -124,12 +124,21 @@ class CasePage(ReportTest):
                        "Time and memory", "MIT", "certified to be at most", "GPL-3.0-or-later", "Young's modulus"):
             self.assertIn(needed, page.text)
         self.assertIn("was not estimated: --accuracy", page.text)
+        self.assertNotIn("without load", page.text)
         self.assertIn(cases.sha256(self.case / "shell.ply"), page.text)
         self.assertIn(json.loads((self.case / "relax.json").read_text())["command"], page.text)
         self.assertTrue(all(column.get("scope") for column in page.of("th")))
         self.assertEqual(len(page.of("caption")), len(page.of("table")))
         levels = [int(tag[1]) for tag, _ in page.elements if re.fullmatch("h[1-6]", tag)]
         self.assertTrue(all(after - before <= 1 for before, after in zip(levels, levels[1:])), levels)
+
+    def test_an_unloaded_shape_is_told(self):
+        self.copy("aneurysm", lambda reports: reports["simulate"]["result"].update(
+            unloaded={"volume_mm3": 4321.0, "distance_mm": {"mean": 0.0125, "max": 0.05}, "iterations": 7}))
+        _, _, page = self.report()
+        self.assertIn(" kPa, from the shape without load", page.text)
+        self.assertIn("Volume without load4321 mm³", page.text)
+        self.assertIn("Off the image under its pressure, mean0.0125 mm", page.text)
 
     def test_loads_nothing_and_runs_its_own_script_alone(self):
         self.copy("aneurysm")
@@ -270,7 +279,8 @@ class CohortPage(ReportTest):
         self.assertIn("--label 1", json.loads((self.case / "extract.json").read_text())["command"])
         self.copy("zz-liver", liver)
         _, text, _ = self.report()
-        self.assertEqual((text.count("(robust z"), text.count('<svg viewBox="0 0 320 58" role="img"')), (0, 14))
+        self.assertEqual((text.count("(robust z"), text.count('<svg viewBox="0 0 320 58" role="img"')), (0, 7))
+        self.assertIn("Too few cases", text)
         self.assertEqual(re.findall("<h3>(Label .*)</h3>", text), ["Label 1", "Label &lt;i&gt;liver"])
 
     def test_error_of_an_accuracy_is_told(self):
@@ -295,6 +305,15 @@ class CohortPage(ReportTest):
         done, _, page = self.report()
         self.assertIn("is certified to be at most 0.625 mm (1.38% of its diagonal)", page.text)
         self.assertRegex(done.stdout, r"certified/1 .* 1.375 ")
+        self.assertNotIn("certified/1/map.png", done.stdout, "that is of the shells before")
+        self.assertIn("Too few cases to tell outliers.", page.text)
+
+        def missed(reports):
+            asked(False)(reports)
+            reports["simulate"].update(ok=False, error="5% of stress is not credible")
+        shells = json.loads((self.copy("missed", missed) / "relax.json").read_text())["result"]["shells"]
+        done, _, page = self.report()
+        self.assertRegex(done.stdout, rf"missed/1 +simulate .* {shells} ", "the finer ones stay under a partial name")
 
     def test_table_and_what_its_columns_mean(self):
         self.cohort(3)
@@ -404,11 +423,7 @@ class Errors(ReportTest):
         self.report("--verify")
         with open(folder / "shell.ply", "ab") as file:
             file.write(b"x")
-        (folder / "coarse.ply").unlink()
-        # Where the outputs were first is not looked at while there are files of these names beside the report.
-        reports = json.loads((folder / "decimate.json").read_text())
-        reports["outputs"][0]["path"] = "nowhere/coarse.ply"
-        (folder / "decimate.json").write_text(json.dumps(reports))
+        (folder / "coarse.ply").unlink()  # where the case was made it is still there
         self.refuse(4, "--verify", says="shell.ply: is not what relax wrote")
         self.refuse(4, "--verify", says="coarse.ply: that decimate wrote, is missing")
         self.assertIn("Outputs that are not what the reports say", self.page.read_text())

@@ -27,6 +27,7 @@ class AccuracyTest(SimulateTest):
         result, claim = report["result"], report["result"]["accuracy"]
         self.assertEqual((claim["requested_percent"], claim["of"], claim["credible"], claim["reasons"]),
                          (2, "displacement", True, []))
+        self.assertNotIn("coarse", " ".join(report["warnings"]), "the claim says more")
         self.assertEqual(claim["not_included"], ["segmentation", "material", "thickness"])
         self.assertEqual(result["shells"], claim["levels"][-1]["shells"])
         self.assertAlmostEqual(result["max_displacement_mm"], claim["value"])
@@ -73,6 +74,19 @@ class AccuracyTest(SimulateTest):
         self.assertIn("more than 1500", self.done.stderr)
         self.assertEqual(sorted(name for name in os.listdir(self.folder) if name.startswith(("out", "fine"))),
                          ["fine.ply.part", "out.hdf.part"])
+        with open(self.path("report.json"), encoding="utf-8") as file:
+            result = json.load(file)["result"]
+        self.assertGreater(result["newton_iterations"], 0, "of the last level")
+
+    def test_beyond_the_limit_load_the_second_mesh_is_the_last(self):
+        """A sphere has no equilibrium above half of 2 E t / (1 - nu) r: finer meshes have none either."""
+        self.run_tool("ball.ply", "out.hdf", *WALL[:-2], "--pressure", "0.1MPa", "--fix", "rigid-motions", "--static",
+                      "--accuracy", "2%", "--target", "target.ply", expect=4)
+        lines = self.done.stderr.strip().splitlines()
+        self.assertIn("no stable static equilibrium beyond load factor", lines[-1])
+        levels = [line for line in lines if " shells: " in line and "load factor" in line]
+        self.assertEqual(len(levels), 1, "the coarsest, and why it has no answer")
+        self.assertIn("80 shells: ", levels[0])
 
     def test_usage_errors(self):
         for arguments, says in (

@@ -246,6 +246,9 @@ Json unloaded_report(const Unloaded& unloaded) {
 }
 
 std::string level_note(const AccuracyLevel& level, const AccuracyRequest& request) {
+  if (!level.failure.empty()) {
+    return fmt::format("{:>7} shells: {}", level.shells, level.failure);
+  }
   return fmt::format("{:>7} shells: {} {:.5g} {}, {:.2g} s", level.shells, name_of(request.of), level.value,
                      unit_of(request.of), level.seconds);
 }

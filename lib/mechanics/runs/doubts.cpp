@@ -169,7 +169,7 @@ void doubt_coarseness(const ShellBody& body, std::vector<std::string>& found) {
         "{}: its shells are coarse for so thin a curved wall: h^2 = {:.2g} R t in the median (at 4 they bend some 20 % "
         "too little, and uneven pressure moves single nodes too far), and their normals leave waves of {:.2f} % of the "
         "wall in the mean (the answer is off by up to thirty times that where these are no features of the surface): "
-        "refine the mesh or fit it again (tunica-relax)",
+        "take more shells, or let an accuracy choose them (--accuracy)",
         at(body.said_at, body.name), bow_at_one * bow, 100 * waves));
   }
 }
@@ -354,13 +354,15 @@ bool is_loaded(const Model& model) {
          std::any_of(model.rigids.begin(), model.rigids.end(), moves);
 }
 
-std::vector<std::string> doubts(const Model& model, const RunSettings& settings) {
+std::vector<std::string> doubts(const Model& model, const RunSettings& settings, bool are_shells_chosen) {
   std::vector<std::string> found;
   std::vector<std::vector<std::array<bool, 6>>> held;
   for (std::size_t b = 0; b < model.shells.size(); ++b) {
     const ShellBody& body = model.shells[b];
     doubt_thickness(body, found);
-    doubt_coarseness(body, found);
+    if (!are_shells_chosen) {
+      doubt_coarseness(body, found);
+    }
     held.push_back(held_freedoms(model, b));
     if (cannot_move(model, b, held.back())) {
       found.push_back(at(body.said_at, body.name) + ": all its nodes are held, so nothing of it can move");

@@ -19,7 +19,8 @@ bool is_loaded(const Model& model);
 /// nodes; bodies that cannot move; forces and moments that only held nodes bear; loads that are zero or stay so during
 /// the run, or jump within a step; nothing that loads at all (static and dynamic runs). The model must have passed
 /// check_model(). Cost: linear.
-std::vector<std::string> doubts(const Model& model, const RunSettings& settings);
+/// @param are_shells_chosen  for an accuracy: its estimate says more of them than their shape
+std::vector<std::string> doubts(const Model& model, const RunSettings& settings, bool are_shells_chosen = false);
 
 struct Curvature {
   double largest = 0;  ///< 1/mm, of the principal ones

@@ -262,7 +262,8 @@ Unloaded find_unloaded(const Model& imaged, const RunSettings& settings,
     if (step < smallest_part) {
       throw RequirementError(fmt::format(
           "no unloaded shape was found that lies where the image shows it under {:.4g} times the pressure {}: {}; was "
-          "the wall as thick and as stiff, and the pressure as high, when the image was taken?",
+          "the wall as thick and as stiff, and the pressure as high, when the image was taken? Where they were, more "
+          "shells may follow the way",
           next, key, map.reason.empty() ? "the iterations do not converge" : map.reason));
     }
   }

@@ -46,4 +46,7 @@ Markup data_address(std::string_view kind, std::string_view bytes);
 /// A number for people: three digits, all digits before the point.
 std::string figure(double value);
 
+/// The same for what is certainly not passed: rounded up.
+std::string figure_above(double value);
+
 }  // namespace tunica::report

@@ -19,7 +19,14 @@ struct Measure {
   std::string source;       ///< where it comes from: stage and key
   bool compared = false;    ///< shown as a strip, and searched for outliers
   std::function<std::optional<double>(const PipelineCase&)> value;
+  bool is_bound = false;  ///< certainly not passed: rounded up
+
+  /// A value for people: whole where it has no unit, else three digits.
+  [[nodiscard]] std::string text(double of) const;
 };
+
+/// Cases of a label, for outliers to be told.
+constexpr std::size_t fewest_compared = 5;
 
 /// All, in the order of the columns.
 const std::vector<Measure>& measures();
