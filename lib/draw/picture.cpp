@@ -102,10 +102,7 @@ public:
     paint_.top = options.maximum.value_or(step > 0 ? std::ceil(largest_ / step - rounding) * step : largest_);
     const bool headed = !options.title.empty() || !options.caption.empty();
     box_ = {36, headed ? 120.0 : 36.0, paint_.plain ? picture_width - 36.0 : 1310.0, picture_height - 66.0};
-    // A loaded organ is seen from where the unloaded one is.
-    const std::vector<Vec3> points = points_to_see(surface, used, options);
-    const std::span<const Vec3> shape = options.outline.vertices;
-    views_ = opposite_views(points, shape.empty() ? std::span(points).first(used.size()) : shape, box_, oversampling);
+    views_ = opposite_views(points_to_see(surface, used, options), box_, oversampling);
   }
 
   std::string png() {

@@ -63,9 +63,8 @@ Vec2 centre_camera(Camera& camera, std::span<const Vec3> points) {
   return (upper - lower).head<2>();
 }
 
-std::array<View, 2> opposite_views(std::span<const Vec3> points, std::span<const Vec3> shape, const Box2& box,
-                                   int oversampling) {
-  const Side& side = side_of(shape);
+std::array<View, 2> opposite_views(std::span<const Vec3> points, const Box2& box, int oversampling) {
+  const Side& side = side_of(points);
   std::array<View, 2> best;
   double best_scale = -1;
   for (const bool beside : {true, false}) {
@@ -101,7 +100,7 @@ std::array<View, 2> opposite_views(std::span<const Vec3> points, std::span<const
 
 std::array<Vec3, 3> picture_axes(const std::vector<Vec3>& points) {
   constexpr double side = 1000;  // pixels, of each view
-  const Camera camera = opposite_views(points, points, {0, 0, 2 * side + gap, side}, 1)[0].camera;
+  const Camera camera = opposite_views(points, {0, 0, 2 * side + gap, side}, 1)[0].camera;
   return {camera.right, camera.up, camera.towards};
 }
 

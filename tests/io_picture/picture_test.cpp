@@ -154,22 +154,6 @@ TEST(Picture, a_surface_along_the_view_is_seen_from_another_side) {
   EXPECT_GT(columns, 1000);
 }
 
-TEST(Picture, a_loaded_surface_is_seen_from_where_the_unloaded_one_is) {
-  TriangleMesh organ = make_sphere(20, 4);
-  for (Vec3& vertex : organ.vertices) {
-    vertex.y() *= 1.26;
-  }
-  TriangleMesh loaded = organ;
-  for (Vec3& vertex : loaded.vertices) {
-    vertex.x() *= 1.05;
-  }
-  const std::vector<double> values = bump(loaded, {0, -1, 0});
-  EXPECT_GT(count_near(picture(loaded, values), left_view, ring, 25), 60) << "along y";
-  const Image image = picture(loaded, values, {.outline = organ, .outline_name = "unloaded"});
-  EXPECT_GT(count_near(image, right_view, ring, 25), 60) << "along x";
-  EXPECT_LT(count_near(image, left_view, ring, 25), 5);
-}
-
 TEST(Picture, other_bodies_are_grey_and_drawn_from_outside_only) {
   const TriangleMesh sphere = make_sphere(20, 4);
   TriangleMesh wall;

@@ -24,12 +24,10 @@ struct View {
 /// Centres the camera on the points (mm, at least one) it sees; their extent to its right and upward, mm.
 Vec2 centre_camera(Camera& camera, std::span<const Vec3> points);
 
-/// Two views from opposite sides in the box: along y, x or z, whichever sees the largest side of the shape's bounding
+/// Two views from opposite sides in the box: along y, x or z, whichever sees the largest side of the points' bounding
 /// box (y counts a quarter more than x, and that more than z); beside or above each other, whichever draws them larger.
 /// @param points        mm, at least one
-/// @param shape         of these points, whose side is chosen: mm, at least one
 /// @param oversampling  pixels of the cameras per pixel of the box
-std::array<View, 2> opposite_views(std::span<const Vec3> points, std::span<const Vec3> shape, const Box2& box,
-                                   int oversampling);
+std::array<View, 2> opposite_views(std::span<const Vec3> points, const Box2& box, int oversampling);
 
 }  // namespace tunica
