@@ -79,6 +79,7 @@ public:
       }
       const Model coarse = std::move(model_);
       level_ = std::move(fine);
+      is_finer_ = true;
       model_ = model_of_(level_.bodies);
       carry_selections(coarse, level_, model_);
     }
@@ -112,11 +113,9 @@ private:
       }
       return solved(settings_);
     } catch (const RequirementError& error) {
-      const bool is_finer = begins_anew_ || !out_.levels.empty();
-      if (is_finer || 4 * level_.shell_count() > request_.max_shells) {
+      if (is_finer_ || 4 * level_.shell_count() > request_.max_shells) {
         throw;
       }
-      begins_anew_ = true;
       if (on_level_) {
         AccuracyLevel level;
         level.shells = level_.shell_count();
@@ -322,8 +321,8 @@ private:
   std::vector<AccuracyChoice> choices_;
   double model_error_ = 0;  // of the cheaper models that were chosen
   std::optional<Checkpoint> near_;
-  bool begins_anew_ = false;  // from a finer mesh than the coarsest
-  bool near_serves_ = true;   // as a start of Newton's method
+  bool is_finer_ = false;    // the level, than the coarsest
+  bool near_serves_ = true;  // as a start of Newton's method
   std::optional<Answer> last_;
   double field_change_ = infinity;
   double other_state_ = 0;  // relative distance of another answer of the second level

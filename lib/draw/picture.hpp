@@ -28,8 +28,8 @@ struct PictureOptions {
 
 /// Draws a surface, coloured by a value per vertex, from two opposite sides, with a colour bar, a scale of lengths and
 /// a ring around the largest value. @return a PNG of 1600 x 900. The views are along an axis of the frame, a little
-/// from the right and above: the front (-y) and the back (+y) with z up, unless another side of the surface's bounding
-/// box is larger by a quarter or more. So the same organ has the same views, whatever the values and the mesh. The same
+/// from the right and above: the front (-y) and the back (+y) with z up, unless another side of the bounding
+/// box of all that is drawn is larger by a quarter or more: values and mesh decide nothing. The same
 /// input gives the same bytes whatever the number of threads.
 /// @param surface  at least one triangle, finite positions, mm
 /// @param values   #V values >= 0; what is not finite is drawn grey and does not count. Empty: a plain surface

@@ -167,9 +167,8 @@ void doubt_coarseness(const ShellBody& body, std::vector<std::string>& found) {
   if (bow / largest_bow + waves / highest_waves > 1) {
     found.push_back(fmt::format(
         "{}: its shells are coarse for so thin a curved wall: h^2 = {:.2g} R t in the median (at 4 they bend some 20 % "
-        "too little, and uneven pressure moves single nodes too far), and their normals leave waves of {:.2f} % of the "
-        "wall in the mean (the answer is off by up to thirty times that where these are no features of the surface): "
-        "take more shells, or let an accuracy choose them (--accuracy)",
+        "too little); their normals leave waves of {:.2f} % of the wall (an error of up to thirty times that, unless "
+        "they are the surface's own): take more shells, or let an accuracy choose them (--accuracy)",
         at(body.said_at, body.name), bow_at_one * bow, 100 * waves));
   }
 }
