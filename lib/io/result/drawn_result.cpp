@@ -2,7 +2,7 @@
 
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
-#include "tunica/io/result/detail/hdf5_file.hpp"
+#include "tunica/io/result/detail/hdf5_chunks.hpp"
 #include "tunica/mechanics/model/wall.hpp"
 #include "tunica/mechanics/runs/curved_displacement.hpp"
 #include "tunica/surface/mesh/tet_checks.hpp"
@@ -67,7 +67,7 @@ public:
     if (whole.empty() || first > whole[0] || count > whole[0] - first) {
       fail(dataset + " has no shape of a result");
     }
-    std::vector<hsize_t> start(whole.size(), 0), extent(whole.begin(), whole.end());
+    std::vector<hdf5::Size> start(whole.size(), 0), extent(whole.begin(), whole.end());
     start[0] = first;
     extent[0] = count;
     std::size_t numbers = count;
@@ -81,7 +81,7 @@ public:
       fail(dataset + " is too large to be drawn");
     }
     const hdf5::Handle data = open(dataset);
-    if (numbers > 0 && !holds_its_chunks(data, start, extent)) {
+    if (numbers > 0 && !hdf5::chunks_are_whole(data, start, extent)) {
       fail(dataset + " has a chunk of another size: the file is damaged");
     }
     const hdf5::Handle space(H5Dget_space(data.get()));
@@ -110,7 +110,7 @@ public:
     const hdf5::Handle type(H5Dget_type(data.get()));
     const std::size_t size = H5Tget_size(type.get());
     if (H5Tget_class(type.get()) != H5T_STRING || H5Tis_variable_str(type.get()) != 0 || size > most_text ||
-        !shape(dataset).empty()) {
+        !shape(dataset).empty() || !hdf5::chunks_are_whole(data, {}, {})) {
       return {};
     }
     std::string value(size, '\0');
@@ -127,46 +127,6 @@ private:
       fail("has no " + dataset + ": it is not a result of tunica-simulate");
     }
     return data;
-  }
-
-  // Whether chunks of these rows that are said to be stored as they are have their size: HDF5 1.10 believes it.
-  static bool holds_its_chunks(const hdf5::Handle& data, const std::vector<hsize_t>& start,
-                               const std::vector<hsize_t>& extent) {
-    const hdf5::Handle made(H5Dget_create_plist(data.get()));
-    if (H5Pget_layout(made.get()) != H5D_CHUNKED) {
-      return true;
-    }
-    const hdf5::Handle type(H5Dget_type(data.get()));
-    const std::size_t rank = start.size();
-    std::vector<hsize_t> size(rank), at(rank);
-    if (H5Pget_chunk(made.get(), narrow<int>(rank), size.data()) != narrow<int>(rank)) {
-      return false;
-    }
-    double bytes = real(H5Tget_size(type.get()));
-    for (std::size_t k = 0; k < rank; ++k) {
-      if (size[k] == 0) {
-        return false;
-      }
-      at[k] = start[k] / size[k] * size[k];
-      bytes *= real(size[k]);
-    }
-    for (std::size_t k = 0; k < rank;) {
-      unsigned skipped_filters = 0;
-      haddr_t place = HADDR_UNDEF;
-      hsize_t stored = 0;
-      if (H5Dget_chunk_info_by_coord(data.get(), at.data(), &skipped_filters, &place, &stored) < 0 ||
-          (place != HADDR_UNDEF && skipped_filters != 0 && real(stored) < bytes)) {
-        return false;
-      }
-      for (k = 0; k < rank; ++k) {
-        at[k] += size[k];
-        if (at[k] < start[k] + extent[k]) {
-          break;
-        }
-        at[k] = start[k] / size[k] * size[k];
-      }
-    }
-    return true;
   }
 
   std::string name_;
