@@ -8,6 +8,7 @@ BUILD/fuzz/findings/PARSER-*: such a file goes into tests/fuzz/found/PARSER unde
 import argparse
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -16,6 +17,9 @@ from pathlib import Path
 SOURCE = Path(__file__).resolve().parent
 SECONDS_EACH = 10  # for one input
 MEGABYTES = 2048
+READERS_TESTS = ("io_volume", "io_mesh", "io_scene")
+ENDINGS = {"nifti": ("nii", "gz", "hdr"), "nrrd": ("nrrd", "nhdr"), "metaimage": ("mha", "mhd"),
+           "slices": ("tif", "tiff", "png"), "label_table": ("txt", "tsv", "csv", "ctbl"), "scene": ("toml",)}
 UNLIMITED = {"result": 1 << 20, "pipeline": 1 << 20}  # megabytes that HDF5 may ask for, and does not get: see result.cpp
 
 
@@ -25,6 +29,20 @@ def in_memory():
     return str(shared) if os.access(shared, os.W_OK) else None
 
 
+def files_of_tests(build):
+    """What the readers' tests write for the readers, a folder per ending; made anew where a test is newer."""
+    folder = build / "fuzz" / "tests"
+    programs = [build / "tests" / test / f"test_{test}" for test in READERS_TESTS]
+    if not folder.is_dir() or any(program.stat().st_mtime > folder.stat().st_mtime for program in programs):
+        shutil.rmtree(folder, ignore_errors=True)
+        with tempfile.TemporaryDirectory(dir=folder.parent) as made:
+            for program in programs:
+                subprocess.run([program, "--gtest_brief=1"], env={**os.environ, "TUNICA_SEEDS": made}, check=True,
+                               stdout=subprocess.DEVNULL)
+            shutil.copytree(made, folder)
+    return folder
+
+
 def fuzz(program, parser, build, seconds):
     """@return executions, inputs kept, the files that were found"""
     corpus = build / "fuzz" / "corpus" / parser
@@ -32,8 +50,9 @@ def fuzz(program, parser, build, seconds):
     corpus.mkdir(parents=True, exist_ok=True)
     findings.mkdir(parents=True, exist_ok=True)
     before = set(findings.iterdir())
-    seeds = [folder for folder in (SOURCE / "found" / parser, SOURCE / "seeds" / parser, build / "fuzz" / "seeds" / parser)
-             if folder.is_dir()]
+    seeds = [SOURCE / "found" / parser, SOURCE / "seeds" / parser, build / "fuzz" / "seeds" / parser]
+    seeds += [files_of_tests(build) / ending for ending in ENDINGS.get(parser, (parser,))]
+    seeds = [folder for folder in seeds if folder.is_dir()]
     command = [program, f"-max_total_time={seconds}", f"-timeout={SECONDS_EACH}", f"-rss_limit_mb={MEGABYTES}",
                f"-malloc_limit_mb={UNLIMITED.get(parser, MEGABYTES)}", f"-artifact_prefix={findings}/{parser}-",
                "-print_final_stats=1", corpus, *seeds]
