@@ -121,9 +121,13 @@ void run(cli::Tool& tool, const Arguments& given) {
   if (lost) {
     throw OutputError(*lost);
   }
-  say_table(tool, given.summary.empty()
-                      ? fmt::format("report: {}\n", given.out.string())
-                      : fmt::format("summary: {}   report: {}\n", given.summary.string(), given.out.string()));
+  std::string places = given.summary.empty() ? "" : fmt::format("summary: {}   ", given.summary.string());
+  places += fmt::format("report: {}", given.out.string());
+  if (page.warned > 0) {
+    places += fmt::format("   read its warnings first: {} of {} cases done have some", page.warned,
+                          cases.size() - page.failed);
+  }
+  say_table(tool, places + "\n");
   require_verified(page.different);
 }
 

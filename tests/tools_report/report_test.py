@@ -264,6 +264,7 @@ class CohortPage(ReportTest):
         self.copy("zz-out", stand_out)
         done, text, page = self.report()
         self.assertRegex(done.stdout, r"zz-failed/1 +relax .*the tolerance cannot be held")
+        self.assertIn("read its warnings first: 1 of 9 cases done have some", done.stdout)
         self.assertEqual(re.findall(r"<dd>(\d+)</dd>", text), ["9", "1", "1"])
         self.assertRegex(page.text, r"zz-failed/1: relax: shell.ply: the tolerance cannot be held\s*Next: tunica-relax .* --verbose")
         self.assertRegex(page.text, r"zz-out/1: Stress p99 50 kPa \(robust z \+\d+")
