@@ -393,11 +393,11 @@ Coding coding_of(const fs::path& path) {
 
 struct ByteStream::Inflater {
   z_stream stream{};
-  std::vector<unsigned char> buffer = std::vector<unsigned char>(buffer_bytes);
+  std::vector<unsigned char> buffer;
   bool ended = false;
   bool cut_off = false;  // the file ended inside the stream
 
-  Inflater() {
+  explicit Inflater(std::size_t buffer_size) : buffer(buffer_size) {
     // 15 bits of window, and 32: gzip or zlib, told by the header.
     if (inflateInit2(&stream, 15 + 32) != Z_OK) {
       throw std::bad_alloc();
@@ -434,7 +434,7 @@ ByteStream::ByteStream(const fs::path& path, std::uint64_t offset, Coding coding
   }
   most_bytes_ = size - offset;
   if (coding == Coding::deflated) {
-    inflater_ = std::make_unique<Inflater>();
+    inflater_ = std::make_unique<Inflater>(std::min<std::uint64_t>(most_bytes_, buffer_bytes));
     most_bytes_ *= deflate_expansion;
   }
 }
