@@ -18,6 +18,8 @@ MOTION = ("DURATION", "STEP")
 WITH_UNIT = {"PRESSURE": "80mmHg", "YOUNG": "1MPa", "THICKNESS": "1.5mm", "DENSITY": "1100kg/m3", "IMAGED_AT": "80mmHg",
              "DURATION": "1s", "STEP": "10ms"}
 FURTHER = ("EXTRACT", "DECIMATE", "RELAX", "SIMULATE")
+SWITCHES = ("LARGEST", "FILL", "OPEN")
+ON, OFF = ("1", "yes", "on", "true"), ("", "0", "no", "off", "false")
 # Variables that a case may have of its own, and those that a run has.
 OF_A_CASE = ("LABEL", "ISOVALUE", "NAMES", "SMOOTH", "LARGEST", "FILL", "OPEN", "SHELLS", "TOLERANCE", "ACCURACY", "OF",
              "METHOD", *WALL, *IMAGE, "KIND", "LOAD_STEPS", *MOTION, "FIX", "MEM", *FURTHER)
@@ -46,7 +48,7 @@ class Case:
         return one_line(self.own[name]) if name in self.own else setting(name)
 
     def switched_on(self, name):
-        return self.setting(name) not in ("", "0", "no", "off", "false")
+        return self.setting(name).lower() in ON
 
 
 def one_line(text):
@@ -222,6 +224,7 @@ def own_settings(row, folder):
                 own.update({name: "" for name in other if name != "LABEL"})
     if "NAMES" in own:
         own["NAMES"] = os.path.join(folder, os.path.expanduser(own["NAMES"]))
+    problems += misspelt_switches(lambda name: own.get(name, ""), str.lower)
     if not is_megabytes(own.get("MEM", "")):
         problems.append(f"mem: '{shown(own['MEM'])}' is no number of megabytes")
     for name in FURTHER:
@@ -233,11 +236,18 @@ def own_settings(row, folder):
     return own, problems
 
 
+def misspelt_switches(value_of, called):
+    """Switches that are neither on nor off, by words. What a spreadsheet writes, FALSE, is off."""
+    return [f"{called(name)}: '{shown(value_of(name))}' is not understood: 1 or 0" for name in SWITCHES
+            if value_of(name).lower() not in ON + OFF]
+
+
 def misstated():
     """What make is given without its unit, or is no word that is understood, by words. A line of a table that is wrong is a
     failed case, and no other one's."""
     wrong = [f"{name}: '{setting(name)}' has no unit: write one, as in {example}" for name, example in WITH_UNIT.items()
              if re.fullmatch(r"[-+]?[0-9.]+(e[-+]?[0-9]+)?", setting(name), re.I)]
+    wrong += misspelt_switches(setting, str)
     if setting("MID_SURFACE") not in ("", "outer", "inner"):
         wrong.append(f"MID_SURFACE: '{shown(setting('MID_SURFACE'))}' is not understood: outer or inner")
     return wrong

@@ -30,7 +30,7 @@ import subprocess
 import sys
 import tempfile
 
-from cases import CONTROL, Refused, find_cases
+from cases import CONTROL, SWITCHES, Refused, find_cases
 
 STAGES = ("extract", "decimate", "relax", "simulate")
 PRODUCTS = {"extract": ["surface.ply"], "decimate": ["coarse.ply"], "relax": ["shell.ply", "map.png"],
@@ -59,7 +59,7 @@ def stage_flags(case):
 
     extract = flag_if("--isovalue", "ISOVALUE") or flag("--label", case.label)
     extract += flag_if("--names", "NAMES") + flag_if("--smooth", "SMOOTH")
-    for name, word in (("LARGEST", "--largest"), ("FILL", "--fill-cavities"), ("OPEN", "--open-border")):
+    for name, word in zip(SWITCHES, ("--largest", "--fill-cavities", "--open-border")):
         extract += [word] if case.switched_on(name) else []
     shells = setting("SHELLS") or ("190" if setting("ACCURACY") else "800")
     decimate = ["--triangles", shells]

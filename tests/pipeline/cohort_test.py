@@ -141,6 +141,15 @@ class Table(WithStubs):
             self.assertIn(f"{self.table}:{4 if chr(10) in line else 3}: ", stderr)
         self.assertFalse(list(self.folder.rglob("pwned*")))
 
+    def test_switches_are_what_spreadsheets_write(self):
+        self.assertIn(":2: a: open: 'N' is not understood: 1 or 0",
+                      self.complaints("volume\tlabel\topen", "a.nii.gz\t1\tN", **LOAD))
+        self.write("case\tvolume\tlabel\topen\tlargest", "p1\ta.nii.gz\t1\tFALSE\tTRUE", "p2\ta.nii.gz\t1\tTrue\tFalse")
+        self.run_table(**LOAD)
+        first, second = (line for line in self.calls() if line.startswith("extract "))
+        self.assertTrue("--largest" in first and "--open-border" not in first, first)
+        self.assertTrue("--largest" not in second and "--open-border" in second, second)
+
     def test_files_that_are_no_table(self):
         self.assertIn("is empty", self.complaints(**LOAD))
         self.assertIn("has columns but no case", self.complaints("volume\tlabel", **LOAD))

@@ -311,6 +311,7 @@ class Rules(WithStubs):
             said = self.refusal(VOLUMES="a.nii.gz", LABEL=1, **{**LOAD, name: "1.5e3"})
             self.assertIn(f"{name}: '1.5e3' has no unit", said)
         self.assertIn("outer or inner", self.refusal(VOLUMES="a.nii.gz", LABEL=1, MID_SURFACE="middle", **LOAD))
+        self.assertIn("OPEN: 'nein' is not understood: 1 or 0", self.refusal(VOLUMES="a.nii.gz", LABEL=1, OPEN="nein", **LOAD))
 
     def test_contradictions_are_refused(self):
         self.assertIn("KIND=quick", self.refusal(VOLUMES="a.nii.gz", LABEL=1, KIND="quick", **LOAD))

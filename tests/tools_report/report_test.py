@@ -192,6 +192,10 @@ class CasePage(ReportTest):
                     file["tunica/nodes/displacement"].id.write_direct_chunk((0, 0, 0), chunk, filter_mask=skipped)
                 _, _, page = self.report(folder=path)
                 self.assertIn("tunica/nodes/displacement has a chunk of another size: the file is damaged", page.text)
+            (path / "result.hdf").unlink()
+            os.mkfifo(path / "result.hdf")
+            _, _, page = self.report(folder=path)
+            self.assertIn("result.hdf: is not a regular file", page.text)
 
     def test_states_of_a_bending_path_agree_with_those_that_the_grid_has(self):
         # What the nodes say of the last state but one, against the grid of a run that ends there.

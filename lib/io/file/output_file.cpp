@@ -31,22 +31,6 @@ struct Closer {
 };
 using File = std::unique_ptr<std::FILE, Closer>;
 
-File open_input(const fs::path& path) {
-  std::error_code error;
-  const fs::file_status status = fs::status(path, error);
-  if (!fs::exists(status)) {
-    throw InputError(fmt::format("{}: no such file", path.string()));
-  }
-  if (!fs::is_regular_file(status)) {
-    throw InputError(fmt::format("{}: is not a regular file", path.string()));
-  }
-  File file(std::fopen(path.c_str(), "rb"));
-  if (!file) {
-    throw InputError(fmt::format("{}: cannot be read: {}", path.string(), reason()));
-  }
-  return file;
-}
-
 // Where a name that is a symbolic link leads: renaming onto the link would replace the link, not the file it stands
 // for.
 fs::path behind_links(fs::path path) {
@@ -235,8 +219,24 @@ void write_file(const fs::path& path, std::string_view bytes, bool overwrite) {
   output.commit();
 }
 
+InputFile open_input(const fs::path& path) {
+  std::error_code error;
+  const fs::file_status status = fs::status(path, error);
+  if (!fs::exists(status)) {
+    throw InputError(fmt::format("{}: no such file", path.string()));
+  }
+  if (!fs::is_regular_file(status)) {
+    throw InputError(fmt::format("{}: is not a regular file", path.string()));
+  }
+  InputFile file(std::fopen(path.c_str(), "rb"), &std::fclose);
+  if (!file) {
+    throw InputError(fmt::format("{}: cannot be read: {}", path.string(), reason()));
+  }
+  return file;
+}
+
 std::string read_file(const fs::path& path, std::size_t limit) {
-  const File file = open_input(path);
+  const InputFile file = open_input(path);
   std::error_code error;
   const std::uintmax_t size = fs::file_size(path, error);
   if (error || size > limit) {
@@ -254,7 +254,7 @@ std::string read_file(const fs::path& path, std::size_t limit) {
 }
 
 std::string sha256_of_file(const fs::path& path) {
-  const File file = open_input(path);
+  const InputFile file = open_input(path);
   const std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> context(EVP_MD_CTX_new(), &EVP_MD_CTX_free);
   // OpenSSL fails at SHA-256 only where memory ends.
   bool has_memory = context && EVP_DigestInit_ex(context.get(), EVP_sha256(), nullptr) == 1;

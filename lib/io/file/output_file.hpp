@@ -1,6 +1,7 @@
 // io/file: outputs that are whole or absent; what the readers share.
 #pragma once
 
+#include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -79,6 +80,12 @@ void require_writable(const std::filesystem::path& path, bool overwrite);
 
 /// Writes `bytes` as a whole file through an OutputFile. Errors: OutputError.
 void write_file(const std::filesystem::path& path, std::string_view bytes, bool overwrite);
+
+using InputFile = std::unique_ptr<std::FILE, int (*)(std::FILE*)>;
+
+/// Opens a regular file to be read: a pipe would wait for ever, a device never end. Errors: InputError when it is
+/// missing, unreadable or not a regular file.
+InputFile open_input(const std::filesystem::path& path);
 
 /// Reads a whole regular file. Errors: InputError when it is missing, unreadable, not a regular file, or larger than
 /// `limit` bytes.

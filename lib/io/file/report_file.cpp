@@ -326,6 +326,8 @@ bool has_number(const Report& report, const std::string& key) {
 std::vector<std::string> number_keys(const Report& report) {
   std::vector<std::string> keys;
   collect_keys(report.json, {}, keys);
+  // A name with dots in it may hide a number behind the same key.
+  std::erase_if(keys, [&](const std::string& key) { return !has_number(report, key); });
   return keys;
 }
 

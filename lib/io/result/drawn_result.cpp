@@ -2,6 +2,7 @@
 
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
+#include "tunica/io/file/output_file.hpp"
 #include "tunica/io/result/detail/hdf5_chunks.hpp"
 #include "tunica/mechanics/model/wall.hpp"
 #include "tunica/mechanics/runs/curved_displacement.hpp"
@@ -25,6 +26,7 @@ constexpr std::size_t most_text = std::size_t{16} << 20;
 class Reader {
 public:
   explicit Reader(const std::filesystem::path& path) : name_(path.string()) {
+    (void)open_input(path);
     H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
     const hdf5::Handle access(H5Pcreate(H5P_FILE_ACCESS));
     (void)H5Pset_file_locking(access.get(), 0, 1);

@@ -21,10 +21,10 @@ constexpr double expansion = 1032;
 
 class PngFile : public SliceFile {
 public:
-  explicit PngFile(const fs::path& path) : path_(path), file_(std::fopen(path.c_str(), "rb"), &std::fclose) {
+  explicit PngFile(const fs::path& path) : path_(path), file_(open_input(path)) {
     std::error_code error;
     size_ = fs::file_size(path, error);
-    if (!file_ || error) {
+    if (error) {
       throw InputError(fmt::format("{}: cannot be read: {}", path.string(), std::strerror(errno)));
     }
     png_ = png_create_read_struct(PNG_LIBPNG_VER_STRING, this, &fail, &complain);
@@ -122,7 +122,7 @@ private:
   }
 
   fs::path path_;
-  std::unique_ptr<std::FILE, int (*)(std::FILE*)> file_;
+  InputFile file_;
   std::uint64_t size_ = 0;
   png_structp png_ = nullptr;
   png_infop info_ = nullptr;

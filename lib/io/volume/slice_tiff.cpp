@@ -50,11 +50,10 @@ std::optional<VoxelType> voxel_type(unsigned bits, unsigned format) {
 
 class TiffFile : public SliceFile {
 public:
-  explicit TiffFile(const fs::path& path)
-      : path_(path), file_(std::fopen(path.c_str(), "rb"), &std::fclose), tiff_(nullptr, &TIFFClose) {
+  explicit TiffFile(const fs::path& path) : path_(path), file_(open_input(path)), tiff_(nullptr, &TIFFClose) {
     std::error_code error;
     size_ = fs::file_size(path, error);
-    if (!file_ || error) {
+    if (error) {
       throw InputError(fmt::format("{}: cannot be read: {}", path.string(), std::strerror(errno)));
     }
     budget_ = most_readings * size_;
@@ -268,7 +267,7 @@ private:
   }
 
   fs::path path_;
-  std::unique_ptr<std::FILE, int (*)(std::FILE*)> file_;
+  InputFile file_;
   std::uint64_t size_ = 0;
   std::uint64_t budget_ = 0;  // bytes that may still be read
   bool cut_ = false;          // more was to be read than there is

@@ -409,18 +409,10 @@ struct ByteStream::Inflater {
 };
 
 ByteStream::ByteStream(const fs::path& path, std::uint64_t offset, Coding coding)
-    : path_(path), file_(nullptr, &std::fclose) {
+    : path_(path), file_(open_input(path)) {
   std::error_code error;
-  const fs::file_status status = fs::status(path, error);
-  if (!fs::exists(status)) {
-    throw InputError(fmt::format("{}: no such file", path.string()));
-  }
-  if (!fs::is_regular_file(status)) {
-    throw InputError(fmt::format("{}: is not a regular file", path.string()));
-  }
-  file_.reset(std::fopen(path.c_str(), "rb"));
   const std::uintmax_t size = fs::file_size(path, error);
-  if (!file_ || error) {
+  if (error) {
     throw InputError(fmt::format("{}: cannot be read: {}", path.string(), std::strerror(errno)));
   }
   if (offset > size) {

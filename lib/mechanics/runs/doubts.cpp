@@ -91,7 +91,7 @@ void doubt_thickness(const ShellBody& body, std::vector<std::string>& found) {
   } else if (thick > most_of_it * whole) {
     found.push_back(fmt::format(
         "{}: its thickness, {:.4g} mm, is more than a quarter of a vessel's radius, or an eighth of a "
-        "ball's, over {:.0f} % of its area: pressure on the inner face moves so thick a wall some 10 % less "
+        "ball's, over {:.0f} % of its area: pressure on the inner face moves so thick a wall at least some 10 % less "
         "than this thin one",
         at(body.said_at, body.name), most, 100 * thick / whole));
   }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "tunica/io/file/output_file.hpp"
 #include "tunica/io/volume/volume_file.hpp"
 
 #include <cstdint>
@@ -58,7 +59,7 @@ private:
   std::size_t read_deflated(void* to, std::size_t size);
 
   std::filesystem::path path_;
-  std::unique_ptr<std::FILE, int (*)(std::FILE*)> file_;
+  InputFile file_;
   std::unique_ptr<Inflater> inflater_;
   std::uint64_t position_ = 0;
   std::uint64_t most_bytes_ = 0;
