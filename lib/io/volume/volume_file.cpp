@@ -33,7 +33,7 @@ std::string other_content(const fs::path& path, std::string_view head) {
          ".mhd), a multi-page TIFF, or a folder of TIFF or PNG slices";
 }
 
-VolumeFile read_any(const fs::path& path, const VolumeOptions& options, const SlabSink* sink) {
+VolumeFile read_known(const fs::path& path, const VolumeOptions& options, const SlabSink* sink) {
   const auto refuse_spacing = [&] {
     if (options.spacing) {
       throw UsageError(fmt::format("{}: --spacing is for slice stacks; this file brings its own", path.string()));
@@ -65,6 +65,17 @@ VolumeFile read_any(const fs::path& path, const VolumeOptions& options, const Sl
     return read_metaimage(path, options, sink);
   }
   throw InputError(fmt::format("{}: {}", path.string(), other_content(path, head)));
+}
+
+VolumeFile read_any(const fs::path& path, const VolumeOptions& options, const SlabSink* sink) {
+  constexpr double shortest = 1e-4, longest = 50;  // mm: of a microscope, and more than any scanner's
+  VolumeFile file = read_known(path, options, sink);
+  const Vec3& edges = file.spacing;
+  if (edges.maxCoeff() > longest || edges.minCoeff() < shortest) {
+    file.warnings.push_back(fmt::format("{}: its voxels are {:.3g} x {:.3g} x {:.3g} mm: is their unit right?",
+                                        path.string(), edges[0], edges[1], edges[2]));
+  }
+  return file;
 }
 
 }  // namespace
