@@ -51,7 +51,8 @@ def fuzz(program, parser, build, seconds):
     findings.mkdir(parents=True, exist_ok=True)
     before = set(findings.iterdir())
     seeds = [SOURCE / "found" / parser, SOURCE / "seeds" / parser, build / "fuzz" / "seeds" / parser]
-    seeds += [files_of_tests(build) / ending for ending in ENDINGS.get(parser, (parser,))]
+    tests = files_of_tests(build)
+    seeds += [tests / ending for ending in ENDINGS.get(parser, (parser,))]
     seeds = [folder for folder in seeds if folder.is_dir()]
     command = [program, f"-max_total_time={seconds}", f"-timeout={SECONDS_EACH}", f"-rss_limit_mb={MEGABYTES}",
                f"-malloc_limit_mb={UNLIMITED.get(parser, MEGABYTES)}", f"-artifact_prefix={findings}/{parser}-",

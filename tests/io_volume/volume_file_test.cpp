@@ -35,6 +35,27 @@ TEST(VolumeFile, APipeIsRefusedAtOnce) {
   EXPECT_THAT(error_of(folder / "pipe.nii"), HasSubstr("not a regular file"));
   folder.file("v.mhd", metaimage_header("MET_UCHAR", "", "pipe.nii"));
   EXPECT_THAT(error_of(folder / "v.mhd"), HasSubstr("not a regular file"));
+  for (const char* slice : {"1.png", "1.tif"}) {
+    const TemporaryFolder slices;
+    ASSERT_EQ(::mkfifo((slices / slice).c_str(), 0600), 0);
+    VolumeOptions options;
+    options.spacing = Vec3(1, 1, 1);
+    EXPECT_THAT(error_of(slices / "", options), HasSubstr("not a regular file"));
+  }
+}
+
+TEST(VolumeFile, VoxelsThatNoScannerMakesAreWarnedOf) {
+  const TemporaryFolder folder;
+  const std::string voxels = encoded(sample_values<std::uint8_t>(60), Endian::little);
+  for (const auto& [spacing, warned] :
+       {std::pair("2e-5 2e-5 2e-5", true), {"2e-4 3e-4 4e-4", false}, {"50 2 3", false}, {"51 2 3", true}}) {
+    const std::string header =
+        replaced(metaimage_header(), "ElementSpacing = 2 3 4", std::string("ElementSpacing = ") + spacing);
+    folder.file("v.mha", header + voxels);
+    const VolumeFile file = read_volume(folder / "v.mha", {});
+    ASSERT_EQ(file.warnings.size(), warned ? 1U : 0U) << spacing;
+    EXPECT_TRUE(!warned || file.warnings[0].ends_with("mm: is their unit right?")) << file.warnings[0];
+  }
 }
 
 // Every damage of a good file is a clean refusal or a volume, in bounded memory and time.

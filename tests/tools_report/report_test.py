@@ -191,7 +191,13 @@ class CasePage(ReportTest):
                 with h5py.File(path / "result.hdf", "r+") as file:
                     file["tunica/nodes/displacement"].id.write_direct_chunk((0, 0, 0), chunk, filter_mask=skipped)
                 _, _, page = self.report(folder=path)
-                self.assertIn("tunica/nodes/displacement has a chunk of another size: the file is damaged", page.text)
+                self.assertIn("tunica/nodes/displacement has chunks of another size", page.text)
+            with h5py.File(path / "result.hdf", "r+") as file:
+                shape = file["tunica/nodes/displacement"].shape
+                del file["tunica/nodes/displacement"]
+                file.create_dataset("tunica/nodes/displacement", data=np.zeros(shape), fletcher32=True)
+            _, _, page = self.report(folder=path)
+            self.assertIn("other filters than tunica-simulate writes", page.text)
             (path / "result.hdf").unlink()
             os.mkfifo(path / "result.hdf")
             _, _, page = self.report(folder=path)

@@ -26,11 +26,6 @@ namespace {
 
 std::string reason() { return std::strerror(errno); }
 
-struct Closer {
-  void operator()(std::FILE* file) const { std::fclose(file); }
-};
-using File = std::unique_ptr<std::FILE, Closer>;
-
 // Where a name that is a symbolic link leads: renaming onto the link would replace the link, not the file it stands
 // for.
 fs::path behind_links(fs::path path) {
@@ -209,7 +204,7 @@ void OutputFile::commit() {
 
 void write_file(const fs::path& path, std::string_view bytes, bool overwrite) {
   OutputFile output(path, overwrite);
-  File file(std::fopen(output.partial_path().c_str(), "wb"));
+  OpenFile file(std::fopen(output.partial_path().c_str(), "wb"), &std::fclose);
   const bool written =
       file && std::fwrite(bytes.data(), 1, bytes.size(), file.get()) == bytes.size() && std::fflush(file.get()) == 0;
   if (!written) {
@@ -219,7 +214,7 @@ void write_file(const fs::path& path, std::string_view bytes, bool overwrite) {
   output.commit();
 }
 
-InputFile open_input(const fs::path& path) {
+OpenFile open_input(const fs::path& path) {
   std::error_code error;
   const fs::file_status status = fs::status(path, error);
   if (!fs::exists(status)) {
@@ -228,7 +223,7 @@ InputFile open_input(const fs::path& path) {
   if (!fs::is_regular_file(status)) {
     throw InputError(fmt::format("{}: is not a regular file", path.string()));
   }
-  InputFile file(std::fopen(path.c_str(), "rb"), &std::fclose);
+  OpenFile file(std::fopen(path.c_str(), "rb"), &std::fclose);
   if (!file) {
     throw InputError(fmt::format("{}: cannot be read: {}", path.string(), reason()));
   }
@@ -236,7 +231,7 @@ InputFile open_input(const fs::path& path) {
 }
 
 std::string read_file(const fs::path& path, std::size_t limit) {
-  const InputFile file = open_input(path);
+  const OpenFile file = open_input(path);
   std::error_code error;
   const std::uintmax_t size = fs::file_size(path, error);
   if (error || size > limit) {
@@ -254,7 +249,7 @@ std::string read_file(const fs::path& path, std::size_t limit) {
 }
 
 std::string sha256_of_file(const fs::path& path) {
-  const InputFile file = open_input(path);
+  const OpenFile file = open_input(path);
   const std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> context(EVP_MD_CTX_new(), &EVP_MD_CTX_free);
   // OpenSSL fails at SHA-256 only where memory ends.
   bool has_memory = context && EVP_DigestInit_ex(context.get(), EVP_sha256(), nullptr) == 1;

@@ -81,11 +81,11 @@ void require_writable(const std::filesystem::path& path, bool overwrite);
 /// Writes `bytes` as a whole file through an OutputFile. Errors: OutputError.
 void write_file(const std::filesystem::path& path, std::string_view bytes, bool overwrite);
 
-using InputFile = std::unique_ptr<std::FILE, int (*)(std::FILE*)>;
+using OpenFile = std::unique_ptr<std::FILE, int (*)(std::FILE*)>;
 
 /// Opens a regular file to be read: a pipe would wait for ever, a device never end. Errors: InputError when it is
 /// missing, unreadable or not a regular file.
-InputFile open_input(const std::filesystem::path& path);
+OpenFile open_input(const std::filesystem::path& path);
 
 /// Reads a whole regular file. Errors: InputError when it is missing, unreadable, not a regular file, or larger than
 /// `limit` bytes.

@@ -69,7 +69,7 @@ private:
   }
 
   std::filesystem::path path_;
-  std::unique_ptr<std::FILE, int (*)(std::FILE*)> file_;
+  OpenFile file_;
   std::string buffer_;
 };
 

@@ -26,7 +26,7 @@ constexpr std::size_t most_text = std::size_t{16} << 20;
 class Reader {
 public:
   explicit Reader(const std::filesystem::path& path) : name_(path.string()) {
-    (void)open_input(path);
+    (void)open_input(path);  // HDF5 would wait on a pipe
     H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
     const hdf5::Handle access(H5Pcreate(H5P_FILE_ACCESS));
     (void)H5Pset_file_locking(access.get(), 0, 1);
@@ -84,7 +84,7 @@ public:
     }
     const hdf5::Handle data = open(dataset);
     if (numbers > 0 && !hdf5::chunks_are_whole(data, start, extent)) {
-      fail(dataset + " has a chunk of another size: the file is damaged");
+      fail(dataset + " has chunks of another size, or of other filters than tunica-simulate writes: write it again");
     }
     const hdf5::Handle space(H5Dget_space(data.get()));
     const hdf5::Handle memory(H5Screate_simple(narrow<int>(extent.size()), extent.data(), nullptr));

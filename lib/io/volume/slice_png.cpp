@@ -25,7 +25,7 @@ public:
     std::error_code error;
     size_ = fs::file_size(path, error);
     if (error) {
-      throw InputError(fmt::format("{}: cannot be read: {}", path.string(), std::strerror(errno)));
+      throw InputError(fmt::format("{}: cannot be read: {}", path.string(), error.message()));
     }
     png_ = png_create_read_struct(PNG_LIBPNG_VER_STRING, this, &fail, &complain);
     info_ = png_ == nullptr ? nullptr : png_create_info_struct(png_);
@@ -122,7 +122,7 @@ private:
   }
 
   fs::path path_;
-  InputFile file_;
+  OpenFile file_;
   std::uint64_t size_ = 0;
   png_structp png_ = nullptr;
   png_infop info_ = nullptr;

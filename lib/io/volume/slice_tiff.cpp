@@ -54,7 +54,7 @@ public:
     std::error_code error;
     size_ = fs::file_size(path, error);
     if (error) {
-      throw InputError(fmt::format("{}: cannot be read: {}", path.string(), std::strerror(errno)));
+      throw InputError(fmt::format("{}: cannot be read: {}", path.string(), error.message()));
     }
     budget_ = most_readings * size_;
     // What has no file to belong to would still be printed.
@@ -267,7 +267,7 @@ private:
   }
 
   fs::path path_;
-  InputFile file_;
+  OpenFile file_;
   std::uint64_t size_ = 0;
   std::uint64_t budget_ = 0;  // bytes that may still be read
   bool cut_ = false;          // more was to be read than there is

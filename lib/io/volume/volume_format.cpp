@@ -413,7 +413,7 @@ ByteStream::ByteStream(const fs::path& path, std::uint64_t offset, Coding coding
   std::error_code error;
   const std::uintmax_t size = fs::file_size(path, error);
   if (error) {
-    throw InputError(fmt::format("{}: cannot be read: {}", path.string(), std::strerror(errno)));
+    throw InputError(fmt::format("{}: cannot be read: {}", path.string(), error.message()));
   }
   if (offset > size) {
     throw InputError(

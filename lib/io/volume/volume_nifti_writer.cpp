@@ -153,7 +153,7 @@ private:
   }
 
   fs::path name_;
-  std::unique_ptr<std::FILE, int (*)(std::FILE*)> file_;
+  OpenFile file_;
   bool gzip_;
   z_stream stream_{};
   std::vector<Bytef> buffer_ = std::vector<Bytef>(std::size_t{1} << 16);

@@ -59,7 +59,7 @@ private:
   std::size_t read_deflated(void* to, std::size_t size);
 
   std::filesystem::path path_;
-  InputFile file_;
+  OpenFile file_;
   std::unique_ptr<Inflater> inflater_;
   std::uint64_t position_ = 0;
   std::uint64_t most_bytes_ = 0;
