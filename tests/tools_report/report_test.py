@@ -192,6 +192,17 @@ class CasePage(ReportTest):
                     file["tunica/nodes/displacement"].id.write_direct_chunk((0, 0, 0), chunk, filter_mask=skipped)
                 _, _, page = self.report(folder=path)
                 self.assertIn("tunica/nodes/displacement has chunks of another size", page.text)
+            # Where a chunk has no dimensions HDF5 1.10 divides by zero. Its layout in the file: version 3, class 2.
+            whole = (path / "result.hdf").read_bytes()
+            with h5py.File(path / "result.hdf") as file:
+                sides = (*file["tunica/history/time"].chunks, 8)
+            layout = re.compile(re.escape(bytes([3, 2, len(sides)])) + b".{8}" + re.escape(struct.pack("<2I", *sides)), re.S)
+            damaged = layout.sub(lambda found: found[0][:2] + bytes(1) + found[0][3:], whole)
+            self.assertNotEqual(damaged, whole)
+            (path / "result.hdf").write_bytes(damaged)
+            _, _, page = self.report(folder=path)
+            self.assertIn("result.hdf: is damaged: HDF5 fails on it", page.text)
+            (path / "result.hdf").write_bytes(whole)
             with h5py.File(path / "result.hdf", "r+") as file:
                 shape = file["tunica/nodes/displacement"].shape
                 del file["tunica/nodes/displacement"]

@@ -4,6 +4,7 @@
 #include "tunica/core/narrow.hpp"
 #include "tunica/io/file/output_file.hpp"
 #include "tunica/io/result/detail/hdf5_chunks.hpp"
+#include "tunica/io/result/detail/hdf5_trial.hpp"
 #include "tunica/mechanics/model/wall.hpp"
 #include "tunica/mechanics/runs/curved_displacement.hpp"
 #include "tunica/surface/mesh/tet_checks.hpp"
@@ -28,9 +29,10 @@ public:
   explicit Reader(const std::filesystem::path& path) : name_(path.string()) {
     (void)open_input(path);  // HDF5 would wait on a pipe
     H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
-    const hdf5::Handle access(H5Pcreate(H5P_FILE_ACCESS));
-    (void)H5Pset_file_locking(access.get(), 0, 1);
-    file_ = hdf5::Handle(H5Fopen(path.c_str(), H5F_ACC_RDONLY, access.get()));
+    if (!hdf5::opens_without_fault(path)) {
+      fail("is damaged: HDF5 fails on it");
+    }
+    file_ = hdf5::opened_for_reading(path);
     if (file_.get() < 0) {
       fail("cannot be read as HDF5");
     }
