@@ -249,6 +249,19 @@ TEST(Doubts, BodiesThatCannotMoveAndLoadsThatMoveNothing) {
   EXPECT_THAT(doubts_of(model), IsEmpty());
 }
 
+TEST(Doubts, ImagedUnderAPressureOfTheOtherSign) {
+  Model model = plate();
+  model.loads.push_back({0, PressureLoad{1e-3, true, 2e-3}, {}, "scene:9:1"});
+  EXPECT_THAT(doubts_of(model), IsEmpty());
+  std::get<PressureLoad>(model.loads.back().kind).imaged_at = -2e-3;
+  EXPECT_THAT(
+      doubts_of(model),
+      ElementsAre("scene:9:1: shell: imaged_at presses on the other face of the wall than the load: is its sign "
+                  "right?"));
+  std::get<PressureLoad>(model.loads.back().kind).value = 0;  // the unloaded shape alone
+  EXPECT_THAT(doubts_of(model), ElementsAre("scene:9:1: shell: this load is zero"));
+}
+
 TEST(Doubts, NormalsThatDoNotFitTheNodes) {
   const auto ball = [](int level, double lean) {
     Model model = pressurised_sphere(level, 0.05, 1e-3);

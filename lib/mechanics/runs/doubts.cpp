@@ -304,6 +304,10 @@ void doubt_loads(const Model& model, const RunSettings& settings,
                       ": the ramp of this load changes within less than a step, so what it sets swinging is lost: "
                       "take shorter steps");
     }
+    if (const auto* pressure = std::get_if<PressureLoad>(&load.kind);
+        pressure != nullptr && pressure->imaged_at && pressure->value * *pressure->imaged_at < 0) {
+      found.push_back(where + ": imaged_at presses on the other face of the wall than the load: is its sign right?");
+    }
   }
   for (const Fix& fix : model.fixes) {
     if (prescribes(fix) && stays_zero(fix.ramp, settings)) {
