@@ -408,7 +408,7 @@ private:
     given_.accuracy.ask(tool_.arguments(), scene_);
     require_fresh();
     name_unloaded(tool_, given_, scene_);
-    asked_ = scene_text(scene_);
+    asked_ = scene_text(scene_, out_);
     loaded_.emplace(load_scene(scene_));
     read_targets();
     for (const std::string& note : loaded_->notes) {

@@ -234,6 +234,16 @@ nearest = ["0mm", "0mm", "10mm"]
         # The same bytes under another name are the same mesh; the part is still what it was.
         self.run_tool("same.ply", "out.hdf", *DYNAMIC, *part)
 
+    def test_a_run_goes_on_where_its_folder_moved(self):
+        self.interrupted()
+        before, self.folder = self.folder, self.path("moved")
+        os.mkdir(self.folder)
+        for name in (*LEFT, "ball.ply"):
+            os.rename(os.path.join(before, name), self.path(name))
+        self.run_tool("--resume", "out.hdf.part")
+        with h5py.File(self.path("out.hdf")) as file:
+            self.assertIn(b'mesh = "ball.ply"', file["tunica/scene"][()])
+
     def test_what_cannot_be_resumed(self):
         self.refused("--resume", "out.hdf.part", says="out.hdf.part: no such file")
         self.refused("--resume", "out.hdf", says="ends with .part", code=2)

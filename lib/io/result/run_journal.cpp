@@ -12,9 +12,12 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstring>
 #include <sstream>
+#include <string_view>
 #include <type_traits>
 
 namespace tunica {
@@ -216,6 +219,8 @@ std::string record_of(const std::string& bytes) {
 
 constexpr std::size_t record_head = sizeof(std::uint64_t) + sizeof(std::uint32_t);
 
+constexpr std::array<std::string_view, 2> mesh_keys{"mesh = ", "fill = "};
+
 // One line per key that two scenes say differently; meshes are compared by their bytes elsewhere.
 std::string scene_difference(const std::string& before, const std::string& now) {
   std::istringstream old_lines(before);
@@ -231,7 +236,9 @@ std::string scene_difference(const std::string& before, const std::string& now) 
       return fmt::format("the scene {} '{}'", old_there ? "no longer has" : "now also has",
                          old_there ? old_line : new_line);
     }
-    if (old_line != new_line && !(old_line.starts_with("mesh = ") && new_line.starts_with("mesh = "))) {
+    const bool both_name_a_mesh = std::ranges::any_of(
+        mesh_keys, [&](std::string_view key) { return old_line.starts_with(key) && new_line.starts_with(key); });
+    if (old_line != new_line && !both_name_a_mesh) {
       return fmt::format("{}'{}' was '{}'", section.empty() ? "" : "in " + section + " ", new_line, old_line);
     }
     if (new_line.starts_with('[')) {

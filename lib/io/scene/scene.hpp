@@ -223,8 +223,8 @@ Model resolve_scene(const Scene& scene, SceneBodies bodies);
 /// Of a scene of shells alone.
 Model resolve_scene(const Scene& scene, std::vector<ShellBody> shells);
 
-/// The scene as a scene file with everything resolved: SI units, absolute mesh paths, defaults written out. Reading it
-/// gives the same scene.
-std::string scene_text(const Scene& scene);
+/// The scene as a scene file with everything resolved: SI units, defaults written out. Reading it gives the same scene.
+/// Paths are absolute; those within the folder of `file` are relative to it, so that both may move together.
+std::string scene_text(const Scene& scene, const std::filesystem::path& file = {});
 
 }  // namespace tunica

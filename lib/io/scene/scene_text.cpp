@@ -100,9 +100,19 @@ std::string table_text(const Table<Value>& table, bool dynamic, const Write& wri
 
 class Text {
 public:
+  explicit Text(const std::filesystem::path& file)
+      : folder_(file.empty() ? file : std::filesystem::absolute(file).lexically_normal().parent_path()) {}
+
   void section(std::string_view header) { text_ += fmt::format("{}{}\n", text_.empty() ? "" : "\n", header); }
   void line(std::string_view key, const std::string& value) { text_ += fmt::format("{} = {}\n", key, value); }
   void word(std::string_view key, std::string_view value) { line(key, toml_string(value)); }
+  /// A path as the file may say it; absolute where it leaves the file's folder, for a link on the way up leads
+  /// elsewhere.
+  [[nodiscard]] std::string place(const std::filesystem::path& path) const {
+    const std::filesystem::path whole = std::filesystem::absolute(path).lexically_normal();
+    const std::filesystem::path within = folder_.empty() ? folder_ : whole.lexically_relative(folder_);
+    return within.empty() || *within.begin() == ".." ? whole.string() : within.string();
+  }
   void value(std::string_view key, double value, std::string_view unit, Dimension dimension) {
     word(key, quantity(value, unit, dimension));
   }
@@ -116,6 +126,7 @@ public:
 
 private:
   std::string text_;
+  std::filesystem::path folder_;
 };
 
 void write_load_factors(const std::vector<double>& factors, Text& text) {
@@ -237,7 +248,7 @@ std::string_view name_of(Bending bending) {
 
 void write_file(std::string_view key, const std::filesystem::path& mesh, std::optional<double> unit_mm, double scale,
                 Text& text) {
-  text.word(key, std::filesystem::absolute(mesh).lexically_normal().string());
+  text.word(key, text.place(mesh));
   if (unit_mm) {
     text.word("unit", *unit_mm == 1 ? "mm" : *unit_mm == 10 ? "cm" : *unit_mm == 1000 ? "m" : "um");
   }
@@ -430,16 +441,15 @@ void write_accuracy(const SceneAccuracy& accuracy, Text& text) {
   }
   std::vector<std::string> targets;
   for (const auto& [body, path] : accuracy.targets) {
-    targets.push_back(fmt::format("{} = {}", toml_string(body),
-                                  toml_string(std::filesystem::absolute(path).lexically_normal().string())));
+    targets.push_back(fmt::format("{} = {}", toml_string(body), toml_string(text.place(path))));
   }
   text.line("target", fmt::format("{{{}}}", fmt::join(targets, ", ")));
 }
 
 }  // namespace
 
-std::string scene_text(const Scene& scene) {
-  Text text;
+std::string scene_text(const Scene& scene, const std::filesystem::path& file) {
+  Text text(file);
   const bool dynamic = std::holds_alternative<DynamicRun>(scene.run.kind);
   write_run(scene, text);
   for (const SceneShell& shell : scene.shells) {
