@@ -13,6 +13,7 @@
 #include <hdf5.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 #include <utility>
@@ -23,13 +24,31 @@ namespace {
 constexpr std::size_t most_numbers = 200'000'000;  // in one reading: what a page cannot show, and damaged files claim
 constexpr std::size_t most_text = std::size_t{16} << 20;
 
+// What is read of a result.
+constexpr std::array datasets{"VTKHDF/Connectivity",
+                              "VTKHDF/PointData/displacement",
+                              "VTKHDF/PointData/von_mises",
+                              "VTKHDF/Points",
+                              "VTKHDF/Types",
+                              "tunica/elements/nodes",
+                              "tunica/elements/normals",
+                              "tunica/elements/patch",
+                              "tunica/elements/von_mises_bottom",
+                              "tunica/elements/von_mises_top",
+                              "tunica/history/load_factor",
+                              "tunica/history/time",
+                              "tunica/nodes/displacement",
+                              "tunica/nodes/position",
+                              "tunica/nodes/rotation",
+                              "tunica/scene"};
+
 /// One file, of which every failure is an InputError that names it.
 class Reader {
 public:
   explicit Reader(const std::filesystem::path& path) : name_(path.string()) {
     (void)open_input(path);  // HDF5 would wait on a pipe
     H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
-    if (!hdf5::opens_without_fault(path)) {
+    if (!hdf5::opens_without_fault(path, datasets)) {
       fail("is damaged: HDF5 fails on it");
     }
     file_ = hdf5::opened_for_reading(path);
@@ -126,6 +145,7 @@ public:
 
 private:
   [[nodiscard]] hdf5::Handle open(const std::string& dataset) const {
+    TUNICA_ASSERT(std::ranges::find(datasets, dataset) != datasets.end());  // or its fault would be this process's
     hdf5::Handle data(has(dataset) ? H5Dopen2(file_.get(), dataset.c_str(), H5P_DEFAULT) : -1);
     if (data.get() < 0) {
       fail("has no " + dataset + ": it is not a result of tunica-simulate");
