@@ -253,7 +253,11 @@ class Flags(SimulateTest):
         by_scene = self.run_tool("--scene", "scene.toml", "b.hdf", "--threads", "1")["result"]
         self.assertEqual(by_flags["max_displacement_mm"], by_scene["max_displacement_mm"])
         with h5py.File(self.path("a.hdf")) as a:
-            self.assertEqual(a["tunica/scene"][()].decode(), text)
+            beside = a["tunica/scene"][()].decode()
+        self.assertIn('mesh = "ball.ply"', beside)
+        self.write("beside.toml", beside)
+        self.run_tool("--scene", "beside.toml", "--check")
+        self.assertEqual(self.done.stdout, text)
         self.run_tool("ball.ply", *PRESSED, "--static", "--check", expect=3)  # free to move: check finds it
 
     def test_quiet_says_nothing_and_help_says_much(self):
