@@ -39,7 +39,7 @@ def files_of_tests(build):
             for program in programs:
                 subprocess.run([program, "--gtest_brief=1"], env={**os.environ, "TUNICA_SEEDS": made}, check=True,
                                stdout=subprocess.DEVNULL)
-            shutil.copytree(made, folder)
+            shutil.copytree(made, folder, dirs_exist_ok=True)  # two may fuzz at once
     return folder
 
 
