@@ -219,10 +219,9 @@ std::string record_of(const std::string& bytes) {
 
 constexpr std::size_t record_head = sizeof(std::uint64_t) + sizeof(std::uint32_t);
 
-constexpr std::array<std::string_view, 2> mesh_keys{"mesh = ", "fill = "};
-
-// One line per key that two scenes say differently; meshes are compared by their bytes elsewhere.
+// What two scenes say differently first; meshes are compared by their bytes elsewhere.
 std::string scene_difference(const std::string& before, const std::string& now) {
+  constexpr std::array<std::string_view, 2> mesh_keys{"mesh = ", "fill = "};
   std::istringstream old_lines(before);
   std::istringstream new_lines(now);
   std::string old_line, new_line, section;

@@ -17,7 +17,7 @@ struct RunIdentity {
   std::string scene;    ///< resolved, SI
   std::string command;
   std::vector<std::pair<std::string, std::string>> inputs;   ///< path, sha256: all that was read
-  std::vector<std::pair<std::string, std::string>> meshes;   ///< path, sha256: one per shell
+  std::vector<std::pair<std::string, std::string>> meshes;   ///< path, sha256: of each mesh file
   std::vector<std::pair<std::string, std::string>> options;  ///< flags beside the scene that shape the outputs
 };
 
