@@ -296,9 +296,13 @@ def say(text):
 def run_make(make, run):
     """Lets make do what is planned, in a process group of its own: a signal that stops this process is passed on to all
     of the group, as a terminal does, since make's own jobs would leave their commands at work. The summary comes after.
+    This make has its job slots for itself: one that outlives a killed process, and the make that called it, could wait
+    for each other's without end (GNU make 4.3, of which the latter takes back all slots as it ends).
     @return make's exit code, and the signal that stopped this process, if any"""
     rules = os.path.join(os.path.dirname(os.path.abspath(__file__)), "cases.mk")
-    environment = dict(os.environ, TUNICA_FROM=os.getcwd())
+    flags, separator, variables = os.environ.get("MAKEFLAGS", "").partition(" -- ")
+    flags = re.sub(r"--jobserver-[a-z]+=\S+", "", flags)
+    environment = dict(os.environ, TUNICA_FROM=os.getcwd(), MAKEFLAGS=flags + separator + variables)
     child = subprocess.Popen([*shlex.split(make), "--no-print-directory", "-f", rules], cwd=run, env=environment,
                              close_fds=False, stdin=subprocess.DEVNULL, preexec_fn=os.setpgrp)
     stopped = []

@@ -587,6 +587,18 @@ class Runs(WithStubs):
             self.assertEqual(self.make("-j2", SHELLS=attempt, **self.ARGUMENTS).returncode, 0)
             self.assertEqual(self.calls(), [])
 
+    def test_makes_wait_for_no_job_slots_of_each_other(self):
+        run = self.start("-j2", environment={"STUB_SECONDS": "0.5"}, **self.ARGUMENTS)
+        self.wait_for(2)  # two at once: the slots are there
+        makes = subprocess.run(["pgrep", "-x", "-s", str(run.pid), "make"], capture_output=True, text=True, check=True).stdout
+        of_cases = next(process for process in makes.split() if process != str(run.pid))
+        environment = pathlib.Path(f"/proc/{of_cases}/environ").read_text().split("\0")
+        run.communicate()
+        self.assertEqual(run.returncode, 0)
+        flags = next(setting for setting in environment if setting.startswith("MAKEFLAGS="))
+        self.assertIn("-j2", flags)
+        self.assertNotIn("jobserver", flags)
+
     def test_a_stopped_run_says_so_and_leaves_nothing_at_work(self):
         run = self.start("-j2", environment={"STUB_SECONDS": "1000"}, **self.ARGUMENTS)
         self.wait_for(2)
