@@ -2,6 +2,7 @@
 """tunica-report: what a page and its tables say, names that are hostile, --verify, --no-paths, size."""
 
 import base64
+import ctypes
 import csv
 import hashlib
 import html.parser
@@ -207,6 +208,35 @@ class CasePage(ReportTest):
                 shape = file["tunica/nodes/displacement"].shape
                 del file["tunica/nodes/displacement"]
                 file.create_dataset("tunica/nodes/displacement", data=np.zeros(shape), fletcher32=True)
+            _, _, page = self.report(folder=path)
+            self.assertIn("other filters than tunica-simulate writes", page.text)
+            # An index that holds two chunks at one place: the first is short, the other one is found.
+            whole_again = (path / "result.hdf").read_bytes()
+            with h5py.File(path / "result.hdf", "r+") as file:
+                del file["tunica/nodes/displacement"]
+                moved = file.create_dataset("tunica/nodes/displacement", shape, chunks=(1, *shape[1:]), compression=4)
+                moved[...] = np.random.default_rng(1).uniform(size=shape)
+                moved.id.write_direct_chunk((0, 0, 0), zlib.compress(b"twelve bytes"))
+                stored = moved.id.get_chunk_info_by_coord((1, 0, 0)).size
+            damaged = (path / "result.hdf").read_bytes()
+            at_one, at_none = (struct.pack("<2I4Q", stored, 0, row, 0, 0, 0) for row in (1, 0))
+            self.assertEqual(damaged.count(at_one), 1)
+            (path / "result.hdf").write_bytes(damaged.replace(at_one, at_none))
+            self.report(folder=path)
+            (path / "result.hdf").write_bytes(whole_again)
+            # Chunks beyond the end of the data that are not deflated, where the others are: h5py cannot ask for that.
+            with h5py.File(path / "result.hdf", "r+") as file:
+                del file["tunica/nodes/displacement"]
+                creation = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+                chunk = (shape[0] - 1, *shape[1:])
+                creation.set_chunk(chunk)
+                creation.set_deflate(4)
+                library = ctypes.CDLL("libhdf5_serial.so.103")
+                self.assertEqual(library.H5Pset_chunk_opts(ctypes.c_int64(creation.id), 2), 0)
+                moved = h5py.h5d.create(file.id, b"tunica/nodes/displacement", h5py.h5t.NATIVE_DOUBLE,
+                                        h5py.h5s.create_simple(shape), creation)
+                moved.write(h5py.h5s.ALL, h5py.h5s.ALL, np.zeros(shape))
+                moved.write_direct_chunk((chunk[0], 0, 0), zlib.compress(np.zeros(chunk).tobytes()))
             _, _, page = self.report(folder=path)
             self.assertIn("other filters than tunica-simulate writes", page.text)
             (path / "result.hdf").unlink()
