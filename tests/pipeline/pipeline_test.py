@@ -272,6 +272,10 @@ class Rules(WithStubs):
         self.assertNotEqual(done.returncode, 0)
         self.assertEqual(self.summary()["a/1"]["exit"], "137")
 
+    def test_a_tool_that_run_does_not_start_is_told(self):
+        self.assertNotEqual(self.make(VOLUMES="a.nii.gz", LABEL=1, RUN="false", **LOAD).returncode, 0)
+        self.assertIn("the tool was killed, or RUN did not start it", self.summary()["a/1"]["message"])
+
     def test_nothing_physical_is_assumed_for_a_users_volume(self):
         for name in LOAD:
             rest = {key: value for key, value in LOAD.items() if key != name}

@@ -59,7 +59,8 @@ std::string reason_of(const PipelineCase& one) {
   const Json error = one.at(one.stage, "error");
   const std::string reason =
       error.is_string() ? error.get<std::string>() : last_line(one.folder / (one.stage + ".log"));
-  return reason.empty() ? "no message" : reason;
+  const bool began = one.reports.contains(one.stage) || !one.unreadable.empty();
+  return !reason.empty() ? reason : began ? "no message" : "no report: the tool was killed, or RUN did not start it";
 }
 
 std::vector<std::string> fields_of(const std::string& line) {
