@@ -264,6 +264,13 @@ class Rules(WithStubs):
         for name in names - {"BIN", "OUT"}:
             self.assertNotIn("no such variable", self.make("help", **{name: "1"}).stderr)
 
+    def test_set_up_is_for_all_goals(self):
+        for goals, wanted in ((("package", "package-check"), {"g++", "debhelper", "debootstrap"}), (("package",), {"debhelper"}),
+                              (("fuzz",), {"g++", "clang-16"}), (("check",), {"g++", "libgtest-dev"})):
+            set_up = re.search("for package in (.*?); do", self.make("-n", *goals).stdout)[1].split()
+            self.assertLessEqual(wanted, set(set_up))
+            self.assertEqual("debootstrap" in set_up, "package-check" in goals)
+
     def test_a_killed_command_is_a_failed_case(self):
         killer = self.folder / "killer"
         killer.write_text("#!/bin/sh\nkill -9 $$\n")
