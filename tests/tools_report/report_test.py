@@ -224,6 +224,12 @@ class CasePage(ReportTest):
             (path / "result.hdf").write_bytes(damaged.replace(at_one, at_none))
             self.report(folder=path)
             (path / "result.hdf").write_bytes(whole_again)
+            with h5py.File(path / "result.hdf", "r+") as file:
+                del file["VTKHDF/Points"]
+                file.create_dataset("VTKHDF/Points", (60_000_000, 3), float, chunks=(1000, 3))
+            _, _, page = self.report(folder=path)
+            self.assertIn("VTKHDF/Points claims more than the file can hold", page.text)
+            (path / "result.hdf").write_bytes(whole_again)
             # Chunks beyond the end of the data that are not deflated, where the others are: h5py cannot ask for that.
             with h5py.File(path / "result.hdf", "r+") as file:
                 del file["tunica/nodes/displacement"]

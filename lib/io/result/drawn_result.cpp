@@ -15,6 +15,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <optional>
 #include <utility>
 
@@ -22,6 +23,7 @@ namespace tunica {
 namespace {
 
 constexpr std::size_t most_numbers = 200'000'000;  // in one reading: what a page cannot show, and damaged files claim
+constexpr double most_inflated = 1032;             // bytes that one of deflate can stand for
 constexpr std::size_t most_text = std::size_t{16} << 20;
 
 // What is read of a result.
@@ -47,6 +49,7 @@ class Reader {
 public:
   explicit Reader(const std::filesystem::path& path) : name_(path.string()) {
     (void)open_input(path);  // HDF5 would wait on a pipe
+    bytes_ = std::filesystem::file_size(path);
     H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
     if (!hdf5::opens_without_fault(path, datasets)) {
       fail("is damaged: HDF5 fails on it");
@@ -104,6 +107,10 @@ public:
       fail(dataset + " is too large to be drawn");
     }
     const hdf5::Handle data = open(dataset);
+    const hdf5::Handle stored(H5Dget_type(data.get()));
+    if (real(numbers) * real(H5Tget_size(stored.get())) > most_inflated * real(bytes_)) {
+      fail(dataset + " claims more than the file can hold");
+    }
     if (numbers > 0 && !hdf5::chunks_are_whole(data, start, extent)) {
       fail(dataset + " has chunks of another size, or of other filters than tunica-simulate writes: write it again");
     }
@@ -154,6 +161,7 @@ private:
   }
 
   std::string name_;
+  std::uintmax_t bytes_ = 0;
   hdf5::Handle file_;
 };
 
