@@ -187,6 +187,10 @@ class CasePage(ReportTest):
                 np.testing.assert_allclose(displacement, part * last, atol=2e-3 * header["displacement"])
                 np.testing.assert_allclose(level.astype(float), part * stress, atol=1.6)
             self.assertIn("Loaded; displacement drawn", text)
+
+    def test_damaged_results_are_named(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = cases.make_case(pathlib.Path(folder), pressure="1Pa", solve=["--load-steps", "4"])
             # Of a chunk shorter than it is said to be HDF5 1.10 reads what lies behind it in memory.
             for chunk, skipped in ((b"twelve bytes", 0xff), (zlib.compress(b"twelve bytes"), 0)):
                 with h5py.File(path / "result.hdf", "r+") as file:
@@ -230,14 +234,14 @@ class CasePage(ReportTest):
             _, _, page = self.report(folder=path)
             self.assertIn("VTKHDF/Points claims more than the file can hold", page.text)
             (path / "result.hdf").write_bytes(whole_again)
-            # Chunks beyond the end of the data that are not deflated, where the others are: h5py cannot ask for that.
+            # Chunks that reach beyond the data are not deflated, the others are: h5py cannot ask for that.
             with h5py.File(path / "result.hdf", "r+") as file:
                 del file["tunica/nodes/displacement"]
                 creation = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
                 chunk = (shape[0] - 1, *shape[1:])
                 creation.set_chunk(chunk)
                 creation.set_deflate(4)
-                library = ctypes.CDLL("libhdf5_serial.so.103")
+                library = ctypes.CDLL(h5py.h5p.__file__)
                 self.assertEqual(library.H5Pset_chunk_opts(ctypes.c_int64(creation.id), 2), 0)
                 moved = h5py.h5d.create(file.id, b"tunica/nodes/displacement", h5py.h5t.NATIVE_DOUBLE,
                                         h5py.h5s.create_simple(shape), creation)

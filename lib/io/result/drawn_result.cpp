@@ -15,7 +15,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdint>
 #include <optional>
 #include <utility>
 
@@ -49,7 +48,6 @@ class Reader {
 public:
   explicit Reader(const std::filesystem::path& path) : name_(path.string()) {
     (void)open_input(path);  // HDF5 would wait on a pipe
-    bytes_ = std::filesystem::file_size(path);
     H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
     if (!hdf5::opens_without_fault(path, datasets)) {
       fail("is damaged: HDF5 fails on it");
@@ -108,7 +106,9 @@ public:
     }
     const hdf5::Handle data = open(dataset);
     const hdf5::Handle stored(H5Dget_type(data.get()));
-    if (real(numbers) * real(H5Tget_size(stored.get())) > most_inflated * real(bytes_)) {
+    hdf5::Size bytes = 0;
+    (void)H5Fget_filesize(file_.get(), &bytes);
+    if (real(numbers) * real(H5Tget_size(stored.get())) > most_inflated * real(bytes)) {
       fail(dataset + " claims more than the file can hold");
     }
     if (numbers > 0 && !hdf5::chunks_are_whole(data, start, extent)) {
@@ -161,7 +161,6 @@ private:
   }
 
   std::string name_;
-  std::uintmax_t bytes_ = 0;
   hdf5::Handle file_;
 };
 

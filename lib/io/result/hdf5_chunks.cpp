@@ -83,7 +83,7 @@ bool chunks_are_whole(const Handle& data, const std::vector<Size>& start, const 
     return true;
   }
   if (H5Pget_nfilters(creation.get()) == 0) {
-    return true;  // opened_for_reading() lets no cache take a chunk for as long as it says
+    return true;  // read from the file, whatever the index says of their length: see opened_for_reading()
   }
   const std::optional<unsigned> deflate = deflate_bit(creation);
   const Handle type(H5Dget_type(data.get()));

@@ -61,8 +61,7 @@ bool Handle::close() {
 Handle opened_for_reading(const std::filesystem::path& path) {
   const Handle access(H5Pcreate(H5P_FILE_ACCESS));
   (void)H5Pset_file_locking(access.get(), 0, 1);
-  // What a chunk without filters is said to be long goes for its place in the cache; without one it is read from the
-  // file.
+  // The cache believes the index how long a chunk without filters is; without a cache its place in the file is read.
   (void)H5Pset_cache(access.get(), 0, 0, 0, 0);
   return Handle(H5Fopen(path.c_str(), H5F_ACC_RDONLY, access.get()));
 }
