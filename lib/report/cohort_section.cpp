@@ -166,11 +166,9 @@ std::string cohort_tsv(const std::vector<CaseReport>& cases) {
   }
   text += "\n";
   for (const CaseReport& one : cases) {
-    for (std::string field :
+    for (const std::string& field :
          {one.name, status_of(one), one.source.stage, one.source.exit, one.redacted(one.source.message)}) {
-      std::ranges::replace_if(
-          field, [](char sign) { return static_cast<unsigned char>(sign) < 0x20 || sign == 0x7f; }, ' ');
-      text += (field.empty() ? "n/a" : field) + "\t";
+      text += (field.empty() ? "n/a" : in_one_line(field)) + "\t";
     }
     text += std::to_string(one.warnings.size());
     for (const Measure& what : measures()) {

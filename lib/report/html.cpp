@@ -48,11 +48,27 @@ bool unwanted(std::uint32_t code) {
 
 }  // namespace
 
-std::string escaped(std::string_view text) {
-  std::string safe;
+std::string legible(std::string_view text) {
+  std::string shown;
   while (!text.empty()) {
     const Character character = first_character(text);
-    switch (character.code) {
+    const std::size_t bytes = std::max<std::size_t>(character.bytes, 1);
+    shown += character.bytes == 0 || unwanted(character.code) ? "\xef\xbf\xbd" : text.substr(0, bytes);
+    text.remove_prefix(bytes);
+  }
+  return shown;
+}
+
+std::string in_one_line(std::string text) {
+  std::ranges::replace_if(
+      text, [](char sign) { return static_cast<unsigned char>(sign) < 0x20 || sign == 0x7f; }, ' ');
+  return legible(text);
+}
+
+std::string escaped(std::string_view text) {
+  std::string safe;
+  for (const char sign : legible(text)) {
+    switch (sign) {
       case '&':
         safe += "&amp;";
         break;
@@ -72,9 +88,8 @@ std::string escaped(std::string_view text) {
         safe += "&#96;";
         break;
       default:
-        safe += character.bytes == 0 || unwanted(character.code) ? "\xef\xbf\xbd" : text.substr(0, character.bytes);
+        safe += sign;
     }
-    text.remove_prefix(character.bytes == 0 ? 1 : character.bytes);
   }
   return safe;
 }

@@ -2,6 +2,7 @@
 
 #include "tunica/core/error.hpp"
 #include "tunica/io/result/report_chart.hpp"
+#include "tunica/report/detail/html.hpp"
 #include "tunica/report/detail/measures.hpp"
 
 #include <fmt/format.h>
@@ -16,21 +17,6 @@ enum Column : std::size_t { name, stage, code, message, shells, error, seconds, 
 using Row = std::array<std::string, columns>;
 
 const Row heads{"case", "stage", "exit", "message", "shells", "error_percent", "seconds"};
-
-// In one line: each run of blanks and control characters is one blank.
-std::string in_one_line(const std::string& text) {
-  std::string line;
-  for (const char sign : text) {
-    const auto byte = static_cast<unsigned char>(sign);
-    if (byte > 0x20 && byte != 0x7f) {
-      line += sign;
-    } else if (!line.empty() && line.back() != ' ') {
-      line += ' ';
-    }
-  }
-  line.erase(line.find_last_not_of(' ') + 1);
-  return line;
-}
 
 Row row_of(const PipelineCase& one) {
   Row row{one.name, one.stage, one.exit, one.message, "", "", ""};

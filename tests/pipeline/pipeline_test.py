@@ -483,6 +483,7 @@ class Names(WithStubs):
         done = self.run_on(name)
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertTrue((self.out / name[:-7] / "1" / "result.hdf").is_file())
+        self.assertIn("\n\ufffd\ufffd/1\t", (self.out / "summary.tsv").read_text(encoding="utf-8"))
 
     def test_control_signs_are_refused_by_name_and_the_others_go_on(self):
         for flags in ((), ("-k", "-j2")):

@@ -36,6 +36,16 @@ TEST(Html, WhatIsNoUtf8OrTurnsTheTextIsReplaced) {
                     "a"),
             replaced + "a")
       << "right to left";
+  EXPECT_EQ(legible("\xff<b>"), replaced + "<b>");
+}
+
+TEST(Html, FieldsOfATableAreOneLine) {
+  EXPECT_EQ(in_one_line("a\tb\r\n c\x7f"), "a b   c ");
+  EXPECT_EQ(in_one_line("\xc2\x9b"
+                        "2J\xff"),
+            "\xef\xbf\xbd"
+            "2J\xef\xbf\xbd")
+      << "a terminal's command";
 }
 
 TEST(Html, FiguresHaveThreeDigits) {

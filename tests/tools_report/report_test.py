@@ -475,9 +475,11 @@ class HostileNames(ReportTest):
         folder = self.copy("plain")
         os.rename(os.fsencode(folder.parent), os.path.join(os.fsencode(self.out), b"\xff\xfe<b>\xc0\xaf"))
         self.copy("other")
-        _, text, page = self.report()
+        table = self.folder / "cohort.tsv"
+        _, text, page = self.report("--tsv", table)
         self.check(text, page)
         self.assertIn("\ufffd\ufffd<b>", page.text)
+        self.assertIn("\n\ufffd\ufffd<b>", table.read_text(encoding="utf-8"))
 
 
 class Errors(ReportTest):

@@ -18,8 +18,13 @@ struct Markup {
   }
 };
 
-/// A text for elements and for attributes in quotes: the signs of HTML escaped; what is no UTF-8, no character of HTML
-/// or turns the direction of reading becomes U+FFFD.
+/// A text as UTF-8: what is none, no character of HTML or turns the direction of reading becomes U+FFFD.
+std::string legible(std::string_view text);
+
+/// The same in one line, for a field of a table: each tab, end of line or other control character of ASCII is a blank.
+std::string in_one_line(std::string text);
+
+/// A legible text for elements and for attributes in quotes: the signs of HTML escaped.
 std::string escaped(std::string_view text);
 
 /// What stands for an argument of html().
