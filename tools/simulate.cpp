@@ -500,9 +500,9 @@ private:
   void unload() {
     stage("solve");
     Unloaded found = naming(subject().string(), [&] {
-      return find_unloaded(model(), scene_.run, [&](double part, double distance) {
-        tool_.detail(fmt::format("unloaded shape: {:.3g} of the pressure, loaded {:.3g} mm from the image in the mean",
-                                 part, distance));
+      return find_unloaded(model(), scene_.run, [&](double part, double change) {
+        tool_.detail(
+            fmt::format("unloaded shape: {:.3g} of the pressure, moved by {:.3g} mm in the mean", part, change));
       });
     });
     loaded_->model = std::move(found.model);

@@ -133,6 +133,23 @@ class Unloaded(SimulateTest):
         self.imaged("image.ply", -4 * classical, "--thickness", "0.1mm", "--fix", "rigid-motions", expect=4)
         self.assertIn("no unloaded shape was found", self.done.stderr)
 
+    def test_an_image_beyond_the_snap_is_refused(self):
+        """A shallow dome, pressed nearly flat: a dome in balance there exists, but pressed so hard it would snap through."""
+        side, rise, thickness = 20.0, 0.1, 0.1
+        wave = rise * math.pi / side
+        points, triangles, normals = grid(
+            16, 16, lambda u, v: (side * u, side * v, rise * np.sin(math.pi * u) * np.sin(math.pi * v)),
+            lambda p, u, v: (-wave * np.cos(math.pi * u) * np.sin(math.pi * v),
+                             -wave * np.sin(math.pi * u) * np.cos(math.pi * v), 1 + 0 * u))
+        write_ply(self.path("image.ply"), points, triangles, normals)
+        stiffness = YOUNG * thickness**3 / (12 * (1 - POISSON**2))
+        one_thickness = -thickness * stiffness / (0.00126 * side**4)  # deflects a clamped plate by so much (Timoshenko)
+        held = ("--thickness", "0.1mm", "--fix", "boundary")
+        unloaded = self.imaged("image.ply", 2 * one_thickness, *held)["result"]["unloaded"]
+        self.assertLess(unloaded["distance_mm"]["max"], 1e-3 * thickness)
+        self.imaged("image.ply", 6 * one_thickness, *held, expect=4)
+        self.assertIn("the pressure leads to another state of rest", self.done.stderr)
+
     def test_a_wall_that_folds_on_the_way_is_refused(self):
         """A cushion, far too full: without its pressure its rim would have to lie within itself."""
         vertices, triangles, normals = sphere(1, 10)

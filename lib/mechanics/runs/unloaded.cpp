@@ -2,8 +2,9 @@
 
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
-#include "tunica/mechanics/algebra/block_matrix.hpp"
 #include "tunica/mechanics/elements/rotation.hpp"
+#include "tunica/mechanics/runs/detail/run.hpp"
+#include "tunica/mechanics/runs/detail/supports.hpp"
 
 #include <fmt/format.h>
 
@@ -15,49 +16,170 @@
 namespace tunica {
 namespace {
 
-constexpr double close_enough = 1e-3;      // of the mean displacement: the loaded shape's mean distance from the image
+// Of the mean displacement: what the next iteration still moves.
+constexpr double close_enough = 1e-4;
 constexpr double close_on_the_way = 1e-2;  // the same, under a part of the pressure
-constexpr double farthest = 1e-2;          // the same: more is no such shape
+constexpr double farthest = 1e-2;          // the same, and of the loaded shape from the image: more is no such shape
 constexpr std::size_t most_iterations = 40;
 constexpr std::size_t patience = 8;    // iterations in a row that come no nearer
 constexpr std::size_t remembered = 5;  // iterates that the acceleration combines
 constexpr double smallest_part = 1.0 / 32;
 constexpr std::string_view key = "imaged_at";
 
-/// Displacements and rotation vectors (times a length) of all nodes from the reference to the image, one after the
-/// other.
-class FixedPoint {
+/// The imaged model under the pressures of the image alone, held where the image shows it.
+Model as_imaged(Model model) {
+  std::erase_if(model.loads, [](const Load& load) {
+    const auto* pressure = std::get_if<PressureLoad>(&load.kind);
+    return pressure == nullptr || !pressure->imaged_at;
+  });
+  for (Load& load : model.loads) {
+    load.ramp = {};
+  }
+  for (Fix& fix : model.fixes) {
+    fix.displacement.setZero();
+    fix.ramp = {};
+  }
+  return model;
+}
+
+RunSettings for_statics(RunSettings settings) {
+  settings.kind = StaticRun{false, {1}};
+  settings.cg_fixed_count = false;
+  settings.converge = std::min(settings.converge, RunSettings().converge);
+  settings.settled = 0;
+  settings.newton_max = std::max(settings.newton_max, RunSettings().newton_max);
+  settings.every = 1;
+  return settings;
+}
+
+/// The way from a reference to the image: displacements and rotation vectors (times a length) of all nodes, one after
+/// the other. A way leads to the image where the pressures there balance the stresses that it causes.
+class Ways {
 public:
-  FixedPoint(const Model& imaged, const RunSettings& settings) : imaged_(imaged), settings_(settings) {
-    settings_.kind = StaticRun{false, {1}};
-    settings_.cg_fixed_count = false;
-    settings_.converge = std::min(settings_.converge, RunSettings().converge);
-    settings_.settled = 0;
-    settings_.newton_max = std::max(settings_.newton_max, RunSettings().newton_max);
-    settings_.every = 1;
-    std::size_t edges = 0;
-    for (const ShellBody& body : imaged.shells) {
-      for (const auto& v : body.mesh.triangles) {
-        length_ += (body.mesh.vertices[v[1]] - body.mesh.vertices[v[0]]).norm();
-        ++edges;
-      }
-    }
-    length_ /= real(edges);
+  Ways(const Model& imaged, const RunSettings& settings)
+      : imaged_(imaged),
+        pressed_(as_imaged(imaged)),
+        settings_(for_statics(settings)),
+        image_(make_checked_system(pressed_, settings_)),
+        solver_(image_, settings_),
+        stiffness_(image_.pattern) {
+    linear_stiffness(image_, stiffness_);
   }
 
-  [[nodiscard]] Eigen::Index size() const { return narrow<Eigen::Index>(6 * imaged_.node_count()); }
+  [[nodiscard]] VectorX none() const { return VectorX::Zero(first_freedom(imaged_.node_count())); }
 
   /// The imaged model, its shells moved back.
-  [[nodiscard]] Model reference(const VectorX& from) const {
-    Model model = imaged_;
+  [[nodiscard]] Model reference(const VectorX& way) const { return moved_back(imaged_, way); }
+
+  /// What is left of a part of the pressures moves the image as a linear spring: a way that is nearer to one that
+  /// leads there. None, and `reason`, where the wall folds.
+  std::optional<VectorX> improved(const VectorX& way, double part) {
+    ++iterations;
+    Model model = under(part, way);
+    std::optional<ShellSystem> system;
+    try {
+      system = make_checked_system(model, settings_);
+    } catch (const InputError& error) {
+      // Shells that were good in the image: what is said of them names the fold, and what it advises is for images.
+      const std::string fault = error.what();
+      reason = "on the way to it the wall folds (" + fault.substr(0, fault.find("; ")) + ")";
+      return {};
+    }
+    Configuration there = configuration(way);
+    Forces forces;
+    evaluate(*system, model, there, load_factors(model, true, 1), {}, forces, nullptr);
+    VectorX left = forces.external - forces.internal;
+    mask(solver_.free(), left);
+    VectorX increment;
+    const bool solved = forces.valid && solver_.solve(stiffness_, left, increment, factored_).solved;
+    if (!solved) {
+      reason = forces.valid ? "the linear stiffness is singular" : "on the way to it elements collapse or fold";
+      return {};
+    }
+    factored_ = true;
+    advance_configuration(image_, increment, there);
+    for (const Piece& piece : system->pieces) {
+      if (held_by_rigid_motions(model, piece.body)) {
+        take_out_rigid_motion(*system, piece, there);
+      }
+    }
+    return way_of(there.displacement, [&](std::size_t i) { return logarithm(there.rotation[i]); });
+  }
+
+  /// Where the pressures lead from the reference of a way, near which rest is looked for first. None, and `reason`,
+  /// where there is no rest.
+  std::optional<VectorX> loaded(const VectorX& way) {
+    const Configuration there = configuration(way);
+    Resumption near;
+    Checkpoint& start = near.near.emplace();
+    start.displacement = there.displacement;
+    start.rotation = there.rotation;
+    State last;
+    try {
+      (void)solve(
+          under(1, way), settings_,
+          [&](const State& state) {
+            volume = state.time == 0 ? state.volume : volume;
+            last = state;
+          },
+          {}, near);
+    } catch (const RequirementError& error) {
+      reason = error.what();
+      return {};
+    }
+    return way_of(last.displacement, [&](std::size_t i) { return last.rotation[i]; });
+  }
+
+  /// Mean and largest length of the displacements.
+  [[nodiscard]] std::array<double, 2> lengths(const VectorX& way) const {
+    double sum = 0, largest = 0;
+    for (std::size_t i = 0; i < imaged_.node_count(); ++i) {
+      const double length = displacement(way, i).norm();
+      sum += length;
+      largest = std::max(largest, length);
+    }
+    return {sum / real(imaged_.node_count()), largest};
+  }
+
+  std::size_t iterations = 0;
+  std::optional<double> volume;  ///< of the last reference that was loaded
+  std::string reason;            ///< why there is no answer
+
+private:
+  [[nodiscard]] Vec3 displacement(const VectorX& way, std::size_t node) const {
+    return way.segment<3>(first_freedom(node));
+  }
+  [[nodiscard]] Vec3 rotation(const VectorX& way, std::size_t node) const {
+    return way.segment<3>(first_freedom(node) + 3) / image_.length;
+  }
+
+  [[nodiscard]] VectorX way_of(const std::vector<Vec3>& displacement, const auto& rotation) const {
+    VectorX way = none();
+    for (std::size_t i = 0; i < imaged_.node_count(); ++i) {
+      way.segment<3>(first_freedom(i)) = displacement[i];
+      way.segment<3>(first_freedom(i) + 3) = image_.length * rotation(i);
+    }
+    return way;
+  }
+
+  [[nodiscard]] Configuration configuration(const VectorX& way) const {
+    Configuration there = reference_configuration(image_);
+    for (std::size_t i = 0; i < imaged_.node_count(); ++i) {
+      there.displacement[i] = displacement(way, i);
+      there.rotation[i] = exponential(rotation(way, i));
+    }
+    return there;
+  }
+
+  [[nodiscard]] Model moved_back(Model model, const VectorX& way) const {
     for (std::size_t b = 0; b < model.shells.size(); ++b) {
       ShellMesh& mesh = model.shells[b].mesh;
       const std::size_t first = model.first_node(b);
       const auto turned_back = [&](Index node, const Vec3& normal) {
-        return Vec3(exponential(-rotation(from, first + node)) * normal);
+        return Vec3(exponential(-rotation(way, first + node)) * normal);
       };
       for (Index i = 0; i < mesh.vertices.size(); ++i) {
-        mesh.vertices[i] -= displacement(from, first + i);
+        mesh.vertices[i] -= displacement(way, first + i);
         if (!mesh.normals.empty()) {
           mesh.normals[i] = turned_back(i, mesh.normals[i]);
         }
@@ -71,83 +193,23 @@ public:
     return model;
   }
 
-  /// What a part of the pressures makes of the reference; none, and `reason`, where it is in no state of rest.
-  std::optional<VectorX> solved(const VectorX& from, double part) {
-    Model model = reference(from);
-    std::erase_if(model.loads, [](const Load& load) {
-      const auto* pressure = std::get_if<PressureLoad>(&load.kind);
-      return pressure == nullptr || !pressure->imaged_at;
-    });
+  /// The reference of a way, with a part of the pressures.
+  [[nodiscard]] Model under(double part, const VectorX& way) const {
+    Model model = moved_back(pressed_, way);
     for (Load& load : model.loads) {
       auto& pressure = std::get<PressureLoad>(load.kind);
       pressure.value = part * *pressure.imaged_at;
-      load.ramp = {};
     }
-    for (Fix& fix : model.fixes) {
-      fix.displacement.setZero();
-      fix.ramp = {};
-    }
-    Resumption near;
-    Checkpoint& start = near.near.emplace();
-    for (std::size_t i = 0; i < imaged_.node_count(); ++i) {
-      start.displacement.push_back(displacement(from, i));
-      start.rotation.push_back(exponential(rotation(from, i)));
-    }
-    State last;
-    ++iterations;
-    try {
-      (void)solve(
-          model, settings_,
-          [&](const State& state) {
-            volume = state.time == 0 ? state.volume : volume;
-            last = state;
-          },
-          {}, near);
-    } catch (const RequirementError& error) {
-      reason = error.what();
-      return {};
-    } catch (const InputError& error) {
-      if (from.isZero(0)) {
-        throw;  // of the image itself
-      }
-      // Shells that were good in the image: what is said of them names the fold, and what it advises is for images.
-      const std::string fault = error.what();
-      reason = "on the way to it the wall folds (" + fault.substr(0, fault.find("; ")) + ")";
-      return {};
-    }
-    VectorX to(size());
-    for (std::size_t i = 0; i < imaged_.node_count(); ++i) {
-      to.segment<3>(first_of(i)) = last.displacement[i];
-      to.segment<3>(first_of(i) + 3) = length_ * last.rotation[i];
-    }
-    return to;
-  }
-
-  /// Mean and largest length of the displacements.
-  [[nodiscard]] std::array<double, 2> lengths(const VectorX& of) const {
-    double sum = 0, largest = 0;
-    for (std::size_t i = 0; i < imaged_.node_count(); ++i) {
-      const double length = displacement(of, i).norm();
-      sum += length;
-      largest = std::max(largest, length);
-    }
-    return {sum / real(imaged_.node_count()), largest};
-  }
-
-  std::size_t iterations = 0;
-  std::optional<double> volume;  ///< of the last reference
-  std::string reason;
-
-private:
-  static Eigen::Index first_of(std::size_t node) { return narrow<Eigen::Index>(6 * node); }
-  [[nodiscard]] Vec3 displacement(const VectorX& of, std::size_t node) const { return of.segment<3>(first_of(node)); }
-  [[nodiscard]] Vec3 rotation(const VectorX& of, std::size_t node) const {
-    return of.segment<3>(first_of(node) + 3) / length_;
+    return model;
   }
 
   const Model& imaged_;
-  RunSettings settings_;
-  double length_ = 0;  ///< mm, mean edge
+  const Model pressed_;
+  const RunSettings settings_;
+  const ShellSystem image_;
+  TangentSolver solver_;
+  BlockMatrix stiffness_;
+  bool factored_ = false;
 };
 
 /// The next iterate of a fixed point y = G(y) from the last ones: the combination of them whose residuals G(y) - y
@@ -200,6 +262,46 @@ void require_shells_only(const Model& model) {
   }
 }
 
+/// Goes to a way that leads to the image under a part of the pressures. @return whether it comes near enough
+bool approach(Ways& ways, double part, const std::function<void(double, double)>& on_iteration, VectorX& way) {
+  const double wanted = part == 1 ? close_enough : close_on_the_way;
+  Acceleration acceleration;
+  VectorX best = way;
+  double least = infinity, size = 0;
+  std::size_t in_vain = 0;
+  ways.reason = "the iterations do not converge";
+  for (std::size_t iteration = 0; iteration < most_iterations && in_vain < patience; ++iteration) {
+    const auto next = ways.improved(way, part);
+    if (!next) {
+      break;
+    }
+    const double change = ways.lengths(*next - way)[0];
+    if (on_iteration) {
+      on_iteration(part, change);
+    }
+    ++in_vain;
+    if (change < least) {
+      in_vain = 0;
+      least = change;
+      best = way;
+      size = ways.lengths(*next)[0];
+    }
+    if (change <= wanted * size) {
+      break;
+    }
+    way = acceleration.next(way, *next);
+  }
+  way = best;
+  return least <= farthest * size;
+}
+
+[[noreturn]] void refuse(double part, const std::string& reason) {
+  throw RequirementError(
+      fmt::format("no unloaded shape was found that lies where the image shows it under {:.4g} times the pressure {}: "
+                  "{}; was the wall as thick and as stiff, and the pressure as high, when the image was taken?",
+                  part, key, reason));
+}
+
 }  // namespace
 
 bool is_imaged_under_pressure(const Model& model) {
@@ -212,47 +314,13 @@ bool is_imaged_under_pressure(const Model& model) {
 Unloaded find_unloaded(const Model& imaged, const RunSettings& settings,
                        const std::function<void(double, double)>& on_iteration) {
   require_shells_only(imaged);
-  FixedPoint map(imaged, settings);
-  VectorX found = VectorX::Zero(map.size());
-  std::array<double, 2> distance{0, 0};
-  // To the fixed point under a part of the pressures. @return whether it is near enough
-  const auto approach = [&](VectorX& y, double part) {
-    const double wanted = part == 1 ? close_enough : close_on_the_way;
-    Acceleration acceleration;
-    VectorX best = y;
-    std::array<double, 2> least{infinity, infinity};
-    double size = 0;
-    std::size_t in_vain = 0;
-    for (std::size_t iteration = 0; iteration < most_iterations && in_vain < patience; ++iteration) {
-      const auto image = map.solved(y, part);
-      if (!image) {
-        break;
-      }
-      const auto off = map.lengths(*image - y);
-      if (on_iteration) {
-        on_iteration(part, off[0]);
-      }
-      ++in_vain;
-      if (off[0] < least[0]) {
-        in_vain = 0;
-        least = off;
-        best = y;
-        size = map.lengths(*image)[0];
-      }
-      if (off[0] <= wanted * size) {
-        break;
-      }
-      y = acceleration.next(y, *image);
-    }
-    y = best;
-    distance = least;
-    return least[0] <= std::max(wanted, farthest) * size;
-  };
+  Ways ways(imaged, settings);
+  VectorX found = ways.none();
   double part = 0, step = 1;
   while (part < 1) {
     const double next = std::min(1.0, part + step);
     VectorX attempt = part > 0 ? VectorX(next / part * found) : found;
-    if (approach(attempt, next)) {
+    if (approach(ways, next, on_iteration, attempt)) {
       found = attempt;
       part = next;
       step *= 2;
@@ -260,14 +328,18 @@ Unloaded find_unloaded(const Model& imaged, const RunSettings& settings,
     }
     step /= 2;
     if (step < smallest_part) {
-      throw RequirementError(fmt::format(
-          "no unloaded shape was found that lies where the image shows it under {:.4g} times the pressure {}: {}; was "
-          "the wall as thick and as stiff, and the pressure as high, when the image was taken? Where they were, more "
-          "shells may follow the way",
-          next, key, map.reason.empty() ? "the iterations do not converge" : map.reason));
+      refuse(next, ways.reason);
     }
   }
-  Unloaded unloaded{map.reference(found), map.volume, distance[0], distance[1], map.iterations};
+  const auto loaded = ways.loaded(found);
+  if (!loaded) {
+    refuse(1, ways.reason);
+  }
+  const std::array<double, 2> distance = ways.lengths(*loaded - found);
+  if (distance[0] > farthest * ways.lengths(found)[0]) {
+    refuse(1, "from the shape that would be in balance there the pressure leads to another state of rest");
+  }
+  Unloaded unloaded{ways.reference(found), ways.volume, distance[0], distance[1], ways.iterations};
   for (Load& load : unloaded.model.loads) {
     if (auto* pressure = std::get_if<PressureLoad>(&load.kind)) {
       pressure->imaged_at.reset();

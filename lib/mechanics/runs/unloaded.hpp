@@ -11,21 +11,22 @@ struct Unloaded {
   std::optional<double> volume;  ///< mm^3, of closed shells
   double mean_distance = 0;      ///< mm: of the loaded shape's nodes from the image
   double largest_distance = 0;
-  std::size_t iterations = 0;  ///< static solutions
+  std::size_t iterations = 0;  ///< corrections of u
 };
 
-/// Finds the reference X whose state of rest under the pressures `imaged_at` lies where the shells of `imaged` lie:
-/// X = x - u(X), x the image and u(X) the displacement from X under those pressures; normals alike, by the rotations.
-/// The fixed point is accelerated (Anderson 1965), and approached by a growing pressure where it is not found at once.
-/// What holds nodes holds them where the image shows them; other loads and prescribed displacements act only
-/// afterwards. Source: Sellier 2011, "An iterative method for the inverse elasto-static problem". Errors: InputError:
-/// the model has solids, rigid bodies or attachments, or as check_model(). RequirementError: there is no such shape
-/// within 1 % of the mean displacement (beyond a limit load, or the unloaded shell would buckle on the way), with the
-/// reason. Cost: some ten static solutions of few iterations each; where there is
-/// no such shape up to some two hundred before that is told.
-/// @param on_iteration  part of the pressure, mean distance so far in mm
+/// Finds the reference X whose state of rest under the pressures `imaged_at` lies where the shells of `imaged` lie. The
+/// forces are in balance on the image x; what is unknown is where they come from: X = x - u, normals alike, by the
+/// rotations. Source: Govindjee, Mihalic 1996, "Computational methods for inverse finite elastostatics". What is out of
+/// balance corrects u by the linear stiffness of the image, accelerated (Anderson 1965), and with a growing pressure
+/// where that does not converge at once. Then the pressures load X, and that state has to be the image: a balance
+/// that is not stable is none. What holds nodes holds them where the image shows them; other loads and prescribed
+/// displacements act only afterwards. Errors: InputError: the model has solids, rigid bodies or attachments, or as
+/// check_model(). RequirementError: there is no such shape within 1 % of the mean displacement (the wall would fold,
+/// or the image lies beyond a limit load), with the reason. Cost: one factorisation, some ten solutions by it and
+/// assemblies of the forces, and a static solution; where there is no such shape up to some two hundred assemblies.
+/// @param on_iteration  part of the pressure, mean change by the iteration in mm
 Unloaded find_unloaded(const Model& imaged, const RunSettings& settings,
-                       const std::function<void(double part, double mean_distance)>& on_iteration = {});
+                       const std::function<void(double part, double mean_change)>& on_iteration = {});
 
 /// Whether some pressure says that the image was taken under it.
 bool is_imaged_under_pressure(const Model& model);
