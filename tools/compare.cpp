@@ -1,5 +1,6 @@
 #include "tunica/cli/tool.hpp"
 #include "tunica/core/narrow.hpp"
+#include "tunica/core/rounding.hpp"
 #include "tunica/draw/picture.hpp"
 #include "tunica/io/file/signed_file.hpp"
 #include "tunica/io/mesh/mesh_file.hpp"
@@ -189,7 +190,8 @@ void write_files(const cli::Tool& tool, const Arguments& given, const Surface& a
     look.title = a.shell ? "Distance of curved shells to a surface" : "Distance of a surface to another one";
     look.caption = fmt::format("{} against {}: two-sided distance at most {:.3g} mm ({:.3g} % of the diagonal)",
                                tool.provenance().name_of(given.a), tool.provenance().name_of(given.b),
-                               distance.both.upper, 100 * distance.both.upper / diagonal_mm);
+                               rounded_upwards(distance.both.upper, 3),
+                               rounded_upwards(100 * distance.both.upper / diagonal_mm, 3));
     look.quantity = "Distance";
     look.diagonal = diagonal_mm;
     if (given.picture_range) {

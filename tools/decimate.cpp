@@ -1,6 +1,7 @@
 #include "tunica/surface/decimation/decimate.hpp"
 #include "tunica/cli/tool.hpp"
 #include "tunica/core/narrow.hpp"
+#include "tunica/core/rounding.hpp"
 #include "tunica/io/mesh/mesh_file.hpp"
 #include "tunica/surface/decimation/degenerate.hpp"
 #include "tunica/surface/distance/hausdorff.hpp"
@@ -227,9 +228,10 @@ void tell(cli::Tool& tool, const Arguments& given, const Coarse& coarse, std::si
                                 {"split_vertices", repairs->split_vertices},
                                 {"cut_edges", repairs->cut_edges}};
   }
-  tool.note(fmt::format(
-      "{} of {} triangles, at most {:.4g} % ({:.4g} mm) from the input, no angle below {:.3g} degrees",
-      mesh.triangles.size(), triangles_in, percent.upper, mm.upper, std::floor(1000 * coarse.angle) / 1000));
+  tool.note(
+      fmt::format("{} of {} triangles, at most {:.4g} % ({:.4g} mm) from the input, no angle below {:.3g} degrees",
+                  mesh.triangles.size(), triangles_in, rounded_upwards(percent.upper, 4), rounded_upwards(mm.upper, 4),
+                  std::floor(1000 * coarse.angle) / 1000));
 }
 
 void run(cli::Tool& tool, const Arguments& given) {

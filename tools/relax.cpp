@@ -3,6 +3,7 @@
 #include "tunica/cli/usage.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/core/quantity.hpp"
+#include "tunica/core/rounding.hpp"
 #include "tunica/draw/picture.hpp"
 #include "tunica/fit/fit.hpp"
 #include "tunica/io/file/signed_file.hpp"
@@ -303,9 +304,10 @@ void write_maps(cli::Tool& tool, const Arguments& given, const ShellMesh& shell,
   if (given.picture) {
     PictureOptions options;
     options.title = "Distance of the curved shells to the surface they stand for";
-    options.caption = fmt::format(
-        "{} shells; two-sided distance at most {:.3g} mm ({:.3g} % of the diagonal), mean {:.3g} mm",
-        shell.triangles.size(), distance.both.upper, 100 * distance.both.upper / target.diagonal(), distance.mean);
+    options.caption =
+        fmt::format("{} shells; two-sided distance at most {:.3g} mm ({:.3g} % of the diagonal), mean {:.3g} mm",
+                    shell.triangles.size(), rounded_upwards(distance.both.upper, 3),
+                    rounded_upwards(100 * distance.both.upper / target.diagonal(), 3), distance.mean);
     options.diagonal = target.diagonal();
     if (given.picture_range) {
       options.maximum = given.picture_range->millimetres(target.diagonal());
@@ -546,9 +548,9 @@ private:
       tool_.note(fmt::format("mean distance certainly below {:.4g} mm, {:.3g} % of the wall", *mean_bound_,
                              100 * *mean_bound_ / *given_.thickness));
     }
-    tool_.note(fmt::format("{} shells, two-sided distance {:.4f} to {:.4f} % of the diagonal: {}",
+    tool_.note(fmt::format("{} shells, two-sided distance {:.4g} to {:.4g} % of the diagonal: {}",
                            relaxed_.shell.triangles.size(), percent() * distance_.both.lower,
-                           percent() * distance_.both.upper, relaxed_.stopped));
+                           rounded_upwards(percent() * distance_.both.upper, 4), relaxed_.stopped));
   }
 
   void measure_shapes() {

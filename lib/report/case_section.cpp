@@ -52,12 +52,13 @@ bool is_fitted_to_middle(const CaseReport& one) {
   return one.source.at("relax", "result.mid_surface.error_mm").is_object();
 }
 
+bool is_unloaded(const CaseReport& one) { return one.source.at("simulate", "result.unloaded").is_object(); }
+
 Markup three_numbers(const CaseReport& one) {
   const auto maximum = measure("stress_max_kpa").value(one.source);
   const auto percent = measure("distance_percent").value(one.source);
   const auto pressure = measure("pressure_kpa").value(one.source);
-  const bool unloaded = one.source.at("simulate", "result.unloaded").is_object();
-  const std::string whence = unloaded ? ", from the shape without load" : "";
+  const std::string whence = is_unloaded(one) ? ", from the shape without load" : "";
   Markup list = html("<dl class=\"three\">\n");
   list += big_number("stress_p99_kpa", "Wall stress, 99th percentile", one,
                      maximum ? "von Mises, at either face; largest " + figure(*maximum) + " kPa" : "not computed");
@@ -78,6 +79,12 @@ Markup discretisation(const CaseReport& one) {
   }
   const Json accuracy = one.source.at("simulate", "result.accuracy");
   if (!accuracy.is_object()) {
+    if (is_fitted_to_middle(one) || is_unloaded(one)) {
+      return html(
+          "<p>How far stress and displacement depend on the number of shells was not estimated: a second run with "
+          "other "
+          "<code>--shells</code> (<code>SHELLS</code> in the pipeline) shows it.</p>\n");
+    }
     return html(
         "<p>How far stress and displacement depend on the number of shells was not estimated: <code>--accuracy</code> "
         "(<code>ACCURACY=5% OF=stress</code> in the pipeline) does that.</p>\n");
@@ -208,7 +215,9 @@ Markup geometry_and_mesh(const CaseReport& one) {
 Markup mechanics(const CaseReport& one) {
   std::vector<Line> lines = lines_of(
       one, {"stress_p99_kpa", "stress_max_kpa", "strain_p99_percent", "max_displacement_mm", "volume_change_percent"});
-  add_if_known(lines, one, "simulate", "result.unloaded.volume_mm3", "Volume without load", "mm³");
+  if (const Json volume = one.source.at("simulate", "result.unloaded.volume_mm3"); volume.is_number()) {
+    lines.push_back({"Volume within the shells, without load", figure(1e-3 * volume.get<double>()) + " ml"});
+  }
   add_if_known(lines, one, "simulate", "result.unloaded.distance_mm.mean", "Off the image under its pressure, mean",
                "mm");
   add_if_known(lines, one, "simulate", "result.strain_energy_mj", "Strain energy", "mJ");

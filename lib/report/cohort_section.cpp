@@ -6,10 +6,14 @@
 
 #include <algorithm>
 #include <array>
+#include <filesystem>
 #include <map>
+#include <set>
 
 namespace tunica::report {
 namespace {
+
+namespace fs = std::filesystem;
 
 // Columns of the page's table: fewer than the file's.
 constexpr std::array shown_keys{"volume_ml",
@@ -31,9 +35,10 @@ Markup counts(const std::vector<CaseReport>& cases) {
     return std::ranges::count_if(cases, [&](const CaseReport& one) { return status_of(one) == status; });
   };
   return html(
-      "<dl class=\"counts\"><div class=\"{}\"><dt>Done</dt><dd>{}</dd></div><div class=\"{}\"><dt>Failed</dt>"
+      "<dl class=\"counts\"><div class=\"{}\"><dt>Done, no warning</dt><dd>{}</dd></div><div "
+      "class=\"{}\"><dt>Failed</dt>"
       "<dd>{}</dd></div><div class=\"{}\"><dt>Done, with warnings</dt><dd>{}</dd></div></dl>\n",
-      "done", count("done") + count("warned"), count("failed") > 0 ? "failed" : "none", count("failed"),
+      "done", count("done"), count("failed") > 0 ? "failed" : "none", count("failed"),
       count("warned") > 0 ? "warned" : "none", count("warned"));
 }
 
@@ -115,7 +120,7 @@ Markup spread_of(const CaseGroup& cases) {
         marks.push_back({*values[i], cases[i]->name, out});
       }
     }
-    strips += strip_plot(what.title, what.unit, marks);
+    strips += strip_plot(what, marks);
     for (const Outlier& outlier : found) {
       items += html("<li>{}: {} {} {} (robust z {})</li>\n", link_to(*cases[outlier.index]), what.title,
                     what.text(*values[outlier.index]), what.unit, fmt::format("{:+.1f}", outlier.z));
@@ -128,21 +133,38 @@ Markup spread_of(const CaseGroup& cases) {
   return made += html("<div class=\"strips\">\n{}</div>\n", strips);
 }
 
-// One organ is compared with its like: cases of a label by themselves.
+fs::path volume_of(const CaseReport& one) {
+  const Json inputs = one.source.at("extract", "inputs");
+  const Json first = inputs.is_array() && !inputs.empty() ? inputs.front() : Json();
+  const bool told = first.is_object() && first.contains("path") && first["path"].is_string();
+  return told ? fs::path(first["path"].get<std::string>()) : fs::path();
+}
+
+// One organ is compared with its like: cases of a label by themselves. A file name that comes back in other folders, as
+// in TotalSegmentator's patient/segmentations/aorta.nii.gz, says which organ its label is.
 Markup spread(const std::vector<CaseReport>& cases) {
-  std::map<std::string, CaseGroup> labels;
+  std::map<fs::path, std::set<fs::path>> folders_of;
+  for (const CaseReport& one : cases) {
+    const fs::path volume = volume_of(one);
+    folders_of[volume.filename()].insert(volume.parent_path());
+  }
+  std::map<std::array<std::string, 2>, CaseGroup> organs;
   for (const CaseReport& one : cases) {
     if (one.source.done()) {
-      labels[label_of(one)].push_back(&one);
+      const fs::path file = volume_of(one).filename();
+      organs[{label_of(one), folders_of[file].size() > 1 ? file.string() : ""}].push_back(&one);
     }
   }
   Markup made = heading(2, "Spread and outliers");
   made += html(
       "<p>An outlier is farther from the median than 3.5 robust standard deviations (by the median absolute "
-      "deviation, taken as 1 % of the median at least), among at least five cases of a label that are done.</p>\n");
-  for (const auto& [label, group] : labels) {
-    if (labels.size() > 1) {
-      made += heading(3, label.empty() ? "No label" : "Label " + label);
+      "deviation, taken as 1 % of the median at least), among at least five cases of a label that are done. Volumes "
+      "whose file names come back from folder to folder are compared name by name.</p>\n");
+  for (const auto& [organ, group] : organs) {
+    if (organs.size() > 1) {
+      const auto& [label, file] = organ;
+      made += heading(3, (label.empty() ? "No label" : "Label " + label) +
+                             (file.empty() ? "" : " of " + group.front()->redacted(file)));
     }
     made += spread_of(group);
   }

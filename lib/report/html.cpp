@@ -1,6 +1,7 @@
 #include "tunica/report/detail/html.hpp"
 
 #include "tunica/core/quantity.hpp"
+#include "tunica/core/rounding.hpp"
 #include "tunica/io/file/encoding.hpp"
 
 #include <fmt/args.h>
@@ -129,12 +130,8 @@ std::string figure(double value) {
 }
 
 std::string figure_above(double value) {
-  if (!std::isfinite(value) || !(value > 0)) {
-    return figure(value);
-  }
-  const int after = std::max(0, 2 - static_cast<int>(std::floor(std::log10(value))));  // digits after the point
-  const double step = std::pow(10, -after);
-  return figure(std::max(value, std::ceil(value / step * (1 - 1e-12)) * step));
+  const int before = value >= 1 ? static_cast<int>(std::floor(std::log10(value))) + 1 : 1;  // digits before the point
+  return figure(rounded_upwards(value, std::max(3, before)));
 }
 
 }  // namespace tunica::report

@@ -20,11 +20,22 @@ bool is_letter(char sign) {
   return std::isalnum(static_cast<unsigned char>(sign)) != 0 || static_cast<unsigned char>(sign) >= 0x80;
 }
 
+// Whether [at, ...) belongs to a flag or to the name of a tool.
+bool is_of_the_command(const std::string& text, std::size_t at) {
+  const std::size_t begin = text.find_last_of(" \t\n'\"(", at) + 1;  // npos + 1 is 0
+  const std::size_t end = std::min(text.find_first_of(" \t\n'\"):,=", begin), text.size());
+  const std::string word = text.substr(begin, end - begin);
+  return at < end && (word.starts_with("--") || std::ranges::any_of(pipeline_stages, [&](const char* stage) {
+                        return word == std::string("tunica-") + stage;
+                      }));
+}
+
 // Whether [at, at + size) is a name of its own, not a part of a word.
 bool stands_alone(const std::string& text, std::size_t at, std::size_t size) {
   const bool before = at == 0 || !is_letter(text[at - 1]) || !is_letter(text[at]);
   const std::size_t end = at + size;
-  return before && (end == text.size() || !is_letter(text[end]) || !is_letter(text[end - 1]));
+  return before && !is_of_the_command(text, at) &&
+         (end == text.size() || !is_letter(text[end]) || !is_letter(text[end - 1]));
 }
 
 void replace_all(std::string& text, const std::string& name, const std::string& instead) {
@@ -126,7 +137,10 @@ Redaction::Redaction(const PipelineCase& one, std::size_t number) : active_(true
 }
 
 void Redaction::forget(const std::string& name, const std::string& instead) {
-  if (name.empty() || name == "." || name == "/") {
+  // Cases that are counted have a number for a name: it names nobody, and would stand for every such number.
+  const bool counted =
+      name.size() <= 3 && std::ranges::all_of(name, [](unsigned char sign) { return std::isdigit(sign) != 0; });
+  if (counted || name == "." || name == "/") {
     return;
   }
   names_.emplace_back(name, instead);

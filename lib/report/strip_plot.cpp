@@ -7,7 +7,7 @@
 
 namespace tunica::report {
 
-Markup strip_plot(const std::string& title, const std::string& unit, const std::vector<StripMark>& marks) {
+Markup strip_plot(const Measure& what, const std::vector<StripMark>& marks) {
   if (marks.empty()) {
     return {};
   }
@@ -28,7 +28,7 @@ Markup strip_plot(const std::string& title, const std::string& unit, const std::
     const auto height = static_cast<int>(12 + 3 * ((i * 3) % 7));
     circles += html("<circle cx=\"{}\" cy=\"{}\" r=\"{}\"{}><title>{}: {} {}</title></circle>", place(marks[i].value),
                     height, marks[i].outlier ? 4 : 3, marks[i].outlier ? Markup{" class=\"out\""} : Markup{},
-                    marks[i].name, figure(marks[i].value), unit);
+                    marks[i].name, what.text(marks[i].value), what.unit);
   }
   return html(
       "<figure class=\"strip\"><figcaption>{0}{1}</figcaption><svg viewBox=\"0 0 320 58\" role=\"img\" "
@@ -36,8 +36,8 @@ Markup strip_plot(const std::string& title, const std::string& unit, const std::
       "y1=\"40\" "
       "y2=\"40\"/><line class=\"median\" x1=\"{7}\" x2=\"{7}\" y1=\"6\" y2=\"40\"/>{8}<text x=\"8\" y=\"54\">{3}</text>"
       "<text x=\"312\" y=\"54\" text-anchor=\"end\">{4}</text></svg></figure>\n",
-      title, unit.empty() ? "" : ", " + unit, marks.size(), figure(least), figure(most), unit, figure(middle),
-      place(middle), circles);
+      what.title, what.unit.empty() ? "" : ", " + what.unit, marks.size(), what.text(least), what.text(most), what.unit,
+      what.text(middle), place(middle), circles);
 }
 
 }  // namespace tunica::report

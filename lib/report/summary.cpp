@@ -1,6 +1,7 @@
 #include "tunica/report/report.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/core/rounding.hpp"
 #include "tunica/io/result/report_chart.hpp"
 #include "tunica/report/detail/html.hpp"
 #include "tunica/report/detail/measures.hpp"
@@ -24,7 +25,7 @@ Row row_of(const PipelineCase& one) {
     row[shells] = fmt::format("{:.0f}", *count);
   }
   if (const auto percent = measure("distance_percent").value(one)) {
-    row[error] = fmt::format("{:.4g}", *percent);
+    row[error] = fmt::format("{:.4g}", rounded_upwards(*percent, 4));
   }
   row[seconds] = fmt::format("{:.2f}", measure("seconds").value(one).value_or(0));
   std::ranges::transform(row, row.begin(), in_one_line);

@@ -116,6 +116,20 @@ TEST(RedactionTest, KnowsNamesAsWordsAlone) {
   EXPECT_EQ(Redaction()("/data/Meyer A.nii.gz"), "/data/Meyer A.nii.gz");
 }
 
+TEST(RedactionTest, LeavesNumbersFlagsAndTools) {
+  for (const std::string name : {"1", "300", "extract", "label"}) {
+    PipelineCase one{name + "/1", "out/" + name + "/1", "extract", "3", "", {}, {}};
+    const std::string command = "tunica-extract out/" + name + "/v.nii.gz --label 1 --smooth 1.5mm --shells=300";
+    one.reports["extract"] = {{"inputs", {{{"path", "out/" + name + "/v.nii.gz"}}}}, {"command", command}};
+    const Redaction redacted(one, 7);
+    EXPECT_EQ(redacted(command), "tunica-extract VOLUME --label 1 --smooth 1.5mm --shells=300") << name;
+    EXPECT_EQ(redacted("1.1 % of 300 shells"), "1.1 % of 300 shells");
+    EXPECT_EQ(redacted("out/" + name + "/1/surface.ply: open").find(name + "/1"), std::string::npos) << name;
+  }
+  PipelineCase meyer{"Meyer/1", "out/Meyer/1", "extract", "3", "", {}, {}};
+  EXPECT_EQ(Redaction(meyer, 7)("--names=Meyer.tsv tunica-Meyer"), "--names=case 7.tsv tunica-case 7");
+}
+
 /// The shells of a sphere of radius 10 as a result draws them: an octahedron split twice, four pieces per edge.
 DrawnResult sphere() {
   ShellMesh shell;

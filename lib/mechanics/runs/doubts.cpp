@@ -161,15 +161,16 @@ double waves_of(const ShellBody& body) {
 }
 
 /// What long shells and what waves leave of an answer adds up, so both take from one allowance.
-void doubt_coarseness(const ShellBody& body, std::vector<std::string>& found) {
+void doubt_coarseness(const ShellBody& body, bool may_be_chosen, std::vector<std::string>& found) {
   const double bow = median_bow_share(body);
   const double waves = waves_of(body);
   if (bow / largest_bow + waves / highest_waves > 1) {
     found.push_back(fmt::format(
         "{}: its shells are coarse for so thin a curved wall: h^2 = {:.2g} R t in the median (at 4 they bend some 20 % "
         "too little); their normals leave waves of {:.2f} % of the wall (an error of up to thirty times that, unless "
-        "they are the surface's own): take more shells, or let an accuracy choose them (--accuracy)",
-        at(body.said_at, body.name), bow_at_one * bow, 100 * waves));
+        "they are the surface's own): take more shells{}",
+        at(body.said_at, body.name), bow_at_one * bow, 100 * waves,
+        may_be_chosen ? ", or let an accuracy choose them (--accuracy)" : ""));
   }
 }
 
@@ -364,7 +365,7 @@ std::vector<std::string> doubts(const Model& model, const RunSettings& settings,
     const ShellBody& body = model.shells[b];
     doubt_thickness(body, found);
     if (!are_shells_chosen) {
-      doubt_coarseness(body, found);
+      doubt_coarseness(body, !is_imaged_under_pressure(model), found);
     }
     held.push_back(held_freedoms(model, b));
     if (cannot_move(model, b, held.back())) {

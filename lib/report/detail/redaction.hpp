@@ -18,7 +18,9 @@ public:
   /// replaces the case's own; what else looks like a path becomes "[path]".
   Redaction(const PipelineCase& one, std::size_t number);
 
-  /// The text without them. Limits: a name in a message that is neither a path nor known from a report stays.
+  /// The text without them. Limits: a name in a message that is neither a path nor known from a report stays, and so
+  /// does a number of up to three digits; a case that is called as the tools call things ("empty", "mm") takes these
+  /// words along.
   [[nodiscard]] std::string operator()(std::string text) const;
 
 private:

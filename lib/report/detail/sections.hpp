@@ -2,6 +2,7 @@
 
 #include "tunica/report/detail/case_report.hpp"
 #include "tunica/report/detail/html.hpp"
+#include "tunica/report/detail/measures.hpp"
 
 #include <string>
 #include <vector>
@@ -36,6 +37,6 @@ struct StripMark {
   std::string name;
   bool outlier = false;
 };
-Markup strip_plot(const std::string& title, const std::string& unit, const std::vector<StripMark>& marks);
+Markup strip_plot(const Measure& what, const std::vector<StripMark>& marks);
 
 }  // namespace tunica::report
