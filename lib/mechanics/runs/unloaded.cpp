@@ -52,11 +52,11 @@ RunSettings for_statics(RunSettings settings) {
   return settings;
 }
 
-/// The way from a reference to the image: displacements and rotation vectors (times a length) of all nodes, one after
-/// the other. A way leads to the image where the pressures there balance the stresses that it causes.
-class Ways {
+/// The equilibrium on the image, solved for the motion that led there from the reference: displacements and rotation
+/// vectors (times a length) of all nodes, one after the other.
+class InverseStatics {
 public:
-  Ways(const Model& imaged, const RunSettings& settings)
+  InverseStatics(const Model& imaged, const RunSettings& settings)
       : imaged_(imaged),
         pressed_(as_imaged(imaged)),
         settings_(for_statics(settings)),
@@ -66,16 +66,16 @@ public:
     linear_stiffness(image_, stiffness_);
   }
 
-  [[nodiscard]] VectorX none() const { return VectorX::Zero(first_freedom(imaged_.node_count())); }
+  [[nodiscard]] VectorX no_motion() const { return VectorX::Zero(first_freedom(imaged_.node_count())); }
 
   /// The imaged model, its shells moved back.
-  [[nodiscard]] Model reference(const VectorX& way) const { return moved_back(imaged_, way); }
+  [[nodiscard]] Model reference(const VectorX& motion) const { return moved_back(imaged_, motion); }
 
-  /// What is left of a part of the pressures moves the image as a linear spring: a way that is nearer to one that
-  /// leads there. None, and `reason`, where the wall folds.
-  std::optional<VectorX> improved(const VectorX& way, double part) {
+  /// What a part of the pressures leaves out of balance on the image corrects the motion, by the linear stiffness of
+  /// the image. None, and `reason`, where the wall folds.
+  std::optional<VectorX> improved(const VectorX& motion, double part) {
     ++iterations;
-    Model model = under(part, way);
+    Model model = under(part, motion);
     std::optional<ShellSystem> system;
     try {
       system = make_checked_system(model, settings_);
@@ -85,7 +85,7 @@ public:
       reason = "on the way to it the wall folds (" + fault.substr(0, fault.find("; ")) + ")";
       return {};
     }
-    Configuration there = configuration(way);
+    Configuration there = configuration(motion);
     Forces forces;
     evaluate(*system, model, there, load_factors(model, true, 1), {}, forces, nullptr);
     VectorX left = forces.external - forces.internal;
@@ -103,13 +103,13 @@ public:
         take_out_rigid_motion(*system, piece, there);
       }
     }
-    return way_of(there.displacement, [&](std::size_t i) { return logarithm(there.rotation[i]); });
+    return motion_of(there.displacement, [&](std::size_t i) { return logarithm(there.rotation[i]); });
   }
 
-  /// Where the pressures lead from the reference of a way, near which rest is looked for first. None, and `reason`,
-  /// where there is no rest.
-  std::optional<VectorX> loaded(const VectorX& way) {
-    const Configuration there = configuration(way);
+  /// The motion by the pressures from the reference of a motion, near which rest is looked for first. None, and
+  /// `reason`, where there is no rest.
+  std::optional<VectorX> loaded(const VectorX& motion) {
+    const Configuration there = configuration(motion);
     Resumption near;
     Checkpoint& start = near.near.emplace();
     start.displacement = there.displacement;
@@ -117,7 +117,7 @@ public:
     State last;
     try {
       (void)solve(
-          under(1, way), settings_,
+          under(1, motion), settings_,
           [&](const State& state) {
             volume = state.time == 0 ? state.volume : volume;
             last = state;
@@ -127,14 +127,14 @@ public:
       reason = error.what();
       return {};
     }
-    return way_of(last.displacement, [&](std::size_t i) { return last.rotation[i]; });
+    return motion_of(last.displacement, [&](std::size_t i) { return last.rotation[i]; });
   }
 
   /// Mean and largest length of the displacements.
-  [[nodiscard]] std::array<double, 2> lengths(const VectorX& way) const {
+  [[nodiscard]] std::array<double, 2> lengths(const VectorX& motion) const {
     double sum = 0, largest = 0;
     for (std::size_t i = 0; i < imaged_.node_count(); ++i) {
-      const double length = displacement(way, i).norm();
+      const double length = displacement(motion, i).norm();
       sum += length;
       largest = std::max(largest, length);
     }
@@ -146,40 +146,40 @@ public:
   std::string reason;            ///< why there is no answer
 
 private:
-  [[nodiscard]] Vec3 displacement(const VectorX& way, std::size_t node) const {
-    return way.segment<3>(first_freedom(node));
+  [[nodiscard]] Vec3 displacement(const VectorX& motion, std::size_t node) const {
+    return motion.segment<3>(first_freedom(node));
   }
-  [[nodiscard]] Vec3 rotation(const VectorX& way, std::size_t node) const {
-    return way.segment<3>(first_freedom(node) + 3) / image_.length;
+  [[nodiscard]] Vec3 rotation(const VectorX& motion, std::size_t node) const {
+    return motion.segment<3>(first_freedom(node) + 3) / image_.length;
   }
 
-  [[nodiscard]] VectorX way_of(const std::vector<Vec3>& displacement, const auto& rotation) const {
-    VectorX way = none();
+  [[nodiscard]] VectorX motion_of(const std::vector<Vec3>& displacement, const auto& rotation) const {
+    VectorX motion = no_motion();
     for (std::size_t i = 0; i < imaged_.node_count(); ++i) {
-      way.segment<3>(first_freedom(i)) = displacement[i];
-      way.segment<3>(first_freedom(i) + 3) = image_.length * rotation(i);
+      motion.segment<3>(first_freedom(i)) = displacement[i];
+      motion.segment<3>(first_freedom(i) + 3) = image_.length * rotation(i);
     }
-    return way;
+    return motion;
   }
 
-  [[nodiscard]] Configuration configuration(const VectorX& way) const {
+  [[nodiscard]] Configuration configuration(const VectorX& motion) const {
     Configuration there = reference_configuration(image_);
     for (std::size_t i = 0; i < imaged_.node_count(); ++i) {
-      there.displacement[i] = displacement(way, i);
-      there.rotation[i] = exponential(rotation(way, i));
+      there.displacement[i] = displacement(motion, i);
+      there.rotation[i] = exponential(rotation(motion, i));
     }
     return there;
   }
 
-  [[nodiscard]] Model moved_back(Model model, const VectorX& way) const {
+  [[nodiscard]] Model moved_back(Model model, const VectorX& motion) const {
     for (std::size_t b = 0; b < model.shells.size(); ++b) {
       ShellMesh& mesh = model.shells[b].mesh;
       const std::size_t first = model.first_node(b);
       const auto turned_back = [&](Index node, const Vec3& normal) {
-        return Vec3(exponential(-rotation(way, first + node)) * normal);
+        return Vec3(exponential(-rotation(motion, first + node)) * normal);
       };
       for (Index i = 0; i < mesh.vertices.size(); ++i) {
-        mesh.vertices[i] -= displacement(way, first + i);
+        mesh.vertices[i] -= displacement(motion, first + i);
         if (!mesh.normals.empty()) {
           mesh.normals[i] = turned_back(i, mesh.normals[i]);
         }
@@ -193,9 +193,9 @@ private:
     return model;
   }
 
-  /// The reference of a way, with a part of the pressures.
-  [[nodiscard]] Model under(double part, const VectorX& way) const {
-    Model model = moved_back(pressed_, way);
+  /// The reference of a motion, with a part of the pressures.
+  [[nodiscard]] Model under(double part, const VectorX& motion) const {
+    Model model = moved_back(pressed_, motion);
     for (Load& load : model.loads) {
       auto& pressure = std::get<PressureLoad>(load.kind);
       pressure.value = part * *pressure.imaged_at;
@@ -262,20 +262,21 @@ void require_shells_only(const Model& model) {
   }
 }
 
-/// Goes to a way that leads to the image under a part of the pressures. @return whether it comes near enough
-bool approach(Ways& ways, double part, const std::function<void(double, double)>& on_iteration, VectorX& way) {
+/// Finds the motion by a part of the pressures. @return whether it comes near enough
+bool approach(InverseStatics& inverse, double part, const std::function<void(double, double)>& on_iteration,
+              VectorX& motion) {
   const double wanted = part == 1 ? close_enough : close_on_the_way;
   Acceleration acceleration;
-  VectorX best = way;
+  VectorX best = motion;
   double least = infinity, size = 0;
   std::size_t in_vain = 0;
-  ways.reason = "the iterations do not converge";
+  inverse.reason = "the iterations do not converge";
   for (std::size_t iteration = 0; iteration < most_iterations && in_vain < patience; ++iteration) {
-    const auto next = ways.improved(way, part);
+    const auto next = inverse.improved(motion, part);
     if (!next) {
       break;
     }
-    const double change = ways.lengths(*next - way)[0];
+    const double change = inverse.lengths(*next - motion)[0];
     if (on_iteration) {
       on_iteration(part, change);
     }
@@ -283,15 +284,15 @@ bool approach(Ways& ways, double part, const std::function<void(double, double)>
     if (change < least) {
       in_vain = 0;
       least = change;
-      best = way;
-      size = ways.lengths(*next)[0];
+      best = motion;
+      size = inverse.lengths(*next)[0];
     }
     if (change <= wanted * size) {
       break;
     }
-    way = acceleration.next(way, *next);
+    motion = acceleration.next(motion, *next);
   }
-  way = best;
+  motion = best;
   return least <= farthest * size;
 }
 
@@ -314,13 +315,13 @@ bool is_imaged_under_pressure(const Model& model) {
 Unloaded find_unloaded(const Model& imaged, const RunSettings& settings,
                        const std::function<void(double, double)>& on_iteration) {
   require_shells_only(imaged);
-  Ways ways(imaged, settings);
-  VectorX found = ways.none();
+  InverseStatics inverse(imaged, settings);
+  VectorX found = inverse.no_motion();
   double part = 0, step = 1;
   while (part < 1) {
     const double next = std::min(1.0, part + step);
     VectorX attempt = part > 0 ? VectorX(next / part * found) : found;
-    if (approach(ways, next, on_iteration, attempt)) {
+    if (approach(inverse, next, on_iteration, attempt)) {
       found = attempt;
       part = next;
       step *= 2;
@@ -328,18 +329,18 @@ Unloaded find_unloaded(const Model& imaged, const RunSettings& settings,
     }
     step /= 2;
     if (step < smallest_part) {
-      refuse(next, ways.reason);
+      refuse(next, inverse.reason);
     }
   }
-  const auto loaded = ways.loaded(found);
+  const auto loaded = inverse.loaded(found);
   if (!loaded) {
-    refuse(1, ways.reason);
+    refuse(1, inverse.reason);
   }
-  const std::array<double, 2> distance = ways.lengths(*loaded - found);
-  if (distance[0] > farthest * ways.lengths(found)[0]) {
+  const std::array<double, 2> distance = inverse.lengths(*loaded - found);
+  if (distance[0] > farthest * inverse.lengths(found)[0]) {
     refuse(1, "from the shape that would be in balance there the pressure leads to another state of rest");
   }
-  Unloaded unloaded{ways.reference(found), ways.volume, distance[0], distance[1], ways.iterations};
+  Unloaded unloaded{inverse.reference(found), inverse.volume, distance[0], distance[1], inverse.iterations};
   for (Load& load : unloaded.model.loads) {
     if (auto* pressure = std::get_if<PressureLoad>(&load.kind)) {
       pressure->imaged_at.reset();
