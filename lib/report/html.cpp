@@ -130,7 +130,8 @@ std::string figure(double value) {
 }
 
 std::string figure_above(double value) {
-  const int before = value >= 1 ? static_cast<int>(std::floor(std::log10(value))) + 1 : 1;  // digits before the point
+  const int before = value >= 1 && std::isfinite(value) ? static_cast<int>(std::floor(std::log10(value))) + 1
+                                                        : 1;  // digits before the point
   return figure(rounded_upwards(value, std::max(3, before)));
 }
 

@@ -22,7 +22,7 @@ bool is_letter(char sign) {
 
 // Whether [at, ...) belongs to a flag or to the name of a tool.
 bool is_of_the_command(const std::string& text, std::size_t at) {
-  const std::size_t begin = text.find_last_of(" \t\n'\"(", at) + 1;  // npos + 1 is 0
+  const std::size_t begin = at == 0 ? 0 : text.find_last_of(" \t\n'\"(", at - 1) + 1;  // npos + 1 is 0
   const std::size_t end = std::min(text.find_first_of(" \t\n'\"):,=", begin), text.size());
   const std::string word = text.substr(begin, end - begin);
   return at < end && (word.starts_with("--") || std::ranges::any_of(pipeline_stages, [&](const char* stage) {

@@ -11,6 +11,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <map>
 #include <set>
 
@@ -72,6 +73,7 @@ TEST(Html, BoundsAreRoundedUp) {
   EXPECT_EQ(figure_above(10), "10");
   EXPECT_EQ(figure_above(0), "0");
   EXPECT_EQ(figure_above(-1), "-1");
+  EXPECT_EQ(figure_above(std::numeric_limits<double>::infinity()), figure(std::numeric_limits<double>::infinity()));
   for (double value = 1e-9; value < 1e5; value *= 1.37) {
     EXPECT_GE(std::stod(figure_above(value)), value * (1 - 1e-12));
     EXPECT_LE(std::stod(figure_above(value)), value * 1.0101 + 1e-12);
