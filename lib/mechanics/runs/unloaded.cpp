@@ -19,10 +19,13 @@ namespace {
 // Of the mean displacement: what the next iteration still moves.
 constexpr double close_enough = 1e-4;
 constexpr double close_on_the_way = 1e-2;  // the same, under a part of the pressure
+constexpr double close_to_image = 1e-3;    // the same: the loaded shape's mean distance from the image
 constexpr double farthest = 1e-2;          // the same, and of the loaded shape from the image: more is no such shape
+constexpr double elsewhere = 0.1;          // the same: more is no state near the image
 constexpr std::size_t most_iterations = 40;
 constexpr std::size_t patience = 8;    // iterations in a row that come no nearer
 constexpr std::size_t remembered = 5;  // iterates that the acceleration combines
+constexpr double mixed = 0.5;  // of the residual that they leave: waves as short as the shells are overshot by more
 constexpr double smallest_part = 1.0 / 32;
 constexpr std::string_view key = "imaged_at";
 
@@ -33,6 +36,8 @@ Model as_imaged(Model model) {
     return pressure == nullptr || !pressure->imaged_at;
   });
   for (Load& load : model.loads) {
+    auto& pressure = std::get<PressureLoad>(load.kind);
+    pressure.value = *pressure.imaged_at;
     load.ramp = {};
   }
   for (Fix& fix : model.fixes) {
@@ -106,9 +111,10 @@ public:
     return motion_of(there.displacement, [&](std::size_t i) { return logarithm(there.rotation[i]); });
   }
 
-  /// The motion by the pressures from the reference of a motion, near which rest is looked for first. None, and
-  /// `reason`, where there is no rest.
+  /// The motion by the pressures from the reference of a motion. None, and `reason`, where there is no rest, or not
+  /// near the image. Source: Sellier 2011, "An iterative method for the inverse elasto-static problem".
   std::optional<VectorX> loaded(const VectorX& motion) {
+    ++iterations;
     const Configuration there = configuration(motion);
     Resumption near;
     Checkpoint& start = near.near.emplace();
@@ -127,7 +133,12 @@ public:
       reason = error.what();
       return {};
     }
-    return motion_of(last.displacement, [&](std::size_t i) { return last.rotation[i]; });
+    VectorX result = motion_of(last.displacement, [&](std::size_t i) { return last.rotation[i]; });
+    if (lengths(result - motion)[0] > elsewhere * lengths(motion)[0]) {
+      reason = "from the shape that would be in balance there the pressure leads to another state of rest";
+      return {};
+    }
+    return result;
   }
 
   /// Mean and largest length of the displacements.
@@ -228,7 +239,7 @@ public:
     }
     last_residual_ = residual;
     last_image_ = g;
-    VectorX result = g;
+    VectorX result = y + mixed * residual;
     if (!residual_changes_.empty()) {
       Eigen::MatrixXd changes(y.size(), narrow<Eigen::Index>(residual_changes_.size()));
       for (std::size_t k = 0; k < residual_changes_.size(); ++k) {
@@ -236,7 +247,7 @@ public:
       }
       const VectorX weights = changes.colPivHouseholderQr().solve(residual);
       for (std::size_t k = 0; k < residual_changes_.size(); ++k) {
-        result -= weights[narrow<Eigen::Index>(k)] * image_changes_[k];
+        result -= weights[narrow<Eigen::Index>(k)] * (image_changes_[k] - (1 - mixed) * residual_changes_[k]);
       }
     }
     return result;
@@ -262,45 +273,47 @@ void require_shells_only(const Model& model) {
   }
 }
 
-/// Finds the motion by a part of the pressures. @return whether it comes near enough
-bool approach(InverseStatics& inverse, double part, const std::function<void(double, double)>& on_iteration,
-              VectorX& motion) {
-  const double wanted = part == 1 ? close_enough : close_on_the_way;
+struct Approach {
+  VectorX motion;
+  std::array<double, 2> off{infinity, infinity};  ///< mean and largest change by the map
+  std::optional<double> volume = {};
+  bool near = false;  ///< within 1 %
+};
+
+/// Finds a motion that a map leaves where it is. @param wanted  of the mean displacement, what it may still change
+Approach approach(InverseStatics& inverse, VectorX motion, double wanted,
+                  const std::function<std::optional<VectorX>(const VectorX&)>& map) {
   Acceleration acceleration;
-  VectorX best = motion;
-  double least = infinity, size = 0;
+  Approach best{motion};
+  double size = 0;
   std::size_t in_vain = 0;
-  inverse.reason = "the iterations do not converge";
   for (std::size_t iteration = 0; iteration < most_iterations && in_vain < patience; ++iteration) {
-    const auto next = inverse.improved(motion, part);
+    const auto next = map(motion);
     if (!next) {
       break;
     }
-    const double change = inverse.lengths(*next - motion)[0];
-    if (on_iteration) {
-      on_iteration(part, change);
-    }
+    const auto off = inverse.lengths(*next - motion);
     ++in_vain;
-    if (change < least) {
+    if (off[0] < best.off[0]) {
       in_vain = 0;
-      least = change;
-      best = motion;
+      best = {motion, off, inverse.volume};
       size = inverse.lengths(*next)[0];
     }
-    if (change <= wanted * size) {
+    if (off[0] <= wanted * size) {
       break;
     }
     motion = acceleration.next(motion, *next);
   }
-  motion = best;
-  return least <= farthest * size;
+  best.near = best.off[0] <= farthest * size;
+  return best;
 }
 
 [[noreturn]] void refuse(double part, const std::string& reason) {
-  throw RequirementError(
-      fmt::format("no unloaded shape was found that lies where the image shows it under {:.4g} times the pressure {}: "
-                  "{}; was the wall as thick and as stiff, and the pressure as high, when the image was taken?",
-                  part, key, reason));
+  throw RequirementError(fmt::format(
+      "no unloaded shape was found that lies where the image shows it under {:.4g} times the pressure {}: "
+      "{}; was the wall as thick and as stiff, and the pressure as high, when the image was taken? Where they were, "
+      "take more shells",
+      part, key, reason));
 }
 
 }  // namespace
@@ -320,9 +333,17 @@ Unloaded find_unloaded(const Model& imaged, const RunSettings& settings,
   double part = 0, step = 1;
   while (part < 1) {
     const double next = std::min(1.0, part + step);
-    VectorX attempt = part > 0 ? VectorX(next / part * found) : found;
-    if (approach(inverse, next, on_iteration, attempt)) {
-      found = attempt;
+    inverse.reason = "the iterations do not converge";
+    const Approach there = approach(inverse, part > 0 ? VectorX(next / part * found) : found,
+                                    next == 1 ? close_enough : close_on_the_way, [&](const VectorX& motion) {
+                                      auto improved = inverse.improved(motion, next);
+                                      if (improved && on_iteration) {
+                                        on_iteration(next, inverse.lengths(*improved - motion)[0]);
+                                      }
+                                      return improved;
+                                    });
+    if (there.near) {
+      found = there.motion;
       part = next;
       step *= 2;
       continue;
@@ -332,15 +353,13 @@ Unloaded find_unloaded(const Model& imaged, const RunSettings& settings,
       refuse(next, inverse.reason);
     }
   }
-  const auto loaded = inverse.loaded(found);
-  if (!loaded) {
+  inverse.reason = "the iterations do not converge";
+  const Approach loaded =
+      approach(inverse, found, close_to_image, [&](const VectorX& motion) { return inverse.loaded(motion); });
+  if (!loaded.near) {
     refuse(1, inverse.reason);
   }
-  const std::array<double, 2> distance = inverse.lengths(*loaded - found);
-  if (distance[0] > farthest * inverse.lengths(found)[0]) {
-    refuse(1, "from the shape that would be in balance there the pressure leads to another state of rest");
-  }
-  Unloaded unloaded{inverse.reference(found), inverse.volume, distance[0], distance[1], inverse.iterations};
+  Unloaded unloaded{inverse.reference(loaded.motion), loaded.volume, loaded.off[0], loaded.off[1], inverse.iterations};
   for (Load& load : unloaded.model.loads) {
     if (auto* pressure = std::get_if<PressureLoad>(&load.kind)) {
       pressure->imaged_at.reset();
