@@ -146,7 +146,7 @@ Markup spread(const std::vector<CaseReport>& cases) {
   std::map<fs::path, std::set<fs::path>> folders_of;
   for (const CaseReport& one : cases) {
     const fs::path volume = volume_of(one);
-    folders_of[volume.filename()].insert(volume.parent_path());
+    folders_of[volume.filename()].insert(volume.parent_path().lexically_normal());
   }
   std::map<std::array<std::string, 2>, CaseGroup> organs;
   for (const CaseReport& one : cases) {

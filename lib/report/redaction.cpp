@@ -25,9 +25,10 @@ bool is_of_the_command(const std::string& text, std::size_t at) {
   const std::size_t begin = at == 0 ? 0 : text.find_last_of(" \t\n'\"(", at - 1) + 1;  // npos + 1 is 0
   const std::size_t end = std::min(text.find_first_of(" \t\n'\"):,=", begin), text.size());
   const std::string word = text.substr(begin, end - begin);
-  return at < end && (word.starts_with("--") || std::ranges::any_of(pipeline_stages, [&](const char* stage) {
-                        return word == std::string("tunica-") + stage;
-                      }));
+  return at < end &&
+         ((word.starts_with("--") && word.find_first_not_of("abcdefghijklmnopqrstuvwxyz-") == std::string::npos) ||
+          std::ranges::any_of(pipeline_stages,
+                              [&](const char* stage) { return word == std::string("tunica-") + stage; }));
 }
 
 // Whether [at, at + size) is a name of its own, not a part of a word.

@@ -130,6 +130,7 @@ TEST(RedactionTest, LeavesNumbersFlagsAndTools) {
   }
   PipelineCase meyer{"Meyer/1", "out/Meyer/1", "extract", "3", "", {}, {}};
   EXPECT_EQ(Redaction(meyer, 7)("--names=Meyer.tsv tunica-Meyer"), "--names=case 7.tsv tunica-case 7");
+  EXPECT_EQ(Redaction(meyer, 7)("--Meyer.nii.gz: cannot be opened").find("Meyer"), std::string::npos);
 }
 
 /// The shells of a sphere of radius 10 as a result draws them: an octahedron split twice, four pieces per edge.
