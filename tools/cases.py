@@ -287,7 +287,8 @@ def cases_of_table(path, out):
         if "VOLUME" not in row.cells:
             wrong.append("volume not given: the path of a segmented volume, from the table's folder")
         elif "CASE" in row.cells and (not is_folder_name(name) or name in OF_THE_RUN):
-            wrong.append(f"case: '{shown(name)}' cannot be the name of a folder of OUT: it is blank, '.' or '..', has a '/' or a control character, or is a file of the run")
+            wrong.append(f"case: '{shown(name)}' cannot be the name of a folder of OUT: it is blank, '.' or '..', has a '/' or a "
+                         "control character, or is a file of the run")
         labels = ["iso" + own["ISOVALUE"]] if own.get("ISOVALUE") else [row.cells["LABEL"]] if "LABEL" in row.cells \
             else find_labels()
         if not labels:

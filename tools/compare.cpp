@@ -244,8 +244,9 @@ void tell(cli::Tool& tool, const Surface& a, const Other& b, const HausdorffResu
   const std::string means = std::isfinite(distance.mean) ? fmt::format(", mean {:.4f} %, rms {:.4f} %",
                                                                        percent * distance.mean, percent * distance.rms)
                                                          : ", no mean over a surface without area";
-  tool.note(fmt::format("distance {:.6g} to {:.6g} mm ({:.4f} to {:.4f} %){}", distance.both.lower, distance.both.upper,
-                        percent * distance.both.lower, percent * distance.both.upper, means));
+  tool.note(fmt::format("distance {:.6g} to {:.6g} mm ({:.4g} to {:.4g} %){}", distance.both.lower,
+                        rounded_upwards(distance.both.upper, 6), percent * distance.both.lower,
+                        rounded_upwards(percent * distance.both.upper, 4), means));
   if (distance.both.upper - distance.both.lower > 1.01 * width) {
     tool.warn("the interval is wider than asked for: rounding allows no less, or the work would have passed its bound");
   }

@@ -10,7 +10,6 @@
 #include "tunica/io/mesh/mesh_file.hpp"
 #include "tunica/io/mesh/mesh_pair.hpp"
 #include "tunica/io/mesh/surface_file.hpp"
-#include "tunica/shell/distance/boundary_distance.hpp"
 #include "tunica/shell/distance/mean_bound.hpp"
 #include "tunica/shell/distance/shell_crossings.hpp"
 #include "tunica/shell/distance/shell_quality.hpp"
@@ -28,7 +27,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <tuple>
 #include <utility>
 
 namespace fs = std::filesystem;
@@ -37,7 +35,6 @@ using namespace tunica;
 namespace {
 
 constexpr double interval_width = 1e-4;  // of the diagonal: what the report certifies
-constexpr double rounding = 1e-9;        // of the diagonal: by which a certified interval may be wider than asked
 constexpr double curved_deviation =
     0.8e-5;  // of the diagonal; the contract of --curved, 1e-5, may be taken of either surface
 constexpr double most_for_spikes = 0.9;             // of the tolerance
@@ -247,39 +244,6 @@ void warn_of_mismatch(const cli::Tool& tool, const MeshFacts& a, const MeshFacts
 }
 
 Json interval(const Interval& mm, double scale) { return {{"lower", mm.lower * scale}, {"upper", mm.upper * scale}}; }
-
-Interval intersection(const Interval& a, const Interval& b) {
-  return {std::max(a.lower, b.lower), std::min(a.upper, b.upper)};
-}
-
-// What relax() proved is narrowed where it is too wide.
-// @param whole  the target with its spikes; relax() knew it without them, `moved` mm from it at most
-ShellDistance certified_distance(const RelaxResult& relaxed, const Target& whole, double moved,
-                                 const ShellDistanceOptions& measuring) {
-  const auto widened = [&](const Interval& known) {
-    return Interval{std::max(0.0, known.lower - moved), known.upper + moved};
-  };
-  ShellDistance distance = relaxed.distance;
-  for (Interval* known : {&distance.both, &distance.shell_to_target, &distance.target_to_shell}) {
-    *known = widened(*known);
-  }
-  const auto narrow = [&](const Interval& known) {
-    return known.upper - known.lower <= measuring.width + rounding * whole.diagonal();
-  };
-  if (!narrow(distance.shell_to_target) || !narrow(distance.target_to_shell)) {
-    // Both intervals are certain, so their intersection is.
-    const ShellDistance measured = shell_distance(relaxed.shell, whole, measuring);
-    distance.both = intersection(distance.both, measured.both);
-    distance.shell_to_target = intersection(distance.shell_to_target, measured.shell_to_target);
-    distance.target_to_shell = intersection(distance.target_to_shell, measured.target_to_shell);
-  }
-  std::tie(distance.mean, distance.rms) = mean_distance(relaxed.shell, whole);
-  if (const auto between = boundary_distance(boundary_curves(relaxed.shell), whole, measuring.width)) {
-    const auto& known = relaxed.distance.boundary;
-    distance.boundary = known ? intersection(between->both, widened(*known)) : between->both;
-  }
-  return distance;
-}
 
 PlyOptions ply_options(const cli::Tool& tool, const std::string& space) {
   PlyOptions options;
@@ -545,8 +509,9 @@ private:
     result["mean_distance_bound_mm"] = mean_bound_ ? Json(*mean_bound_) : Json();
     measure_shapes();
     if (mean_bound_) {
-      tool_.note(fmt::format("mean distance certainly below {:.4g} mm, {:.3g} % of the wall", *mean_bound_,
-                             100 * *mean_bound_ / *given_.thickness));
+      tool_.note(fmt::format("mean distance certainly below {:.4g} mm, {:.3g} % of the wall",
+                             rounded_upwards(*mean_bound_, 4),
+                             rounded_upwards(100 * *mean_bound_ / *given_.thickness, 3)));
     }
     tool_.note(fmt::format("{} shells, two-sided distance {:.4g} to {:.4g} % of the diagonal: {}",
                            relaxed_.shell.triangles.size(), percent() * distance_.both.lower,

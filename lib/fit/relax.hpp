@@ -62,4 +62,11 @@ TriangleMesh turned_around(TriangleMesh mesh);
 /// Cost: per iteration about 100 us per shell plus 2 us per target triangle for each step of the normals' fit.
 RelaxResult relax_by_barycentre(const TriangleMesh& coarse, const Target& target, const RelaxOptions& options);
 
+/// The distance of a result's curved surface from its target, and of their boundaries: what was proved on the way, and
+/// measured again where that is wider than asked for.
+/// @param whole  the target as it was given; the result knew it without spikes, `moved` mm from it at most
+/// Cost: as shell_distance() where it is measured again, and a mean by samples.
+ShellDistance certified_distance(const RelaxResult& relaxed, const Target& whole, double moved,
+                                 const ShellDistanceOptions& measuring);
+
 }  // namespace tunica

@@ -81,9 +81,8 @@ Markup discretisation(const CaseReport& one) {
   if (!accuracy.is_object()) {
     if (is_fitted_to_middle(one) || is_unloaded(one)) {
       return html(
-          "<p>How far stress and displacement depend on the number of shells was not estimated: a second run with "
-          "other "
-          "<code>--shells</code> (<code>SHELLS</code> in the pipeline) shows it.</p>\n");
+          "<p>How far stress and displacement depend on the number of shells was not estimated: a second run with other"
+          " <code>--shells</code> (<code>SHELLS</code> in the pipeline) shows it.</p>\n");
     }
     return html(
         "<p>How far stress and displacement depend on the number of shells was not estimated: <code>--accuracy</code> "
@@ -285,16 +284,13 @@ Markup files(const CaseReport& one, int level, bool paths) {
   Markup rows;
   for (const char* stage : pipeline_stages) {
     for (const char* kind : {"inputs", "outputs"}) {
-      const Json entries = one.source.at(stage, kind);
-      for (const Json& entry : entries.is_array() ? entries : Json::array()) {
-        if (!entry.is_object() || !entry.contains("path") || !entry["path"].is_string()) {
+      for (const auto& [path, hash] : one.source.files(stage, kind)) {
+        if (path.empty()) {
           continue;
         }
-        const Json hash = entry.value("sha256", Json());
-        const std::string path = entry["path"].get<std::string>();
         rows += html("<tr><th scope=\"row\">{} {}</th><td>{}</td><td><code>{}</code></td></tr>\n", stage,
-                     std::string(kind) == "inputs" ? "read" : "wrote", paths ? path : one.redacted(path),
-                     hash.is_string() ? hash.get<std::string>() : "–");
+                     std::string(kind) == "inputs" ? "read" : "wrote",
+                     paths ? path.string() : one.redacted(path.string()), hash.empty() ? "–" : hash);
       }
     }
   }

@@ -35,10 +35,10 @@ Markup counts(const std::vector<CaseReport>& cases) {
     return std::ranges::count_if(cases, [&](const CaseReport& one) { return status_of(one) == status; });
   };
   return html(
-      "<dl class=\"counts\"><div class=\"{}\"><dt>Done, no warning</dt><dd>{}</dd></div><div "
-      "class=\"{}\"><dt>Failed</dt>"
-      "<dd>{}</dd></div><div class=\"{}\"><dt>Done, with warnings</dt><dd>{}</dd></div></dl>\n",
-      "done", count("done"), count("failed") > 0 ? "failed" : "none", count("failed"),
+      "<dl class=\"counts\"><div class=\"{}\"><dt>Done, no warning</dt><dd>{}</dd></div>"
+      "<div class=\"{}\"><dt>Failed</dt><dd>{}</dd></div><div class=\"{}\"><dt>Done, with "
+      "warnings</dt><dd>{}</dd></div></dl>\n",
+      count("done") > 0 ? "done" : "none", count("done"), count("failed") > 0 ? "failed" : "none", count("failed"),
       count("warned") > 0 ? "warned" : "none", count("warned"));
 }
 
@@ -134,10 +134,8 @@ Markup spread_of(const CaseGroup& cases) {
 }
 
 fs::path volume_of(const CaseReport& one) {
-  const Json inputs = one.source.at("extract", "inputs");
-  const Json first = inputs.is_array() && !inputs.empty() ? inputs.front() : Json();
-  const bool told = first.is_object() && first.contains("path") && first["path"].is_string();
-  return told ? fs::path(first["path"].get<std::string>()) : fs::path();
+  const std::vector<ReportedFile> inputs = one.source.files("extract", "inputs");
+  return inputs.empty() ? fs::path() : inputs.front().path;
 }
 
 // One organ is compared with its like: cases of a label by themselves. A file name that comes back in other folders, as

@@ -31,22 +31,18 @@ std::vector<std::string> differences(const PipelineCase& one) {
     if (!one.reports.contains(stage) && fs::exists(one.folder / products[i], error)) {
       found.push_back((one.folder / products[i]).string() + ": no report of " + stage + " tells what it wrote");
     }
-    const Json outputs = one.at(stage, "outputs");
     std::optional<fs::path> folder;  // of the case when the first file, the stage's product, was written
-    for (const Json& entry : outputs.is_array() ? outputs : Json::array()) {
-      const bool hashed = entry.is_object() && entry.contains("path") && entry["path"].is_string() &&
-                          entry.contains("sha256") && entry["sha256"].is_string();
-      if (!hashed) {
+    for (const ReportedFile& file : one.files(stage, "outputs")) {
+      if (file.path.empty() || file.sha256.empty()) {
         found.push_back((one.folder / (stage + ".json")).string() +
                         ": tells no hashes of the outputs: it is of an older version, run the stage again");
         break;
       }
       // A file of the case lies where the case lies now; a user's own flag may have named another place.
-      const fs::path told = entry["path"].get<std::string>();
-      folder = folder.value_or(told.parent_path());
-      const fs::path path = told.parent_path() == *folder ? one.folder / told.filename() : told;
+      folder = folder.value_or(file.path.parent_path());
+      const fs::path path = file.path.parent_path() == *folder ? one.folder / file.path.filename() : file.path;
       try {
-        if (sha256_of_file(path) != entry["sha256"].get<std::string>()) {
+        if (sha256_of_file(path) != file.sha256) {
           found.push_back(path.string() + ": is not what " + stage + " wrote");
         }
       } catch (const InputError&) {

@@ -20,22 +20,20 @@ bool is_letter(char sign) {
   return std::isalnum(static_cast<unsigned char>(sign)) != 0 || static_cast<unsigned char>(sign) >= 0x80;
 }
 
-// Whether [at, ...) belongs to a flag or to the name of a tool.
-bool is_of_the_command(const std::string& text, std::size_t at) {
-  const std::size_t begin = at == 0 ? 0 : text.find_last_of(" \t\n'\"(", at - 1) + 1;  // npos + 1 is 0
-  const std::size_t end = std::min(text.find_first_of(" \t\n'\"):,=", begin), text.size());
-  const std::string word = text.substr(begin, end - begin);
-  return at < end &&
-         ((word.starts_with("--") && word.find_first_not_of("abcdefghijklmnopqrstuvwxyz-") == std::string::npos) ||
-          std::ranges::any_of(pipeline_stages,
-                              [&](const char* stage) { return word == std::string("tunica-") + stage; }));
+// Whether text[at] belongs to a flag: volumes are called label.nii.gz and mask.nii.gz, too.
+bool is_of_a_flag(const std::string& text, std::size_t at) {
+  constexpr const char* letters = "abcdefghijklmnopqrstuvwxyz-";
+  const std::size_t begin = text.find_last_not_of(letters, at) + 1;  // npos + 1 is 0
+  const std::size_t end = std::min(text.find_first_not_of(letters, begin), text.size());
+  const auto blank = [&](std::size_t i) { return i == text.size() || text[i] == ' ' || text[i] == '='; };
+  return text.compare(begin, 2, "--") == 0 && (begin == 0 || blank(begin - 1)) && blank(end);
 }
 
 // Whether [at, at + size) is a name of its own, not a part of a word.
 bool stands_alone(const std::string& text, std::size_t at, std::size_t size) {
   const bool before = at == 0 || !is_letter(text[at - 1]) || !is_letter(text[at]);
   const std::size_t end = at + size;
-  return before && !is_of_the_command(text, at) &&
+  return before && !is_of_a_flag(text, at) &&
          (end == text.size() || !is_letter(text[end]) || !is_letter(text[end - 1]));
 }
 
@@ -103,14 +101,8 @@ Redaction::Redaction(const PipelineCase& one, std::size_t number) : active_(true
   const std::string stem = fs::path(one.name).parent_path().string();
   forget(one.name, own);
   forget(stem, own);
-  const auto path_of = [](const Json& entry) {
-    const bool told = entry.is_object() && entry.contains("path") && entry["path"].is_string();
-    return told ? entry["path"].get<std::string>() : std::string();
-  };
   for (const auto& [stage, report] : one.reports) {
-    const Json inputs = one.at(stage, "inputs");
-    for (const Json& entry : inputs.is_array() ? inputs : Json::array()) {
-      const fs::path path = path_of(entry);
+    for (const auto& [path, hash] : one.files(stage, "inputs")) {
       forget(path.string(), stage == "extract" ? "VOLUME" : path.filename().string());
       if (stage == "extract") {
         forget(path.filename().string(), "VOLUME");
@@ -118,9 +110,7 @@ Redaction::Redaction(const PipelineCase& one, std::size_t number) : active_(true
         forget(stem_of_volume(path.parent_path()), own);  // a folder of slices
       }
     }
-    const Json outputs = one.at(stage, "outputs");
-    for (const Json& entry : outputs.is_array() ? outputs : Json::array()) {
-      const fs::path path = path_of(entry);
+    for (const auto& [path, hash] : one.files(stage, "outputs")) {
       forget(path.string(), path.filename().string());
     }
     for (const std::string& word : words_of(one, stage)) {

@@ -59,15 +59,12 @@ std::optional<Inside> rule_of(const std::vector<std::string>& words, const Volum
 // Errors: InputError that says why the volume cannot be shown.
 Image read_image(const PipelineCase& one) {
   const auto words = words_of(one, "extract");
-  const Json inputs = one.at("extract", "inputs");
-  const bool told = inputs.is_array() && !inputs.empty() && inputs[0].is_object() && inputs[0].contains("path") &&
-                    inputs[0]["path"].is_string();
-  if (!told) {
+  const std::vector<ReportedFile> inputs = one.files("extract", "inputs");
+  if (inputs.empty() || inputs.front().path.empty()) {
     throw InputError("no slices: the report of the extraction names no volume");
   }
-  const fs::path path = inputs[0]["path"].get<std::string>();
-  const Json hash = inputs[0].value("sha256", Json());
-  if (hash.is_string() && sha256_of_file(path) != hash.get<std::string>()) {
+  const auto& [path, hash] = inputs.front();
+  if (!hash.empty() && sha256_of_file(path) != hash) {
     throw InputError(path.string() + ": is not the volume that was extracted any more: no slices of it are shown");
   }
   VolumeOptions options;

@@ -1,3 +1,4 @@
+#include "tunica/report/report.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/report/detail/command_words.hpp"
 #include "tunica/report/detail/drawn_shells.hpp"
@@ -80,6 +81,12 @@ TEST(Html, BoundsAreRoundedUp) {
   }
 }
 
+TEST(Summary, RoundsBoundsUp) {
+  PipelineCase one{"a/1", "out/a/1", "relax", "0", "done", {}, {}};
+  one.reports["relax"] = {{"result", {{"shells", 8}, {"hausdorff_percent", {{"lower", 0.11}, {"upper", 0.114634}}}}}};
+  EXPECT_THAT(summary_tsv({one}), testing::HasSubstr("\t0.1147\t"));
+}
+
 TEST(CommandWords, AreThoseTheShellSees) {
   EXPECT_THAT(command_words("tunica-extract 'my scan.nii' --label 3 'it'\\''s' ''"),
               ElementsAre("tunica-extract", "my scan.nii", "--label", "3", "it's", ""));
@@ -118,8 +125,8 @@ TEST(RedactionTest, KnowsNamesAsWordsAlone) {
   EXPECT_EQ(Redaction()("/data/Meyer A.nii.gz"), "/data/Meyer A.nii.gz");
 }
 
-TEST(RedactionTest, LeavesNumbersFlagsAndTools) {
-  for (const std::string name : {"1", "300", "extract", "label"}) {
+TEST(RedactionTest, LeavesNumbersAndFlags) {
+  for (const std::string name : {"1", "300", "smooth", "label"}) {
     PipelineCase one{name + "/1", "out/" + name + "/1", "extract", "3", "", {}, {}};
     const std::string command = "tunica-extract out/" + name + "/v.nii.gz --label 1 --smooth 1.5mm --shells=300";
     one.reports["extract"] = {{"inputs", {{{"path", "out/" + name + "/v.nii.gz"}}}}, {"command", command}};

@@ -140,6 +140,8 @@ class CasePage(ReportTest):
         _, _, page = self.report()
         self.assertIn(" kPa, from the shape without load", page.text)
         self.assertIn("Volume within the shells, without load4.32 ml", page.text)
+        self.assertIn("was not estimated: a second run", page.text)
+        self.assertNotIn("ACCURACY=", page.text, "it is refused with an imaging pressure")
         self.assertIn("Off the image under its pressure, mean0.0125 mm", page.text)
 
     def test_loads_nothing_and_runs_its_own_script_alone(self):

@@ -115,6 +115,8 @@ class Unloaded(SimulateTest):
         self.imaged("image.ply", pressure, "--thickness", "0.2mm", "--fix", "rigid-motions", expect=4)
         self.assertIn("no unloaded shape was found", self.done.stderr)
         self.assertIn("times the pressure imaged_at: ", self.done.stderr)
+        self.assertIn("take more shells", self.done.stderr)
+        self.assertNotIn("--accuracy", self.done.stderr, "it is refused with imaged_at")
         self.assertIn("was the wall as thick and as stiff", self.done.stderr)
 
     def test_loads_out_of_balance_are_no_fault_of_the_wall(self):

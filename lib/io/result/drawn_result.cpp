@@ -22,7 +22,7 @@ namespace tunica {
 namespace {
 
 constexpr std::size_t most_numbers = 200'000'000;  // in one reading: what a page cannot show, and damaged files claim
-constexpr double most_inflated = 1032;             // bytes that one of deflate can stand for
+constexpr double most_inflated = 1032;             // bytes that one of deflate can stand for (zlib's technical details)
 constexpr std::size_t most_text = std::size_t{16} << 20;
 
 // What is read of a result.

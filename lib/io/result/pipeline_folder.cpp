@@ -164,6 +164,19 @@ Json PipelineCase::at(const std::string& stage_name, const std::string& key) con
   return *value;
 }
 
+std::vector<ReportedFile> PipelineCase::files(const std::string& stage_name, const std::string& kind) const {
+  const Json entries = at(stage_name, kind);
+  std::vector<ReportedFile> found;
+  for (const Json& entry : entries.is_array() ? entries : Json::array()) {
+    const auto text = [&](const char* key) {
+      const bool told = entry.is_object() && entry.contains(key) && entry[key].is_string();
+      return told ? entry[key].get<std::string>() : std::string();
+    };
+    found.push_back({text("path"), text("sha256")});
+  }
+  return found;
+}
+
 std::vector<PipelineCase> read_pipeline_folder(const fs::path& folder) {
   std::error_code error;
   if (!fs::is_directory(folder, error)) {

@@ -14,6 +14,12 @@ namespace tunica {
 /// The stages of a case, in order. A stage's report is STAGE.json in the case's folder.
 inline constexpr std::array<const char*, 4> pipeline_stages{"extract", "decimate", "relax", "simulate"};
 
+/// A file that a report names.
+struct ReportedFile {
+  std::filesystem::path path;  ///< empty where the entry tells none
+  std::string sha256;          ///< the same
+};
+
 /// A case: one label of one volume.
 struct PipelineCase {
   std::string name;                     ///< "STEM/LABEL", any bytes
@@ -27,6 +33,8 @@ struct PipelineCase {
   [[nodiscard]] bool done() const { return message == "done"; }
   /// The value behind a stage's report's dotted key; null where there is none.
   [[nodiscard]] Json at(const std::string& stage_name, const std::string& key) const;
+  /// What a stage's report says that it read ("inputs") or wrote ("outputs"): one per entry, in their order.
+  [[nodiscard]] std::vector<ReportedFile> files(const std::string& stage_name, const std::string& kind) const;
 };
 
 /// The cases of a folder, as the last run of the pipeline left word of them in FOLDER/.cases (a line per case: name,

@@ -16,12 +16,11 @@
 namespace tunica {
 namespace {
 
-// Of the mean displacement: what the next iteration still moves.
-constexpr double close_enough = 1e-4;
-constexpr double close_on_the_way = 1e-2;  // the same, under a part of the pressure
-constexpr double close_to_image = 1e-3;    // the same: the loaded shape's mean distance from the image
-constexpr double farthest = 1e-2;          // the same, and of the loaded shape from the image: more is no such shape
-constexpr double elsewhere = 0.1;          // the same: more is no state near the image
+// Of the mean displacement, in the mean: what an iteration still changes, and the loaded shape's distance from the
+// image.
+constexpr double wanted = 1e-3;
+constexpr double farthest = 1e-2;  // more is no such shape; enough under a part of the pressure
+constexpr double elsewhere = 0.1;  // a state of rest farther from the image is another one
 constexpr std::size_t most_iterations = 40;
 constexpr std::size_t patience = 8;    // iterations in a row that come no nearer
 constexpr std::size_t remembered = 5;  // iterates that the acceleration combines
@@ -123,12 +122,7 @@ public:
     State last;
     try {
       (void)solve(
-          under(1, motion), settings_,
-          [&](const State& state) {
-            volume = state.time == 0 ? state.volume : volume;
-            last = state;
-          },
-          {}, near);
+          under(1, motion), settings_, [&](const State& state) { last = state; }, {}, near);
     } catch (const RequirementError& error) {
       reason = error.what();
       return {};
@@ -139,6 +133,13 @@ public:
       return {};
     }
     return result;
+  }
+
+  /// mm^3, of the closed shells of the reference.
+  [[nodiscard]] std::optional<double> volume(const VectorX& motion) const {
+    const Model model = under(0, motion);
+    const ShellSystem system = make_system(model);
+    return enclosed_volume(system, model, reference_configuration(system));
   }
 
   /// Mean and largest length of the displacements.
@@ -153,8 +154,7 @@ public:
   }
 
   std::size_t iterations = 0;
-  std::optional<double> volume;  ///< of the last reference that was loaded
-  std::string reason;            ///< why there is no answer
+  std::string reason;  ///< why there is no answer
 
 private:
   [[nodiscard]] Vec3 displacement(const VectorX& motion, std::size_t node) const {
@@ -276,13 +276,13 @@ void require_shells_only(const Model& model) {
 struct Approach {
   VectorX motion;
   std::array<double, 2> off{infinity, infinity};  ///< mean and largest change by the map
-  std::optional<double> volume = {};
-  bool near = false;  ///< within 1 %
+  bool near = false;                              ///< it is less than `farthest`
 };
 
-/// Finds a motion that a map leaves where it is. @param wanted  of the mean displacement, what it may still change
-Approach approach(InverseStatics& inverse, VectorX motion, double wanted,
+/// Finds a motion that a map leaves where it is. @param enough  of the mean displacement, what it may still change
+Approach approach(InverseStatics& inverse, VectorX motion, double enough,
                   const std::function<std::optional<VectorX>(const VectorX&)>& map) {
+  inverse.reason = "the iterations do not converge";
   Acceleration acceleration;
   Approach best{motion};
   double size = 0;
@@ -296,10 +296,10 @@ Approach approach(InverseStatics& inverse, VectorX motion, double wanted,
     ++in_vain;
     if (off[0] < best.off[0]) {
       in_vain = 0;
-      best = {motion, off, inverse.volume};
+      best = {motion, off};
       size = inverse.lengths(*next)[0];
     }
-    if (off[0] <= wanted * size) {
+    if (off[0] <= enough * size) {
       break;
     }
     motion = acceleration.next(motion, *next);
@@ -333,9 +333,8 @@ Unloaded find_unloaded(const Model& imaged, const RunSettings& settings,
   double part = 0, step = 1;
   while (part < 1) {
     const double next = std::min(1.0, part + step);
-    inverse.reason = "the iterations do not converge";
     const Approach there = approach(inverse, part > 0 ? VectorX(next / part * found) : found,
-                                    next == 1 ? close_enough : close_on_the_way, [&](const VectorX& motion) {
+                                    next == 1 ? wanted : farthest, [&](const VectorX& motion) {
                                       auto improved = inverse.improved(motion, next);
                                       if (improved && on_iteration) {
                                         on_iteration(next, inverse.lengths(*improved - motion)[0]);
@@ -353,13 +352,13 @@ Unloaded find_unloaded(const Model& imaged, const RunSettings& settings,
       refuse(next, inverse.reason);
     }
   }
-  inverse.reason = "the iterations do not converge";
   const Approach loaded =
-      approach(inverse, found, close_to_image, [&](const VectorX& motion) { return inverse.loaded(motion); });
+      approach(inverse, found, wanted, [&](const VectorX& motion) { return inverse.loaded(motion); });
   if (!loaded.near) {
     refuse(1, inverse.reason);
   }
-  Unloaded unloaded{inverse.reference(loaded.motion), loaded.volume, loaded.off[0], loaded.off[1], inverse.iterations};
+  Unloaded unloaded{inverse.reference(loaded.motion), inverse.volume(loaded.motion), loaded.off[0], loaded.off[1],
+                    inverse.iterations};
   for (Load& load : unloaded.model.loads) {
     if (auto* pressure = std::get_if<PressureLoad>(&load.kind)) {
       pressure->imaged_at.reset();

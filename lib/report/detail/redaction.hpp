@@ -19,8 +19,8 @@ public:
   Redaction(const PipelineCase& one, std::size_t number);
 
   /// The text without them. Limits: a name in a message that is neither a path nor known from a report stays, and so
-  /// does a number of up to three digits; a case that is called as the tools call things ("empty", "mm") takes these
-  /// words along.
+  /// does a number of up to three digits; of a case that is called as the tools call things ("empty", "mm") these words
+  /// go, too, but no flags.
   [[nodiscard]] std::string operator()(std::string text) const;
 
 private:
