@@ -1,11 +1,16 @@
 // io/file: outputs that are whole or absent; what the readers share; bytes as text.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <string_view>
 
 /// Bytes as other bytes or as text, for files that carry data inside: deflate, base64, SHA-256.
 namespace tunica {
+
+/// Bytes that one byte of deflate stands for at the most: 258 from two bits, and a little for headers and the block at
+/// the end.
+inline constexpr std::uint64_t deflate_expansion = 1032;
 
 /// RFC 1950 (zlib) at its best level: what a browser's DecompressionStream calls "deflate". Cost: some 10 MB/s.
 std::string deflated(std::string_view bytes);

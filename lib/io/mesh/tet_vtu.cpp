@@ -6,6 +6,7 @@
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/core/progress.hpp"
+#include "tunica/io/file/encoding.hpp"
 #include "tunica/io/mesh/detail/tet_formats.hpp"
 
 #include <fmt/format.h>
@@ -17,8 +18,6 @@
 
 namespace tunica::tets {
 namespace {
-
-constexpr std::size_t most_inflation = 1100;  // zlib makes at most 1032 bytes of one
 
 std::optional<NumberType> vtu_scalar(std::string_view word) {
   static const std::map<std::string, NumberType, std::less<>> scalars = {
@@ -491,7 +490,7 @@ private:
     const std::size_t last = header_number(stream);
     // The size of a block says nothing where there is only the last one, which may be smaller.
     const std::size_t whole = last > 0 && blocks > 0 ? blocks - 1 : blocks;
-    const std::size_t most = stream.left() * most_inflation;
+    const std::size_t most = stream.left() * deflate_expansion;
     if (blocks > stream.left() / size_of(header_) || (whole > 0 && block > most / whole) || last > block ||
         last > most) {
       throw InputError(fmt::format("{}: is truncated: {} of {} blocks of {} bytes cannot be in the bytes that are left",
@@ -504,7 +503,7 @@ private:
       const std::string packed = stream.take(sizes[i]);
       const std::size_t expected = i + 1 == blocks && last > 0 ? last : block;
       // No more memory than a block can need, even when the next block proves to be a lie.
-      if (expected > packed.size() * most_inflation) {
+      if (expected > packed.size() * deflate_expansion) {
         vtu_truncated(name_);
       }
       const std::size_t begin = bytes.size();

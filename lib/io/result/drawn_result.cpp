@@ -2,6 +2,7 @@
 
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
+#include "tunica/io/file/encoding.hpp"
 #include "tunica/io/file/output_file.hpp"
 #include "tunica/io/result/detail/hdf5_chunks.hpp"
 #include "tunica/io/result/detail/hdf5_trial.hpp"
@@ -22,7 +23,6 @@ namespace tunica {
 namespace {
 
 constexpr std::size_t most_numbers = 200'000'000;  // in one reading: what a page cannot show, and damaged files claim
-constexpr double most_inflated = 1032;             // bytes that one of deflate can stand for (zlib's technical details)
 constexpr std::size_t most_text = std::size_t{16} << 20;
 
 // What is read of a result.
@@ -108,7 +108,7 @@ public:
     const hdf5::Handle stored(H5Dget_type(data.get()));
     hdf5::Size bytes = 0;
     (void)H5Fget_filesize(file_.get(), &bytes);
-    if (real(numbers) * real(H5Tget_size(stored.get())) > most_inflated * real(bytes)) {
+    if (real(numbers) * real(H5Tget_size(stored.get())) > deflate_expansion * real(bytes)) {
       fail(dataset + " claims more than the file can hold");
     }
     if (numbers > 0 && !hdf5::chunks_are_whole(data, start, extent)) {

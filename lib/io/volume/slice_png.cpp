@@ -3,6 +3,7 @@
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/core/progress.hpp"
+#include "tunica/io/file/encoding.hpp"
 #include "tunica/io/volume/detail/slice_file.hpp"
 
 #include <png.h>
@@ -15,9 +16,6 @@
 namespace tunica::volume_format {
 namespace fs = std::filesystem;
 namespace {
-
-// What deflate can make of a byte at the best.
-constexpr double expansion = 1032;
 
 class PngFile : public SliceFile {
 public:
@@ -113,7 +111,7 @@ private:
       throw InputError(fmt::format("{}: has a transparent grey value: save it without", path_.string()));
     }
     const SliceHeader header{width, height, bits == 8 ? VoxelType::uint8 : VoxelType::uint16};
-    if (real(header.row_bytes()) * height > expansion * real(size_)) {
+    if (real(header.row_bytes()) * height > deflate_expansion * real(size_)) {
       throw InputError(
           fmt::format("{}: has {} x {} pixels, more than its bytes can hold: it is truncated; get it again",
                       path_.string(), width, height));

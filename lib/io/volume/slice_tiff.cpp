@@ -2,6 +2,7 @@
 
 #include "tunica/core/error.hpp"
 #include "tunica/core/progress.hpp"
+#include "tunica/io/file/encoding.hpp"
 #include "tunica/io/volume/detail/slice_file.hpp"
 
 #include <tiffio.h>
@@ -25,7 +26,7 @@ std::optional<double> expansion_of(unsigned compression) {
       return 4096;
     case COMPRESSION_ADOBE_DEFLATE:
     case COMPRESSION_DEFLATE:
-      return 1032;
+      return deflate_expansion;
     case COMPRESSION_PACKBITS:
       return 64;
     default:
