@@ -12,9 +12,9 @@ OF_THE_RUN = (".lock", ".run", ".cases", "summary.tsv", "chart.svg", "report.htm
 BLANKS = re.compile(r"\s+", re.ASCII)
 CONTROL = re.compile(r"[\x00-\x1f\x7f]")
 
-WALL = ("PRESSURE", "YOUNG", "POISSON", "THICKNESS", "DENSITY")
+WALL = ("PRESSURE", "YOUNG", "POISSON", "THICKNESS")
 IMAGE = ("IMAGED_AT", "MID_SURFACE")
-MOTION = ("DURATION", "STEP")
+MOTION = ("DENSITY", "DURATION", "STEP")
 WITH_UNIT = {"PRESSURE": "80mmHg", "YOUNG": "1MPa", "THICKNESS": "1.5mm", "DENSITY": "1100kg/m3", "IMAGED_AT": "80mmHg",
              "DURATION": "1s", "STEP": "10ms"}
 FURTHER = ("EXTRACT", "DECIMATE", "RELAX", "SIMULATE")

@@ -8,7 +8,7 @@ import tempfile
 import unittest
 from pathlib import Path
 
-WALL = ["PRESSURE=1kPa", "YOUNG=1MPa", "POISSON=0.45", "THICKNESS=1.5mm", "DENSITY=1100kg/m3"]
+WALL = ["PRESSURE=1kPa", "YOUNG=1MPa", "POISSON=0.45", "THICKNESS=1.5mm"]
 
 
 class Batch(unittest.TestCase):
@@ -70,7 +70,7 @@ class Batch(unittest.TestCase):
             done = self.batch(goal)
             self.assertEqual(done.returncode, 2)
             self.assertIn(f"{goal}: needs tunica's source", done.stderr)
-        self.assertIn("VOLUMES LABELS PRESSURE YOUNG POISSON THICKNESS DENSITY not given", self.batch("-j2").stderr)
+        self.assertIn("VOLUMES LABELS PRESSURE YOUNG POISSON THICKNESS not given", self.batch("-j2").stderr)
         self.assertIn("no such variable: PRESURE", self.batch("PRESURE=1kPa").stderr)
 
     def test_without_make(self):

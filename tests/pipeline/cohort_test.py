@@ -8,7 +8,7 @@ import unittest
 import cohort
 from pipeline_test import LOAD, STAGES, TOOLS, Pipeline, WithStubs
 
-WALL = "pressure\tyoung\tpoisson\tthickness\tdensity"
+WALL = "pressure\tyoung\tpoisson\tthickness"
 
 
 class Table(WithStubs):
@@ -59,8 +59,8 @@ class Table(WithStubs):
         self.assertIn("env M=900 ", planned)
 
     def test_the_table_alone(self):
-        self.write("volume\tlabel\t" + WALL, "a.nii.gz\t1\t1kPa\t1MPa\t0.45\t1mm\t1g/cm3",
-                   "b.seg.nrrd\t7\t2kPa\t2MPa\t0.3\t2mm\t2g/cm3")
+        self.write("volume\tlabel\t" + WALL, "a.nii.gz\t1\t1kPa\t1MPa\t0.45\t1mm",
+                   "b.seg.nrrd\t7\t2kPa\t2MPa\t0.3\t2mm")
         self.assertEqual(self.run_table().returncode, 0)
         self.assertEqual(self.done_cases(), ["a/1", "b/7"])
 
@@ -98,22 +98,21 @@ class Table(WithStubs):
         self.assertEqual(sorted(line.split()[0] for line in self.calls()), sorted(["simulate", *STAGES[1:]]))
 
     def test_what_is_missing_is_named_by_line_and_case(self):
-        stderr = self.complaints("case\tvolume\tlabel\tpressure\tdensity", "p1\ta.nii.gz\t1\t1kPa\t",
-                                 "p2\tb.seg.nrrd\t\t\t1g/cm3", "p3\t\t1\t1kPa\t1g/cm3", YOUNG="1MPa", POISSON="0.45",
-                                 THICKNESS="1mm")
-        self.assertIn(f"pipeline: {self.table}:2: p1: density not given: fill the cell, or give DENSITY to make", stderr)
+        stderr = self.complaints("case\tvolume\tlabel\tpressure\tthickness", "p1\ta.nii.gz\t1\t1kPa\t",
+                                 "p2\tb.seg.nrrd\t\t\t1mm", "p3\t\t1\t1kPa\t1mm", YOUNG="1MPa", POISSON="0.45")
+        self.assertIn(f"pipeline: {self.table}:2: p1: thickness not given: fill the cell, or give THICKNESS to make", stderr)
         self.assertIn(f"pipeline: {self.table}:3: p2: label not given", stderr)
         self.assertIn(f"pipeline: {self.table}:3: p2: pressure not given", stderr)
         self.assertIn(f"pipeline: {self.table}:4: p3: volume not given", stderr)
         stderr = self.complaints("volume\tlabel\tkind", "a.nii.gz\t1\tdynamic", "b.seg.nrrd\t1\tslow", **LOAD)
-        self.assertIn(":2: a: duration, step not given", stderr)
+        self.assertIn(":2: a: density, duration, step not given", stderr)
         self.assertIn(":3: b: kind: 'slow' is not understood: static or dynamic", stderr)
         stderr = self.complaints("volume\tlabel\tmid_surface", "a.nii.gz\t1\tinner", ACCURACY="2%", **LOAD)
         self.assertIn(":2: a: accuracy refits the shells to the face", stderr)
         stderr = self.complaints("volume\tlabel\timaged_at", "a.nii.gz\t1\t1kPa", ACCURACY="2%", **LOAD)
         self.assertIn(":2: a: accuracy loads the shells as imaged", stderr)
         many = self.complaints("volume\tlabel", *(f"{i}.nii\t1" for i in range(30)))
-        self.assertEqual(many.count("pressure, young, poisson, thickness, density not given"), 20)
+        self.assertEqual(many.count("pressure, young, poisson, thickness not given"), 20)
         self.assertIn("and 10 problems more", many)
 
     def test_columns_that_are_not_known(self):

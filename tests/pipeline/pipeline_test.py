@@ -20,7 +20,7 @@ import unittest
 
 SOURCE = pathlib.Path(__file__).resolve().parents[2]
 TOOLS = pathlib.Path(os.environ.get("TUNICA_BIN", SOURCE / "build" / "release" / "bin"))
-LOAD = {"PRESSURE": "1kPa", "YOUNG": "1MPa", "POISSON": "0.45", "THICKNESS": "1.5mm", "DENSITY": "1100kg/m3"}
+LOAD = {"PRESSURE": "1kPa", "YOUNG": "1MPa", "POISSON": "0.45", "THICKNESS": "1.5mm"}
 STAGES = ["extract", "decimate", "relax", "simulate"]
 
 
@@ -114,8 +114,8 @@ class Rules(WithStubs):
         self.assertIn("--label 3 --smooth none --open-border --frame 2 --threads 3", extract)
         self.assertIn("--triangles 123", decimate)
         self.assertIn("--tolerance 0.5% --refine --method barycentre", relax)
-        self.assertIn("--fix below z=-10mm --pressure 1kPa --young 1MPa --poisson 0.45 --thickness 1.5mm "
-                      "--density 1100kg/m3 --static", simulate)
+        self.assertIn("--fix below z=-10mm --pressure 1kPa --young 1MPa --poisson 0.45 --thickness 1.5mm --static",
+                      simulate)
 
     def test_a_misspelt_variable_is_refused(self):
         self.assertIn("no such variable: PRESURE", self.refusal(VOLUMES="a.nii.gz", LABEL=1, PRESURE="1kPa", **LOAD))
@@ -155,10 +155,11 @@ class Rules(WithStubs):
         self.assertTrue((self.out / "a" / "iso-0.5" / "result.hdf").exists())
 
     def test_dynamic(self):
-        done = self.make(VOLUMES="a.nii.gz", LABEL=1, KIND="dynamic", DURATION="1s", STEP="10ms", **LOAD)
+        done = self.make(VOLUMES="a.nii.gz", LABEL=1, KIND="dynamic", DENSITY="1100kg/m3", DURATION="1s", STEP="10ms",
+                         **LOAD)
         self.assertEqual(done.returncode, 0, done.stderr)
         simulate = self.calls()[3]
-        self.assertIn("--duration 1s --step 10ms", simulate)
+        self.assertIn("--density 1100kg/m3 --duration 1s --step 10ms", simulate)
         self.assertNotIn("--static", simulate)
 
     def test_boundary_is_held_where_there_is_one(self):
@@ -287,9 +288,9 @@ class Rules(WithStubs):
         for name in LOAD:
             rest = {key: value for key, value in LOAD.items() if key != name}
             self.assertIn(f"{name} not given", self.refusal(VOLUMES="a.nii.gz", LABEL=1, **rest))
-        self.assertIn("PRESSURE YOUNG POISSON THICKNESS DENSITY not given", self.refusal(VOLUMES="a.nii.gz", LABEL=1))
+        self.assertIn("PRESSURE YOUNG POISSON THICKNESS not given", self.refusal(VOLUMES="a.nii.gz", LABEL=1))
         self.assertIn("LABELS not given", self.refusal(VOLUMES="a.nii.gz", **LOAD))
-        self.assertIn("DURATION STEP not given", self.refusal(VOLUMES="a.nii.gz", LABEL=1, KIND="dynamic", **LOAD))
+        self.assertIn("DENSITY DURATION STEP not given", self.refusal(VOLUMES="a.nii.gz", LABEL=1, KIND="dynamic", **LOAD))
 
     def test_flags_that_a_tool_does_not_take_cost_no_result(self):
         self.make(VOLUMES="a.nii.gz b.seg.nrrd", LABEL=3, **LOAD)

@@ -12,7 +12,7 @@ import unittest
 import cohort
 from pipeline_test import SOURCE, STAGES, TOOLS
 
-WALL = ("young=1MPa", "poisson=0.45", "density=1100kg/m3")
+WALL = ("young=1MPa", "poisson=0.45")
 
 
 @unittest.skipUnless(shutil.which("snakemake"), "Snakemake is not installed")
