@@ -7,6 +7,7 @@
 #include "tunica/io/volume/label_names.hpp"
 #include "tunica/io/volume/volume_file.hpp"
 #include "tunica/surface/mesh/checks.hpp"
+#include "tunica/surface/mesh/incidence.hpp"
 #include "tunica/surface/mesh/measure.hpp"
 #include "tunica/volume/cubes/label_index.hpp"
 #include "tunica/volume/cubes/marching_cubes.hpp"
@@ -534,12 +535,35 @@ void warn_of_few_voxels(const cli::Tool& tool, const Surface& surface, const Jso
   }
 }
 
-void warn_of_cut(const cli::Tool& tool, const Surface& surface, const std::string& name) {
-  if (const std::size_t cut = count_at_border(surface.mask); cut > 0) {
+void warn_of_cut(const cli::Tool& tool, const Surface& surface, const Target& target) {
+  const std::size_t cut = count_at_border(surface.mask);
+  if (cut == 0) {
+    return;
+  }
+  const auto& dims = surface.mask.dims();
+  const auto inner = [](std::size_t count) { return count - std::min<std::size_t>(count, 2); };
+  const std::size_t border = dims[0] * dims[1] * dims[2] - inner(dims[0]) * inner(dims[1]) * inner(dims[2]);
+  if (const auto rule = target.inside.rule; rule != Inside::Rule::label && 2 * cut > border) {
+    tool.warn(fmt::format("{}: it is most of the image's border: what is meant may be the other side (--inside {})",
+                          target.name, rule == Inside::Rule::above ? "below" : "above"));
+  }
+  tool.warn(
+      fmt::format("{}: the image's border cuts it ({} voxels), and flat lids close it there; --open-border, OPEN=1 "
+                  "of the pipeline, leaves it open, as a vessel is",
+                  target.name, cut));
+}
+
+// A cut of a few voxels is no end of a vessel, but would be held as one.
+void warn_of_narrow_rims(const cli::Tool& tool, const Surface& surface, const std::string& name) {
+  constexpr std::size_t narrow_rim = 12;  // vertices, one per face of a voxel around it: 3 x 3 voxels
+  const auto rims = boundary_loops(surface.mesh);
+  const auto few = std::ranges::count_if(rims, [](const auto& rim) { return rim.size() < narrow_rim; });
+  if (few > 0) {
     tool.warn(
-        fmt::format("{}: the image's border cuts it ({} voxels), and flat lids close it there; --open-border, OPEN=1 "
-                    "of the pipeline, leaves it open, as a vessel is",
-                    name, cut));
+        fmt::format("{}: the image's border leaves {} of its {} opening(s) a few voxels wide: supports at the boundary "
+                    "hold these as they do the ends of a vessel; leave the outermost slices out of the image, or "
+                    "hold the ends by where they are (--fix 'above z=...', FIX of the pipeline)",
+                    name, few, rims.size()));
   }
 }
 
@@ -551,8 +575,10 @@ Json extract_to_file(cli::Tool& tool, Selection selection, const Arguments& argu
   Surface surface = extract(tool, std::move(selection), arguments, names, smoothing);
   Json result = measured(surface, arguments.open_border);
   warn_of_few_voxels(tool, surface, result, target.name);
-  if (!arguments.open_border) {
-    warn_of_cut(tool, surface, target.name);
+  if (arguments.open_border) {
+    warn_of_narrow_rims(tool, surface, target.name);
+  } else {
+    warn_of_cut(tool, surface, target);
   }
   const fs::path out = output_path(arguments.out, target);
   tool.require_unchanged_inputs();

@@ -507,6 +507,7 @@ private:
     result["stopped"] = relaxed_.stopped;
     result["diagonal_mm"] = whole().diagonal();
     result["mean_distance_bound_mm"] = mean_bound_ ? Json(*mean_bound_) : Json();
+    warn_if_far();
     measure_shapes();
     if (mean_bound_) {
       tool_.note(fmt::format("mean distance certainly below {:.4g} mm, {:.3g} % of the wall",
@@ -516,6 +517,17 @@ private:
     tool_.note(fmt::format("{} shells, two-sided distance {:.4g} to {:.4g} % of the diagonal: {}",
                            relaxed_.shell.triangles.size(), percent() * distance_.both.lower,
                            rounded_upwards(percent() * distance_.both.upper, 4), relaxed_.stopped));
+  }
+
+  /// Shells that are fitted come nearer, whatever their number.
+  void warn_if_far() {
+    constexpr double far = 0.2;
+    if (const double apart = distance_.both.lower / whole().diagonal(); apart > far) {
+      tool_.warn(
+          fmt::format("shells and surface are {:.3g} % of the surface's diagonal apart: are COARSE and TARGET of one "
+                      "organ, in this order and in the same place?",
+                      percent() * distance_.both.lower));
+    }
   }
 
   void measure_shapes() {

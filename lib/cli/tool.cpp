@@ -366,8 +366,9 @@ std::string Tool::out_of_memory(const std::string& why) {
   if (::getrlimit(RLIMIT_AS, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY) {
     limits += fmt::format("limit {} MiB by ulimit -v, ", limit.rlim_cur >> 20U);
   }
-  return fmt::format("{}{} ({}{}at most {:.0f} MiB were in use)", at_hand_.empty() ? "" : at_hand_ + ": ", why,
-                     running_.empty() ? "" : "stage " + running_ + ", ", limits, peak_mebibytes());
+  return fmt::format("{}{} ({}{}at most {:.0f} MiB were in use, the program itself among them)",
+                     at_hand_.empty() ? "" : at_hand_ + ": ", why, running_.empty() ? "" : "stage " + running_ + ", ",
+                     limits, peak_mebibytes());
 }
 
 void Tool::register_report() {

@@ -28,7 +28,7 @@ constexpr double fewest_across = 4;  // of the longest edges: along a square of 
 constexpr int passes = 3;            // of collapses, of mending, steps of settling: the last bring hardly anything
 constexpr int default_rounds = 12;   // of exchanges
 constexpr double fewer_by = 0.92;    // of the shells: the next count to be tried
-constexpr int certificates = 12;     // each followed by splits
+constexpr int certificates = 16;     // each followed by splits
 constexpr int patience = 3;          // rounds in a row that bring nothing
 constexpr std::size_t fewest_sampled = 8;  // shells: as few want no fewer points of the target
 constexpr double exchanged = 0.05;         // of the shells, in a round; half as many where that brought nothing
@@ -183,11 +183,11 @@ private:
   }
 
   /// Flips and mends, with at most so many shells.
-  void improve(FitMesh& mesh, const FitSamples& samples, std::size_t most) {
+  void improve(FitMesh& mesh, const FitSamples& samples, std::size_t most, bool may_collapse = true) {
     limit_lengths(mesh, mesh.alive);
     flip_edges(mesh, samples, limits_);
     for (int pass = 0; pass < passes; ++pass) {
-      mend_shapes(mesh, samples, limits_, most);
+      mend_shapes(mesh, samples, limits_, most, 0, may_collapse);
     }
   }
 
@@ -247,9 +247,9 @@ private:
   void make_certain(FitMesh& mesh, FitSamples& samples, double tolerance) {
     result_.stopped = "further splits bring too little";
     std::size_t fewest_faults = std::numeric_limits<std::size_t>::max();
-    double closest = infinity;
+    double closest = infinity, seen = infinity;
     int fruitless = 0;  // certificates in a row
-    for (int i = 0; i < certificates && fruitless < patience; ++i) {
+    for (int i = 0; i < certificates && fruitless <= patience; ++i) {
       std::vector<Index> patch_of;
       const ShellDistance distance = certified(mesh.shell(&patch_of));
       if (distance.upper() <= tolerance) {
@@ -266,8 +266,10 @@ private:
         if (i >= patience && distance.both.lower > out_of_reach * tolerance) {
           return;
         }
-        fruitless = distance.upper() < worth_it * closest ? 0 : fruitless + 1;
+        const bool helped = distance.upper() < worth_it * closest || distance.both.lower < worth_it * seen;
+        fruitless = helped ? 0 : fruitless + 1;
         closest = std::min(closest, distance.upper());
+        seen = std::min(seen, distance.both.lower);
       }
       for (const FarPlace& place : distance.beyond_of_target) {
         samples.add({place.point});
@@ -281,9 +283,20 @@ private:
           far[patch_of[place.patch]] = std::max(far[patch_of[place.patch]], place.distance);
         }
       }
+      const bool in_vain = fruitless > 1;
+      if (in_vain) {  // what lies around is split as well
+        const std::vector<double> there = far;
+        for (std::size_t t = 0; t < mesh.patches.size(); ++t) {
+          for (std::size_t k = 0; mesh.patches[t].is_alive() && k < 3; ++k) {
+            for (const Index around : mesh.around[mesh.patches[t].nodes[k]]) {
+              far[around] = std::max(far[around], there[t]);
+            }
+          }
+        }
+      }
       for (std::size_t t = 0; t < mesh.patches.size(); ++t) {
         double& error = mesh.patches[t].error;
-        const bool is_known = mesh.patches[t].boundary == 0 && fruitless < 2;
+        const bool is_known = mesh.patches[t].boundary == 0 && !in_vain;
         error = std::max(is_known ? std::min(error, limits_.error) : error, far[t]);
       }
       // Finer ones follow the target between its walls, and leave room for better shapes.
@@ -304,7 +317,7 @@ private:
       }
       split_worst(mesh, samples, limits_, std::min((most_ - mesh.alive) / 2, mesh.alive / 4 + fewest_sampled));
       settle(mesh, samples, Lessened::largest);
-      improve(mesh, samples, most_);
+      improve(mesh, samples, most_, !in_vain);
     }
   }
 

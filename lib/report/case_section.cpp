@@ -23,7 +23,7 @@ Markup verdict(const CaseReport& one) {
   const PipelineCase& source = one.source;
   const std::string status = status_of(one);
   if (status == "failed") {
-    const std::string exit = source.exit.empty() ? "" : ", exit code " + source.exit;
+    const std::string exit = source.exit.empty() || source.exit == "0" ? "" : ", exit code " + source.exit;
     Markup line = html("<p class=\"verdict failed\"><strong>Failed</strong> at {}{}: {}</p>\n",
                        source.stage == "none" ? "the start" : source.stage, exit, one.redacted(source.message));
     const std::string next = next_command(one);
@@ -212,6 +212,9 @@ Markup geometry_and_mesh(const CaseReport& one) {
 }
 
 Markup mechanics(const CaseReport& one) {
+  if (one.source.at("simulate", "ok") != true) {
+    return {};
+  }
   std::vector<Line> lines = lines_of(
       one, {"stress_p99_kpa", "stress_max_kpa", "strain_p99_percent", "max_displacement_mm", "volume_change_percent"});
   if (const Json volume = one.source.at("simulate", "result.unloaded.volume_mm3"); volume.is_number()) {

@@ -1,6 +1,7 @@
 #include "tunica/report/report.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/rounding.hpp"
 #include "tunica/io/result/report_chart.hpp"
 #include "tunica/report/detail/html.hpp"
@@ -32,6 +33,11 @@ Row row_of(const PipelineCase& one) {
   return row;
 }
 
+// Characters of a text in UTF-8.
+std::size_t width(const std::string& text) {
+  return narrow<std::size_t>(std::ranges::count_if(text, [](char c) { return (c & 0xc0) != 0x80; }));
+}
+
 std::vector<Row> rows_of(const std::vector<PipelineCase>& cases) {
   std::vector<Row> rows{heads};
   std::ranges::transform(cases, std::back_inserter(rows), row_of);
@@ -55,16 +61,16 @@ std::string summary_text(const std::vector<PipelineCase>& cases) {
   std::array<std::size_t, columns> widths{};
   for (const Row& row : rows) {
     for (std::size_t i = 0; i < columns; ++i) {
-      widths[i] = std::max(widths[i], row[i].size());
+      widths[i] = std::max(widths[i], width(row[i]));
     }
   }
   std::string text;
   for (const Row& row : rows) {
     for (const Column left : {name, stage, code}) {
-      text += row[left] + std::string(widths[left] - row[left].size() + 2, ' ');
+      text += row[left] + std::string(widths[left] - width(row[left]) + 2, ' ');
     }
     for (const Column right : {shells, error, seconds}) {
-      text += std::string(widths[right] - row[right].size(), ' ') + row[right] + "  ";
+      text += std::string(widths[right] - width(row[right]), ' ') + row[right] + "  ";
     }
     text += row[message] + "\n";
   }

@@ -48,7 +48,8 @@ class MemoryLimit(unittest.TestCase):
                     ended += 1
                     self.assertEqual(done.returncode, 6, done.stderr)
                     self.assertRegex(done.stderr, rf"^tunica-{verb}: [^\n]*memory[^\n]*limit {mebibytes}MiB by "
-                                                  rf"--memory-limit, at most \d+ MiB were in use\)\n$")
+                                                  rf"--memory-limit, at most \d+ MiB were in use, the program itself among "
+                                                  r"them\)\n$")
                     for name, data in self.outputs().items():  # whole states, and what a run can go on with
                         self.assertTrue(".part" in name or data == whole.get(name), name)
                     report = self.report()

@@ -284,7 +284,20 @@ class Choices(ExtractTest):
         rim = [a for a, b in directed if (b, a) not in directed]
         self.assertGreater(len(rim), 0)
         self.assertTrue((ply.vertices[rim][:, 2] == -0.5).all())
+        array[2:6, 2:6, 0] = 0
+        array[2:4, 2, 0] = 1
+        record, _ = self.run_tool(self.nifti(array, name="tip.nii"), self.out, "--label", 1, "--open-border", "--force")
+        self.assertIn("leaves 1 of its 1 opening(s) a few voxels wide", record["warnings"][-1])
         self.refuse_full_image()
+
+    def test_the_outside_of_a_level_set_is_told(self):
+        x = numpy.arange(12) - 5.5
+        level = numpy.sqrt(x[:, None, None]**2 + x[:, None]**2 + x**2).astype(numpy.float32) - 4
+        path = self.nifti(level)
+        record, _ = self.run_tool(path, self.out, "--isovalue", 0)
+        self.assertIn("may be the other side (--inside below)", " ".join(record["warnings"]))
+        record, _ = self.run_tool(path, self.out, "--isovalue", 0, "--inside", "below", "--force")
+        self.assertNotIn("other side", " ".join(record["warnings"]))
 
     def refuse_full_image(self):
         self.out.unlink()

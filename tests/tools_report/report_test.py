@@ -134,6 +134,19 @@ class CasePage(ReportTest):
         levels = [int(tag[1]) for tag, _ in page.elements if re.fullmatch("h[1-6]", tag)]
         self.assertTrue(all(after - before <= 1 for before, after in zip(levels, levels[1:])), levels)
 
+    def test_a_run_that_ended_early_has_no_answer(self):
+        """Its last state is one under a part of the load."""
+        self.copy("limit", lambda reports: reports["simulate"].update(ok=False, error="no equilibrium at load factor .1"))
+        table = self.folder / "cohort.tsv"
+        _, text, page = self.report("--tsv", table)
+        self.assertEqual(re.findall(r"<dd><b>([^<]*)</b>", text)[:2], ["–", "–"])
+        self.assertNotIn("Strain energy", page.text)
+        with open(table, encoding="utf-8", newline="") as file:
+            row, = csv.DictReader(file, delimiter="\t")
+        self.assertEqual([row[key] for key in ("stress_p99_kpa", "strain_p99_percent", "max_displacement_mm", "pressure_kpa")],
+                         ["n/a", "n/a", "n/a", "1"])
+        self.assertNotEqual(row["distance_mm"], "n/a")
+
     def test_an_unloaded_shape_is_told(self):
         self.copy("aneurysm", lambda reports: reports["simulate"]["result"].update(
             unloaded={"volume_mm3": 4321.0, "distance_mm": {"mean": 0.0125, "max": 0.05}, "iterations": 7}))
@@ -514,6 +527,14 @@ class Errors(ReportTest):
         self.refuse(4, "--verify", says="shell.ply: is not what relax wrote")
         self.refuse(4, "--verify", says="coarse.ply: that decimate wrote, is missing")
         self.assertIn("Outputs that are not what the reports say", self.page.read_text())
+
+    def test_verify_finds_files_whose_names_are_left_out(self):
+        case = self.copy("aneurysm")
+        words = ["decimate", case / "surface.ply", case / "coarse.ply", "--triangles", 200, "--report", case / "decimate.json"]
+        cases.run(*words, "--force", "--quiet", "--no-paths")
+        self.report("--verify")
+        (case / "coarse.ply").write_text("ply")
+        self.refuse(4, "--verify", says="decimate.json: no file beside it is the OUT.ply that decimate wrote")
 
     def test_a_report_that_has_gone_is_no_case_that_is_done(self):
         folder = self.copy("aneurysm")
