@@ -63,7 +63,9 @@ Markup three_numbers(const CaseReport& one) {
   list += big_number("stress_p99_kpa", "Wall stress, 99th percentile", one,
                      maximum ? "von Mises, at either face; largest " + figure(*maximum) + " kPa" : "not computed");
   list += big_number("max_displacement_mm", "Largest displacement", one,
-                     pressure ? "under " + figure(*pressure) + " kPa" + whence : "of the curved surface");
+                     !measure("max_displacement_mm").value(one.source) ? "not computed"
+                     : pressure                                        ? "under " + figure(*pressure) + " kPa" + whence
+                                                                       : "of the curved surface");
   const bool in_middle = is_fitted_to_middle(one);
   list +=
       big_number("distance_mm", in_middle ? "Shells to middle of the wall, at most" : "Shells to surface, at most", one,

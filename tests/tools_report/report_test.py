@@ -140,6 +140,7 @@ class CasePage(ReportTest):
         table = self.folder / "cohort.tsv"
         _, text, page = self.report("--tsv", table)
         self.assertEqual(re.findall(r"<dd><b>([^<]*)</b>", text)[:2], ["–", "–"])
+        self.assertEqual(page.text.count("not computed"), 2)
         self.assertNotIn("Strain energy", page.text)
         with open(table, encoding="utf-8", newline="") as file:
             row, = csv.DictReader(file, delimiter="\t")
