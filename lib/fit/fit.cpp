@@ -243,7 +243,29 @@ private:
     limits_.error = limit;
   }
 
-  /// What the samples miss is found by a certificate, added to them, and mended; where that does not do, split.
+  /// How far a certificate found each patch to be, mm, 0 within the limit.
+  /// @param around  patches that meet one as far off as it is
+  static std::vector<double> far_by_patch(const FitMesh& mesh, const ShellDistance& distance,
+                                          const std::vector<Index>& patch_of, bool around) {
+    std::vector<double> far(mesh.patches.size(), 0);
+    for (const auto* places : {&distance.beyond_of_shell, &distance.beyond_of_target}) {
+      for (const FarPlace& place : *places) {
+        far[patch_of[place.patch]] = std::max(far[patch_of[place.patch]], place.distance);
+      }
+    }
+    const std::vector<double> own = far;
+    for (std::size_t t = 0; around && t < own.size(); ++t) {
+      for (std::size_t k = 0; own[t] > 0 && k < 3; ++k) {
+        for (const Index other : mesh.around[mesh.patches[t].nodes[k]]) {
+          far[other] = std::max(far[other], own[t]);
+        }
+      }
+    }
+    return far;
+  }
+
+  /// What the samples miss is found by a certificate, added to them, and mended; where that does not do, split; where
+  /// that was in vain twice, with what lies around, and nothing is collapsed for shapes.
   void make_certain(FitMesh& mesh, FitSamples& samples, double tolerance) {
     result_.stopped = "further splits bring too little";
     std::size_t fewest_faults = std::numeric_limits<std::size_t>::max();
@@ -277,23 +299,8 @@ private:
       settle(mesh, samples, Lessened::largest);
       // The certificate says where: samples alone see errors, too, where the target itself is rough. Of boundaries as
       // curves it says nothing; and where it was said in vain all is tried.
-      std::vector<double> far(mesh.patches.size(), 0);
-      for (const auto* places : {&distance.beyond_of_shell, &distance.beyond_of_target}) {
-        for (const FarPlace& place : *places) {
-          far[patch_of[place.patch]] = std::max(far[patch_of[place.patch]], place.distance);
-        }
-      }
       const bool in_vain = fruitless > 1;
-      if (in_vain) {  // what lies around is split as well
-        const std::vector<double> there = far;
-        for (std::size_t t = 0; t < mesh.patches.size(); ++t) {
-          for (std::size_t k = 0; mesh.patches[t].is_alive() && k < 3; ++k) {
-            for (const Index around : mesh.around[mesh.patches[t].nodes[k]]) {
-              far[around] = std::max(far[around], there[t]);
-            }
-          }
-        }
-      }
+      const std::vector<double> far = far_by_patch(mesh, distance, patch_of, in_vain);
       for (std::size_t t = 0; t < mesh.patches.size(); ++t) {
         double& error = mesh.patches[t].error;
         const bool is_known = mesh.patches[t].boundary == 0 && !in_vain;
