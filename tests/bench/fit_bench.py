@@ -149,8 +149,9 @@ def rule(data, folder):
         run("decimate", target, coarse, "--triangles", count, "--min-angle", ANGLE, *MILLIMETRES)
         report, _ = run("relax", coarse, target, shell, "--method", "barycentre", "--surface", "comas", "--max-iterations", 5,
                         *MILLIMETRES)
-        yield (f"| {name} | {theirs} | {percent(coarse):.3g} | {report['result']['shells']:,} | "
-               f"{percent(shell):.3g} | {percent(shell, '--shell'):.3g} |")
+        ruled = (f"{report['result']['shells']:,} | {percent(shell):.3g} | {percent(shell, '--shell'):.3g}" if report["ok"]
+                 else "refused: its nodes fold | – | –")
+        yield f"| {name} | {theirs} | {percent(coarse):.3g} | {ruled} |"
 
 
 def scaling(folder, chart):

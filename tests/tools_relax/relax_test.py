@@ -686,7 +686,7 @@ class MidSurface(Case):
         self.assertEqual(record["result"]["self_intersections"], 0)
 
     def test_funnels_come_within_most_tolerances(self):
-        """Which edits the search takes hangs on last digits, and so on the processor."""
+        """Which edits the search takes hangs on the last digits of the mesh, which numpy computes anew on each processor."""
         words = self.narrow_torus()
         reached = 0
         for tolerance in ("2.5%", "2%", "1.7%"):
