@@ -521,12 +521,13 @@ private:
 
   /// Shells that are fitted come nearer, whatever their number.
   void warn_if_far() {
-    constexpr double far = 0.2;
-    if (const double apart = distance_.both.lower / whole().diagonal(); apart > far) {
+    constexpr double far = 20;  // % of the diagonal
+    if (const double apart = percent() * distance_.both.lower; apart > far) {
       tool_.warn(
           fmt::format("shells and surface are {:.3g} % of the surface's diagonal apart: are COARSE and TARGET of one "
-                      "organ, in this order and in the same place?",
-                      percent() * distance_.both.lower));
+                      "organ, in this "
+                      "order and in the same place?",
+                      apart));
     }
   }
 

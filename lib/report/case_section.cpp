@@ -23,9 +23,9 @@ Markup verdict(const CaseReport& one) {
   const PipelineCase& source = one.source;
   const std::string status = status_of(one);
   if (status == "failed") {
-    const std::string exit = source.exit.empty() || source.exit == "0" ? "" : ", exit code " + source.exit;
-    Markup line = html("<p class=\"verdict failed\"><strong>Failed</strong> at {}{}: {}</p>\n",
-                       source.stage == "none" ? "the start" : source.stage, exit, one.redacted(source.message));
+    Markup line =
+        html("<p class=\"verdict failed\"><strong>Failed</strong> at {}{}: {}</p>\n",
+             source.stage == "none" ? "the start" : source.stage, told_exit(source), one.redacted(source.message));
     const std::string next = next_command(one);
     if (!next.empty()) {
       line += html("<p class=\"next\">Next: <code>{}</code></p>\n", next);
@@ -326,6 +326,10 @@ Markup commands(const CaseReport& one, int level) {
 }
 
 }  // namespace
+
+std::string told_exit(const PipelineCase& one) {
+  return one.exit.empty() || one.exit == "0" ? "" : ", exit code " + one.exit;
+}
 
 std::string next_command(const CaseReport& one) {
   const PipelineCase& source = one.source;

@@ -49,10 +49,9 @@ Markup failures(const std::vector<CaseReport>& cases) {
       continue;
     }
     const std::string next = next_command(one);
-    items +=
-        html("<li>{}: {}{}: {}{}</li>\n", link_to(one), one.source.stage == "none" ? "not begun" : one.source.stage,
-             one.source.exit.empty() || one.source.exit == "0" ? "" : ", exit code " + one.source.exit,
-             one.redacted(one.source.message), next.empty() ? Markup{} : html("<br>Next: <code>{}</code>", next));
+    items += html("<li>{}: {}{}: {}{}</li>\n", link_to(one),
+                  one.source.stage == "none" ? "not begun" : one.source.stage, told_exit(one.source),
+                  one.redacted(one.source.message), next.empty() ? Markup{} : html("<br>Next: <code>{}</code>", next));
   }
   return items.text.empty() ? Markup{} : heading(2, "Failures") += html("<ul class=\"failures\">\n{}</ul>\n", items);
 }

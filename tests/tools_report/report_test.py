@@ -543,6 +543,7 @@ class Errors(ReportTest):
         self.report("--verify")
         (folder / "simulate.json").unlink()
         self.refuse(4, "--verify", says="simulate.json: is missing")
+        self.assertNotIn("exit code 0", self.page.read_text(encoding="utf-8"))
         _, _, page = self.report()
         self.assertIn("Failed", page.text)
         (self.out / ".cases").unlink()

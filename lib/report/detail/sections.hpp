@@ -25,6 +25,9 @@ Markup methods_section(const CaseReport& one, int level);
 /// The command that looks further into a failed case; empty where there is none.
 std::string next_command(const CaseReport& one);
 
+/// How a failed stage ended, ", exit code N"; empty where no code tells of a failure.
+std::string told_exit(const PipelineCase& one);
+
 /// The table of a cohort, tab-separated; "n/a" where a value is not known.
 std::string cohort_tsv(const std::vector<CaseReport>& cases);
 
