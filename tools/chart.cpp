@@ -39,7 +39,7 @@ Runs read_reports(cli::Tool& tool, const std::vector<std::filesystem::path>& pat
     } else if (draws_failed) {
       runs.failed.push_back(std::move(report));
     } else {
-      tool.warn(path.string() + ": the run failed, its report is skipped");
+      tool.warn({Weight::minor, "left out", path.string() + ": the run failed, its report is skipped"});
       skipped.push_back(path.string());
     }
   }
@@ -152,7 +152,7 @@ void run(cli::Tool& tool, Arguments& given) {
     made = chart_of_reports(runs.good, runs.failed, given.options);
     svg = chart_svg(made.chart);
   }
-  for (const std::string& warning : made.warnings) {
+  for (const Warning& warning : made.warnings) {
     tool.warn(warning);
   }
   {

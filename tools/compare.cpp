@@ -248,7 +248,9 @@ void tell(cli::Tool& tool, const Surface& a, const Other& b, const HausdorffResu
                         rounded_upwards(distance.both.upper, 6), percent * distance.both.lower,
                         rounded_upwards(percent * distance.both.upper, 4), means));
   if (distance.both.upper - distance.both.lower > 1.01 * width) {
-    tool.warn("the interval is wider than asked for: rounding allows no less, or the work would have passed its bound");
+    tool.warn(
+        {Weight::minor, "wide interval",
+         "the interval is wider than asked for: rounding allows no less, or the work would have passed its bound"});
   }
 }
 

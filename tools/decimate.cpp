@@ -109,16 +109,20 @@ MeshFile read_surface(const fs::path& path, const std::optional<double>& unit_mm
 // What became of the input's triangles without area, where that is more than the same surface without them.
 void warn_of_changes(const cli::Tool& tool, const fs::path& in, const DecimateResult& result, std::size_t degenerate) {
   if (result.closed_loops > 0) {
-    tool.warn(fmt::format("{}: {} hole(s) whose rim was a single point are closed", in.string(), result.closed_loops));
+    tool.warn(
+        {Weight::minor, "holes closed",
+         fmt::format("{}: {} hole(s) whose rim was a single point are closed", in.string(), result.closed_loops)});
   }
   if (result.longest_spike > 0) {
-    tool.warn(fmt::format("{}: spikes without area, up to {:.4g} mm long, are taken away from its boundary",
-                          in.string(), result.longest_spike));
+    tool.warn({Weight::minor, "spikes",
+               fmt::format("{}: spikes without area, up to {:.4g} mm long, are taken away from its boundary",
+                           in.string(), result.longest_spike)});
   }
   if (degenerate > 0) {
-    tool.warn(fmt::format("{} triangle(s) without area are left: {}", degenerate,
-                          result.long_spikes > 0 ? "--max-error is too small for their spikes to go"
-                                                 : "without them pieces would be lost or parts fall apart"));
+    tool.warn({Weight::minor, "triangles without area",
+               fmt::format("{} triangle(s) without area are left: {}", degenerate,
+                           result.long_spikes > 0 ? "--max-error is too small for their spikes to go"
+                                                  : "without them pieces would be lost or parts fall apart")});
   }
 }
 
@@ -201,8 +205,10 @@ void tell(cli::Tool& tool, const Arguments& given, const Coarse& coarse, std::si
   const auto min_angle = wanted_angle(given);
   warn_of_changes(tool, given.in, coarse.made, degenerate);
   if (min_angle && coarse.angle < *min_angle) {
-    tool.warn(fmt::format("the smallest angle is {:.3g} degrees, below --min-angle: {}", coarse.angle,
-                          coarse.made.angle_held ? "there IN's own corners are sharper" : "no better mesh was found"));
+    tool.warn(
+        {Weight::minor, "narrow angles",
+         fmt::format("the smallest angle is {:.3g} degrees, below --min-angle: {}", coarse.angle,
+                     coarse.made.angle_held ? "there IN's own corners are sharper" : "no better mesh was found")});
   }
   const Interval &mm = coarse.distance, percent{100 * mm.lower / coarse.diagonal, 100 * mm.upper / coarse.diagonal};
   tool.result() = {

@@ -202,7 +202,8 @@ public:
         tool.input(table);
         return;
       } catch (const InputError& error) {
-        tool.warn(fmt::format("{}; left out, the volume's labels have no names of it", error.what()));
+        tool.warn({Weight::minor, "label table",
+                   fmt::format("{}; left out, the volume's labels have no names of it", error.what())});
       }
     }
   }
@@ -237,9 +238,11 @@ SlabSize slab_size(const Arguments& arguments) {
 void note_not_finite(VolumeFile& file, const fs::path& path, std::size_t count) {
   if (count > 0) {
     file.warnings.push_back(
-        fmt::format("{}: {} of {} voxels are no finite numbers: not-a-number is outside, and a surface beside one lies "
-                    "in the middle",
-                    path.string(), count, file.volume.dims[0] * file.volume.dims[1] * file.volume.dims[2]));
+        {Weight::minor, "no numbers",
+         fmt::format(
+             "{}: {} of {} voxels are no finite numbers: not-a-number is outside, and a surface beside one lies "
+             "in the middle",
+             path.string(), count, file.volume.dims[0] * file.volume.dims[1] * file.volume.dims[2])});
   }
 }
 
@@ -384,20 +387,23 @@ void warn_of_smoothing(const cli::Tool& tool, const Selection& selection, const 
   constexpr double notable = 0.1;
   const double changed = real(count_differing(selection.mask, smoothed)) / real(count_voxels(selection.mask));
   if (changed > notable) {
-    tool.warn(
-        fmt::format("{}: smoothing changes the shape: it moves as many voxels in or out as {:.3g} % of its own; pass a "
-                    "smaller sigma",
-                    selection.target.name, 1e2 * changed));
+    tool.warn({Weight::minor, "smoothing",
+               fmt::format(
+                   "{}: smoothing changes the shape: it moves as many voxels in or out as {:.3g} % of its own; pass a "
+                   "smaller sigma",
+                   selection.target.name, 1e2 * changed)});
   }
 }
 
 void warn_of_pieces(const cli::Tool& tool, const std::string& name, double left_out) {
   constexpr double notable = 0.01;
   if (left_out > notable) {
-    tool.warn(fmt::format(
-        "{}: only its largest piece is taken: {:.3g} % of its voxels lie in others, which are left out; without "
-        "--largest, LARGEST=0 of the pipeline, they stay",
-        name, 1e2 * left_out));
+    tool.warn(
+        {Weight::minor, "pieces left out",
+         fmt::format(
+             "{}: only its largest piece is taken: {:.3g} % of its voxels lie in others, which are left out; without "
+             "--largest, LARGEST=0 of the pipeline, they stay",
+             name, 1e2 * left_out)});
   }
 }
 
@@ -512,10 +518,10 @@ void note_file(cli::Tool& tool, const VolumeFile& file) {
   for (const fs::path& path : file.data_files) {
     tool.input(path);
   }
-  for (const std::string& warning : file.warnings) {
+  for (const Warning& warning : file.warnings) {
     tool.warn(warning);
   }
-  tool.result()["warnings"] = file.warnings;
+  tool.result()["warnings"] = texts_of(file.warnings);
 }
 
 // A surface runs halfway between the middles of voxels and is rounded off there: what is a few voxels thick loses
@@ -528,10 +534,12 @@ void warn_of_few_voxels(const cli::Tool& tool, const Surface& surface, const Jso
   const double voxels = real(count_voxels(surface.mask)) * surface.mask.voxel_volume();
   const double change = result["volume_mm3"].get<double>() / voxels - 1;
   if (std::abs(change) > notable) {
-    tool.warn(fmt::format(
-        "{}: the surface encloses {:.3g} % {} than its voxels: it is few voxels thick, and neither volume need "
-        "be right within that; take finer voxels",
-        name, 1e2 * std::abs(change), change < 0 ? "less" : "more"));
+    tool.warn(
+        {Weight::minor, "few voxels",
+         fmt::format(
+             "{}: the surface encloses {:.3g} % {} than its voxels: it is few voxels thick, and neither volume need "
+             "be right within that; take finer voxels",
+             name, 1e2 * std::abs(change), change < 0 ? "less" : "more")});
   }
 }
 
@@ -544,13 +552,15 @@ void warn_of_cut(const cli::Tool& tool, const Surface& surface, const Target& ta
   const auto inner = [](std::size_t count) { return count - std::min<std::size_t>(count, 2); };
   const std::size_t border = dims[0] * dims[1] * dims[2] - inner(dims[0]) * inner(dims[1]) * inner(dims[2]);
   if (const auto rule = target.inside.rule; rule != Inside::Rule::label && 2 * cut > border) {
-    tool.warn(fmt::format("{}: it is most of the image's border: what is meant may be the other side (--inside {})",
-                          target.name, rule == Inside::Rule::above ? "below" : "above"));
+    tool.warn({Weight::major, "other side",
+               fmt::format("{}: it is most of the image's border: what is meant may be the other side (--inside {})",
+                           target.name, rule == Inside::Rule::above ? "below" : "above")});
   }
   tool.warn(
-      fmt::format("{}: the image's border cuts it ({} voxels), and flat lids close it there; --open-border, OPEN=1 "
-                  "of the pipeline, leaves it open, as a vessel is",
-                  target.name, cut));
+      {Weight::minor, "cut by the border",
+       fmt::format("{}: the image's border cuts it ({} voxels), and flat lids close it there; --open-border, OPEN=1 "
+                   "of the pipeline, leaves it open, as a vessel is",
+                   target.name, cut)});
 }
 
 // A cut of a few voxels is no end of a vessel, but would be held as one.
@@ -559,11 +569,12 @@ void warn_of_narrow_rims(const cli::Tool& tool, const Surface& surface, const st
   const auto rims = boundary_loops(surface.mesh);
   const auto few = std::ranges::count_if(rims, [](const auto& rim) { return rim.size() < narrow_rim; });
   if (few > 0) {
-    tool.warn(
-        fmt::format("{}: the image's border leaves {} of its {} opening(s) a few voxels wide: supports at the boundary "
-                    "hold these as they do the ends of a vessel; leave the outermost slices out of the image, or "
-                    "hold the ends by where they are (--fix 'above z=...', FIX of the pipeline)",
-                    name, few, rims.size()));
+    tool.warn({Weight::minor, "narrow opening",
+               fmt::format(
+                   "{}: the image's border leaves {} of its {} opening(s) a few voxels wide: supports at the boundary "
+                   "hold these as they do the ends of a vessel; leave the outermost slices out of the image, or "
+                   "hold the ends by where they are (--fix 'above z=...', FIX of the pipeline)",
+                   name, few, rims.size())});
   }
 }
 

@@ -218,8 +218,9 @@ void take_spikes(const cli::Tool& tool, const fs::path& path, Surface& surface) 
   }
   WithoutDegenerate cleaned = without_degenerate_triangles(mesh);
   if (cleaned.longest_spike > 0) {
-    tool.warn(fmt::format("{}: spikes without area, up to {:.4g} mm long, are taken away from its boundary",
-                          path.string(), cleaned.longest_spike));
+    tool.warn({Weight::minor, "spikes",
+               fmt::format("{}: spikes without area, up to {:.4g} mm long, are taken away from its boundary",
+                           path.string(), cleaned.longest_spike)});
     surface.moved = cleaned.moved;
     surface.with_spikes = std::exchange(mesh, std::move(cleaned.mesh));
   }
@@ -235,8 +236,9 @@ Surface read_surface(const cli::Tool& tool, const fs::path& path, const std::opt
 void warn_of_mismatch(const cli::Tool& tool, const MeshFacts& a, const MeshFacts& b) {
   const auto differ = [&](std::size_t of_coarse, std::size_t of_target, const std::string& what) {
     if (of_coarse != of_target) {
-      tool.warn(fmt::format("COARSE has {} {}, TARGET has {}; the distance will show what cannot be covered", of_coarse,
-                            what, of_target));
+      tool.warn({Weight::major, "another topology",
+                 fmt::format("COARSE has {} {}, TARGET has {}; the distance will show what cannot be covered",
+                             of_coarse, what, of_target)});
     }
   };
   differ(a.components, b.components, "component(s)");
@@ -350,11 +352,12 @@ private:
     warn_of_mismatch(tool_, start.facts, surface.facts);
     if (looks_for_middle && faces_inward(face)) {
       face_.emplace(turned_around(face.mesh()));
-      tool_.warn("TARGET's triangles face inward; they were turned around");
+      tool_.warn({Weight::minor, "faces inward", "TARGET's triangles face inward; they were turned around"});
     }
     if (faces_other_way(coarse_, looks_for_middle ? *face_ : *target_)) {
       coarse_ = turned_around(std::move(coarse_));
-      tool_.warn("COARSE faces the other way than TARGET; its triangles were turned around");
+      tool_.warn(
+          {Weight::minor, "faces inward", "COARSE faces the other way than TARGET; its triangles were turned around"});
     }
     if (fits_ && given_.tolerance && !given_.refine && given_.coarse != given_.target) {
       tool_.note(
@@ -410,19 +413,23 @@ private:
                     middle.mesh.triangles.size(), middle.cell, middle.error[0], middle.error[1]));
     if (middle.left_out > 0) {
       tool_.warn(
-          fmt::format("{} piece(s) of the middle of the wall, {:.3g} mm2 together, are left out: half of the wall "
-                      "closes a gap of TARGET or parts it there",
-                      middle.left_out, middle.left_out_area));
+          {Weight::minor, "left out",
+           fmt::format("{} piece(s) of the middle of the wall, {:.3g} mm2 together, are left out: half of the wall "
+                       "closes a gap of TARGET or parts it there",
+                       middle.left_out, middle.left_out_area)});
     }
     if (middle.crossing > 0) {
-      tool_.warn(fmt::format("the middle of the wall crosses itself at {} pair(s) of its triangles", middle.crossing));
+      tool_.warn(
+          {Weight::major, "wall crosses itself",
+           fmt::format("the middle of the wall crosses itself at {} pair(s) of its triangles", middle.crossing)});
     }
     const MeshFacts before = examine(face_->mesh()), after = examine(middle.mesh), coarse = examine(coarse_);
     if (before.euler != after.euler || before.boundary_loops != after.boundary_loops + face_->point_loops()) {
       tool_.warn(
-          fmt::format("the middle of the wall has {} rim(s) and {} handle(s), TARGET has {} and {}: half of the "
-                      "wall closes a gap, or a branch is too narrow for it",
-                      after.boundary_loops, handles(after), before.boundary_loops, handles(before)));
+          {Weight::major, "another topology",
+           fmt::format("the middle of the wall has {} rim(s) and {} handle(s), TARGET has {} and {}: half of the "
+                       "wall closes a gap, or a branch is too narrow for it",
+                       after.boundary_loops, handles(after), before.boundary_loops, handles(before))});
     }
     Json& said = tool_.result()["mid_surface"];
     said["grid_mm"] = middle.cell;
@@ -453,8 +460,9 @@ private:
     } catch (const Interrupted&) {
       if (!best_.triangles.empty()) {
         keep_partial(best_);
-        tool_.warn(
-            fmt::format("the best mesh so far, {} shells, is in {}.part", best_.triangles.size(), given_.out.string()));
+        tool_.warn({Weight::note, "partial result",
+                    fmt::format("the best mesh so far, {} shells, is in {}.part", best_.triangles.size(),
+                                given_.out.string())});
       }
       throw;
     } catch (const InputError& error) {
@@ -524,10 +532,11 @@ private:
     constexpr double far = 20;  // % of the diagonal
     if (const double apart = percent() * distance_.both.lower; apart > far) {
       tool_.warn(
-          fmt::format("shells and surface are {:.3g} % of the surface's diagonal apart: are COARSE and TARGET of one "
-                      "organ, in this "
-                      "order and in the same place?",
-                      apart));
+          {Weight::major, "another surface",
+           fmt::format("shells and surface are {:.3g} % of the surface's diagonal apart: are COARSE and TARGET of one "
+                       "organ, in this "
+                       "order and in the same place?",
+                       apart)});
     }
   }
 
@@ -536,17 +545,20 @@ private:
     const double angle = min_angle_degrees(flat_facets(relaxed_.shell));
     result["min_angle_deg"] = angle;
     if (const double wanted = min_angle_.value_or(usual_angle); fits_ && angle < rounded_up * wanted) {
-      tool_.warn(fmt::format(
-          "the smallest angle is {:.3g} degrees, below {:.3g}: boundaries or creases do not allow more, or the error "
-          "would be larger",
-          angle, wanted));
+      tool_.warn({Weight::minor, "narrow angles",
+                  fmt::format("the smallest angle is {:.3g} degrees, below {:.3g}: boundaries or creases do not allow "
+                              "more, or the error "
+                              "would be larger",
+                              angle, wanted)});
     }
     const std::size_t crossings = crossing_patches(relaxed_.shell).size();
     result["self_intersections"] = crossings;
     if (crossings > 0) {
-      tool_.warn(fmt::format(
-          "{} pair(s) of curved shells cross: more shells, or a target that does not cross itself, will part them",
-          crossings));
+      tool_.warn(
+          {Weight::minor, "shells cross",
+           fmt::format(
+               "{} pair(s) of curved shells cross: more shells, or a target that does not cross itself, will part them",
+               crossings)});
     }
     const ShellQuality quality = shell_quality(relaxed_.shell, whole());
     result["mean_distance_mm"] = quality.mean_distance;
@@ -630,7 +642,8 @@ private:
       const std::size_t crossings = crossing_patches(middle.shell).size();
       tool_.result()["self_intersections"] = crossings;
       if (crossings > 0) {
-        tool_.warn(fmt::format("{} pair(s) of curved shells cross in the middle of the wall", crossings));
+        tool_.warn({Weight::major, "wall crosses itself",
+                    fmt::format("{} pair(s) of curved shells cross in the middle of the wall", crossings)});
       }
       said["error_mm"] = nullptr;
       require_wall(middle.thickness);

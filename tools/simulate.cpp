@@ -296,7 +296,7 @@ public:
     if (scene_.accuracy && !given_.check) {
       choose_model();
     }
-    for (const std::string& doubt : doubts(model(), scene_.run, accuracy_.has_value())) {
+    for (const Warning& doubt : doubts(model(), scene_.run, accuracy_.has_value())) {
       tool_.warn(doubt);
     }
     if (given_.check) {
@@ -417,9 +417,10 @@ private:
     for (std::size_t b = 0; scene_.accuracy && b < targets_.size(); ++b) {
       if (!targets_[b] && model().shells[b].curved) {
         tool_.warn(
-            fmt::format("{}: has no target: finer shells lie on its own patches, and the error of its geometry is not "
-                        "seen (--target, or target in [accuracy])",
-                        scene_.shells[b].mesh.string()));
+            {Weight::minor, "no target",
+             fmt::format("{}: has no target: finer shells lie on its own patches, and the error of its geometry is not "
+                         "seen (--target, or target in [accuracy])",
+                         scene_.shells[b].mesh.string())});
       }
     }
   }
@@ -644,9 +645,10 @@ private:
     tool_.note(modes_note(summary, frequencies != nullptr ? frequencies->count : kind<BucklingRun>()->count));
     if (summary.stiffened_from && frequencies == nullptr) {
       tool_.warn(
-          fmt::format("{}: the mesh is coarse for so thin a curved shell (h^2 > 3 R t): buckles shorter than its "
-                      "elements are not seen, and the factors may be too high: refine it",
-                      subject().string()));
+          {Weight::major, "coarse shells",
+           fmt::format("{}: the mesh is coarse for so thin a curved shell (h^2 > 3 R t): buckles shorter than its "
+                       "elements are not seen, and the factors may be too high: refine it",
+                       subject().string())});
     }
   }
 
@@ -654,10 +656,11 @@ private:
     tool_.note(fmt::format("{} nodes in {} steps, {}: largest displacement {:.4g} mm", model().node_count(),
                            summary.steps, converged ? "converged" : "not asked to converge",
                            tool_.result()["max_displacement_mm"].get<double>()));
-    std::vector<std::string> texts = run_warnings(scene_.run, summary, wall_, unresolved_);
-    std::ranges::copy(contact_warnings(tool_.result()), std::back_inserter(texts));
-    for (const std::string& text : texts) {
-      tool_.warn(fmt::format("{}: {}", subject().string(), text));
+    std::vector<Warning> warnings = run_warnings(scene_.run, summary, wall_, unresolved_);
+    std::ranges::copy(contact_warnings(tool_.result()), std::back_inserter(warnings));
+    for (Warning& warning : warnings) {
+      warning.text = fmt::format("{}: {}", subject().string(), warning.text);
+      tool_.warn(std::move(warning));
     }
   }
 

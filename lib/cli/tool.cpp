@@ -440,13 +440,22 @@ Json Tool::describe_outputs(bool ok) const {
 void Tool::write_report(bool ok, const std::string& error) {
   Json seconds{{"total", seconds_since(start_)}};  // without the hashes of the outputs
   seconds.update(seconds_);
+  std::vector<Warning> warnings = warnings_;
+  std::ranges::stable_sort(warnings, std::greater<>(), &Warning::weight);
+  const auto first_note = std::ranges::find(warnings, Weight::note, &Warning::weight);
+  const std::vector<Warning> notes(first_note, warnings.end());
+  warnings.erase(first_note, warnings.end());
+  std::vector<std::string> kinds;
+  std::ranges::transform(warnings, std::back_inserter(kinds), &Warning::kind);
   const Json report{
       {"tool", "tunica-" + verb_},
       {"version", version},
       {"instruction_set", instruction_set()},
       {"ok", ok},
       {"error", error.empty() ? Json() : Json(error)},
-      {"warnings", warnings_},
+      {"warnings", texts_of(warnings)},
+      {"warning_kinds", kinds},
+      {"notes", texts_of(notes)},
       {"command", provenance_.command()},
       {"inputs", inputs_},
       {"outputs", describe_outputs(ok)},
@@ -589,11 +598,13 @@ void Tool::detail(const std::string& text) const {
   }
 }
 
-void Tool::warn(const std::string& text) const {
-  warnings_.push_back(one_line(text));
+void Tool::warn(Warning warning) const {
+  warning.text = one_line(warning.text);
   if (!quiet_) {
-    say_line(fmt::format("tunica-{}: warning: {}\n", verb_, one_line(text)));
+    say_line(
+        fmt::format("tunica-{}: {}: {}\n", verb_, warning.weight == Weight::note ? "note" : "warning", warning.text));
   }
+  warnings_.push_back(std::move(warning));
 }
 
 void Tool::print(const std::string& text) const {

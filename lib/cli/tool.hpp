@@ -7,6 +7,7 @@
 #include "tunica/core/json.hpp"
 #include "tunica/core/progress.hpp"
 #include "tunica/core/quantity.hpp"
+#include "tunica/core/warning.hpp"
 #include "tunica/io/file/output_file.hpp"
 
 #include <CLI/CLI.hpp>
@@ -101,11 +102,11 @@ public:
   /// A callback that draws a bar on a terminal, prints a line now and then elsewhere, and is silent with --quiet.
   [[nodiscard]] Progress progress(const std::string& doing);
 
-  /// A line on stderr: always but with --quiet (`note`), only with --verbose (`detail`), a warning; the last stands in
-  /// the report too, also with --quiet.
+  /// A line on stderr: always but with --quiet (`note`), only with --verbose (`detail`), a warning. Warnings stand in
+  /// the report, also with --quiet, the heaviest first; those that are mere notes stand apart (`notes`).
   void note(const std::string& text) const;
   void detail(const std::string& text) const;
-  void warn(const std::string& text) const;
+  void warn(Warning warning) const;
 
   /// What was asked for on standard output. Errors: OutputError when it is lost, UsageError when the report goes there.
   void print(const std::string& text) const;
@@ -167,7 +168,7 @@ private:
   std::string at_hand_;  ///< the input registered last
   std::string running_;  ///< the stage begun last
   Json inputs_ = Json::array();
-  mutable Json warnings_ = Json::array();  ///< warn() says, it does not change the tool
+  mutable std::vector<Warning> warnings_;  ///< warn() says, it does not change the tool
   std::vector<std::filesystem::path> outputs_;
   Json seconds_ = Json::object();
   Json result_ = Json::object();

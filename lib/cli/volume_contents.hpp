@@ -1,6 +1,7 @@
 #pragma once
 
 #include "tunica/core/json.hpp"
+#include "tunica/core/warning.hpp"
 #include "tunica/io/volume/label_names.hpp"
 #include "tunica/io/volume/volume_file.hpp"
 #include "tunica/volume/cubes/label_index.hpp"
@@ -15,7 +16,7 @@
 namespace tunica::cli {
 
 struct VolumeContents {
-  std::vector<std::string> warnings;
+  std::vector<Warning> warnings;
   std::optional<std::vector<Label>> labels;   ///< none: a grey volume
   std::vector<std::size_t> surface_vertices;  ///< per label, of its surface before decimation
   LabelNames names;

@@ -90,7 +90,7 @@ inline VolumeFile read_both_ways(const std::filesystem::path& path, const Volume
               slab.data);
         });
     EXPECT_EQ(next, whole.volume.dims[2]);
-    EXPECT_EQ(file.warnings, whole.warnings);
+    EXPECT_EQ(texts_of(file.warnings), texts_of(whole.warnings));
     EXPECT_EQ(file.volume.label_names, whole.volume.label_names);
   }
   const VolumeFile header = read_volume_header(path, options);

@@ -193,7 +193,7 @@ TEST(NiftiLabelNames, damaged_ones_are_a_warning_and_the_voxels_are_read) {
            {bomb, "document type"}}) {
     const VolumeFile file = read_both_ways(folder.file("v.nii", extended(xml)));
     ASSERT_EQ(file.warnings.size(), 1U) << xml;
-    EXPECT_THAT(file.warnings[0], HasSubstr(why));
+    EXPECT_THAT(file.warnings[0].text, HasSubstr(why));
   }
   // Sizes that no extension has: there is none.
   for (const std::int32_t size : {0, -1, 7, 2147483647, -2147483647 - 1}) {

@@ -124,7 +124,7 @@ TEST(MetaImage, WithoutSpacingOrMatrixWarns) {
   const TemporaryFolder folder;
   std::string header = replaced(metaimage_header(), "ElementSpacing = 2 3 4\n", "");
   header = replaced(header, "TransformMatrix = 1 0 0 0 1 0 0 0 1\n", "");
-  EXPECT_THAT(read_both_ways(folder.file("v.mha", header + voxels)).warnings,
+  EXPECT_THAT(texts_of(read_both_ways(folder.file("v.mha", header + voxels)).warnings),
               ElementsAre(HasSubstr("no ElementSpacing"), HasSubstr("no TransformMatrix")));
 }
 

@@ -69,7 +69,7 @@ TEST(NiftiWriter, AShearedVolumeHasNoQform) {
   options.prefer_qform = true;
   const VolumeFile file = read_both_ways(folder / "v.nii", options);
   EXPECT_EQ(file.transform, "sform");
-  EXPECT_THAT(file.warnings, testing::ElementsAre(HasSubstr("no qform")));
+  EXPECT_THAT(texts_of(file.warnings), testing::ElementsAre(HasSubstr("no qform")));
   EXPECT_TRUE(file.volume.affine.isApprox(volume.affine));
 }
 
@@ -180,13 +180,14 @@ TEST(NiftiTransform, BothAndDifferent) {
   folder.file("v.nii", nifti_file(options));
   VolumeFile file = read_both_ways(folder / "v.nii");
   EXPECT_EQ(file.volume.affine(0, 3), -10);
-  EXPECT_THAT(file.warnings, testing::ElementsAre(AllOf(HasSubstr("sform [2 0 0 10]"), HasSubstr("qform [2 0 0 11]"),
-                                                        HasSubstr("the sform is used"), HasSubstr("--prefer-qform"))));
+  EXPECT_THAT(texts_of(file.warnings),
+              testing::ElementsAre(AllOf(HasSubstr("sform [2 0 0 10]"), HasSubstr("qform [2 0 0 11]"),
+                                         HasSubstr("the sform is used"), HasSubstr("--prefer-qform"))));
   VolumeOptions prefer;
   prefer.prefer_qform = true;
   file = read_both_ways(folder / "v.nii", prefer);
   EXPECT_EQ(file.volume.affine(0, 3), -11);
-  EXPECT_THAT(file.warnings, testing::ElementsAre(HasSubstr("the qform is used")));
+  EXPECT_THAT(texts_of(file.warnings), testing::ElementsAre(HasSubstr("the qform is used")));
 }
 
 TEST(NiftiTransform, NeitherIsASpacingWithAWarning) {
@@ -199,7 +200,7 @@ TEST(NiftiTransform, NeitherIsASpacingWithAWarning) {
   EXPECT_EQ(file.volume.affine(0, 0), -2);
   EXPECT_EQ(file.volume.affine(1, 1), -3);
   EXPECT_EQ(file.volume.affine(2, 2), 4);
-  EXPECT_THAT(file.warnings, testing::ElementsAre(HasSubstr("neither sform nor qform")));
+  EXPECT_THAT(texts_of(file.warnings), testing::ElementsAre(HasSubstr("neither sform nor qform")));
   options.pixdim = {0, 2, 0, 4};
   folder.file("v.nii", nifti_file(options));
   EXPECT_THAT(error_of(folder / "v.nii"), HasSubstr("spacing"));
@@ -215,7 +216,7 @@ TEST(NiftiTransform, UnitsScaleToMillimetres) {
     EXPECT_TRUE(file.volume.affine.isApprox(scale * flipped(sample_affine()))) << units;
     const bool metres = units == 1;  // of a voxel's edge: no scanner has that
     ASSERT_EQ(file.warnings.size(), units == 0 || units == 5 || metres ? 1U : 0U);
-    EXPECT_TRUE(!metres || file.warnings[0].ends_with("mm: is their unit right?")) << file.warnings[0];
+    EXPECT_TRUE(!metres || file.warnings[0].text.ends_with("mm: is their unit right?")) << file.warnings[0].text;
   }
 }
 
@@ -343,11 +344,13 @@ TEST(NiftiDamage, TrailingBytesWarn) {
   const TemporaryFolder folder;
   const std::string bytes = nifti_file();
   folder.file("v.nii", bytes + "more");
-  EXPECT_THAT(read_both_ways(folder / "v.nii").warnings, testing::ElementsAre(HasSubstr("4 bytes follow the voxels")));
+  EXPECT_THAT(texts_of(read_both_ways(folder / "v.nii").warnings),
+              testing::ElementsAre(HasSubstr("4 bytes follow the voxels")));
   folder.file("v.nii", deflated(bytes + "more"));
-  EXPECT_THAT(read_both_ways(folder / "v.nii").warnings, testing::ElementsAre(HasSubstr("4 bytes follow the voxels")));
+  EXPECT_THAT(texts_of(read_both_ways(folder / "v.nii").warnings),
+              testing::ElementsAre(HasSubstr("4 bytes follow the voxels")));
   folder.file("v.nii", deflated(bytes) + "more");
-  EXPECT_THAT(read_both_ways(folder / "v.nii").warnings,
+  EXPECT_THAT(texts_of(read_both_ways(folder / "v.nii").warnings),
               testing::ElementsAre(HasSubstr("follow its compressed stream")));
   folder.file("v.nii", deflated(bytes.substr(0, 380)) + deflated(bytes.substr(380)));
   EXPECT_THAT(read_both_ways(folder / "v.nii").warnings, IsEmpty());

@@ -64,7 +64,8 @@ TEST(Nrrd, EverySpace) {
   }
   for (const std::string space : {"3D-right-handed", "scanner-xyz"}) {
     const std::string header = replaced(nrrd_header(), "left-posterior-superior", space);
-    EXPECT_THAT(read_both_ways(folder.file("v.nrrd", header + voxels)).warnings, ElementsAre(HasSubstr(space)));
+    EXPECT_THAT(texts_of(read_both_ways(folder.file("v.nrrd", header + voxels)).warnings),
+                ElementsAre(HasSubstr(space)));
   }
 }
 
@@ -73,9 +74,10 @@ TEST(Nrrd, SpacingsWhenThereAreNoDirections) {
   const std::string header = "NRRD0001\ntype: uint8\ndimension: 3\nsizes: 3 4 5\nspacings: 2 3 4\nencoding: raw\n\n";
   const VolumeFile file = read_both_ways(folder.file("v.nrrd", header + voxels));
   EXPECT_EQ(file.spacing, Vec3(2, 3, 4));
-  EXPECT_THAT(file.warnings, ElementsAre(HasSubstr("placed by their spacings alone")));
+  EXPECT_THAT(texts_of(file.warnings), ElementsAre(HasSubstr("placed by their spacings alone")));
   const auto warnings_of = [&](const std::string& spacings) {
-    return read_both_ways(folder.file("u.nrrd", replaced(header, "spacings: 2 3 4\n", spacings) + voxels)).warnings;
+    return texts_of(
+        read_both_ways(folder.file("u.nrrd", replaced(header, "spacings: 2 3 4\n", spacings) + voxels)).warnings);
   };
   EXPECT_THAT(warnings_of("spacings: nan 3 4\n"), ElementsAre(HasSubstr("spacings (1 of 3 unknown: 1 mm)")));
   EXPECT_THAT(warnings_of("spacings: nan nan nan\n"), ElementsAre(HasSubstr("number (spacing 1 mm)")));

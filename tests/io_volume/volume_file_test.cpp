@@ -54,7 +54,7 @@ TEST(VolumeFile, VoxelsThatNoScannerMakesAreWarnedOf) {
     folder.file("v.mha", header + voxels);
     const VolumeFile file = read_volume(folder / "v.mha", {});
     ASSERT_EQ(file.warnings.size(), warned ? 1U : 0U) << spacing;
-    EXPECT_TRUE(!warned || file.warnings[0].ends_with("mm: is their unit right?")) << file.warnings[0];
+    EXPECT_TRUE(!warned || file.warnings[0].text.ends_with("mm: is their unit right?")) << file.warnings[0].text;
   }
 }
 

@@ -171,7 +171,7 @@ TEST(CheckModel, RefusesAWallThickerThanTheWholeBody) {
 
 std::vector<std::string> doubts_of(const Model& model, const RunSettings& settings = linear_run()) {
   EXPECT_NO_THROW(check_model(model, settings));
-  return doubts(model, settings);
+  return texts_of(doubts(model, settings));
 }
 
 using testing::ElementsAre;

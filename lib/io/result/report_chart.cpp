@@ -202,7 +202,7 @@ struct Row {
 
 // Pairs of coordinates; a single value is repeated along a list. Pairs with a null are left out and counted.
 std::vector<Row> rows_of(const std::vector<Report>& reports, const Coordinate& x, const Coordinate& y,
-                         const ReportChartOptions& options, std::vector<std::string>& warnings) {
+                         const ReportChartOptions& options, std::vector<Warning>& warnings) {
   std::vector<Row> rows;
   for (std::size_t r = 0; r < reports.size(); ++r) {
     const Report& report = reports[r];
@@ -230,22 +230,25 @@ std::vector<Row> rows_of(const std::vector<Report>& reports, const Coordinate& x
                       {*px, *py, report.name, pick(labels, i, options.label.value_or(""))}});
     }
     if (undefined > 0) {
-      warnings.push_back(fmt::format("{}: {} of {} values of '{}' against '{}' are undefined (null) and left out",
-                                     report.path.string(), undefined, count, y.key, x.key));
+      warnings.push_back({Weight::minor, "left out",
+                          fmt::format("{}: {} of {} values of '{}' against '{}' are undefined (null) and left out",
+                                      report.path.string(), undefined, count, y.key, x.key)});
     }
   }
   return rows;
 }
 
-void drop_negative(std::vector<Row>& rows, const ReportChartOptions& options, std::vector<std::string>& warnings) {
+void drop_negative(std::vector<Row>& rows, const ReportChartOptions& options, std::vector<Warning>& warnings) {
   const std::size_t before = rows.size();
   std::erase_if(rows, [&](const Row& row) {
     return (options.x_scale == Scale::logarithmic && row.mark.x < 0) ||
            (options.y_scale == Scale::logarithmic && row.mark.y < 0);
   });
   if (rows.size() < before) {
-    warnings.push_back(fmt::format("{} marks with negative values have no place on a logarithmic axis and are left out",
-                                   before - rows.size()));
+    warnings.push_back(
+        {Weight::minor, "left out",
+         fmt::format("{} marks with negative values have no place on a logarithmic axis and are left out",
+                     before - rows.size())});
   }
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "tunica/core/warning.hpp"
 #include "tunica/draw/chart.hpp"
 #include "tunica/io/file/report_file.hpp"
 
@@ -31,7 +32,7 @@ struct ReportChart {
   std::size_t marks = 0;
   std::size_t failures = 0;  ///< on the rim
   std::size_t on_front = 0;
-  std::vector<std::string> warnings;  ///< what was left out, and why
+  std::vector<Warning> warnings;  ///< what was left out, and why
 };
 
 /// Makes a chart of runs, one mark per run, or a line of marks where a key leads through a list.

@@ -285,77 +285,89 @@ std::string modes_note(const Summary& summary, std::size_t asked) {
                      values.size() < asked ? fmt::format(", of {} asked for: there are no more", asked) : "");
 }
 
-std::vector<std::string> contact_warnings(const Json& result) {
-  std::vector<std::string> warnings;
+std::vector<Warning> contact_warnings(const Json& result) {
+  std::vector<Warning> warnings;
   if (!result.contains("contacts")) {
     return warnings;
   }
   for (const auto& [name, record] : result["contacts"].items()) {
     const Json& points = record["points"];
     if (!points.empty() && std::all_of(points.begin(), points.end(), [](const Json& n) { return n == 0; })) {
-      warnings.push_back(fmt::format("{}: nothing touches in any step: do these bodies come together?", name));
+      warnings.push_back({Weight::major, "no contact",
+                          fmt::format("{}: nothing touches in any step: do these bodies come together?", name)});
     }
   }
   return warnings;
 }
 
-std::vector<std::string> run_warnings(const RunSettings& run, const Summary& summary, const Wall& wall,
-                                      std::size_t unresolved) {
-  std::vector<std::string> warnings;
+std::vector<Warning> run_warnings(const RunSettings& run, const Summary& summary, const Wall& wall,
+                                  std::size_t unresolved) {
+  std::vector<Warning> warnings;
   constexpr double small_strain = 0.1;
   if (wall.strain_p99 > small_strain) {
-    warnings.push_back(fmt::format(
-        "1 % of the wall is strained by more than {:.3g} %: linear elasticity is meant for strains of up to "
-        "about 10 %",
-        1e2 * wall.strain_p99));
+    warnings.push_back(
+        {Weight::major, "large strain",
+         fmt::format(
+             "1 % of the wall is strained by more than {:.3g} %: linear elasticity is meant for strains of up to "
+             "about 10 %",
+             1e2 * wall.strain_p99)});
   }
   for (const Snap& snap : summary.snaps) {
     warnings.push_back(
-        fmt::format("at load factor {:.6g} the path of equilibria breaks off (limit load): the shell snaps, by up "
-                    "to {:.3g} mm, to the next state of rest, from which the load goes on; arc length shows the path, "
-                    "a dynamic run the motion",
-                    snap.load_factor, snap.distance));
+        {Weight::major, "limit load",
+         fmt::format("at load factor {:.6g} the path of equilibria breaks off (limit load): the shell snaps, by up "
+                     "to {:.3g} mm, to the next state of rest, from which the load goes on; arc length shows the path, "
+                     "a dynamic run the motion",
+                     snap.load_factor, snap.distance)});
   }
   if (summary.energy && summary.energy->gaining_step > 0) {
     warnings.push_back(
-        fmt::format("time integration gains energy, {:.3g} % of the largest so far, more than 10 % from step {} "
-                    "({:.6g} s) on: the steps are too coarse for the motion: take shorter ones, or a smaller "
-                    "spectral_radius",
-                    1e2 * summary.energy->gained, summary.energy->gaining_step, summary.energy->gaining_time));
+        {Weight::major, "long steps",
+         fmt::format("time integration gains energy, {:.3g} % of the largest so far, more than 10 % from step {} "
+                     "({:.6g} s) on: the steps are too coarse for the motion: take shorter ones, or a smaller "
+                     "spectral_radius",
+                     1e2 * summary.energy->gained, summary.energy->gaining_step, summary.energy->gaining_time)});
   }
   constexpr double notable_loss = 0.1;
   if (summary.energy && summary.energy->lost > notable_loss * summary.energy->largest) {
     warnings.push_back(
-        fmt::format("time integration took {:.3g} % of the energy: what swings is smaller than it should be, the state "
-                    "of rest is not: for the motion take shorter steps, or integrator = \"generalised-alpha\"",
-                    1e2 * summary.energy->lost / summary.energy->largest));
+        {Weight::minor, "long steps",
+         fmt::format(
+             "time integration took {:.3g} % of the energy: what swings is smaller than it should be, the state "
+             "of rest is not: for the motion take shorter steps, or integrator = \"generalised-alpha\"",
+             1e2 * summary.energy->lost / summary.energy->largest)});
   }
   constexpr double notable_bend = 0.25;  // of what swings with half of the largest motion: a ninth of its period
   if (summary.largest_bend > notable_bend * summary.largest_motion) {
     warnings.push_back(
-        fmt::format("the steps are long for what swings: from one to the next the motion bends by {:.2g} % of its "
-                    "largest value: take shorter ones, or error control (adaptive)",
-                    1e2 * summary.largest_bend / summary.largest_motion));
+        {Weight::minor, "long steps",
+         fmt::format("the steps are long for what swings: from one to the next the motion bends by {:.2g} % of its "
+                     "largest value: take shorter ones, or error control (adaptive)",
+                     1e2 * summary.largest_bend / summary.largest_motion)});
   }
   if (summary.stiffened_from) {
     warnings.push_back(
-        fmt::format("the mesh is coarse for so thin a curved shell (h^2 > 3 R t): from {} {:.4g} on, where it "
-                    "would have buckled in waves as short as its elements, these were made stiff; whether the shell "
-                    "itself buckles this mesh does not resolve: refine it",
-                    std::holds_alternative<DynamicRun>(run.kind) ? "second" : "load factor", *summary.stiffened_from));
+        {Weight::major, "coarse shells",
+         fmt::format("the mesh is coarse for so thin a curved shell (h^2 > 3 R t): from {} {:.4g} on, where it "
+                     "would have buckled in waves as short as its elements, these were made stiff; whether the shell "
+                     "itself buckles this mesh does not resolve: refine it",
+                     std::holds_alternative<DynamicRun>(run.kind) ? "second" : "load factor",
+                     *summary.stiffened_from)});
   }
   constexpr double notable_residual = 1e-3;
   if (run.newton_max == 1 && summary.residual > notable_residual) {
     warnings.push_back(
-        fmt::format("one linearisation per step left {:.2g} of the forces unbalanced in the last one: take "
-                    "smaller steps, or leave newton_max at its default",
-                    summary.residual));
+        {Weight::minor, "not in balance",
+         fmt::format("one linearisation per step left {:.2g} of the forces unbalanced in the last one: take "
+                     "smaller steps, or leave newton_max at its default",
+                     summary.residual)});
   }
   if (unresolved > 0) {
     warnings.push_back(
-        fmt::format("{} shells bend by more than 30 degrees within themselves: the mesh is too coarse for "
-                    "this load, refine it there",
-                    unresolved));
+        {Weight::minor, "coarse shells",
+         fmt::format("{} shells bend by more than 30 degrees within themselves: the mesh is too coarse for "
+                     "this load, refine it there",
+                     unresolved)});
   }
   return warnings;
 }

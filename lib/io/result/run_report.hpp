@@ -2,6 +2,7 @@
 
 #include "tunica/accuracy/accuracy.hpp"
 #include "tunica/core/json.hpp"
+#include "tunica/core/warning.hpp"
 #include "tunica/mechanics/runs/solve.hpp"
 #include "tunica/mechanics/runs/unloaded.hpp"
 
@@ -40,11 +41,11 @@ std::string modes_note(const Summary& summary, std::size_t asked);
 
 /// What a user should know of a run that has ended well.
 /// @param wall  of the last state, as `unresolved`: count_unresolved()
-std::vector<std::string> run_warnings(const RunSettings& run, const Summary& summary, const Wall& wall,
-                                      std::size_t unresolved);
+std::vector<Warning> run_warnings(const RunSettings& run, const Summary& summary, const Wall& wall,
+                                  std::size_t unresolved);
 
 /// Contacts in which nothing ever touches.
 /// @param result  of a run that has ended
-std::vector<std::string> contact_warnings(const Json& result);
+std::vector<Warning> contact_warnings(const Json& result);
 
 }  // namespace tunica

@@ -134,19 +134,21 @@ std::uint64_t ByteStream::skip(std::uint64_t size) {
   return done;
 }
 
-void ByteStream::finish(std::vector<std::string>& warnings) {
+void ByteStream::finish(std::vector<Warning>& warnings) {
   std::array<char, 4096> rest;
   const std::size_t count = read(rest.data(), rest.size());  // and so verifies the checksum at a gzip stream's end
   if (count > 0) {
-    warnings.push_back(fmt::format("{}: {}{} bytes follow the voxels and are ignored", path_.string(),
-                                   count == rest.size() ? "at least " : "", count));
+    warnings.push_back({Weight::minor, "bytes too many",
+                        fmt::format("{}: {}{} bytes follow the voxels and are ignored", path_.string(),
+                                    count == rest.size() ? "at least " : "", count)});
   } else if (inflater_ && inflater_->cut_off) {
     throw InputError(
         fmt::format("{}: truncated: at least 1 byte is missing from the end of its compressed stream, after "
                     "the last voxel; get the whole file again",
                     path_.string()));
   } else if (inflater_ && (inflater_->stream.avail_in > 0 || std::fgetc(file_.get()) != EOF)) {
-    warnings.push_back(fmt::format("{}: bytes follow its compressed stream and are ignored", path_.string()));
+    warnings.push_back({Weight::minor, "bytes too many",
+                        fmt::format("{}: bytes follow its compressed stream and are ignored", path_.string())});
   }
 }
 

@@ -72,8 +72,9 @@ VolumeFile read_any(const fs::path& path, const VolumeOptions& options, const Sl
   VolumeFile file = read_known(path, options, sink);
   const Vec3& edges = file.spacing;
   if (edges.maxCoeff() > longest || edges.minCoeff() < shortest) {
-    file.warnings.push_back(fmt::format("{}: its voxels are {:.3g} x {:.3g} x {:.3g} mm: is their unit right?",
-                                        path.string(), edges[0], edges[1], edges[2]));
+    file.warnings.push_back({Weight::major, "voxel size",
+                             fmt::format("{}: its voxels are {:.3g} x {:.3g} x {:.3g} mm: is their unit right?",
+                                         path.string(), edges[0], edges[1], edges[2])});
   }
   return file;
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "tunica/core/types.hpp"
+#include "tunica/core/warning.hpp"
 #include "tunica/volume/labels/volume.hpp"
 
 #include <cstddef>
@@ -30,7 +31,7 @@ struct VolumeFile {
   std::string transform;        ///< where the orientation comes from, e.g. "sform", "space directions"
   std::size_t frames = 1;       ///< in the file; one of them is in `volume`
   std::size_t layers = 1;       ///< in the file; one of them is in `volume`
-  std::vector<std::string> warnings;
+  std::vector<Warning> warnings;
   std::vector<std::filesystem::path> data_files;  ///< further files that were read (detached data, slices)
 };
 

@@ -119,14 +119,16 @@ void set_geometry(VolumeFile& file, const fs::path& path, const Header& header, 
   };
   std::vector<double> spacing = numbers({"ElementSpacing", "ElementSize"}, dimensions);
   if (spacing.empty()) {
-    file.warnings.push_back(fmt::format("{}: has no ElementSpacing: 1 mm is taken", path.string()));
+    file.warnings.push_back(
+        {Weight::major, "voxel size", fmt::format("{}: has no ElementSpacing: 1 mm is taken", path.string())});
     spacing.assign(dimensions, 1);
   }
   std::vector<double> matrix = numbers({"TransformMatrix", "Rotation", "Orientation"}, dimensions * dimensions);
   file.transform = "TransformMatrix";
   if (matrix.empty()) {
     file.warnings.push_back(
-        fmt::format("{}: has no TransformMatrix: axes to the left, back and top are taken", path.string()));
+        {Weight::minor, "world transform",
+         fmt::format("{}: has no TransformMatrix: axes to the left, back and top are taken", path.string())});
     file.transform = "spacing";
     matrix.assign(dimensions * dimensions, 0);
     for (std::size_t i = 0; i < dimensions; ++i) {
@@ -149,7 +151,8 @@ void set_geometry(VolumeFile& file, const fs::path& path, const Header& header, 
   if (unit == "um" || unit == "cm" || unit == "m") {
     affine *= parse_length_unit(unit);
   } else if (!unit.empty() && unit != "mm" && unit != "?") {
-    file.warnings.push_back(fmt::format("{}: unknown unit of length '{}' taken as mm", path.string(), shown(unit)));
+    file.warnings.push_back({Weight::minor, "unit of length",
+                             fmt::format("{}: unknown unit of length '{}' taken as mm", path.string(), shown(unit))});
   }
   set_affine(file, path, affine);
 }

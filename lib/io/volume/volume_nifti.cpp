@@ -187,7 +187,7 @@ VoxelType voxel_type(const fs::path& path, std::int64_t code) {
 }
 
 // Millimetres per unit of the header's lengths.
-double unit_size(const fs::path& path, std::int64_t xyzt_units, std::vector<std::string>& warnings) {
+double unit_size(const fs::path& path, std::int64_t xyzt_units, std::vector<Warning>& warnings) {
   switch (xyzt_units & 7) {
     case 1:
       return 1000;
@@ -198,8 +198,9 @@ double unit_size(const fs::path& path, std::int64_t xyzt_units, std::vector<std:
     default:
       break;
   }
-  warnings.push_back(fmt::format("{}: the header names no known unit of length (xyzt_units {}): taken as mm",
-                                 path.string(), xyzt_units));
+  warnings.push_back({Weight::note, "unit of length",
+                      fmt::format("{}: the header names no known unit of length (xyzt_units {}): taken as mm",
+                                  path.string(), xyzt_units)});
   return 1;
 }
 
@@ -284,24 +285,27 @@ void set_transform(VolumeFile& file, const fs::path& path, const Header& header,
   file.transform = use_qform ? "qform" : has_sform ? "sform" : "spacing";
   if (prefer_qform && !has_qform) {
     file.warnings.push_back(
-        fmt::format("{}: has no qform (its code is 0): its {} is used", path.string(), file.transform));
+        {Weight::minor, "world transform",
+         fmt::format("{}: has no qform (its code is 0): its {} is used", path.string(), file.transform)});
   }
   if (has_sform && has_qform) {
     const double apart = difference(sform(header), qform(header), file.volume.dims);
     const double smallest = spacing_of(header).minCoeff();
     if (!(apart <= 0.01 * smallest)) {
       file.warnings.push_back(
-          fmt::format("{}: its sform {} and qform {} place a corner of the volume {:.4g} apart; the {} "
-                      "is used{}",
-                      path.string(), printed(sform(header)), printed(qform(header)), apart, file.transform,
-                      use_qform ? "" : " (--prefer-qform takes the other)"));
+          {Weight::minor, "world transform",
+           fmt::format("{}: its sform {} and qform {} place a corner of the volume {:.4g} apart; the {} "
+                       "is used{}",
+                       path.string(), printed(sform(header)), printed(qform(header)), apart, file.transform,
+                       use_qform ? "" : " (--prefer-qform takes the other)")});
     }
   }
   if (!has_sform && !has_qform) {
     file.warnings.push_back(
-        fmt::format("{}: has neither sform nor qform: voxels are placed by their spacing alone, with "
-                    "axes to the right, front and top",
-                    path.string()));
+        {Weight::major, "world transform",
+         fmt::format("{}: has neither sform nor qform: voxels are placed by their spacing alone, with "
+                     "axes to the right, front and top",
+                     path.string())});
   }
   if (file.transform != "sform" && !(spacing_of(header).minCoeff() > 0)) {
     throw InputError(fmt::format("{}: its voxel spacing {} x {} x {} is not positive: correct the header",
@@ -374,7 +378,8 @@ void read_extensions(VolumeFile& file, const fs::path& path, const Header& heade
   const std::uint64_t end = header.pair ? std::numeric_limits<std::uint64_t>::max() : voxel_offset(path, header);
   const auto damaged = [&](const std::string& why) {
     file.warnings.push_back(
-        fmt::format("{}: the label names in its header's extension are damaged: {}", path.string(), why));
+        {Weight::minor, "label table",
+         fmt::format("{}: the label names in its header's extension are damaged: {}", path.string(), why)});
   };
   std::array<char, 8> head{};
   if (stream.read(head.data(), 4) < 4 || head[0] == 0) {

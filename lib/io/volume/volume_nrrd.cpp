@@ -354,7 +354,7 @@ void set_roles(const fs::path& path, std::vector<AxisInfo>& axes, bool has_direc
 }
 
 // Millimetres per unit of the vectors or spacings: all axes must agree.
-double unit_size(const fs::path& path, const Header& header, bool has_directions, std::vector<std::string>& warnings) {
+double unit_size(const fs::path& path, const Header& header, bool has_directions, std::vector<Warning>& warnings) {
   const std::string name = has_directions ? "spaceunits" : "units";
   const std::string* text = find(header, name);
   if (text == nullptr) {
@@ -379,7 +379,8 @@ double unit_size(const fs::path& path, const Header& header, bool has_directions
     if (size == 0) {
       const bool none = word.empty() || word == "none" || word == "???" || word == "s" || word == "ms";
       if (!none) {
-        warnings.push_back(fmt::format("{}: unknown unit of length '{}' taken as mm", path.string(), shown(word)));
+        warnings.push_back({Weight::minor, "unit of length",
+                            fmt::format("{}: unknown unit of length '{}' taken as mm", path.string(), shown(word))});
       }
       continue;
     }
@@ -410,12 +411,14 @@ void set_geometry(VolumeFile& file, const fs::path& path, const Header& header, 
   }
   file.transform = has_directions ? "space directions" : "spacings";
   if (!has_directions) {
-    file.warnings.push_back(fmt::format(
-        "{}: has no space directions: voxels are placed by their {} alone, with axes to the left, back and top",
-        path.string(),
-        unknown == 3   ? "number (spacing 1 mm)"
-        : unknown == 0 ? "spacings"
-                       : fmt::format("spacings ({} of 3 unknown: 1 mm)", unknown)));
+    file.warnings.push_back(
+        {Weight::minor, "world transform",
+         fmt::format(
+             "{}: has no space directions: voxels are placed by their {} alone, with axes to the left, back and top",
+             path.string(),
+             unknown == 3   ? "number (spacing 1 mm)"
+             : unknown == 0 ? "spacings"
+                            : fmt::format("spacings ({} of 3 unknown: 1 mm)", unknown))});
   }
   if (const std::string* text = find(header, "spaceorigin")) {
     const auto vectors = parse_vectors(path, "space origin", *text);
@@ -424,7 +427,8 @@ void set_geometry(VolumeFile& file, const fs::path& path, const Header& header, 
     }
     affine.col(3) = Vec3((*vectors[0])[0], (*vectors[0])[1], (*vectors[0])[2]);
   } else if (has_directions) {
-    file.warnings.push_back(fmt::format("{}: has no space origin: 0 is taken", path.string()));
+    file.warnings.push_back(
+        {Weight::minor, "no origin", fmt::format("{}: has no space origin: 0 is taken", path.string())});
   }
   affine *= unit_size(path, header, has_directions, file.warnings);
   const std::string* space = find(header, "space");
@@ -432,8 +436,9 @@ void set_geometry(VolumeFile& file, const fs::path& path, const Header& header, 
   if (signs) {
     affine = signs->asDiagonal() * affine;
   } else if (has_directions) {
-    file.warnings.push_back(fmt::format("{}: its space '{}' is not tied to the body: taken as left-posterior-superior",
-                                        path.string(), space != nullptr ? shown(*space) : "unnamed"));
+    file.warnings.push_back({Weight::minor, "world transform",
+                             fmt::format("{}: its space '{}' is not tied to the body: taken as left-posterior-superior",
+                                         path.string(), space != nullptr ? shown(*space) : "unnamed")});
   }
   set_affine(file, path, affine);
 }

@@ -53,7 +53,7 @@ std::optional<std::pair<std::string, std::uint64_t>> numbered(const fs::path& pa
   return value ? std::optional(std::pair(stem.substr(0, begin), *value)) : std::nullopt;
 }
 
-void warn_of_gaps(const fs::path& folder, const std::vector<fs::path>& slices, std::vector<std::string>& warnings) {
+void warn_of_gaps(const fs::path& folder, const std::vector<fs::path>& slices, std::vector<Warning>& warnings) {
   std::vector<std::uint64_t> steps;
   for (std::size_t i = 1; i < slices.size(); ++i) {
     const auto before = numbered(slices[i - 1]);
@@ -66,13 +66,14 @@ void warn_of_gaps(const fs::path& folder, const std::vector<fs::path>& slices, s
   const auto largest = std::max_element(steps.begin(), steps.end());
   if (largest != steps.end() && *largest > *std::min_element(steps.begin(), steps.end())) {
     const std::size_t before = largest - steps.begin();
-    warnings.push_back(fmt::format("{}: a slice seems to be missing between {} and {}", folder.string(),
-                                   slices[before].filename().string(), slices[before + 1].filename().string()));
+    warnings.push_back({Weight::major, "missing slice",
+                        fmt::format("{}: a slice seems to be missing between {} and {}", folder.string(),
+                                    slices[before].filename().string(), slices[before + 1].filename().string())});
   }
 }
 
 // The slices of a folder in the natural order of their names.
-std::vector<fs::path> slices_in(const fs::path& folder, std::vector<std::string>& warnings) {
+std::vector<fs::path> slices_in(const fs::path& folder, std::vector<Warning>& warnings) {
   std::vector<fs::path> slices;
   std::size_t others = 0;
   std::error_code error;
@@ -98,7 +99,8 @@ std::vector<fs::path> slices_in(const fs::path& folder, std::vector<std::string>
   });
   if (others > 0) {
     warnings.push_back(
-        fmt::format("{}: {} files that are no slices (.png, .tif, .tiff) are ignored", folder.string(), others));
+        {Weight::note, "files ignored",
+         fmt::format("{}: {} files that are no slices (.png, .tif, .tiff) are ignored", folder.string(), others)});
   }
   warn_of_gaps(folder, slices, warnings);
   return slices;
@@ -210,9 +212,10 @@ VolumeFile read_slices(const fs::path& path, const VolumeOptions& options, const
   const SliceHeader& common = stack.common;
   if (stack.count == 1) {
     file.warnings.push_back(
-        fmt::format("{}: is a single slice, a volume one voxel thick: name a multi-page TIFF or the "
-                    "folder of the slices",
-                    path.string()));
+        {Weight::major, "single slice",
+         fmt::format("{}: is a single slice, a volume one voxel thick: name a multi-page TIFF or the "
+                     "folder of the slices",
+                     path.string())});
   }
   file.format = stack.format + " stack";
   set_type(file, common.type);

@@ -65,14 +65,15 @@ private:
   std::vector<Vec3> of_vertices_;
 };
 
-void doubt_thickness(const ShellBody& body, std::vector<std::string>& found) {
+void doubt_thickness(const ShellBody& body, std::vector<Warning>& found) {
   const double diagonal_mm = diagonal(flat_facets(body.mesh));
   const double most = *std::max_element(body.thickness.begin(), body.thickness.end());
   if (most > thickest * diagonal_mm) {
     found.push_back(
-        fmt::format("{}: its thickness, {:.4g} mm, is more than a twentieth of the body's diagonal, {:.4g} mm: "
-                    "this is no thin shell, whose wall does not shear; is the unit right?",
-                    at(body.said_at, body.name), most, diagonal_mm));
+        {Weight::major, "thick wall",
+         fmt::format("{}: its thickness, {:.4g} mm, is more than a twentieth of the body's diagonal, {:.4g} mm: "
+                     "this is no thin shell, whose wall does not shear; is the unit right?",
+                     at(body.said_at, body.name), most, diagonal_mm)});
     return;
   }
   const std::vector<Curvature> curvatures = curvatures_of(body.mesh, body.curved);
@@ -85,15 +86,18 @@ void doubt_thickness(const ShellBody& body, std::vector<std::string>& found) {
   }
   if (through_itself > most_of_it * whole) {
     found.push_back(
-        fmt::format("{}: its thickness, {:.4g} mm, is more than the radius of curvature over {:.0f} % of its "
-                    "area: the wall would pass through itself; is the unit right?",
-                    at(body.said_at, body.name), most, 100 * through_itself / whole));
+        {Weight::major, "thick wall",
+         fmt::format("{}: its thickness, {:.4g} mm, is more than the radius of curvature over {:.0f} % of its "
+                     "area: the wall would pass through itself; is the unit right?",
+                     at(body.said_at, body.name), most, 100 * through_itself / whole)});
   } else if (thick > most_of_it * whole) {
-    found.push_back(fmt::format(
-        "{}: its thickness, {:.4g} mm, is more than a quarter of a vessel's radius, or an eighth of a "
-        "ball's, over {:.0f} % of its area: pressure on the inner face moves so thick a wall at least some 10 % less "
-        "than this thin one",
-        at(body.said_at, body.name), most, 100 * thick / whole));
+    found.push_back(
+        {Weight::minor, "thick wall",
+         fmt::format("{}: its thickness, {:.4g} mm, is more than a quarter of a vessel's radius, or an eighth of a "
+                     "ball's, over {:.0f} % of its area: pressure on the inner face moves so thick a wall at least "
+                     "some 10 % less "
+                     "than this thin one",
+                     at(body.said_at, body.name), most, 100 * thick / whole)});
   }
 }
 
@@ -161,16 +165,18 @@ double waves_of(const ShellBody& body) {
 }
 
 /// What long shells and what waves leave of an answer adds up, so both take from one allowance.
-void doubt_coarseness(const ShellBody& body, bool may_be_chosen, std::vector<std::string>& found) {
+void doubt_coarseness(const ShellBody& body, bool may_be_chosen, std::vector<Warning>& found) {
   const double bow = median_bow_share(body);
   const double waves = waves_of(body);
   if (bow / largest_bow + waves / highest_waves > 1) {
-    found.push_back(fmt::format(
-        "{}: its shells are coarse for so thin a curved wall: h^2 = {:.2g} R t in the median (at 4 they bend some 20 % "
-        "too little); their normals leave waves of {:.2f} % of the wall (an error of up to thirty times that, unless "
-        "they are the surface's own): take more shells{}",
-        at(body.said_at, body.name), bow_at_one * bow, 100 * waves,
-        may_be_chosen ? ", or let an accuracy choose them (--accuracy)" : ""));
+    found.push_back({Weight::minor, "coarse shells",
+                     fmt::format("{}: its shells are coarse for so thin a curved wall: h^2 = {:.2g} R t in the median "
+                                 "(at 4 they bend some 20 % "
+                                 "too little); their normals leave waves of {:.2f} % of the wall (an error of up to "
+                                 "thirty times that, unless "
+                                 "they are the surface's own): take more shells{}",
+                                 at(body.said_at, body.name), bow_at_one * bow, 100 * waves,
+                                 may_be_chosen ? ", or let an accuracy choose them (--accuracy)" : "")});
   }
 }
 
@@ -290,30 +296,35 @@ bool jumps_within_a_step(const Ramp& ramp, const RunSettings& settings) {
 }
 
 void doubt_loads(const Model& model, const RunSettings& settings,
-                 const std::vector<std::vector<std::array<bool, 6>>>& held, std::vector<std::string>& found) {
+                 const std::vector<std::vector<std::array<bool, 6>>>& held, std::vector<Warning>& found) {
   for (const Load& load : model.loads) {
     const std::string where = at(load.said_at, model.name_of(load.body));
     if (is_zero(load)) {
-      found.push_back(where + ": this load is zero");
+      found.push_back({Weight::minor, "no load", where + ": this load is zero"});
     } else if (stays_zero(load.ramp, settings)) {
-      found.push_back(where + ": the ramp of this load is zero during the whole run, so it never acts");
+      found.push_back(
+          {Weight::minor, "no load", where + ": the ramp of this load is zero during the whole run, so it never acts"});
     } else if (const auto on = shared(load); on && only_held_nodes_bear(*on, held[load.body])) {
-      found.push_back(fmt::format("{}: this {} acts on held nodes only, so it moves nothing", where, on->name));
+      found.push_back({Weight::minor, "no load",
+                       fmt::format("{}: this {} acts on held nodes only, so it moves nothing", where, on->name)});
     }
     if (jumps_within_a_step(load.ramp, settings)) {
-      found.push_back(where +
-                      ": the ramp of this load changes within less than a step, so what it sets swinging is lost: "
-                      "take shorter steps");
+      found.push_back({Weight::minor, "long steps",
+                       where +
+                           ": the ramp of this load changes within less than a step, so what it sets swinging is lost: "
+                           "take shorter steps"});
     }
     if (const auto* pressure = std::get_if<PressureLoad>(&load.kind);
         pressure != nullptr && pressure->imaged_at && pressure->value * *pressure->imaged_at < 0) {
-      found.push_back(where + ": imaged_at presses on the other face of the wall than the load: is its sign right?");
+      found.push_back({Weight::major, "imaging pressure",
+                       where + ": imaged_at presses on the other face of the wall than the load: is its sign right?"});
     }
   }
   for (const Fix& fix : model.fixes) {
     if (prescribes(fix) && stays_zero(fix.ramp, settings)) {
-      found.push_back(at(fix.said_at, model.name_of(fix.body)) +
-                      ": the ramp of this displacement is zero during the whole run, so it moves nothing");
+      found.push_back({Weight::minor, "no load",
+                       at(fix.said_at, model.name_of(fix.body)) +
+                           ": the ramp of this displacement is zero during the whole run, so it moves nothing"});
     }
   }
 }
@@ -358,8 +369,8 @@ bool is_loaded(const Model& model) {
          std::any_of(model.rigids.begin(), model.rigids.end(), moves);
 }
 
-std::vector<std::string> doubts(const Model& model, const RunSettings& settings, bool are_shells_chosen) {
-  std::vector<std::string> found;
+std::vector<Warning> doubts(const Model& model, const RunSettings& settings, bool are_shells_chosen) {
+  std::vector<Warning> found;
   std::vector<std::vector<std::array<bool, 6>>> held;
   for (std::size_t b = 0; b < model.shells.size(); ++b) {
     const ShellBody& body = model.shells[b];
@@ -369,7 +380,8 @@ std::vector<std::string> doubts(const Model& model, const RunSettings& settings,
     }
     held.push_back(held_freedoms(model, b));
     if (cannot_move(model, b, held.back())) {
-      found.push_back(at(body.said_at, body.name) + ": all its nodes are held, so nothing of it can move");
+      found.push_back({Weight::major, "held altogether",
+                       at(body.said_at, body.name) + ": all its nodes are held, so nothing of it can move"});
     }
   }
   for (std::size_t b = model.shells.size(); b < model.body_count(); ++b) {
@@ -378,15 +390,16 @@ std::vector<std::string> doubts(const Model& model, const RunSettings& settings,
   doubt_loads(model, settings, held, found);
   for (const Contact& contact : model.contacts) {
     if (!contact.consistent) {
-      found.push_back(at(contact.said_at, contact.name) +
-                      ": transfer = \"paper\" spreads forces by the paper's rule, which is not in balance");
+      found.push_back({Weight::minor, "the paper's transfer",
+                       at(contact.said_at, contact.name) +
+                           ": transfer = \"paper\" spreads forces by the paper's rule, which is not in balance"});
     }
   }
   const bool needs_load =
       std::holds_alternative<StaticRun>(settings.kind) || std::holds_alternative<DynamicRun>(settings.kind);
   if (needs_load && !is_loaded(model) && !is_imaged_under_pressure(model)) {
     const std::string& place = model.shells.empty() ? model.solids.front().said_at : model.shells.front().said_at;
-    found.push_back(at(place, "nothing loads the model, so it stays as it is: add a load"));
+    found.push_back({Weight::minor, "no load", at(place, "nothing loads the model, so it stays as it is: add a load")});
   }
   return found;
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "tunica/core/warning.hpp"
 #include "tunica/mechanics/model/model.hpp"
 
 #include <string>
@@ -20,7 +21,7 @@ bool is_loaded(const Model& model);
 /// the run, or jump within a step; nothing that loads at all (static and dynamic runs). The model must have passed
 /// check_model(). Cost: linear.
 /// @param are_shells_chosen  for an accuracy: its estimate says more of them than their shape
-std::vector<std::string> doubts(const Model& model, const RunSettings& settings, bool are_shells_chosen = false);
+std::vector<Warning> doubts(const Model& model, const RunSettings& settings, bool are_shells_chosen = false);
 
 struct Curvature {
   double largest = 0;  ///< 1/mm, of the principal ones

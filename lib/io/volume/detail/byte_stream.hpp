@@ -1,5 +1,6 @@
 #pragma once
 
+#include "tunica/core/warning.hpp"
 #include "tunica/io/file/output_file.hpp"
 
 #include <cstdint>
@@ -35,7 +36,7 @@ public:
   std::uint64_t skip(std::uint64_t size);
 
   /// Called after the last voxel: checks that a compressed stream is whole, and warns of bytes that follow.
-  void finish(std::vector<std::string>& warnings);
+  void finish(std::vector<Warning>& warnings);
 
   /// Bytes delivered or skipped so far.
   [[nodiscard]] std::uint64_t position() const { return position_; }
