@@ -100,7 +100,7 @@ class Rules(WithStubs):
         self.assertIn(str(self.out / "chart.svg"), done.stdout)
         self.assertIn("<svg", (self.out / "chart.svg").read_text())
         self.assertIn("a/3", (self.out / "cohort.tsv").read_text())
-        self.assertIn("columns", json.loads((self.out / "cohort.json").read_text()))
+        self.assertIn("stress_p99_kpa", json.loads((self.out / "cohort.json").read_text()))
         self.assertIn(f"report: {self.out / 'report.html'}", done.stdout)
         self.assertIn("surface.ply: ", (self.out / "report.html").read_text(), "the stub's files are no meshes: told")
 
