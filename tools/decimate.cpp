@@ -26,6 +26,7 @@ struct Arguments {
   std::optional<std::string> triangles;
   std::optional<LengthTolerance> max_error;
   std::optional<std::string> min_angle;
+  bool soft_angle = false;
   bool repair = false;
   std::optional<std::string> mesh_unit;
 };
@@ -49,6 +50,8 @@ void declare(cli::Tool& tool, Arguments& given) {
          "well-shaped triangles for a larger error: no angle below DEG degrees (e.g. 20, at most 40; 0: any) but "
          "where IN's own corners are sharper; exit code 4 when that cannot be held")
       ->type_name("DEG");
+  app.add_flag("--soft-angle", given.soft_angle,
+               "where --min-angle cannot be held, take the best mesh with a warning in place of exit code 4");
   tool.group("Input");
   app.add_flag(
       "--repair", given.repair,
@@ -135,7 +138,7 @@ std::optional<std::string> what_failed(const Arguments& given, const DecimateRes
         "--max-error; allow more error",
         result.longest_spike);
   }
-  if (!result.error_kept && wanted_angle(given)) {
+  if (!result.error_kept && wanted_angle(given) && !given.soft_angle) {
     return fmt::format(
         "no mesh was found that keeps both --max-error and --min-angle ({:.3g} mm at {:.3g} degrees); "
         "allow more error or smaller angles",
@@ -145,7 +148,7 @@ std::optional<std::string> what_failed(const Arguments& given, const DecimateRes
     return fmt::format("the error asked for by --max-error is below what double precision can certify ({:.3g} mm)",
                        result.error->upper);
   }
-  if (!result.angle_held) {
+  if (!result.angle_held && !given.soft_angle) {
     return fmt::format(
         "the smallest angle that could be reached{} is {:.3g} degrees; lower --min-angle or allow more {}",
         given.max_error ? " within the error" : "", angle, given.max_error ? "error" : "triangles");
@@ -178,7 +181,13 @@ DecimateResult decimated(cli::Tool& tool, const Arguments& given, const Triangle
   }
   options.progress = tool.progress("decimate");
   try {
-    return decimate(mesh, options);
+    DecimateResult made = decimate(mesh, options);
+    if (given.soft_angle && options.min_angle && !(made.error_kept && made.count_reached)) {
+      const double wish = *std::exchange(options.min_angle, std::nullopt);  // what else is asked for goes before
+      made = decimate(mesh, options);
+      made.angle_held = min_angle_degrees(made.mesh) >= wish;
+    }
+    return made;
   } catch (const InputError& error) {
     throw InputError(fmt::format("{}: {}", given.in.string(), error.what()));
   }
@@ -205,10 +214,10 @@ void tell(cli::Tool& tool, const Arguments& given, const Coarse& coarse, std::si
   const auto min_angle = wanted_angle(given);
   warn_of_changes(tool, given.in, coarse.made, degenerate);
   if (min_angle && coarse.angle < *min_angle) {
-    tool.warn(
-        {Weight::minor, "narrow angles",
-         fmt::format("the smallest angle is {:.3g} degrees, below --min-angle: {}", coarse.angle,
-                     coarse.made.angle_held ? "there IN's own corners are sharper" : "no better mesh was found")});
+    tool.warn({Weight::minor, "narrow angles",
+               fmt::format("the smallest angle is {:.3g} degrees, below --min-angle: {}", coarse.angle,
+                           coarse.made.angle_held ? "there IN's own corners are sharper"
+                                                  : "no better mesh was found, allow more triangles")});
   }
   const Interval &mm = coarse.distance, percent{100 * mm.lower / coarse.diagonal, 100 * mm.upper / coarse.diagonal};
   tool.result() = {

@@ -68,7 +68,7 @@ def stage_flags(case):
     shells = setting("SHELLS") or ("190" if setting("ACCURACY") else "800")
     decimate = ["--triangles", shells]
     if not re.search(r"--min-angle\b", setting("DECIMATE")):
-        decimate += ["--min-angle", "20"]  # needles would bend too stiffly
+        decimate += ["--min-angle", "20", "--soft-angle"]  # needles would bend too stiffly
     relax = flag("--tolerance", setting("TOLERANCE")) + ["--refine"] if setting("TOLERANCE") else []
     if setting("ACCURACY"):
         relax = ["--shells", shells, "--max-iterations", "1"]  # the coarsest of the levels, near enough to be refitted

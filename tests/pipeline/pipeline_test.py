@@ -109,7 +109,7 @@ class Rules(WithStubs):
                   METHOD="barycentre", THREADS=3, FIX="below z=-10mm", EXTRACT="--frame 2", **LOAD)
         extract, decimate, relax, simulate = self.calls()
         self.assertIn("--label 3 --smooth none --open-border --frame 2 --threads 3", extract)
-        self.assertIn("--triangles 123 --min-angle 20 --threads", decimate)
+        self.assertIn("--triangles 123 --min-angle 20 --soft-angle --threads", decimate)
         self.assertIn("--tolerance 0.5% --refine --method barycentre", relax)
         self.assertIn("--fix below z=-10mm --pressure 1kPa --young 1MPa --poisson 0.45 --thickness 1.5mm --static",
                       simulate)
@@ -141,7 +141,7 @@ class Rules(WithStubs):
     def test_an_accuracy_chooses_the_shells(self):
         self.make(VOLUMES="a.nii.gz", LABEL=3, ACCURACY="2%", OF="energy", **LOAD)
         _, decimate, relax, simulate = self.calls()
-        self.assertIn("--triangles 190 --min-angle 20", decimate)
+        self.assertIn("--triangles 190 --min-angle 20 --soft-angle", decimate)
         self.assertIn("--shells 190 --max-iterations 1", relax)
         self.assertIn("--accuracy 2% --of energy", simulate)
         folder = self.out / "a" / "3"
@@ -168,7 +168,7 @@ class Rules(WithStubs):
         extract, decimate, relax, simulate = self.calls()
         self.assertIn("--isovalue=-0.5 --smooth staircase --largest --fill-cavities", extract)
         self.assertNotIn("--open-border", extract)
-        self.assertIn("--triangles 800 --min-angle 20 ", decimate)
+        self.assertIn("--triangles 800 --min-angle 20 --soft-angle ", decimate)
         self.assertNotIn("--tolerance", relax)
         self.assertTrue((self.out / "a" / "iso-0.5" / "result.hdf").exists())
 

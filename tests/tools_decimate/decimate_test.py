@@ -104,6 +104,11 @@ class Decimate(WholeTool):
         self.assertIs(report["result"]["min_angle_held"], False)
         self.assertTrue(self.exists("out.ply.part"))
         self.assertFalse(self.exists("out.ply"))
+        wish = self.run_tool("in.ply", "out.ply", "--triangles", 2, "--min-angle", 20, "--soft-angle", "--force")
+        self.assertEqual((wish["result"]["min_angle_deg"], wish["result"]["min_angle_held"]), (angle, False))
+        self.assertIn("no better mesh was found", wish["warnings"][0])
+        within = self.run_tool("in.ply", "out.ply", "--max-error", "1e-6mm", "--min-angle", 20, "--soft-angle", "--force")["result"]
+        self.assertLessEqual(within["hausdorff_mm"]["upper"], 1e-6)
 
     @unittest.skipUnless(os.path.isdir(os.path.join(DATA, "meshes")), "the real meshes are absent: skipped")
     def test_min_angle_on_real_organs(self):
