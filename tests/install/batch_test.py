@@ -2,6 +2,7 @@
 """tunica-batch of an installed tree that was moved, without the repository: usage, a cohort to its end, what it refuses."""
 
 import os
+import re
 import shutil
 import subprocess
 import tempfile
@@ -47,6 +48,31 @@ class Batch(unittest.TestCase):
             self.assertIn(f"\\fB{word}\\fR", page)
             self.assertIn(word, self.batch("-h").stdout)
 
+    def complete(self, *words):
+        """What bash offers for the last word."""
+        script = self.prefix / "share" / "bash-completion" / "completions" / "tunica-batch"
+        quoted = " ".join(f"'{word}'" for word in ("tunica-batch", *words))
+        lines = [f". {script}", f"COMP_WORDS=({quoted})", f"COMP_CWORD={len(words)}", "_tunica_batch",
+                 'printf "%s\\n" "${COMPREPLY[@]}"']
+        done = subprocess.run(["bash", "-c", "\n".join(lines)], capture_output=True, text=True, check=True, cwd=self.folder)
+        self.assertEqual(done.stderr, "")
+        return done.stdout.split()
+
+    def test_completion_knows_variables_and_values(self):
+        offered = {word[:-1] for word in self.complete("") if word.endswith("=")}
+        told = self.batch("help").stdout.split("of the target charts")[0]
+        known = {name for line in told.splitlines() for name in re.findall(r"\b[A-Z_]{2,}\b", line.split("  ")[0])
+                 if "  of `" not in line}
+        self.assertEqual(offered, known - {"BIN", "BALLOON"} | {"LABEL"})
+        self.assertEqual(self.complete("PR"), ["PRESSURE="])
+        self.assertEqual(self.complete("-k", "--v"), ["--version"])
+        self.assertEqual(self.complete("KIND", "="), ["static", "dynamic"])
+        self.assertEqual(self.complete("KIND", "=", "dy"), ["dynamic"])
+        self.assertEqual(self.complete("KIND=dy"), ["KIND=dynamic"])
+        self.assertEqual(self.complete("-j4", "OPEN", "=", ""), ["0", "1"])
+        self.assertIn("organ.nii.gz", self.complete("VOLUMES", "=", "org"))
+        self.assertEqual(self.complete("PRESSURE", "=", ""), [])
+
     def test_a_cohort_runs_to_its_end(self):
         (self.folder / "organ.tsv").write_text("index\tname\n1\tbladder\n")
         (self.folder / "cases.tsv").write_text("case\tvolume\tlabel\tpressure\np1\torgan.nii.gz\tbladder\t\n"
@@ -71,7 +97,7 @@ class Batch(unittest.TestCase):
             self.assertEqual(done.returncode, 2)
             self.assertIn(f"{goal}: needs tunica's source", done.stderr)
         self.assertIn("VOLUMES LABELS PRESSURE YOUNG POISSON THICKNESS not given", self.batch("-j2").stderr)
-        self.assertIn("no such variable: PRESURE", self.batch("PRESURE=1kPa").stderr)
+        self.assertIn("no such variable: PRESURE: did you mean PRESSURE?", self.batch("PRESURE=1kPa").stderr)
 
     def test_without_make(self):
         tools = self.folder / "few"

@@ -751,17 +751,23 @@ class Runs(WithStubs):
         self.assertIn("-j2", flags)
         self.assertNotIn("jobserver", flags)
 
-    def test_a_stopped_run_says_so_and_leaves_nothing_at_work(self):
-        run = self.start("-j2", environment={"STUB_SECONDS": "1000"}, **self.ARGUMENTS)
-        self.wait_for(2)
-        os.kill(run.pid, signal.SIGTERM)
-        stdout, stderr = run.communicate(timeout=100)
-        self.assertNotEqual(run.returncode, 0)
-        with open(self.out / ".lock") as file:
-            fcntl.flock(file, fcntl.LOCK_EX)  # the last process of the run has ended
-        self.assertNotIn("Traceback", stderr)
-        self.assertNotIn("done", stdout)
-        self.assertEqual({row["message"] for row in self.summary().values()}, {"stopped while it ran", "not run"})
+    def test_a_stopped_run_says_so_leaves_nothing_at_work_and_goes_on(self):
+        for stop in (lambda run: os.kill(run.pid, signal.SIGTERM), lambda run: os.killpg(run.pid, signal.SIGINT)):
+            run = self.start("-j2", environment={"STUB_SECONDS": "1000"}, **self.ARGUMENTS)
+            self.wait_for(2)
+            stop(run)
+            stdout, stderr = run.communicate(timeout=100)
+            self.assertNotEqual(run.returncode, 0)
+            with open(self.out / ".lock") as file:
+                fcntl.flock(file, fcntl.LOCK_EX)  # the last process of the run has ended
+            self.assertNotIn("Traceback", stderr)
+            self.assertNotIn("done", stdout)
+            self.assertEqual({row["message"] for row in self.summary().values()}, {"stopped while it ran", "not run"})
+            for busy in self.out.rglob("*.busy"):  # of a stub that was stopped
+                busy.rmdir()
+            self.calls()
+        self.assertEqual(self.make("-j2", **self.ARGUMENTS).returncode, 0)
+        self.assertEqual([row["message"] for row in self.summary().values()], ["done"] * 4)
 
     def test_what_an_earlier_run_did_is_not_told(self):
         self.make("-k", environment={"STUB_FAIL": "relax/b/1"}, **self.ARGUMENTS)
