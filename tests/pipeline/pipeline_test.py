@@ -126,9 +126,9 @@ class Rules(WithStubs):
         for flags in ((), ("-e",)):
             done = self.make(*flags, VOLUMES="a.nii.gz", LABELS=1, environment=shell, **LOAD)
             self.assertEqual(done.returncode, 0, done.stderr)
-            self.assertEqual(done.stderr.count("pipeline: not taken from the environment: "), 1)
+            self.assertEqual(done.stderr.count("pipeline: exported shell variables are not used: "), 1)
             for name in shell.keys() - {"OUT", "BIN"}:
-                self.assertRegex(done.stderr, rf"environment: .*\b{name}\b.*: give make")
+                self.assertRegex(done.stderr, rf"not used: .*\b{name}\b.*: a setting stands")
             if not flags:
                 extract, _, relax, simulate = self.calls()
         self.assertEqual(self.calls(), [])
