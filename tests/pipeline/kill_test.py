@@ -39,7 +39,7 @@ def content(path):
     data = path.read_bytes()
     if path.suffix == ".json":
         return json.dumps(without_times(json.loads(data)), sort_keys=True)
-    if path.name == "summary.tsv":
+    if path.suffix == ".tsv":
         rows = csv.DictReader(io.StringIO(data.decode()), delimiter="\t", quoting=csv.QUOTE_NONE)
         return json.dumps(sorted(json.dumps(without_times(row)) for row in rows))
     if path.suffix in (".html", ".svg"):
