@@ -210,10 +210,11 @@ def read_rows(path):
         lines = [(reader.line_num, [cell.strip() for cell in line]) for line in reader]
     except csv.Error:
         raise Refused(f"{path}: is no table of text: its columns are separated by tabs, ';' or ','") from None
-    lines = [(number, line) for number, line in lines if any(line) and not line[0].startswith("#")]
+    lines = [(number, line) for number, line in lines if any(line) and not line[0].startswith("#") and line[0] != "sep="]
     if not lines:
         raise Refused(f"{path}: is empty: its first line names the columns, such as case, volume, label, pressure")
-    columns = [check_column(path, lines[0][1], name) for name in lines[0][1]]
+    heads = lines[0][1][:max(at for at, head in enumerate(lines[0][1], 1) if head)]  # spreadsheets add blank ones
+    columns = [check_column(path, heads, name) for name in heads]
     rows = []
     for number, line in lines[1:]:
         if any(line[len(columns):]):
