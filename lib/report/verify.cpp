@@ -138,6 +138,9 @@ void find_unclaimed(const PipelineCase& one, const std::string& stage, Strings& 
 
 Strings differences(const PipelineCase& one) {
   Strings found;
+  if (one.folder.empty()) {  // it was refused before any file was made
+    return found;
+  }
   for (const char* stage : pipeline_stages) {
     find_unclaimed(one, stage, found);
     compare_outputs(one, stage, found);
