@@ -10,49 +10,52 @@ ifeq ($(THREADS),)
 endif
 
 .PHONY: all
-.DELETE_ON_ERROR:
 .SUFFIXES:
-all: $(cases:=/done)
+all: $(cases:=/simulate.done)
 
-# A tool that is missing is no error of make: a dry run may come before the build.
-bin/%: ;
-
+# What each stage leaves beside its report; with ACCURACY simulate leaves refined.ply, too.
 files_extract := surface.ply
 files_decimate := coarse.ply
 files_relax := shell.ply map.png
-files_simulate := result.hdf picture.png refined.ply
+files_simulate := result.hdf picture.png
 from_simulate := simulate
 from_relax := relax $(from_simulate)
 from_decimate := decimate $(from_relax)
 from_extract := extract $(from_decimate)
 
-# $(call stage,case,stage): removes what this stage and the later ones left, notes what this one depends on and when it
-# began, runs the command where the user stands, and keeps its exit code: none is left by one that was killed.
+# $(call stage,case,stage): removes what this stage and the later ones left, notes what this one depends on, runs the
+# command where the user stands, and keeps its exit code: none is left by one that was killed. Done is what left its files
+# and a good report; looking into the folder first shows what another machine wrote there.
 define stage
 	@echo '$(1): $(2)' || :
-	@: > $(1)/$(2).exit; rm -f $(foreach later,$(from_$(2)),$(addprefix $(1)/out/,$(files_$(later)) $(later).json \
-	  $(later).log .$(later).flags)) && cp $(1)/$(2).flags $(1)/out/.$(2).flags
+	@: > $(1)/$(2).exit; rm -f $(1)/out/refined.ply $(foreach later,$(from_$(2)),$(addprefix $(1)/out/,$(files_$(later)) \
+	  $(later).json $(later).log .$(later).flags)) && cp $(1)/$(2).flags $(1)/out/.$(2).flags
 	@( cd "$$TUNICA_FROM" && $(RUN) $(file < $(1)/$(2).command) --threads $(THREADS) ) 2> $(1)/out/$(2).log; code=$$?; \
-	  echo $$code > $(1)/$(2).exit; [ $$code = 0 ] || cat $(1)/out/$(2).log >&2; exit $$code
+	  ls $(1)/out/ > /dev/null; \
+	  if [ $$code = 0 ] && ! { $(foreach file,$(files_$(2)),[ -s $(1)/out/$(file) ] &&) \
+	    grep -q '^  "ok": true' $(1)/out/$(2).json 2> /dev/null; }; then code=1; \
+    echo 'tunica-$(2): ended with exit code 0, but without $(files_$(2)) and a good report: look at RUN and at its flags' \
+      >> $(1)/out/$(2).log; fi; \
+  echo $$code > $(1)/$(2).exit; [ $$code = 0 ] || \
+    { cat $(1)/out/$(2).log >&2; rm -f $(addprefix $(1)/out/,$(files_$(2))); exit $$code; }
+	@: > $(1)/$(2).done
 endef
 
-# $(call rules,case)
+# $(call rules,case): the chain. No times are compared: a stage is run unless its mark is there, which tools/pipeline.py
+# leaves where all that went into the stage, and its files, are what its report says.
 define rules
-$(addprefix $(1)/out/,surface.ply coarse.ply shell.ply result.hdf): MEM := $$(file < $(1)/mem)
+$(addprefix $(1)/,extract.done decimate.done relax.done simulate.done): MEM := $$(file < $(1)/mem)
 
-$(1)/done: $(1)/out/result.hdf
-	@touch $$@
-
-$(1)/out/surface.ply: $(1)/extract.flags bin/tunica-extract
+$(1)/extract.done:
 	$$(call stage,$(1),extract)
 
-$(1)/out/coarse.ply: $(1)/out/surface.ply $(1)/decimate.flags bin/tunica-decimate
+$(1)/decimate.done: | $(1)/extract.done
 	$$(call stage,$(1),decimate)
 
-$(1)/out/shell.ply: $(1)/out/coarse.ply $(1)/relax.flags bin/tunica-relax
+$(1)/relax.done: | $(1)/decimate.done
 	$$(call stage,$(1),relax)
 
-$(1)/out/result.hdf: $(1)/out/shell.ply $(1)/simulate.flags bin/tunica-simulate
+$(1)/simulate.done: | $(1)/relax.done
 	$$(call stage,$(1),simulate)
 endef
 $(foreach case,$(cases),$(eval $(call rules,$(case))))

@@ -3,12 +3,14 @@
 import csv
 import difflib
 import glob
+import io
 import os
 import re
 import shlex
+import sys
 
 ENDINGS = (".seg.nrrd", ".nii.gz", ".nii", ".nrrd", ".nhdr", ".mha", ".mhd", ".tiff", ".tif", ".png")
-OF_THE_RUN = (".lock", ".run", ".cases", "summary.tsv", "chart.svg", "report.html")
+OF_THE_RUN = (".lock", ".run", ".cases", "summary.tsv", "cohort.tsv", "cohort.json", "chart.svg", "report.html")
 BLANKS = re.compile(r"\s+", re.ASCII)
 CONTROL = re.compile(r"[\x00-\x1f\x7f]")
 
@@ -17,6 +19,7 @@ IMAGE = ("IMAGED_AT", "MID_SURFACE")
 MOTION = ("DENSITY", "DURATION", "STEP")
 WITH_UNIT = {"PRESSURE": "80mmHg", "YOUNG": "1MPa", "THICKNESS": "1.5mm", "DENSITY": "1100kg/m3", "IMAGED_AT": "80mmHg",
              "DURATION": "1s", "STEP": "10ms"}
+NUMBERS = (*WITH_UNIT, "POISSON", "TOLERANCE", "ACCURACY", "ISOVALUE", "SMOOTH", "SHELLS", "LOAD_STEPS")
 FURTHER = ("EXTRACT", "DECIMATE", "RELAX", "SIMULATE")
 SWITCHES = ("LARGEST", "FILL", "OPEN")
 ON, OFF = ("1", "yes", "on", "true"), ("", "0", "no", "off", "false")
@@ -61,8 +64,11 @@ def setting(name):
     return one_line(os.environ.get(name, ""))
 
 
-def is_megabytes(text):
-    return re.fullmatch(r"[0-9]{0,10}", text, re.ASCII) is not None
+def say(text):
+    try:
+        print(f"pipeline: {text}", file=sys.stderr, flush=True)
+    except OSError:
+        pass  # words that cannot be said do not end a run
 
 
 def shown(name):
@@ -130,11 +136,16 @@ def name_volumes(volumes):
     return names
 
 
+def is_of_the_run(name):
+    """Whether files of the run are called so, or what they are called while they are written."""
+    return re.sub(r"\.part.*", "", name) in OF_THE_RUN
+
+
 def unfit(volume, name):
     """Why no case can be made of a volume, or None."""
     if CONTROL.search(volume):
         return f"{shown(volume)}: has a control character in its name: rename the file or link to it"
-    if name in ("", ".", "..", *OF_THE_RUN):
+    if name in ("", ".", "..") or is_of_the_run(name):
         return f"{volume}: its results cannot be called '{name}' in OUT: rename the file or link to it"
     return None
 
@@ -169,16 +180,36 @@ class Row:
         self.cells = cells
 
 
-def read_rows(path):
-    """The lines of the table. Errors: Refused: unreadable, no text, columns that are not known or twice there."""
+def text_of(path):
+    """A table as spreadsheets save it: UTF-8, UTF-16, or, where it is no UTF-8, the Windows code page of western Europe."""
     try:
-        with open(path, encoding="utf-8-sig", newline="") as file:
-            reader = csv.reader(file, delimiter="\t")
-            lines = [(reader.line_num, [cell.strip() for cell in line]) for line in reader]
+        with open(path, "rb") as file:
+            data = file.read()
     except OSError as error:
         raise Refused(f"{path}: {error.strerror}") from None
-    except (UnicodeDecodeError, csv.Error):
-        raise Refused(f"{path}: is no table of text with tabs between its columns") from None
+    encodings = ["utf-16"] if data[:2] in (b"\xff\xfe", b"\xfe\xff") else ["utf-16-le"] if data[1:2] == b"\0" else \
+        ["utf-8-sig", "cp1252"]
+    for encoding in encodings:
+        try:
+            text = data.decode(encoding)
+        except UnicodeDecodeError:
+            continue
+        if encoding == "cp1252":
+            say(f"{path}: is no UTF-8: read as Windows-1252 (Latin-1); if names look wrong, save it as UTF-8")
+        return text
+    raise Refused(f"{path}: is no table of text in UTF-8, UTF-16 or Windows-1252: save it as UTF-8")
+
+
+def read_rows(path):
+    """The lines of the table. Errors: Refused: unreadable, no text, columns that are not known or twice there."""
+    text = text_of(path)
+    head = next((line for line in text.splitlines() if line.strip() and not line.startswith("#")), "")
+    separator = next((sign for sign in "\t;," if sign in head), "\t")
+    try:
+        reader = csv.reader(io.StringIO(text, newline=""), delimiter=separator)
+        lines = [(reader.line_num, [cell.strip() for cell in line]) for line in reader]
+    except csv.Error:
+        raise Refused(f"{path}: is no table of text: its columns are separated by tabs, ';' or ','") from None
     lines = [(number, line) for number, line in lines if any(line) and not line[0].startswith("#")]
     if not lines:
         raise Refused(f"{path}: is empty: its first line names the columns, such as case, volume, label, pressure")
@@ -186,7 +217,8 @@ def read_rows(path):
     rows = []
     for number, line in lines[1:]:
         if any(line[len(columns):]):
-            raise Refused(f"{path}:{number}: has {len(line)} cells, the table has {len(columns)} columns")
+            hint = "" if separator == "\t" else f": a cell with '{separator}' in it stands between quotation marks"
+            raise Refused(f"{path}:{number}: has {len(line)} cells, the table has {len(columns)} columns{hint}")
         rows.append(Row(f"{path}:{number}", {name: cell for name, cell in zip(columns, line) if cell}))
     if not rows:
         raise Refused(f"{path}: has columns but no case")
@@ -197,8 +229,6 @@ def check_column(path, heads, head):
     """The variable of a column. Errors: Refused."""
     name = head.upper()
     known = ["CASE", "VOLUME", *OF_A_CASE]
-    if len(heads) == 1 and re.search(r"[,;]", head):
-        raise Refused(f"{path}: its columns are to be separated by tabs: save the table as TSV")
     if name in OF_A_RUN:
         raise Refused(f"{path}: {head} is the same for a whole run: give {name} to make")
     if name not in known:
@@ -224,22 +254,23 @@ def own_settings(row, folder):
                 own.update({name: "" for name in other if name != "LABEL"})
     if "NAMES" in own:
         own["NAMES"] = os.path.join(folder, os.path.expanduser(own["NAMES"]))
-    problems += misspelt_switches(lambda name: own.get(name, ""), str.lower)
-    if not is_megabytes(own.get("MEM", "")):
-        problems.append(f"mem: '{shown(own['MEM'])}' is no number of megabytes")
+    return own, problems + misspelt(lambda name: own.get(name, ""), str.lower)
+
+
+def misspelt(value_of, called):
+    """What no tool could mean, of make or of a line of a table, by words. What a spreadsheet writes, FALSE, is off."""
+    wrong = [f"{called(name)}: '{shown(value_of(name))}' is not understood: 1 or 0" for name in SWITCHES
+             if value_of(name).lower() not in ON + OFF]
+    wrong += [f"{called(name)}: '{shown(value_of(name))}' has a comma: write {shown(value_of(name)).replace(',', '.', 1)}, and "
+              "thousands without a sign" for name in NUMBERS if re.match(r"[-+]?[0-9]+,[0-9]", value_of(name))]
+    if not re.fullmatch(r"[0-9]{0,10}", value_of("MEM"), re.ASCII):
+        wrong.append(f"{called('MEM')}: '{shown(value_of('MEM'))}' is no number of megabytes")
     for name in FURTHER:
         try:
-            # A make variable is the user's own command line; a table may come from elsewhere: its cells are words.
-            own.update({name: shlex.join(shlex.split(own[name]))} if name in own else {})
+            shlex.split(value_of(name))
         except ValueError:
-            problems.append(f"{name.lower()}: a quotation mark is not closed")
-    return own, problems
-
-
-def misspelt_switches(value_of, called):
-    """Switches that are neither on nor off, by words. What a spreadsheet writes, FALSE, is off."""
-    return [f"{called(name)}: '{shown(value_of(name))}' is not understood: 1 or 0" for name in SWITCHES
-            if value_of(name).lower() not in ON + OFF]
+            wrong.append(f"{called(name)}: a quotation mark is not closed")
+    return wrong
 
 
 def misstated():
@@ -247,7 +278,9 @@ def misstated():
     failed case, and no other one's."""
     wrong = [f"{name}: '{setting(name)}' has no unit: write one, as in {example}" for name, example in WITH_UNIT.items()
              if re.fullmatch(r"[-+]?[0-9.]+(e[-+]?[0-9]+)?", setting(name), re.I)]
-    wrong += misspelt_switches(setting, str)
+    wrong += misspelt(setting, str)
+    if not re.fullmatch(r"([1-9][0-9]{0,4})?", setting("THREADS"), re.ASCII):
+        wrong.append(f"THREADS: '{shown(setting('THREADS'))}' is no number of threads")
     if setting("MID_SURFACE") not in ("", "outer", "inner"):
         wrong.append(f"MID_SURFACE: '{shown(setting('MID_SURFACE'))}' is not understood: outer or inner")
     return wrong
@@ -286,7 +319,7 @@ def cases_of_table(path, out):
         name = row.cells.get("CASE", names.get(volume, ""))
         if "VOLUME" not in row.cells:
             wrong.append("volume not given: the path of a segmented volume, from the table's folder")
-        elif "CASE" in row.cells and (not is_folder_name(name) or name in OF_THE_RUN):
+        elif "CASE" in row.cells and (not is_folder_name(name) or is_of_the_run(name)):
             wrong.append(f"case: '{shown(name)}' cannot be the name of a folder of OUT: it is blank, '.' or '..', has a '/' or a "
                          "control character, or is a file of the run")
         labels = ["iso" + own["ISOVALUE"]] if own.get("ISOVALUE") else [row.cells["LABEL"]] if "LABEL" in row.cells \
@@ -311,8 +344,6 @@ def cases_of_table(path, out):
 
 def find_cases(out):
     """All cases of the run. Errors: Refused."""
-    if not is_megabytes(setting("MEM")):
-        raise Refused(f"MEM: '{shown(setting('MEM'))}' is no number of megabytes")
     if wrong := misstated():
         raise Refused(*wrong)
     if setting("CASES"):

@@ -44,9 +44,10 @@ void declare(cli::Tool& tool, Arguments& given) {
   app.add_option("--mesh-unit", given.mesh_unit, "unit of mesh files that do not state one: mm, cm, m or um")
       ->type_name("mm|cm|m|um");
   tool.group("How far");
-  app.add_option("--min-angle", given.min_angle,
-                 "well-shaped triangles for a larger error: no angle below DEG degrees (e.g. 20, at most 40) but where "
-                 "IN's own corners are sharper; exit code 4 when that cannot be held")
+  app.add_option(
+         "--min-angle", given.min_angle,
+         "well-shaped triangles for a larger error: no angle below DEG degrees (e.g. 20, at most 40; 0: any) but "
+         "where IN's own corners are sharper; exit code 4 when that cannot be held")
       ->type_name("DEG");
   tool.group("Input");
   app.add_flag(
@@ -74,11 +75,10 @@ std::optional<double> wanted_angle(const Arguments& given) {
     return std::nullopt;
   }
   const auto number = parse_number(*given.min_angle);
-  if (!number || !(*number > 0 && *number <= 40)) {
-    throw UsageError(
-        fmt::format("--min-angle: '{}' is not a number of degrees above 0 and at most 40", *given.min_angle));
+  if (!number || !(*number >= 0 && *number <= 40)) {
+    throw UsageError(fmt::format("--min-angle: '{}' is not a number of degrees from 0 to 40", *given.min_angle));
   }
-  return number;
+  return *number > 0 ? number : std::nullopt;
 }
 
 MeshFile read_surface(const fs::path& path, const std::optional<double>& unit_mm, bool require_unit,
@@ -135,7 +135,7 @@ std::optional<std::string> what_failed(const Arguments& given, const DecimateRes
         "--max-error; allow more error",
         result.longest_spike);
   }
-  if (!result.error_kept && given.min_angle) {
+  if (!result.error_kept && wanted_angle(given)) {
     return fmt::format(
         "no mesh was found that keeps both --max-error and --min-angle ({:.3g} mm at {:.3g} degrees); "
         "allow more error or smaller angles",

@@ -6,10 +6,11 @@ called by a harmless name, with
   out              a link to the case's own folder, OUT/<volume stem>/<label>
   mem              its MEM, or what stands for it in RUN
   STAGE.command    the command of the stage, its words quoted for the shell
-  STAGE.flags      what its result depends on besides the files make sees; as old as can be when that has not changed
+  STAGE.flags      what its result depends on besides the files that its report names
   STAGE.exit       the exit code of the stage in this run; empty while it runs
-  done             there when every stage is up to date
-and cases.mk, run in OUT/.run, knows the rest. Settings are environment variables, set by Makefile.pipeline.
+  STAGE.done       there when the stage is up to date
+and cases.mk, run in OUT/.run, knows the rest. What is up to date is decided by content: times lie, those of packages, copies
+and other machines. Settings are environment variables, set by Makefile.pipeline.
 
 OUT/.lock is held, by a descriptor that every process of the run inherits, from the planning until the last of them has
 ended: runs on one OUT come one after the other, also after a kill that left some of their processes.
@@ -19,6 +20,8 @@ import argparse
 import copy
 import errno
 import fcntl
+import functools
+import glob
 import hashlib
 import json
 import os
@@ -30,11 +33,12 @@ import subprocess
 import sys
 import tempfile
 
-from cases import CONTROL, SWITCHES, Refused, find_cases
+from cases import CONTROL, SWITCHES, Refused, find_cases, say, stem_of
 
 STAGES = ("extract", "decimate", "relax", "simulate")
 PRODUCTS = {"extract": ["surface.ply"], "decimate": ["coarse.ply"], "relax": ["shell.ply", "map.png"],
             "simulate": ["result.hdf", "picture.png"]}
+TABLES = (".tsv", ".csv", ".txt", ".json", ".xml", ".ctbl", ".label", ".lut")  # of label names, beside a volume
 REFINED = "refined.ply"  # with ACCURACY: the shells that carried the load
 
 
@@ -63,15 +67,16 @@ def stage_flags(case):
         extract += [word] if case.switched_on(name) else []
     shells = setting("SHELLS") or ("190" if setting("ACCURACY") else "800")
     decimate = ["--triangles", shells]
+    if not re.search(r"--min-angle\b", setting("DECIMATE")):
+        decimate += ["--min-angle", "20"]  # needles would bend too stiffly
     relax = flag("--tolerance", setting("TOLERANCE")) + ["--refine"] if setting("TOLERANCE") else []
     if setting("ACCURACY"):
-        # The coarsest of the levels: well shaped, and near enough to be refitted.
-        decimate += ["--min-angle", "20"]
-        relax = ["--shells", shells, "--max-iterations", "1"]
+        relax = ["--shells", shells, "--max-iterations", "1"]  # the coarsest of the levels, near enough to be refitted
     relax += flag_if("--method", "METHOD")
     if setting("MID_SURFACE"):
         relax += flag("--mid-surface", setting("MID_SURFACE")) + flag_if("--thickness", "THICKNESS")
-    simulate = flag_if("--fix", "FIX") + flag_if("--accuracy", "ACCURACY") + flag_if("--of", "OF")
+    simulate = [word for fix in setting("FIX").split(";") if fix.strip() for word in flag("--fix", fix.strip())]
+    simulate += flag_if("--accuracy", "ACCURACY") + flag_if("--of", "OF")
     for name in ("pressure", "young", "poisson", "thickness", "density"):
         simulate += flag_if("--" + name, name.upper())
     simulate += flag_if("--imaged-at", "IMAGED_AT")
@@ -80,7 +85,7 @@ def stage_flags(case):
     else:
         simulate += flag_if("--duration", "DURATION") + flag_if("--step", "STEP")
     words = {"extract": extract, "decimate": decimate, "relax": relax, "simulate": simulate}
-    return {stage: f"{shlex.join(words[stage])} {setting(stage.upper())}".strip() for stage in words}
+    return {stage: shlex.join(words[stage] + shlex.split(setting(stage.upper()))) for stage in words}
 
 
 def stage_commands(case, binaries, flags):
@@ -109,10 +114,12 @@ def stage_commands(case, binaries, flags):
 # --------------------------------------------------------------------------------------------------- what is refused
 
 def misused(command):
-    """What a tool says of flags that it does not take; "" when it takes them all."""
+    """What is wrong with a tool's flags: what it says of those that it does not take; "" when nothing is."""
     threads = flag("--threads", os.environ["THREADS"]) if os.environ.get("THREADS", "").strip() else []
     done = subprocess.run(["/bin/sh", "-c", f"{command} {shlex.join(threads)}"], stdin=subprocess.DEVNULL, check=False,
                           stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+    if done.returncode == 0:
+        return f"{os.path.basename(shlex.split(command)[0])}: one of its flags ends it before its work, as --help does: leave it out"
     said = os.fsdecode(done.stderr).strip().splitlines()
     return said[-1] if done.returncode == 2 and said else ""
 
@@ -165,6 +172,7 @@ def write_text(path, text):
         file.write(os.fsencode(text))
 
 
+@functools.cache
 def sha256(path):
     digest = hashlib.sha256()
     with open(path, "rb") as file:
@@ -173,42 +181,44 @@ def sha256(path):
     return digest.hexdigest()
 
 
-def file_told(told, case):
-    """The file that a report names: one whose name is no UTF-8 stands there with U+FFFD for its bytes."""
-    known = [case.volume, *(os.path.join(case.folder, name) for names in PRODUCTS.values() for name in names)]
-    return next((path for path in known if os.fsencode(path).decode("utf-8", "replace") == told), told)
-
-
-def changed_since(entry, case, start_ns):
-    """Whether an input named in a report is another one than at that time. A file that was moved here keeps its age, so
-    where only its entry is younger its content decides."""
+@functools.cache
+def identity(tool):
+    """What tells a tool from another one: its content and, since it may use a shared library, its version."""
     try:
-        path = file_told(entry["path"], case)
-        info = os.stat(path)
-        if info.st_mtime_ns >= start_ns:
-            return True
-        return info.st_ctime_ns >= start_ns and sha256(path) != entry["sha256"]
-    except IsADirectoryError:
-        return False  # the report names its files, too
-    except (OSError, KeyError, TypeError, ValueError):
-        return True
+        said = subprocess.run([tool, "--version"], stdin=subprocess.DEVNULL, capture_output=True, check=False).stdout
+        return f"{sha256(tool)} {os.fsdecode(said.partition(b' (')[0]).strip()}"
+    except OSError:
+        return "none"  # of a dry run before the build
+
+
+def around(volume):
+    """What an extraction depends on besides the files its report names: which slices a folder has, which tables of label
+    names lie beside the volume."""
+    try:
+        slices = sorted(os.listdir(volume)) if os.path.isdir(volume) else []
+        beginning = glob.escape(os.path.join(os.path.dirname(os.path.abspath(volume)), stem_of(volume)))
+        tables = sorted(path for path in glob.glob(beginning + "[._]*") if path.endswith(TABLES))
+        return [*slices, *((path, sha256(path)) for path in tables)]
+    except OSError:
+        return []
 
 
 def is_up_to_date(case, stage, remembered):
-    """Whether a stage left its files and a good report, had these flags, and read nothing that has changed since: the
-    report names all of that, data beside a header and slices of a folder too."""
-    try:
-        start_ns = os.stat(os.path.join(case.folder, f".{stage}.flags")).st_mtime_ns
-    except OSError:
-        return False
-    products = PRODUCTS[stage] + ([REFINED] if stage == "simulate" and case.setting("ACCURACY") else [])
-    if not all(os.path.isfile(os.path.join(case.folder, name)) for name in products):
+    """Whether a stage had these flags and left a good report, whose files, written and read, data beside a header and slices
+    of a folder too, are still the same."""
+    if read_text(os.path.join(case.folder, f".{stage}.flags")) != remembered:
         return False
     report = read_report(os.path.join(case.folder, f"{stage}.json"))
-    if read_text(os.path.join(case.folder, f".{stage}.flags")) != remembered or report.get("ok") is not True:
+    own = {name: os.path.join(case.folder, name) for names in (*PRODUCTS.values(), [REFINED]) for name in names}
+    # A name that is no UTF-8 stands in a report with U+FFFD for its bytes.
+    own[os.fsencode(os.path.basename(case.volume)).decode("utf-8", "replace")] = case.volume
+    try:
+        files = [(os.path.basename(entry["path"]), entry) for entry in [*report["inputs"], *report["outputs"]]]
+        wanted = {*PRODUCTS[stage], *([REFINED] if stage == "simulate" and case.setting("ACCURACY") else [])}
+        return report["ok"] is True and wanted <= {name for name, _ in files} and all(
+            entry["sha256"] is None or sha256(own.get(name, entry["path"])) == entry["sha256"] for name, entry in files)
+    except (OSError, KeyError, TypeError, ValueError):
         return False
-    inputs = report.get("inputs") or []
-    return isinstance(inputs, list) and not any(changed_since(entry, case, start_ns) for entry in inputs)
 
 
 def plan_case(case, binaries, dry):
@@ -221,23 +231,18 @@ def plan_case(case, binaries, dry):
     write_text(os.path.join(case.plan, "mem"), case.setting("MEM") or "4000")
     flags = stage_flags(case)
     commands = stage_commands(case, binaries, flags)
+    done = True
     for stage in STAGES:
+        tool = os.path.join(binaries, f"tunica-{stage}")
         # The volume itself, which may be a folder of slices, stands here: a report names the files.
-        remembered = flags[stage] if stage != "extract" else f"{os.path.abspath(case.volume)} {flags[stage]}"
-        path = os.path.join(case.plan, f"{stage}.flags")
-        write_text(path, remembered)
-        write_text(os.path.join(case.plan, f"{stage}.command"), commands[stage])
-        if is_up_to_date(case, stage, remembered) and not (stage == "extract" and volume_changed(case)):
-            os.utime(path, (0, 0))
-
-
-def volume_changed(case):
-    """Whether the volume is younger than its extraction: a file, or a folder that slices came to or went from."""
-    start_ns = os.stat(os.path.join(case.folder, ".extract.flags")).st_mtime_ns
-    try:
-        return os.stat(case.volume).st_mtime_ns >= start_ns
-    except OSError:
-        return True
+        read = f"{os.path.abspath(case.volume)} {around(case.volume)} " if stage == "extract" else ""
+        remembered = f"{read}{flags[stage]}\n{identity(tool)}"
+        path = os.path.join(case.plan, stage)
+        write_text(path + ".flags", remembered)
+        write_text(path + ".command", commands[stage])
+        done = done and is_up_to_date(case, stage, remembered)
+        if done:
+            write_text(path + ".done", "")
 
 
 def plan_cases(cases, run, binaries, dry):
@@ -286,13 +291,6 @@ def lock(out):
         say(f"{out}: its file system knows no locks: no other run may work there at the same time")
 
 
-def say(text):
-    try:
-        print(f"pipeline: {text}", file=sys.stderr, flush=True)
-    except OSError:
-        pass  # words that cannot be said do not end a run
-
-
 def run_make(make, run):
     """Lets make do what is planned, in a process group of its own: a signal that stops this process is passed on to all
     of the group, as a terminal does, since make's own jobs would leave their commands at work. The summary comes after.
@@ -333,7 +331,7 @@ def how_it_ended(case):
     stage itself, which its report tells."""
     if case.refused:
         return "none", "2", case.refused
-    if os.path.exists(os.path.join(case.plan, "done")):
+    if os.path.exists(os.path.join(case.plan, STAGES[-1] + ".done")):
         return STAGES[-1], "0", "done"
     last = ("none", "", "not run")
     for stage in STAGES:
@@ -361,7 +359,7 @@ def tell(out, cases, binaries):
     if os.path.isfile(chart):
         os.remove(chart)  # where no shells were made there is none
     command = [os.path.join(binaries, "tunica-report"), out, "--force", "-o", os.path.join(out, "report.html"),
-               "--summary", os.path.join(out, "summary.tsv"), "--chart", chart]
+               "--summary", os.path.join(out, "summary.tsv"), "--tsv", os.path.join(out, "cohort.tsv"), "--chart", chart]
     told = subprocess.run(command, check=False, stdin=subprocess.DEVNULL).returncode == 0
     return 0 if told and all(message == "done" for _, _, message in ends) else 1
 
@@ -387,15 +385,16 @@ def real_run(cases, out, binaries, make):
 
 
 def main():
-    arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    arguments = argparse.ArgumentParser(description="Runs the cases of Makefile.pipeline, by which it is called.")
     arguments.add_argument("--make", default="make", help="how make is called")
     arguments.add_argument("--dry-run", action="store_true", help="write nothing")
     arguments.add_argument("--check", action="store_true", help="only see whether the cases can be meant")
     options = arguments.parse_args()
     out = path_word(os.environ.get("OUT", ""))
-    if not out.strip() or CONTROL.search(out):
-        raise Refused("OUT: has no name for the folder of the results that fits in one line")
     binaries = path_word(os.environ.get("BIN", "").rstrip("/"))
+    for name, path in (("OUT", out), ("BIN", binaries)):
+        if not path.strip() or CONTROL.search(path):
+            raise Refused(f"{name}: has no name of a folder that fits in one line")
     cases = find_cases(out)
     if options.check:
         return 0

@@ -4,83 +4,17 @@
 #include "tunica/core/narrow.hpp"
 #include "tunica/core/version.hpp"
 #include "tunica/io/file/encoding.hpp"
-#include "tunica/io/file/output_file.hpp"
-#include "tunica/report/detail/command_words.hpp"
 #include "tunica/report/detail/embedded.hpp"
 #include "tunica/report/detail/organ.hpp"
 #include "tunica/report/detail/sections.hpp"
+#include "tunica/report/detail/verify.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
-#include <filesystem>
-#include <optional>
-#include <set>
 
 namespace tunica::report {
 namespace {
-
-namespace fs = std::filesystem;
-
-// The contents of all files of a folder.
-std::set<std::string> contents_of(const fs::path& folder) {
-  std::set<std::string> found;
-  std::error_code error;
-  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
-    std::error_code unknown;
-    if (entry->is_regular_file(unknown)) {
-      try {
-        found.insert(sha256_of_file(entry->path()));
-      } catch (const InputError&) {  // it is none of those that are looked for, or is missed
-      }
-    }
-  }
-  return found;
-}
-
-std::vector<std::string> differences(const PipelineCase& one) {
-  constexpr std::array<const char*, pipeline_stages.size()> products{"surface.ply", "coarse.ply", "shell.ply",
-                                                                     "result.hdf"};
-  std::vector<std::string> found;
-  std::optional<std::set<std::string>> contents;  // where names are left out
-  for (std::size_t i = 0; i < pipeline_stages.size(); ++i) {
-    const std::string stage = pipeline_stages[i];
-    std::error_code error;
-    if (!one.reports.contains(stage) && fs::exists(one.folder / products[i], error)) {
-      found.push_back((one.folder / products[i]).string() + ": no report of " + stage + " tells what it wrote");
-    }
-    const auto words = words_of(one, stage);
-    const bool is_named = std::ranges::find(words, "--no-paths") == words.end();
-    std::optional<fs::path> folder;  // of the case when the first file, the stage's product, was written
-    for (const ReportedFile& file : one.files(stage, "outputs")) {
-      if (file.path.empty() || file.sha256.empty()) {
-        found.push_back((one.folder / (stage + ".json")).string() +
-                        ": tells no hashes of the outputs: it is of an older version, run the stage again");
-        break;
-      }
-      if (!is_named) {
-        contents = contents ? contents : contents_of(one.folder);
-        if (!contents->contains(file.sha256)) {
-          found.push_back((one.folder / (stage + ".json")).string() + ": no file beside it is the " +
-                          file.path.filename().string() + " that " + stage + " wrote, whose name --no-paths left out");
-        }
-        continue;
-      }
-      // A file of the case lies where the case lies now; a user's own flag may have named another place.
-      folder = folder.value_or(file.path.parent_path());
-      const fs::path path = file.path.parent_path() == *folder ? one.folder / file.path.filename() : file.path;
-      try {
-        if (sha256_of_file(path) != file.sha256) {
-          found.push_back(path.string() + ": is not what " + stage + " wrote");
-        }
-      } catch (const InputError&) {
-        found.push_back(path.string() + ": that " + stage + " wrote, is missing or cannot be read");
-      }
-    }
-  }
-  return found;
-}
 
 std::vector<std::string> warnings_of(const CaseReport& one) {
   std::vector<std::string> all;

@@ -70,6 +70,24 @@ class Table(WithStubs):
         self.assertEqual(self.run_table(**LOAD).returncode, 0)
         self.assertEqual(self.done_cases(), ['p1/the "big" one', "p2/2"])
 
+    def test_encodings_and_separators_of_spreadsheets(self):
+        (self.table.parent / "gro\u00df.nii").write_text("a volume")
+        lines = ["case;volume;label;fix", 'p1;gro\u00df.nii;1;"below z=1mm; above z=9mm"', "p2;a.nii.gz;Gef\u00e4\u00df;"]
+        for separator in ";,\t":
+            text = "\r\n".join(line.replace(";", separator).replace(f"mm{separator} above", "mm; above") for line in lines)
+            for encoding in ("utf-8", "utf-16", "utf-16-le", "cp1252"):
+                self.table.write_bytes(text.encode(encoding))
+                done = self.run_table("-n", "-k", **LOAD)
+                self.assertEqual(done.returncode, 0, done.stderr)
+                self.assertIn("gro\u00df.nii", done.stdout)
+                self.assertIn("--label 'Gef\u00e4\u00df'", done.stdout)
+                self.assertIn("--fix 'below z=1mm' --fix 'above z=9mm'", done.stdout)
+                self.assertEqual("read as Windows-1252" in done.stderr, encoding == "cp1252")
+        self.assertIn("a cell with ';' in it stands between quotation marks",
+                      self.complaints("volume;label;fix", "a.nii.gz;1;below z=1mm; above z=9mm", **LOAD))
+        self.assertIn(":2: a: poisson: '0,45' has a comma: write 0.45",
+                      self.complaints("volume;label;poisson", "a.nii.gz;1;0,45", **LOAD))
+
     def test_labels_of_make_and_cells_that_stand_instead(self):
         self.write("case\tvolume\tlabel\tisovalue\taccuracy", "p1\ta.nii.gz\t\t\t", "p2\ta.nii.gz\t\t0.5\t",
                    "p3\ta.nii.gz\t9\t\t2%")
@@ -120,7 +138,6 @@ class Table(WithStubs):
                              ("volume\tlabel\tage of patient", "'age of patient': known are case, volume, label"),
                              ("volume\tlabel\tthreads", "threads is the same for a whole run: give THREADS to make"),
                              ("volume\tlabel\tLabel", "the column label is there twice"),
-                             ("volume,label,pressure", "separated by tabs"),
                              ("volume\tlabel\t\tfix", "no such column: ''")):
             self.assertIn(words, self.complaints(heads, "a.nii.gz\t1\t\t", **LOAD), heads)
 
@@ -129,6 +146,7 @@ class Table(WithStubs):
                             ("p1\ta.nii.gz\t1\t\t2%\t5\t", "accuracy and shells exclude each other"),
                             ("../p1\ta.nii.gz\t1\t\t\t\t", "case: '../p1' cannot be the name of a folder"),
                             ("summary.tsv\ta.nii.gz\t1\t\t\t\t", "case: 'summary.tsv' cannot be the name of a folder"),
+                            (".cases.part\ta.nii.gz\t1\t\t\t\t", "case: '.cases.part' cannot be the name of a folder"),
                             ("p1\ta.nii.gz\ta/b\t\t\t\t", "label: 'a/b' cannot be the name of a folder"),
                             ("p1\ta.nii.gz\t1\t\t\t\t$(touch pwned)", "'$(touch pwned)' is no number of megabytes"),
                             ("p1\ta.nii.gz\t1\0\t\t\t\t", r"label: '1\x00' has a control character"),
@@ -152,7 +170,7 @@ class Table(WithStubs):
     def test_files_that_are_no_table(self):
         self.assertIn("is empty", self.complaints(**LOAD))
         self.assertIn("has columns but no case", self.complaints("volume\tlabel", **LOAD))
-        for data in (b"\x89PNG\xff\xfe", b"volume\tlabel\n\xff\t1\n", b"volume\n" + b"x" * 200000):
+        for data in (b"\x81PNG\xff\xfe", b"\xff\xfe\x00", b"volume\n" + b"x" * 200000):
             self.table.write_bytes(data)
             done = self.run_table(LABEL=1, **LOAD)
             self.assertEqual(done.returncode, 2)

@@ -75,11 +75,6 @@ class WithStubs(Pipeline):
     def verbs(self):
         return sorted(line.split()[0] for line in self.calls())
 
-    def touch_later(self, path):
-        """Makes `path` newer than everything there is."""
-        newest = max(p.stat().st_mtime_ns for p in self.folder.rglob("*"))
-        os.utime(path, ns=(newest + 1_000_000, newest + 1_000_000))
-
     def refusal(self, *flags, **variables):
         done = self.make(*flags, **variables)
         self.assertNotEqual(done.returncode, 0)
@@ -104,6 +99,8 @@ class Rules(WithStubs):
             self.assertIn(str(self.out / "a" / "3" / name), done.stdout)
         self.assertIn(str(self.out / "chart.svg"), done.stdout)
         self.assertIn("<svg", (self.out / "chart.svg").read_text())
+        self.assertIn("a/3", (self.out / "cohort.tsv").read_text())
+        self.assertIn("stress_p99_kpa", json.loads((self.out / "cohort.json").read_text()))
         self.assertIn(f"report: {self.out / 'report.html'}", done.stdout)
         self.assertIn("surface.ply: ", (self.out / "report.html").read_text(), "the stub's files are no meshes: told")
 
@@ -112,13 +109,34 @@ class Rules(WithStubs):
                   METHOD="barycentre", THREADS=3, FIX="below z=-10mm", EXTRACT="--frame 2", **LOAD)
         extract, decimate, relax, simulate = self.calls()
         self.assertIn("--label 3 --smooth none --open-border --frame 2 --threads 3", extract)
-        self.assertIn("--triangles 123", decimate)
+        self.assertIn("--triangles 123 --min-angle 20 --threads", decimate)
         self.assertIn("--tolerance 0.5% --refine --method barycentre", relax)
         self.assertIn("--fix below z=-10mm --pressure 1kPa --young 1MPa --poisson 0.45 --thickness 1.5mm --static",
                       simulate)
 
     def test_a_misspelt_variable_is_refused(self):
-        self.assertIn("no such variable: PRESURE", self.refusal(VOLUMES="a.nii.gz", LABEL=1, PRESURE="1kPa", **LOAD))
+        for name, near in (("PRESURE", "PRESSURE"), ("pressure", "PRESSURE"), ("ACURACY", "ACCURACY"), ("Thread", "THREADS")):
+            said = self.refusal(VOLUMES="a.nii.gz", LABEL=1, **{name: "1kPa"}, **LOAD)
+            self.assertIn(f"no such variable: {name}: did you mean {near}?", said)
+        self.assertIn("no such variable: XQJ'Z: make", self.refusal(VOLUMES="a.nii.gz", LABEL=1, **{"XQJ'Z": 1}, **LOAD))
+
+    def test_nothing_is_taken_from_the_shells_variables(self):
+        shell = {"OPEN": "1", "SMOOTH": "none", "FIX": "rigid-motions", "TOLERANCE": "3%", "OUT": "elsewhere", "RUN": "false",
+                 "LABEL": "9", "THREADS": "7", "KIND": "dynamic", "EXTRACT": "--frame 3", "BIN": "nowhere", "SECONDS": "5"}
+        for flags in ((), ("-e",)):
+            done = self.make(*flags, VOLUMES="a.nii.gz", LABELS=1, environment=shell, **LOAD)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertEqual(done.stderr.count("pipeline: not taken from the environment: "), 1)
+            for name in shell.keys() - {"OUT", "BIN"}:
+                self.assertRegex(done.stderr, rf"environment: .*\b{name}\b.*: give make")
+            if not flags:
+                extract, _, relax, simulate = self.calls()
+        self.assertEqual(self.calls(), [])
+        self.assertIn("--label 1 --smooth staircase --largest --fill-cavities --threads", extract)
+        self.assertNotIn("--tolerance", relax)
+        self.assertIn("--static", simulate)
+        self.assertNotIn("--threads 7", simulate)
+        self.assertFalse((self.folder / "elsewhere").exists())
 
     def test_an_accuracy_chooses_the_shells(self):
         self.make(VOLUMES="a.nii.gz", LABEL=3, ACCURACY="2%", OF="energy", **LOAD)
@@ -150,7 +168,7 @@ class Rules(WithStubs):
         extract, decimate, relax, simulate = self.calls()
         self.assertIn("--isovalue=-0.5 --smooth staircase --largest --fill-cavities", extract)
         self.assertNotIn("--open-border", extract)
-        self.assertIn("--triangles 800", decimate)
+        self.assertIn("--triangles 800 --min-angle 20 ", decimate)
         self.assertNotIn("--tolerance", relax)
         self.assertTrue((self.out / "a" / "iso-0.5" / "result.hdf").exists())
 
@@ -187,11 +205,6 @@ class Rules(WithStubs):
             arguments.update(changed)
             self.assertEqual(self.make(**arguments).returncode, 0)
             self.assertEqual(self.verbs(), sorted(redone), changed)
-        for path, redone in ((self.folder / "a.nii.gz", STAGES), (self.out / "a" / "1" / "coarse.ply", STAGES[2:]),
-                             (self.bin / "tunica-simulate", STAGES[3:])):
-            self.touch_later(path)
-            self.make(**arguments)
-            self.assertEqual(self.verbs(), sorted(redone), path)
         (self.out / "a" / "1" / "map.png").unlink()
         self.make(**arguments)
         self.assertEqual(self.verbs(), sorted(STAGES[2:]))
@@ -262,8 +275,8 @@ class Rules(WithStubs):
         names = {name for line in text.splitlines() if not line.startswith(" ")
                  for name in re.findall(r"\b[A-Z_]{2,}\b", line[:line.index("  ")] if "  " in line else "")}
         self.assertLessEqual({"VOLUMES", "MEM", "STEP", "REPORTS", "PAPER", "FACTOR"}, names)
-        for name in names - {"BIN", "OUT"}:
-            self.assertNotIn("no such variable", self.make("help", **{name: "1"}).stderr)
+        taken = names - {"LABELS", "ACCURACY", "VOLUMES"}  # which exclude others
+        self.assertEqual(self.make("help", **dict.fromkeys(taken, "1")).stderr, "")
 
     def test_set_up_is_for_all_goals(self):
         for goals, wanted in ((("package", "package-check"), {"g++", "debhelper", "debootstrap"}), (("package",), {"debhelper"}),
@@ -338,6 +351,77 @@ class Rules(WithStubs):
         (self.bin / "tunica-relax").unlink()
         self.assertIn("no tunica-relax", self.refusal(VOLUMES="a.nii.gz", LABEL=1, **LOAD))
 
+    def test_the_users_own_angle_goes_before(self):
+        for words in ("--min-angle 0", "--min-angle=5"):
+            self.make(VOLUMES="a.nii.gz", LABEL=1, DECIMATE=words, **LOAD)
+            self.assertIn(f"--triangles 800 {words} ", [line for line in self.calls() if line.startswith("decimate")][0])
+
+    def test_labels_and_supports_of_several_parts(self):
+        done = self.make(VOLUMES="a.nii.gz", LABELS="1+2 'left atrium+7'", FIX="below z=-1mm;; above z=2 mm ;", **LOAD)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(sorted(path.name for path in (self.out / "a").iterdir()), ["1+2", "left atrium+7"])
+        calls = self.calls()
+        self.assertIn("--label 1+2 ", calls[0])
+        self.assertIn(" --fix below z=-1mm --fix above z=2 mm --pressure", calls[3])
+        self.assertIn("give one", self.refusal_of(LABEL=1, LABELS=2))
+
+    def refusal_of(self, **variables):
+        return self.make(VOLUMES="a.nii.gz", **LOAD, **variables).stderr
+
+    def test_a_stage_is_done_when_its_files_are_there(self):
+        arguments = dict(VOLUMES="a.nii.gz", LABEL=1, **LOAD)
+        for flags, more, stage in (((), {"EXTRACT": "--nothing"}, "extract"), (("-k", "-j"), {"RUN": "true"}, "extract"),
+                                   (("-k",), {"SIMULATE": "--nothing"}, "simulate")):
+            done = self.make(*flags, **more, **arguments)
+            self.assertEqual(done.returncode, 2, more)
+            row = self.summary()["a/1"]
+            self.assertEqual((row["stage"], row["exit"]), (stage, "1"), more)
+            self.assertIn(f"tunica-{stage}: ended with exit code 0, but without ", row["message"])
+            self.assertNotIn("done", done.stdout)
+            self.calls()
+        self.assertEqual(self.make(**arguments).returncode, 0)
+        self.assertEqual(self.verbs(), ["simulate"], "what a try without a result left is no result")
+        done = self.make(SIMULATE="--help", **arguments)
+        self.assertEqual((done.returncode, self.calls()), (2, []))
+        self.assertIn("tunica-simulate: one of its flags ends it before its work", self.summary()["a/1"]["message"])
+        self.assertTrue((self.out / "a" / "1" / "result.hdf").is_file())
+
+    def test_flags_of_make_that_take_things_for_done(self):
+        arguments = dict(VOLUMES="a.nii.gz", LABEL=1, **LOAD)
+        for flag in ("-i", "-t", "-ik"):
+            self.assertIn("use -k", self.refusal(flag, **arguments))
+        self.assertIn("use -k", self.refusal(environment={"MAKEFLAGS": "i"}, **arguments))
+        asked = self.make("-q", **arguments)
+        self.assertNotEqual(asked.returncode, 0, "there is something to do")
+        self.assertEqual((self.out.exists(), self.calls()), (False, []))
+        self.assertEqual(self.make("--no-print-directory", **arguments).returncode, 0)
+        self.assertEqual(len(self.calls()), 4)
+        self.assertEqual((self.make("-q", **arguments).returncode, self.calls()), (0, []))
+        self.assertEqual(self.make("-B", **arguments).returncode, 0)
+        self.assertEqual(self.verbs(), sorted(STAGES), "all anew")
+
+    def test_values_are_no_code(self):
+        arguments = dict(VOLUMES="a.nii.gz", LABEL=1, **LOAD)
+        for code in ("1; touch pwned", "$(shell touch pwned)", "1 `touch pwned`", "1\ntouch pwned", "'$(touch pwned)'"):
+            self.assertIn("is no number of threads", self.refusal(THREADS=code, **arguments))
+            self.make("-B", **dict.fromkeys(("EXTRACT", "DECIMATE", "RELAX", "SIMULATE", "FIX", "SMOOTH"), code), **arguments)
+            self.make("help", "-n", **dict.fromkeys(("MAPS", "CELL", "PARSER", "SECONDS", "DATA"), code))
+            shutil.rmtree(self.out)
+        self.assertFalse(list(self.folder.rglob("pwned*")))
+        self.calls()
+        self.make(EXTRACT="--names 'my table.tsv' \\$HOME", **arguments)
+        self.assertIn("--names my table.tsv $HOME ", self.calls()[0])
+        self.assertIn("EXTRACT: a quotation mark is not closed", self.make(EXTRACT="'", **arguments).stderr)
+
+    def test_a_comma_is_no_decimal_point(self):
+        for name, value, right in (("THICKNESS", "1,5mm", "1.5mm"), ("POISSON", "0,45", "0.45"), ("TOLERANCE", "0,5%", "0.5%")):
+            said = self.refusal(VOLUMES="a.nii.gz", LABEL=1, **{**LOAD, name: value})
+            self.assertIn(f"{name}: '{value}' has a comma: write {right}", said)
+
+    def test_runs_under_an_optimizing_python(self):
+        done = self.make(VOLUMES="a.nii.gz", LABEL=1, environment={"PYTHONOPTIMIZE": "2"}, **LOAD)
+        self.assertEqual(done.returncode, 0, done.stderr)
+
     def test_dry_run_names_what_would_be_done_and_writes_nothing(self):
         arguments = dict(VOLUMES="a.nii.gz", LABEL=1, **LOAD)
         planned = self.make("-n", **arguments)
@@ -405,6 +489,62 @@ class Inputs(WithStubs):
         self.read.pop().unlink()
         self.assertEqual(self.run_again("slices"), sorted(STAGES), "one less")
         self.assertEqual(self.run_again("slices"), [])
+
+    def again(self, arguments, **rest):
+        self.assertEqual(self.make(**arguments, **rest).returncode, 0)
+        return self.verbs()
+
+    def test_times_say_nothing(self):
+        arguments = dict(VOLUMES="a.nii.gz", LABEL=1, **LOAD)
+        self.again(arguments)
+        for time_ in (1, 5_000_000_000):  # 1970 and 2128
+            for path in [self.folder / "a.nii.gz", *self.bin.iterdir(), *self.out.rglob("*")]:
+                os.utime(path, (time_, time_))
+            self.assertEqual(self.again(arguments), [])
+        tool = self.bin / "tunica-relax"
+        tool.write_text(tool.read_text() + "# another one\n")
+        os.utime(tool, (1, 1))
+        self.assertEqual(self.again(arguments), sorted(STAGES[2:]))
+        self.assertEqual(self.again(arguments, environment={"STUB_VERSION": "2"}), sorted(STAGES), "another shared library")
+
+    def test_damaged_files_are_made_anew(self):
+        arguments = dict(VOLUMES="a.nii.gz", LABEL=1, **LOAD)
+        self.again(arguments)
+        for name, redone in (("surface.ply", STAGES), ("coarse.ply", STAGES[1:]), ("map.png", STAGES[2:]), ("result.hdf", STAGES[3:])):
+            path = self.out / "a" / "1" / name
+            good, state = path.read_text(), path.stat()
+            path.write_text("damaged")
+            os.utime(path, ns=(state.st_atime_ns, state.st_mtime_ns))
+            self.assertEqual(self.again(arguments), sorted(redone), name)
+            self.assertEqual(path.read_text(), good)
+
+    def test_files_of_another_case_are_none_of_this(self):
+        arguments = dict(VOLUMES="a.nii.gz", LABELS="1 2", **LOAD)
+        stub = self.bin / "tunica-extract"  # whose surfaces differ from case to case
+        stub.write_text(stub.read_text().replace('echo "$verb" > "$output"', 'echo "$output" > "$output"'))
+        self.again(arguments)
+        for stage, files in (("decimate", ["coarse.ply"]), ("relax", ["shell.ply", "map.png"]), ("simulate", ["result.hdf", "picture.png"])):
+            for name in (*files, f"{stage}.json", f".{stage}.flags"):
+                shutil.copy2(self.out / "a" / "1" / name, self.out / "a" / "2" / name)
+        self.assertEqual(self.again(arguments), sorted(STAGES[1:]))
+
+    def test_a_table_of_names_that_comes_first_now(self):
+        arguments = dict(VOLUMES="a.nii.gz", LABEL=1, **LOAD)
+        self.again(arguments)
+        table = self.folder / "a.tsv"
+        for text in ("index\tname\n1\taorta\n", "index\tname\n2\taorta\n"):
+            table.write_text(text)
+            os.utime(table, (1, 1))
+            self.assertEqual(self.again(arguments), sorted(STAGES))
+        (self.folder / "another.tsv").write_text(text)
+        self.assertEqual(self.again(arguments), [])
+
+    def test_results_that_were_moved(self):
+        arguments = dict(VOLUMES="a.nii.gz", LABEL=1, **LOAD)
+        self.again(arguments)
+        moved = self.folder / "moved"
+        self.out.rename(moved)
+        self.assertEqual(self.again({**arguments, "OUT": "moved"}), [])
 
     def test_another_volume_of_the_same_relative_name(self):
         self.run_again()
@@ -475,9 +615,7 @@ class Names(WithStubs):
             done = self.make(VOLUMES=name, LABEL=1, **LOAD)
             self.assertEqual(done.returncode, 0, done.stderr)
             self.assertTrue((self.out / name[:-4] / "1" / "result.hdf").is_file(), name)
-            environment = {"VOLUMES": name, "SHELLS": "7"}
-            self.assertEqual(self.make(LABEL=1, environment=environment, **LOAD).returncode, 0, name)
-        self.assertFalse(list(self.folder.rglob("pwned*")))
+            self.assertFalse(list(self.folder.rglob("pwned*")))
 
     def test_bytes_that_are_no_text(self):
         name = os.fsdecode(b"\xff\xfe.nii.gz")
@@ -499,13 +637,14 @@ class Names(WithStubs):
             shutil.rmtree(self.out)
 
     def test_names_of_the_pipelines_own_files_are_refused(self):
-        done = self.run_on("summary.tsv.nii.gz", ".lock.nii.gz", "good.nii.gz", "bin.nii.gz", "cases.nii.gz",
-                           volumes="scans/* scans/.lock.nii.gz")
+        own = ("summary.tsv", "cohort.tsv", "cohort.json", "report.html.part", ".lock", ".run", ".cases.part")
+        done = self.run_on(*(f"{name}.nii.gz" for name in own), "good.nii.gz", "bin.nii.gz", "cases.nii.gz",
+                           volumes="scans/* scans/.[lrc]*")
         self.assertNotEqual(done.returncode, 0)
         rows = self.summary()
         self.assertEqual([rows[f"{name}/1"]["message"] for name in ("good", "bin", "cases")], ["done"] * 3)
-        self.assertIn("cannot be called 'summary.tsv'", rows["summary.tsv/1"]["message"])
-        self.assertIn("cannot be called '.lock'", rows[".lock/1"]["message"])
+        for name in own:
+            self.assertIn(f"cannot be called '{name}'", rows[f"{name}/1"]["message"])
 
     def test_names_that_are_alike_to_make_stay_apart(self):
         done = self.run_on("a b.nii.gz", "a+b.nii.gz", "a_b.nii.gz", "a_b_2.nii.gz")
@@ -524,10 +663,10 @@ class Names(WithStubs):
         self.assertIn("cannot be written", rows["a/1"]["message"])
 
     def test_settings_are_single_words(self):
-        done = self.make(VOLUMES="a.nii.gz", LABEL=1, FIX="below z=-1mm; touch pwned",
+        done = self.make(VOLUMES="a.nii.gz", LABEL=1, FIX="below z=-1mm & touch pwned",
                          **{**LOAD, "PRESSURE": "$(touch pwned)"})
         self.assertEqual(done.returncode, 0, done.stderr)
-        self.assertIn("--fix below z=-1mm; touch pwned --pressure $(touch pwned) ", self.calls()[3])
+        self.assertIn("--fix below z=-1mm & touch pwned --pressure $(touch pwned) ", self.calls()[3])
         self.assertFalse(list(self.folder.rglob("pwned*")))
 
 

@@ -529,10 +529,29 @@ class Errors(ReportTest):
         self.refuse(4, "--verify", says="coarse.ply: that decimate wrote, is missing")
         self.assertIn("Outputs that are not what the reports say", self.page.read_text())
 
-    def test_verify_finds_files_whose_names_are_left_out(self):
+    def test_verify_names_a_chain_of_two_cases(self):
         case = self.copy("aneurysm")
-        words = ["decimate", case / "surface.ply", case / "coarse.ply", "--triangles", 200, "--report", case / "decimate.json"]
-        cases.run(*words, "--force", "--quiet", "--no-paths")
+        solved = {path.name: path.read_bytes() for path in case.iterdir() if path.stem in ("result", "simulate")}
+        cases.run("decimate", case / "surface.ply", case / "coarse.ply", "--triangles", 150, "--report", case / "decimate.json", "--force")
+        self.refuse(4, "--verify", says="relax.json: relax read another coarse.ply than decimate wrote")
+        cases.run("relax", case / "coarse.ply", case / "surface.ply", case / "shell.ply", "--report", case / "relax.json", "--force")
+        for name, content in solved.items():
+            (case / name).write_bytes(content)
+        self.refuse(4, "--verify", says="simulate.json: simulate read another shell.ply than relax wrote")
+
+    def test_verify_names_files_that_no_report_tells_of(self):
+        case = self.copy("aneurysm")
+        (case / "map.png").write_bytes(b"of another case")
+        self.refuse(4, "--verify", says="map.png: no report of relax tells what it wrote")
+        (case / "map.png").unlink()
+        (case / "refined.ply").write_bytes(b"of another run")
+        self.refuse(4, "--verify", says="refined.ply: no report of simulate tells what it wrote")
+
+    def test_verify_finds_files_whose_names_are_left_out(self):
+        def left_out(reports):
+            reports["decimate"]["command"] += " --no-paths"
+            reports["decimate"]["outputs"][0]["path"] = "OUT.ply"
+        case = self.copy("aneurysm", left_out)
         self.report("--verify")
         (case / "coarse.ply").write_text("ply")
         self.refuse(4, "--verify", says="decimate.json: no file beside it is the OUT.ply that decimate wrote")

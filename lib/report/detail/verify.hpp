@@ -1,0 +1,16 @@
+#pragma once
+
+#include "tunica/io/result/pipeline_folder.hpp"
+
+#include <string>
+#include <vector>
+
+namespace tunica::report {
+
+/// How the files of a case differ from what its reports say, a sentence each: outputs that are missing or have another
+/// SHA-256, stages that read other files than the stages before wrote, files with a stage's names that no report tells
+/// of. Cost: reads every output once; where --no-paths left out names, every file of the case's folder. Limits: only
+/// files that the reports of `one` name, and those with the names that Makefile.pipeline gives.
+std::vector<std::string> differences(const PipelineCase& one);
+
+}  // namespace tunica::report

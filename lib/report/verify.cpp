@@ -1,0 +1,149 @@
+#include "tunica/report/detail/verify.hpp"
+
+#include "tunica/core/error.hpp"
+#include "tunica/io/file/output_file.hpp"
+#include "tunica/report/detail/command_words.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <set>
+
+namespace tunica::report {
+namespace {
+
+namespace fs = std::filesystem;
+using Strings = std::vector<std::string>;
+
+// What a stage of Makefile.pipeline leaves, the product first that the next stages read, and which products it reads.
+struct Stage {
+  Strings files;
+  Strings reads;
+};
+
+const std::map<std::string, Stage>& stages() {
+  static const std::map<std::string, Stage> all{
+      {"extract", {{"surface.ply"}, {}}},
+      {"decimate", {{"coarse.ply"}, {"extract"}}},
+      {"relax", {{"shell.ply", "map.png"}, {"extract", "decimate"}}},
+      {"simulate", {{"result.hdf", "picture.png", "refined.ply"}, {"relax"}}},
+  };
+  return all;
+}
+
+// SHA-256 of a file; empty where it is missing or cannot be read.
+std::string content_of(const fs::path& path) {
+  try {
+    return sha256_of_file(path);
+  } catch (const InputError&) {
+    return {};
+  }
+}
+
+// The contents of all files of a folder.
+std::set<std::string> contents_of(const fs::path& folder) {
+  std::set<std::string> found;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+    std::error_code unknown;
+    if (entry->is_regular_file(unknown)) {
+      found.insert(content_of(entry->path()));
+    }
+  }
+  return found;
+}
+
+bool names_files(const PipelineCase& one, const std::string& stage) {
+  const auto words = words_of(one, stage);
+  return std::ranges::find(words, "--no-paths") == words.end();
+}
+
+std::string report_file(const PipelineCase& one, const std::string& stage) {
+  return (one.folder / (stage + ".json")).string();
+}
+
+// The outputs of a stage whose files are not what its report says.
+void compare_outputs(const PipelineCase& one, const std::string& stage, Strings& found) {
+  std::optional<std::set<std::string>> contents;  // where names are left out
+  std::optional<fs::path> folder;                 // of the case when the first file, the stage's product, was written
+  for (const ReportedFile& file : one.files(stage, "outputs")) {
+    if (file.path.empty() || file.sha256.empty()) {
+      found.push_back(report_file(one, stage) +
+                      ": tells no hashes of the outputs: it is of an older version, run the stage again");
+      break;
+    }
+    if (!names_files(one, stage)) {
+      contents = contents ? contents : contents_of(one.folder);
+      if (!contents->contains(file.sha256)) {
+        found.push_back(report_file(one, stage) + ": no file beside it is the " + file.path.filename().string() +
+                        " that " + stage + " wrote, whose name --no-paths left out");
+      }
+      continue;
+    }
+    // A file of the case lies where the case lies now; a user's own flag may have named another place.
+    folder = folder.value_or(file.path.parent_path());
+    const fs::path path = file.path.parent_path() == *folder ? one.folder / file.path.filename() : file.path;
+    const std::string content = content_of(path);
+    if (content.empty()) {
+      found.push_back(path.string() + ": that " + stage + " wrote, is missing or cannot be read");
+    } else if (content != file.sha256) {
+      found.push_back(path.string() + ": is not what " + stage + " wrote");
+    }
+  }
+}
+
+// Whether a stage read what the stages before it wrote: a chain may be mixed from the files of two cases or of two
+// runs.
+void compare_inputs(const PipelineCase& one, const std::string& stage, Strings& found) {
+  const auto inputs = one.files(stage, "inputs");
+  const auto hashed = [](const ReportedFile& file) { return !file.sha256.empty(); };
+  if (std::ranges::none_of(inputs, hashed)) {
+    return;  // none were read, or the report tells no hashes
+  }
+  for (const std::string& before : stages().at(stage).reads) {
+    const auto outputs = one.files(before, "outputs");
+    if (!outputs.empty() && hashed(outputs.front()) &&
+        std::ranges::find(inputs, outputs.front().sha256, &ReportedFile::sha256) == inputs.end()) {
+      found.push_back(fmt::format("{}: {} read another {} than {} wrote: the files are of two runs, run the case again",
+                                  report_file(one, stage), stage, stages().at(before).files.front(), before));
+    }
+  }
+}
+
+// Files of the pipeline's names that no report tells of. A report that an earlier run left, which is not read, may do
+// so.
+void find_unclaimed(const PipelineCase& one, const std::string& stage, Strings& found) {
+  std::error_code error;
+  if (!one.reports.contains(stage) && fs::exists(report_file(one, stage), error)) {
+    return;
+  }
+  const auto outputs = one.files(stage, "outputs");
+  for (const std::string& name : stages().at(stage).files) {
+    const fs::path path = one.folder / name;
+    const auto tells = [&](const ReportedFile& file) {
+      return file.sha256.empty() || file.path.filename() == name ||
+             (!names_files(one, stage) && content_of(path) == file.sha256);
+    };
+    if (fs::is_regular_file(path, error) && std::ranges::none_of(outputs, tells)) {
+      found.push_back(path.string() + ": no report of " + stage + " tells what it wrote");
+    }
+  }
+}
+
+}  // namespace
+
+Strings differences(const PipelineCase& one) {
+  Strings found;
+  for (const char* stage : pipeline_stages) {
+    find_unclaimed(one, stage, found);
+    compare_outputs(one, stage, found);
+    compare_inputs(one, stage, found);
+  }
+  return found;
+}
+
+}  // namespace tunica::report
