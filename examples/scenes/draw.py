@@ -1,29 +1,33 @@
 #!/usr/bin/python3
-"""Pictures of a result with shells, tetrahedra and rigid bodies, cut open, without a display.
+"""Pictures of any result of tunica-simulate: shells, tetrahedra and rigid bodies, cut open if wanted, without a display.
 
-    draw.py RESULT.hdf OUT.png --at 0 0.25 0.5 1 [--cut y=0] [--view 0.4 1 0.5] [--up 0 0 1] [--most 0.2]
+    draw.py RESULT.hdf OUT.png [--at 0 0.25 0.5 1] [--cut y=0] [--view 0.4 1 0.5] [--up 0 0 1] [--most 0.2]
 
-RESULT.hdf comes from tunica-simulate with --export pvd, so that RESULT_0000.vtu and its like lie beside it. One panel for
-each place in --at (load factor, or seconds of a motion: the nearest state), left to right, then down. Colours are
-the von Mises stress, from 0 (blue) to --most MPa (red; default: what 1 % of the points of all panels pass). Rigid bodies
-are grey. --cut y=1 leaves what lies at y < 1, --cut=-y=1 what lies at y > 1. Shells are drawn a little before what they lie
-on. Needs python3-vtk9 and python3-h5py.
+One panel for each place in --at, left to right, then down: the load factor, seconds of a motion, the frequency or factor of
+a mode; the nearest written state is drawn (default: the last one). Colours are the von Mises stress, from 0 (blue) to
+--most MPa (red; default: what 1 % of the points of all panels pass). Rigid bodies are grey; rigid meshes are not drawn.
+--cut y=1 leaves what lies at y < 1, --cut=-y=1 what lies at y > 1; without a number the cut is in the middle of the bodies.
+Shells are drawn a little before what they lie on. Needs python3-vtk9 and python3-h5py.
 """
 import argparse
+import re
 import struct
+import sys
 import tomllib
 import zlib
 
 import h5py
 import numpy as np
 import vtk
-from vtk.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+from vtk.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray, vtk_to_numpy
 
 PANEL = (560, 420)  # pixels
 FINER = 2           # samples per pixel and direction
 COLOURS = np.array([(0.15, 0.25, 0.55), (0.2, 0.6, 0.65), (0.98, 0.85, 0.4), (0.75, 0.12, 0.15)])
 PLACES = (0, 0.35, 0.7, 1)
 GREY = (0.62, 0.62, 0.66)
+PIECES = 4          # of the edge of a shell
+UNITS = {"um": 1e-3, "mm": 1, "cm": 10, "m": 1000, "us": 1e-6, "ms": 1e-3, "s": 1, "min": 60}  # to mm and s
 
 
 def filtered(algorithm, data):
@@ -32,15 +36,112 @@ def filtered(algorithm, data):
     return algorithm.GetOutput()
 
 
-def deformed(path):
-    reader = vtk.vtkXMLUnstructuredGridReader()
-    reader.SetFileName(path)
-    reader.Update()
-    grid = reader.GetOutput()
-    points = vtk_to_numpy(grid.GetPoints().GetData()) + vtk_to_numpy(grid.GetPointData().GetArray("displacement"))
-    moved = vtk.vtkPoints()
-    moved.SetData(numpy_to_vtk(points, deep=True))
-    grid.SetPoints(moved)
+def patches(corners, normals):
+    """Points of the cubic patches of triangles at barycentric(PIECES): edges as those of docs/reconstruction.md away from
+    creases, the middle as that of curved PN triangles.
+    @param corners, normals  triangles x 3 x 3
+    """
+    def control(a, b):
+        edge = corners[:, b] - corners[:, a]
+        length = np.linalg.norm(edge, axis=1, keepdims=True)
+        tangent = edge - np.sum(edge * normals[:, a], axis=1, keepdims=True) * normals[:, a]
+        size = np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), 1e-12 * length)
+        return corners[:, a] + 2 * length / (3 * (1 + size / length)) * tangent / size
+
+    pairs = [(a, b) for a in range(3) for b in range(3) if a != b]
+    controls = {(a, b): control(a, b) for a, b in pairs}
+    middle = 1.5 * np.mean([*controls.values()], axis=0) - 0.5 * corners.mean(axis=1)
+    weights = barycentric(PIECES)
+    points = np.einsum("sk,tkc->tsc", weights ** 3, corners) + 6 * np.prod(weights, axis=1)[None, :, None] * middle[:, None]
+    for a, b in pairs:
+        points += (3 * weights[:, a] ** 2 * weights[:, b])[None, :, None] * controls[a, b][:, None]
+    return points
+
+
+def turned(vectors, rotations):
+    """Vectors turned by rotation vectors."""
+    angle = np.linalg.norm(rotations, axis=-1, keepdims=True)
+    axis = rotations / np.maximum(angle, 1e-30)
+    return (np.cos(angle) * vectors + np.sin(angle) * np.cross(axis, vectors)
+            + (1 - np.cos(angle)) * np.sum(axis * vectors, axis=-1, keepdims=True) * axis)
+
+
+def at_nodes(count, cells, values, sizes):
+    """Mean of the cells' values at their nodes, by size."""
+    total, weight = np.zeros(count), np.zeros(count)
+    for corner in cells.T:
+        np.add.at(total, corner, sizes * values)
+        np.add.at(weight, corner, sizes)
+    return total / np.maximum(weight, 1e-300)
+
+
+def small_triangles():
+    """Rows of barycentric(PIECES) of the triangles between its points."""
+    def counts(n):
+        return np.rint(n * barycentric(n)).astype(int)
+
+    index, unit = {tuple(point): i for i, point in enumerate(counts(PIECES))}, np.eye(3, dtype=int)
+    corners = [point + unit for point in counts(PIECES - 1)] + [point + 1 - unit for point in counts(PIECES - 2)]
+    return np.array([[index[tuple(corner)] for corner in triangle] for triangle in corners])
+
+
+def shell_cells(part, state, moved):
+    """@return points of the curved shells, their stress, and triangles; neighbours share what lies on their edge"""
+    nodes = part["elements/nodes"][()].astype(int)
+    rotation = part["nodes/rotation"][state][nodes]
+    points = patches(moved[nodes], turned(part["elements/normals"][()].reshape(-1, 3, 3), rotation))
+    faces = [at_nodes(len(moved), nodes, part[f"elements/von_mises_{face}"][state], part["elements/area"][()]) for face in ("top", "bottom")]
+    weights = barycentric(PIECES)
+    stress = np.maximum(*faces)[nodes] @ weights.T
+
+    # A name for every point: the nodes that it lies between with its parts of them, or its shell where it is inside.
+    parts = np.rint(PIECES * weights).astype(int)
+    names = np.zeros((*points.shape[:2], 6), int)
+    for i, share in enumerate(parts):
+        some = share > 0
+        if some.all():
+            names[:, i, 0], names[:, i, 1] = -1 - np.arange(len(nodes)), i
+            continue
+        between, shares = nodes[:, some], np.broadcast_to(share[some], (len(nodes), some.sum()))
+        order = np.argsort(between, axis=1)
+        names[:, i, :some.sum()] = np.take_along_axis(between, order, 1)
+        names[:, i, 3:3 + some.sum()] = np.take_along_axis(shares, order, 1)
+    _, first, place = np.unique(names.reshape(-1, 6), axis=0, return_index=True, return_inverse=True)
+    triangles = place.reshape(len(nodes), -1)[:, small_triangles()].reshape(-1, 3)
+    return points.reshape(-1, 3)[first], stress.reshape(-1)[first], triangles
+
+
+def solid_cells(part, state, moved):
+    """@return the nodes, their stress, and the tetrahedra"""
+    nodes = part["tetrahedra/nodes"][()].astype(int)
+    corners = part["nodes/position"][()][nodes]
+    volume = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 6
+    return moved, at_nodes(len(moved), nodes, part["tetrahedra/solid_von_mises"][state], volume), nodes
+
+
+def deformed(part, state):
+    """Shells and tetrahedra of one state, with `von_mises` and `of_shell` at the points.
+    @param part  /tunica of the result
+    """
+    moved = part["nodes/position"][()] + part["nodes/displacement"][state]
+    pieces = [(kind, *cells(part, state, moved)) for kind, name, cells in
+              ((vtk.VTK_TRIANGLE, "elements", shell_cells), (vtk.VTK_TETRA, "tetrahedra", solid_cells)) if name in part]
+    grid, points, before = vtk.vtkUnstructuredGrid(), vtk.vtkPoints(), 0
+    points.SetData(numpy_to_vtk(np.concatenate([p for _, p, *_ in pieces]), deep=True))
+    grid.SetPoints(points)
+    rows, kinds = [], []
+    for kind, own, _, cells in pieces:
+        rows.append(np.column_stack([np.full(len(cells), cells.shape[1]), cells + before]).ravel())
+        kinds.append(np.full(len(cells), kind, np.uint8))
+        before += len(own)
+    cells = vtk.vtkCellArray()
+    cells.ImportLegacyFormat(numpy_to_vtkIdTypeArray(np.concatenate(rows).astype(np.int64), deep=True))
+    grid.SetCells(numpy_to_vtk(np.concatenate(kinds), deep=True), cells)
+    for name, values in (("von_mises", [np.nan_to_num(stress) for _, _, stress, _ in pieces]),
+                         ("of_shell", [np.full(len(own), float(kind == vtk.VTK_TRIANGLE)) for kind, own, *_ in pieces])):
+        array = numpy_to_vtk(np.concatenate(values), deep=True)
+        array.SetName(name)
+        grid.GetPointData().AddArray(array)
     return grid
 
 
@@ -74,20 +175,24 @@ def surface(data, cut):
     normals.SetFeatureAngle(40)
     data = filtered(normals, data)
     stress = data.GetPointData().GetArray("von_mises")
+    if data.GetNumberOfPolys() == 0:
+        sys.exit(f"draw.py: --cut {cut} leaves nothing: give it a place between the ends of the bodies, or none for their middle")
     triangles = vtk_to_numpy(data.GetPolys().GetData()).reshape(-1, 4)[:, 1:]
     return (vtk_to_numpy(data.GetPoints().GetData()).astype(float), vtk_to_numpy(data.GetPointData().GetNormals()).astype(float),
-            triangles, None if stress is None else np.isfinite(vtk_to_numpy(data.GetPointData().GetArray("thickness"))),
+            triangles, None if stress is None else vtk_to_numpy(data.GetPointData().GetArray("of_shell")) > 0.5,
             None if stress is None else vtk_to_numpy(stress).astype(float))
 
 
-def in_unit(text, unit=1.0):
-    return float(text.removesuffix("mm").removesuffix("m")) * (1 if text.endswith("mm") else 1000) * unit
+def in_unit(text):
+    """Of a length or time in the resolved scene: mm or s; of a plain number itself."""
+    number, unit = re.fullmatch(r"\s*([-+0-9.eE]+?)\s*([a-z]*)\s*", str(text)).groups()
+    return float(number) * (UNITS[unit] if unit else 1)
 
 
 def at_place(value, place, read):
     """A quantity of the scene, or a table of [place, quantity]."""
     if isinstance(value, list) and isinstance(value[0], list):
-        rows = [(float(str(t).removesuffix("s")), read(v)) for t, v in value]
+        rows = [(in_unit(t), read(v)) for t, v in value]
         times = [t for t, _ in rows]
         return np.array([np.interp(place, times, c) for c in np.array([np.atleast_1d(v) for _, v in rows]).T])
     return np.atleast_1d(read(value))
@@ -223,30 +328,43 @@ def view_frame(direction, up):
     return np.array([right, np.cross(out, right), out])
 
 
+def whole_cut(cut, part):
+    """AXIS without a place: through the middle of the bodies."""
+    axis, _, at = (cut or "").removeprefix("-").partition("=")
+    if cut is None or at:
+        return cut
+    along = part["nodes/position"][:, "xyz".index(axis)]
+    return f"{cut}={(along.min() + along.max()) / 2!r}"
+
+
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("result")
     parser.add_argument("out")
-    parser.add_argument("--at", type=float, nargs="+", required=True)
-    parser.add_argument("--cut")
+    parser.add_argument("--at", type=float, nargs="+")
+    parser.add_argument("--cut", help="AXIS or AXIS=MM, with - before it for the other side")
     parser.add_argument("--view", type=float, nargs=3, default=[0.4, 1, 0.5])
     parser.add_argument("--up", type=float, nargs=3, default=[0, 0, 1])
     parser.add_argument("--most", type=float)
     given = parser.parse_args()
+    if given.cut and not re.fullmatch(r"-?[xyz](=[-+0-9.eE]+)?", given.cut):
+        parser.error(f"--cut {given.cut}: write it like y, y=1.5 or -y=1.5")
+    if np.linalg.norm(np.cross(given.view, given.up)) < 1e-6 * np.linalg.norm(given.view):
+        parser.error("--view looks along --up: give --up another direction")
 
     with h5py.File(given.result) as file:
-        places = file["tunica/history/time"][:]
-        text = file["tunica/scene"][()]
-        scene = tomllib.loads(text.decode() if isinstance(text, bytes) else text)
-    states = [int(np.argmin(np.abs(places - place))) for place in given.at]
-    grids = [deformed(given.result.removesuffix(".hdf") + "_%04d.vtu" % state) for state in states]
-    drawn = [surface(grid, given.cut) for grid in grids]
+        part = file["tunica"]
+        places = part["history/time"][:]
+        scene = tomllib.loads(part["scene"].asstr()[()])
+        states = [int(np.argmin(np.abs(places - place))) for place in given.at or places[-1:]]
+        cut = whole_cut(given.cut, part)
+        drawn = [surface(deformed(part, state), cut) for state in states]
     most = given.most or max(float(np.quantile(np.concatenate([stress for *_, stress in drawn]), 0.99)), 1e-9)
     frame = view_frame(given.view, given.up)
     seen = np.concatenate([points for points, *_ in drawn]) @ frame.T
     low, high = seen.min(axis=0), seen.max(axis=0)
     spread = high - low
-    scale = 0.7 * min(PANEL[0] / spread[0], PANEL[1] / spread[1])
+    scale = 0.7 * min(PANEL[0] / max(spread[0], 1e-9 * max(spread)), PANEL[1] / max(spread[1], 1e-9 * max(spread)))
     panels = []
     for state, (points, normals, triangles, of_shell, stress) in zip(states, drawn):
         panel = Panel(frame, (low + high) / 2 @ frame, scale)

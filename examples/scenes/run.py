@@ -128,9 +128,9 @@ def lumen(folder, balloon, wall, places):
     directions = np.outer(np.cos(angles), side) + np.outer(np.sin(angles), up)
     with h5py.File(folder.out / "scene.hdf") as file:
         factors = file["tunica/history/load_factor"][:]
+        grids = {name: draw.deformed(file["tunica"], int(np.argmin(np.abs(factors - place)))) for name, place in places.items()}
     curves, middle = {}, {}
-    for name, place in places.items():
-        grid = draw.deformed(str(folder.out / f"scene_{int(np.argmin(np.abs(factors - place))):04d}.vtu"))
+    for name, grid in grids.items():
         shells, deposits = (draw.polydata(grid, kind) for kind in (vtk.VTK_TRIANGLE, vtk.VTK_TETRA))
         middle[name] = first_hits(shells, points, directions)
         inner = first_hits(deposits, points, directions) if deposits.GetNumberOfCells() else np.inf

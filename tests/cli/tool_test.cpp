@@ -105,11 +105,14 @@ TEST_F(ToolTest, AReportHoldsTheKeysOfTheContract) {
 
 TEST_F(ToolTest, WarningsStandInTheReportAlsoWhereNothingIsPrinted) {
   const auto doubting = [](Tool& tool) {
-    tool.warn("the first\nin two lines");
-    tool.warn("the second");
+    tool.warn({Weight::minor, "first kind", "the first\nin two lines"});
+    tool.warn({Weight::note, "further", "a note"});
+    tool.warn({Weight::major, "second kind", "the second"});
   };
   const auto said = run({"--report", report()}, doubting);
-  EXPECT_EQ(said.report["warnings"], Json::array({"the first in two lines", "the second"}));
+  EXPECT_EQ(said.report["warnings"], Json::array({"the second", "the first in two lines"}));
+  EXPECT_EQ(said.report["warning_kinds"], Json::array({"second kind", "first kind"}));
+  EXPECT_EQ(said.report["notes"], Json::array({"a note"}));
   EXPECT_THAT(said.error, HasSubstr("warning: the second"));
   const auto quiet = run({"--report", report(), "--force", "--quiet"}, doubting);
   EXPECT_EQ(quiet.report["warnings"].size(), 2U);
@@ -355,7 +358,7 @@ TEST_F(ToolTest, WordsThatCannotBeSaidCostNeitherWorkNorExitCode) {
       const auto body = [&](Tool& tool) {
         lose(STDERR_FILENO, how);
         occupy_standard_descriptors();
-        tool.warn("a warning");
+        tool.warn({Weight::minor, "kind", "a warning"});
         tool.note("a note");
         tool.progress("work")(0.5);
         write_file(folder_ / "out", "the work", true);
@@ -391,7 +394,7 @@ TEST_F(ToolTest, NoFileOfTheRunGetsTheWords) {
       OutputFile file(tool.output(folder_ / "out"), true);
       const int descriptor = ::open(file.partial_path().c_str(), O_WRONLY | O_CLOEXEC);
       TUNICA_ASSERT(descriptor > STDERR_FILENO);
-      tool.warn("a warning");
+      tool.warn({Weight::minor, "kind", "a warning"});
       TUNICA_ASSERT(::write(descriptor, "abc", 3) == 3);
       tool.note("a note");
       file.commit();
