@@ -291,6 +291,19 @@ std::size_t handles(const MeshFacts& facts) {
   return narrow<std::size_t>(std::max(0L, without - facts.euler) / 2);
 }
 
+void warn_of_middle(const cli::Tool& tool, const HalfWaySurface& middle) {
+  if (middle.left_out > 0) {
+    tool.warn({Weight::minor, "left out",
+               fmt::format("{} piece(s) of the middle of the wall, {:.3g} mm2 together, are left out: half of the wall "
+                           "closes a gap of TARGET or parts it there",
+                           middle.left_out, middle.left_out_area)});
+  }
+  if (middle.crossing > 0) {
+    tool.warn({Weight::major, "wall crosses itself",
+               fmt::format("the middle of the wall crosses itself at {} pair(s) of its triangles", middle.crossing)});
+  }
+}
+
 /// One run: read, relax, measure, write.
 class Run {
 public:
@@ -411,18 +424,7 @@ private:
         fmt::format("the middle of the wall: {} triangles by cells of {:.3g} mm; {:.3g} mm in the mean and "
                     "{:.3g} mm at most from half a wall away",
                     middle.mesh.triangles.size(), middle.cell, middle.error[0], middle.error[1]));
-    if (middle.left_out > 0) {
-      tool_.warn(
-          {Weight::minor, "left out",
-           fmt::format("{} piece(s) of the middle of the wall, {:.3g} mm2 together, are left out: half of the wall "
-                       "closes a gap of TARGET or parts it there",
-                       middle.left_out, middle.left_out_area)});
-    }
-    if (middle.crossing > 0) {
-      tool_.warn(
-          {Weight::major, "wall crosses itself",
-           fmt::format("the middle of the wall crosses itself at {} pair(s) of its triangles", middle.crossing)});
-    }
+    warn_of_middle(tool_, middle);
     const MeshFacts before = examine(face_->mesh()), after = examine(middle.mesh), coarse = examine(coarse_);
     if (before.euler != after.euler || before.boundary_loops != after.boundary_loops + face_->point_loops()) {
       tool_.warn(
@@ -534,8 +536,7 @@ private:
       tool_.warn(
           {Weight::major, "another surface",
            fmt::format("shells and surface are {:.3g} % of the surface's diagonal apart: are COARSE and TARGET of one "
-                       "organ, in this "
-                       "order and in the same place?",
+                       "organ, in this order and in the same place?",
                        apart)});
     }
   }
@@ -547,8 +548,7 @@ private:
     if (const double wanted = min_angle_.value_or(usual_angle); fits_ && angle < rounded_up * wanted) {
       tool_.warn({Weight::minor, "narrow angles",
                   fmt::format("the smallest angle is {:.3g} degrees, below {:.3g}: boundaries or creases do not allow "
-                              "more, or the error "
-                              "would be larger",
+                              "more, or the error would be larger",
                               angle, wanted)});
     }
     const std::size_t crossings = crossing_patches(relaxed_.shell).size();

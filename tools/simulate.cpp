@@ -283,6 +283,13 @@ void name_unloaded(cli::Tool& tool, const Arguments& given, const Scene& scene) 
   tool.output(*given.unloaded, {".ply"});
 }
 
+void warn_of(const cli::Tool& tool, const fs::path& subject, std::vector<Warning> warnings) {
+  for (Warning& warning : warnings) {
+    warning.text = fmt::format("{}: {}", subject.string(), warning.text);
+    tool.warn(std::move(warning));
+  }
+}
+
 class Simulation {
 public:
   Simulation(cli::Tool& tool, const Arguments& given) : tool_(tool), given_(given) {}
@@ -656,12 +663,8 @@ private:
     tool_.note(fmt::format("{} nodes in {} steps, {}: largest displacement {:.4g} mm", model().node_count(),
                            summary.steps, converged ? "converged" : "not asked to converge",
                            tool_.result()["max_displacement_mm"].get<double>()));
-    std::vector<Warning> warnings = run_warnings(scene_.run, summary, wall_, unresolved_);
-    std::ranges::copy(contact_warnings(tool_.result()), std::back_inserter(warnings));
-    for (Warning& warning : warnings) {
-      warning.text = fmt::format("{}: {}", subject().string(), warning.text);
-      tool_.warn(std::move(warning));
-    }
+    warn_of(tool_, subject(), run_warnings(scene_.run, summary, wall_, unresolved_));
+    warn_of(tool_, subject(), contact_warnings(tool_.result()));
   }
 
   cli::Tool& tool_;
