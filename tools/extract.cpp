@@ -74,8 +74,9 @@ void declare(cli::Tool& tool, Arguments& arguments) {
          "the label whose surface is wanted, by value or by the name that the volume, --names or a table beside "
          "the volume (scan.tsv, .ctbl, .label, .lut, .txt, .csv of scan.nii.gz) gives it")
       ->type_name("N");
-  app.add_option("--names", arguments.names,
-                 "a table of label names: BIDS _dseg.tsv, ITK-SNAP's, Slicer's .ctbl, FreeSurfer's look-up table")
+  app.add_option(
+         "--names", arguments.names,
+         "a table of label names: BIDS _dseg.tsv, ITK-SNAP's, Slicer's .ctbl, FreeSurfer's look-up table, CSV, JSON")
       ->type_name("FILE");
   app.add_option("--isovalue", arguments.isovalue, "the value on the surface of a grey volume")->type_name("V");
   app.add_option("--inside", arguments.inside,
@@ -194,12 +195,14 @@ public:
   void read(cli::Tool& tool, const Arguments& arguments) {
     if (arguments.names) {
       given_ = read_label_names(tool.input(*arguments.names));
+      warn_of_several(tool, *arguments.names, given_);
       return;
     }
     for (const fs::path& table : label_tables_beside(arguments.volume)) {
       try {
         beside_ = read_label_names(table);
         tool.input(table);
+        warn_of_several(tool, table, beside_);
         return;
       } catch (const InputError& error) {
         tool.warn({Weight::minor, "label table",
@@ -213,6 +216,12 @@ public:
   }
 
 private:
+  static void warn_of_several(const cli::Tool& tool, const fs::path& table, const LabelNames& names) {
+    if (const auto warning = several_names(table, names)) {
+      tool.warn(*warning);
+    }
+  }
+
   LabelNames given_;
   LabelNames beside_;
 };
@@ -247,34 +256,48 @@ void note_not_finite(VolumeFile& file, const fs::path& path, std::size_t count) 
 }
 
 // Reads the volume slab by slab; the visits count as the stage `doing`.
-VolumeFile read_slabs(cli::Tool& tool, const Arguments& arguments, const char* doing, const SlabVisitor& visit) {
+VolumeFile read_slabs(cli::Tool& tool, const Arguments& arguments, const char* doing, const SlabVisitor& visit,
+                      Wholeness* values = nullptr) {
   std::optional<cli::Tool::Stage> reading(std::in_place, tool, "read");
   std::size_t not_finite = 0;
+  Wholeness whole;
   VolumeFile read = read_volume_slabs(arguments.volume, arguments.volume_options, slab_size(arguments),
                                       [&](const VolumeFile& file, const Volume& slab, std::size_t first_slice) {
                                         reading.reset();
                                         {
                                           const auto stage = tool.stage(doing);
                                           not_finite += count_not_finite(slab);
+                                          whole.add(slab);
                                           visit(file, slab, first_slice);
                                         }
                                         reading.emplace(tool, "read");
                                       });
   note_not_finite(read, arguments.volume, not_finite);
+  if (!arguments.isovalue) {
+    cli::note_rounded(read, arguments.volume, whole);
+  }
+  if (arguments.label || arguments.all_labels) {
+    cli::require_whole(arguments.volume, whole, arguments.label);
+  }
+  if (values != nullptr) {
+    *values = whole;
+  }
   return read;
 }
 
 VolumeContents contents_of(cli::Tool& tool, const Arguments& arguments, const Names& names) {
   VolumeContents contents;
   std::optional<LabelIndex> index;
-  const VolumeFile file =
-      read_slabs(tool, arguments, "read", [&](const VolumeFile& header, const Volume& slab, std::size_t first_slice) {
+  const VolumeFile file = read_slabs(
+      tool, arguments, "read",
+      [&](const VolumeFile& header, const Volume& slab, std::size_t first_slice) {
         if (!index) {
           index.emplace(header.volume.dims, header.volume.affine);
         }
-        index->add(slab, first_slice);
+        naming(arguments.volume.string(), [&] { index->add(slab, first_slice); });
         widen(contents.values, slab);
-      });
+      },
+      &contents.whole);
   contents.warnings = file.warnings;
   contents.names = names.of(file);
   contents.labels = index->labels(contents.names);
@@ -623,7 +646,7 @@ void run_all_labels(cli::Tool& tool, const Arguments& arguments, const Names& na
                                        if (!index) {
                                          index.emplace(header.volume.dims, header.volume.affine);
                                        }
-                                       index->add(slab, first_slice);
+                                       naming(arguments.volume.string(), [&] { index->add(slab, first_slice); });
                                      });
   note_file(tool, file);
   const auto labels = index->labels(names.of(file));
@@ -723,6 +746,9 @@ void run(cli::Tool& tool, Arguments& arguments) {
   tool.input(arguments.volume);
   Names names;
   names.read(tool, arguments);
+  if (arguments.label && !arguments.names) {
+    arguments.volume_options.segment = *arguments.label;
+  }
   if (arguments.info) {
     VolumeFile header = read_volume_header(arguments.volume, arguments.volume_options);
     const VolumeContents contents = contents_of(tool, arguments, names);

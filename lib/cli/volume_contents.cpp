@@ -47,7 +47,41 @@ std::pair<std::string, Json> list_labels(const VolumeFile& file, const VolumeCon
   return {std::move(text), std::move(list)};
 }
 
+// "12.5 % of its voxels that are not 0 (812) lie between whole numbers, such as 0.37"
+std::string fractions(const Wholeness& whole) {
+  return fmt::format("{:.3g} % of its voxels that are not 0 ({}) lie between whole numbers, such as {:.6g}",
+                     1e2 * real(whole.between) / real(whole.not_zero), whole.between, whole.example);
+}
+
+// Why no labels are listed.
+std::string grey(const Wholeness& whole) {
+  return whole.between > 0 ? fmt::format("a grey volume: {}", fractions(whole)) : "a grey volume";
+}
+
 }  // namespace
+
+void note_rounded(VolumeFile& file, const std::filesystem::path& path, const Wholeness& whole) {
+  if (whole.rounded > 0) {
+    file.warnings.push_back(
+        {Weight::note, "rounded labels",
+         fmt::format("{}: {} of its voxels are not quite whole numbers, by {:.2g} at most: they are "
+                     "taken as the labels next to them",
+                     path.string(), whole.rounded, whole.farthest)});
+  }
+}
+
+void require_whole(const std::filesystem::path& path, const Wholeness& whole, const std::optional<std::string>& asked) {
+  const auto label = asked ? parse_number(*asked) : std::nullopt;
+  if (whole.between == 0 || (label && *label != std::floor(*label))) {
+    return;
+  }
+  throw InputError(fmt::format(
+      "{}: {}: it is a grey volume, or labels that were resampled by interpolation, which eats their borders; pass "
+      "--isovalue {}, or resample the labels again by nearest neighbour",
+      path.string(), fractions(whole),
+      label && *label != 0 ? fmt::format("{:g} if it is a mask of 0 and {:g}", *label / 2, *label)
+                           : "V (0.5 of a mask of 0 and 1)"));
+}
 
 bool are_labels(const std::optional<std::vector<Label>>& labels) {
   return labels && std::all_of(labels->begin(), labels->end(),
@@ -128,7 +162,7 @@ std::pair<std::string, Json> volume_info(const std::filesystem::path& path, cons
     text += lines;
     list = std::move(entries);
   } else {
-    text += fmt::format("labels       none: a grey volume\n");
+    text += fmt::format("labels       none: {}\n", grey(contents.whole));
   }
   Json result;
   result["format"] = file.format;

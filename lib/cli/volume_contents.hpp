@@ -5,6 +5,7 @@
 #include "tunica/io/volume/label_names.hpp"
 #include "tunica/io/volume/volume_file.hpp"
 #include "tunica/volume/cubes/label_index.hpp"
+#include "tunica/volume/labels/whole_labels.hpp"
 
 #include <filesystem>
 #include <optional>
@@ -21,7 +22,15 @@ struct VolumeContents {
   std::vector<std::size_t> surface_vertices;  ///< per label, of its surface before decimation
   LabelNames names;
   Interval values{infinity, -infinity};  ///< of all voxels
+  Wholeness whole;                       ///< of all voxels
 };
+
+/// Adds the note that values were rounded to labels, where some were.
+void note_rounded(VolumeFile& file, const std::filesystem::path& path, const Wholeness& whole);
+
+/// Errors: InputError where values lie between whole numbers: labels of such a volume have lost their borders.
+/// @param asked  the label, by value or name; none: all. A value that is no whole number is taken as it stands.
+void require_whole(const std::filesystem::path& path, const Wholeness& whole, const std::optional<std::string>& asked);
 
 /// Whether a volume of these values is a segmentation: whole numbers, and not too many of them.
 bool are_labels(const std::optional<std::vector<Label>>& labels);

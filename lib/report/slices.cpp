@@ -71,6 +71,7 @@ Image read_image(const PipelineCase& one) {
   options.frame = count_in(words, "--frame");
   options.layer = count_in(words, "--layer");
   options.prefer_qform = std::ranges::find(words, "--prefer-qform") != words.end();
+  options.segment = flag_value(words, "--names") ? std::nullopt : flag_value(words, "--label");
   Volume volume = read_volume(path, options).volume;
   const auto rule = rule_of(words, volume);
   if (!rule) {

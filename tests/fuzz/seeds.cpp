@@ -44,6 +44,11 @@ void nifti(const Seeds& seeds) {
   options.quatern = {0, 0, 1, 5, 6, 7};
   seeds.put("frames.nii", test::nifti_file(options));
   options = {};
+  options.dims = {1, 3, 4, 5};
+  options.sform = {};
+  options.qform_code = 1;
+  seeds.put("channel.nii", test::nifti_file(options));
+  options = {};
   options.endian = test::Endian::big;
   seeds.put("big.nii.gz", test::deflated(test::nifti_file(options)));
   options.pair = true;
@@ -78,7 +83,27 @@ void other_volumes(const fs::path& all) {
            "space origin: (0,0,0)\nSegment0_ID:=a\nSegment0_Name:=aorta\nSegment0_LabelValue:=1\nSegment0_Layer:=0\n"
            "Segment1_Name:=left atrium\nSegment1_LabelValue:=1\nSegment1_Layer:=1\n\n" +
                voxels());
+  nrrd.put("old.seg.nrrd",
+           "NRRD0004\ntype: uchar\ndimension: 4\nspace: left-posterior-superior\nsizes: 2 3 2 5\n"
+           "space directions: none (2,0,0) (0,3,0) (0,0,4)\nkinds: list domain domain domain\nencoding: raw\n"
+           "space origin: (0,0,0)\nSegment0_ID:=a\nSegment0_Name:=aorta\nSegment1_ID:=b\n\n" +
+               voxels());
+  const std::string plain = "NRRD0004\ntype: uchar\ndimension: 3\nsizes: 3 4 5\nspacings: 2 3 4\n";
+  nrrd.put("minima.nrrd",
+           plain + "axis mins: 1 2 3\naxis maxs: 4 5 6\ncenters: cell node cell\nencoding: raw\n\n" + voxels());
+  nrrd.put("end.nrrd",
+           plain + "encoding: gzip\nline skip: 1\nbyte skip: -3\n\na\n" + test::deflated("abc" + voxels() + "de"));
+  nrrd.put("channel.nrrd", "NRRD0004\ntype: uchar\ndimension: 4\nsizes: 1 3 4 5\nencoding: raw\n\n" + voxels());
   const Seeds meta(all, "metaimage");
+  meta.put("channel.mha",
+           test::replaced(
+               test::replaced(
+                   test::replaced(test::replaced(test::replaced(test::metaimage_header(), "NDims = 3", "NDims = 4"),
+                                                 "1 0 0 0 1 0 0 0 1", "1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1"),
+                                  "10 20 30", "0 10 20 30"),
+                   "2 3 4", "1 2 3 4"),
+               "3 4 5", "1 3 4 5") +
+               voxels());
   meta.put("raw.mha", test::metaimage_header() + voxels());
   const std::string packed = test::deflated(voxels(), 15);
   meta.put("packed.mha", test::metaimage_header("MET_UCHAR", "CompressedData = True\nCompressedDataSize = " +
@@ -96,6 +121,14 @@ void other_volumes(const fs::path& all) {
     slices.put("c" + std::to_string(compression) + ".tif",
                test::tiff_file<std::uint8_t>(7, 5, {grey(35), grey(35), grey(35)}, options));
   }
+  const std::vector<std::uint8_t> bits(35, 1);
+  slices.put("1-bit.png", test::packed_png(7, 5, bits, 1, 0));
+  slices.put("palette.png", test::packed_png(7, 5, bits, 4, 3));
+  std::string utf16 = test::encoded<std::uint16_t>(0xfeff, test::Endian::little);
+  for (const char c : std::string_view("index;name\r\n1;aorta\r\n")) {
+    utf16 += {c, '\0'};
+  }
+  Seeds(all, "label_table").put("utf16.csv", utf16);
   slices.put("8.png", test::png_file(7, 5, grey(35)));
   slices.put("16.png", test::png_file(7, 5, test::sample_values<std::uint16_t>(35)));
 }

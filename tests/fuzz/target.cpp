@@ -114,6 +114,9 @@ void volume_at(const fs::path& path, bool slices) {
     options.spacing = Vec3(1, 1, 2);
   }
   read_volume_in_all_ways(path, options);
+  options.segment = "aorta";
+  read_volume_in_all_ways(path, options);
+  options.segment.reset();
   options.prefer_qform = true;
   options.frame = 0;
   options.layer = 0;

@@ -82,6 +82,81 @@ TEST_F(LabelTables, are_told_by_their_content) {
   EXPECT_THAT(read("7 colon\n-8 Area 4 255 0 0 0"), ElementsAre(Pair(7, "colon"), Pair(-8, "Area 4")));
 }
 
+// Each character of ASCII or Latin-1 as two bytes, after the mark.
+std::string utf16(const std::string& latin_1, Endian endian) {
+  std::string bytes = encoded<std::uint16_t>(0xfeff, endian);
+  for (const char c : latin_1) {
+    bytes += encoded<std::uint16_t>(static_cast<unsigned char>(c), endian);
+  }
+  return bytes;
+}
+
+TEST_F(LabelTables, may_be_in_latin_1_or_utf_16) {
+  const auto read = [&](const std::string& text) { return read_label_names(folder.file("any.name", text)); };
+  const std::string latin_1 = "index\tname\n1\tArt\xe8re f\xe9morale\n2\tc\x9cur\n";
+  EXPECT_THAT(read(latin_1), ElementsAre(Pair(1, "Artère fémorale"), Pair(2, "cœur")));
+  EXPECT_THAT(read("index\tname\n1\tArtère fémorale\n"), ElementsAre(Pair(1, "Artère fémorale"))) << "UTF-8 already";
+  for (const Endian endian : {Endian::little, Endian::big}) {
+    EXPECT_THAT(read(utf16("index;name\r\n1;V\xe4ne\r\n", endian)), ElementsAre(Pair(1, "Väne")));
+    std::string outside = utf16("1 ", endian);
+    for (const int unit : {0xd83e, 0xdec0}) {
+      outside += encoded(static_cast<std::uint16_t>(unit), endian);
+    }
+    EXPECT_THAT(read(outside), ElementsAre(Pair(1, "\xf0\x9f\xab\x80"))) << "a pair: the anatomical heart";
+    EXPECT_THAT(error_in(outside.substr(0, outside.size() - 2)), HasSubstr("UTF-16 text that is damaged at byte 6"));
+    EXPECT_THAT(error_in(outside.substr(0, outside.size() - 1)), HasSubstr("UTF-16 text that is damaged"));
+  }
+  EXPECT_THAT(error_in(utf16("1 aorta\n", Endian::little).substr(2)), HasSubstr("save it as UTF-8"));
+}
+
+TEST_F(LabelTables, may_have_any_separator_and_names_with_one_in_them) {
+  const auto read = [&](const std::string& text) { return read_label_names(folder.file("any.name", text)); };
+  EXPECT_THAT(read("Label;Name;Farbe\n1;aorta;#ff0000\n2;left, right;#00ff00\n"),
+              ElementsAre(Pair(1, "aorta"), Pair(2, "left, right")));
+  EXPECT_THAT(read("index,name\n1,atrium, left\n2,aorta,,\n"), ElementsAre(Pair(1, "atrium, left"), Pair(2, "aorta")));
+  EXPECT_THAT(read("name,index,r,g,b\natrium, left,1,255,0,0\n"), ElementsAre(Pair(1, "atrium, left")));
+  EXPECT_THAT(read("1;aorta\n2;atrium, left\n"), ElementsAre(Pair(1, "aorta"), Pair(2, "atrium, left")));
+  EXPECT_THAT(read("1,aorta,255,0,0\n2,atrium, left,1,2,3\n"), ElementsAre(Pair(1, "aorta"), Pair(2, "atrium, left")));
+  EXPECT_THAT(read("index,name\n1.0,aorta\n"), ElementsAre(Pair(1, "aorta"))) << "as pandas writes them";
+  EXPECT_THAT(error_in("index,name,notes\n1,atrium,left,seen twice\n"),
+              HasSubstr(":2: the row has 4 cells between ',', the heading 3: put a name with ',' in it in quotes"));
+  EXPECT_THAT(error_in("index\tname\n1\taorta\tx\n"), HasSubstr("the row has 3 cells between 'tab'"));
+  EXPECT_THAT(error_in("aorta;1\n"), HasSubstr("begins with their names, index and name"));
+}
+
+TEST_F(LabelTables, may_be_json) {
+  const auto read = [&](const std::string& text) { return read_label_names(folder.file("any.name", text)); };
+  const auto two = ElementsAre(Pair(1, "aorta"), Pair(2, "left atrium"));
+  EXPECT_THAT(read(R"({"1": "aorta", "2": "left atrium"})"), two);
+  EXPECT_THAT(read(R"( {"aorta": 1, "left atrium": "2"})"), two);
+  EXPECT_THAT(read(R"([{"value": 1, "name": "aorta"}, {"name": "left atrium", "value": 2}])"), two);
+  EXPECT_THAT(read(R"([{"id": 1, "name": "aorta"}, {"label": "2", "name": "left atrium", "color": [1, 2]}])"), two);
+  EXPECT_THAT(read(R"({"1": {"name": "aorta"}, "2": {"name": "left atrium"}})"), two);
+  EXPECT_THAT(read(R"({"name": "set", "labels": {"aorta": 1, "left atrium": 2, "both": [1, 2]}, "numTraining": 7})"),
+              two);
+  EXPECT_THAT(read(R"({"labels": {"1": "aorta", "2": "left atrium"}})"), two);
+  EXPECT_THAT(read(R"({"segmentAttributes": [[{"labelID": 1, "SegmentLabel": "aorta"}],)"
+                   R"([{"labelID": 2, "SegmentLabel": "left atrium"}]]})"),
+              two);
+  EXPECT_THAT(read(utf16(R"({"1": "V\u00e4ne"})", Endian::little)), ElementsAre(Pair(1, "Väne")));
+  EXPECT_THAT(error_in(R"({"1": "aorta", "1": "vein"})"), HasSubstr("has the key '1' twice"));
+  EXPECT_THAT(error_in(R"({"1": "aorta")"), HasSubstr("is not JSON"));
+  EXPECT_THAT(error_in(R"({"Modality": "MR", "EchoTime": 0.03})"), HasSubstr("Modality"));
+  EXPECT_THAT(error_in(R"({"aorta": 1.5})"), HasSubstr("neither a name nor a label"));
+  EXPECT_THAT(error_in(R"(["aorta", "left atrium"])"), HasSubstr("its label names are wanted as"));
+  EXPECT_THAT(error_in("[]"), HasSubstr("names no label"));
+  EXPECT_THAT(error_in(std::string(100000, '[')), HasSubstr("nested deeper than 16"));
+  EXPECT_THAT(error_in(R"({"1": "a\u0001b"})"), HasSubstr("control character"));
+  EXPECT_THAT(error_in("{\"1\": \"" + std::string(201, 'a') + "\"}"), HasSubstr("201 bytes"));
+}
+
+TEST_F(LabelTables, with_several_names_of_a_label_are_told) {
+  EXPECT_FALSE(several_names("t.tsv", {{1, "aorta"}, {2, "vein"}, {1, "aorta"}}));
+  const auto warning = several_names("t.tsv", {{1, "aorta"}, {2, "vein"}, {1, "trachea"}});
+  ASSERT_TRUE(warning);
+  EXPECT_THAT(warning->text, HasSubstr("t.tsv: the label 1 is called 'aorta' and 'trachea'"));
+}
+
 TEST_F(LabelTables, that_are_none_are_refused_with_their_line) {
   EXPECT_THAT(error_in(""), HasSubstr("names no label"));
   EXPECT_THAT(error_in("# only a comment\n"), HasSubstr("names no label"));
@@ -110,7 +185,9 @@ TEST_F(LabelTables, that_are_none_are_refused_with_their_line) {
 
 TEST_F(LabelTables, damaged_ones_are_read_or_refused) {
   std::size_t refused = 0;
-  for (const std::string& text : {bids, itk_snap, slicer, freesurfer, slicer_csv}) {
+  const std::string json = R"({"labels": {"aorta": 1, "left atrium": 2, "both": [1, 2]}})";
+  for (const std::string& text :
+       {bids, itk_snap, slicer, freesurfer, slicer_csv, json, utf16(bids, Endian::big), utf16(json, Endian::little)}) {
     for (std::uint64_t seed = 0; seed < 400; ++seed) {
       try {
         EXPECT_FALSE(read_label_names(folder.file("labels.txt", mutate(text, seed))).empty());
@@ -136,6 +213,12 @@ TEST(LabelNamesTest, are_found_by_value_or_name) {
   const LabelNames names{{1, "aorta"}, {2, "colon"}, {3, "aorta"}, {2, "bowel"}, {4, ""}};
   EXPECT_EQ(find_label(names, "2"), 2);
   EXPECT_EQ(find_label(names, "9"), 9) << "a value needs no name";
+  EXPECT_EQ(find_label(names, "9007199254740992"), 0x1p53);
+  EXPECT_EQ(find_label(names, "-7"), -7);
+  EXPECT_EQ(find_label(names, "007"), 7);
+  for (const char* beyond : {"9007199254740993", "18446744073709551615", "-9007199254740993"}) {
+    EXPECT_THROW(find_label(names, beyond), InputError) << beyond;
+  }
   EXPECT_EQ(find_label(names, "colon"), 2);
   EXPECT_EQ(find_label(names, "bowel"), 2) << "a label may have two names";
   EXPECT_EQ(find_label(names, "liver"), std::nullopt);

@@ -141,8 +141,46 @@ TEST(MetaImageDamage, TruncatedAnywhere) {
   const std::string packed = deflated(voxels, 15);
   const std::string header = metaimage_header(
       "MET_UCHAR", "CompressedData = True\nCompressedDataSize = " + std::to_string(packed.size()) + "\n");
-  EXPECT_THAT(error_of(folder.file("v.mha", header + packed.substr(0, packed.size() - 7))),
-              HasSubstr("7 of the " + std::to_string(packed.size()) + " bytes of compressed voxels"));
+  EXPECT_THAT(error_of(folder.file("v.mha", header + packed.substr(0, packed.size() - 7))), HasSubstr("truncated: "));
+}
+
+TEST(MetaImage, AStatedCompressedSizeThatIsTooLargeIsANote) {
+  const TemporaryFolder folder;
+  const std::string packed = deflated(voxels, 15);
+  const std::string header = metaimage_header("MET_UCHAR", "CompressedData = True\nCompressedDataSize = 9999\n");
+  const VolumeFile file = read_both_ways(folder.file("v.mha", header + packed));
+  EXPECT_EQ(values_of(file.volume), values_of(read_volume(folder.file("p.mha", metaimage_header() + voxels)).volume));
+  ASSERT_EQ(file.warnings.size(), 1U);
+  EXPECT_EQ(file.warnings[0].weight, Weight::note);
+  EXPECT_THAT(file.warnings[0].text, HasSubstr("promises 9999 bytes of compressed voxels, and " +
+                                               std::to_string(packed.size()) + " are there"));
+  for (std::size_t size = 1; size < packed.size(); ++size) {
+    EXPECT_THAT(error_of(folder.file("v.mha", header + packed.substr(0, size))), HasSubstr("truncated: "));
+  }
+}
+
+TEST(MetaImage, AChannelBeforeThreeAxesOfSpace) {
+  const TemporaryFolder folder;
+  std::string header = replaced(metaimage_header(), "NDims = 3", "NDims = 4");
+  header = replaced(header, "1 0 0 0 1 0 0 0 1", "1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1");
+  header = replaced(header, "Offset = 10 20 30", "Offset = 0 10 20 30");
+  header = replaced(header, "ElementSpacing = 2 3 4", "ElementSpacing = 1 2 3 4");
+  header = replaced(header, "DimSize = 3 4 5", "DimSize = 1 3 4 5");
+  const VolumeFile file = read_both_ways(folder.file("v.mha", header + voxels));
+  EXPECT_EQ(file.volume.dims, (std::array<std::size_t, 3>{3, 4, 5}));
+  EXPECT_TRUE(file.volume.affine.isApprox(sample_affine()));
+  EXPECT_THAT(texts_of(file.warnings), ElementsAre(HasSubstr("the leading 1 is taken as a channel")));
+  header = replaced(header, "DimSize = 1 3 4 5", "DimSize = 2 3 4 5");
+  EXPECT_THAT(error_of(folder.file("v.mha", header + voxels + voxels)), HasSubstr("looks like 2 channels"));
+}
+
+TEST(MetaImage, AMatrixWithoutVolumeIsNamed) {
+  const TemporaryFolder folder;
+  for (const auto& [matrix, why] :
+       {std::pair("0 0 0 0 0 0 0 0 0", "is all zero"), {"1 0 0 1 0 0 0 0 1", "is singular"}}) {
+    EXPECT_THAT(error_of(folder.file("v.mha", replaced(metaimage_header(), "1 0 0 0 1 0 0 0 1", matrix) + voxels)),
+                HasSubstr(std::string("its TransformMatrix ") + why));
+  }
 }
 
 TEST(MetaImageDamage, DamagedHeaders) {

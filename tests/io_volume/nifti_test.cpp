@@ -227,7 +227,7 @@ TEST(NiftiTransform, NotFiniteOrSingularIsRefused) {
     NiftiOptions options;
     options.sform[5] = bad;
     folder.file("v.nii", nifti_file(options));
-    EXPECT_THAT(error_of(folder / "v.nii"), HasSubstr("sform is not finite"));
+    EXPECT_THAT(error_of(folder / "v.nii"), HasSubstr(bad == 1e30 ? "sform reaches 1e+30 mm" : "sform is not finite"));
     options.sform_code = 0;
     options.qform_code = 1;
     options.quatern[1] = bad;
@@ -238,6 +238,105 @@ TEST(NiftiTransform, NotFiniteOrSingularIsRefused) {
   options.sform = {2, 4, 0, 0, 1, 2, 0, 0, 0, 0, 1, 0};
   folder.file("v.nii", nifti_file(options));
   EXPECT_THAT(error_of(folder / "v.nii"), HasSubstr("singular"));
+}
+
+TEST(NiftiTransform, AnSformThatCannotBeGivesWayToTheQform) {
+  const TemporaryFolder folder;
+  NiftiOptions good;
+  good.sform_code = 0;
+  good.qform_code = 1;
+  good.quatern = {0, 0, 0, 10, 20, 30};
+  const auto expected = read_volume(folder.file("good.nii", nifti_file(good))).volume.affine;
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (const auto& sform :
+       {std::array<double, 12>{}, {2, 4, 0, 0, 1, 2, 0, 0, 0, 0, 1, 0}, {nan, 0, 0, 0, 0, 3, 0, 0, 0, 0, 4, 0}}) {
+    for (const bool prefer_qform : {false, true}) {
+      NiftiOptions options = good;
+      options.sform_code = 1;
+      options.sform = sform;
+      VolumeOptions reading;
+      reading.prefer_qform = prefer_qform;
+      const VolumeFile file = read_both_ways(folder.file("v.nii", nifti_file(options)), reading);
+      EXPECT_EQ(file.transform, "qform");
+      EXPECT_EQ(file.volume.affine, expected);
+      EXPECT_THAT(texts_of(file.warnings),
+                  testing::ElementsAre(AllOf(HasSubstr("its sform "), HasSubstr("the qform is used instead"))));
+      options.qform_code = 0;
+      EXPECT_THAT(error_of(folder.file("v.nii", nifti_file(options)), reading),
+                  AllOf(HasSubstr("its sform "), HasSubstr("its qform is not set (its code is 0)")));
+    }
+  }
+}
+
+TEST(NiftiTransform, AQformThatCannotBeGivesWayToTheSform) {
+  const TemporaryFolder folder;
+  NiftiOptions options;
+  options.qform_code = 1;
+  options.quatern = {1, 1, 1, 0, 0, 0};
+  VolumeOptions prefer;
+  prefer.prefer_qform = true;
+  const VolumeFile file = read_both_ways(folder.file("v.nii", nifti_file(options)), prefer);
+  EXPECT_EQ(file.transform, "sform");
+  EXPECT_THAT(texts_of(file.warnings),
+              testing::ElementsAre(HasSubstr(
+                  "its qform has the quaternion (1, 1, 1), which is no rotation: the sform is used instead")));
+  EXPECT_THAT(read_both_ways(folder / "v.nii").warnings, IsEmpty());
+  options.sform_code = 0;
+  EXPECT_THAT(error_of(folder.file("v.nii", nifti_file(options))), HasSubstr("no rotation"));
+}
+
+TEST(Nifti, AChannelBeforeThreeAxesOfSpace) {
+  const TemporaryFolder folder;
+  for (const std::vector<std::int64_t>& dims :
+       {std::vector<std::int64_t>{1, 3, 4, 5}, {1, 1, 3, 4, 5}, {1, 3, 4, 5, 1}}) {
+    NiftiOptions options;
+    options.dims = dims;
+    const VolumeFile file = read_both_ways(folder.file("v.nii", nifti_file(options)));
+    EXPECT_EQ(file.volume.dims, (std::array<std::size_t, 3>{3, 4, 5}));
+    EXPECT_EQ(values_of(file.volume), values_of(read_volume(folder.file("p.nii", nifti_file())).volume));
+    EXPECT_EQ(file.spacing, Vec3(2, 3, 4));
+    ASSERT_EQ(file.warnings.size(), 1U);
+    EXPECT_EQ(file.warnings[0].weight, Weight::note);
+    EXPECT_THAT(file.warnings[0].text, HasSubstr("the leading 1 is taken as a channel"));
+  }
+  NiftiOptions options;
+  options.dims = {1, 3, 4, 5};
+  VolumeOptions frame;
+  frame.frame = 2;
+  const VolumeFile series = read_both_ways(folder.file("v.nii", nifti_file(options)), frame);
+  EXPECT_EQ(series.volume.dims, (std::array<std::size_t, 3>{1, 3, 4}));
+  EXPECT_THAT(texts_of(series.warnings), testing::ElementsAre(HasSubstr("a single slice")));
+}
+
+TEST(Nifti, ClassesAsChannelsAreNoSeries) {
+  const TemporaryFolder folder;
+  NiftiOptions options;
+  options.dims = {2, 5, 4, 6};
+  folder.file("v.nii", nifti_file(options));
+  EXPECT_THAT(error_of(folder / "v.nii"), AllOf(HasSubstr("2 x 5 x 4 x 6: its first axis looks like 2 channels"),
+                                                HasSubstr("argmax over the first axis"), HasSubstr("--frame 0..5")));
+  VolumeOptions frame;
+  frame.frame = 2;
+  const VolumeFile file = read_both_ways(folder / "v.nii", frame);
+  ASSERT_EQ(file.warnings.size(), 1U);
+  EXPECT_EQ(file.warnings[0].weight, Weight::major);
+  options.dims = {5, 5, 4, 6};
+  EXPECT_THAT(error_of(folder.file("v.nii", nifti_file(options))), HasSubstr("has 6 frames"));
+}
+
+TEST(NiftiPair, TheVoxelsMayBeNamed) {
+  const TemporaryFolder folder;
+  NiftiOptions options;
+  options.pair = true;
+  folder.file("v.img", voxels);
+  EXPECT_THAT(error_of(folder / "v.img"), HasSubstr("is not a volume"));
+  folder.file("v.hdr", nifti_header(options, 2, 8).substr(0, 348));
+  const VolumeFile file = read_both_ways(folder / "v.img");
+  EXPECT_EQ(values_of(file.volume), values_of(read_volume(folder / "v.hdr").volume));
+  EXPECT_THAT(file.data_files, testing::ElementsAre(folder / "v.hdr"));
+  folder.file("w.hdr", nifti_header(options, 2, 8).substr(0, 348));
+  folder.file("w.img.gz", deflated(voxels));
+  EXPECT_EQ(values_of(read_both_ways(folder / "w.img.gz").volume), values_of(file.volume));
 }
 
 TEST(Nifti, ScaleIsKeptAndSlopeZeroMeansNone) {

@@ -127,9 +127,64 @@ TEST(Nrrd, SkippedLinesAndBytes) {
   EXPECT_EQ(read("encoding: gzip\nline skip: 1\nbyte skip: 3\n", "a\n" + deflated("xyz" + voxels)), expected);
   for (const std::string more :
        {"encoding: raw\nbyte skip: -2\n", "encoding: raw\nbyte skip: x\n", "encoding: gzip\nbyte skip: -1\n",
-        "encoding: raw\nline skip: 99\n", "encoding: raw\nbyte skip: 18446744073709551615\n"}) {
+        "encoding: raw\nline skip: 99\n", "encoding: raw\nbyte skip: 18446744073709551615\n",
+        "encoding: raw\nbyte skip: -0\n", "encoding: raw\nbyte skip: -18446744073709551615\n",
+        "encoding: ascii\nbyte skip: -1\n"}) {
     error_of(folder.file("v.nrrd", nrrd_header("uint8", more) + voxels));
   }
+}
+
+// Teem counts them in what is inflated, from its end too: -1 - N leaves N bytes behind the voxels.
+TEST(Nrrd, SkippedBytesFromTheEnd) {
+  const TemporaryFolder folder;
+  const auto expected = values_of(read_volume(folder.file("v.nrrd", nrrd_header() + voxels)).volume);
+  for (const bool gzip : {false, true}) {
+    const std::string coding = gzip ? "encoding: gzip\n" : "encoding: raw\n";
+    const auto read = [&](const std::string& skip, const std::string& data) {
+      folder.file("v.raw", "a line\n" + (gzip ? deflated(data) : data));
+      const std::string header =
+          nrrd_header("uint8", coding + "line skip: 1\nbyte skip: " + skip + "\ndata file: v.raw\n");
+      const VolumeFile file = read_both_ways(folder.file("v.nhdr", header));
+      EXPECT_THAT(file.warnings, testing::IsEmpty());
+      return values_of(file.volume);
+    };
+    EXPECT_EQ(read("-1", "any header" + voxels), expected);
+    EXPECT_EQ(read("-4", "any header" + voxels + "xyz"), expected);
+    folder.file("v.raw", gzip ? deflated(voxels) : voxels);
+    EXPECT_THAT(error_of(folder.file("v.nhdr", nrrd_header("uint8", coding + "byte skip: -2\ndata file: v.raw\n"))),
+                HasSubstr("truncated: it holds 60 bytes, and 60 of voxels with 1 behind them"));
+  }
+}
+
+TEST(Nrrd, AxisMinimaAreTheOriginWhereThereIsNone) {
+  const TemporaryFolder folder;
+  const std::string header = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 3 4 5\nencoding: raw\n";
+  const auto affine_of = [&](const std::string& more) {
+    return read_both_ways(folder.file("v.nrrd", header + more + "\n" + voxels)).volume.affine;
+  };
+  // A cell begins half a spacing before its sample, a node at it; cells unless the file says otherwise.
+  EXPECT_EQ(affine_of("spacings: 2 3 4\naxis mins: 10 20 30\n").col(3), Vec3(11, 21.5, 32));
+  EXPECT_EQ(affine_of("spacings: 2 3 4\naxis mins: 10 20 30\ncenters: cell node node\n").col(3), Vec3(11, 20, 30));
+  const auto from_both = affine_of("axis mins: 10 20 30\naxis maxs: 16 29 50\ncenterings: cell node cell\n");
+  EXPECT_TRUE(from_both.isApprox((Eigen::Matrix<double, 3, 4>() << 2, 0, 0, 11, 0, 3, 0, 20, 0, 0, 4, 32).finished()));
+  EXPECT_EQ(affine_of("spacings: 2 3 4\naxis mins: 10 nan 30\n").col(3), Vec3(0, 0, 0)) << "one is unknown";
+  EXPECT_EQ(affine_of("spacings: 2 3 4\naxis mins: 1 2 3\nspace: LPS\nspace origin: (7,8,9)\n").col(3), Vec3(7, 8, 9));
+  error_of(folder.file("v.nrrd", header + "spacings: 2 3 4\naxis mins: 10 20\n\n" + voxels));
+}
+
+TEST(Nrrd, AChannelBeforeThreeAxesOfSpace) {
+  const TemporaryFolder folder;
+  const auto file_of = [&](const std::string& sizes, int count) {
+    return folder.file(
+        "v.nrrd", "NRRD0004\ntype: uint8\ndimension: 4\nsizes: " + sizes + "\nspacings: nan 2 3 4\nencoding: raw\n\n" +
+                      encoded(sample_values<std::uint8_t>(static_cast<std::size_t>(count)), Endian::little));
+  };
+  const VolumeFile file = read_both_ways(file_of("1 3 4 5", 60));
+  EXPECT_EQ(file.volume.dims, (std::array<std::size_t, 3>{3, 4, 5}));
+  EXPECT_EQ(file.spacing, Vec3(2, 3, 4));
+  EXPECT_EQ(file.warnings[0].weight, Weight::note);
+  EXPECT_THAT(file.warnings[0].text, HasSubstr("1 x 3 x 4 x 5: the leading 1 is taken as a channel"));
+  EXPECT_THAT(error_of(file_of("2 3 4 5", 120)), AllOf(HasSubstr("looks like 2 channels"), HasSubstr("argmax")));
 }
 
 std::string layered(const std::string& more = {}) {
@@ -150,7 +205,7 @@ TEST(Nrrd, OverlappingSegmentsNeedALayer) {
   }
   const auto path = folder.file("v.seg.nrrd", layered(segments) + deflated(encoded(both, Endian::little)));
   EXPECT_THAT(error_of(path), AllOf(HasSubstr("has 2 layers: choose one with --layer 0..1"),
-                                    HasSubstr("layer 0 holds ribs; layer 1 holds left lung")));
+                                    HasSubstr("ribs (label 1 of layer 0), left lung (label 1 of layer 1)")));
   for (std::size_t layer = 0; layer < 2; ++layer) {
     VolumeOptions options;
     options.layer = layer;
@@ -165,6 +220,69 @@ TEST(Nrrd, OverlappingSegmentsNeedALayer) {
   VolumeOptions options;
   options.layer = 2;
   EXPECT_THAT(error_of(path, options), HasSubstr("--layer 2 does not exist"));
+}
+
+// Two layers, of which voxel i holds 2 i and 2 i + 1.
+std::string two_layers(const std::string& segments) {
+  std::vector<std::uint8_t> both(120);
+  for (std::size_t i = 0; i < both.size(); ++i) {
+    both[i] = static_cast<std::uint8_t>(i);
+  }
+  return layered(segments) + deflated(encoded(both, Endian::little));
+}
+
+VolumeOptions segment(const std::string& name, std::optional<std::size_t> layer = {}) {
+  VolumeOptions options;
+  options.segment = name;
+  options.layer = layer;
+  return options;
+}
+
+TEST(NrrdSegments, ChooseTheirLayer) {
+  const TemporaryFolder folder;
+  // Slicer before 4.11 writes neither layers nor values: a layer each, the value 1.
+  const std::string old = "Segment0_Extent:=0 2 0 3 0 4\nSegment0_Name:=ribs\nSegment1_ID:=Segment_2\n";
+  const std::string crossed =
+      "Segment0_Name:=ribs\nSegment0_Layer:=1\nSegment0_LabelValue:=3\n"
+      "Segment1_Name:=left lung\nSegment1_Layer:=0\nSegment1_LabelValue:=5\n";
+  const auto first_of = [&](const std::string& segments, const VolumeOptions& options) {
+    return values_of(read_both_ways(folder.file("v.seg.nrrd", two_layers(segments)), options).volume)[0];
+  };
+  EXPECT_EQ(first_of(old, segment("ribs")), 0);
+  EXPECT_EQ(first_of(old, segment("Segment_2")), 1) << "called by its identifier";
+  EXPECT_EQ(first_of(crossed, segment("ribs")), 1);
+  EXPECT_EQ(first_of(crossed, segment("left lung")), 0);
+  EXPECT_EQ(first_of(crossed, segment("3")), 1) << "a value of one segment alone";
+  EXPECT_EQ(first_of(crossed, segment("ribs", 1)), 1);
+  EXPECT_EQ(first_of(old, segment("1", 1)), 1) << "a value and a layer";
+  const auto path = folder.file("v.seg.nrrd", two_layers(old));
+  EXPECT_THAT(error_of(path, segment("Segment_2", 0)),
+              HasSubstr("--layer 0 does not hold the segment 'Segment_2', which is in layer 1"));
+  EXPECT_THAT(error_of(path, segment("1")),
+              AllOf(HasSubstr("segments in several layers"), HasSubstr("ribs (label 1 of layer 0)")));
+  EXPECT_THAT(error_of(path, segment("rib")), HasSubstr("has no segment 'rib'"));
+  EXPECT_THAT(error_of(path, segment("ribs+Segment_2")), HasSubstr("one of them, for a surface is made of one layer"));
+  EXPECT_EQ(first_of("Segment0_Name:=a+b\nSegment1_Name:=b\n", segment("a+b")), 0);
+  EXPECT_EQ(
+      first_of("Segment0_Name:=a\nSegment1_Name:=b\nSegment1_Layer:=0\nSegment1_LabelValue:=2\n", segment("a + b")), 0);
+}
+
+TEST(NrrdSegments, ThatSayNoLayerOrNoNumber) {
+  const TemporaryFolder folder;
+  const auto path = folder.file("v.seg.nrrd", two_layers("Segment5_Name:=ribs\n"));
+  EXPECT_THAT(error_of(path, segment("ribs")), HasSubstr("does not say in which of its 2 layers the segment ribs is"));
+  for (const char* line : {"Segment0_Layer:=-1\n", "Segment0_LabelValue:=one\n"}) {
+    EXPECT_THAT(error_of(folder.file("v.seg.nrrd", two_layers(line))), HasSubstr("has no such number"));
+  }
+}
+
+TEST(NrrdSegments, OfOneValueAreToldWithTheirNames) {
+  const TemporaryFolder folder;
+  const std::string header =
+      replaced(nrrd_header(), "encoding: raw\n", "encoding: raw\nSegment0_Name:=ribs\nSegment1_Name:=lung\n");
+  const VolumeFile file = read_both_ways(folder.file("v.seg.nrrd", header + voxels), segment("ribs"));
+  EXPECT_THAT(texts_of(file.warnings), ElementsAre(HasSubstr("the label 1 is called 'lung' and 'ribs'")));
+  EXPECT_EQ(file.segments.size(), 2U);
 }
 
 TEST(Nrrd, TimeNeedsAFrame) {

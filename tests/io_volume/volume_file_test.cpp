@@ -52,10 +52,44 @@ TEST(VolumeFile, VoxelsThatNoScannerMakesAreWarnedOf) {
     const std::string header =
         replaced(metaimage_header(), "ElementSpacing = 2 3 4", std::string("ElementSpacing = ") + spacing);
     folder.file("v.mha", header + voxels);
-    const VolumeFile file = read_volume(folder / "v.mha", {});
+    VolumeFile file = read_volume(folder / "v.mha", {});
+    std::erase_if(file.warnings, [](const Warning& warning) { return warning.kind == "anisotropic voxels"; });
     ASSERT_EQ(file.warnings.size(), warned ? 1U : 0U) << spacing;
     EXPECT_TRUE(!warned || file.warnings[0].text.ends_with("mm: is their unit right?")) << file.warnings[0].text;
   }
+}
+
+TEST(VolumeFile, ThickSlicesAreWarnedOf) {
+  const TemporaryFolder folder;
+  for (const auto& [spacing, warned] : {std::pair("0.7 0.7 3", true), {"5 0.7 0.7", true}, {"1 1 2", false}}) {
+    const std::string header =
+        replaced(metaimage_header(), "ElementSpacing = 2 3 4", std::string("ElementSpacing = ") + spacing);
+    folder.file("v.mha", header + std::string(60, '\1'));
+    const VolumeFile file = read_volume(folder / "v.mha", {});
+    ASSERT_EQ(file.warnings.size(), warned ? 1U : 0U) << spacing;
+    if (warned) {
+      EXPECT_EQ(file.warnings[0].kind, "anisotropic voxels");
+      EXPECT_EQ(file.warnings[0].weight, Weight::minor);
+      EXPECT_THAT(file.warnings[0].text,
+                  HasSubstr(spacing[0] == '5' ? "half a slice, 2.5 mm" : "half a slice, 1.5 mm"));
+    }
+  }
+}
+
+TEST(VolumeFile, ASingleSliceIsWarnedOf) {
+  const TemporaryFolder folder;
+  const std::string header = replaced(metaimage_header(), "DimSize = 3 4 5", "DimSize = 12 1 5");
+  const VolumeFile file = read_volume(folder.file("v.mha", header + std::string(60, '\1')), {});
+  ASSERT_EQ(file.warnings.size(), 1U);
+  EXPECT_THAT(file.warnings[0].text, HasSubstr("12 x 1 x 5 voxels, a single slice"));
+}
+
+TEST(VolumeFile, VoxelsWithoutAHeaderNameTheOneBesideThem) {
+  const TemporaryFolder folder;
+  folder.file("v.raw", std::string(60, '\1'));
+  EXPECT_THAT(error_of(folder / "v.raw"), HasSubstr("is not a volume"));
+  folder.file("v.mhd", metaimage_header("MET_UCHAR", "", "v.raw"));
+  EXPECT_THAT(error_of(folder / "v.raw"), HasSubstr("v.mhd, which is beside it"));
 }
 
 // Every damage of a good file is a clean refusal or a volume, in bounded memory and time.

@@ -2,10 +2,13 @@
 #include "tunica/core/threads.hpp"
 #include "tunica/volume/cubes/label_index.hpp"
 #include "tunica/volume/cubes/marching_cubes.hpp"
+#include "tunica/volume/labels/whole_labels.hpp"
+#include "tunica/volume/smoothing/smoothing.hpp"
 #include "volumes.hpp"
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -199,6 +202,114 @@ TEST(LabelIndex, LabelsHaveTheirVolumesAndNames) {
   EXPECT_EQ((*meant)[0].value, 1);
   EXPECT_EQ((*meant)[0].voxels, 32U);
   EXPECT_EQ((*meant)[1].value, 4.5);
+}
+
+TEST(LabelIndex, ValuesNextToWholeNumbersAreThoseLabels) {
+  const auto labels_of = [](const Volume& volume) {
+    LabelIndex index(volume.dims, volume.affine);
+    for_each_slab(volume, 2, [&](const Volume& slab, std::size_t first) { index.add(slab, first); });
+    const auto labels = index.labels();
+    for (const Label& label : *labels) {
+      const Mask mask = index.mask(label.value);
+      EXPECT_EQ(mask, select(volume, {Inside::Rule::label, label.value})) << label.value;
+      EXPECT_EQ(label.voxels, count_voxels(mask));
+      EXPECT_EQ(index.surface_vertices(label.value), edges_between(mask));
+    }
+    std::vector<double> values;
+    for (const Label& label : *labels) {
+      values.push_back(label.value);
+    }
+    return values;
+  };
+  Random random(5);
+  // The noise of a resampling, and zeros that are not quite.
+  const auto noisy = [&](double size) {
+    return make_volume<double>({70, 5, 6}, [&](auto i, auto, auto k) {
+      return static_cast<double>(i / 20 % 3) + (k % 2 == 0 ? size * (random.uniform() - 0.5) : 0);
+    });
+  };
+  EXPECT_EQ(labels_of(noisy(1.9e-3)), (std::vector<double>{1, 2}));
+  EXPECT_GT(labels_of(noisy(3e-3)).size(), 3U);
+  // A mask of 0 and 255 by the slope 1/255 of a header of 32-bit floats.
+  Volume mask = make_volume<std::uint8_t>({70, 4, 4}, [](auto i, auto...) { return i % 3 == 0 ? 255 : 0; });
+  mask.slope = static_cast<double>(1.0F / 255.0F);
+  EXPECT_NE(mask.slope * 255, 1);
+  EXPECT_EQ(labels_of(mask), (std::vector<double>{1}));
+  const Volume scaled = make_volume<float>({70, 4, 4}, [](auto i, auto...) { return i % 3 == 0 ? 2.9999F : 5.5F; });
+  EXPECT_EQ(labels_of(scaled), (std::vector<double>{3, 5.5}));
+}
+
+TEST(LabelIndex, LabelsThatDoublesCannotTellApartAreRefused) {
+  const auto index_of = [](std::uint64_t label) {
+    const Volume volume = make_volume<std::uint64_t>({3, 3, 3}, [&](auto i, auto...) { return i == 1 ? label : 0; });
+    LabelIndex index(volume.dims, volume.affine);
+    index.add(volume, 0);
+    return index.labels()->at(0).value;
+  };
+  EXPECT_EQ(index_of(std::uint64_t{1} << 60), 0x1p60);
+  EXPECT_THROW(index_of((std::uint64_t{1} << 53) + 1), InputError);
+  EXPECT_THROW(index_of(std::numeric_limits<std::uint64_t>::max()), InputError);
+}
+
+TEST(LabelIndex, ALabelOfSeveralNamesHasThemAll) {
+  const Volume volume = make_volume<std::uint8_t>({3, 3, 3}, [](auto i, auto...) { return i == 1 ? 7 : 0; });
+  LabelIndex index(volume.dims, volume.affine);
+  index.add(volume, 0);
+  EXPECT_EQ(index.labels({{7, "vein"}, {7, "aorta"}, {7, "vein"}})->at(0).name, "aorta / vein");
+}
+
+TEST(Wholeness, CountsWhatIsRoundedAndWhatLiesBetween) {
+  const Volume volume = make_volume<float>({8, 1, 3}, [](auto i, auto, auto k) {
+    constexpr std::array<float, 8> values{0, 1, 2.0005F, 0.0001F, 2.5F, 0.37F, HUGE_VALF, -1};
+    return k == 2 ? std::nanf("") : values.at(i);
+  });
+  Wholeness whole;
+  for_each_slab(volume, 1, [&](const Volume& slab, std::size_t) { whole.add(slab); });
+  EXPECT_EQ(whole.rounded, 4U);
+  EXPECT_NEAR(whole.farthest, 5e-4, 1e-6);
+  EXPECT_EQ(whole.between, 4U);
+  EXPECT_EQ(whole.example, 2.5);
+  EXPECT_EQ(whole.not_zero, 10U);  // 1, 2.0005, 2.5, 0.37 and -1, twice
+  Wholeness integers;
+  integers.add(make_volume<std::uint8_t>({2, 2, 2}, [](auto...) { return 3; }));
+  EXPECT_EQ(integers.between + integers.rounded, 0U);
+}
+
+TEST(Volumes, ThatAreNoneAreRefused) {
+  const Volume good = make_volume<std::uint8_t>({4, 4, 4}, [](auto...) { return 1; });
+  const auto refused = [](const Volume& volume) {
+    EXPECT_THROW(select(volume, {Inside::Rule::label, 1}), InputError);
+    EXPECT_THROW(marching_cubes(volume, {Inside::Rule::above, 0.5}), InputError);
+    EXPECT_THROW(smooth_values(volume, 1), InputError);
+    EXPECT_THROW(Wholeness().add(volume), InputError);
+    EXPECT_THROW(LabelIndex({4, 4, 4}, Volume().affine).add(volume, 0), InputError);
+  };
+  constexpr std::size_t huge = std::size_t{1} << 62;
+  for (const auto& dims :
+       {std::array<std::size_t, 3>{4, 4, 0}, {4, 4, 5}, {huge, 4, 1}, {huge, 1, 4}, {huge, huge, huge}}) {
+    Volume bad = good;
+    bad.dims = dims;
+    refused(bad);
+    if (dims[2] != 5) {
+      EXPECT_THROW(Mask(dims, good.affine), InputError);
+      EXPECT_THROW(LabelIndex(dims, good.affine), InputError);
+    }
+  }
+  for (const double value : {0.0, std::nan(""), HUGE_VAL}) {
+    Volume bad = good;
+    bad.slope = value;
+    refused(bad);
+    bad = good;
+    bad.affine.col(1).setConstant(value);
+    refused(bad);
+  }
+  EXPECT_THROW(select(good, {Inside::Rule::label, std::nan("")}), InputError);
+  EXPECT_THROW(marching_cubes(good, {Inside::Rule::above, std::nan("")}), InputError);
+  EXPECT_THROW(marching_cubes(good, {Inside::Rule::above, 0}, Mask({4, 4, 3}, good.affine)), InputError);
+  Mask mask({4, 4, 4}, good.affine);
+  EXPECT_THROW(select(good, 1, {Inside::Rule::label, 1}, mask), InputError);
+  EXPECT_THROW(SlabMarchingCubes(mask, {Inside::Rule::above, 0}).finish(), InputError);
+  EXPECT_THROW(SlabMarchingCubes(mask, {Inside::Rule::label, 1}), InputError);
 }
 
 TEST(LabelIndex, AnImageIsNotASegmentation) {

@@ -138,9 +138,10 @@ void ByteStream::finish(std::vector<Warning>& warnings) {
   std::array<char, 4096> rest;
   const std::size_t count = read(rest.data(), rest.size());  // and so verifies the checksum at a gzip stream's end
   if (count > 0) {
-    warnings.push_back({Weight::minor, "bytes too many",
-                        fmt::format("{}: {}{} bytes follow the voxels and are ignored", path_.string(),
-                                    count == rest.size() ? "at least " : "", count)});
+    warnings.push_back(
+        {Weight::minor, "bytes too many",
+         fmt::format("{}: {}{} bytes follow the voxels and are ignored: the sizes in its header may be wrong",
+                     path_.string(), count == rest.size() ? "at least " : "", count)});
   } else if (inflater_ && inflater_->cut_off) {
     throw InputError(
         fmt::format("{}: truncated: at least 1 byte is missing from the end of its compressed stream, after "

@@ -1,6 +1,7 @@
 #include "tunica/io/volume/label_names.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/quantity.hpp"
 #include "tunica/io/file/suggestion.hpp"
 #include "tunica/io/file/text_scanner.hpp"
@@ -11,6 +12,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <iterator>
+#include <map>
+#include <set>
 
 namespace tunica {
 namespace fs = std::filesystem;
@@ -36,22 +41,19 @@ std::string read_text(const fs::path& path) {
   if (text.size() > most_bytes) {
     throw InputError(fmt::format("{}: is larger than 16 MiB: no table of labels is", path.string()));
   }
-  if (text.find('\0') != std::string::npos) {
-    throw InputError(fmt::format("{}: holds binary data: no table of labels does", path.string()));
-  }
-  return text.starts_with("\xef\xbb\xbf") ? text.substr(3) : text;
+  return volume_format::to_utf8(path, std::move(text));
 }
 
 [[noreturn]] void throw_line(const fs::path& path, std::size_t line, const std::string& what) {
   throw InputError(fmt::format("{}:{}: {}", path.string(), line, what));
 }
 
-void add(LabelNames& names, const fs::path& path, std::size_t line, std::int64_t index, std::string_view name) {
+void add(LabelNames& names, const fs::path& path, std::size_t line, double label, std::string_view name) {
   if (const auto why = label_error(names, name)) {
     throw_line(path, line, *why);
   }
   if (!name.empty() && lower_case(name) != "n/a") {
-    names.emplace_back(static_cast<double>(index), name);
+    names.emplace_back(label, name);
   }
 }
 
@@ -69,18 +71,31 @@ std::optional<std::pair<std::string, std::string_view>> quoted_cell(std::string_
   return {};
 }
 
-std::vector<std::string> cells(std::string_view line, char separator) {
-  std::vector<std::string> found;
+struct Cell {
+  std::string text;
+  std::size_t begin = 0;  // in the line
+  std::size_t end = 0;
+};
+
+std::vector<Cell> cells(std::string_view line, char separator) {
+  std::vector<Cell> found;
+  std::size_t begin = 0;
   for (bool more = true; more;) {
-    std::string_view rest = line.substr(std::min(line.find_first_not_of(' '), line.size()));
+    std::string_view rest = line.substr(std::min(line.find_first_not_of(' ', begin), line.size()));
     const auto quoted = rest.starts_with('"') ? quoted_cell(rest) : std::nullopt;
     rest = quoted ? quoted->second : rest;
-    const std::size_t end = std::min(rest.find(separator), rest.size());
-    found.push_back(quoted ? quoted->first : std::string(trimmed(rest.substr(0, end))));
-    more = end < rest.size();
-    line = rest.substr(std::min(end + 1, rest.size()));
+    const std::size_t length = std::min(rest.find(separator), rest.size());
+    const std::size_t end = line.size() - rest.size() + length;
+    found.push_back({quoted ? quoted->first : std::string(trimmed(rest.substr(0, length))), begin, end});
+    more = end < line.size();
+    begin = end + 1;
   }
   return found;
+}
+
+// A number or a colour as #rrggbb: no part of a name.
+bool is_data(std::string_view text) {
+  return text.empty() || text.starts_with('#') || parse_number(text).has_value() || lower_case(text) == "n/a";
 }
 
 // The column whose heading is one of these.
@@ -95,33 +110,77 @@ std::optional<std::size_t> column(const std::vector<std::string>& heads,
   return {};
 }
 
+struct Columns {
+  char separator = ',';
+  std::size_t count = 0;
+  std::size_t index = 0;
+  std::size_t name = 0;
+};
+
+// The columns of a table's heading; none where the line is no heading.
+std::optional<Columns> columns_of(std::string_view heading) {
+  for (const char separator : {'\t', ';', ','}) {
+    std::vector<std::string> heads;
+    for (Cell& cell : cells(heading, separator)) {
+      heads.push_back(std::move(cell.text));
+    }
+    const auto name =
+        column(heads, {"name", "labelname", "label_name", "structure", "structure_name", "region", "organ", "label"});
+    const auto index = column(heads, {"index", "labelvalue", "label_value", "voxel_value", "value", "id", "labelid",
+                                      "label_id", "label id", "label"});
+    if (index && name && index != name) {
+      return Columns{separator, heads.size(), *index, *name};
+    }
+  }
+  return {};
+}
+
+std::optional<double> whole_number(std::string_view text) {
+  const auto number = parse_number(text);
+  return number && *number == std::floor(*number) && std::abs(*number) < 0x1p53 ? number : std::nullopt;
+}
+
+// What a row says under the two columns. Cells too many are of a name with the separator in it, where the row leaves no
+// doubt: what stands behind the name is numbers and colours.
+std::pair<std::string, std::string> index_and_name(const fs::path& path, std::size_t number, std::string_view line,
+                                                   const Columns& columns) {
+  std::vector<Cell> row = cells(line, columns.separator);
+  while (row.size() > columns.count && row.back().text.empty()) {
+    row.pop_back();
+  }
+  if (row.size() <= std::max(columns.index, columns.name)) {
+    throw_line(path, number, "the row is shorter than the table's heading");
+  }
+  const std::size_t surplus = row.size() - std::min(row.size(), columns.count);
+  const Cell& last = row[columns.name + surplus];
+  const bool clear = std::all_of(row.begin() + static_cast<std::ptrdiff_t>(columns.name + surplus + 1), row.end(),
+                                 [](const Cell& cell) { return is_data(cell.text); });
+  if (surplus > 0 && (!clear || columns.separator == '\t')) {
+    throw_line(path, number,
+               fmt::format("the row has {} cells between '{}', the heading {}: put a name with '{}' in it in quotes",
+                           row.size(), columns.separator == '\t' ? "tab" : std::string(1, columns.separator),
+                           columns.count, columns.separator == '\t' ? "tab" : std::string(1, columns.separator)));
+  }
+  const std::size_t begin = row[columns.name].begin;
+  return {row[columns.index + (columns.index > columns.name ? surplus : 0)].text,
+          surplus > 0 ? std::string(trimmed(line.substr(begin, last.end - begin))) : row[columns.name].text};
+}
+
 // A table with a heading, or none where the first line is no heading.
 std::optional<LabelNames> parse_columns(const fs::path& path, std::string_view text) {
   TextScanner scanner(text);
-  if (!scanner.next_line()) {
-    return {};
-  }
-  const std::string_view first = scanner.rest();
-  const char separator = first.find('\t') != std::string_view::npos ? '\t' : ',';
-  const auto heads = cells(first, separator);
-  const auto index_at = column(heads, {"index", "labelvalue", "voxel_value", "value", "id"});
-  const auto name_at = column(heads, {"name", "labelname", "label"});
-  if (!index_at || !name_at || index_at == name_at) {
+  const auto columns = scanner.next_line() ? columns_of(scanner.rest()) : std::nullopt;
+  if (!columns) {
     return {};
   }
   LabelNames names;
   while (scanner.next_line()) {
-    const auto row = cells(scanner.rest(), separator);
-    if (row.size() <= std::max(*index_at, *name_at)) {
-      throw_line(path, scanner.line(), "the row is shorter than the table's heading");
+    const auto [index, name] = index_and_name(path, scanner.line(), scanner.rest(), *columns);
+    const auto label = whole_number(index);
+    if (!label) {
+      throw_line(path, scanner.line(), fmt::format("'{}' is no label value, a whole number", shown(index)));
     }
-    TextScanner cell(row[*index_at]);
-    const bool filled = cell.next_line();
-    const auto index = filled ? cell.integer() : std::nullopt;
-    if (!index || !cell.at_line_end()) {
-      throw_line(path, scanner.line(), fmt::format("'{}' is no label value, a whole number", shown(row[*index_at])));
-    }
-    add(names, path, scanner.line(), *index, row[*name_at]);
+    add(names, path, scanner.line(), *label, name);
   }
   return names;
 }
@@ -150,20 +209,42 @@ std::optional<std::string_view> name_in(std::string_view rest) {
   return std::string_view(words[0].data(), last.data() + last.size() - words[0].data());
 }
 
+// "1;aorta" or "1,aorta,255,0,0" of a table without a heading.
+std::optional<std::pair<double, std::string>> separated(std::string_view line) {
+  const std::size_t at = line.find_first_of(",;");
+  const auto index = at == std::string_view::npos ? std::nullopt : whole_number(trimmed(line.substr(0, at)));
+  if (!index) {
+    return {};
+  }
+  const std::string_view rest = line.substr(at + 1);
+  std::vector<Cell> row = cells(rest, line[at]);
+  while (row.size() > 1 && is_data(row.back().text)) {
+    row.pop_back();
+  }
+  const std::string name = row.size() == 1 ? row[0].text : std::string(trimmed(rest.substr(0, row.back().end)));
+  return is_data(name) ? std::nullopt : std::optional(std::pair(*index, name));
+}
+
 LabelNames parse_lines(const fs::path& path, std::string_view text) {
   LabelNames names;
   TextScanner scanner(text);
   while (scanner.next_line()) {
-    if (scanner.rest().starts_with('#')) {
+    const std::string_view line = scanner.rest();
+    if (line.starts_with('#')) {
+      continue;
+    }
+    if (const auto row = separated(line)) {
+      add(names, path, scanner.line(), row->first, row->second);
       continue;
     }
     const auto index = scanner.integer();
     const auto name = index ? name_in(scanner.rest()) : std::nullopt;
     if (!name) {
       throw_line(path, scanner.line(),
-                 "is no line of a table of labels, 'index name' with or without a colour, or one of ITK-SNAP's");
+                 "is no line of a table of labels, 'index name' with or without a colour, or one of ITK-SNAP's; with "
+                 "tabs, commas or semicolons between its columns a table begins with their names, index and name");
     }
-    add(names, path, scanner.line(), *index, trimmed(*name));
+    add(names, path, scanner.line(), real(*index), trimmed(*name));
   }
   return names;
 }
@@ -199,7 +280,13 @@ std::optional<std::string> volume_format::label_error(const LabelNames& names, s
 
 LabelNames read_label_names(const fs::path& path) {
   const std::string text = read_text(path);
-  auto names = parse_columns(path, text);
+  const std::string_view content = trimmed(text);
+  std::optional<LabelNames> names;
+  if (content.starts_with('{') || content.starts_with('[')) {
+    names = volume_format::parse_label_json(path, text);
+  } else {
+    names = parse_columns(path, text);
+  }
   if (!names) {
     names = parse_lines(path, text);
   }
@@ -224,6 +311,13 @@ std::vector<fs::path> label_tables_beside(const fs::path& volume) {
 
 std::optional<double> find_label(const LabelNames& names, const std::string& text) {
   if (const auto value = parse_number(text)) {
+    const std::size_t digits = text.find_first_not_of("+-0");
+    const bool whole = digits != std::string::npos && text.find_first_not_of("0123456789", digits) == std::string::npos;
+    if (!std::isfinite(*value) || (whole && fmt::format("{:.0f}", std::abs(*value)) != text.substr(digits))) {
+      throw InputError(fmt::format(
+          "the label {} cannot be told from its neighbours, as few above 2^53 can: give the labels smaller numbers",
+          shown(text)));
+    }
     return value;
   }
   std::optional<double> found;
@@ -238,6 +332,29 @@ std::optional<double> find_label(const LabelNames& names, const std::string& tex
     found = value;
   }
   return found;
+}
+
+std::optional<Warning> several_names(const fs::path& path, const LabelNames& names) {
+  std::map<double, std::set<std::string>> names_of;
+  for (const auto& [value, name] : names) {
+    names_of[value].insert(name);
+  }
+  constexpr std::size_t most = 3;
+  std::string labels;
+  std::size_t count = 0;
+  for (const auto& [value, all] : names_of) {
+    if (all.size() > 1 && ++count <= most) {
+      labels += fmt::format("{}{} is called '{}' and '{}'", labels.empty() ? "" : ", ", value, shown(*all.begin()),
+                            shown(*std::next(all.begin())));
+    }
+  }
+  if (count == 0) {
+    return {};
+  }
+  return Warning{Weight::minor, "several names",
+                 fmt::format("{}: the label {}{}: either name takes the same voxels, so a surface may be of another "
+                             "organ than its name says; give each label one name",
+                             path.string(), labels, count > most ? fmt::format(" (and {} more)", count - most) : "")};
 }
 
 std::string nearest_label(const LabelNames& names, std::string_view text) {

@@ -63,6 +63,7 @@ public:
       if (header_->type == VoxelType::uint16 && std::endian::native == std::endian::little) {
         png_set_swap(png_);
       }
+      png_set_packing(png_);  // of 1, 2 and 4 bits: a byte each, with the values they have
       passes_ = png_set_interlace_handling(png_);
       png_start_read_image(png_);
     });
@@ -100,18 +101,16 @@ private:
     const unsigned height = png_get_image_height(png_, info_);
     const unsigned bits = png_get_bit_depth(png_, info_);
     const unsigned colour = png_get_color_type(png_, info_);
-    if (colour != PNG_COLOR_TYPE_GRAY) {
+    // With a palette the labels are the numbers of its colours, as programs that paint masks mean them.
+    if (colour != PNG_COLOR_TYPE_GRAY && colour != PNG_COLOR_TYPE_PALETTE) {
       throw InputError(
           fmt::format("{}: has colours (PNG colour type {}): save one grey value per pixel", path_.string(), colour));
     }
-    if (bits != 8 && bits != 16) {
-      throw InputError(fmt::format("{}: has grey values of {} bits: save 8 or 16", path_.string(), bits));
-    }
-    if (png_get_valid(png_, info_, PNG_INFO_tRNS) != 0) {
+    if (colour == PNG_COLOR_TYPE_GRAY && png_get_valid(png_, info_, PNG_INFO_tRNS) != 0) {
       throw InputError(fmt::format("{}: has a transparent grey value: save it without", path_.string()));
     }
-    const SliceHeader header{width, height, bits == 8 ? VoxelType::uint8 : VoxelType::uint16};
-    if (real(header.row_bytes()) * height > deflate_expansion * real(size_)) {
+    const SliceHeader header{width, height, bits == 16 ? VoxelType::uint16 : VoxelType::uint8};
+    if (real(png_get_rowbytes(png_, info_)) * height > deflate_expansion * real(size_)) {
       throw InputError(
           fmt::format("{}: has {} x {} pixels, more than its bytes can hold: it is truncated; get it again",
                       path_.string(), width, height));

@@ -5,11 +5,21 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 namespace tunica {
 namespace fs = std::filesystem;
 namespace {
 
 using namespace volume_format;
+
+// The beginning of a file's content, inflated if need be.
+std::string head_of(const fs::path& path) {
+  ByteStream stream(path, 0, coding_of(path));
+  std::string head(1024, '\0');
+  head.resize(stream.read(head.data(), head.size()));
+  return head;
+}
 
 // What the content is, when it is something else that people have in such folders.
 std::string other_content(const fs::path& path, std::string_view head) {
@@ -33,6 +43,38 @@ std::string other_content(const fs::path& path, std::string_view head) {
          ".mhd), a multi-page TIFF, or a folder of TIFF or PNG slices";
 }
 
+// The NIfTI header beside X.img or X.img.gz.
+std::optional<fs::path> header_of_image(const fs::path& path) {
+  fs::path base = path;
+  if (lower_case(base.extension().string()) == ".gz") {
+    base.replace_extension();
+  }
+  if (lower_case(base.extension().string()) != ".img") {
+    return {};
+  }
+  for (const char* extension : {".hdr", ".hdr.gz", ".HDR"}) {
+    const fs::path header = fs::path(base).replace_extension(extension);
+    std::error_code error;
+    if (fs::is_regular_file(header, error) && looks_like_nifti(head_of(header))) {
+      return header;
+    }
+  }
+  return {};
+}
+
+// The header that names data without one: X.mhd or X.nhdr of X.raw, X.zraw, X.raw.gz.
+std::string header_hint(const fs::path& path) {
+  const fs::path base = lower_case(path.extension().string()) == ".gz" ? path.parent_path() / path.stem() : path;
+  for (const char* extension : {".mhd", ".nhdr", ".hdr"}) {
+    const fs::path header = fs::path(base).replace_extension(extension);
+    std::error_code error;
+    if (header != path && fs::is_regular_file(header, error)) {
+      return fmt::format("holds voxels without a header: name {}, which is beside it", header.string());
+    }
+  }
+  return {};
+}
+
 VolumeFile read_known(const fs::path& path, const VolumeOptions& options, const SlabSink* sink) {
   const auto refuse_spacing = [&] {
     if (options.spacing) {
@@ -43,11 +85,13 @@ VolumeFile read_known(const fs::path& path, const VolumeOptions& options, const 
   if (fs::is_directory(path, error)) {
     return read_slices(path, options, sink);
   }
-  ByteStream stream(path, 0, coding_of(path));
-  std::string head(1024, '\0');
-  head.resize(stream.read(head.data(), head.size()));
+  const std::string head = head_of(path);
   if (head.empty()) {
     throw InputError(fmt::format("{}: is empty", path.string()));
+  }
+  if (const auto header = looks_like_nifti(head) ? std::nullopt : header_of_image(path)) {
+    refuse_spacing();
+    return read_nifti(*header, options, sink, path);
   }
   if (looks_like_tiff(head) || looks_like_png(head)) {
     return read_slices(path, options, sink);
@@ -64,7 +108,8 @@ VolumeFile read_known(const fs::path& path, const VolumeOptions& options, const 
     refuse_spacing();
     return read_metaimage(path, options, sink);
   }
-  throw InputError(fmt::format("{}: {}", path.string(), other_content(path, head)));
+  const std::string hint = header_hint(path);
+  throw InputError(fmt::format("{}: {}", path.string(), hint.empty() ? other_content(path, head) : hint));
 }
 
 VolumeFile read_any(const fs::path& path, const VolumeOptions& options, const SlabSink* sink) {
@@ -75,6 +120,24 @@ VolumeFile read_any(const fs::path& path, const VolumeOptions& options, const Sl
     file.warnings.push_back({Weight::major, "voxel size",
                              fmt::format("{}: its voxels are {:.3g} x {:.3g} x {:.3g} mm: is their unit right?",
                                          path.string(), edges[0], edges[1], edges[2])});
+  }
+  // Twice as long as wide: from there on the slices, not the pixels, decide how well the surface is known.
+  constexpr double notable = 2;
+  if (edges.maxCoeff() > notable * edges.minCoeff()) {
+    file.warnings.push_back(
+        {Weight::minor, "anisotropic voxels",
+         fmt::format("{}: its voxels are {:.3g} x {:.3g} x {:.3g} mm: where the organ's surface lies along the slices, "
+                     "it is known to half a slice, {:.3g} mm; displacements and stresses of single places are as "
+                     "uncertain there: trust means and percentiles, or take thinner slices",
+                     path.string(), edges[0], edges[1], edges[2], edges.maxCoeff() / 2)});
+  }
+  const auto& dims = file.volume.dims;
+  if (std::ranges::count(dims, std::size_t{1}) == 1 && file.volume.voxels() > 1) {
+    file.warnings.push_back(
+        {Weight::major, "single slice",
+         fmt::format("{}: is {} x {} x {} voxels, a single slice: its surface is that of a sheet one voxel thick; name "
+                     "the whole volume (of slices in files: the folder or a multi-page TIFF)",
+                     path.string(), dims[0], dims[1], dims[2])});
   }
   return file;
 }

@@ -17,28 +17,39 @@ namespace tunica {
 struct VolumeOptions {
   std::optional<std::size_t> frame;  ///< which 3-D volume of a time series, from 0
   std::optional<std::size_t> layer;  ///< which layer of overlapping segments (a `list` axis), from 0
-  bool prefer_qform = false;         ///< NIfTI: the qform wins where both transforms are set
-  std::optional<Vec3> spacing;       ///< slice stacks: mm per column, row and slice
+  /// The segment that is wanted, by name or value, or several with + between them: its layer is read where `layer`
+  /// chooses none. InputError where the file names it in another layer than `layer`, or in several.
+  std::optional<std::string> segment;
+  bool prefer_qform = false;    ///< NIfTI: the qform wins where both transforms are set
+  std::optional<Vec3> spacing;  ///< slice stacks: mm per column, row and slice
+};
+
+/// A segment as a .seg.nrrd names it: the voxels of `label` in one of the layers.
+struct Segment {
+  std::string name;
+  double label = 1;
+  std::optional<std::size_t> layer;  ///< none: the file has several layers, and does not say in which it is
 };
 
 /// A volume as read, and what the file said about itself.
 struct VolumeFile {
   Volume volume;
-  std::string format;           ///< "NIfTI-1", "NRRD", "MetaImage", "TIFF stack", …
-  std::string datatype;         ///< stored type of a voxel, "uint8" … "float64"
-  Vec3 spacing = Vec3::Ones();  ///< mm between neighbouring voxels along i, j, k
-  std::string orientation;      ///< where i, j, k point to, e.g. "RAS", "LPS"
-  std::string transform;        ///< where the orientation comes from, e.g. "sform", "space directions"
-  std::size_t frames = 1;       ///< in the file; one of them is in `volume`
-  std::size_t layers = 1;       ///< in the file; one of them is in `volume`
+  std::string format;             ///< "NIfTI-1", "NRRD", "MetaImage", "TIFF stack", …
+  std::string datatype;           ///< stored type of a voxel, "uint8" … "float64"
+  Vec3 spacing = Vec3::Ones();    ///< mm between neighbouring voxels along i, j, k
+  std::string orientation;        ///< where i, j, k point to, e.g. "RAS", "LPS"
+  std::string transform;          ///< where the orientation comes from, e.g. "sform", "space directions"
+  std::size_t frames = 1;         ///< in the file; one of them is in `volume`
+  std::size_t layers = 1;         ///< in the file; one of them is in `volume`
+  std::vector<Segment> segments;  ///< of all layers; the names of that in `volume` are its label_names
   std::vector<Warning> warnings;
   std::vector<std::filesystem::path> data_files;  ///< further files that were read (detached data, slices)
 };
 
-/// Reads NIfTI-1/2 (.nii, .nii.gz, .hdr/.img), NRRD (.nrrd, .seg.nrrd, .nhdr), MetaImage (.mha, .mhd), multi-page TIFF,
-/// or a folder of TIFF or PNG slices. The format is told by content, not by name.
-/// Errors: InputError naming the file: missing, not a volume, truncated (with the bytes that are missing), hostile, or
-/// with more than one frame or layer and none chosen. UsageError: a slice stack without spacing, a spacing for others.
+/// Reads NIfTI-1/2 (.nii, .nii.gz, .hdr/.img, either named), NRRD (.nrrd, .seg.nrrd, .nhdr), MetaImage (.mha, .mhd),
+/// multi-page TIFF, or a folder of TIFF or PNG slices. The format is told by content, not by name. Errors: InputError
+/// naming the file: missing, not a volume, truncated (with the bytes that are missing), hostile, or with more than one
+/// frame or layer and none chosen, with channels. UsageError: a slice stack without spacing, a spacing for others.
 /// Cost: memory for the voxels of one frame, and never more than the bytes in the file can hold.
 VolumeFile read_volume(const std::filesystem::path& path, const VolumeOptions& options = {});
 

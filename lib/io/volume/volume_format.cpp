@@ -4,8 +4,11 @@
 #include "tunica/core/narrow.hpp"
 #include "tunica/core/progress.hpp"
 #include "tunica/core/quantity.hpp"
+#include "tunica/io/volume/label_names.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <Eigen/LU>
 
 #include <algorithm>
@@ -388,14 +391,25 @@ std::size_t SlabSink::slices(const std::array<std::size_t, 3>& dims, VoxelType t
                                    dims[2]);
 }
 
+std::uint64_t stored_bytes(const std::vector<Axis>& axes, VoxelType type) {
+  std::uint64_t bytes = size_of(type);
+  for (const Axis& axis : axes) {
+    if (__builtin_mul_overflow(bytes, axis.size, &bytes)) {
+      return std::numeric_limits<std::uint64_t>::max();
+    }
+  }
+  return bytes;
+}
+
 void read_voxels(VolumeFile& file, ByteStream& stream, VoxelType type, bool big_endian, const std::vector<Axis>& axes,
-                 const SlabSink* sink) {
+                 const SlabSink* sink, bool more) {
   const Plan sizes = plan(stream, axes, size_of(type));
   if (sink != nullptr && !sink->visit) {
     return;
   }
   with_type(type, [&](auto zero) { read_typed<decltype(zero)>(file, stream, type, big_endian, axes, sizes, sink); });
-  stream.finish(file.warnings);
+  std::vector<Warning> more_bytes;
+  stream.finish(more ? more_bytes : file.warnings);
 }
 
 void read_text_voxels(VolumeFile& file, ByteStream& stream, VoxelType type, const std::vector<Axis>& axes,
@@ -428,20 +442,78 @@ std::size_t choose(const fs::path& path, const char* what, std::uint64_t count, 
   return *chosen;
 }
 
-void set_affine(VolumeFile& file, const fs::path& path, const Eigen::Matrix<double, 3, 4>& lps) {
+std::size_t leading_channels(std::span<const std::uint64_t> sizes) {
+  std::size_t channels = 0;
+  while (channels < sizes.size() && sizes[channels] == 1) {
+    ++channels;
+  }
+  std::size_t end = sizes.size();
+  while (end > channels && sizes[end - 1] == 1) {
+    --end;
+  }
+  const bool long_ones =
+      std::none_of(sizes.begin() + channels, sizes.begin() + end, [](auto size) { return size == 1; });
+  return end == channels + 3 && long_ones ? channels : 0;
+}
+
+Warning channel_note(const fs::path& path, std::span<const std::uint64_t> sizes) {
+  return {Weight::note, "channel first",
+          fmt::format("{}: its sizes are {}: the leading 1 is taken as a channel, the other three axes as space, with "
+                      "the spacing and orientation of the header; pass --frame N if the last axis is time",
+                      path.string(), fmt::join(sizes, " x "))};
+}
+
+std::size_t choose_frame(VolumeFile& file, const fs::path& path, std::span<const std::uint64_t> sizes,
+                         std::optional<std::size_t> chosen) {
+  file.frames = sizes.size() > 3 ? sizes[3] : 1;
+  // A scan's first axis is a row of pixels, of which there are no fewer than slices or frames.
+  if (file.frames == 1 || sizes[0] == 1 || *std::min_element(sizes.begin() + 1, sizes.begin() + 4) <= sizes[0]) {
+    return choose(path, "frame", file.frames, chosen);
+  }
+  const std::string looks =
+      fmt::format("{}: its sizes are {}: its first axis looks like {} channels, one for each class", path.string(),
+                  fmt::join(sizes.first(4), " x "), sizes[0]);
+  if (!chosen) {
+    throw InputError(
+        fmt::format("{}, before three axes of space: save the classes as one volume of labels (argmax over the first "
+                    "axis); or pass --frame 0..{} if it is a series of {} volumes that are {} voxels wide",
+                    looks, file.frames - 1, file.frames, sizes[0]));
+  }
+  const std::size_t frame = choose(path, "frame", file.frames, chosen);
+  file.warnings.push_back({Weight::major, "channel first",
+                           fmt::format("{}, and --frame {} takes a sheet of {} voxels across them: leave it out unless "
+                                       "it is a series of volumes as thin as that",
+                                       looks, frame, sizes[0])});
+  return frame;
+}
+
+std::optional<std::string> affine_error(const Eigen::Matrix<double, 3, 4>& affine) {
   constexpr double largest = 1e9;  // mm
-  if (!lps.allFinite() || lps.cwiseAbs().maxCoeff() > largest) {
-    throw InputError(fmt::format("{}: its {} is not finite: the header is corrupt", path.string(), file.transform));
+  if (!affine.allFinite()) {
+    return "is not finite";
+  }
+  if (affine.cwiseAbs().maxCoeff() > largest) {
+    return fmt::format("reaches {:.3g} mm", affine.cwiseAbs().maxCoeff());
+  }
+  const Mat3 axes = affine.leftCols<3>();
+  const Vec3 spacing = axes.colwise().norm().transpose();
+  if (axes.isZero(0)) {
+    return "is all zero";
+  }
+  if (!(spacing.minCoeff() > 1e-9) || !(std::abs(axes.determinant()) > 1e-6 * spacing.prod())) {
+    return fmt::format("is singular (voxels of {:.6g} x {:.6g} x {:.6g} mm with a volume of {:.6g} mm3)", spacing.x(),
+                       spacing.y(), spacing.z(), std::abs(axes.determinant()));
+  }
+  return {};
+}
+
+void set_affine(VolumeFile& file, const fs::path& path, const Eigen::Matrix<double, 3, 4>& lps) {
+  if (const auto why = affine_error(lps)) {
+    throw InputError(fmt::format("{}: its {} {}: voxels have no place or no volume; correct the header", path.string(),
+                                 file.transform, *why));
   }
   const Mat3 axes = lps.leftCols<3>();
   file.spacing = axes.colwise().norm().transpose();
-  const double box = file.spacing.prod();
-  if (!(file.spacing.minCoeff() > 1e-9) || !(std::abs(axes.determinant()) > 1e-6 * box)) {
-    throw InputError(fmt::format(
-        "{}: its {} is singular (spacing {} x {} x {} mm, determinant {} mm3): voxels have no "
-        "volume; correct the header",
-        path.string(), file.transform, file.spacing.x(), file.spacing.y(), file.spacing.z(), axes.determinant()));
-  }
   file.volume.affine = lps;
 
   // Each index axis gets the world axis it follows most, no world axis twice.
@@ -472,6 +544,12 @@ void set_affine(VolumeFile& file, const fs::path& path, const Eigen::Matrix<doub
 Eigen::Matrix<double, 3, 4> flip_xy(Eigen::Matrix<double, 3, 4> affine) {
   affine.topRows<2>() = -affine.topRows<2>();
   return affine;
+}
+
+void warn_of_several_names(VolumeFile& file, const fs::path& path) {
+  if (auto warning = several_names(path, file.volume.label_names)) {
+    file.warnings.push_back(std::move(*warning));
+  }
 }
 
 void set_dims(VolumeFile& file, const fs::path& path, std::span<const std::uint64_t, 3> dims) {

@@ -112,7 +112,9 @@ VoxelType voxel_type(const fs::path& path, std::string_view text) {
   return at->second;
 }
 
-void set_geometry(VolumeFile& file, const fs::path& path, const Header& header, std::size_t dimensions) {
+// @param first  axis of space in the file; those before it are channels
+void set_geometry(VolumeFile& file, const fs::path& path, const Header& header, std::size_t dimensions,
+                  std::size_t first) {
   const auto numbers = [&](std::initializer_list<std::string_view> names, std::size_t count) {
     const std::string_view text = find(header, names);
     return text.empty() ? std::vector<double>() : parse_numbers(path, *names.begin(), text, count);
@@ -143,9 +145,9 @@ void set_geometry(VolumeFile& file, const fs::path& path, const Header& header, 
   Eigen::Matrix<double, 3, 4> affine;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     for (std::size_t row = 0; row < 3; ++row) {
-      affine(row, axis) = matrix[axis * dimensions + row] * spacing[axis];
+      affine(row, axis) = matrix[(first + axis) * dimensions + first + row] * spacing[first + axis];
     }
-    affine(axis, 3) = offset[axis];
+    affine(axis, 3) = offset[first + axis];
   }
   const std::string unit = lower_case(find(header, {"DistanceUnits"}));
   if (unit == "um" || unit == "cm" || unit == "m") {
@@ -184,16 +186,6 @@ Place voxel_place(const fs::path& path, const Header& header) {
   return {data_file_beside(path, name), 0};
 }
 
-std::uint64_t stored_bytes(const std::vector<Axis>& axes, VoxelType type) {
-  std::uint64_t bytes = size_of(type);
-  for (const Axis& axis : axes) {
-    if (__builtin_mul_overflow(bytes, axis.size, &bytes)) {
-      return std::numeric_limits<std::uint64_t>::max();
-    }
-  }
-  return bytes;
-}
-
 void read_data(VolumeFile& file, const fs::path& path, const Header& header, const std::vector<Axis>& axes,
                VoxelType type, const SlabSink* sink) {
   Place place = voxel_place(path, header);
@@ -220,6 +212,10 @@ void read_data(VolumeFile& file, const fs::path& path, const Header& header, con
     read_text_voxels(file, stream, type, axes, sink);
     return;
   }
+  const bool big_endian = is_true(find(header, {"BinaryDataByteOrderMSB", "ElementByteOrderMSB"}));
+  ByteStream stream(place.path, place.offset, compressed ? Coding::deflated : Coding::plain);
+  read_voxels(file, stream, type, big_endian, axes, sink);
+  // The stream says itself where it ends, and its checksum whether it is whole.
   if (const std::string_view text = find(header, {"CompressedDataSize"}); compressed && !text.empty() && text != "0") {
     const auto bytes = parse_count(text);
     if (!bytes) {
@@ -227,15 +223,13 @@ void read_data(VolumeFile& file, const fs::path& path, const Header& header, con
     }
     const std::uint64_t left = error || size < place.offset ? 0 : size - place.offset;
     if (left < *bytes) {
-      throw InputError(
-          fmt::format("{}: truncated: {} of the {} bytes of compressed voxels its header promises are "
-                      "missing; get the whole file again",
-                      place.path.string(), *bytes - left, *bytes));
+      file.warnings.push_back(
+          {Weight::note, "compressed size",
+           fmt::format("{}: its header promises {} bytes of compressed voxels, and {} are there: all voxels are in "
+                       "them, and their checksum is right",
+                       place.path.string(), *bytes, left)});
     }
   }
-  const bool big_endian = is_true(find(header, {"BinaryDataByteOrderMSB", "ElementByteOrderMSB"}));
-  ByteStream stream(place.path, place.offset, compressed ? Coding::deflated : Coding::plain);
-  read_voxels(file, stream, type, big_endian, axes, sink);
 }
 
 }  // namespace
@@ -272,12 +266,17 @@ VolumeFile read_metaimage(const fs::path& path, const VolumeOptions& options, co
   if (sizes.size() != dimensions || sizes.back() == 0) {
     throw_field(path, "DimSize", sizes_text);
   }
+  const std::vector<std::uint64_t> stored = sizes;
+  const std::size_t leading = options.frame ? 0 : leading_channels(stored);
+  if (leading > 0) {
+    file.warnings.push_back(channel_note(path, stored));
+    std::rotate(sizes.begin(), sizes.begin() + static_cast<std::ptrdiff_t>(leading), sizes.end());
+  }
   set_dims(file, path, std::span<const std::uint64_t, 3>(sizes.data(), 3));
-  set_geometry(file, path, header, dimensions);
+  set_geometry(file, path, header, dimensions, leading);
   set_intensity(file, path, header);
   choose(path, "layer", 1, options.layer);
-  file.frames = dimensions == 4 ? sizes[3] : 1;
-  const std::size_t frame = choose(path, "frame", file.frames, options.frame);
+  const std::size_t frame = choose_frame(file, path, sizes, options.frame);
   read_data(file, path, header, {{sizes[0], {}}, {sizes[1], {}}, {sizes[2], {}}, {file.frames, frame}}, type, sink);
   return file;
 }

@@ -5,6 +5,7 @@
 #include "tunica/io/volume/detail/volume_format.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <Eigen/Geometry>
 
@@ -277,16 +278,51 @@ double difference(const Affine& a, const Affine& b, const std::array<std::size_t
   return largest;
 }
 
-// sform if its code > 0, else qform, else the spacing alone; --prefer-qform turns the first two round.
+// Why the sform (qform) places no voxels; none where it does.
+std::optional<std::string> sform_error(const Header& header) {
+  return header.sform_code > 0 ? affine_error(sform(header)) : "is not set (its code is 0)";
+}
+
+std::optional<std::string> qform_error(const Header& header) {
+  if (!(header.qform_code > 0)) {
+    return "is not set (its code is 0)";
+  }
+  if (!(spacing_of(header).minCoeff() > 0)) {
+    return fmt::format("has voxels of {} x {} x {} mm", header.pixdim[1], header.pixdim[2], header.pixdim[3]);
+  }
+  if (!(Vec3(header.quatern.data()).squaredNorm() < 1.01)) {
+    return fmt::format("has the quaternion ({}, {}, {}), which is no rotation", header.quatern[0], header.quatern[1],
+                       header.quatern[2]);
+  }
+  return affine_error(qform(header));
+}
+
+// sform if its code > 0, else qform, else the spacing alone; --prefer-qform turns the first two round. One that cannot
+// be gives way to the other.
 void set_transform(VolumeFile& file, const fs::path& path, const Header& header, bool prefer_qform) {
-  const bool has_sform = header.sform_code > 0;
-  const bool has_qform = header.qform_code > 0;
+  const auto no_sform = sform_error(header);
+  const auto no_qform = qform_error(header);
+  const bool has_sform = !no_sform;
+  const bool has_qform = !no_qform;
   const bool use_qform = has_qform && (prefer_qform || !has_sform);
+  const bool damaged = (header.sform_code > 0 && !has_sform) || (header.qform_code > 0 && !has_qform);
+  if (damaged && !has_sform && !has_qform) {
+    throw InputError(fmt::format(
+        "{}: its sform {}, its qform {}: nothing says where its voxels are; copy the header of the image that was "
+        "segmented",
+        path.string(), *no_sform, *no_qform));
+  }
   file.transform = use_qform ? "qform" : has_sform ? "sform" : "spacing";
-  if (prefer_qform && !has_qform) {
+  if (prefer_qform && header.qform_code <= 0) {
     file.warnings.push_back(
         {Weight::minor, "world transform",
          fmt::format("{}: has no qform (its code is 0): its {} is used", path.string(), file.transform)});
+  }
+  if (damaged && (use_qform || prefer_qform)) {
+    file.warnings.push_back(
+        {Weight::minor, "world transform",
+         fmt::format("{}: its {} {}: the {} is used instead; compare the surface's place with the image's",
+                     path.string(), has_sform ? "qform" : "sform", has_sform ? *no_qform : *no_sform, file.transform)});
   }
   if (has_sform && has_qform) {
     const double apart = difference(sform(header), qform(header), file.volume.dims);
@@ -304,24 +340,21 @@ void set_transform(VolumeFile& file, const fs::path& path, const Header& header,
     file.warnings.push_back(
         {Weight::major, "world transform",
          fmt::format("{}: has neither sform nor qform: voxels are placed by their spacing alone, with "
-                     "axes to the right, front and top",
+                     "axes to the right, front and top, so left and right may be exchanged; copy the header of the "
+                     "image that was segmented",
                      path.string())});
   }
-  if (file.transform != "sform" && !(spacing_of(header).minCoeff() > 0)) {
+  if (file.transform == "spacing" && !(spacing_of(header).minCoeff() > 0)) {
     throw InputError(fmt::format("{}: its voxel spacing {} x {} x {} is not positive: correct the header",
                                  path.string(), header.pixdim[1], header.pixdim[2], header.pixdim[3]));
-  }
-  if (file.transform == "qform" && !(Vec3(header.quatern.data()).squaredNorm() < 1.01)) {
-    throw InputError(fmt::format("{}: its qform's quaternion ({}, {}, {}) is no rotation: the header is corrupt",
-                                 path.string(), header.quatern[0], header.quatern[1], header.quatern[2]));
   }
   const double scale = unit_size(path, header.units, file.warnings);
   const Affine ras = use_qform ? qform(header) : has_sform ? sform(header) : without_orientation(header);
   set_affine(file, path, flip_xy(scale * ras));
 }
 
-// The seven sizes, with 1 for those that dim[0] does not count.
-std::array<std::uint64_t, 7> sizes_of(const fs::path& path, const Header& header) {
+// The seven sizes, with 1 for those that dim[0] does not count, and without leading axes that are channels.
+std::array<std::uint64_t, 7> sizes_of(VolumeFile& file, const fs::path& path, const Header& header, bool frame_chosen) {
   if (header.dim[0] < 1 || header.dim[0] > 7) {
     throw InputError(fmt::format("{}: its header counts {} dimensions, between 1 and 7 are possible: it is corrupt",
                                  path.string(), header.dim[0]));
@@ -336,10 +369,17 @@ std::array<std::uint64_t, 7> sizes_of(const fs::path& path, const Header& header
     }
     sizes[axis] = static_cast<std::uint64_t>(std::max<std::int64_t>(size, 1));
   }
+  const std::span<const std::uint64_t> stored(sizes.data(), static_cast<std::size_t>(header.dim[0]));
+  if (const std::size_t channels = frame_chosen ? 0 : leading_channels(stored); channels > 0) {
+    file.warnings.push_back(channel_note(path, stored));
+    std::rotate(sizes.begin(), sizes.begin() + channels, sizes.end());
+  }
   for (std::size_t axis = 4; axis < 7; ++axis) {
     if (sizes[axis] > 1) {
-      throw InputError(fmt::format("{}: has {} values per voxel along its axis {}: one value per voxel is needed",
-                                   path.string(), sizes[axis], axis + 1));
+      throw InputError(
+          fmt::format("{}: its sizes are {}: it has {} values per voxel along its axis {}, and one value per voxel is "
+                      "needed; save one volume of labels",
+                      path.string(), fmt::join(stored, " x "), sizes[axis], axis + 1));
     }
   }
   return sizes;
@@ -415,7 +455,8 @@ void read_extensions(VolumeFile& file, const fs::path& path, const Header& heade
 
 bool looks_like_nifti(std::string_view head) { return version_of(head, false) != 0 || version_of(head, true) != 0; }
 
-VolumeFile read_nifti(const fs::path& path, const VolumeOptions& options, const SlabSink* sink) {
+VolumeFile read_nifti(const fs::path& path, const VolumeOptions& options, const SlabSink* sink,
+                      const std::optional<fs::path>& image) {
   auto stream = std::make_unique<ByteStream>(path, 0, coding_of(path));
   std::string head(size_2, '\0');
   head.resize(stream->read(head.data(), head.size()));
@@ -423,7 +464,7 @@ VolumeFile read_nifti(const fs::path& path, const VolumeOptions& options, const 
 
   VolumeFile file;
   file.format = fmt::format("NIfTI-{}{}", header.version, header.pair ? " pair" : "");
-  const auto sizes = sizes_of(path, header);
+  const auto sizes = sizes_of(file, path, header, options.frame.has_value());
   set_dims(file, path, std::span<const std::uint64_t, 3>(sizes.data(), 3));
   const VoxelType type = voxel_type(path, header.datatype);
   set_type(file, type);
@@ -436,15 +477,15 @@ VolumeFile read_nifti(const fs::path& path, const VolumeOptions& options, const 
     file.volume.intercept = header.intercept;
   }
   choose(path, "layer", 1, options.layer);
-  file.frames = sizes[3];
-  const std::size_t frame = choose(path, "frame", sizes[3], options.frame);
+  const std::size_t frame = choose_frame(file, path, sizes, options.frame);
   stream = std::make_unique<ByteStream>(path, 0, coding_of(path));
   stream->skip(header.version == 1 ? size_1 : size_2);
   read_extensions(file, path, header, *stream);
+  warn_of_several_names(file, path);
 
-  const fs::path voxels = header.pair ? image_of(path) : path;
+  const fs::path voxels = !header.pair ? path : image ? *image : image_of(path);
   if (header.pair) {
-    file.data_files.push_back(voxels);
+    file.data_files.push_back(image ? path : voxels);
   }
   stream = std::make_unique<ByteStream>(voxels, 0, coding_of(voxels));
   const std::uint64_t offset = voxel_offset(path, header);

@@ -181,9 +181,9 @@ std::string with_comment(std::string header, const std::string& text) {
 
 void write_nifti(const fs::path& path, const Volume& volume, bool overwrite, const std::string& made_by) {
   static_assert(std::endian::native == std::endian::little, "the header is written in the machine's byte order");
+  require_volume(volume);
   std::visit(
       [&](const auto& values) {
-        TUNICA_ASSERT(values.size() == volume.voxels());
         using T = typename std::decay_t<decltype(values)>::value_type;
         const std::string header = with_comment(header_of(path, volume, sizeof(T)), made_by);
         OutputFile output(path, overwrite);

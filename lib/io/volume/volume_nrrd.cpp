@@ -1,4 +1,4 @@
-// NRRD: https://teem.sourceforge.net/nrrd/format.html
+// NRRD: https://teem.sourceforge.net/nrrd/format.html, and Teem's own reader where that leaves things open
 // Segments in .seg.nrrd: https://slicer.readthedocs.io/en/latest/developer_guide/modules/segmentations.html
 
 #include "tunica/core/error.hpp"
@@ -7,7 +7,9 @@
 #include "tunica/io/volume/detail/volume_format.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -19,12 +21,6 @@ namespace {
 
 constexpr std::size_t largest_header = std::size_t{16} << 20;
 
-struct Segment {
-  double label = 1;
-  std::uint64_t layer = 0;
-  std::string name;
-};
-
 enum class Role { space, layer, frame, values };
 
 struct AxisInfo {
@@ -32,6 +28,9 @@ struct AxisInfo {
   std::string kind;               // lower case, empty when unknown
   std::optional<Vec3> direction;  // of a space axis, in the file's space and unit
   std::optional<double> spacing;
+  std::optional<double> min;  // where the axis begins and ends
+  std::optional<double> max;
+  bool node = false;  // samples lie on the ends, not half a sample within them
   Role role = Role::space;
 };
 
@@ -41,6 +40,22 @@ struct Header {
   std::uint64_t end = 0;  // where attached data begins
   bool complete = false;  // ended by an empty line
 };
+
+// Takes one of a segment's keys. A segment is called as its identifier where it has no name.
+void set_segment(const fs::path& path, Segment& segment, std::string_view line, std::string_view key,
+                 std::string_view value) {
+  if (key == "Name" || (key == "ID" && segment.name.empty())) {
+    segment.name = value;
+  }
+  const auto label = key == "LabelValue" ? parse_number(value) : std::nullopt;
+  const auto layer = key == "Layer" ? parse_count(value) : std::nullopt;
+  if ((key == "LabelValue" && !label) || (key == "Layer" && !layer)) {
+    throw InputError(fmt::format("{}: the NRRD header's line '{}' has no such number: it is corrupt", path.string(),
+                                 shown(trimmed(line))));
+  }
+  segment.label = label.value_or(segment.label);
+  segment.layer = layer ? layer : segment.layer;
+}
 
 // The header's lines, up to the empty one or the end of the file.
 Header read_header(const fs::path& path) {
@@ -101,13 +116,7 @@ Header read_header(const fs::path& path) {
         continue;
       }
       Segment& segment = header.segments[*number];
-      if (key == "Name") {
-        segment.name = value;
-      } else if (key == "LabelValue") {
-        segment.label = parse_number(value).value_or(segment.label);
-      } else if (key == "Layer") {
-        segment.layer = parse_count(value).value_or(0);
-      }
+      set_segment(path, segment, line, key, value);
       continue;
     }
     std::string key = lower_case(name);
@@ -276,13 +285,19 @@ std::vector<AxisInfo> parse_axes(const fs::path& path, const Header& header) {
     }
     return true;
   });
-  each("spacings", [](AxisInfo& axis, std::string_view word) {
-    if (lower_case(word) == "nan") {
+  const auto number_or_nan = [](std::string_view word, std::optional<double>& number) {
+    number = parse_number(word);
+    return number.has_value() || lower_case(word) == "nan";
+  };
+  each("spacings", [&](AxisInfo& axis, std::string_view word) { return number_or_nan(word, axis.spacing); });
+  each("axismins", [&](AxisInfo& axis, std::string_view word) { return number_or_nan(word, axis.min); });
+  each("axismaxs", [&](AxisInfo& axis, std::string_view word) { return number_or_nan(word, axis.max); });
+  for (const char* name : {"centers", "centerings"}) {
+    each(name, [](AxisInfo& axis, std::string_view word) {
+      axis.node = lower_case(word) == "node";
       return true;
-    }
-    axis.spacing = parse_number(std::string(word));
-    return axis.spacing.has_value();
-  });
+    });
+  }
   if (const std::string* text = find(header, "spacedirections")) {
     const auto vectors = parse_vectors(path, "space directions", *text);
     if (vectors.size() != axes.size()) {
@@ -316,6 +331,26 @@ Role role_of_kind(const std::string& kind, bool leading) {
     return Role::layer;
   }
   return kind.empty() || kind == "domain" || kind == "space" ? Role::frame : Role::values;
+}
+
+std::vector<std::uint64_t> sizes_of(const std::vector<AxisInfo>& axes) {
+  std::vector<std::uint64_t> sizes;
+  for (const AxisInfo& axis : axes) {
+    sizes.push_back(axis.size);
+  }
+  return sizes;
+}
+
+// Axes of one sample that stand before three of space, and that nothing says to be space themselves.
+void set_leading_channels(VolumeFile& file, const fs::path& path, std::vector<AxisInfo>& axes) {
+  const auto sizes = sizes_of(axes);
+  const std::size_t channels = leading_channels(sizes);
+  for (std::size_t i = 0; i < channels; ++i) {
+    axes[i].kind = "list";
+  }
+  if (channels > 0) {
+    file.warnings.push_back(channel_note(path, sizes));
+  }
 }
 
 // Which three axes are space, and what the others are.
@@ -392,6 +427,32 @@ double unit_size(const fs::path& path, const Header& header, bool has_directions
   return unit == 0 ? 1 : unit;
 }
 
+// Spacing of an axis that is not oriented: stated, or from its two ends; none where it is unknown.
+std::optional<double> spacing_of(const AxisInfo& axis) {
+  if (axis.spacing || !axis.min || !axis.max) {
+    return axis.spacing;
+  }
+  const std::uint64_t steps = axis.node ? axis.size - 1 : axis.size;
+  return steps > 0 ? std::optional((*axis.max - *axis.min) / real(steps)) : std::nullopt;
+}
+
+// The place of the first samples by the axes' minima, as nrrdOriginCalculate(): of a cell its middle. None where one of
+// them has none.
+std::optional<Vec3> origin_of_minima(const std::vector<AxisInfo>& axes) {
+  Vec3 origin = Vec3::Zero();
+  Eigen::Index row = 0;
+  for (const AxisInfo& axis : axes) {
+    if (axis.role != Role::space) {
+      continue;
+    }
+    if (!axis.min) {
+      return {};
+    }
+    origin[row++] = *axis.min + (axis.node ? 0 : spacing_of(axis).value_or(1) / 2);
+  }
+  return origin;
+}
+
 void set_geometry(VolumeFile& file, const fs::path& path, const Header& header, const std::vector<AxisInfo>& axes,
                   bool has_directions) {
   Eigen::Matrix<double, 3, 4> affine = Eigen::Matrix<double, 3, 4>::Zero();
@@ -401,11 +462,11 @@ void set_geometry(VolumeFile& file, const fs::path& path, const Header& header, 
     if (axis.role != Role::space) {
       continue;
     }
-    unknown += axis.spacing ? 0 : 1;
+    unknown += spacing_of(axis) ? 0 : 1;
     if (has_directions) {
       affine.col(column) = *axis.direction;
     } else {
-      affine(column, column) = axis.spacing.value_or(1);
+      affine(column, column) = spacing_of(axis).value_or(1);
     }
     ++column;
   }
@@ -417,7 +478,7 @@ void set_geometry(VolumeFile& file, const fs::path& path, const Header& header, 
              "{}: has no space directions: voxels are placed by their {} alone, with axes to the left, back and top",
              path.string(),
              unknown == 3   ? "number (spacing 1 mm)"
-             : unknown == 0 ? "spacings"
+             : unknown == 0 ? (origin_of_minima(axes) ? "axis mins and spacings" : "spacings")
                             : fmt::format("spacings ({} of 3 unknown: 1 mm)", unknown))});
   }
   if (const std::string* text = find(header, "spaceorigin")) {
@@ -426,9 +487,15 @@ void set_geometry(VolumeFile& file, const fs::path& path, const Header& header, 
       throw_field(path, "space origin", *text);
     }
     affine.col(3) = Vec3((*vectors[0])[0], (*vectors[0])[1], (*vectors[0])[2]);
+  } else if (const auto origin = has_directions ? std::nullopt : origin_of_minima(axes)) {
+    affine.col(3) = *origin;
   } else if (has_directions) {
     file.warnings.push_back(
-        {Weight::minor, "no origin", fmt::format("{}: has no space origin: 0 is taken", path.string())});
+        {Weight::minor, "no origin",
+         fmt::format(
+             "{}: has no space origin: the first voxel is placed at 0, and the surface is as far off as that is "
+             "wrong; add the field to the header",
+             path.string())});
   }
   affine *= unit_size(path, header, has_directions, file.warnings);
   const std::string* space = find(header, "space");
@@ -443,19 +510,97 @@ void set_geometry(VolumeFile& file, const fs::path& path, const Header& header, 
   set_affine(file, path, affine);
 }
 
-// The segments of every layer, for the message that asks for one.
-std::string layer_hint(const Header& header, std::uint64_t layers) {
-  std::string hint;
-  for (std::uint64_t layer = 0; layer < std::min<std::uint64_t>(layers, 8); ++layer) {
-    std::string names;
-    for (const auto& [number, segment] : header.segments) {
-      if (segment.layer == layer && names.size() < 160) {
-        names += fmt::format("{}{}", names.empty() ? "" : ", ", shown(segment.name));
-      }
-    }
-    hint += names.empty() ? "" : fmt::format("; layer {} holds {}", layer, names);
+// The file's segments. Those of Slicer before 4.11 name no layer: the segment's number is its layer.
+std::vector<Segment> segments_of(const Header& header, std::uint64_t layers) {
+  std::vector<Segment> segments;
+  for (const auto& [number, stored] : header.segments) {
+    Segment segment = stored;
+    const std::uint64_t layer = segment.layer.value_or(layers == 1 ? 0 : number);
+    segment.layer = layer < layers ? std::optional<std::size_t>(layer) : std::nullopt;
+    segments.push_back(std::move(segment));
   }
-  return hint;
+  return segments;
+}
+
+// "aorta (label 1 of layer 0), …"
+std::string list_of(const std::vector<Segment>& segments) {
+  constexpr std::size_t most = 400;
+  std::string text;
+  for (const Segment& segment : segments) {
+    if (text.size() > most) {
+      return text + ", ...";
+    }
+    text += fmt::format("{}{} (label {} of {})", text.empty() ? "" : ", ",
+                        segment.name.empty() ? "unnamed" : shown(segment.name), segment.label,
+                        segment.layer ? fmt::format("layer {}", *segment.layer) : "no layer that it has");
+  }
+  return text;
+}
+
+// The segments that are wanted: what has a + in it is several, unless one is called so.
+std::vector<std::string> parts_of(const VolumeFile& file, std::string_view wanted) {
+  if (std::ranges::any_of(file.segments, [&](const Segment& segment) { return segment.name == wanted; })) {
+    return {std::string(wanted)};
+  }
+  std::vector<std::string> parts;
+  for (bool more = true; more;) {
+    const std::size_t plus = std::min(wanted.find('+'), wanted.size());
+    parts.emplace_back(trimmed(wanted.substr(0, plus)));
+    more = plus < wanted.size();
+    wanted.remove_prefix(std::min(plus + 1, wanted.size()));
+  }
+  return parts;
+}
+
+// The layer of the segment that is wanted, none where the segments do not say.
+std::optional<std::size_t> layer_of_segment(const VolumeFile& file, const fs::path& path, const std::string& wanted,
+                                            std::optional<std::size_t> chosen) {
+  const auto value = parse_number(wanted);
+  const std::vector<std::string> parts = parts_of(file, wanted);
+  std::vector<Segment> meant;
+  std::vector<std::size_t> layers;
+  for (const Segment& segment : file.segments) {
+    if (std::ranges::any_of(parts, [&](const std::string& part) {
+          const auto label = parse_number(part);
+          return label ? segment.label == *label : segment.name == part;
+        })) {
+      meant.push_back(segment);
+      if (!segment.layer) {
+        throw InputError(
+            fmt::format("{}: does not say in which of its {} layers the segment {} is: its segments are {}",
+                        path.string(), file.layers, shown(segment.name), list_of(file.segments)));
+      }
+      layers.push_back(*segment.layer);
+    }
+  }
+  std::sort(layers.begin(), layers.end());
+  layers.erase(std::unique(layers.begin(), layers.end()), layers.end());
+  if (chosen && !layers.empty() && !value && std::ranges::find(layers, *chosen) == layers.end()) {
+    throw InputError(
+        fmt::format("{}: --layer {} does not hold the segment '{}', which is in layer {}: leave --layer out",
+                    path.string(), *chosen, shown(wanted), fmt::join(layers, " and ")));
+  }
+  if (!chosen && layers.size() > 1) {
+    throw InputError(fmt::format("{}: '{}' means segments in several layers: {}; pass {}", path.string(), shown(wanted),
+                                 list_of(meant),
+                                 value              ? "--label NAME, or --layer too"
+                                 : parts.size() > 1 ? "one of them, for a surface is made of one layer"
+                                                    : "--layer too"));
+  }
+  return chosen || layers.empty() ? chosen : layers.front();
+}
+
+std::size_t choose_layer(const VolumeFile& file, const fs::path& path, const VolumeOptions& options) {
+  std::optional<std::size_t> layer = options.layer;
+  if (options.segment && !file.segments.empty() && file.layers > 1) {
+    layer = layer_of_segment(file, path, *options.segment, options.layer);
+    if (!layer && !parse_number(*options.segment)) {
+      throw InputError(fmt::format("{}: has no segment '{}': its segments are {}", path.string(),
+                                   shown(*options.segment), list_of(file.segments)));
+    }
+  }
+  return choose(path, "layer", file.layers, layer,
+                file.segments.empty() ? "" : fmt::format(", or a segment by --label NAME: {}", list_of(file.segments)));
 }
 
 // Byte at which the line after `lines` lines begins.
@@ -517,12 +662,16 @@ void read_data(VolumeFile& file, const fs::path& path, const Header& header, con
   }
   const std::string encoding = lower_case(require(path, header, "encoding"));
   const std::string skip_text = find(header, "byteskip") != nullptr ? *find(header, "byteskip") : "0";
-  const bool from_end = skip_text == "-1";
-  const auto skip = from_end ? std::optional<std::uint64_t>(0) : parse_count(skip_text);
-  if (!skip || (from_end && encoding != "raw")) {
+  // -1: the voxels are the last bytes; -1 - N: N bytes follow them.
+  const bool from_end = skip_text.starts_with('-');
+  const auto skip = parse_count(from_end ? skip_text.substr(1) : skip_text);
+  if (!skip || (from_end && *skip == 0)) {
     throw_field(path, "byte skip", skip_text);
   }
   if (encoding == "ascii" || encoding == "text" || encoding == "txt") {
+    if (from_end) {
+      throw_field(path, "byte skip", skip_text);
+    }
     ByteStream stream(place.path, place.offset, Coding::plain);
     stream.skip(*skip);
     read_text_voxels(file, stream, type, axes, sink);
@@ -541,21 +690,24 @@ void read_data(VolumeFile& file, const fs::path& path, const Header& header, con
     }
     big_endian = endian == "big";
   }
+  // Lines are skipped in the file, bytes in what is inflated of it.
+  const auto coding = gzip ? Coding::deflated : Coding::plain;
+  std::uint64_t before = *skip;
   if (from_end) {
-    std::uint64_t bytes = size_of(type);
-    for (const Axis& axis : axes) {
-      if (__builtin_mul_overflow(bytes, axis.size, &bytes)) {
-        bytes = std::numeric_limits<std::uint64_t>::max();
-        break;
-      }
+    const std::uint64_t behind = *skip - 1;
+    const std::uint64_t voxels = stored_bytes(axes, type);
+    ByteStream whole(place.path, place.offset, coding);
+    const std::uint64_t size = whole.skip(std::numeric_limits<std::int64_t>::max());
+    if (size < voxels || size - voxels < behind) {
+      throw InputError(fmt::format("{}: truncated: it holds {} bytes, and {} of voxels with {} behind them are wanted",
+                                   place.path.string(), size, voxels, behind));
     }
-    std::error_code error;
-    const std::uintmax_t size = fs::file_size(place.path, error);
-    place.offset = !error && size >= bytes ? std::max<std::uint64_t>(place.offset, size - bytes) : place.offset;
+    before = size - voxels - behind;
   }
-  ByteStream stream(place.path, place.offset, gzip ? Coding::deflated : Coding::plain);
-  stream.skip(*skip);
-  read_voxels(file, stream, type, big_endian, axes, sink);
+  ByteStream stream(place.path, place.offset, coding);
+  stream.skip(before);
+  // What follows is said by the header.
+  read_voxels(file, stream, type, big_endian, axes, sink, from_end);
 }
 
 }  // namespace
@@ -571,6 +723,9 @@ VolumeFile read_nrrd(const fs::path& path, const VolumeOptions& options, const S
 
   std::vector<AxisInfo> axes = parse_axes(path, header);
   const bool has_directions = find(header, "spacedirections") != nullptr;
+  if (!has_directions && !options.frame) {
+    set_leading_channels(file, path, axes);
+  }
   set_roles(path, axes, has_directions);
   std::vector<std::uint64_t> dims;
   for (const AxisInfo& axis : axes) {
@@ -585,8 +740,11 @@ VolumeFile read_nrrd(const fs::path& path, const VolumeOptions& options, const S
   set_dims(file, path, std::span<const std::uint64_t, 3>(dims.data(), 3));
   set_geometry(file, path, header, axes, has_directions);
 
-  const std::size_t layer = choose(path, "layer", file.layers, options.layer, layer_hint(header, file.layers));
-  const std::size_t frame = choose(path, "frame", file.frames, options.frame);
+  file.segments = segments_of(header, file.layers);
+  const std::size_t layer = choose_layer(file, path, options);
+  const bool as_stored = axes.size() == 4 && axes.back().role == Role::frame && axes.back().kind != "time";
+  const std::size_t frame = as_stored ? choose_frame(file, path, sizes_of(axes), options.frame)
+                                      : choose(path, "frame", file.frames, options.frame);
   std::vector<Axis> stored;
   for (const AxisInfo& axis : axes) {
     std::optional<std::uint64_t> pick;
@@ -595,11 +753,12 @@ VolumeFile read_nrrd(const fs::path& path, const VolumeOptions& options, const S
     }
     stored.push_back({axis.size, pick});
   }
-  for (const auto& [number, segment] : header.segments) {
+  for (const Segment& segment : file.segments) {
     if (segment.layer == layer && !segment.name.empty()) {
       file.volume.label_names.emplace_back(segment.label, segment.name);
     }
   }
+  warn_of_several_names(file, path);
   read_data(file, path, header, stored, type, sink);
   return file;
 }

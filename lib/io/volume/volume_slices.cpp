@@ -66,9 +66,11 @@ void warn_of_gaps(const fs::path& folder, const std::vector<fs::path>& slices, s
   const auto largest = std::max_element(steps.begin(), steps.end());
   if (largest != steps.end() && *largest > *std::min_element(steps.begin(), steps.end())) {
     const std::size_t before = largest - steps.begin();
-    warnings.push_back({Weight::major, "missing slice",
-                        fmt::format("{}: a slice seems to be missing between {} and {}", folder.string(),
-                                    slices[before].filename().string(), slices[before + 1].filename().string())});
+    warnings.push_back(
+        {Weight::major, "missing slice",
+         fmt::format("{}: a slice seems to be missing between {} and {}: what lies beyond is moved up by as much; "
+                     "add it",
+                     folder.string(), slices[before].filename().string(), slices[before + 1].filename().string())});
   }
 }
 
@@ -210,13 +212,6 @@ VolumeFile read_slices(const fs::path& path, const VolumeOptions& options, const
 
   const Stack stack = stack_of(paths, folder);
   const SliceHeader& common = stack.common;
-  if (stack.count == 1) {
-    file.warnings.push_back(
-        {Weight::major, "single slice",
-         fmt::format("{}: is a single slice, a volume one voxel thick: name a multi-page TIFF or the "
-                     "folder of the slices",
-                     path.string())});
-  }
   file.format = stack.format + " stack";
   set_type(file, common.type);
   set_dims(file, path, std::array<std::uint64_t, 3>{common.width, common.height, stack.count});

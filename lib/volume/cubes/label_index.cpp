@@ -4,6 +4,9 @@
 #include "tunica/core/narrow.hpp"
 #include "tunica/core/threads.hpp"
 #include "tunica/volume/labels/pack_bits.hpp"
+#include "tunica/volume/labels/whole_labels.hpp"
+
+#include <fmt/format.h>
 
 #include <Eigen/LU>
 
@@ -11,30 +14,33 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <set>
 #include <type_traits>
 #include <unordered_map>
+#include <utility>
 
 namespace tunica {
-namespace {
 
+/// Voxels of one value among up to 64 of a row.
 template <typename T>
-struct Piece {
+struct LabelIndex::Piece {
   T value;
-  std::uint32_t at;
+  std::uint32_t at;  ///< word of the mask
   std::uint64_t bits;
 };
 
-/// The pieces of up to 64 voxels, one for each value among them (or none for a value of 0, the most frequent one).
-template <typename T>
-void split_word(const T* values, std::size_t count, std::uint32_t at, bool zero_is_none,
-                std::vector<Piece<T>>& pieces) {
+namespace {
+
+/// The pieces of up to 64 voxels, one for each value among them but 0, which is no label.
+template <typename T, typename Piece>
+void split_word(const T* values, std::size_t count, std::uint32_t at, std::vector<Piece>& pieces) {
   const std::uint64_t all = count == 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << count) - 1;
   bool differ = false;
   for (std::size_t i = 1; i < count; ++i) {
     differ |= values[i] != values[0];
   }
   if (!differ) {
-    if (values[0] == values[0] && !(zero_is_none && values[0] == T{0})) {
+    if (values[0] == values[0] && values[0] != T{0}) {
       pieces.push_back({values[0], at, all});
     }
     return;
@@ -48,9 +54,23 @@ void split_word(const T* values, std::size_t count, std::uint32_t at, bool zero_
     }
     const std::uint64_t bits = pack_bits(flags);
     rest &= ~(bits | std::uint64_t{1} << first);  // NaN is not even equal to itself
-    if (bits != 0) {
+    if (bits != 0 && value != T{0}) {
       pieces.push_back({value, at, bits});
     }
+  }
+}
+
+// What up to 64 values mean. Whole numbers without scaling are labels as they are stored.
+template <typename Meaning, typename T>
+const Meaning* labels_of(const T* values, std::size_t count, const Volume& slab, std::array<Meaning, 64>& labels) {
+  if constexpr (std::is_integral_v<Meaning>) {
+    return values;
+  } else {
+    for (std::size_t i = 0; i < count; ++i) {
+      // No rounding: a float's whole number is a float, and so is what label_meant() leaves alone.
+      labels[i] = static_cast<Meaning>(label_meant(slab.slope * static_cast<double>(values[i]) + slab.intercept));
+    }
+    return labels.data();
   }
 }
 
@@ -59,63 +79,86 @@ void split_word(const T* values, std::size_t count, std::uint32_t at, bool zero_
 LabelIndex::LabelIndex(const std::array<std::size_t, 3>& dims, const Eigen::Matrix<double, 3, 4>& affine,
                        std::size_t limit)
     : dims_(dims), affine_(affine), limit_(limit) {
-  if ((dims[0] + 63) / 64 * dims[1] * dims[2] > std::numeric_limits<std::uint32_t>::max()) {
+  if (voxel_count(dims) > std::size_t{1} << 38 ||
+      (dims[0] + 63) / 64 * dims[1] * dims[2] > std::numeric_limits<std::uint32_t>::max()) {
     throw InputError("the volume has more than 2^38 voxels, too many for all labels at once: name one label");
   }
 }
 
 void LabelIndex::add(const Volume& slab, std::size_t first_slice) {
-  TUNICA_ASSERT(slab.dims[0] == dims_[0] && slab.dims[1] == dims_[1] && first_slice + slab.dims[2] <= dims_[2]);
-  std::visit([&](const auto& values) { add_values(slab, values, first_slice); }, slab.data);
+  require_slab(slab, first_slice, dims_);
+  std::visit(
+      [&](const auto& values) {
+        using T = typename std::decay_t<decltype(values)>::value_type;
+        if (slab.slope == 1 && slab.intercept == 0) {
+          add_values<T>(slab, values, first_slice);
+        } else {
+          add_values<double>(slab, values, first_slice);
+        }
+      },
+      slab.data);
 }
 
-template <typename T>
+template <typename Meaning, typename T>
 void LabelIndex::add_values(const Volume& slab, const std::vector<T>& values, std::size_t first_slice) {
+  // So few slices at a time that a grey volume, a piece for every voxel, is told before its pieces fill the memory.
+  constexpr std::size_t most_voxels = std::size_t{1} << 22;
+  const std::size_t words = (dims_[0] + 63) / 64;
+  const std::size_t at_once = std::max<std::size_t>(1, most_voxels / (dims_[0] * dims_[1]));
+  for (std::size_t first = 0; first < slab.dims[2] && !image_; first += at_once) {
+    std::vector<std::vector<Piece<Meaning>>> slices(std::min(at_once, slab.dims[2] - first));
+    parallel_for_blocks(slices.size(), 1, [&](std::size_t k, std::size_t) {
+      check_interrupt();
+      std::array<Meaning, 64> room;
+      for (std::size_t j = 0; j < dims_[1]; ++j) {
+        const T* const row = values.data() + dims_[0] * (j + dims_[1] * (first + k));
+        const std::size_t first_word = words * (j + dims_[1] * (first_slice + first + k));
+        for (std::size_t w = 0; w < words; ++w) {
+          const std::size_t count = std::min<std::size_t>(64, dims_[0] - 64 * w);
+          const Meaning* const labels = labels_of(row + 64 * w, count, slab, room);
+          split_word(labels, count, narrow<std::uint32_t>(first_word + w), slices[k]);
+        }
+      }
+    });
+    for (const auto& slice : slices) {
+      add_pieces(slice);
+    }
+  }
+}
+
+template <typename Meaning>
+void LabelIndex::add_pieces(const std::vector<Piece<Meaning>>& pieces) {
   if (image_) {
     return;
   }
   const std::size_t words = (dims_[0] + 63) / 64;
-  std::vector<std::vector<Piece<T>>> slices(slab.dims[2]);
-  parallel_for_blocks(slab.dims[2], 1, [&](std::size_t k, std::size_t) {
-    check_interrupt();
-    for (std::size_t j = 0; j < dims_[1]; ++j) {
-      const T* const row = values.data() + dims_[0] * (j + dims_[1] * k);
-      const std::size_t first_word = words * (j + dims_[1] * (first_slice + k));
-      for (std::size_t w = 0; w < words; ++w) {
-        split_word(row + 64 * w, std::min<std::size_t>(64, dims_[0] - 64 * w), narrow<std::uint32_t>(first_word + w),
-                   slab.intercept == 0, slices[k]);
+  std::unordered_map<Meaning, Entry*> entry_of;
+  for (const auto& [value, at, bits] : pieces) {
+    const auto [found, fresh] = entry_of.try_emplace(value, nullptr);
+    if (fresh) {
+      const auto label = static_cast<double>(value);
+      if (std::is_integral_v<Meaning> && static_cast<long double>(label) != static_cast<long double>(value)) {
+        throw InputError(fmt::format(
+            "its label {} is above 2^53, where labels cannot be told apart: give the labels smaller numbers", value));
+      }
+      found->second = &entries_[label];
+      if (entries_.size() > limit_) {
+        image_ = true;
+        entries_.clear();
+        return;
       }
     }
-  });
-  // Different stored values may mean the same.
-  std::unordered_map<T, Entry*> entry_of;
-  for (const auto& slice : slices) {
-    for (const auto& [value, at, bits] : slice) {
-      const auto [found, fresh] = entry_of.try_emplace(value, nullptr);
-      if (fresh) {
-        const double meaning = slab.slope * static_cast<double>(value) + slab.intercept;
-        found->second = meaning != 0 && !std::isnan(meaning) ? &entries_[meaning] : nullptr;
-        if (entries_.size() > limit_) {
-          image_ = true;
-          entries_.clear();
-          return;
-        }
-      }
-      if (found->second == nullptr) {
-        continue;
-      }
-      Entry& entry = *found->second;
-      const std::size_t j = at / words % dims_[1];
-      const std::size_t k = at / words / dims_[1];
-      if (entry.voxels == 0) {
-        entry.bounds = {{j, j + 1}, {k, k + 1}};
-      }
-      entry.bounds.rows = {std::min(entry.bounds.rows[0], j), std::max(entry.bounds.rows[1], j + 1)};
-      entry.bounds.slices[1] = k + 1;
-      entry.voxels += std::popcount(bits);
-      entry.at.push_back(at);
-      entry.bits.push_back(bits);
+    Entry& entry = *found->second;
+    const std::size_t j = at / words % dims_[1];
+    const std::size_t k = at / words / dims_[1];
+    if (entry.voxels == 0) {
+      entry.bounds = {{j, j + 1}, {k, k + 1}};
     }
+    entry.bounds.rows = {std::min(entry.bounds.rows[0], j), std::max(entry.bounds.rows[1], j + 1)};
+    entry.bounds.slices[1] = k + 1;
+    entry.voxels += std::popcount(bits);
+    entry.at.push_back(at);
+    entry.bits.push_back(bits);
   }
 }
 
@@ -124,15 +167,18 @@ std::optional<std::vector<Label>> LabelIndex::labels(const std::vector<std::pair
     return std::nullopt;
   }
   const double voxel_volume = std::abs(affine_.leftCols<3>().determinant());
-  std::map<double, std::string> name_of;  // the first of several
+  std::map<double, std::set<std::string>> names_of;
   for (const auto& [value, name] : names) {
-    name_of.emplace(value, name);
+    names_of[value].insert(name);
   }
+  constexpr std::size_t longest_name = 400;  // bytes: two of the longest that are read
   std::vector<Label> labels;
   for (const auto& [value, entry] : entries_) {
-    const auto name = name_of.find(value);
-    labels.push_back(
-        {value, entry.voxels, real(entry.voxels) * voxel_volume, name == name_of.end() ? std::string{} : name->second});
+    std::string name;
+    for (const std::string& one : names_of[value]) {
+      name += name.empty() ? one : name.size() < longest_name ? " / " + one : "";
+    }
+    labels.push_back({value, entry.voxels, real(entry.voxels) * voxel_volume, std::move(name)});
   }
   return labels;
 }

@@ -11,10 +11,10 @@
 namespace tunica {
 
 struct Label {
-  double value = 0;        ///< slope * v + intercept
+  double value = 0;        ///< label_meant() of slope * v + intercept
   std::size_t voxels = 0;  ///< at least 1
   double volume_mm3 = 0;   ///< voxels times the volume of one
-  std::string name;        ///< empty where the file has none
+  std::string name;        ///< empty where the file has none; several with " / " between them
 };
 
 /// All labels of a segmentation that comes slab by slab, so that the surfaces of hundreds of them take one pass over
@@ -27,7 +27,8 @@ public:
   LabelIndex(const std::array<std::size_t, 3>& dims, const Eigen::Matrix<double, 3, 4>& affine,
              std::size_t limit = 65536);
 
-  /// Takes the slices [first_slice, first_slice + slab.dims[2]).
+  /// Takes the slices [first_slice, first_slice + slab.dims[2]). Errors: InputError: require_slab();
+  /// a label of 64 bits that no double is equal to.
   void add(const Volume& slab, std::size_t first_slice);
 
   /// In increasing order, with their sizes; none of an image. @param names  of labels, by value
@@ -39,8 +40,7 @@ public:
   [[nodiscard]] MaskBounds bounds(double label) const;
 
   /// Vertices of the closed surface of a label that labels() lists: edges between a voxel with it and one without.
-  /// Its surface has about twice as many triangles. Cost: one pass over the label's words. Limits: too many where
-  /// several stored values mean the same label.
+  /// Its surface has about twice as many triangles. Cost: one pass over the label's words.
   [[nodiscard]] std::size_t surface_vertices(double label) const;
 
 private:
@@ -50,8 +50,12 @@ private:
     std::vector<std::uint32_t> at;    ///< words of the mask in memory order
     std::vector<std::uint64_t> bits;  ///< and what they hold
   };
-  template <typename T>
+  template <typename Meaning>
+  struct Piece;
+  template <typename Meaning, typename T>
   void add_values(const Volume& slab, const std::vector<T>& values, std::size_t first_slice);
+  template <typename Meaning>
+  void add_pieces(const std::vector<Piece<Meaning>>& pieces);
 
   std::array<std::size_t, 3> dims_;
   Eigen::Matrix<double, 3, 4> affine_;

@@ -156,15 +156,24 @@ private:
 
 SlabMarchingCubes::SlabMarchingCubes(const Mask& mask, const Inside& rule, const MarchingCubesOptions& options)
     : writer_(std::make_unique<Writer>(mask, options)), mask_(mask), value_(rule.value) {
-  TUNICA_ASSERT(rule.rule != Inside::Rule::label && !options.bounds);
+  if (rule.rule == Inside::Rule::label || options.bounds) {
+    throw InputError(
+        "a surface by label needs no values, and one by values has no bounds: marching_cubes() of the mask");
+  }
+  if (std::isnan(rule.value)) {
+    throw InputError("not-a-number is no isovalue");
+  }
 }
 
 SlabMarchingCubes::~SlabMarchingCubes() = default;
 
 void SlabMarchingCubes::add(const Volume& slab, std::size_t first_slice) {
   const auto& dims = mask_.dims();
-  TUNICA_ASSERT(first_slice == next_slice_ && slab.dims[0] == dims[0] && slab.dims[1] == dims[1] && slab.dims[2] >= 1 &&
-                first_slice + slab.dims[2] <= dims[2]);
+  require_slab(slab, first_slice, dims);
+  if (first_slice != next_slice_ || slab.data.index() != (first_slice > 0 ? carry_ : slab.data).index()) {
+    throw InputError(
+        fmt::format("slices from {} on, or of another type, come where slice {} is next", first_slice, next_slice_));
+  }
   const std::size_t slice_voxels = dims[0] * dims[1];
   // The last slice of the slab before, for the edges from it to this slab's first one.
   const std::size_t carried = first_slice > 0 ? 1 : 0;
@@ -191,7 +200,9 @@ void SlabMarchingCubes::add(const Volume& slab, std::size_t first_slice) {
 }
 
 TriangleMesh SlabMarchingCubes::finish() {
-  TUNICA_ASSERT(next_slice_ == mask_.dims()[2]);
+  if (next_slice_ != mask_.dims()[2]) {
+    throw InputError(fmt::format("only {} of {} slices came", next_slice_, mask_.dims()[2]));
+  }
   return writer_->finish();
 }
 
@@ -203,7 +214,10 @@ TriangleMesh marching_cubes(const Mask& mask, const MarchingCubesOptions& option
 
 TriangleMesh marching_cubes(const Volume& volume, const Inside& rule, const Mask& mask,
                             const MarchingCubesOptions& options) {
-  TUNICA_ASSERT(volume.dims == mask.dims());
+  require_volume(volume);
+  if (volume.dims != mask.dims()) {
+    throw InputError("volume and mask have different dimensions");
+  }
   if (rule.rule == Inside::Rule::label) {
     return marching_cubes(mask, options);
   }

@@ -4,6 +4,7 @@
 #include "tunica/core/progress.hpp"
 #include "tunica/core/threads.hpp"
 #include "tunica/volume/labels/pack_bits.hpp"
+#include "tunica/volume/labels/whole_labels.hpp"
 
 #include <Eigen/LU>
 
@@ -56,7 +57,7 @@ struct Order {
 };
 
 /// The stored values that are inside: they are neighbours in their type's order, for slope * v + intercept is monotone
-/// in floating point too.
+/// in floating point too, and so is label_meant().
 template <typename T>
 struct Range {
   T first;
@@ -66,10 +67,14 @@ struct Range {
 template <typename T>
 std::optional<Range<T>> stored_range(const Volume& volume, const Inside& rule) {
   const bool scaled = volume.slope != 1 || volume.intercept != 0;
+  const bool rounded = rule.rule == Inside::Rule::label && (scaled || std::is_floating_point_v<T>);
   // long double holds every 64-bit integer.
   const auto meaning = [&](T v) -> long double {
-    return scaled ? static_cast<long double>(volume.slope * static_cast<double>(v) + volume.intercept)
-                  : static_cast<long double>(v);
+    if (!scaled && !rounded) {
+      return static_cast<long double>(v);
+    }
+    const double value = volume.slope * static_cast<double>(v) + volume.intercept;
+    return static_cast<long double>(rounded ? label_meant(value) : value);
   };
   const auto threshold = static_cast<long double>(rule.value);
   const auto above = [&](T v) { return meaning(v) > threshold; };
@@ -144,30 +149,24 @@ std::size_t count_bits(const std::uint64_t* words, std::size_t count) {
 
 Mask::Mask(const std::array<std::size_t, 3>& dims, const Eigen::Matrix<double, 3, 4>& affine)
     : dims_(dims), words_per_row_((dims[0] + 63) / 64), affine_(affine) {
-  if (dims[0] == 0 || dims[1] == 0 || dims[2] == 0) {
-    throw InputError("the volume has no voxels");
-  }
-  const double determinant = affine.leftCols<3>().determinant();
-  if (!affine.allFinite() || determinant == 0 || !std::isfinite(determinant)) {
-    throw InputError("the volume's orientation matrix has no inverse: its voxels have no extent in some direction");
-  }
+  // A row of one voxel takes a word.
+  voxel_count({words_per_row_ * 64, dims[1], dims[2]});
+  require_affine(affine);
   words_ = decltype(words_)(words_per_row_ * dims[1] * dims[2]);
 }
 
 double Mask::voxel_volume() const { return std::abs(affine_.leftCols<3>().determinant()); }
 
 void select(const Volume& slab, std::size_t first_slice, const Inside& rule, Mask& mask) {
-  TUNICA_ASSERT(slab.dims[0] == mask.dims()[0] && slab.dims[1] == mask.dims()[1] &&
-                first_slice + slab.dims[2] <= mask.dims()[2]);
-  if (!std::isfinite(slab.slope) || slab.slope == 0 || !std::isfinite(slab.intercept)) {
-    throw InputError("the volume's scaling (slope, intercept) is zero or not finite");
+  require_slab(slab, first_slice, mask.dims());
+  if (std::isnan(rule.value)) {
+    throw InputError("not-a-number is neither a label nor an isovalue");
   }
   std::visit(
       [&](const auto& values) {
         using T = typename std::decay_t<decltype(values)>::value_type;
-        TUNICA_ASSERT(values.size() == slab.voxels());
         const std::optional<Range<T>> range = stored_range<T>(slab, rule);
-        if (!range || std::isnan(rule.value)) {
+        if (!range) {
           return;
         }
         parallel_for_blocks(slab.dims[2], 4, [&](std::size_t begin, std::size_t end) {

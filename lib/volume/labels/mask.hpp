@@ -11,7 +11,7 @@ namespace tunica {
 /// Which samples of a volume are inside, by what they mean (slope * v + intercept). NaN is outside, whatever the rule.
 struct Inside {
   enum class Rule {
-    label,  ///< equal to `value`
+    label,  ///< label_meant() of it is `value`: a whole number also takes what misses it by rounding
     above,  ///< greater than `value`; a sample equal to it is outside
     below,  ///< less than `value`; a sample equal to it is outside
   };
@@ -59,6 +59,7 @@ private:
 
 /// The voxels that are inside by `rule`. Exact: integers are compared as integers where the volume has no scaling, and
 /// no rounding of slope * v + intercept depends on the machine.
+/// Errors: InputError: require_volume(); a rule whose value is not-a-number.
 /// Cost: one pass over the volume.
 Mask select(const Volume& volume, const Inside& rule);
 

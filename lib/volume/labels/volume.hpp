@@ -2,7 +2,9 @@
 
 #include "tunica/core/types.hpp"
 
+#include <array>
 #include <cstddef>
+#include <cstdint>
 #include <string>
 #include <variant>
 #include <vector>
@@ -27,5 +29,17 @@ struct Volume {
 
   [[nodiscard]] std::size_t voxels() const { return dims[0] * dims[1] * dims[2]; }
 };
+
+/// The number of voxels. Errors: InputError: a dimension is 0, or there are more than memory can number.
+std::size_t voxel_count(const std::array<std::size_t, 3>& dims);
+
+/// Errors: InputError: the affine is not finite or has no inverse.
+void require_affine(const Eigen::Matrix<double, 3, 4>& affine);
+
+/// Checks that a volume is one: dims, data of that size, affine, slope and intercept. Errors: InputError.
+void require_volume(const Volume& volume);
+
+/// As require_volume(), of slices [first_slice, first_slice + slab.dims[2]) of a volume of `dims`.
+void require_slab(const Volume& slab, std::size_t first_slice, const std::array<std::size_t, 3>& dims);
 
 }  // namespace tunica

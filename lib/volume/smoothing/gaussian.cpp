@@ -226,6 +226,7 @@ SmoothedField smooth_mask(const Mask& mask, double sigma, const Progress& progre
 }
 
 Volume smooth_values(const Volume& volume, double sigma, const Progress& progress) {
+  require_volume(volume);
   const std::size_t columns = volume.dims[0];
   return std::visit(
       [&](const auto& values) {

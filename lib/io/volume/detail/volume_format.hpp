@@ -40,9 +40,13 @@ struct SlabSink {
 /// Reads an array whose first axis runs fastest, and checks that the stream holds all of it, before memory is taken:
 /// into the file's volume, whose dims are those of the array's axes without a pick, or with a sink into that.
 /// Trailing bytes become a warning.
+/// @param more  bytes that follow are no surprise
 /// Errors: InputError: overflow, truncated.
 void read_voxels(VolumeFile& file, ByteStream& stream, VoxelType type, bool big_endian, const std::vector<Axis>& axes,
-                 const SlabSink* sink);
+                 const SlabSink* sink, bool more = false);
+
+/// Bytes of the array; the largest number where they overflow it.
+std::uint64_t stored_bytes(const std::vector<Axis>& axes, VoxelType type);
 
 /// As read_voxels, for numbers written as text.
 void read_text_voxels(VolumeFile& file, ByteStream& stream, VoxelType type, const std::vector<Axis>& axes,
@@ -63,12 +67,30 @@ inline void set_type(VolumeFile& file, VoxelType type) {
 std::size_t choose(const std::filesystem::path& path, const char* what, std::uint64_t count,
                    std::optional<std::size_t> chosen, const std::string& hint = {});
 
+/// How many leading axes of one sample are channels of deep learning (1, X, Y, Z), not space: those before exactly
+/// three longer ones; 0 where there is none.
+std::size_t leading_channels(std::span<const std::uint64_t> sizes);
+
+/// The note of that.
+Warning channel_note(const std::filesystem::path& path, std::span<const std::uint64_t> sizes);
+
+/// Index of the frame to read of an array whose first three axes are space, and the fourth time. Where the first is
+/// the shortest of four it is rather of channels, one class each: that is said. Errors: as choose().
+std::size_t choose_frame(VolumeFile& file, const std::filesystem::path& path, std::span<const std::uint64_t> sizes,
+                         std::optional<std::size_t> chosen);
+
+/// Why no volume can lie so in space; none where one can.
+std::optional<std::string> affine_error(const Eigen::Matrix<double, 3, 4>& affine);
+
 /// Sets the volume's affine (index to LPS mm), spacing and orientation letters.
 /// Errors: InputError: not finite, singular, or beyond any scanner.
 void set_affine(VolumeFile& file, const std::filesystem::path& path, const Eigen::Matrix<double, 3, 4>& lps);
 
 /// RAS to LPS and back.
 Eigen::Matrix<double, 3, 4> flip_xy(Eigen::Matrix<double, 3, 4> affine);
+
+/// Warns where a label in the volume has several names.
+void warn_of_several_names(VolumeFile& file, const std::filesystem::path& path);
 
 /// Sets volume.dims. Errors: InputError: a size is 0 or the count overflows.
 void set_dims(VolumeFile& file, const std::filesystem::path& path, std::span<const std::uint64_t, 3> dims);
@@ -96,7 +118,9 @@ bool looks_like_png(std::string_view head);
 
 /// Each reads a whole file of its format, detached data included; the voxels into the sink where there is one.
 /// Errors: InputError naming the file.
-VolumeFile read_nifti(const std::filesystem::path& path, const VolumeOptions& options, const SlabSink* sink);
+/// @param image  NIfTI pairs: the file with the voxels; without it that beside the header
+VolumeFile read_nifti(const std::filesystem::path& path, const VolumeOptions& options, const SlabSink* sink,
+                      const std::optional<std::filesystem::path>& image = {});
 VolumeFile read_nrrd(const std::filesystem::path& path, const VolumeOptions& options, const SlabSink* sink);
 VolumeFile read_metaimage(const std::filesystem::path& path, const VolumeOptions& options, const SlabSink* sink);
 VolumeFile read_slices(const std::filesystem::path& path, const VolumeOptions& options, const SlabSink* sink);
