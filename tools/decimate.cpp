@@ -86,8 +86,10 @@ std::optional<double> wanted_angle(const Arguments& given) {
 }
 
 // What IN is, beside fit for the work: open where it looks whole, or inside out. Both stay as they are.
-void warn_of_surface(const cli::Tool& tool, const fs::path& path, const TriangleMesh& mesh, const MeshFacts& facts) {
-  for (const Warning& warning : seam_warnings(mesh, facts, path, Weight::major)) {
+// @param repaired  boundary edges that still coincide are those that could not agree, which `repairs` counts
+void warn_of_surface(const cli::Tool& tool, const fs::path& path, const TriangleMesh& mesh, const MeshFacts& facts,
+                     bool repaired) {
+  for (const Warning& warning : repaired ? std::vector<Warning>() : seam_warnings(mesh, facts, path, Weight::major)) {
     tool.warn(warning);
   }
   if (const Facing facing = facing_of(mesh); facing.inward > 0) {
@@ -120,7 +122,7 @@ MeshFile read_surface(const cli::Tool& tool, const fs::path& path, const std::op
   if (!(diagonal(file.mesh) > 0)) {
     throw InputError(fmt::format("{}: all its vertices lie in one point", path.string()));
   }
-  warn_of_surface(tool, path, file.mesh, facts);
+  warn_of_surface(tool, path, file.mesh, facts, repairs.has_value());
   return file;
 }
 
