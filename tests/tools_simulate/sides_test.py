@@ -22,7 +22,7 @@ kind = "pressure"
 value = "{}"
 [[fix]]
 body = "wall"
-where = "rigid-motions"
+where = {{rigid_motions = true}}
 [run]
 kind = "static"
 """
