@@ -4,6 +4,7 @@
 #include "tunica/cli/tool.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/core/version.hpp"
+#include "tunica/fit/relax.hpp"
 #include "tunica/io/file/output_file.hpp"
 #include "tunica/io/mesh/mesh_file.hpp"
 #include "tunica/io/mesh/mesh_pair.hpp"
@@ -250,6 +251,36 @@ RunIdentity identity_of_run(const cli::Tool& tool, const Scene& scene, const std
   return identity;
 }
 
+/// What the meshes of a scene say beside what they hold.
+void tell_findings(const cli::Tool& tool, const LoadedScene& loaded) {
+  for (const std::string& note : loaded.notes) {
+    tool.note(note);
+  }
+  for (const Warning& warning : loaded.warnings) {
+    tool.warn(warning);
+  }
+}
+
+void warn_of_no_target(const cli::Tool& tool, const fs::path& shells) {
+  tool.warn({Weight::minor, "no target",
+             fmt::format("{}: has no target: finer shells lie on its own patches, and the error of its geometry is not "
+                         "seen (--target, or target in [accuracy])",
+                         shells.string())});
+}
+
+/// A target that faces as the shells do.
+std::unique_ptr<Target> target_like(const cli::Tool& tool, const ShellMesh& shell, TriangleMesh mesh,
+                                    const fs::path& path) {
+  auto target = std::make_unique<Target>(std::move(mesh));
+  if (faces_other_way({shell.vertices, shell.triangles}, *target)) {
+    tool.warn({Weight::minor, "faces the other way",
+               fmt::format("{}: faces the other way than the shells: its triangles are turned around to agree",
+                           path.string())});
+    target = std::make_unique<Target>(turned_around(target->mesh()));
+  }
+  return target;
+}
+
 /// A target that cannot be what the shells were fitted to: no finer than they are, or somewhere else.
 void require_own_target(const ShellMesh& shell, const Target& target, const fs::path& path) {
   constexpr std::size_t facets_per_shell = 2;
@@ -411,16 +442,10 @@ private:
     asked_ = scene_text(scene_, out_);
     loaded_.emplace(load_scene(scene_));
     read_targets();
-    for (const std::string& note : loaded_->notes) {
-      tool_.note(note);
-    }
+    tell_findings(tool_, *loaded_);
     for (std::size_t b = 0; scene_.accuracy && b < targets_.size(); ++b) {
       if (!targets_[b] && model().shells[b].curved) {
-        tool_.warn(
-            {Weight::minor, "no target",
-             fmt::format("{}: has no target: finer shells lie on its own patches, and the error of its geometry is not "
-                         "seen (--target, or target in [accuracy])",
-                         scene_.shells[b].mesh.string())});
+        warn_of_no_target(tool_, scene_.shells[b].mesh);
       }
     }
   }
@@ -463,7 +488,7 @@ private:
       for (Vec3& vertex : file.mesh.vertices) {
         vertex *= shell.scale;
       }
-      targets_[b] = std::make_unique<Target>(std::move(file.mesh));
+      targets_[b] = target_like(tool_, model().shells[b].mesh, std::move(file.mesh), path);
       require_own_target(model().shells[b].mesh, *targets_[b], path);
     }
   }

@@ -17,7 +17,6 @@ namespace {
 
 constexpr int pieces_per_edge = 4;   // where distances are sampled
 constexpr double least_stand = 0.2;  // of a normal on its facet: less is no shell
-constexpr double small_rims = 0.3;   // of the area: what closes them
 
 void require_unfolded(const ShellMesh& before, const ShellMesh& after) {
   for (std::size_t t = 0; t < after.triangles.size(); ++t) {
@@ -38,23 +37,6 @@ void require_unfolded(const ShellMesh& before, const ShellMesh& after) {
 }
 
 }  // namespace
-
-bool faces_inward(const Target& face) {
-  TriangleMesh closed = face.mesh();
-  for (const auto& rim : face.boundary_vertices()) {
-    Vec3 middle = Vec3::Zero();
-    for (const Index v : rim) {
-      middle += closed.vertices[v] / real(rim.size());
-    }
-    const auto centre = narrow<Index>(closed.vertices.size());
-    closed.vertices.push_back(middle);
-    for (std::size_t i = 0; i < rim.size(); ++i) {
-      closed.triangles.push_back({rim[(i + 1) % rim.size()], rim[i], centre});
-    }
-  }
-  const double open = area(face.mesh());
-  return area(closed) - open <= small_rims * open && signed_volume(closed) < 0;
-}
 
 TriangleMesh moved_half_way(TriangleMesh coarse, const Target& face, WallFace which, double thickness,
                             const Target& half_way) {

@@ -37,9 +37,6 @@ struct HalfWaySurface {
 /// less than 30 degrees to the wall counts as one that lies in no plane.
 HalfWaySurface half_way_surface(const Target& face, WallFace which, double thickness, const Progress& progress = {});
 
-/// Whether a face that is closed, but for rims that are small beside it, has its normals inward.
-bool faces_inward(const Target& face);
-
 /// A coarse mesh of the face, each vertex moved to the surface half of the wall away. Cost: linear.
 TriangleMesh moved_half_way(TriangleMesh coarse, const Target& face, WallFace which, double thickness,
                             const Target& half_way);

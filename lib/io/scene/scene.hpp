@@ -3,6 +3,7 @@
 
 #include "tunica/accuracy/accuracy.hpp"
 #include "tunica/core/error.hpp"
+#include "tunica/core/warning.hpp"
 #include "tunica/mechanics/model/model.hpp"
 
 #include <filesystem>
@@ -204,6 +205,7 @@ void check_scene(const Scene& scene);
 struct LoadedScene {
   Model model;
   std::vector<std::string> notes;  ///< of the scene and of its meshes (flat facets)
+  std::vector<Warning> warnings;   ///< of its meshes: which way they face, where they are open unawares
 };
 
 /// The meshes of a scene at hand: shells, solids and rigid bodies each in the scene's order.
@@ -214,8 +216,9 @@ struct SceneBodies {
 };
 
 /// Reads the meshes and resolves every name and selection. A mesh without normals is simulated as the flat facets it
-/// holds; a note says so. A rigid mesh that faces inward is turned; a note says that too.
-/// Errors: InputError: as read_mesh; a selection that is empty, a node that does not exist, or that two bodies carry.
+/// holds; a note says so. A rigid mesh that faces inward is turned; a warning says so. Shells stay as they are: a
+/// warning says where a pressure meets normals that point inward. Errors: InputError: as read_mesh; meshes that say
+/// different spaces; a selection that is empty, a node that does not exist, or that two bodies carry.
 LoadedScene load_scene(const Scene& scene);
 
 /// The same on bodies that are at hand, such as finer meshes of the same.
