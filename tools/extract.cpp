@@ -527,7 +527,9 @@ std::array<Selection, 2> both_faces(cli::Tool& tool, const Subject& subject, con
   if (hollows.sizes.empty()) {
     throw InputError(fmt::format(
         "{}: {} is no wall around a hollow, so it has no inner and no outer face: leave out --face; where it "
-        "is a wall with an open end in the image, crop the image so that its border cuts the wall there",
+        "is a wall with a hole, close that in the segmentation, and where it ends within the image, crop the image so "
+        "that "
+        "its border cuts the wall",
         arguments.volume.string(), wall.target.name));
   }
   warn_all(tool, doubt_wall(subject, hollows));
@@ -565,11 +567,12 @@ Json extract_to_file(cli::Tool& tool, Selection selection, const Arguments& argu
   tool.require_unchanged_inputs();
   write(tool, output_path(arguments.out, target), surface.mesh, name, voxel, arguments);
   if (other) {
-    const FaceDistance thickness = distance_of_faces(surface.mesh, other->mesh);
+    const FaceDistance thickness =
+        distance_of_faces(without_border(surface.mesh, surface.mask), without_border(other->mesh, other->mask));
     result["face"] = *arguments.face;
-    result["wall_thickness_mm"] = {{"mean", thickness.mean}, {"min", thickness.min}, {"max", thickness.max}};
-    tool.note(fmt::format("{}: the wall is {:.4g} mm thick in the mean, {:.4g} to {:.4g} mm", target.name,
-                          thickness.mean, thickness.min, thickness.max));
+    result["wall_thickness_mm"] = {{"mean", thickness.mean}, {"p5", thickness.p5}, {"p95", thickness.p95}};
+    tool.note(fmt::format("{}: the wall is {:.4g} mm thick in the mean, {:.4g} to {:.4g} mm over nine tenths of it",
+                          target.name, thickness.mean, thickness.p5, thickness.p95));
     if (arguments.other_face) {
       const std::string& behind = *arguments.face == "inner" ? "outer" : "inner";
       write(tool, output_path(*arguments.other_face, target), other->mesh, target.name + ", " + behind + " face", voxel,

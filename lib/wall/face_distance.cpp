@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 namespace tunica {
@@ -27,15 +28,28 @@ FaceDistance distance_of_faces(const TriangleMesh& face, const TriangleMesh& oth
       distance[t] = std::sqrt(closest.closest(middle).squared_distance);
     }
   });
-  FaceDistance found{0, *std::ranges::min_element(distance), *std::ranges::max_element(distance)};
+  std::vector<std::pair<double, double>> by_distance;  // with the areas
+  FaceDistance found;
   double whole = 0;
   for (std::size_t t = 0; t < distance.size(); ++t) {
     const auto& [a, b, c] = face.triangles[t];
     const double area = triangle_area(face.vertices[a], face.vertices[b], face.vertices[c]);
+    by_distance.emplace_back(distance[t], area);
     found.mean += area * distance[t];
     whole += area;
   }
   found.mean /= whole;
+  std::ranges::sort(by_distance);
+  const auto quantile = [&](double share) {
+    double below = 0;
+    const auto at = std::ranges::find_if(by_distance, [&](const auto& one) {
+      below += one.second;
+      return below >= share * whole;
+    });
+    return at == by_distance.end() ? by_distance.back().first : at->first;
+  };
+  found.p5 = quantile(0.05);
+  found.p95 = quantile(0.95);
   return found;
 }
 

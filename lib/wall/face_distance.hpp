@@ -8,8 +8,8 @@ namespace tunica {
 /// How thick a wall is by its two faces.
 struct FaceDistance {
   double mean = 0;  ///< mm, over the area of the one face
-  double min = 0;
-  double max = 0;
+  double p5 = 0;    ///< over a twentieth of the area it is less
+  double p95 = 0;   ///< and over a twentieth more: corners of lids and crotches say nothing of the wall
 };
 
 /// Distance of one face of a wall from the other, at the middles of its triangles. Both have triangles.

@@ -109,7 +109,7 @@ class Walls(Warnings):
         i, j, k = grid()
         r = numpy.hypot(i - 19.5, j - 19.5)
         volume = self.nifti(((r < 14) & (r >= 12) & (k > 5) & (k < 40)).astype(numpy.uint8))
-        self.warned(volume, self.out, "--label", 1, of="wall with two faces", saying=["open within the image"])
+        self.warned(volume, self.out, "--label", 1, of="wall with two faces", saying=["open end or a hole within the image"])
         self.out.unlink()
         self.refuse(3, volume, self.out, "--label", 1, "--face", "inner", saying=["no wall around a hollow", "crop"])
 
@@ -121,6 +121,18 @@ class Walls(Warnings):
                               (["--label", 1, "--face", "inner", "--other-face", self.out], "out.ply")):
             self.refuse(2, volume, self.folder / "out.ply" if "--all-labels" not in flags else self.folder / "{label}.ply",
                         *flags, saying=saying)
+
+
+    def test_of_which_a_side_is_cut_have_their_thickness_without_the_lids(self):
+        i, j, _ = grid()
+        r = numpy.hypot(i, j - 19.5)
+        volume = self.nifti(((r < 14) & (r >= 12)).astype(numpy.uint8), MM)
+        for border in ([], ["--open-border"]):
+            report, _ = self.run_tool(volume, self.out, "--label", 1, "--face", "inner", "--smooth", "staircase", *border)
+            thickness = report["result"]["wall_thickness_mm"]
+            self.assertAlmostEqual(thickness["mean"], 1.6, delta=0.1)
+            self.assertGreater(thickness["p5"], 1)
+            self.assertLess(thickness["p95"], 2)
 
 
 class Cavities(Warnings):

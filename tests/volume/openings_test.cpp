@@ -95,6 +95,7 @@ TEST(Openings, OfVesselsThatLeaveTheImageAreEnds) {
     EXPECT_EQ(ends(result.openings), 2U) << lean;
     EXPECT_FALSE(result.openings.lids.any());
   }
+  EXPECT_EQ(ends(opened(vessel({31, 31, 2}, {15, 15, 0}, {0, 0, 1}, 8)).openings), 2U);
   // A wall cut across, a ball cut in half, and a vessel in long voxels of a mirrored image.
   const Mask ring = select(
       make_volume<std::uint8_t>(
@@ -142,11 +143,26 @@ TEST(Openings, ThroughASideAreClosedByLids) {
 TEST(Openings, ThatShaveOffADomeAreClosed) {
   const Mask dome =
       select(make_volume<std::uint8_t>(
-                 {41, 41, 33}, [](double x, double y, double z) { return std::hypot(x - 20, y - 20, z - 15) < 18; }),
+                 {41, 41, 25}, [](double x, double y, double z) { return std::hypot(x - 20, y - 20, z - 8) < 18; }),
              label_one);
   const Opened result = opened(dome);
   EXPECT_EQ(ends(result.openings), 1U);  // below, where it is wide, but not above
-  EXPECT_EQ(planes_of_boundary(result.mesh, {41, 41, 33}), std::set<int>{4});
+  EXPECT_EQ(planes_of_boundary(result.mesh, {41, 41, 25}), std::set<int>{4});
+}
+
+TEST(Openings, ThroughTheBendOfAVesselAreClosed) {
+  const Mask arch = select(make_volume<std::uint8_t>({60, 60, 60},
+                                                     [](double x, double y, double z) {
+                                                       const double across = std::abs(x - 30) - 16;
+                                                       const double off =
+                                                           z > 40 ? std::hypot(x - 30, z - 40) - 16 : across;
+                                                       return std::hypot(off, y - 30) < 7;
+                                                     }),
+                           label_one);
+  const Opened result = opened(arch);
+  EXPECT_EQ(result.openings.openings.size(), 3U);
+  EXPECT_EQ(ends(result.openings), 2U);
+  EXPECT_EQ(planes_of_boundary(result.mesh, {60, 60, 60}), std::set<int>{4});
 }
 
 TEST(Openings, LidsLieOnTheBorderOfAMeshByValuesToo) {

@@ -22,8 +22,9 @@ constexpr double share_of_wall = 0.1;
 constexpr double notable_share = 0.01;
 // Of a volume: not worth a word.
 constexpr double least_share = 0.001;
-// Of what the sections of an open wall enclose: rings of bone around marrow or a canal have less.
-constexpr double share_of_open_wall = 0.4;
+// Of what the sections of an open wall enclose, as of a tube whose wall is as thick as its lumen's radius. A vertebra
+// around its canal, or an organ around a vessel, has less than half of that.
+constexpr double share_of_open_wall = 0.25;
 constexpr double notable_few = 0.05;       // of the volume of the voxels
 constexpr double notable_smoothing = 0.1;  // of the voxels
 constexpr std::size_t narrow_rim = 12;     // vertices, one per face of a voxel around it: 3 x 3 voxels
@@ -108,10 +109,11 @@ std::vector<Warning> doubt_hollows(const Subject& subject, const Mask& mask, con
   if (hollows.ring_share >= share_of_open_wall) {
     return {
         {Weight::major, "wall with two faces",
-         fmt::format("{}: it may be a wall with two faces that is open within the image: its sections are rings around "
+         fmt::format("{}: it may be a wall with two faces, with an open end or a hole within the image: its sections "
+                     "are rings around "
                      "{:.3g} % of what they enclose; both faces become one surface, and one pressure presses them in "
-                     "opposite directions; crop the image so that its border cuts the wall's open end, and pass --face "
-                     "inner or --face outer",
+                     "opposite directions; close the hole, or crop the image so that its border cuts the open end, "
+                     "and pass --face inner or --face outer",
                      subject.name, 1e2 * hollows.ring_share)}};
   }
   if (real(cavities.voxels) < least_share * real(count_voxels(mask))) {

@@ -9,7 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+#include <iterator>
 #include <optional>
 #include <utility>
 
@@ -17,8 +17,8 @@ namespace tunica {
 namespace {
 
 constexpr std::size_t no_opening = ~std::size_t{0};
-/// sin^2 over cos^2 at 60 degrees.
-constexpr double steepest_end = 3;
+/// sin^2 over cos^2 at 55 degrees.
+constexpr double steepest_end = 2;
 /// Of all squares: a wall that turns less about the normal of the plane is a sheet.
 constexpr double least_turn = 0.01;
 
@@ -137,7 +137,10 @@ private:
 /// The surface around rims: its normals without the staircase, and who is whose neighbour.
 class RimSurface {
 public:
-  explicit RimSurface(const TriangleMesh& mesh) : mesh_(mesh), first_(mesh.vertices.size() + 1, 0) {
+  /// @param on_border  vertices; triangles at them stand upright on the border, whatever the wall does, and do not
+  /// count
+  RimSurface(const TriangleMesh& mesh, const std::vector<bool>& on_border)
+      : mesh_(mesh), first_(mesh.vertices.size() + 1, 0) {
     const auto for_each_edge = [&](const auto& visit) {
       for (const auto& t : mesh.triangles) {
         for (std::size_t i = 0; i < 3; ++i) {
@@ -155,6 +158,9 @@ public:
     for_each_edge([&](Index a, Index b) { neighbours_[next[a]++] = b; });
     normals_.assign(mesh.vertices.size(), Vec3::Zero());
     for (const auto& t : mesh.triangles) {
+      if (on_border[t[0]] || on_border[t[1]] || on_border[t[2]]) {
+        continue;
+      }
       const Vec3 normal =
           (mesh.vertices[t[1]] - mesh.vertices[t[0]]).cross(mesh.vertices[t[2]] - mesh.vertices[t[0]]) / 6;
       for (const Index v : t) {
@@ -246,27 +252,46 @@ Openings find_openings(const Mask& mask, const TriangleMesh& surface) {
   const Mat3 axes = mask.affine().leftCols<3>();
   const Mat3 to_index = axes.inverse();
   std::vector<std::vector<Index>> rims(found.openings.size());
+  std::vector<bool> on_border(surface.vertices.size(), false);
   for (Index v = 0; v < surface.vertices.size(); ++v) {
     const Vec3 index = to_index * (surface.vertices[v] - mask.affine().col(3));
     for (const ImageFace& face : faces) {
       if (const std::size_t opening = face.opening_at(index); opening != no_opening) {
         rims[opening].push_back(v);
+        on_border[v] = true;
       }
     }
   }
-  RimSurface rim_surface(surface);
+  RimSurface rim_surface(surface, on_border);
   const double two_voxels = 2 * axes.colwise().norm().maxCoeff();
   for (std::size_t i = 0; i < rims.size(); ++i) {
     Opening& opening = found.openings[i];
-    const double reach = std::max(two_voxels, std::sqrt(opening.area / std::numbers::pi));
     const Vec3 normal = axes.col((opening.axis + 1) % 3).cross(axes.col((opening.axis + 2) % 3)).normalized();
-    opening.is_end = turns_about(rim_surface.turn(rims[i], reach), normal);
+    const Mat3 turn = rim_surface.turn(rims[i], two_voxels);
+    // Of an image of two slices nothing is known but the rims.
+    opening.is_end = !rims[i].empty() && (turn.isZero() || turns_about(turn, normal));
   }
   for (std::size_t face = 0; face < faces.size(); ++face) {
     found.lids.closed[face / 2][face % 2] = faces[face].closed(found.openings);
   }
   std::ranges::sort(found.openings, [](const Opening& a, const Opening& b) { return a.area > b.area; });
   return found;
+}
+
+TriangleMesh without_border(const TriangleMesh& surface, const Mask& mask) {
+  const Mat3 to_index = mask.affine().leftCols<3>().inverse();
+  std::vector<unsigned> faces(surface.vertices.size(), 0);  // a bit for each face of the image that a vertex is near
+  for (std::size_t v = 0; v < faces.size(); ++v) {
+    const Vec3 index = to_index * (surface.vertices[v] - mask.affine().col(3));
+    for (int axis = 0; axis < 3; ++axis) {
+      faces[v] |= index[axis] < 0 ? 1U << (2 * axis) : 0U;
+      faces[v] |= index[axis] > real(mask.dims()[axis] - 1) ? 2U << (2 * axis) : 0U;
+    }
+  }
+  TriangleMesh rest{surface.vertices, {}};
+  std::ranges::copy_if(surface.triangles, std::back_inserter(rest.triangles),
+                       [&](const auto& t) { return (faces[t[0]] & faces[t[1]] & faces[t[2]]) == 0; });
+  return rest.triangles.empty() ? surface : rest;
 }
 
 }  // namespace tunica
