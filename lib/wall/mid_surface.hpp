@@ -1,4 +1,3 @@
-// wall: from one face of a wall to its middle, where a shell lies.
 #pragma once
 
 #include "tunica/core/progress.hpp"
