@@ -628,8 +628,7 @@ private:
     if (given_.picture.out && (!is_modes() || !drawn_ || drawn_->first.time == 0)) {
       drawn_.emplace(state, of_state);
     }
-    wall_ = of_state.wall;
-    unresolved_ = count_unresolved(model(), state, most_bending);
+    last_ = {of_state.wall, count_unresolved(model(), state, most_bending), of_state.turn_p99};
   }
 
   Summary solved() {
@@ -678,10 +677,18 @@ private:
   }
 
   void tell(const Summary& summary, bool converged) {
-    tool_.note(fmt::format("{} nodes in {} steps, {}: largest displacement {:.4g} mm", model().node_count(),
-                           summary.steps, converged ? "converged" : "not asked to converge",
-                           tool_.result()["max_displacement_mm"].get<double>()));
-    std::vector<Warning> warnings = run_warnings(scene_.run, summary, wall_, unresolved_);
+    const Json& result = tool_.result();
+    std::string found = fmt::format("largest displacement {:.4g} mm", result["max_displacement_mm"].get<double>());
+    if (!model().shells.empty()) {
+      found += fmt::format(" (99 % of the wall below {:.4g} mm), stress of the wall {} (99th percentile)",
+                           result["displacement_p99_mm"].get<double>(), pressure_text(last_.wall.stress_p99));
+    }
+    tool_.note(fmt::format("{} nodes in {} steps, {}: {}", model().node_count(), summary.steps,
+                           converged ? "converged" : "not asked to converge", found));
+    if (accuracy_) {
+      last_.turn_p99 = 0;  // a linear model was held against a nonlinear one
+    }
+    std::vector<Warning> warnings = run_warnings(scene_.run, summary, last_);
     std::ranges::copy(contact_warnings(tool_.result()), std::back_inserter(warnings));
     for (Warning& warning : warnings) {
       warning.text = fmt::format("{}: {}", subject().string(), warning.text);
@@ -708,8 +715,7 @@ private:
   std::optional<ResultFile> file_;
   std::optional<ResultExport> exported_;
   std::optional<ElementFieldEvaluator> fields_;
-  Wall wall_;                   // of the last state
-  std::size_t unresolved_ = 0;  // elements that bend more than the mesh can show
+  LastState last_;
 };
 
 }  // namespace

@@ -420,6 +420,7 @@ void understand_comments(MeshFile& file, const std::string& name) {
         const auto edge = parse_number(words.token());
         if (edge && *edge > 0 && std::isfinite(*edge)) {
           file.voxel = std::max(file.voxel.value_or(0), *edge);
+          file.shortest_voxel = std::min(file.shortest_voxel.value_or(*edge), *edge);
         }
       }
     } else if (first == "units") {

@@ -39,10 +39,15 @@ std::vector<std::string> accuracy_notes(const Accuracy& accuracy);
 /// A line on the modes found.
 std::string modes_note(const Summary& summary, std::size_t asked);
 
+/// What of the last state tells how far it may be trusted.
+struct LastState {
+  Wall wall;
+  std::size_t unresolved = 0;  ///< count_unresolved()
+  double turn_p99 = 0;         ///< rad, as in ElementFields
+};
+
 /// What a user should know of a run that has ended well.
-/// @param wall  of the last state, as `unresolved`: count_unresolved()
-std::vector<Warning> run_warnings(const RunSettings& run, const Summary& summary, const Wall& wall,
-                                  std::size_t unresolved);
+std::vector<Warning> run_warnings(const RunSettings& run, const Summary& summary, const LastState& last);
 
 /// Contacts in which nothing ever touches.
 /// @param result  of a run that has ended

@@ -180,6 +180,9 @@ ShellBody load_shell(const SceneShell& shell, BodyFindings& found) {
     }
   }
   body.thickness = thickness_of(shell, read.file);
+  if (read.file.voxel) {
+    body.voxel = {shell.scale * *read.file.shortest_voxel, shell.scale * *read.file.voxel};
+  }
   body.material = shell.material;
   body.membrane = shell.membrane;
   body.bending = shell.bending;

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <numeric>
 #include <set>
+#include <utility>
 
 namespace tunica {
 namespace {
@@ -480,11 +481,11 @@ bool ContactSystem::find_pairs(const Configuration& configuration) {
       }
     }
   }
-  if (all.size() == pairs_.size()) {
-    return false;
+  if (all.size() != pairs_.size()) {
+    pairs_.assign(all.begin(), all.end());
+    pairs_are_new_ = true;
   }
-  pairs_.assign(all.begin(), all.end());
-  return true;
+  return std::exchange(pairs_are_new_, false);
 }
 
 void ContactSystem::accept(const Configuration& configuration) {
@@ -554,10 +555,15 @@ void ContactSystem::keep_slip(const Configuration& configuration) {
 }
 
 std::vector<double> ContactSystem::memory() const {
-  std::vector<double> values = stiffness_;
+  std::vector<double> values = accepted_stiffness_;
+  values.push_back(real(pairs_.size()));
+  for (const auto& [i, j] : pairs_) {
+    values.insert(values.end(), {real(i), real(j)});
+  }
   for (const Group& group : groups_) {
-    values.push_back(real(group.level));
-    for (const Sample& sample : group.samples) {
+    values.insert(values.end(), {real(group.level), group.sag});
+    for (std::size_t i = 0; contacts_[group.contact].friction > 0 && i < group.samples.size(); ++i) {
+      const Sample& sample = group.samples[i];
       values.push_back(sample.followed ? 1 : 0);
       values.insert(values.end(), sample.slip.begin(), sample.slip.end());
       values.push_back(sample.slipped);
@@ -567,28 +573,42 @@ std::vector<double> ContactSystem::memory() const {
 }
 
 void ContactSystem::recall(const std::vector<double>& memory, const Configuration& configuration, double time) {
-  std::size_t next = contacts_.size();
-  TUNICA_ASSERT(memory.size() >= next);
-  for (Group& group : groups_) {
-    TUNICA_ASSERT(next < memory.size());
-    sample(group, truncated<int>(memory[next]));
-    next += 1 + 5 * group.samples.size();
+  std::size_t read = 0;
+  const auto next = [&] {
+    TUNICA_ASSERT(read < memory.size());
+    return memory[read++];
+  };
+  std::ranges::generate(accepted_stiffness_, next);
+  stiffness_ = accepted_stiffness_;
+  std::vector<std::array<Index, 2>> pairs(truncated<std::size_t>(next()));
+  for (auto& [i, j] : pairs) {
+    i = truncated<Index>(next());
+    j = truncated<Index>(next());
   }
-  TUNICA_ASSERT(memory.size() == next);
-  set_step(time, time, configuration);
-  accept(configuration);
-  next = contacts_.size();
+  pairs_are_new_ = pairs_are_new_ || pairs != pairs_;
+  pairs_ = std::move(pairs);
+  begin_ = end_ = time;
+  left_ = 0;
+  for (std::size_t r = 0; r < shapes_.size(); ++r) {
+    shapes_[r].set_time(time);
+    shapes_end_[r].set_time(time);
+  }
+  shapes_before_ = shapes_;
+  accepted_ = maps_at(configuration);
   for (Group& group : groups_) {
-    ++next;
-    for (Sample& sample : group.samples) {
-      sample.followed = memory[next] != 0;
-      sample.slip = Vec3(memory[next + 1], memory[next + 2], memory[next + 3]);
-      sample.slipped = memory[next + 4];
-      next += 5;
+    if (const int level = truncated<int>(next()); level != group.level) {
+      sample(group, level);
+    }
+    group.sag = next();
+    for (std::size_t i = 0; contacts_[group.contact].friction > 0 && i < group.samples.size(); ++i) {
+      Sample& sample = group.samples[i];
+      sample.followed = next() != 0;
+      sample.slip = Vec3::NullaryExpr([&] { return next(); });
+      sample.slipped = next();
+      sample.before = place(group, sample, *accepted_);
     }
   }
-  std::copy_n(memory.begin(), contacts_.size(), stiffness_.begin());
-  accepted_stiffness_ = stiffness_;
+  TUNICA_ASSERT(read == memory.size());
 }
 
 }  // namespace tunica

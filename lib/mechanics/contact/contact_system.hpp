@@ -63,7 +63,7 @@ public:
   void set_left(double left);
 
   /// Which nodes may come to act on each other, beyond those of one element.
-  /// @return whether there are more than before
+  /// @return whether they are others than at the last call
   bool find_pairs(const Configuration& configuration);
   [[nodiscard]] const std::vector<std::array<Index, 2>>& pairs() const { return pairs_; }
 
@@ -115,9 +115,12 @@ public:
     double area = 0;      ///< mm^2
   };
 
-  /// What is kept between steps, so that a run that goes on repeats the uninterrupted one.
+  /// What is kept between steps, so that a run that goes on repeats the uninterrupted one: of the last accepted state
+  /// how stiff the barrier is, who may meet, how finely what is near is sampled, and with friction how far each sample
+  /// has slipped. Cost: two numbers per face, with friction five per sample.
   [[nodiscard]] std::vector<double> memory() const;
-  /// @param memory  of the same model; configuration, time  of the last accepted state
+  /// Puts the contact back to an accepted state.
+  /// @param memory  of the same model; configuration, time  of that state
   void recall(const std::vector<double>& memory, const Configuration& configuration, double time);
 
 private:
@@ -177,6 +180,8 @@ private:
   [[nodiscard]] bool is_close(const Group& group, const std::vector<std::size_t>& near, const FaceMaps& maps) const;
   /// Errors: InputError: bodies overlap in the reference.
   void require_apart(const Model& model);
+  /// Errors: InputError: a body that touches itself passes through itself at points that its parts share.
+  void require_no_own_crossing(const Model& model) const;
   void sample(Group& group, int level) const;
   [[nodiscard]] Sample sample_at(const Group& group, const PatchMap& map, int i, int j) const;
   void keep_slip(const Configuration& configuration);
@@ -250,6 +255,7 @@ private:
   Closest closest_;                       ///< at the last forces
   std::vector<double> largest_pressure_;  ///< MPa, per contact, of the last forces
   std::vector<std::array<Index, 2>> pairs_;
+  bool pairs_are_new_ = false;  ///< nobody has been told yet
   const Configuration rest_;
   std::shared_ptr<const FaceMaps> accepted_;    ///< of the last accepted state
   std::shared_ptr<const FaceMaps> at_tangent_;  ///< where the last tangent was made

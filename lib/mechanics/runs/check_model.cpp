@@ -136,6 +136,17 @@ void check_triangles(const ShellBody& body) {
   }
 }
 
+/// Half a wall stands on either side of its middle.
+void check_inner_face(const ShellBody& body) {
+  constexpr double most_of_it = 0.5;
+  if (const double share = share_without_inner_face(body); share > most_of_it) {
+    refuse(body,
+           fmt::format("its thickness, {:.6g} mm, is more than twice the radius of curvature over {:.0f} % of its "
+                       "area, so that no inner face is left: is its unit right?",
+                       *std::max_element(body.thickness.begin(), body.thickness.end()), 100 * share));
+  }
+}
+
 void check_selections(const Model& model) {
   const auto check = [&](std::size_t body, const std::vector<Index>& nodes, const char* what) {
     if (body >= model.body_count()) {
@@ -355,6 +366,7 @@ ShellSystem make_checked_system(const Model& model, const RunSettings& settings)
   for (const ShellBody& body : model.shells) {
     check_body(body);
     check_triangles(body);
+    check_inner_face(body);
   }
   check_solids(model, settings);
   check_selections(model);

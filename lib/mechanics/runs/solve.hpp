@@ -65,7 +65,10 @@ struct ElementFields {
   std::vector<double> pressure;   ///< MPa, of this state
   std::vector<double> von_mises;  ///< MPa, #nodes: the larger of both faces' averages at the nodes
   Wall wall;
-  double largest_displacement = 0;      ///< mm, of the curved surfaces, also between the nodes
+  double largest_displacement = 0;  ///< mm, of the curved surfaces, also between the nodes
+  double displacement_p99 = 0;      ///< mm, passed on 1 % of the area of the shells
+  /// rad, by which 1 % of the shells' area or of the solids' volume turns at least; of a linear state, else 0.
+  double turn_p99 = 0;
   std::vector<double> solid_von_mises;  ///< MPa, #tetrahedra of all solids in order; of the true (Cauchy) stress
   std::vector<double> solid_pressure;   ///< MPa, the same; minus the mean stress: positive in compression
 };
