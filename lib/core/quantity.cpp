@@ -54,7 +54,8 @@ std::string_view example_unit(const Usage& usage) { return usage.units.substr(0,
     }
     way = usage.units.empty()
               ? fmt::format("write {} alone", number)
-              : fmt::format("units of {} are {}, for example {}{}", usage.name.substr(usage.name.find(' ') + 1), names, number, example_unit(usage));
+              : fmt::format("units of {} are {}, for example {}{}", usage.name.substr(usage.name.find(' ') + 1), names,
+                            number, example_unit(usage));
   }
   throw UsageError(fmt::format("'{}' {}: {}", text, why, way));
 }
