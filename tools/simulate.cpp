@@ -15,6 +15,7 @@
 #include "tunica/io/result/run_report.hpp"
 #include "tunica/io/scene/scene.hpp"
 #include "tunica/io/scene/scene_file.hpp"
+#include "tunica/io/scene/stated.hpp"
 #include "tunica/mechanics/runs/curved_displacement.hpp"
 #include "tunica/mechanics/runs/doubts.hpp"
 #include "tunica/mechanics/runs/solve.hpp"
@@ -142,6 +143,7 @@ Scene read_scene_of_run(cli::Tool& tool, const Arguments& a, const std::optional
     scene = parse_scene(before->identity().scene, a.resume);
   } else {
     scene = a.flags.scene(a.files.front());
+    cli::SceneFlags::keep_typed(tool.arguments(), scene);
   }
   for (const fs::path& mesh : mesh_files(scene)) {
     if (std::find(inputs.begin(), inputs.end(), mesh) == inputs.end()) {
@@ -440,6 +442,7 @@ private:
     require_fresh();
     name_unloaded(tool_, given_, scene_);
     asked_ = scene_text(scene_, out_);
+    tool_.stated() = stated_inputs(scene_);
     loaded_.emplace(load_scene(scene_));
     read_targets();
     tell_findings(tool_, *loaded_);
@@ -579,10 +582,8 @@ private:
     }
     if (!accuracy_->reasons.empty()) {
       journal_->remove();
-      throw RequirementError(fmt::format("{}: {:g}% of {} is not credible: {}; what there is stays in {}.part",
-                                         subject().string(), 100 * accuracy_->request.within,
-                                         name_of(accuracy_->request.of), fmt::join(accuracy_->reasons, "; "),
-                                         out_.string()));
+      throw RequirementError(fmt::format("{}: {}; what there is stays in {}.part", subject().string(),
+                                         missed_accuracy(*accuracy_), out_.string()));
     }
   }
 

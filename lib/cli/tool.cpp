@@ -447,7 +447,10 @@ void Tool::write_report(bool ok, const std::string& error) {
   warnings.erase(first_note, warnings.end());
   std::vector<std::string> kinds;
   std::ranges::transform(warnings, std::back_inserter(kinds), &Warning::kind);
-  const Json report{
+  std::vector<std::string> weights;
+  std::ranges::transform(warnings, std::back_inserter(weights),
+                         [](const Warning& warning) { return warning.weight == Weight::major ? "major" : "minor"; });
+  Json report{
       {"tool", "tunica-" + verb_},
       {"version", version},
       {"instruction_set", instruction_set()},
@@ -455,6 +458,7 @@ void Tool::write_report(bool ok, const std::string& error) {
       {"error", error.empty() ? Json() : Json(error)},
       {"warnings", texts_of(warnings)},
       {"warning_kinds", kinds},
+      {"warning_weights", weights},
       {"notes", texts_of(notes)},
       {"command", provenance_.command()},
       {"inputs", inputs_},
@@ -464,6 +468,9 @@ void Tool::write_report(bool ok, const std::string& error) {
       {"threads", thread_count()},
       {"result", result_},
   };
+  if (!stated_.is_null()) {
+    report["stated"] = stated_;
+  }
   // A file name need not be UTF-8; the report has to be.
   const std::string text = told(report).dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
   if (report_ == standard_output) {

@@ -114,6 +114,9 @@ public:
   /// The `result` object of the report. A value that is undefined is set to null (`Json()`).
   [[nodiscard]] Json& result() { return result_; }
 
+  /// The `stated` object of the report: what the user said of the organ, as numbers. Null: the tool is told nothing.
+  [[nodiscard]] Json& stated() { return stated_; }
+
   /// Whether standard output belongs to the report (`--report -`).
   [[nodiscard]] bool reports_to_standard_output() const { return report_ == "-"; }
 
@@ -172,6 +175,7 @@ private:
   std::vector<std::filesystem::path> outputs_;
   Json seconds_ = Json::object();
   Json result_ = Json::object();
+  Json stated_;
   std::vector<std::function<void()>> after_parse_;
   std::filesystem::file_time_type start_on_disk_;
   Clock::time_point start_ = Clock::now();

@@ -248,12 +248,29 @@ Json unloaded_report(const Unloaded& unloaded) {
           {"iterations", unloaded.iterations}};
 }
 
+namespace {
+
+// Stress in kPa, as pictures and pages have it.
+std::string value_text(Quantity of, double value) {
+  return of == Quantity::stress ? fmt::format("{:.5g} kPa", 1e3 * value) : fmt::format("{:.5g} {}", value, unit_of(of));
+}
+
+}  // namespace
+
 std::string level_note(const AccuracyLevel& level, const AccuracyRequest& request) {
   if (!level.failure.empty()) {
     return fmt::format("{:>7} shells: {}", level.shells, level.failure);
   }
-  return fmt::format("{:>7} shells: {} {:.5g} {}, {:.2g} s", level.shells, name_of(request.of), level.value,
-                     unit_of(request.of), level.seconds);
+  return fmt::format("{:>7} shells: {} {}, {:.2g} s", level.shells, name_of(request.of),
+                     value_text(request.of, level.value), level.seconds);
+}
+
+std::string missed_accuracy(const Accuracy& accuracy) {
+  return fmt::format(
+      "accuracy not reached: {} {} with {} shells, {}, {:.3g} % asked: {}", name_of(accuracy.request.of),
+      value_text(accuracy.request.of, accuracy.levels.back().value), accuracy.levels.back().shells,
+      accuracy.estimate ? fmt::format("estimated error {:.2g} %", 100 * *accuracy.estimate) : "error not estimated",
+      100 * accuracy.request.within, fmt::join(accuracy.reasons, "; "));
 }
 
 std::vector<std::string> accuracy_notes(const Accuracy& accuracy) {

@@ -33,6 +33,10 @@ Json unloaded_report(const Unloaded& unloaded);
 /// A level on a line.
 std::string level_note(const AccuracyLevel& level, const AccuracyRequest& request);
 
+/// What a run came to whose accuracy was not reached, and why: "accuracy not reached: stress 159 kPa with 3200
+/// shells, estimated error 12 %, 5 % asked: …".
+std::string missed_accuracy(const Accuracy& accuracy);
+
 /// Claim and choices as lines for a terminal.
 std::vector<std::string> accuracy_notes(const Accuracy& accuracy);
 

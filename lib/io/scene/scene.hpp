@@ -20,7 +20,8 @@ namespace tunica {
 /// Where something was said: "FILE:line:column" or a flag. Every message about it starts with this.
 struct Place {
   std::string text;
-  bool flag = false;  ///< said on the command line: what is wrong with the value itself is a UsageError
+  bool flag = false;    ///< said on the command line: what is wrong with the value itself is a UsageError
+  std::string typed{};  ///< the value as it was written, such as "120mmHg"; empty: not a text, or not known
 
   /// Throws InputError, or UsageError for a flag, with "text: what".
   [[noreturn]] void fail(const std::string& what) const;
@@ -225,6 +226,10 @@ LoadedScene load_scene(const Scene& scene);
 Model resolve_scene(const Scene& scene, SceneBodies bodies);
 /// Of a scene of shells alone.
 Model resolve_scene(const Scene& scene, std::vector<ShellBody> shells);
+
+/// As scenes and flags name them.
+std::string_view name_of(Membrane membrane);
+std::string_view name_of(Bending bending);
 
 /// The scene as a scene file with everything resolved: SI units, defaults written out. Reading it gives the same scene.
 /// Paths are absolute; those within the folder of `file` are relative to it, so that both may move together.
