@@ -312,7 +312,7 @@ ReportChart chart_of_reports(const std::vector<Report>& reports, const std::vect
   drop_negative(rows, options, made.warnings);
   if (rows.empty()) {
     throw InputError(fmt::format("{}: nothing to draw: no run has both '{}' and '{}'{}", reports.front().path.string(),
-                                 x.key, y.key, made.warnings.empty() ? "" : "; " + made.warnings.back()));
+                                 x.key, y.key, made.warnings.empty() ? "" : "; " + made.warnings.back().text));
   }
 
   Chart& chart = made.chart;

@@ -70,7 +70,7 @@ std::optional<std::pair<std::string, std::string_view>> quoted_cell(std::string_
 }
 
 std::vector<std::string> cells(std::string_view line, char separator) {
-  std::vector<Warning> found;
+  std::vector<std::string> found;
   for (bool more = true; more;) {
     std::string_view rest = line.substr(std::min(line.find_first_not_of(' '), line.size()));
     const auto quoted = rest.starts_with('"') ? quoted_cell(rest) : std::nullopt;
