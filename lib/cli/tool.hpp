@@ -174,7 +174,9 @@ private:
   std::vector<std::shared_ptr<PartLock>> locks_;  ///< of the outputs
   std::shared_ptr<PartLock> report_lock_;
   bool replaces_report_ = false;  ///< an older one of this name
-  mutable std::mutex recording_;  ///< guards what the report tells but `result_`: a StopWatch may have to write it
+  /// Guards what the report tells but `result_`: a StopWatch may have to write it. Recursive, because memory may end
+  /// where it is held, and the report is then written from there.
+  mutable std::recursive_mutex recording_;
   std::unique_ptr<StopWatch> stop_watch_;
   std::string at_hand_;  ///< the input registered last
   std::string running_;  ///< the stage begun last
