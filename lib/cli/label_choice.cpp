@@ -75,12 +75,18 @@ void LabelTables::read(Tool& tool, const std::filesystem::path& volume,
                        const std::optional<std::filesystem::path>& named) {
   if (named) {
     given_ = read_label_names(tool.input(*named));
+    if (const auto several = several_names(*named, given_)) {
+      tool.warn(*several);
+    }
     return;
   }
   for (const std::filesystem::path& table : label_tables_beside(volume)) {
     try {
       beside_ = read_label_names(table);
       tool.input(table);
+      if (const auto several = several_names(table, beside_)) {
+        tool.warn(*several);
+      }
       return;
     } catch (const InputError& error) {
       tool.warn({Weight::minor, "label table",
