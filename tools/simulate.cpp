@@ -316,6 +316,13 @@ void name_unloaded(cli::Tool& tool, const Arguments& given, const Scene& scene) 
   tool.output(*given.unloaded, {".ply"});
 }
 
+void warn_of(const cli::Tool& tool, const fs::path& subject, std::vector<Warning> warnings) {
+  for (Warning& warning : warnings) {
+    warning.text = fmt::format("{}: {}", subject.string(), warning.text);
+    tool.warn(std::move(warning));
+  }
+}
+
 class Simulation {
 public:
   Simulation(cli::Tool& tool, const Arguments& given) : tool_(tool), given_(given) {}
@@ -689,12 +696,8 @@ private:
     if (accuracy_) {
       last_.turn_p99 = 0;  // a linear model was held against a nonlinear one
     }
-    std::vector<Warning> warnings = run_warnings(scene_.run, summary, last_);
-    std::ranges::copy(contact_warnings(tool_.result()), std::back_inserter(warnings));
-    for (Warning& warning : warnings) {
-      warning.text = fmt::format("{}: {}", subject().string(), warning.text);
-      tool_.warn(std::move(warning));
-    }
+    warn_of(tool_, subject(), run_warnings(scene_.run, summary, last_));
+    warn_of(tool_, subject(), contact_warnings(tool_.result()));
   }
 
   cli::Tool& tool_;
