@@ -82,8 +82,9 @@ void declare(cli::Tool& tool, Arguments& arguments) {
          "the label whose surface is wanted, by value or by the name that the volume, --names or a table beside "
          "the volume (scan.tsv, .ctbl, .label, .lut, .txt, .csv of scan.nii.gz) gives it; A+B: several as one organ")
       ->type_name("N[+N]");
-  app.add_option("--names", arguments.names,
-                 "a table of label names: BIDS _dseg.tsv, ITK-SNAP's, Slicer's .ctbl, FreeSurfer's look-up table, CSV, JSON")
+  app.add_option(
+         "--names", arguments.names,
+         "a table of label names: BIDS _dseg.tsv, ITK-SNAP's, Slicer's .ctbl, FreeSurfer's look-up table, CSV, JSON")
       ->type_name("FILE");
   app.add_option("--isovalue", arguments.isovalue, "the value on the surface of a grey volume")->type_name("V");
   app.add_option("--inside", arguments.inside,

@@ -19,7 +19,7 @@ struct MeshFile {
   std::optional<std::string> units;                 ///< what holds by the file: "mm", …; none for OBJ, STL, OFF
   bool unit_unknown = false;                        ///< no unit in the file's format, and none was given
   std::optional<double> voxel;                      ///< mm, longest edge: `voxel` comment, of the image behind it
-  std::optional<double> shortest_voxel;  ///< mm, its shortest edge
+  std::optional<double> shortest_voxel;             ///< mm, its shortest edge
   std::optional<std::string> space;   ///< world axes, "LPS" or "RAS": `SPACE=` in a comment, header or name
   std::vector<std::string> comments;  ///< all PLY comments, for provenance
   std::vector<std::pair<std::string, std::vector<double>>> vertex_properties;  ///< further scalar ones, e.g. thickness

@@ -1,7 +1,6 @@
 #include "tunica/mechanics/runs/doubts.hpp"
 
 #include "tunica/mechanics/contact/rigid_shape.hpp"
-#include "tunica/mechanics/runs/detail/nested.hpp"
 #include "tunica/mechanics/runs/unloaded.hpp"
 #include "tunica/shell/distance/target.hpp"
 #include "tunica/surface/mesh/measure.hpp"
@@ -157,22 +156,6 @@ bool is_pressed(const Model& model, std::size_t body) {
   return std::ranges::any_of(model.loads, [&](const Load& load) {
     return load.body == body && std::holds_alternative<PressureLoad>(load.kind);
   });
-}
-
-void doubt_cavities(const Model& model, std::size_t b, std::vector<Warning>& found) {
-  const ShellBody& body = model.shells[b];
-  if (!is_pressed(model, b)) {
-    return;
-  }
-  if (const std::size_t count = triangles_of_cavities(flat_facets(body.mesh)); count > 0) {
-    found.push_back(
-        {Weight::major, "nested surfaces",
-         fmt::format("{}: {} of its shells are a closed surface inside another and face the other way, as a "
-                     "cavity's do: pressure presses them into the hollow, against what it does outside; "
-                     "fill the cavity (--fill-cavities of tunica-extract, FILL=1), or make it a body of "
-                     "its own",
-                     at(body.said_at, body.name), count)});
-  }
 }
 
 void doubt_voxels(const ShellBody& body, std::vector<Warning>& found) {
@@ -458,7 +441,6 @@ std::vector<Warning> doubts(const Model& model, const RunSettings& settings, boo
     const ShellBody& body = model.shells[b];
     doubt_thickness(body, found);
     doubt_material(at(body.said_at, body.name), body.material, is_pressed(model, b), found);
-    doubt_cavities(model, b, found);
     doubt_voxels(body, found);
     if (!are_shells_chosen) {
       doubt_coarseness(body, !is_imaged_under_pressure(model), found);

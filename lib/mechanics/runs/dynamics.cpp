@@ -103,6 +103,101 @@ void find_change(const Configuration& start, const Configuration& end, VectorX& 
 
 bool acceptable(const NewtonResult& result) { return result.converged && result.valid && result.stable; }
 
+using Memory = std::map<std::string, std::vector<double>, std::less<>>;
+
+/// Damping by beta K: forces beta K times the rate of deformation, in each element's own frame. The rate at the end of
+/// a step is viscosity (deformation - zero): the backward difference, or that of second order through the step before.
+class StiffnessDamping {
+public:
+  StiffnessDamping(const ShellSystem& system, double beta, bool second_order)
+      : system_(system), beta_(beta), second_order_(second_order) {}
+
+  /// @param start deformation at the start of the step; @param length s, of the step.
+  void begin(const std::vector<ElementState>& start, double length) {
+    if (beta_ == 0) {
+      return;
+    }
+    if (!second_order_ || before_.empty()) {
+      zero_ = start;
+      viscosity_ = beta_ / length;
+      return;
+    }
+    const double r = length / length_before_;
+    const double leading = (1 + 2 * r) / (1 + r);
+    zero_.resize(start.size());
+    for (std::size_t e = 0; e < start.size(); ++e) {
+      zero_[e] = ((1 + r) * start[e] - r * r / (1 + r) * before_[e]) / leading;
+    }
+    viscosity_ = beta_ * leading / length;
+  }
+
+  [[nodiscard]] ViscousState state() const { return {viscosity_, viscosity_ > 0 ? &zero_ : nullptr}; }
+
+  /// @return the work of these forces over the step, mJ: by the mean of those at both of its ends.
+  double accept(const std::vector<ElementState>& start, const std::vector<ElementState>& end, double length) {
+    if (beta_ == 0) {
+      return 0;
+    }
+    double work = 0;
+    rate_.resize(system_.elements.size(), ElementState::Zero());
+    for (std::size_t e = 0; e < system_.elements.size(); ++e) {
+      const ShellElement& element = system_.elements[e];
+      const ElementState rate = viscosity_ * (end[e] - zero_[e]);
+      const ElementState mean = 0.5 * (rate_[e] + rate);
+      const ElementState change = end[e] - start[e];
+      // The energy is a quadratic form: of what belongs to it, the product of both.
+      work += strain_energy(element, mean + change) - strain_energy(element, mean) - strain_energy(element, change);
+      rate_[e] = rate;
+    }
+    if (second_order_) {
+      before_ = start;
+      length_before_ = length;
+    }
+    return work;
+  }
+
+  void remember(Memory& memory) const {
+    memory["viscous_rate"] = numbers_of(rate_);
+    memory["deformation_before"] = numbers_of(before_);
+    memory["length_before"] = {length_before_};
+  }
+
+  void recall(const Memory& memory) {
+    rate_ = of_elements(memory.at("viscous_rate"));
+    before_ = of_elements(memory.at("deformation_before"));
+    length_before_ = memory.at("length_before").at(0);
+  }
+
+private:
+  static std::vector<double> numbers_of(const std::vector<ElementState>& of_elements) {
+    std::vector<double> numbers;
+    for (const ElementState& d : of_elements) {
+      numbers.insert(numbers.end(), d.begin(), d.end());
+    }
+    return numbers;
+  }
+
+  /// Of the elements, or of none.
+  [[nodiscard]] std::vector<ElementState> of_elements(const std::vector<double>& numbers) const {
+    constexpr std::size_t size = ElementState::SizeAtCompileTime;
+    TUNICA_ASSERT(numbers.empty() || numbers.size() == size * system_.elements.size());
+    std::vector<ElementState> result(numbers.size() / size);
+    for (std::size_t e = 0; e < result.size(); ++e) {
+      result[e] = Eigen::Map<const ElementState>(numbers.data() + size * e);
+    }
+    return result;
+  }
+
+  const ShellSystem& system_;
+  double beta_;  ///< s
+  bool second_order_;
+  double viscosity_ = 0;              ///< beta / s: of the rate by the deformation
+  std::vector<ElementState> zero_;    ///< the deformation at which these forces vanish
+  std::vector<ElementState> before_;  ///< at the start of the step before
+  std::vector<ElementState> rate_;    ///< beta times the rate of deformation, at the start of the step
+  double length_before_ = 0;          ///< s
+};
+
 /// M a1 + alpha M v1 + f_int(x1) = f_ext(x1, t1), with velocity and acceleration at the end of a step as the scheme
 /// says. Masses are lumped; rotary inertia is rho t^3 / 12 per area about every axis (that of a plate about the axes in
 /// its plane), so it needs no gyroscopic term. Damping is alpha M and, in each element's own frame, beta K times the
@@ -115,6 +210,7 @@ public:
         settings_(settings),
         run_(run),
         scheme_(run),
+        damping_(system, run.damping.stiffness, scheme_.second_order()),
         matrix_(system.pattern),
         mass_(lumped_masses(system)),
         longest_side_(longest_side(system)),
@@ -206,39 +302,19 @@ public:
   }
 
   /// What a run must keep between its steps to go on as if nothing had happened, beyond the configuration.
-  [[nodiscard]] std::map<std::string, std::vector<double>, std::less<>> memory(const Motion& motion) const {
+  [[nodiscard]] Memory memory(const Motion& motion) const {
     const auto values = [](const VectorX& v) { return std::vector<double>(v.begin(), v.end()); };
-    const auto flat = [](const std::vector<ElementState>& of_elements) {
-      std::vector<double> numbers;
-      for (const ElementState& d : of_elements) {
-        numbers.insert(numbers.end(), d.begin(), d.end());
-      }
-      return numbers;
-    };
-    std::map<std::string, std::vector<double>, std::less<>> result{{"velocity", values(motion.rates.velocity)},
-                                                                   {"acceleration", values(motion.rates.acceleration)},
-                                                                   {"auxiliary", values(motion.rates.auxiliary)},
-                                                                   {"acting", values(acting_)},
-                                                                   {"part", {part_}},
-                                                                   {"at_rest", {at_rest_ ? 1.0 : 0.0}},
-                                                                   {"viscous_rate", flat(viscous_rate_)},
-                                                                   {"deformation_before", flat(before_)},
-                                                                   {"length_before", {length_before_}}};
+    Memory result{{"velocity", values(motion.rates.velocity)},
+                  {"acceleration", values(motion.rates.acceleration)},
+                  {"auxiliary", values(motion.rates.auxiliary)},
+                  {"acting", values(acting_)},
+                  {"part", {part_}},
+                  {"at_rest", {at_rest_ ? 1.0 : 0.0}}};
+    damping_.remember(result);
     return result;
   }
 
-  /// Of the elements, or of none.
-  [[nodiscard]] std::vector<ElementState> of_elements(const std::vector<double>& numbers) const {
-    constexpr std::size_t size = ElementState::SizeAtCompileTime;
-    TUNICA_ASSERT(numbers.empty() || numbers.size() == size * system_.elements.size());
-    std::vector<ElementState> result(numbers.size() / size);
-    for (std::size_t e = 0; e < result.size(); ++e) {
-      result[e] = Eigen::Map<const ElementState>(numbers.data() + size * e);
-    }
-    return result;
-  }
-
-  void recall(const std::map<std::string, std::vector<double>, std::less<>>& memory, Motion& motion) {
+  void recall(const Memory& memory, Motion& motion) {
     for (auto [name, vector] :
          {std::pair{"velocity", &motion.rates.velocity}, std::pair{"acceleration", &motion.rates.acceleration},
           std::pair{"auxiliary", &motion.rates.auxiliary}, std::pair{"acting", &acting_}}) {
@@ -251,9 +327,7 @@ public:
     work_ = damped_ = 0;
     part_ = memory.at("part").at(0);
     at_rest_ = memory.at("at_rest").at(0) != 0;
-    viscous_rate_ = of_elements(memory.at("viscous_rate"));
-    before_ = of_elements(memory.at("deformation_before"));
-    length_before_ = memory.at("length_before").at(0);
+    damping_.recall(memory);
     braking_ = run_.damping.mass * mass_.cwiseProduct(motion.rates.velocity);
   }
 
@@ -312,7 +386,7 @@ private:
       evaluate(system_, model_, s.start, s.factors_before, {}, forces_, nullptr);
       deformation_ = forces_.deformation;
     }
-    viscosity_ = find_viscosity(length);
+    damping_.begin(deformation_, length);
     s.held = VectorX::Zero(motion.rates.velocity.size());
     for (const PrescribedFreedom& p : system_.prescribed) {
       const Ramp& ramp = model_.fixes[p.fix].ramp;
@@ -333,25 +407,6 @@ private:
     return result;
   }
 
-  /// Beta times the derivative of the rate of deformation, and `viscous_zero_`, from which on it resists: the backward
-  /// difference, or that of second order through the step before.
-  double find_viscosity(double length) {
-    if (run_.damping.stiffness == 0) {
-      return 0;
-    }
-    if (!scheme_.second_order() || before_.empty()) {
-      viscous_zero_ = deformation_;
-      return run_.damping.stiffness / length;
-    }
-    const double r = length / length_before_;
-    const double leading = (1 + 2 * r) / (1 + r);
-    viscous_zero_.resize(deformation_.size());
-    for (std::size_t e = 0; e < deformation_.size(); ++e) {
-      viscous_zero_[e] = ((1 + r) * deformation_[e] - r * r / (1 + r) * before_[e]) / leading;
-    }
-    return run_.damping.stiffness * leading / length;
-  }
-
   /// The step is done: its end is where the next one starts. What acts does work by the mean of both ends, forces of
   /// damping as all others: else one of them gains what another loses.
   void accept(double length, const Motion& motion) {
@@ -362,28 +417,8 @@ private:
     const VectorX braked = std::move(braking_);
     braking_ = run_.damping.mass * mass_.cwiseProduct(motion.rates.velocity);
     damped_ += 0.5 * (braked + braking_).dot(change_);
-    if (viscosity_ > 0) {
-      damp_by_stiffness();
-    }
-    if (viscosity_ > 0 && scheme_.second_order()) {
-      before_.swap(deformation_);
-      length_before_ = length;
-    }
+    damped_ += damping_.accept(deformation_, forces_.deformation, length);
     deformation_ = forces_.deformation;
-  }
-
-  /// Work of damping by beta K over a step, element by element.
-  void damp_by_stiffness() {
-    viscous_rate_.resize(system_.elements.size(), ElementState::Zero());
-    for (std::size_t e = 0; e < system_.elements.size(); ++e) {
-      const ShellElement& element = system_.elements[e];
-      const ElementState rate = viscosity_ * (forces_.deformation[e] - viscous_zero_[e]);
-      const ElementState mean = 0.5 * (viscous_rate_[e] + rate);
-      const ElementState change = forces_.deformation[e] - deformation_[e];
-      // The energy is a quadratic form: of what belongs to it, the product of both.
-      damped_ += strain_energy(element, mean + change) - strain_energy(element, mean) - strain_energy(element, change);
-      viscous_rate_[e] = rate;
-    }
   }
 
   /// Loads, and on held freedoms what moves them.
@@ -401,12 +436,11 @@ private:
   /// Balance of the step with a part of its change; 1: the equation of the step itself.
   Balance balance(Step& s, double part, const Configuration& c, BlockMatrix* tangent,
                   const std::vector<ElementState>& predicted) {
-    const ViscousState viscous{viscosity_, viscosity_ > 0 ? &viscous_zero_ : nullptr};
     std::vector<double> factors = s.factors;
     for (std::size_t l = 0; part < 1 && l < factors.size(); ++l) {
       factors[l] = s.factors_before[l] + part * (s.factors[l] - s.factors_before[l]);
     }
-    evaluate(system_, model_, c, factors, viscous, forces_, tangent, predicted);
+    evaluate(system_, model_, c, factors, damping_.state(), forces_, tangent, predicted);
     find_change(s.start, c, s.change);
     scheme_.end_rates(s.length, system_.held, s.rates_before, s.change, s.rates);
     const VectorX inertia = mass_.cwiseProduct(s.rates.acceleration + run_.damping.mass * s.rates.velocity);
@@ -529,25 +563,21 @@ private:
   const RunSettings& settings_;
   const DynamicRun& run_;
   const TimeScheme scheme_;
+  StiffnessDamping damping_;
   std::optional<TangentSolver> solver_;
   BlockMatrix matrix_;
   VectorX mass_;
   Forces forces_;
-  std::vector<ElementState> deformation_;   ///< at the start of the step
-  std::vector<ElementState> before_;        ///< at the start of the step before, where damping asks for it
-  VectorX change_;                          ///< displacements and rotations of the last part of a step
-  VectorX acting_;                          ///< at the start of the step
-  VectorX braking_;                         ///< forces of damping by mass, likewise
-  std::vector<ElementState> viscous_rate_;  ///< beta times the rate of deformation, likewise
-  double work_ = 0;                         ///< mJ, since energies were last balanced
+  std::vector<ElementState> deformation_;  ///< at the start of the step
+  VectorX change_;                         ///< displacements and rotations of the last part of a step
+  VectorX acting_;                         ///< at the start of the step
+  VectorX braking_;                        ///< forces of damping by mass, likewise
+  double work_ = 0;                        ///< mJ, since energies were last balanced
   double damped_ = 0;
-  std::vector<ElementState> viscous_zero_;  ///< the deformation at which damping by beta K vanishes
-  double viscosity_ = 0;                    ///< beta / s: of the deformation's rate by the deformation
-  double longest_side_ = 0;                 ///< mm
-  double length_before_ = 0;                ///< s
-  double tolerance_ = 0;                    ///< mm, of error control; 0: none
-  double part_ = 0;                         ///< s: length of the next part under error control
-  bool at_rest_ = false;                    ///< the last step changed nothing
+  double longest_side_ = 0;  ///< mm
+  double tolerance_ = 0;     ///< mm, of error control; 0: none
+  double part_ = 0;          ///< s: length of the next part under error control
+  bool at_rest_ = false;     ///< the last step changed nothing
 };
 
 double first_load_factor(const Model& model, double time) {
