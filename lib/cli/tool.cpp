@@ -401,11 +401,11 @@ void Tool::register_report() {
   }
   // A report that is refused is not to be written by finish() either.
   const std::filesystem::path report = std::exchange(report_, {});
-  replaces_report_ = force_ || (goes_on() && tells_of_failure(report, "tunica-" + verb_));
-  require_writable(report, replaces_report_);
+  replaces_failed_ = goes_on() && tells_of_failure(report, "tunica-" + verb_);
+  require_writable(report, force_ || replaces_failed_);
   require_no_other_file(report);
   report_lock_ = PartLock::take(part_of(report));
-  require_writable(report, replaces_report_);
+  require_writable(report, force_ || replaces_failed_);
   report_ = report;
   // However this run ends, an older report must not speak for it. Where the command line names that file once more, it
   // may be an input, which is yet to be refused.
@@ -563,7 +563,7 @@ void Tool::write_report(bool ok, const std::string& error, const Json& result) {
     return;
   }
   require_no_other_file(report_);
-  write_file(report_, text, replaces_report_);
+  write_file(report_, text, force_ || replaces_failed_);
 }
 
 void Tool::claim(const std::filesystem::path& path, bool written) {

@@ -176,7 +176,7 @@ private:
   std::vector<Claim> claimed_;                    ///< files of the run
   std::vector<std::shared_ptr<PartLock>> locks_;  ///< of the outputs
   std::shared_ptr<PartLock> report_lock_;
-  bool replaces_report_ = false;  ///< an older one of this name
+  bool replaces_failed_ = false;  ///< an older one of this name
   /// Guards what the report tells but `result_`: a StopWatch may have to write it. Recursive, because memory may end
   /// where it is held, and the report is then written from there.
   mutable std::recursive_mutex recording_;

@@ -78,9 +78,8 @@ TEST(ContactInTime, RubbingRunsGoOnAsIfNothingHadHappened) {
   expect_same_from_every_checkpoint(plate_and_ball(way(0.02), 0.3), motion(0.02, 2e-3, Integrator::generalised_alpha));
 }
 
-/// The deepest that the middle of the plate has been, and how many points pressed at most.
 struct Seen {
-  double moved = 0;
+  double moved = 0;  ///< mm, of the node that moved most, at the end
   std::size_t parts = 0;
   double energy = 0;
 };
@@ -88,6 +87,7 @@ struct Seen {
 Seen seen(const Model& model, const RunSettings& settings) {
   Seen result;
   const Summary summary = solve(model, settings, [&](const State& state) {
+    result.moved = 0;
     for (const Vec3& u : state.displacement) {
       result.moved = std::max(result.moved, u.norm());
     }

@@ -375,6 +375,16 @@ bool jumps_within_a_step(const Ramp& ramp, const RunSettings& settings) {
   return false;
 }
 
+void doubt_steps(const std::string& where, const char* what, const Ramp& ramp, const RunSettings& settings,
+                 std::vector<Warning>& found) {
+  if (jumps_within_a_step(ramp, settings)) {
+    found.push_back({Weight::minor, "long steps",
+                     fmt::format("{}: the ramp of this {} changes within less than a step, so what it sets swinging is "
+                                 "lost: take shorter steps",
+                                 where, what)});
+  }
+}
+
 void doubt_loads(const Model& model, const RunSettings& settings,
                  const std::vector<std::vector<std::array<bool, 6>>>& held, std::vector<Warning>& found) {
   for (const Load& load : model.loads) {
@@ -388,12 +398,7 @@ void doubt_loads(const Model& model, const RunSettings& settings,
       found.push_back({Weight::minor, "no load",
                        fmt::format("{}: this {} acts on held nodes only, so it moves nothing", where, on->name)});
     }
-    if (jumps_within_a_step(load.ramp, settings)) {
-      found.push_back({Weight::minor, "long steps",
-                       where +
-                           ": the ramp of this load changes within less than a step, so what it sets swinging is lost: "
-                           "take shorter steps"});
-    }
+    doubt_steps(where, "load", load.ramp, settings, found);
     if (const auto* pressure = std::get_if<PressureLoad>(&load.kind);
         pressure != nullptr && pressure->imaged_at && pressure->value * *pressure->imaged_at < 0) {
       found.push_back({Weight::major, "imaging pressure",
@@ -406,6 +411,7 @@ void doubt_loads(const Model& model, const RunSettings& settings,
                        at(fix.said_at, model.name_of(fix.body)) +
                            ": the ramp of this displacement is zero during the whole run, so it moves nothing"});
     }
+    doubt_steps(at(fix.said_at, model.name_of(fix.body)), "displacement", fix.ramp, settings, found);
   }
 }
 

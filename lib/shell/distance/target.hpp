@@ -1,6 +1,6 @@
 #pragma once
 
-#include "tunica/shell/distance/point_tree.hpp"
+#include "tunica/surface/distance/point_tree.hpp"
 #include "tunica/surface/distance/closest_point.hpp"
 #include "tunica/surface/distance/cover_bound.hpp"
 #include "tunica/surface/mesh/incidence.hpp"

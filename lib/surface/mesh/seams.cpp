@@ -3,8 +3,8 @@
 #include "tunica/core/disjoint_sets.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/core/progress.hpp"
+#include "tunica/surface/distance/point_tree.hpp"
 #include "tunica/surface/mesh/incidence.hpp"
-#include "tunica/surface/mesh/self_intersections.hpp"
 
 #include <algorithm>
 #include <map>
@@ -247,21 +247,21 @@ private:
     }
     std::ranges::sort(ends);
     ends.erase(std::unique(ends.begin(), ends.end()), ends.end());
-    std::vector<Vec3> lower, upper;
-    for (const Index r : open) {
-      const Vec3 &from = mesh_.vertices[rims_[r].from], &to = mesh_.vertices[rims_[r].to];
-      const Vec3 margin = Vec3::Constant(std::max(reach_[local(rims_[r].from)], reach_[local(rims_[r].to)]));
-      lower.emplace_back(from.cwiseMin(to) - margin);
-      upper.emplace_back(from.cwiseMax(to) + margin);
-    }
+    std::vector<Vec3> places;
+    places.reserve(ends.size());
     for (const Index i : ends) {
-      lower.push_back(at(i));
-      upper.push_back(at(i));
+      places.push_back(at(i));
     }
+    const PointTree tree(places);
     std::map<Index, std::vector<std::pair<double, Index>>> along;  // by edge: how far along, and the place
-    for (const auto& [one, other] : overlapping_boxes(lower, upper)) {
-      if (one < open.size() && other >= open.size()) {
-        look(open[one], ends[other - open.size()], along);
+    for (std::size_t i = 0; i < open.size(); ++i) {
+      const Rim& rim = rims_[open[i]];
+      const double reach = std::max(reach_[local(rim.from)], reach_[local(rim.to)]);
+      for (const Index beside : tree.beside(mesh_.vertices[rim.from], mesh_.vertices[rim.to], reach)) {
+        look(open[i], ends[beside], along);
+      }
+      if (i % 65536 == 0) {
+        check_interrupt();
       }
     }
     std::vector<Part> parts;
