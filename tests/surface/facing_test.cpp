@@ -59,19 +59,22 @@ TEST(Facing, EachPieceByWhatLiesAroundIt) {
   const TriangleMesh wall = shapes::together(outer, turned(inner));
   Facing facing = facing_of(wall);
   EXPECT_EQ(facing.pieces, 2U);
-  EXPECT_EQ(facing.nested, 1U);
+  EXPECT_EQ(facing.hollows, 1U);
   EXPECT_EQ(facing.inward, 0U);
   facing = facing_of(turned(wall));
   EXPECT_EQ(facing.inward, 2U);
   EXPECT_EQ(facing_of(turned_outward(turned(wall), facing)).inward, 0U);
-  EXPECT_EQ(facing_of(shapes::together(outer, inner)).inward, 1U);
+  facing = facing_of(shapes::together(outer, inner));  // a balloon in a balloon
+  EXPECT_EQ(facing.inward, 1U);
+  EXPECT_EQ(facing.outermost_inward, 0U);
+  EXPECT_EQ(facing.hollows, 0U);
   facing = facing_of(shapes::together(wall, turned(core)));  // within both: outward again
   EXPECT_EQ(facing.inward, 1U);
   EXPECT_LT(facing.place.norm(), 4);
   EXPECT_EQ(facing_of(shapes::together(wall, core)).inward, 0U);
   // Side by side nothing lies within anything.
   facing = facing_of(shapes::together(outer, shapes::moved(turned(inner), Vec3(30, 0, 0))));
-  EXPECT_EQ(facing.nested, 0U);
+  EXPECT_EQ(facing.hollows, 0U);
   EXPECT_EQ(facing.inward, 1U);
   EXPECT_GT(facing.place.x(), 20);
 }

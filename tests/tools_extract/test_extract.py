@@ -590,7 +590,7 @@ class SharedVolumes(ExtractTest):
 
     def test_overlapping_segments(self):
         path = SHARED / "volumes" / "sio_thorax_overlapping_4d.seg.nrrd"
-        self.refuse(3, path, self.out, "--label", 1, saying="has 2 layers: choose one with --layer 0..1")
+        self.refuse(3, path, self.out, "--label", 1, saying="pass --label NAME, or --layer too")
         for layer in (0, 1):
             array, affine = read_volume(path, layer)
             for label in numpy.unique(array)[1:3]:

@@ -672,7 +672,7 @@ class Fit(Case):
         write_ply(wedge, corners, [[0, 1, 2], [0, 2, 3]])
         record, err = self.relax(wedge, wedge, self.out, "--tolerance", "0.5%", "--min-angle", 20)
         self.assertLess(record["result"]["min_angle_deg"], 20)
-        self.assertIn("the smallest angle is", err)
+        self.assertIn("the smallest angle of the shells is", err)
 
     def test_a_limit_of_shells_that_only_a_search_for_the_fewest_keeps_is_kept(self):
         record, _ = self.relax(self.target, self.target, self.out, "--tolerance", "0.6%")
@@ -876,7 +876,7 @@ class Organs(Case):
                 lumen = os.path.join(MESHES, name)
                 record, error = self.relax(lumen, lumen, self.path("shell.ply"), "--mesh-unit", "mm", "--tolerance", "1%",
                                            "--mid-surface", "inner", "--thickness", "1.5mm", "--force")
-                self.assertIn("face inward", error)
+                self.assertIn("its normals point inward", error)
                 self.assertNotIn("rim(s)", error)
                 result = record["result"]
                 self.assertEqual(result["self_intersections"], 0)

@@ -62,7 +62,7 @@ std::vector<Warning> pressed_side_warnings(const TriangleMesh& mesh, double pres
                                            const std::filesystem::path& path) {
   std::vector<Warning> warnings;
   const Facing facing = facing_of(mesh);
-  if (facing.inward > 0) {
+  if (facing.outermost_inward > 0) {
     warnings.push_back(
         {Weight::major, "faces inward",
          fmt::format("{}: {}: positive pressure pushes along the normals, so here into the organ, and the {} pressure "
@@ -71,13 +71,13 @@ std::vector<Warning> pressed_side_warnings(const TriangleMesh& mesh, double pres
                      path.string(), facing_phrase(facing), pressure < 0 ? "negative" : "positive",
                      pressure < 0 ? "outward" : "inward")});
   }
-  if (facing.nested > 0) {
+  if (facing.hollows > 0) {
     warnings.push_back(
         {Weight::major, "nested surfaces",
-         fmt::format("{}: {} of its {} pieces lie within others, the largest {}: positive pressure pushes a piece "
-                     "within another into its hollow; extract without cavities (--fill-cavities, FILL=1), or take each "
-                     "surface as a body of its own",
-                     path.string(), facing.nested, facing.pieces, near(facing.nested_place))});
+         fmt::format("{}: {} of its {} pieces lie within others and face the other way, as hollows do, the largest {}: "
+                     "positive pressure pushes them into the hollow; fill it (--fill-cavities of tunica-extract, "
+                     "FILL=1), or take each surface as a body of its own",
+                     path.string(), facing.hollows, facing.pieces, near(facing.hollow_place))});
   }
   return warnings;
 }

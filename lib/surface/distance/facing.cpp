@@ -62,18 +62,21 @@ public:
     Facing found;
     found.pieces = all_.size();
     found.is_wrong.assign(mesh_.triangles.size(), false);
-    double largest = 0, largest_nested = 0;
+    double largest = 0, largest_hollow = 0;
     for (const Component& piece : all_) {
       const Vec3& at = corner(piece.triangles.front(), 0);
-      found.nested += piece.depth > 0 ? 1 : 0;
-      if (piece.depth > 0 && piece.area > largest_nested) {
-        largest_nested = piece.area;
-        found.nested_place = at;
+      if (piece.depth > 0 && piece.sign < 0) {
+        ++found.hollows;
+        if (piece.area > largest_hollow) {
+          largest_hollow = piece.area;
+          found.hollow_place = at;
+        }
       }
       if (piece.sign != (piece.depth % 2 == 0 ? -1 : 1)) {
         continue;
       }
       ++found.inward;
+      found.outermost_inward += piece.depth == 0 ? 1 : 0;
       if (piece.area > largest) {
         largest = piece.area;
         found.place = at;

@@ -9,7 +9,7 @@
 namespace tunica {
 namespace {
 
-constexpr std::size_t leaf_size = 8;
+constexpr std::size_t most_in_leaf = 8;
 
 struct Candidate {
   double squared_distance;
@@ -71,7 +71,7 @@ PointTree::PointTree(const std::vector<Vec3>& points) : items_(points.size()), a
 }
 
 void PointTree::build(std::size_t begin, std::size_t end) {
-  if (end - begin <= leaf_size) {
+  if (end - begin <= most_in_leaf) {
     return;
   }
   Vec3 lower = items_[begin].point, upper = lower;
@@ -91,7 +91,7 @@ void PointTree::build(std::size_t begin, std::size_t end) {
 }
 
 void PointTree::visit(std::size_t begin, std::size_t end, Search& search) const {
-  if (end - begin <= leaf_size) {
+  if (end - begin <= most_in_leaf) {
     for (std::size_t i = begin; i < end; ++i) {
       search.offer(items_[i]);
     }
@@ -129,7 +129,7 @@ void PointTree::visit(std::size_t begin, std::size_t end, double first, double l
   if (first > last) {
     return;
   }
-  if (end - begin <= leaf_size) {
+  if (end - begin <= most_in_leaf) {
     for (std::size_t i = begin; i < end; ++i) {
       line.offer(items_[i]);
     }
