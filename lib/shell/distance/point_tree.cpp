@@ -4,6 +4,8 @@
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 namespace tunica {
@@ -49,7 +51,9 @@ struct PointTree::Search {
 
 PointTree::PointTree(const std::vector<Vec3>& points) : items_(points.size()), axis_(points.size(), 0) {
   for (std::size_t i = 0; i < points.size(); ++i) {
-    TUNICA_ASSERT(points[i].allFinite());
+    if (!points[i].allFinite()) {
+      throw InputError(fmt::format("point {} is not finite", i));
+    }
     items_[i] = {points[i], narrow<Index>(i)};
   }
   build(0, items_.size());
