@@ -5,6 +5,7 @@
 #include "tunica/core/progress.hpp"
 #include "tunica/core/threads.hpp"
 #include "tunica/surface/distance/closest_point.hpp"
+#include "tunica/surface/mesh/checks.hpp"
 #include "tunica/surface/mesh/measure.hpp"
 
 #include <algorithm>
@@ -18,6 +19,7 @@ FaceDistance distance_of_faces(const TriangleMesh& face, const TriangleMesh& oth
   if (face.triangles.empty() || other.triangles.empty()) {
     throw InputError("a face of the wall has no triangles: its thickness is not known");
   }
+  require_valid(face);
   const ClosestPoint closest(other);
   std::vector<double> distance(face.triangles.size());
   parallel_for_blocks(distance.size(), 4096, [&](std::size_t begin, std::size_t end) {

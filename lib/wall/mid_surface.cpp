@@ -2,7 +2,9 @@
 
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
+#include "tunica/core/require.hpp"
 #include "tunica/shell/patch/curved_surface.hpp"
+#include "tunica/surface/mesh/checks.hpp"
 #include "tunica/surface/mesh/measure.hpp"
 
 #include <fmt/format.h>
@@ -40,6 +42,8 @@ void require_unfolded(const ShellMesh& before, const ShellMesh& after) {
 
 TriangleMesh moved_half_way(TriangleMesh coarse, const Target& face, WallFace which, double thickness,
                             const Target& half_way) {
+  require_positive(thickness, "the thickness");
+  require_valid(coarse);
   const double way = which == WallFace::inner ? thickness / 2 : -thickness / 2;
   for (Vec3& p : coarse.vertices) {
     const Target::Foot foot = face.closest(p);
@@ -49,6 +53,10 @@ TriangleMesh moved_half_way(TriangleMesh coarse, const Target& face, WallFace wh
 }
 
 MidSurface mid_surface_between(const ShellMesh& face, WallFace which, const Target& other) {
+  require_shells(face);
+  if (face.normals.size() != face.vertices.size()) {
+    throw InputError("the middle of a wall needs a normal at each vertex of its face");
+  }
   MidSurface middle{face, {}};
   const std::vector<Vec3> its_normals = vertex_normals(other.mesh());
   const auto facets = facet_normals(other.mesh());
@@ -77,6 +85,8 @@ MidSurface mid_surface_between(const ShellMesh& face, WallFace which, const Targ
 }
 
 std::array<double, 2> half_wall_error(const ShellMesh& shell, const Target& face, double thickness) {
+  require_shells(shell);
+  require_positive(thickness, "the thickness");
   const Tessellation fine = tessellate_uniformly(shell, pieces_per_edge);
   const std::vector<Vec3>& x = fine.mesh.vertices;
   std::vector<double> off(x.size());

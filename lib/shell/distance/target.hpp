@@ -14,7 +14,7 @@ namespace tunica {
 /// Cost: build n log n, about 200 bytes per triangle; a query a few microseconds.
 class Target {
 public:
-  /// Vertices that belong to no triangle are left out. Errors: TUNICA_ASSERT on a mesh without triangles. Limits: an
+  /// Vertices that belong to no triangle are left out. Errors: InputError as require_surface(). Limits: an
   /// oriented manifold; the caller checks.
   explicit Target(TriangleMesh mesh);
   Target(const Target&) = delete;

@@ -1,6 +1,7 @@
 #include "tunica/surface/distance/facing.hpp"
 
 #include "tunica/core/disjoint_sets.hpp"
+#include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/core/progress.hpp"
 #include "tunica/core/threads.hpp"
@@ -223,9 +224,15 @@ private:
 
 }  // namespace
 
-Facing facing_of(const TriangleMesh& mesh) { return Components(mesh).facing(); }
+Facing facing_of(const TriangleMesh& mesh) {
+  require_valid(mesh);
+  return Components(mesh).facing();
+}
 
 TriangleMesh turned_outward(TriangleMesh mesh, const Facing& facing) {
+  if (facing.is_wrong.size() != mesh.triangles.size()) {
+    throw InputError("which way the pieces face was told of another mesh: the numbers of triangles differ");
+  }
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     if (facing.is_wrong[t]) {
       std::swap(mesh.triangles[t][1], mesh.triangles[t][2]);

@@ -4,6 +4,8 @@
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 namespace tunica {
@@ -64,7 +66,9 @@ struct PointTree::Line {
 
 PointTree::PointTree(const std::vector<Vec3>& points) : items_(points.size()), axis_(points.size(), 0) {
   for (std::size_t i = 0; i < points.size(); ++i) {
-    TUNICA_ASSERT(points[i].allFinite());
+    if (!points[i].allFinite()) {
+      throw InputError(fmt::format("point {} is not finite", i));
+    }
     items_[i] = {points[i], narrow<Index>(i)};
   }
   build(0, items_.size());

@@ -10,6 +10,7 @@ namespace tunica {
 /// Cost: build n log n, 32 bytes per point; query about log n for small k.
 class PointTree {
 public:
+  /// Errors: InputError where a point is not finite.
   explicit PointTree(const std::vector<Vec3>& points);
 
   /// @param accept  points it refuses do not count; empty: all count

@@ -4,6 +4,7 @@
 #include "tunica/core/narrow.hpp"
 #include "tunica/core/progress.hpp"
 #include "tunica/surface/distance/point_tree.hpp"
+#include "tunica/surface/mesh/checks.hpp"
 #include "tunica/surface/mesh/incidence.hpp"
 
 #include <algorithm>
@@ -315,9 +316,13 @@ private:
 
 }  // namespace
 
-Seams find_seams(const TriangleMesh& mesh) { return SeamFinder(mesh).seams(); }
+Seams find_seams(const TriangleMesh& mesh) {
+  require_valid(mesh);
+  return SeamFinder(mesh).seams();
+}
 
 WithoutSeams without_seams(TriangleMesh mesh) {
+  require_valid(mesh);
   const SeamFinder finder(mesh);
   const Seams found = finder.seams();
   if (found.edges == 0) {

@@ -3,6 +3,7 @@
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/surface/decimation/degenerate.hpp"
+#include "tunica/surface/mesh/checks.hpp"
 #include "tunica/surface/mesh/seams.hpp"
 
 #include <Eigen/Geometry>
@@ -356,6 +357,9 @@ private:
 
 }  // namespace
 
-Repaired repaired(const TriangleMesh& mesh) { return Repairer(mesh).run(); }
+Repaired repaired(const TriangleMesh& mesh) {
+  require_corners(mesh.vertices.size(), mesh.triangles);
+  return Repairer(mesh).run();
+}
 
 }  // namespace tunica

@@ -31,7 +31,7 @@ struct Repaired {
 /// on, and what then only touches gets vertices of its own. Pieces of nothing but degenerate triangles (see
 /// is_degenerate) go; others keep theirs, see without_degenerate_triangles(). Holes stay open, pieces that cross go on
 /// crossing. An oriented manifold with area everywhere and without such seams comes back as it is. Errors: InputError
-/// when no triangle is left. Cost: n log n.
+/// when a corner does not exist, or no triangle is left. Cost: n log n.
 Repaired repaired(const TriangleMesh& mesh);
 
 }  // namespace tunica
