@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <ranges>
 #include <set>
 #include <utility>
 
@@ -57,6 +58,13 @@ ContactSystem::ContactSystem(const Model& model, Surfaces surfaces, std::vector<
         face.curved = face.curved && face.body != party.index;
       }
     }
+  }
+  const auto name = [&](const ContactParty& party) {
+    return party.rigid ? model.rigids[party.index].name : model.name_of(party.index);
+  };
+  for (const auto& [one, other] : contacts_ | std::views::transform(&Contact::between)) {
+    const bool self = !one.rigid && !other.rigid && one.index == other.index;
+    meetings_.push_back(fmt::format("{} meets {}", name(one), self ? "itself" : name(other)));
   }
   make_groups();
   accepted_ = maps_at(rest_);
@@ -531,8 +539,9 @@ std::string ContactSystem::closest_place() const {
   if (!std::isfinite(closest_.gap)) {
     return "";
   }
-  return fmt::format("; in contact {} they are closest at ({:.4g}, {:.4g}, {:.4g}) mm",
-                     contacts_[closest_.contact].name, closest_.at.x(), closest_.at.y(), closest_.at.z());
+  return fmt::format("; in contact {} they are closest at ({:.4g}, {:.4g}, {:.4g}) mm, where {}",
+                     contacts_[closest_.contact].name, closest_.at.x(), closest_.at.y(), closest_.at.z(),
+                     meetings_[closest_.contact]);
 }
 
 void ContactSystem::keep_slip(const Configuration& configuration) {

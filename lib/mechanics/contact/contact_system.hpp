@@ -10,6 +10,8 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <string>
+#include <utility>
 #include <vector>
 
 /// Contact of curved surfaces with each other and with rigid bodies, inside the implicit step.
@@ -99,8 +101,8 @@ public:
   /// Back to the last accepted state, after attempts that came to nothing.
   void go_back();
 
-  /// Where bodies were closest at the last forces: "; in contact NAME they are closest at (x, y, z) mm". Empty where
-  /// nothing came near.
+  /// Where bodies were closest at the last forces: "; in contact NAME they are closest at (x, y, z) mm, where BODY
+  /// meets OTHER". Empty where nothing came near.
   [[nodiscard]] std::string closest_place() const;
 
   /// What acts in a configuration, per contact of the model; gaps as intervals.
@@ -244,6 +246,7 @@ private:
   Surfaces surfaces_;
   const std::vector<Vec3> reference_;
   const std::vector<Contact> contacts_;
+  std::vector<std::string> meetings_;      ///< per contact: "BODY meets OTHER"
   std::map<Index, std::size_t> carrier_;   ///< body, of carried nodes
   std::vector<RigidShape> shapes_;         ///< now
   std::vector<RigidShape> shapes_before_;  ///< in the last accepted state
