@@ -30,6 +30,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <iterator>
 #include <numbers>
 
@@ -321,6 +322,12 @@ void warn_of(const cli::Tool& tool, const fs::path& subject, std::vector<Warning
     warning.text = fmt::format("{}: {}", subject.string(), warning.text);
     tool.warn(std::move(warning));
   }
+}
+
+std::function<void(const std::string&)> slow_step_note(const cli::Tool& tool, const fs::path& subject) {
+  return [&tool, name = subject.string()](const std::string& text) {
+    tool.warn({Weight::note, "slow step", fmt::format("{}: {}", name, text)});
+  };
 }
 
 class Simulation {
@@ -653,6 +660,7 @@ private:
       journal_->offer(make);
       stage("solve");
     };
+    resumption.on_slow_step = slow_step_note(tool_, subject());
     const auto on_state = [&](const State& state) {
       stage("write");
       journal_->append(state);

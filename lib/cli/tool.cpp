@@ -90,8 +90,18 @@ double peak_mebibytes() {
   return real(usage.ru_maxrss) / 1024.0;
 }
 
+// Where the words of a command line end that may be options.
+std::vector<std::string>::const_iterator end_of_options(const std::vector<std::string>& words) {
+  return std::ranges::find(words, "--");
+}
+
+bool is_given(const std::vector<std::string>& words, const char* flag) {
+  return std::find(words.begin(), end_of_options(words), flag) != end_of_options(words);
+}
+
 // The report of a run whose command line could not be parsed: then no option has been stored yet.
-std::filesystem::path report_argument(const std::vector<std::string>& words) {
+std::filesystem::path report_argument(const std::vector<std::string>& all) {
+  const std::vector<std::string> words(all.begin(), end_of_options(all));
   for (std::size_t i = 1; i < words.size(); ++i) {
     if (words[i - 1] == report_flag) {
       return words[i];
@@ -165,6 +175,16 @@ void require_no_other_file(const std::filesystem::path& report) {
   if (file && file >> first && first != '{') {
     throw OutputError(fmt::format("{}: exists and is not a report, name another file", report.string()));
   }
+}
+
+// The report is written last: where the process may open no file beside those it has, that is told before the work.
+void require_descriptor(const std::filesystem::path& report) {
+  const int spare = ::dup(STDERR_FILENO);
+  if (spare < 0) {
+    throw OutputError(
+        fmt::format("{}: cannot be written: {}: allow more (ulimit -n)", report.string(), std::strerror(errno)));
+  }
+  ::close(spare);
 }
 
 // Whether there is a report in which this tool says that it did not come to its end: a run that goes on replaces it.
@@ -301,7 +321,7 @@ std::optional<int> Tool::parse(int argc, char** argv) {
     }
   } catch (const CLI::ParseError& error) {
     report_ = report_argument(words_);
-    force_ = std::ranges::find(words_, "--force") != words_.end();
+    force_ = is_given(words_, "--force");
     return finish(ExitCode::usage, fmt::format("{} (see tunica-{} --help)", usage_message(app_, error), verb_));
   } catch (const UsageError& error) {
     return finish(error.code(), fmt::format("{} (see tunica-{} --help)", error.what(), verb_));
@@ -320,7 +340,7 @@ int Tool::run(int argc, char** argv, const std::function<void()>& body) {
   said.resize(std::max<std::size_t>(said.size(), 1));
   said[0] = "tunica-" + verb_;
   provenance_ = Provenance(std::move(said));
-  no_paths_ = std::ranges::find(words_, "--no-paths") != words_.end();
+  no_paths_ = is_given(words_, "--no-paths");
   if (no_paths_) {
     provenance_.hide_paths();  // before anything fails: the report of that must not name them either
   }
@@ -405,6 +425,7 @@ void Tool::register_report() {
   require_writable(report, force_ || replaces_failed_);
   require_no_other_file(report);
   report_lock_ = PartLock::take(part_of(report));
+  require_descriptor(report);
   require_writable(report, force_ || replaces_failed_);
   report_ = report;
   // However this run ends, an older report must not speak for it. Where the command line names that file once more, it

@@ -153,7 +153,7 @@ void ContactSystem::require_apart(const Model& model) {
   };
   Overlap deepest;
   for (std::size_t g = 0; g < groups_.size(); ++g) {
-    const Group& group = groups_[g];
+    Group& group = groups_[g];
     if (group.point && model.is_solid(group.other.index)) {
       deepest.look(solid(group.other.index).first.at(place(group, group.samples[0], maps)).distance,
                    same_distance * group.wall, group.contact);
@@ -164,12 +164,16 @@ void ContactSystem::require_apart(const Model& model) {
                           group.other.index != face.body && !is_carried(face, group.other.index);
     if (in_solid) {
       const auto& [distance, box] = solid(group.other.index);
-      for (std::size_t i = 0; box.meets(maps.bounds(group.face), face.half_thickness) && i < group.samples.size();
-           ++i) {
-        const Vec3 x = maps[group.face].point(group.samples[i].weights);
+      if (!box.meets(maps.bounds(group.face), face.half_thickness)) {
+        continue;
+      }
+      wake(group);
+      for (const Sample& sample : group.samples) {
+        const Vec3 x = maps[group.face].point(sample.weights);
         deepest.look(distance.at(x).distance - face.half_thickness, same_distance * group.wall, group.contact);
       }
     } else if (is_close(group, near[g], maps)) {
+      wake(group);
       for (const Sample& sample : group.samples) {
         const double gap = touch(group, place(group, sample, maps), near[g], maps).gap + group.sag;
         deepest.look(gap, same_distance * group.wall, group.contact);

@@ -192,6 +192,29 @@ void check_selections(const Model& model) {
   }
 }
 
+double size_of(const PressureLoad& load) { return std::abs(load.value); }
+double size_of(const ForceLoad& load) { return load.total.cwiseAbs().maxCoeff(); }
+double size_of(const MomentLoad& load) { return load.total.cwiseAbs().maxCoeff(); }
+double size_of(const EdgeLoad& load) { return load.per_length.cwiseAbs().maxCoeff(); }
+double size_of(const AreaLoad& load) { return load.per_area.cwiseAbs().maxCoeff(); }
+double size_of(const GravityLoad& load) { return load.acceleration.cwiseAbs().maxCoeff(); }
+
+/// Norms take squares of loads, which have to be numbers.
+void check_sizes(const Model& model, const RunSettings& settings) {
+  const auto* run = std::get_if<StaticRun>(&settings.kind);
+  for (const Load& load : model.loads) {
+    double factor = load.ramp.points.empty() && run != nullptr ? run->load_factors.back() : 1;
+    for (const auto& point : load.ramp.points) {
+      factor = std::max(factor, std::abs(point.second));
+    }
+    const double most = factor * std::visit([](const auto& kind) { return size_of(kind); }, load.kind);
+    if (!std::isfinite(most * most)) {
+      throw InputError(fmt::format("{}this load on {}, with its ramp, is larger than any force: is its unit right?",
+                                   load.said_at.empty() ? "" : load.said_at + ": ", model.name_of(load.body)));
+    }
+  }
+}
+
 constexpr double largest_solid_poisson = 0.4999;
 
 void check_solids(const Model& model, const RunSettings& settings) {
@@ -371,6 +394,7 @@ ShellSystem make_checked_system(const Model& model, const RunSettings& settings)
   check_solids(model, settings);
   check_selections(model);
   check_run(model, settings);
+  check_sizes(model, settings);
   ShellSystem system = make_system(model);
   if (std::holds_alternative<FrequencyRun>(settings.kind) || std::holds_alternative<BucklingRun>(settings.kind)) {
     stiffen_short_waves(system);

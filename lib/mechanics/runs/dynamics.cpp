@@ -637,6 +637,8 @@ private:
       result = take_part(turns_.next(time_, end, shortest_part * run_.step));
       iterations += result.iterations;
       cg_iterations += result.cg_iterations;
+      tell_slow_step(iterations, fmt::format("{:.6g} s of {:.6g} s", time_, run_.duration),
+                     "it is taken in short parts" + (system_.contact ? system_.contact->closest_place() : ""));
     }
     stepper_.balance_energy(summary_.steps + 1, end, motion_, *summary_.energy);
     look_for_swing(before);

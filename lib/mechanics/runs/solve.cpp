@@ -61,11 +61,12 @@ std::string describe_loads(const Model& model, const std::vector<double>& reache
     if (const auto* pressure = std::get_if<PressureLoad>(&model.loads[l].kind)) {
       // kPa are what organs bear; what is out of all bounds is told as it is kept, for it may be the last number.
       constexpr double most_in_kpa = 1e6;
+      const double part = reached[l] * pressure->value;
       const double whole = wanted[l] * pressure->value;
-      const bool in_kpa = std::abs(whole) < most_in_kpa;
-      text += fmt::format("{}{:.4g} {} of {:.4g} {} on {}", text.empty() ? "" : "; ",
-                          (in_kpa ? 1e3 : 1) * reached[l] * pressure->value, in_kpa ? "kPa" : "MPa",
-                          (in_kpa ? 1e3 : 1) * whole, in_kpa ? "kPa" : "MPa", model.name_of(model.loads[l].body));
+      const bool in_kpa = std::max(std::abs(part), std::abs(whole)) < most_in_kpa;
+      text += fmt::format("{}{:.4g} {} of {:.4g} {} on {}", text.empty() ? "" : "; ", (in_kpa ? 1e3 : 1) * part,
+                          in_kpa ? "kPa" : "MPa", (in_kpa ? 1e3 : 1) * whole, in_kpa ? "kPa" : "MPa",
+                          model.name_of(model.loads[l].body));
       if (model.is_solid(model.loads[l].body)) {
         continue;
       }

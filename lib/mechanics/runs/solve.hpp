@@ -136,7 +136,7 @@ struct Checkpoint {
   std::map<std::string, std::vector<double>, std::less<>> memory;
 };
 
-/// How a run is made to outlive its process.
+/// How a run is made to outlive its process, and what it says on the way.
 struct Resumption {
   std::optional<Checkpoint> from;  ///< goes on here; the reference state is then not handed over again
   /// Called after every step, when what `on_state` got is complete up to it; `make` builds the checkpoint, so that none
@@ -145,6 +145,9 @@ struct Resumption {
   /// Of a nonlinear static run: a configuration near that of the first load step, such as a coarser mesh's. Newton's
   /// method begins there; where it does not converge, at the reference.
   std::optional<Checkpoint> near{};
+  /// Called once, with a sentence, where a step of a model with contact takes far more iterations than others: how far
+  /// it has come, why its parts are short, where bodies are closest, and what to do.
+  std::function<void(const std::string&)> on_slow_step{};
 
   void offer(const std::function<Checkpoint()>& make) const {
     if (on_step) {

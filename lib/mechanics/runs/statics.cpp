@@ -299,6 +299,8 @@ private:
         increment_ *= 2;
         continue;
       }
+      tell_slow_step(iterations, fmt::format("load factor {:.6g} of {:.6g}", factor_, run_.load_factors.back()),
+                     why_short(result, next - before) + place_of_yielding(attempt));
       increment_ = (next - before) / 2;
       if (increment_ >= smallest) {
         continue;
@@ -319,6 +321,16 @@ private:
     result.iterations = iterations;
     result.cg_iterations = cg_iterations;
     return result;
+  }
+
+  /// Of an attempt that came to nothing.
+  [[nodiscard]] std::string why_short(const NewtonResult& result, double part) const {
+    return fmt::format("in a part of {:.3g} {}", part,
+                       !result.apart       ? "bodies would pass through each other"
+                       : !result.valid     ? "bodies would overlap, or elements fold"
+                       : !result.converged ? "Newton's method does not come to rest"
+                       : !result.stable    ? "the stiffness is not positive"
+                                           : "the shell leaves its path");
   }
 
   [[nodiscard]] bool is_apart(const Configuration& attempt) const {
@@ -343,7 +355,7 @@ private:
     NewtonResult told = failed;
     told.apart = failed.apart && (!settled.settled || is_apart(attempt));
     if (!settled.settled || !told.apart) {
-      fail(told, settled, settled.ran_away ? loose_body(attempt) : "");
+      fail(told, settled, settled.ran_away ? loose_body(attempt) : "", place_of_yielding(attempt));
     }
     const bool unstable = !failed.stable || settled.lost_stability;
     if (unstable && distance(attempt, configuration_) > largest_branch * thickness_) {
@@ -371,8 +383,24 @@ private:
     return "";
   }
 
-  [[noreturn]] void fail(const NewtonResult& failed, const SettleResult& let_go, const std::string& loose) {
-    const std::string place = system_.contact ? system_.contact->closest_place() : "";
+  /// Where bodies were closest; where nothing is near, which node has moved most since the last state of rest.
+  [[nodiscard]] std::string place_of_yielding(const Configuration& ended) const {
+    if (const std::string closest = system_.contact ? system_.contact->closest_place() : ""; !closest.empty()) {
+      return closest;
+    }
+    std::size_t most = 0;
+    const auto moved = [&](std::size_t i) {
+      return (ended.displacement[i] - configuration_.displacement[i]).squaredNorm();
+    };
+    for (std::size_t i = 0; i < system_.node_count(); ++i) {
+      most = moved(i) > moved(most) ? i : most;
+    }
+    const Vec3 at = system_.reference[most] + configuration_.displacement[most];
+    return fmt::format("; it yields most at ({:.4g}, {:.4g}, {:.4g}) mm", at.x(), at.y(), at.z());
+  }
+
+  [[noreturn]] void fail(const NewtonResult& failed, const SettleResult& let_go, const std::string& loose,
+                         const std::string& place) {
     if (system_.contact) {
       system_.contact->go_back();
     }
