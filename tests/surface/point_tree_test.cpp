@@ -1,4 +1,4 @@
-#include "tunica/surface/distance/point_tree.hpp"
+#include "tunica/surface/mesh/point_tree.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,9 +1,9 @@
 #pragma once
 
-#include "tunica/surface/distance/point_tree.hpp"
 #include "tunica/surface/distance/closest_point.hpp"
 #include "tunica/surface/distance/cover_bound.hpp"
 #include "tunica/surface/mesh/incidence.hpp"
+#include "tunica/surface/mesh/point_tree.hpp"
 #include "tunica/surface/mesh/triangle_mesh.hpp"
 
 #include <optional>

@@ -3,13 +3,14 @@
 #include "tunica/core/disjoint_sets.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/core/progress.hpp"
-#include "tunica/surface/distance/point_tree.hpp"
 #include "tunica/surface/mesh/checks.hpp"
 #include "tunica/surface/mesh/incidence.hpp"
+#include "tunica/surface/mesh/point_tree.hpp"
 
 #include <algorithm>
 #include <map>
 #include <numeric>
+#include <optional>
 #include <tuple>
 
 namespace tunica {
@@ -254,15 +255,21 @@ private:
       places.push_back(at(i));
     }
     const PointTree tree(places);
+    const std::vector<std::pair<Index, Index>> meeting = by_places(open);
     std::map<Index, std::vector<std::pair<double, Index>>> along;  // by edge: how far along, and the place
     for (std::size_t i = 0; i < open.size(); ++i) {
+      if (i % 65536 == 0) {
+        check_interrupt();
+      }
+      if (!has_edge_along(open[i], meeting)) {
+        continue;
+      }
       const Rim& rim = rims_[open[i]];
       const double reach = std::max(reach_[local(rim.from)], reach_[local(rim.to)]);
       for (const Index beside : tree.beside(mesh_.vertices[rim.from], mesh_.vertices[rim.to], reach)) {
-        look(open[i], ends[beside], along);
-      }
-      if (i % 65536 == 0) {
-        check_interrupt();
+        if (const auto fraction = fraction_along(open[i], ends[beside])) {
+          along[open[i]].emplace_back(*fraction, place_of_[ends[beside]]);
+        }
       }
     }
     std::vector<Part> parts;
@@ -285,21 +292,44 @@ private:
     pair(std::move(parts));
   }
 
-  /// Whether a vertex lies along an edge of another triangle, between its ends.
-  void look(Index r, Index vertex, std::map<Index, std::vector<std::pair<double, Index>>>& along) const {
+  /// Edges with the places of their ends, ascending.
+  [[nodiscard]] std::vector<std::pair<Index, Index>> by_places(const std::vector<Index>& edges) const {
+    std::vector<std::pair<Index, Index>> found;
+    for (const Index r : edges) {
+      for (const Index place : places_of(rims_[r])) {
+        found.emplace_back(place, r);
+      }
+    }
+    std::ranges::sort(found);
+    return found;
+  }
+
+  /// Whether another edge begins where this one does and runs along it: else nothing can be joined to it. Most edges
+  /// of what is no surface are told by that, without a search of the space along them.
+  [[nodiscard]] bool has_edge_along(Index r, const std::vector<std::pair<Index, Index>>& by_place) const {
+    return std::ranges::any_of(places_of(rims_[r]), [&](Index place) {
+      return std::ranges::any_of(
+          std::ranges::equal_range(by_place, place, {}, &std::pair<Index, Index>::first), [&](const auto& other) {
+            const Rim& rim = rims_[other.second];
+            return other.second != r && (fraction_along(r, local(rim.from)) || fraction_along(r, local(rim.to)));
+          });
+    });
+  }
+
+  /// Where a vertex lies along an edge of another triangle, between its ends; none if it does not.
+  [[nodiscard]] std::optional<double> fraction_along(Index r, Index vertex) const {
     const Rim& rim = rims_[r];
     const auto& corners = mesh_.triangles[rim.triangle];
     const auto [from, to] = places_of(rim);
     const Index place = place_of_[vertex];
     if (place == from || place == to || std::ranges::find(corners, vertices_[vertex]) != corners.end()) {
-      return;
+      return std::nullopt;
     }
     const Vec3 way = mesh_.vertices[rim.to] - mesh_.vertices[rim.from];
     const Vec3 there = at(vertex) - mesh_.vertices[rim.from];
     const double fraction = there.dot(way) / way.squaredNorm();
-    if (fraction > 0 && fraction < 1 && (there - fraction * way).norm() <= reach_[vertex]) {
-      along[r].emplace_back(fraction, place);
-    }
+    return fraction > 0 && fraction < 1 && (there - fraction * way).norm() <= reach_[vertex] ? std::optional(fraction)
+                                                                                             : std::nullopt;
   }
 
   const TriangleMesh& mesh_;

@@ -1,5 +1,5 @@
 // Source: Bentley, "Multidimensional binary search trees used for associative searching", CACM 18(9), 1975.
-#include "tunica/surface/distance/point_tree.hpp"
+#include "tunica/surface/mesh/point_tree.hpp"
 
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
