@@ -422,6 +422,9 @@ void Tool::register_report() {
   // A report that is refused is not to be written by finish() either.
   const std::filesystem::path report = std::exchange(report_, {});
   replaces_failed_ = goes_on() && tells_of_failure(report, "tunica-" + verb_);
+  if (app_.get_option_no_throw(resume_flag) != nullptr && !force_) {
+    std::ranges::for_each(words_, [&](const std::string& word) { require_none_to_go_on_with(word); });
+  }
   require_writable(report, force_ || replaces_failed_);
   require_no_other_file(report);
   report_lock_ = PartLock::take(part_of(report));

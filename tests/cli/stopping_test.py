@@ -83,11 +83,12 @@ class Stopping(unittest.TestCase):
         self.assertEqual(running.returncode, 130, error)
         self.assertIn("tunica-simulate --resume out.hdf.part", error)
         kept = checkpoint.read_bytes()
-        again = self.run_tool("simulate", *words[:-2])
-        self.assertEqual(again.returncode, 5, again.stderr)
-        self.assertIn("--resume out.hdf.part", again.stderr)
-        self.assertIn("--force", again.stderr)
-        self.assertEqual(checkpoint.read_bytes(), kept)
+        for same in words, words[:-2]:  # with its report and without
+            again = self.run_tool("simulate", *same)
+            self.assertEqual(again.returncode, 5, again.stderr)
+            self.assertIn("--resume out.hdf.part", again.stderr)
+            self.assertIn("--force", again.stderr)
+            self.assertEqual(checkpoint.read_bytes(), kept)
         running = subprocess.Popen([BIN / "tunica-simulate", "--resume", "out.hdf.part", "--report", "run.json"],
                                    cwd=self.folder, stderr=subprocess.PIPE, text=True)
         time.sleep(3)

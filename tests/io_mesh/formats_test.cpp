@@ -285,9 +285,12 @@ TEST(Space, IsReadWhereverAFormatHasRoomForIt) {
   EXPECT_EQ(space_of(folder, "a.stl", test::binary_stl("3D Slicer output. SPACE=RAS")), "RAS");
   EXPECT_EQ(space_of(folder, "b.stl", with(test::ascii_stl(), "a name with words", "Slicer output. SPACE=LPS")), "LPS");
   EXPECT_EQ(space_of(folder, "c.obj", "# exported, space = ras, today\n" + test::tetrahedron_obj), "RAS");
+  EXPECT_EQ(space_of(folder, "f.obj", test::tetrahedron_obj + "\ng organ # SPACE=RAS\n"), "RAS");
+  EXPECT_EQ(space_of(folder, "g.stl", with(test::ascii_stl(), "endsolid", "endsolid organ SPACE=RAS")), "RAS");
   EXPECT_EQ(space_of(folder, "d.off", with(test::tetrahedron_off, "made by hand", "SPACE: Right-Anterior-Superior.")),
             "RAS");
   for (const auto& [from, to] : {std::pair(R"("version":"2.0")", R"("version":"2.0","extras":{"SPACE":"RAS"})"),
+                                 {R"("asset":)", R"("extras":{"SPACE":"RAS"},"asset":)"},
                                  {R"("name":"parent")", R"("name":"SPACE=RAS; made by a program")"},
                                  {R"("meshes":[{)", R"("meshes":[{"name":"SPACE=RAS",)"},
                                  {R"("meshes":[{)", R"("meshes":[{"extras":{"note":"in SPACE=RAS"},)"}}) {

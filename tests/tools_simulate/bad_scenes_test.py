@@ -110,7 +110,7 @@ class BadScenes(SimulateTest):
         self.write("scene.toml", RUN + shell() + ball(5) + contact("plate", "ball", 'name = "c"\n') +
                    "[[load]]\nbody = \"plate\"\nkind = \"pressure\"\nvalue = \"-1Pa\"\n")
         self.run_tool("--scene", "scene.toml", "out.hdf")
-        self.assertIn("c: nothing touches in any step", self.done.stderr)
+        self.assertIn("c: nothing touches at the end of any step", self.done.stderr)
 
     def test_a_body_that_crosses_itself(self):
         points, triangles, normals = sphere(1, 2)

@@ -123,7 +123,8 @@ public:
     return std::move(mesh_);
   }
 
-  /// The world axes, where the file, its scenes, nodes or meshes say them: in names, in `extras`, in what made it.
+  /// The world axes, where the file, its asset, scenes, nodes or meshes say them: in names, in `extras`, in what made
+  /// it.
   void say_space(MeshFile& file) const {
     const auto say = [&](const SortedJson& object) {
       for (const char* key : {"name", "generator", "copyright", "extras"}) {
@@ -134,6 +135,7 @@ public:
         }
       }
     };
+    say(in_);
     if (const auto asset = in_.find("asset"); asset != in_.end() && asset->is_object()) {
       say(*asset);
     }

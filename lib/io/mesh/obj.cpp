@@ -21,7 +21,7 @@ public:
         read_vertex();
       } else if (keyword == "f") {
         read_face();
-      } else if (keyword.starts_with('#')) {
+      } else if (!keyword.empty() && !keyword.starts_with('v')) {  // comments, and names that may end in one
         const std::string_view rest = scanner_.rest();
         take_space(file_, {keyword.data(), narrow<std::size_t>(rest.data() + rest.size() - keyword.data())}, name_);
       }

@@ -82,6 +82,7 @@ public:
         take_space(file, scanner_.rest(), name_);
         inside = true;
       } else if (keyword == "endsolid") {
+        take_space(file, scanner_.rest(), name_);
         inside = false;
       } else if (keyword == "facet") {
         read_facet(file.mesh);

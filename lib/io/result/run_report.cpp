@@ -314,7 +314,7 @@ std::vector<Warning> contact_warnings(const Json& result) {
     const Json& points = record["points"];
     if (!points.empty() && std::all_of(points.begin(), points.end(), [](const Json& n) { return n == 0; })) {
       warnings.push_back({Weight::major, "no contact",
-                          fmt::format("{}: nothing touches in any step: do these bodies come together?", name)});
+                          fmt::format("{}: nothing touches at the end of any step: do these bodies come together?", name)});
     }
   }
   return warnings;

@@ -347,6 +347,11 @@ bool stays_zero(const Ramp& ramp, const RunSettings& settings) {
     }
   } else if (const auto* statics = std::get_if<StaticRun>(&settings.kind)) {
     times = statics->load_factors;
+    for (const auto& [time, factor] : ramp.points) {
+      if (time < statics->load_factors.back()) {
+        times.push_back(time);
+      }
+    }
   } else if (const auto* frequencies = std::get_if<FrequencyRun>(&settings.kind)) {
     times = frequencies->preload.load_factors;
   }
