@@ -116,6 +116,20 @@ std::vector<Reading> readings_of(std::string digits) {
     const std::size_t first = text.starts_with("-") ? 1 : 0;
     return text.compare(first, 1, ".") == 0 ? text.insert(first, "0") : text;
   };
+  const auto groups_thousands = [&](char sign) {
+    std::size_t at = digits.find(sign);
+    while (at != std::string::npos) {
+      const std::size_t next = digits.find(sign, at + 1);
+      if (std::min(next, digits.size()) != at + 4) {
+        return false;
+      }
+      at = next;
+    }
+    return true;
+  };
+  if ((commas == 0 && points > 1 && !groups_thousands('.')) || (points == 0 && commas > 1 && !groups_thousands(','))) {
+    return {};
+  }
   if (commas == 0) {
     return {{points > 1 ? without('.') : digits, ""}};
   }
@@ -259,7 +273,8 @@ std::size_t edits(std::string_view a, std::string_view b) {
   return row.back();
 }
 
-// The one usual unit of the dimension that begins with what is written, or, where that is no unit, is one letter away.
+// The one usual unit of the dimension that begins with what is written, or, where that is no unit, is one letter away,
+// which is not the first: "mmH2O" and "ksi" are units of their own, and tunica has others than these.
 std::vector<UnitReading> usual_unit_near(const std::string& unit, const Usage& usage) {
   constexpr std::size_t fewest_letters = 2;
   const std::string small = lower(unit);
@@ -272,7 +287,7 @@ std::vector<UnitReading> usual_unit_near(const std::string& unit, const Usage& u
     rest.remove_prefix(std::min(end + 1, rest.size()));
     if (lower(name).starts_with(small)) {
       longer.push_back({name, 1, ""});
-    } else if (!parse_unit(unit) && edits(lower(name), small) == 1) {
+    } else if (!parse_unit(unit) && lower(name).front() == small.front() && edits(lower(name), small) == 1) {
       nearest.push_back({name, 1, ""});
     }
   }

@@ -126,6 +126,12 @@ TEST(Quantity, WhatPeopleWriteGetsTheNearestRightSpelling) {
   }
   EXPECT_THAT(refusal("5atm", dimension::pressure), HasSubstr("kPa, Pa, hPa, MPa, GPa, mmHg, cmH2O"));
   EXPECT_THAT(refusal("5xPa", dimension::pressure), HasSubstr("units of pressure are")) << "more than one is near";
+  for (const char* other : {"10mmH2O", "1ksi"}) {
+    EXPECT_THAT(refusal(other, dimension::pressure), HasSubstr("units of pressure are")) << "units of their own";
+  }
+  EXPECT_THAT(refusal("12.5.3kPa", dimension::pressure), testing::Not(HasSubstr("write 1253")));
+  EXPECT_THAT(refusal("1,25,3kPa", dimension::pressure), testing::Not(HasSubstr("write 1253")));
+  EXPECT_THAT(refusal("1.250.300Pa", dimension::pressure), EndsWith("write 1250300Pa"));
   EXPECT_THAT(refusal("5ms", dimension::length), HasSubstr("is a time, not a length: units of length are"));
   EXPECT_THAT(refusal("5e400kPa", dimension::pressure), HasSubstr("is not a pressure"));
 }
