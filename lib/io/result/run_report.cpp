@@ -313,8 +313,9 @@ std::vector<Warning> contact_warnings(const Json& result) {
   for (const auto& [name, record] : result["contacts"].items()) {
     const Json& points = record["points"];
     if (!points.empty() && std::all_of(points.begin(), points.end(), [](const Json& n) { return n == 0; })) {
-      warnings.push_back({Weight::major, "no contact",
-                          fmt::format("{}: nothing touches at the end of any step: do these bodies come together?", name)});
+      warnings.push_back(
+          {Weight::major, "no contact",
+           fmt::format("{}: nothing touches at the end of any step: do these bodies come together?", name)});
     }
   }
   return warnings;

@@ -634,7 +634,7 @@ private:
     std::size_t iterations = 0;
     std::size_t cg_iterations = 0;
     while (time_ != end) {
-      result = take_part(turns_.next(time_, end, shortest_part * run_.step));
+      result = take_part(system_.contact ? turns_.next(time_, end, shortest_part * run_.step) : end);
       iterations += result.iterations;
       cg_iterations += result.cg_iterations;
       tell_slow_step(iterations, fmt::format("{:.6g} s of {:.6g} s", time_, run_.duration),

@@ -39,9 +39,6 @@ double farthest_entry(const Table<Vec3>& table, double tolerance, double from, d
 }  // namespace
 
 TableTurns::TableTurns(const Model& model) {
-  if (model.contacts.empty()) {
-    return;
-  }
   for (const RigidBody& body : model.rigids) {
     for (Table<Vec3>& table : tables_of(body)) {
       add(std::move(table), of_a_place);

@@ -8,9 +8,8 @@ namespace tunica {
 
 /// Where what a scene says over time (dynamic) or load factor (static) leaves a straight line: the tables of rigid
 /// bodies, and the ramps of prescribed displacements and loads. A step that passes such a place sees only its ends, so
-/// a body that goes there and back would not have touched anything: runs end a part of the step there. Without contact
-/// there are no such places: what loads do within a step its length decides, and uneven parts would make a second-order
-/// scheme ring.
+/// a body that goes there and back would not have touched anything: runs end a part of the step there. Motions do so
+/// where bodies touch: else uneven parts would make a second-order scheme ring.
 class TableTurns {
 public:
   explicit TableTurns(const Model& model);
