@@ -304,15 +304,19 @@ private:
     return found;
   }
 
-  /// Whether another edge begins where this one does and runs along it: else nothing can be joined to it. Most edges
-  /// of what is no surface are told by that, without a search of the space along them.
+  /// Whether another edge at one of its ends runs along it or goes on in its line: else nothing can be joined to it.
+  /// Most edges of what is no surface are told by that, without a search of the space along them.
   [[nodiscard]] bool has_edge_along(Index r, const std::vector<std::pair<Index, Index>>& by_place) const {
+    constexpr double largest_sine = 2 * share_of_edge;
+    const auto way_of = [&](Index edge) {
+      return Vec3((mesh_.vertices[rims_[edge].to] - mesh_.vertices[rims_[edge].from]).normalized());
+    };
+    const Vec3 way = way_of(r);
     return std::ranges::any_of(places_of(rims_[r]), [&](Index place) {
-      return std::ranges::any_of(
-          std::ranges::equal_range(by_place, place, {}, &std::pair<Index, Index>::first), [&](const auto& other) {
-            const Rim& rim = rims_[other.second];
-            return other.second != r && (fraction_along(r, local(rim.from)) || fraction_along(r, local(rim.to)));
-          });
+      return std::ranges::any_of(std::ranges::equal_range(by_place, place, {}, &std::pair<Index, Index>::first),
+                                 [&](const auto& other) {
+                                   return other.second != r && way.cross(way_of(other.second)).norm() <= largest_sine;
+                                 });
     });
   }
 
