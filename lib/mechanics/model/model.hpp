@@ -73,6 +73,7 @@ template <typename Value>
 struct Table {
   std::vector<std::pair<double, Value>> points;  ///< (time s, value), times increasing, at least one
 
+  /// Errors: InputError: no point.
   [[nodiscard]] Value at(double time) const;
 };
 
@@ -228,6 +229,7 @@ struct Model {
 
   [[nodiscard]] std::size_t body_count() const { return shells.size() + solids.size(); }
   [[nodiscard]] bool is_solid(std::size_t body) const { return body >= shells.size(); }
+  // Errors: InputError: there is no such body.
   [[nodiscard]] const std::string& name_of(std::size_t body) const;
   /// Reference positions of a body's nodes.
   [[nodiscard]] const std::vector<Vec3>& vertices_of(std::size_t body) const;

@@ -31,7 +31,7 @@ constexpr double largest_linear_strain = 0.2;
 /// The shift of a free body, of its lowest eigenvalue.
 constexpr double near_part = 0.2;
 
-void require_freedoms(std::size_t wanted, std::size_t there) {
+void require_modes(std::size_t wanted, std::size_t there) {
   if (wanted > there) {
     throw InputError(fmt::format("count = {}, but the model has only {} modes: ask for fewer", wanted, there));
   }
@@ -335,7 +335,7 @@ Summary run_frequencies(ShellSystem& system, const Model& model, const RunSettin
   summary.dof = narrow<std::size_t>(std::count(free.begin(), free.end(), true));
 
   const std::vector<VectorX> rigid = idle_rigid_modes(system, configuration, stiffness);
-  require_freedoms(run.count, summary.dof - rigid.size());
+  require_modes(run.count, summary.dof - rigid.size());
   const VectorX mass = lumped_masses(system);
   // Where a body is free the first shift is only known to be small against the lowest value; one that is near it keeps
   // the rigid motions, which the inverse enlarges, from drowning the modes in round-off.
@@ -380,7 +380,7 @@ Summary run_buckling(ShellSystem& system, const Model& model, const RunSettings&
   on_state(reference_state(system, model, summary));
   const FreeMask free = free_freedoms(system);
   summary.dof = narrow<std::size_t>(std::count(free.begin(), free.end(), true));
-  require_freedoms(run.count, summary.dof);
+  require_modes(run.count, summary.dof);
 
   const VectorX solution = linear_solution(system, model, settings);
   const double strain = largest_strain(system, solution);

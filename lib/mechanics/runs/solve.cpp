@@ -132,9 +132,24 @@ void record_step(const State& state, double seconds, Summary& summary) {
   }
 }
 
+const std::vector<double>& remembered(const Checkpoint& from, std::string_view name, std::optional<std::size_t> count) {
+  const auto found = from.memory.find(name);
+  if (found == from.memory.end() || found->second.size() != count.value_or(found->second.size())) {
+    throw InputError(fmt::format("a checkpoint without \"{}\", or with that of another model", name));
+  }
+  return found->second;
+}
+
 Summary solve(const Model& model, const RunSettings& settings, const std::function<void(const State&)>& on_state,
               const Progress& progress, const Resumption& resumption) {
   ShellSystem system = make_checked_system(model, settings);
+  for (const auto* checkpoint : {&resumption.from, &resumption.near}) {
+    if (*checkpoint && ((*checkpoint)->displacement.size() != model.node_count() ||
+                        (*checkpoint)->rotation.size() != model.node_count())) {
+      throw InputError(fmt::format("a checkpoint of {} nodes is not of a model of {}",
+                                   (*checkpoint)->displacement.size(), model.node_count()));
+    }
+  }
   if (const auto* dynamic = std::get_if<DynamicRun>(&settings.kind)) {
     return run_dynamic(system, model, settings, *dynamic, on_state, progress, resumption);
   }
@@ -193,6 +208,11 @@ double turn_of(const Model& model, const ShellSystem& system, const State& state
   return turn;
 }
 
+const Model& checked(const Model& model) {
+  require_valid(model);
+  return model;
+}
+
 /// From the fields of the elements what of them is large.
 void find_wall(const Model& model, ElementFields& fields) {
   constexpr double equal_stress = 1e-6;
@@ -238,7 +258,7 @@ struct ElementFieldEvaluator::Implementation {
 };
 
 ElementFieldEvaluator::ElementFieldEvaluator(const Model& model)
-    : implementation_(new Implementation{model, make_system(model)}) {}
+    : implementation_(new Implementation{checked(model), make_system(model)}) {}
 ElementFieldEvaluator::~ElementFieldEvaluator() = default;
 
 ElementFields element_fields(const Model& model, const State& state) { return ElementFieldEvaluator(model)(state); }
@@ -247,7 +267,10 @@ ElementFields ElementFieldEvaluator::operator()(const State& state) const {
   const auto& [model, system] = *implementation_;
   ElementFields fields;
   const std::size_t nodes = model.node_count();
-  TUNICA_ASSERT(state.displacement.size() == nodes && state.rotation.size() == nodes);
+  require_valid(model, state);
+  if (!system.solids.empty() && state.pressure.size() != nodes) {
+    throw InputError(fmt::format("a state with {} pressures for {} nodes", state.pressure.size(), nodes));
+  }
   std::vector<double> pressure(model.body_count(), 0);
   for (const Load& load : model.loads) {
     if (const auto* p = std::get_if<PressureLoad>(&load.kind)) {

@@ -227,7 +227,7 @@ private:
   void resume(const Checkpoint& from) override {
     configuration_ = recall(from);
     factor_ = from.position;
-    increment_ = from.memory.at("increment").at(0);
+    increment_ = remembered(from, "increment", 1)[0];
   }
 
   State take_step() override {

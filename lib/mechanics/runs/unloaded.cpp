@@ -327,6 +327,7 @@ bool is_imaged_under_pressure(const Model& model) {
 
 Unloaded find_unloaded(const Model& imaged, const RunSettings& settings,
                        const std::function<void(double, double)>& on_iteration) {
+  require_valid(imaged);
   require_shells_only(imaged);
   InverseStatics inverse(imaged, settings);
   VectorX found = inverse.no_motion();
