@@ -330,6 +330,13 @@ std::function<void(const std::string&)> slow_step_note(const cli::Tool& tool, co
   };
 }
 
+/// The world axes that the mesh of the first shells says.
+std::string space_of_shells(const Scene& scene, const std::string& otherwise) {
+  return scene.shells.empty()
+             ? otherwise
+             : read_mesh(scene.shells.front().mesh, scene.shells.front().unit_mm).space.value_or(otherwise);
+}
+
 class Simulation {
 public:
   Simulation(cli::Tool& tool, const Arguments& given) : tool_(tool), given_(given) {}
@@ -368,7 +375,7 @@ public:
                    dynamic != nullptr ? std::optional(dynamic->duration) : std::nullopt);
     require_accuracy();
     if (given_.unloaded) {
-      space_ = read_mesh(scene_.shells.front().mesh, scene_.shells.front().unit_mm).space.value_or(space_);
+      space_ = space_of_shells(scene_, space_);
       write_shells(*given_.unloaded, model().shells.front().mesh, false);
     }
     if (given_.picture.out) {
@@ -417,7 +424,8 @@ private:
                                journal_ ? told(journal_->identity().command) : tool_.provenance().lasting_command()),
         .series = is_series(),
         .tessellation = drawing_.level(),
-        .overwrite = tool_.force() || !given_.resume.empty()};
+        .overwrite = tool_.force() || !given_.resume.empty(),
+        .space = drawing_.surface_endings().empty() ? space_ : space_of_shells(scene_, space_)};
   }
 
   void read() {

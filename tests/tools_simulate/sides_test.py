@@ -1,5 +1,6 @@
 """Which way shells face, whether they are whole, in which space: what a mesh says of itself when it enters."""
 import json
+import pathlib
 import struct
 import unittest
 
@@ -114,6 +115,17 @@ class Sides(SimulateTest):
         report = self.run_tool("--scene", "scene.toml", "out.hdf", "--force")
         self.assertIn("faces inward", self.kinds(report))
         self.assertIn("turned around", "".join(report["warnings"]))
+
+    def test_exported_surfaces_say_the_axes_of_the_shells(self):
+        vertices, triangles, normals = self.ball
+        for space in "RAS", "LPS":
+            write_ply(self.path("shell.ply"), vertices, triangles, normals)
+            content = pathlib.Path(self.path("shell.ply")).read_bytes()
+            pathlib.Path(self.path("shell.ply")).write_bytes(
+                content.replace(b"comment units mm", b"comment units mm\ncomment SPACE=" + space.encode()))
+            self.run_tool("shell.ply", "out.hdf", *FLAGS, "--export", "obj", "--export", "stl")
+            for ending in "obj", "stl":
+                self.assertIn(b"SPACE=" + space.encode(), pathlib.Path(self.path("out." + ending)).read_bytes()[:500])
 
 
 if __name__ == "__main__":
