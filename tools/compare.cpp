@@ -5,6 +5,7 @@
 #include "tunica/io/file/signed_file.hpp"
 #include "tunica/io/mesh/mesh_file.hpp"
 #include "tunica/io/mesh/mesh_pair.hpp"
+#include "tunica/io/mesh/surface_doubts.hpp"
 #include "tunica/io/mesh/surface_file.hpp"
 #include "tunica/shell/distance/boundary_distance.hpp"
 #include "tunica/shell/distance/shell_distance.hpp"
@@ -250,7 +251,32 @@ void tell(cli::Tool& tool, const Surface& a, const Other& b, const HausdorffResu
   if (distance.both.upper - distance.both.lower > 1.01 * width) {
     tool.warn(
         {Weight::minor, "wide interval",
-         "the interval is wider than asked for: rounding allows no less, or the work would have passed its bound"});
+         fmt::format("the distance is known to {:.3g} mm, and {:.3g} mm were asked for: rounding, or the bound of "
+                     "the work, allows no less; both ends of the interval hold",
+                     distance.both.upper - distance.both.lower, width)});
+  }
+}
+
+// What the files hold beside what is compared: curved shells that are read as flat triangles, open seams.
+void warn_of_surfaces(const cli::Tool& tool, const Arguments& given, const MeshFile& file_a, const MeshFile& file_b) {
+  const auto is_shell = [](const MeshFile& file) { return file.patch && !file.normals.empty(); };
+  if (!given.shell && is_shell(file_a)) {
+    tool.warn({Weight::minor, "shell read flat",
+               fmt::format("{}: is a shell mesh, and only its flat facets are compared, whose distance is many times "
+                           "that of the curved shells: pass --shell to compare these",
+                           given.a.string())});
+  }
+  if (is_shell(file_b)) {
+    tool.warn(
+        {Weight::minor, "shell read flat",
+         fmt::format("{}: is a shell mesh, and only its flat facets are compared: name it first, with --shell, to "
+                     "compare its curved shells",
+                     given.b.string())});
+  }
+  for (const auto& [file, path] : {std::pair(&file_a, &given.a), std::pair(&file_b, &given.b)}) {
+    for (const Warning& warning : seam_warnings(file->mesh, examine(file->mesh), *path, Weight::minor)) {
+      tool.warn(warning);
+    }
   }
 }
 
@@ -286,6 +312,7 @@ void run(cli::Tool& tool, const Arguments& given) {
     MeshFile file_b = read_mesh(given.b, unit_mm, require_unit);
     const std::string space = common_space(file_a, given.a, file_b, given.b);
     require_same_scale(file_a, given.a, file_b, given.b, unit_mm);
+    warn_of_surfaces(tool, given, file_a, file_b);
     a = surface_of(std::move(file_a), given);
     a.space = space;
     target = std::move(file_b.mesh);

@@ -3,10 +3,14 @@
 #include "tunica/core/narrow.hpp"
 #include "tunica/core/rounding.hpp"
 #include "tunica/io/mesh/mesh_file.hpp"
+#include "tunica/io/mesh/surface_doubts.hpp"
+#include "tunica/io/mesh/voxel_comments.hpp"
 #include "tunica/surface/decimation/degenerate.hpp"
 #include "tunica/surface/distance/hausdorff.hpp"
 #include "tunica/surface/mesh/checks.hpp"
 #include "tunica/surface/mesh/measure.hpp"
+#include "tunica/surface/mesh/seams.hpp"
+#include "tunica/surface/mesh/self_intersections.hpp"
 #include "tunica/surface/repair/repair.hpp"
 
 #include <fmt/format.h>
@@ -55,8 +59,8 @@ void declare(cli::Tool& tool, Arguments& given) {
   tool.group("Input");
   app.add_flag(
       "--repair", given.repair,
-      "mend an IN that is no oriented manifold: drop double triangles and pieces without area, turn triangles that "
-      "face the wrong way, take apart what meets at too many; holes stay");
+      "mend IN: join boundary edges that coincide (seams, T-junctions), drop double triangles and pieces without "
+      "area, turn triangles that face the wrong way, take apart what meets at too many; holes stay");
 }
 
 std::optional<std::size_t> wanted_triangles(const Arguments& given) {
@@ -84,8 +88,22 @@ std::optional<double> wanted_angle(const Arguments& given) {
   return *number > 0 ? number : std::nullopt;
 }
 
-MeshFile read_surface(const fs::path& path, const std::optional<double>& unit_mm, bool require_unit,
-                      std::optional<Repairs>& repairs) {
+// What IN is, beside fit for the work: open where it looks whole, or inside out. Both stay as they are.
+// @param repaired  boundary edges that still coincide are those that could not agree, which `repairs` counts
+void warn_of_surface(const cli::Tool& tool, const fs::path& path, const TriangleMesh& mesh, const MeshFacts& facts,
+                     bool repaired) {
+  for (const Warning& warning : repaired ? std::vector<Warning>() : seam_warnings(mesh, facts, path, Weight::major)) {
+    tool.warn(warning);
+  }
+  if (const Facing facing = facing_of(mesh); facing.inward > 0) {
+    tool.warn({Weight::minor, "faces inward",
+               fmt::format("{}: {}; they are kept as they are, and tunica-relax turns them outward", path.string(),
+                           facing_phrase(facing))});
+  }
+}
+
+MeshFile read_surface(const cli::Tool& tool, const fs::path& path, const std::optional<double>& unit_mm,
+                      bool require_unit, std::optional<Repairs>& repairs) {
   MeshFile file = read_mesh(path, unit_mm, require_unit);
   require_no_other_unit(file, unit_mm, path);
   if (repairs) {
@@ -97,7 +115,8 @@ MeshFile read_surface(const fs::path& path, const std::optional<double>& unit_mm
       throw InputError(fmt::format("{}: {}", path.string(), error.what()));
     }
   }
-  if (const auto reason = why_unfit(examine(file.mesh))) {
+  const MeshFacts facts = examine(file.mesh);
+  if (const auto reason = why_unfit_surface(file.mesh, facts)) {
     throw InputError(fmt::format(
         "{}: {}; decimation needs a surface where every edge has at most two triangles that face the same way: mend it "
         "with --repair",
@@ -106,6 +125,7 @@ MeshFile read_surface(const fs::path& path, const std::optional<double>& unit_mm
   if (!(diagonal(file.mesh) > 0)) {
     throw InputError(fmt::format("{}: all its vertices lie in one point", path.string()));
   }
+  warn_of_surface(tool, path, file.mesh, facts, repairs.has_value());
   return file;
 }
 
@@ -166,9 +186,10 @@ std::optional<std::string> what_failed(const Arguments& given, const DecimateRes
 struct Coarse {
   DecimateResult made;
   std::optional<Repairs> repairs;
-  Interval distance;    // mm, to the input, two-sided
-  double diagonal = 0;  // mm
-  double angle = 0;     // degrees, smallest
+  Interval distance;                            // mm, to the input, two-sided
+  std::vector<std::array<Index, 2>> crossings;  // pairs of its triangles that cross
+  double diagonal = 0;                          // mm
+  double angle = 0;                             // degrees, smallest
 };
 
 DecimateResult decimated(cli::Tool& tool, const Arguments& given, const TriangleMesh& mesh, double diagonal_mm) {
@@ -207,12 +228,52 @@ Interval measured(cli::Tool& tool, const DecimateResult& coarse, const TriangleM
   return distance;
 }
 
-void tell(cli::Tool& tool, const Arguments& given, const Coarse& coarse, std::size_t triangles_in) {
+// Sheets that were nearer to each other than the error: triangles of one pass through the other.
+void warn_of_crossings(const cli::Tool& tool, const Arguments& given, const Coarse& coarse, const TriangleMesh& in) {
+  const auto& crossings = coarse.crossings;
+  if (crossings.empty() || find_seams(in).edges > 0) {
+    return;  // both sides of a seam touch, and that it is one has been said
+  }
+  const Vec3& place = coarse.made.mesh.vertices[coarse.made.mesh.triangles[crossings.front()[0]][0]];
+  const std::string where = fmt::format(
+      "{}: {} pairs of triangles of the coarser mesh cross, the first near ({:.4g}, "
+      "{:.4g}, {:.4g})",
+      given.in.string(), crossings.size(), place.x(), place.y(), place.z());
+  const std::size_t before = count_self_intersections(in);
+  tool.warn({crossings.size() > before ? Weight::major : Weight::minor, "surface crosses itself",
+             before > 0 ? fmt::format("{}, and {} pairs of IN do: the wall passes through itself there; make IN anew "
+                                      "without crossings",
+                                      where, before)
+                        : fmt::format("{}, because parts of IN lie nearer to each other than the error of {:.3g} mm: "
+                                      "allow more --triangles, or a --max-error smaller than half their distance",
+                                      where, coarse.distance.upper)});
+}
+
+// A count that is far from reached from below. With --repair a count is named to keep all.
+void warn_of_count(const cli::Tool& tool, const Arguments& given, std::size_t triangles, std::size_t triangles_in) {
+  constexpr double about = 0.95;
+  const auto wanted = wanted_triangles(given);
+  if (!wanted || given.max_error || given.repair || real(triangles) >= about * real(*wanted)) {
+    return;
+  }
+  tool.warn({Weight::minor, "fewer than asked for",
+             fmt::format("{}: {} triangles instead of {}: {}", given.in.string(), triangles, *wanted,
+                         *wanted > triangles_in
+                             ? fmt::format("IN has only {}, and decimation makes none; for more, extract from a finer "
+                                           "image, or split shells by tunica-relax --refine",
+                                           triangles_in)
+                             : "its shape and --min-angle leave no more; name more triangles")});
+}
+
+void tell(cli::Tool& tool, const Arguments& given, const Coarse& coarse, const TriangleMesh& in) {
   const TriangleMesh& mesh = coarse.made.mesh;
+  const std::size_t triangles_in = in.triangles.size();
   const MeshFacts facts = examine(mesh);
   const std::size_t degenerate = count_degenerate(mesh);
   const auto min_angle = wanted_angle(given);
   warn_of_changes(tool, given.in, coarse.made, degenerate);
+  warn_of_crossings(tool, given, coarse, in);
+  warn_of_count(tool, given, mesh.triangles.size(), triangles_in);
   if (min_angle && coarse.angle < *min_angle) {
     tool.warn({Weight::minor, "narrow angles",
                fmt::format("the smallest angle is {:.3g} degrees, below --min-angle: {}", coarse.angle,
@@ -231,6 +292,7 @@ void tell(cli::Tool& tool, const Arguments& given, const Coarse& coarse, std::si
       {"manifold", facts.manifold && facts.oriented},
       {"euler", facts.euler},
       {"boundary_loops", facts.boundary_loops},
+      {"self_intersections", coarse.crossings.size()},
       {"degenerate_triangles", degenerate},
       {"closed_loops", coarse.made.closed_loops},
       {"longest_spike_mm", coarse.made.longest_spike},
@@ -238,6 +300,8 @@ void tell(cli::Tool& tool, const Arguments& given, const Coarse& coarse, std::si
   };
   if (const auto& repairs = coarse.repairs) {
     tool.result()["repairs"] = {{"dropped_triangles", repairs->dropped_triangles},
+                                {"joined_edges", repairs->joined_edges},
+                                {"split_edges", repairs->split_edges},
                                 {"turned_triangles", repairs->turned_triangles},
                                 {"opened_edges", repairs->opened_edges},
                                 {"split_vertices", repairs->split_vertices},
@@ -266,7 +330,7 @@ void run(cli::Tool& tool, const Arguments& given) {
   {
     const auto stage = tool.stage("read");
     const bool in_millimetres = given.max_error && !given.max_error->relative;
-    in = read_surface(tool.input(given.in), unit_mm, in_millimetres, coarse.repairs);
+    in = read_surface(tool, tool.input(given.in), unit_mm, in_millimetres, coarse.repairs);
     tool.require_unchanged_inputs();
   }
   coarse.diagonal = diagonal(in.mesh);
@@ -275,13 +339,15 @@ void run(cli::Tool& tool, const Arguments& given) {
   {
     const auto stage = tool.stage("measure");
     coarse.distance = measured(tool, coarse.made, in.mesh, coarse.diagonal);
-    tell(tool, given, coarse, in.mesh.triangles.size());
+    coarse.crossings = find_self_intersections(coarse.made.mesh);
+    tell(tool, given, coarse, in.mesh);
   }
 
   const auto stage = tool.stage("write");
   const auto failure = what_failed(given, coarse.made, coarse.angle);
   PlyOptions options;
-  options.comments = {"made by " + tool.made_by()};
+  options.comments = voxel_comments(in);
+  options.comments.push_back("made by " + tool.made_by());
   options.space = in.space.value_or(options.space);
   options.millimetres = !in.unit_unknown;
   options.overwrite = tool.force();

@@ -1,26 +1,31 @@
+#include "tunica/cli/label_choice.hpp"
+#include "tunica/cli/surface_result.hpp"
 #include "tunica/cli/tool.hpp"
 #include "tunica/cli/usage.hpp"
 #include "tunica/cli/volume_contents.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/core/version.hpp"
 #include "tunica/io/mesh/surface_file.hpp"
-#include "tunica/io/volume/label_names.hpp"
 #include "tunica/io/volume/volume_file.hpp"
-#include "tunica/surface/mesh/checks.hpp"
 #include "tunica/surface/mesh/incidence.hpp"
 #include "tunica/surface/mesh/measure.hpp"
+#include "tunica/volume/cubes/doubts.hpp"
 #include "tunica/volume/cubes/label_index.hpp"
 #include "tunica/volume/cubes/marching_cubes.hpp"
+#include "tunica/volume/cubes/openings.hpp"
 #include "tunica/volume/cubes/outward.hpp"
 #include "tunica/volume/labels/components.hpp"
+#include "tunica/volume/labels/hollows.hpp"
 #include "tunica/volume/smoothing/smoothing.hpp"
+#include "tunica/wall/face_distance.hpp"
 
 #include <fmt/format.h>
 
-#include <Eigen/LU>
-
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <functional>
+#include <memory>
 #include <utility>
 
 namespace {
@@ -42,6 +47,8 @@ struct Arguments {
   bool largest = false;
   bool fill_cavities = false;
   bool open_border = false;
+  std::optional<std::string> face;  // of a wall
+  std::optional<fs::path> other_face;
   std::string smooth = "none";
   std::string space = "lps";
   std::optional<std::string> spacing;
@@ -59,8 +66,9 @@ struct Smoothing {
 
 // What is extracted: one selection of voxels, and how it is called.
 struct Target {
-  Inside inside;
-  std::string name;  // "label 3 (aorta)", "above 200"
+  Inside inside;             // of several labels the first
+  std::string name;          // "label 3 (aorta)", "above 200"
+  std::string in_file_name;  // for {label}
 };
 
 void declare(cli::Tool& tool, Arguments& arguments) {
@@ -72,8 +80,8 @@ void declare(cli::Tool& tool, Arguments& arguments) {
   app.add_option(
          "--label", arguments.label,
          "the label whose surface is wanted, by value or by the name that the volume, --names or a table beside "
-         "the volume (scan.tsv, .ctbl, .label, .lut, .txt, .csv of scan.nii.gz) gives it")
-      ->type_name("N");
+         "the volume (scan.tsv, .ctbl, .label, .lut, .txt, .csv of scan.nii.gz) gives it; A+B: several as one organ")
+      ->type_name("N[+N]");
   app.add_option(
          "--names", arguments.names,
          "a table of label names: BIDS _dseg.tsv, ITK-SNAP's, Slicer's .ctbl, FreeSurfer's look-up table, CSV, JSON")
@@ -88,7 +96,13 @@ void declare(cli::Tool& tool, Arguments& arguments) {
   app.add_flag("--largest", arguments.largest, "keep the largest component only");
   app.add_flag("--fill-cavities", arguments.fill_cavities, "drop the surfaces of cavities");
   app.add_flag("--open-border", arguments.open_border,
-               "leave open, trimmed flat, what the image's border cuts, instead of closing it");
+               "leave open, trimmed flat, the ends of vessels that the image's border cuts, instead of closing them");
+  app.add_option("--face", arguments.face,
+                 "of a label that is the wall itself: this face alone, closed or open as a vessel, normals outward")
+      ->check(CLI::IsMember({"inner", "outer"}))
+      ->type_name("inner|outer");
+  app.add_option("--other-face", arguments.other_face, "with --face: write the wall's other face here")
+      ->type_name("OUT.ply");
   app.add_option("--smooth", arguments.smooth,
                  "none, staircase (steps of the voxels, within half a voxel), or a Gaussian's sigma such as 1.5mm")
       ->type_name("none|staircase|SIGMA");
@@ -172,6 +186,12 @@ void refuse_contradictions(const Arguments& arguments) {
   if (arguments.isovalue && !parse_number(*arguments.isovalue)) {
     throw UsageError(fmt::format("--isovalue: '{}' is not a number", *arguments.isovalue));
   }
+  if (arguments.face && arguments.all_labels) {
+    refuse("--face is of one wall: name it by --label instead of --all-labels");
+  }
+  if (arguments.other_face && !arguments.face) {
+    refuse("--other-face needs --face inner or outer, which says what OUT.ply is");
+  }
   if (arguments.info) {
     return;
   }
@@ -188,43 +208,6 @@ void refuse_contradictions(const Arguments& arguments) {
                     arguments.out.string()));
   }
 }
-
-// The names of a volume's labels: those of --names, else the volume's own, else those of a table beside it.
-class Names {
-public:
-  void read(cli::Tool& tool, const Arguments& arguments) {
-    if (arguments.names) {
-      given_ = read_label_names(tool.input(*arguments.names));
-      warn_of_several(tool, *arguments.names, given_);
-      return;
-    }
-    for (const fs::path& table : label_tables_beside(arguments.volume)) {
-      try {
-        beside_ = read_label_names(table);
-        tool.input(table);
-        warn_of_several(tool, table, beside_);
-        return;
-      } catch (const InputError& error) {
-        tool.warn({Weight::minor, "label table",
-                   fmt::format("{}; left out, the volume's labels have no names of it", error.what())});
-      }
-    }
-  }
-
-  [[nodiscard]] const LabelNames& of(const VolumeFile& file) const {
-    return !given_.empty() ? given_ : !file.volume.label_names.empty() ? file.volume.label_names : beside_;
-  }
-
-private:
-  static void warn_of_several(const cli::Tool& tool, const fs::path& table, const LabelNames& names) {
-    if (const auto warning = several_names(table, names)) {
-      tool.warn(*warning);
-    }
-  }
-
-  LabelNames given_;
-  LabelNames beside_;
-};
 
 void widen(Interval& range, const Volume& volume) {
   std::visit(
@@ -285,7 +268,7 @@ VolumeFile read_slabs(cli::Tool& tool, const Arguments& arguments, const char* d
   return read;
 }
 
-VolumeContents contents_of(cli::Tool& tool, const Arguments& arguments, const Names& names) {
+VolumeContents contents_of(cli::Tool& tool, const Arguments& arguments, const cli::LabelTables& names) {
   VolumeContents contents;
   std::optional<LabelIndex> index;
   const VolumeFile file = read_slabs(
@@ -311,22 +294,12 @@ VolumeContents contents_of(cli::Tool& tool, const Arguments& arguments, const Na
   return contents;
 }
 
-// The label asked for, by value or by name; none where there is none of that name, or the background.
-std::optional<Target> label_target(const fs::path& path, const LabelNames& names, const std::string& text) {
-  const auto value = naming(path.string(), [&] { return find_label(names, text); });
-  if (!value || *value == 0) {
-    return {};
-  }
-  const auto at = std::ranges::find(names, *value, [](const auto& label) { return label.first; });
-  const std::string name = parse_number(text) ? (at == names.end() ? "" : at->second) : text;
-  return Target{{Inside::Rule::label, *value}, "label " + named({*value, 0, 0, name})};
-}
-
 Target isovalue_target(const Arguments& arguments) {
   const bool below = arguments.inside == "below";
   const double value = *parse_number(*arguments.isovalue);
   return {{below ? Inside::Rule::below : Inside::Rule::above, value},
-          fmt::format("{} {}", below ? "below" : "above", value)};
+          fmt::format("{} {}", below ? "below" : "above", value),
+          {}};
 }
 
 fs::path output_path(const fs::path& pattern, const Target& target) {
@@ -334,42 +307,19 @@ fs::path output_path(const fs::path& pattern, const Target& target) {
   if (target.inside.rule == Inside::Rule::label) {
     const std::string word = "{label}";
     for (std::size_t at = text.find(word); at != std::string::npos; at = text.find(word, at)) {
-      text.replace(at, word.size(), fmt::format("{}", target.inside.value));
+      text.replace(at, word.size(), target.in_file_name);
     }
   }
   return text;
 }
 
-Json undefined_result() {
-  Json result;
-  for (const char* key : {"vertices", "triangles", "components", "euler", "closed", "manifold", "oriented_outward",
-                          "volume_mm3", "voxel_volume_mm3", "area_mm2", "diagonal_mm"}) {
-    result[key] = nullptr;
-  }
-  return result;
-}
-
 struct Surface {
   TriangleMesh mesh;
   Mask mask;                                 // the selection the mesh bounds
-  double voxel_volume_mm3 = 0;               // of the whole selection, before pieces were dropped
   bool outward = false;                      // of the surface before the staircase was smoothed
   std::optional<StaircaseResult> staircase;  // what that smoothing did
+  Openings openings;                         // of an open border
 };
-
-// @return the share of the voxels that pieces had which are left out
-double keep_wanted_pieces(Mask& mask, const Arguments& arguments) {
-  double left_out = 0;
-  if (arguments.largest) {
-    const std::size_t selected = count_voxels(mask);
-    keep_largest_piece(mask);
-    left_out = selected > 0 ? 1 - real(count_voxels(mask)) / real(selected) : 0;
-  }
-  if (arguments.fill_cavities) {
-    fill_cavities(mask);
-  }
-  return left_out;
-}
 
 // Voxels that were selected, and how their surface is made of them.
 struct Selection {
@@ -377,13 +327,66 @@ struct Selection {
   Mask mask;
   std::optional<MaskBounds> bounds;  // where the mask holds anything, if known
   const Volume* volume = nullptr;    // the values of a grey volume that is at hand
+  std::optional<std::string> face;   // of the wall that was selected: the mask is what it bounds
 };
+
+// By which a surface lies between the values of a grey volume: what the inner face of a wall bounds is its hollow.
+Inside surface_rule(const Selection& selection) {
+  Inside rule = selection.target.inside;
+  if (selection.face == "inner" && rule.rule != Inside::Rule::label) {
+    rule.rule = rule.rule == Inside::Rule::above ? Inside::Rule::below : Inside::Rule::above;
+  }
+  return rule;
+}
+
+Mask solid_of(const Mask& wall, const Hollows& hollows, const std::string& face) {
+  return face == "inner" ? inner_solid(hollows) : outer_solid(wall, hollows);
+}
+
+void keep_wanted_pieces(Mask& mask, const Arguments& arguments) {
+  if (arguments.largest) {
+    keep_largest_piece(mask);
+  }
+  if (arguments.fill_cavities) {
+    fill_cavities(mask);
+  }
+}
+
+void warn_all(const cli::Tool& tool, const std::vector<Warning>& warnings) {
+  for (const Warning& warning : warnings) {
+    tool.warn(warning);
+  }
+}
+
+// Keeps the pieces that are wanted, and says what that left out or filled, and what is odd about the rest.
+void keep_and_doubt(cli::Tool& tool, const Subject& subject, Selection& selection, const Arguments& arguments) {
+  Mask& mask = selection.mask;
+  const std::size_t selected = count_voxels(mask);
+  std::optional<Hollows> hollows;
+  if (!selection.face) {
+    hollows = find_hollows(mask);
+  }
+  if (arguments.largest) {
+    keep_largest_piece(mask);
+    warn_all(tool, doubt_pieces(subject, 1 - real(count_voxels(mask)) / real(selected)));
+  }
+  if (hollows) {
+    Mask filled = mask;
+    CavityFacts cavities{fill_cavities(filled), 0, arguments.fill_cavities};
+    cavities.voxels = count_voxels(filled) - count_voxels(mask);
+    warn_all(tool, doubt_hollows(subject, mask, *hollows, cavities));
+    if (arguments.fill_cavities) {
+      mask = std::move(filled);
+    }
+  }
+  warn_all(tool, doubt_bridge(subject, find_bridge(mask)));
+}
 
 // Values that are not at hand are read a second time.
 TriangleMesh marching_cubes_of(const Selection& selection, const Arguments& arguments,
                                const MarchingCubesOptions& options) {
   const Mask& mask = selection.mask;
-  const Inside& inside = selection.target.inside;
+  const Inside inside = surface_rule(selection);
   if (inside.rule == Inside::Rule::label) {
     return marching_cubes(mask, options);
   }
@@ -405,128 +408,79 @@ SmoothedField smoothed_field(cli::Tool& tool, const Selection& selection, double
              : smooth_mask(selection.mask, sigma, progress);
 }
 
-// Smoothing keeps the volume, so that only the voxels tell what it did to the shape.
-void warn_of_smoothing(const cli::Tool& tool, const Selection& selection, const Mask& smoothed) {
-  constexpr double notable = 0.1;
-  const double changed = real(count_differing(selection.mask, smoothed)) / real(count_voxels(selection.mask));
-  if (changed > notable) {
-    tool.warn({Weight::minor, "smoothing",
-               fmt::format(
-                   "{}: smoothing changes the shape: it moves as many voxels in or out as {:.3g} % of its own; pass a "
-                   "smaller sigma",
-                   selection.target.name, 1e2 * changed)});
+[[noreturn]] void throw_nothing(cli::Tool& tool, const std::string& name, const Arguments& arguments,
+                                const cli::LabelTables& names) {
+  const VolumeContents contents = contents_of(tool, arguments, names);
+  if (arguments.label) {
+    cli::throw_no_label(arguments.volume, contents, *arguments.label);
   }
+  throw InputError(fmt::format("{}: no voxel is {}; its values are {:.6g} to {:.6g}", arguments.volume.string(), name,
+                               contents.values.lower, contents.values.upper));
 }
 
-void warn_of_pieces(const cli::Tool& tool, const std::string& name, double left_out) {
-  constexpr double notable = 0.01;
-  if (left_out > notable) {
-    tool.warn(
-        {Weight::minor, "pieces left out",
-         fmt::format(
-             "{}: only its largest piece is taken: {:.3g} % of its voxels lie in others, which are left out; without "
-             "--largest, LARGEST=0 of the pipeline, they stay",
-             name, 1e2 * left_out)});
+// The surface of what Gaussian smoothing makes of a selection, which becomes the selection's mask.
+std::function<TriangleMesh(const MarchingCubesOptions&)> smoothed_surface(cli::Tool& tool, const Subject& subject,
+                                                                          Selection& selection,
+                                                                          const Arguments& arguments, double sigma) {
+  auto smoothed = std::make_shared<SmoothedField>(smoothed_field(tool, selection, sigma));
+  const auto stage = tool.stage("extract");
+  Mask mask = select(smoothed->field, smoothed->rule);
+  if (selection.volume != nullptr && selection.face) {
+    mask = solid_of(mask, find_hollows(mask), *selection.face);
+    smoothed->rule = surface_rule(selection);
   }
+  keep_wanted_pieces(mask, arguments);
+  // Smoothing keeps the volume, so that only the voxels tell what it did to the shape.
+  warn_all(tool,
+           doubt_smoothing(subject, real(count_differing(selection.mask, mask)) / real(count_voxels(selection.mask))));
+  selection.mask = std::move(mask);
+  return [smoothed, &selection](const MarchingCubesOptions& options) {
+    return marching_cubes(smoothed->field, smoothed->rule, selection.mask, options);
+  };
 }
 
-Surface extract(cli::Tool& tool, Selection selection, const Arguments& arguments, const Names& names,
+Surface extract(cli::Tool& tool, const Subject& subject, Selection selection, const Arguments& arguments,
                 const Smoothing& smoothing) {
-  double voxel_volume = 0;
+  const bool gaussian = smoothing.kind == Smoothing::Kind::gaussian;
   {
     const auto stage = tool.stage("extract");
-    voxel_volume = real(count_voxels(selection.mask)) * selection.mask.voxel_volume();
-    if (voxel_volume > 0) {
-      warn_of_pieces(tool, selection.target.name, keep_wanted_pieces(selection.mask, arguments));
-    }
-  }
-  const Target target = selection.target;
-  if (voxel_volume == 0) {
-    const VolumeContents contents = contents_of(tool, arguments, names);
-    if (arguments.label) {
-      cli::throw_no_label(arguments.volume, contents, *arguments.label);
-    }
-    throw InputError(fmt::format("{}: no voxel is {}; its values are {:.6g} to {:.6g}", arguments.volume.string(),
-                                 target.name, contents.values.lower, contents.values.upper));
+    keep_and_doubt(tool, subject, selection, arguments);
   }
   MarchingCubesOptions options;
   options.open_border = arguments.open_border;
   options.progress = tool.progress("extract");
-  std::optional<Surface> surface;
-  const bool gaussian = smoothing.kind == Smoothing::Kind::gaussian;
+  std::function<TriangleMesh(const MarchingCubesOptions&)> cubes = [&](const MarchingCubesOptions& chosen) {
+    return marching_cubes_of(selection, arguments, chosen);
+  };
   if (gaussian) {
-    const SmoothedField smoothed = smoothed_field(tool, selection, smoothing.sigma);
-    const auto stage = tool.stage("extract");
-    Mask mask = select(smoothed.field, smoothed.rule);
-    keep_wanted_pieces(mask, arguments);
-    warn_of_smoothing(tool, selection, mask);
-    TriangleMesh mesh = marching_cubes(smoothed.field, smoothed.rule, mask, options);
-    surface.emplace(Surface{std::move(mesh), std::move(mask), voxel_volume, false, {}});
+    cubes = smoothed_surface(tool, subject, selection, arguments, smoothing.sigma);
   } else {
-    const auto stage = tool.stage("extract");
     options.bounds = selection.bounds;
-    TriangleMesh mesh = marching_cubes_of(selection, arguments, options);
-    surface.emplace(Surface{std::move(mesh), std::move(selection.mask), voxel_volume, false, {}});
   }
-  if (surface->mesh.triangles.empty()) {
-    throw InputError(fmt::format("{}: the surface of {} is empty: {}", arguments.volume.string(), target.name,
-                                 gaussian ? "the smoothing removes it; pass a smaller sigma"
-                                          : "it fills the whole image; leave out --open-border"));
-  }
-  surface->outward = faces_outward(surface->mesh, surface->mask, arguments.open_border);
-  if (smoothing.kind == Smoothing::Kind::staircase) {
-    const auto stage = tool.stage("smooth");
-    const StaircaseOptions staircase{arguments.open_border, tool.progress("smooth")};
-    surface->staircase = smooth_staircase(surface->mesh, surface->mask, staircase);
-  }
-  return std::move(*surface);
-}
-
-// Measures what was made; a surface that is not what marching cubes promises is a defect of ours.
-Json measured(const Surface& surface, bool open_border) {
-  const MeshFacts facts = examine(surface.mesh);
-  if (const auto why = why_unfit(facts, open_border ? Boundary::allowed : Boundary::forbidden)) {
-    throw InternalError("the extracted surface is not a manifold: " + *why);
-  }
-  const double volume = signed_volume(surface.mesh);
-  Json result = undefined_result();
-  result["vertices"] = facts.vertices;
-  result["triangles"] = facts.triangles;
-  result["components"] = facts.components;
-  result["euler"] = facts.euler;
-  result["closed"] = facts.closed;
-  result["manifold"] = facts.manifold;
-  result["oriented_outward"] = facts.oriented && surface.outward && (!facts.closed || volume > 0);
-  result["volume_mm3"] = facts.closed ? Json(volume) : Json();
-  result["voxel_volume_mm3"] = surface.voxel_volume_mm3;
-  result["area_mm2"] = area(surface.mesh);
-  result["diagonal_mm"] = diagonal(surface.mesh);
-  if (surface.staircase) {
-    result["staircase"] = {{"largest_move_voxels", surface.staircase->largest_move},
-                           {"volume_change", surface.staircase->volume_change},
-                           {"held_back", surface.staircase->held_back}};
-  }
-  return result;
-}
-
-// Sums of what can be summed; the report's top level for several labels.
-Json summed(const Json& labels) {
-  Json total = undefined_result();
-  for (const auto& [label, result] : labels.items()) {
-    for (const auto& [key, value] : result.items()) {
-      if (key == "diagonal_mm") {
-        continue;  // boxes of several surfaces do not add up
-      }
-      if (value.is_boolean()) {
-        total[key] = (total[key].is_null() || total[key].get<bool>()) && value.get<bool>();
-      } else if (value.is_number_integer()) {
-        total[key] = (total[key].is_null() ? 0L : total[key].get<long>()) + value.get<long>();
-      } else if (value.is_number()) {
-        total[key] = (total[key].is_null() ? 0.0 : total[key].get<double>()) + value.get<double>();
+  Surface surface{{}, selection.mask, false, {}, {}};
+  {
+    const auto stage = tool.stage("extract");
+    surface.mesh = cubes(options);
+    if (arguments.open_border && !surface.mesh.triangles.empty()) {
+      surface.openings = find_openings(surface.mask, surface.mesh);
+      if (surface.openings.lids.any()) {
+        options.lids = &surface.openings.lids;
+        surface.mesh = cubes(options);
       }
     }
   }
-  return total;
+  if (surface.mesh.triangles.empty()) {
+    throw InputError(fmt::format("{}: the surface of {} is empty: {}", arguments.volume.string(), subject.name,
+                                 gaussian ? "the smoothing removes it; pass a smaller sigma"
+                                          : "it fills the whole image; leave out --open-border"));
+  }
+  surface.outward = faces_outward(surface.mesh, surface.mask, arguments.open_border);
+  if (smoothing.kind == Smoothing::Kind::staircase) {
+    const auto stage = tool.stage("smooth");
+    const StaircaseOptions staircase{arguments.open_border, tool.progress("smooth")};
+    surface.staircase = smooth_staircase(surface.mesh, surface.mask, staircase);
+  }
+  return surface;
 }
 
 void to_space(TriangleMesh& mesh, const std::string& space) {
@@ -547,89 +501,108 @@ void note_file(cli::Tool& tool, const VolumeFile& file) {
   tool.result()["warnings"] = texts_of(file.warnings);
 }
 
-// A surface runs halfway between the middles of voxels and is rounded off there: what is a few voxels thick loses
-// volume.
-void warn_of_few_voxels(const cli::Tool& tool, const Surface& surface, const Json& result, const std::string& name) {
-  constexpr double notable = 0.05;
-  if (result["volume_mm3"].is_null()) {
-    return;
+void doubt(cli::Tool& tool, const Subject& subject, const Surface& surface, const Target& target, const Json& result,
+           bool open_border) {
+  if (!result["volume_mm3"].is_null()) {
+    warn_all(tool, doubt_volume(subject, surface.mask, result["volume_mm3"].get<double>()));
   }
-  const double voxels = real(count_voxels(surface.mask)) * surface.mask.voxel_volume();
-  const double change = result["volume_mm3"].get<double>() / voxels - 1;
-  if (std::abs(change) > notable) {
-    tool.warn(
-        {Weight::minor, "few voxels",
-         fmt::format(
-             "{}: the surface encloses {:.3g} % {} than its voxels: it is few voxels thick, and neither volume need "
-             "be right within that; take finer voxels",
-             name, 1e2 * std::abs(change), change < 0 ? "less" : "more")});
+  if (open_border) {
+    warn_all(tool, doubt_openings(subject, surface.openings, result["area_mm2"].get<double>()));
+    warn_all(tool, doubt_rims(subject, surface.mask, surface.mesh, boundary_loops(surface.mesh)));
+  } else {
+    warn_all(tool, doubt_closed_border(subject, surface.mask, target.inside));
   }
 }
 
-void warn_of_cut(const cli::Tool& tool, const Surface& surface, const Target& target) {
-  const std::size_t cut = count_at_border(surface.mask);
-  if (cut == 0) {
-    return;
-  }
-  const auto& dims = surface.mask.dims();
-  const auto inner = [](std::size_t count) { return count - std::min<std::size_t>(count, 2); };
-  const std::size_t border = dims[0] * dims[1] * dims[2] - inner(dims[0]) * inner(dims[1]) * inner(dims[2]);
-  if (const auto rule = target.inside.rule; rule != Inside::Rule::label && 2 * cut > border) {
-    tool.warn({Weight::major, "other side",
-               fmt::format("{}: it is most of the image's border: what is meant may be the other side (--inside {})",
-                           target.name, rule == Inside::Rule::above ? "below" : "above")});
-  }
-  tool.warn(
-      {Weight::minor, "cut by the border",
-       fmt::format("{}: the image's border cuts it ({} voxels), and flat lids close it there; --open-border, OPEN=1 "
-                   "of the pipeline, leaves it open, as a vessel is",
-                   target.name, cut)});
+void write(cli::Tool& tool, const fs::path& out, TriangleMesh mesh, const std::string& name, const Vec3& voxel,
+           const Arguments& arguments) {
+  const auto stage = tool.stage("write");
+  PlyOptions options;
+  options.comments = {fmt::format("tunica-extract {}", version), printable("made by " + tool.made_by()),
+                      printable("source " + tool.provenance().name_of(arguments.volume)), printable(name),
+                      fmt::format("voxel {:.6g} {:.6g} {:.6g} mm", voxel.x(), voxel.y(), voxel.z())};
+  options.space = arguments.space == "ras" ? "RAS" : "LPS";
+  options.overwrite = tool.force();
+  to_space(mesh, arguments.space);
+  write_surface(out, mesh, options);
+  tool.note(fmt::format("{}: {} triangles, {:.6g} mm2", out.string(), mesh.triangles.size(), area(mesh)));
 }
 
-// A cut of a few voxels is no end of a vessel, but would be held as one.
-void warn_of_narrow_rims(const cli::Tool& tool, const Surface& surface, const std::string& name) {
-  constexpr std::size_t narrow_rim = 12;  // vertices, one per face of a voxel around it: 3 x 3 voxels
-  const auto rims = boundary_loops(surface.mesh);
-  const auto few = std::ranges::count_if(rims, [](const auto& rim) { return rim.size() < narrow_rim; });
-  if (few > 0) {
-    tool.warn({Weight::minor, "narrow opening",
-               fmt::format(
-                   "{}: the image's border leaves {} of its {} opening(s) a few voxels wide: supports at the boundary "
-                   "hold these as they do the ends of a vessel; leave the outermost slices out of the image, or "
-                   "hold the ends by where they are (--fix 'above z=...', FIX of the pipeline)",
-                   name, few, rims.size())});
+// The selection by which a face of a wall is extracted.
+Selection face_of(const Selection& wall, const Hollows& hollows, const std::string& face) {
+  Selection selection{wall.target, solid_of(wall.mask, hollows, face), {}, wall.volume, face};
+  selection.target.name += ", " + face + " face";
+  return selection;
+}
+
+// What is extracted of a wall: one face, and the other one.
+std::array<Selection, 2> both_faces(cli::Tool& tool, const Subject& subject, const Selection& wall,
+                                    const Arguments& arguments) {
+  const Hollows hollows = find_hollows(wall.mask);
+  if (hollows.sizes.empty()) {
+    throw InputError(fmt::format(
+        "{}: {} is no wall around a hollow, so it has no inner and no outer face: leave out --face; where it "
+        "is a wall with a hole, close that in the segmentation, and where it ends within the image, crop the image so "
+        "that "
+        "its border cuts the wall",
+        arguments.volume.string(), wall.target.name));
   }
+  warn_all(tool, doubt_wall(subject, hollows));
+  const std::string& face = *arguments.face;
+  return {face_of(wall, hollows, face), face_of(wall, hollows, face == "inner" ? "outer" : "inner")};
 }
 
 // Extracts one surface, writes it and returns what the report says of it.
-Json extract_to_file(cli::Tool& tool, Selection selection, const Arguments& arguments, const Names& names,
+Json extract_to_file(cli::Tool& tool, Selection selection, const Arguments& arguments, const cli::LabelTables& names,
                      const Smoothing& smoothing) {
   const Target target = selection.target;
   const Vec3 voxel = selection.mask.affine().leftCols<3>().colwise().norm();
-  Surface surface = extract(tool, std::move(selection), arguments, names, smoothing);
-  Json result = measured(surface, arguments.open_border);
-  warn_of_few_voxels(tool, surface, result, target.name);
-  if (arguments.open_border) {
-    warn_of_narrow_rims(tool, surface, target.name);
-  } else {
-    warn_of_cut(tool, surface, target);
+  const double voxel_volume = real(count_voxels(selection.mask)) * selection.mask.voxel_volume();
+  if (voxel_volume == 0) {
+    throw_nothing(tool, target.name, arguments, names);
   }
-  const fs::path out = output_path(arguments.out, target);
+  Subject subject{target.name, arguments.space == "ras"};
+  std::optional<Surface> other;
+  if (arguments.face) {
+    auto [face, behind] = both_faces(tool, subject, selection, arguments);
+    other = extract(tool, {behind.target.name, subject.ras}, behind, arguments, smoothing);
+    selection = std::move(face);
+    subject.name = selection.target.name;
+  }
+  const std::string name = selection.target.name;
+  const Surface surface = extract(tool, subject, std::move(selection), arguments, smoothing);
+  Json result = cli::measure_surface(surface.mesh, surface.outward, arguments.open_border);
+  result["voxel_volume_mm3"] = voxel_volume;
+  if (surface.staircase) {
+    result["staircase"] = {{"largest_move_voxels", surface.staircase->largest_move},
+                           {"volume_change", surface.staircase->volume_change},
+                           {"held_back", surface.staircase->held_back}};
+  }
+  doubt(tool, subject, surface, target, result, arguments.open_border);
   tool.require_unchanged_inputs();
-  {
-    const auto stage = tool.stage("write");
-    PlyOptions options;
-    options.comments = {fmt::format("tunica-extract {}", version), printable("made by " + tool.made_by()),
-                        printable("source " + tool.provenance().name_of(arguments.volume)), printable(target.name),
-                        fmt::format("voxel {:.6g} {:.6g} {:.6g} mm", voxel.x(), voxel.y(), voxel.z())};
-    options.space = arguments.space == "ras" ? "RAS" : "LPS";
-    options.overwrite = tool.force();
-    to_space(surface.mesh, arguments.space);
-    write_surface(out, surface.mesh, options);
+  write(tool, output_path(arguments.out, target), surface.mesh, name, voxel, arguments);
+  if (other) {
+    const FaceDistance thickness =
+        distance_of_faces(without_border(surface.mesh, surface.mask), without_border(other->mesh, other->mask));
+    result["face"] = *arguments.face;
+    result["wall_thickness_mm"] = {{"mean", thickness.mean}, {"p5", thickness.p5}, {"p95", thickness.p95}};
+    tool.note(fmt::format("{}: the wall is {:.4g} mm thick in the mean, {:.4g} to {:.4g} mm over nine tenths of it",
+                          target.name, thickness.mean, thickness.p5, thickness.p95));
+    if (arguments.other_face) {
+      const std::string& behind = *arguments.face == "inner" ? "outer" : "inner";
+      write(tool, output_path(*arguments.other_face, target), other->mesh, target.name + ", " + behind + " face", voxel,
+            arguments);
+    }
   }
-  tool.note(fmt::format("{}: {} triangles, {:.6g} mm2", out.string(), result["triangles"].get<std::size_t>(),
-                        result["area_mm2"].get<double>()));
   return result;
+}
+
+// Registers what one selection is written to.
+void claim_outputs(cli::Tool& tool, const Arguments& arguments, const Target& target) {
+  tool.output(output_path(arguments.out, target), surface_endings());
+  if (arguments.other_face) {
+    tool.output(output_path(*arguments.other_face, target), surface_endings());
+  }
 }
 
 void set_result(cli::Tool& tool, const Json& result) {
@@ -639,7 +612,8 @@ void set_result(cli::Tool& tool, const Json& result) {
 }
 
 // One pass over the volume, whatever the number of labels.
-void run_all_labels(cli::Tool& tool, const Arguments& arguments, const Names& names, const Smoothing& smoothing) {
+void run_all_labels(cli::Tool& tool, const Arguments& arguments, const cli::LabelTables& names,
+                    const Smoothing& smoothing) {
   std::optional<LabelIndex> index;
   const VolumeFile file = read_slabs(tool, arguments, "extract",
                                      [&](const VolumeFile& header, const Volume& slab, std::size_t first_slice) {
@@ -657,7 +631,7 @@ void run_all_labels(cli::Tool& tool, const Arguments& arguments, const Names& na
   }
   std::vector<Target> targets;
   for (const Label& label : *labels) {
-    targets.push_back({{Inside::Rule::label, label.value}, "label " + named(label)});
+    targets.push_back({{Inside::Rule::label, label.value}, "label " + named(label), fmt::format("{}", label.value)});
     tool.output(output_path(arguments.out, targets.back()), surface_endings());
   }
   Json results;
@@ -666,12 +640,12 @@ void run_all_labels(cli::Tool& tool, const Arguments& arguments, const Names& na
     {
       const auto stage = tool.stage("extract");
       const double value = target.inside.value;
-      selection.emplace(Selection{target, index->mask(value), index->bounds(value)});
+      selection.emplace(Selection{target, index->mask(value), index->bounds(value), nullptr, {}});
     }
     results[fmt::format("{}", target.inside.value)] =
         extract_to_file(tool, std::move(*selection), arguments, names, smoothing);
   }
-  set_result(tool, summed(results));
+  set_result(tool, cli::sum_of_surfaces(results));
   tool.result()["labels"] = results;
 }
 
@@ -684,9 +658,10 @@ bool hold_values(const Arguments& arguments, const Smoothing& smoothing, const V
          (!arguments.slab && header.volume.voxels() <= most_bytes / voxel_bytes);
 }
 
-Json run_isovalue(cli::Tool& tool, const Arguments& arguments, const Names& names, const Smoothing& smoothing) {
+Json run_isovalue(cli::Tool& tool, const Arguments& arguments, const cli::LabelTables& names,
+                  const Smoothing& smoothing) {
   const Target target = isovalue_target(arguments);
-  tool.output(arguments.out, surface_endings());
+  claim_outputs(tool, arguments, target);
   std::optional<VolumeFile> file;
   std::optional<Mask> mask;
   {
@@ -710,31 +685,38 @@ Json run_isovalue(cli::Tool& tool, const Arguments& arguments, const Names& name
                       });
   }
   note_file(tool, *file);
-  return extract_to_file(tool, {target, std::move(*mask), {}, held ? &file->volume : nullptr}, arguments, names,
+  return extract_to_file(tool, {target, std::move(*mask), {}, held ? &file->volume : nullptr, {}}, arguments, names,
                          smoothing);
 }
 
-Json run_label(cli::Tool& tool, const Arguments& arguments, const Names& names, const Smoothing& smoothing) {
+Json run_label(cli::Tool& tool, const Arguments& arguments, const cli::LabelTables& names, const Smoothing& smoothing) {
   std::optional<Target> target;
-  std::optional<Mask> mask;
-  const VolumeFile file = read_slabs(tool, arguments, "extract",
-                                     [&](const VolumeFile& header, const Volume& slab, std::size_t first_slice) {
-                                       if (!mask) {
-                                         mask.emplace(header.volume.dims, header.volume.affine);
-                                         target = label_target(arguments.volume, names.of(header), *arguments.label);
-                                         if (target) {
-                                           tool.output(output_path(arguments.out, *target), surface_endings());
-                                         }
-                                       }
-                                       if (target) {
-                                         select(slab, first_slice, target->inside, *mask);
-                                       }
-                                     });
+  std::optional<cli::LabelSelection> selection;
+  std::string absent;
+  const VolumeFile file = read_slabs(
+      tool, arguments, "extract", [&](const VolumeFile& header, const Volume& slab, std::size_t first_slice) {
+        if (first_slice == 0) {
+          auto [choice, missing] =
+              naming(arguments.volume.string(), [&] { return cli::choose_labels(names.of(header), *arguments.label); });
+          absent = missing;
+          if (choice) {
+            target = {{Inside::Rule::label, choice->values[0]}, choice->name, choice->in_file_name};
+            claim_outputs(tool, arguments, *target);
+            selection.emplace(std::move(*choice), header.volume);
+          }
+        }
+        if (selection) {
+          selection->add(slab, first_slice);
+        }
+      });
   note_file(tool, file);
-  if (!target) {
-    cli::throw_no_label(arguments.volume, contents_of(tool, arguments, names), *arguments.label);
+  if (selection) {
+    absent = selection->absent();
   }
-  return extract_to_file(tool, {*target, std::move(*mask), {}, nullptr}, arguments, names, smoothing);
+  if (!selection || !absent.empty()) {
+    cli::throw_no_label(arguments.volume, contents_of(tool, arguments, names), absent);
+  }
+  return extract_to_file(tool, {*target, std::move(selection->mask()), {}, nullptr, {}}, arguments, names, smoothing);
 }
 
 void run(cli::Tool& tool, Arguments& arguments) {
@@ -744,8 +726,8 @@ void run(cli::Tool& tool, Arguments& arguments) {
     arguments.volume_options.spacing = parse_spacing(*arguments.spacing);
   }
   tool.input(arguments.volume);
-  Names names;
-  names.read(tool, arguments);
+  cli::LabelTables names;
+  names.read(tool, arguments.volume, arguments.names);
   if (arguments.label && !arguments.names) {
     arguments.volume_options.segment = *arguments.label;
   }
@@ -754,7 +736,7 @@ void run(cli::Tool& tool, Arguments& arguments) {
     const VolumeContents contents = contents_of(tool, arguments, names);
     header.warnings = contents.warnings;
     const auto [text, info] = cli::volume_info(arguments.volume, header, contents, arguments.shells.value_or(800));
-    tool.result() = undefined_result();
+    tool.result() = cli::undefined_surface();
     tool.result().update(info);
     note_file(tool, header);
     tool.print(text);

@@ -9,7 +9,9 @@
 #include "tunica/io/file/signed_file.hpp"
 #include "tunica/io/mesh/mesh_file.hpp"
 #include "tunica/io/mesh/mesh_pair.hpp"
+#include "tunica/io/mesh/surface_doubts.hpp"
 #include "tunica/io/mesh/surface_file.hpp"
+#include "tunica/io/mesh/voxel_comments.hpp"
 #include "tunica/shell/distance/mean_bound.hpp"
 #include "tunica/shell/distance/shell_crossings.hpp"
 #include "tunica/shell/distance/shell_quality.hpp"
@@ -206,11 +208,11 @@ std::optional<double> degrees(const std::string& option, const std::optional<std
 struct Surface {
   MeshFile file;
   MeshFacts facts;
-  std::optional<TriangleMesh> with_spikes;  ///< as it was given, where spikes were taken away
+  std::optional<TriangleMesh> with_spikes;  ///< as it was given, where triangles without area were taken away
   double moved = 0;                         ///< mm, by that
 };
 
-// Shells have area: what hangs on a surface without any can only be taken away.
+// Shells have area: what hangs on a surface without any can only be taken away. Caps within it would be creases.
 void take_spikes(const cli::Tool& tool, const fs::path& path, Surface& surface) {
   TriangleMesh& mesh = surface.file.mesh;
   if (count_degenerate(mesh) == 0) {
@@ -221,14 +223,34 @@ void take_spikes(const cli::Tool& tool, const fs::path& path, Surface& surface) 
     tool.warn({Weight::minor, "spikes",
                fmt::format("{}: spikes without area, up to {:.4g} mm long, are taken away from its boundary",
                            path.string(), cleaned.longest_spike)});
+  }
+  // A boundary loop that is a point stays one of the target's.
+  if (cleaned.longest_spike > 0 || cleaned.closed_loops == 0) {
     surface.moved = cleaned.moved;
     surface.with_spikes = std::exchange(mesh, std::move(cleaned.mesh));
   }
 }
 
+// Pressure pushes along the normals: they are to point outward.
+void turn_outward(const cli::Tool& tool, const fs::path& path, TriangleMesh& mesh) {
+  const Facing facing = facing_of(mesh);
+  if (facing.inward == 0) {
+    return;
+  }
+  mesh = turned_outward(std::move(mesh), facing);
+  tool.warn({Weight::minor, "faces inward",
+             fmt::format("{}: {}: they are turned around, so that a positive pressure pushes outward; give a negative "
+                         "one to push inward",
+                         path.string(), facing_phrase(facing))});
+}
+
 Surface read_surface(const cli::Tool& tool, const fs::path& path, const std::optional<double>& unit_mm) {
   Surface surface{read_mesh(path, unit_mm, true), {}, {}, 0};
   surface.facts = require_surface(surface.file, path);
+  for (const Warning& warning : seam_warnings(surface.file.mesh, surface.facts, path, Weight::major)) {
+    tool.warn(warning);
+  }
+  turn_outward(tool, path, surface.file.mesh);
   take_spikes(tool, path, surface);
   return surface;
 }
@@ -236,9 +258,11 @@ Surface read_surface(const cli::Tool& tool, const fs::path& path, const std::opt
 void warn_of_mismatch(const cli::Tool& tool, const MeshFacts& a, const MeshFacts& b) {
   const auto differ = [&](std::size_t of_coarse, std::size_t of_target, const std::string& what) {
     if (of_coarse != of_target) {
-      tool.warn({Weight::major, "another topology",
-                 fmt::format("COARSE has {} {}, TARGET has {}; the distance will show what cannot be covered",
-                             of_coarse, what, of_target)});
+      tool.warn(
+          {Weight::major, "another topology",
+           fmt::format("COARSE has {} {}, TARGET has {}: what COARSE lacks stays uncovered, and the distance shows "
+                       "it; make COARSE of this TARGET by tunica-decimate",
+                       of_coarse, what, of_target)});
     }
   };
   differ(a.components, b.components, "component(s)");
@@ -286,6 +310,33 @@ void write_maps(cli::Tool& tool, const Arguments& given, const ShellMesh& shell,
   }
 }
 
+void warn_of_crossings(const cli::Tool& tool, const ShellMesh& shell,
+                       const std::vector<std::array<Index, 2>>& crossings) {
+  if (crossings.empty()) {
+    return;
+  }
+  const Vec3& place = shell.vertices[shell.triangles[crossings.front()[0]][0]];
+  tool.warn({Weight::minor, "shells cross",
+             fmt::format("{} pair(s) of curved shells cross, the first near ({:.4g}, {:.4g}, {:.4g}): the wall passes "
+                         "through itself there; more shells part them, or a TARGET that does not cross itself",
+                         crossings.size(), place.x(), place.y(), place.z())});
+}
+
+/// A count that the target itself does not reach.
+/// @param coarse  triangles of COARSE
+void warn_if_few(const cli::Tool& tool, const Arguments& given, std::size_t coarse, const ShellMesh& made,
+                 const Target& target) {
+  constexpr double about = 0.95;
+  const std::size_t wanted = given.shells.value_or(coarse);
+  const bool is_to_count = given.method == "fit" && !given.tolerance && !given.refine;
+  if (is_to_count && real(made.triangles.size()) < about * real(wanted)) {
+    tool.warn({Weight::minor, "fewer than asked for",
+               fmt::format("{}: {} shells instead of {}: TARGET has {} triangles, and what they allow is all there is; "
+                           "for more, extract TARGET from a finer image, or split these shells by --refine",
+                           given.target.string(), made.triangles.size(), wanted, target.mesh().triangles.size())});
+  }
+}
+
 std::size_t handles(const MeshFacts& facts) {
   const long without = 2 * narrow<long>(facts.components) - narrow<long>(facts.boundary_loops);
   return narrow<std::size_t>(std::max(0L, without - facts.euler) / 2);
@@ -300,7 +351,9 @@ void warn_of_middle(const cli::Tool& tool, const HalfWaySurface& middle) {
   }
   if (middle.crossing > 0) {
     tool.warn({Weight::major, "wall crosses itself",
-               fmt::format("the middle of the wall crosses itself at {} pair(s) of its triangles", middle.crossing)});
+               fmt::format("the middle of the wall crosses itself at {} pair(s) of its triangles: a thinner wall or a "
+                           "smoother TARGET parts them",
+                           middle.crossing)});
   }
 }
 
@@ -343,6 +396,8 @@ private:
     require_same_scale(start.file, given_.coarse, surface.file, given_.target, unit_mm);
     require_near(start.file, given_.coarse, surface.file, given_.target);
     ply_ = ply_options(tool_, common_space(start.file, given_.coarse, surface.file, given_.target));
+    const auto kept = voxel_comments(voxel_comments(surface.file).empty() ? start.file : surface.file);
+    ply_.comments.insert(ply_.comments.begin(), kept.begin(), kept.end());
     if (given_.other_face) {
       tool_.input(*given_.other_face);
       Surface other = read_surface(tool_, *given_.other_face, unit_mm);
@@ -353,6 +408,7 @@ private:
     }
     tool_.require_unchanged_inputs();
     coarse_ = std::move(start.file.mesh);
+    asked_ = coarse_.triangles.size();
     const bool looks_for_middle = given_.mid_surface && !other_;
     Target& face = (looks_for_middle ? face_ : target_).emplace(std::move(surface.file.mesh));
     if (surface.with_spikes && !looks_for_middle) {
@@ -363,14 +419,11 @@ private:
       surface.facts.boundary_loops -= face.point_loops();  // decimation closes them
     }
     warn_of_mismatch(tool_, start.facts, surface.facts);
-    if (looks_for_middle && faces_inward(face)) {
-      face_.emplace(turned_around(face.mesh()));
-      tool_.warn({Weight::minor, "faces inward", "TARGET's triangles face inward; they were turned around"});
-    }
-    if (faces_other_way(coarse_, looks_for_middle ? *face_ : *target_)) {
+    if (faces_other_way(coarse_, face)) {
       coarse_ = turned_around(std::move(coarse_));
-      tool_.warn(
-          {Weight::minor, "faces inward", "COARSE faces the other way than TARGET; its triangles were turned around"});
+      tool_.warn({Weight::minor, "faces the other way",
+                  fmt::format("{}: faces the other way than {}: its triangles are turned around to agree",
+                              given_.coarse.string(), given_.target.string())});
     }
     if (fits_ && given_.tolerance && !given_.refine && given_.coarse != given_.target) {
       tool_.note(
@@ -430,7 +483,7 @@ private:
       tool_.warn(
           {Weight::major, "another topology",
            fmt::format("the middle of the wall has {} rim(s) and {} handle(s), TARGET has {} and {}: half of the "
-                       "wall closes a gap, or a branch is too narrow for it",
+                       "wall closes a gap, or a branch is too narrow for it; a thinner wall leaves them",
                        after.boundary_loops, handles(after), before.boundary_loops, handles(before))});
     }
     Json& said = tool_.result()["mid_surface"];
@@ -518,6 +571,7 @@ private:
     result["diagonal_mm"] = whole().diagonal();
     result["mean_distance_bound_mm"] = mean_bound_ ? Json(*mean_bound_) : Json();
     warn_if_far();
+    warn_if_few(tool_, given_, asked_, relaxed_.shell, *target_);
     measure_shapes();
     if (mean_bound_) {
       tool_.note(fmt::format("mean distance certainly below {:.4g} mm, {:.3g} % of the wall",
@@ -536,7 +590,8 @@ private:
       tool_.warn(
           {Weight::major, "another surface",
            fmt::format("shells and surface are {:.3g} % of the surface's diagonal apart: are COARSE and TARGET of one "
-                       "organ, in this order and in the same place?",
+                       "organ, in this "
+                       "order and in the same place?",
                        apart)});
     }
   }
@@ -546,20 +601,15 @@ private:
     const double angle = min_angle_degrees(flat_facets(relaxed_.shell));
     result["min_angle_deg"] = angle;
     if (const double wanted = min_angle_.value_or(usual_angle); fits_ && angle < rounded_up * wanted) {
-      tool_.warn({Weight::minor, "narrow angles",
-                  fmt::format("the smallest angle is {:.3g} degrees, below {:.3g}: boundaries or creases do not allow "
-                              "more, or the error would be larger",
-                              angle, wanted)});
-    }
-    const std::size_t crossings = crossing_patches(relaxed_.shell).size();
-    result["self_intersections"] = crossings;
-    if (crossings > 0) {
       tool_.warn(
-          {Weight::minor, "shells cross",
-           fmt::format(
-               "{} pair(s) of curved shells cross: more shells, or a target that does not cross itself, will part them",
-               crossings)});
+          {Weight::minor, "narrow angles",
+           fmt::format("the smallest angle of the shells is {:.3g} degrees, below {:.3g}: boundaries, creases or the "
+                       "tolerance allow no more, and stresses there are less certain; allow more shells",
+                       angle, wanted)});
     }
+    const auto crossings = crossing_patches(relaxed_.shell);
+    result["self_intersections"] = crossings.size();
+    warn_of_crossings(tool_, relaxed_.shell, crossings);
     const ShellQuality quality = shell_quality(relaxed_.shell, whole());
     result["mean_distance_mm"] = quality.mean_distance;
     result["normal_error_deg"] = {{"mean", quality.mean_normal_error}, {"max", quality.max_normal_error}};
@@ -688,6 +738,7 @@ private:
   bool fits_;
   std::optional<double> min_angle_;  // degrees
   TriangleMesh coarse_;
+  std::size_t asked_ = 0;       // triangles of COARSE
   std::optional<Target> face_;  // TARGET, where the middle of the wall takes its place
   std::optional<Target> target_, with_spikes_;
   std::optional<Target> other_;  // the wall's other face

@@ -4,6 +4,7 @@
 #include "tunica/cli/tool.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/core/version.hpp"
+#include "tunica/fit/relax.hpp"
 #include "tunica/io/file/output_file.hpp"
 #include "tunica/io/mesh/mesh_file.hpp"
 #include "tunica/io/mesh/mesh_pair.hpp"
@@ -14,6 +15,7 @@
 #include "tunica/io/result/run_report.hpp"
 #include "tunica/io/scene/scene.hpp"
 #include "tunica/io/scene/scene_file.hpp"
+#include "tunica/io/scene/stated.hpp"
 #include "tunica/mechanics/runs/curved_displacement.hpp"
 #include "tunica/mechanics/runs/doubts.hpp"
 #include "tunica/mechanics/runs/solve.hpp"
@@ -28,6 +30,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <iterator>
 #include <numbers>
 
@@ -141,6 +144,7 @@ Scene read_scene_of_run(cli::Tool& tool, const Arguments& a, const std::optional
     scene = parse_scene(before->identity().scene, a.resume);
   } else {
     scene = a.flags.scene(a.files.front());
+    cli::SceneFlags::keep_typed(tool.arguments(), scene);
   }
   for (const fs::path& mesh : mesh_files(scene)) {
     if (std::find(inputs.begin(), inputs.end(), mesh) == inputs.end()) {
@@ -250,6 +254,36 @@ RunIdentity identity_of_run(const cli::Tool& tool, const Scene& scene, const std
   return identity;
 }
 
+/// What the meshes of a scene say beside what they hold.
+void tell_findings(const cli::Tool& tool, const LoadedScene& loaded) {
+  for (const std::string& note : loaded.notes) {
+    tool.note(note);
+  }
+  for (const Warning& warning : loaded.warnings) {
+    tool.warn(warning);
+  }
+}
+
+void warn_of_no_target(const cli::Tool& tool, const fs::path& shells) {
+  tool.warn({Weight::minor, "no target",
+             fmt::format("{}: has no target: finer shells lie on its own patches, and the error of its geometry is not "
+                         "seen (--target, or target in [accuracy])",
+                         shells.string())});
+}
+
+/// A target that faces as the shells do.
+std::unique_ptr<Target> target_like(const cli::Tool& tool, const ShellMesh& shell, TriangleMesh mesh,
+                                    const fs::path& path) {
+  auto target = std::make_unique<Target>(std::move(mesh));
+  if (faces_other_way({shell.vertices, shell.triangles}, *target)) {
+    tool.warn({Weight::minor, "faces the other way",
+               fmt::format("{}: faces the other way than the shells: its triangles are turned around to agree",
+                           path.string())});
+    target = std::make_unique<Target>(turned_around(target->mesh()));
+  }
+  return target;
+}
+
 /// A target that cannot be what the shells were fitted to: no finer than they are, or somewhere else.
 void require_own_target(const ShellMesh& shell, const Target& target, const fs::path& path) {
   constexpr std::size_t facets_per_shell = 2;
@@ -290,6 +324,19 @@ void warn_of(const cli::Tool& tool, const fs::path& subject, std::vector<Warning
   }
 }
 
+std::function<void(const std::string&)> slow_step_note(const cli::Tool& tool, const fs::path& subject) {
+  return [&tool, name = subject.string()](const std::string& text) {
+    tool.warn({Weight::note, "slow step", fmt::format("{}: {}", name, text)});
+  };
+}
+
+/// The world axes that the mesh of the first shells says.
+std::string space_of_shells(const Scene& scene, const std::string& otherwise) {
+  return scene.shells.empty()
+             ? otherwise
+             : read_mesh(scene.shells.front().mesh, scene.shells.front().unit_mm).space.value_or(otherwise);
+}
+
 class Simulation {
 public:
   Simulation(cli::Tool& tool, const Arguments& given) : tool_(tool), given_(given) {}
@@ -328,7 +375,7 @@ public:
                    dynamic != nullptr ? std::optional(dynamic->duration) : std::nullopt);
     require_accuracy();
     if (given_.unloaded) {
-      space_ = read_mesh(scene_.shells.front().mesh, scene_.shells.front().unit_mm).space.value_or(space_);
+      space_ = space_of_shells(scene_, space_);
       write_shells(*given_.unloaded, model().shells.front().mesh, false);
     }
     if (given_.picture.out) {
@@ -377,7 +424,8 @@ private:
                                journal_ ? told(journal_->identity().command) : tool_.provenance().lasting_command()),
         .series = is_series(),
         .tessellation = drawing_.level(),
-        .overwrite = tool_.force() || !given_.resume.empty()};
+        .overwrite = tool_.force() || !given_.resume.empty(),
+        .space = drawing_.surface_endings().empty() ? space_ : space_of_shells(scene_, space_)};
   }
 
   void read() {
@@ -416,18 +464,13 @@ private:
     require_fresh();
     name_unloaded(tool_, given_, scene_);
     asked_ = scene_text(scene_, out_);
+    tool_.stated() = stated_inputs(scene_);
     loaded_.emplace(load_scene(scene_));
     read_targets();
-    for (const std::string& note : loaded_->notes) {
-      tool_.note(note);
-    }
+    tell_findings(tool_, *loaded_);
     for (std::size_t b = 0; scene_.accuracy && b < targets_.size(); ++b) {
       if (!targets_[b] && model().shells[b].curved) {
-        tool_.warn(
-            {Weight::minor, "no target",
-             fmt::format("{}: has no target: finer shells lie on its own patches, and the error of its geometry is not "
-                         "seen (--target, or target in [accuracy])",
-                         scene_.shells[b].mesh.string())});
+        warn_of_no_target(tool_, scene_.shells[b].mesh);
       }
     }
   }
@@ -470,7 +513,7 @@ private:
       for (Vec3& vertex : file.mesh.vertices) {
         vertex *= shell.scale;
       }
-      targets_[b] = std::make_unique<Target>(std::move(file.mesh));
+      targets_[b] = target_like(tool_, model().shells[b].mesh, std::move(file.mesh), path);
       require_own_target(model().shells[b].mesh, *targets_[b], path);
     }
   }
@@ -561,10 +604,8 @@ private:
     }
     if (!accuracy_->reasons.empty()) {
       journal_->remove();
-      throw RequirementError(fmt::format("{}: {:g}% of {} is not credible: {}; what there is stays in {}.part",
-                                         subject().string(), 100 * accuracy_->request.within,
-                                         name_of(accuracy_->request.of), fmt::join(accuracy_->reasons, "; "),
-                                         out_.string()));
+      throw RequirementError(fmt::format("{}: {}; what there is stays in {}.part", subject().string(),
+                                         missed_accuracy(*accuracy_), out_.string()));
     }
   }
 
@@ -610,8 +651,7 @@ private:
     if (given_.picture.out && (!is_modes() || !drawn_ || drawn_->first.time == 0)) {
       drawn_.emplace(state, of_state);
     }
-    wall_ = of_state.wall;
-    unresolved_ = count_unresolved(model(), state, most_bending);
+    last_ = {of_state.wall, count_unresolved(model(), state, most_bending), of_state.turn_p99};
   }
 
   Summary solved() {
@@ -628,6 +668,7 @@ private:
       journal_->offer(make);
       stage("solve");
     };
+    resumption.on_slow_step = slow_step_note(tool_, subject());
     const auto on_state = [&](const State& state) {
       stage("write");
       journal_->append(state);
@@ -660,10 +701,18 @@ private:
   }
 
   void tell(const Summary& summary, bool converged) {
-    tool_.note(fmt::format("{} nodes in {} steps, {}: largest displacement {:.4g} mm", model().node_count(),
-                           summary.steps, converged ? "converged" : "not asked to converge",
-                           tool_.result()["max_displacement_mm"].get<double>()));
-    warn_of(tool_, subject(), run_warnings(scene_.run, summary, wall_, unresolved_));
+    const Json& result = tool_.result();
+    std::string found = fmt::format("largest displacement {:.4g} mm", result["max_displacement_mm"].get<double>());
+    if (!model().shells.empty()) {
+      found += fmt::format(" (99 % of the wall below {:.4g} mm), stress of the wall {} (99th percentile)",
+                           result["displacement_p99_mm"].get<double>(), pressure_text(last_.wall.stress_p99));
+    }
+    tool_.note(fmt::format("{} nodes in {} steps, {}: {}", model().node_count(), summary.steps,
+                           converged ? "converged" : "not asked to converge", found));
+    if (accuracy_) {
+      last_.turn_p99 = 0;  // a linear model was held against a nonlinear one
+    }
+    warn_of(tool_, subject(), run_warnings(scene_.run, summary, last_));
     warn_of(tool_, subject(), contact_warnings(tool_.result()));
   }
 
@@ -686,8 +735,7 @@ private:
   std::optional<ResultFile> file_;
   std::optional<ResultExport> exported_;
   std::optional<ElementFieldEvaluator> fields_;
-  Wall wall_;                   // of the last state
-  std::size_t unresolved_ = 0;  // elements that bend more than the mesh can show
+  LastState last_;
 };
 
 }  // namespace

@@ -37,8 +37,7 @@ def filtered(algorithm, data):
 
 
 def patches(corners, normals):
-    """Points of the cubic patches of triangles at barycentric(PIECES): edges as those of docs/reconstruction.md away from
-    creases, the middle as that of curved PN triangles.
+    """Points of the watertight patches (docs/reconstruction.md) of triangles at barycentric(PIECES), without their rule at creases.
     @param corners, normals  triangles x 3 x 3
     """
     def control(a, b):
@@ -50,7 +49,15 @@ def patches(corners, normals):
 
     pairs = [(a, b) for a in range(3) for b in range(3) if a != b]
     controls = {(a, b): control(a, b) for a, b in pairs}
-    middle = 1.5 * np.mean([*controls.values()], axis=0) - 0.5 * corners.mean(axis=1)
+
+    def middle_without_xxy(a, b, c):
+        edge, side = corners[:, b] - corners[:, a], corners[:, c] - corners[:, a]
+        s = np.sum(edge * side, axis=1, keepdims=True) / np.sum(edge * edge, axis=1, keepdims=True)
+        at_a = corners[:, a] - 2 * controls[a, b] + controls[b, a]
+        at_b = corners[:, b] - 2 * controls[b, a] + controls[a, b]
+        return ((s - 1) * at_a - s * at_b + controls[a, c] + controls[b, c]) / 2
+
+    middle = np.mean([middle_without_xxy(*turn) for turn in ((0, 1, 2), (1, 2, 0), (2, 0, 1))], axis=0)
     weights = barycentric(PIECES)
     points = np.einsum("sk,tkc->tsc", weights ** 3, corners) + 6 * np.prod(weights, axis=1)[None, :, None] * middle[:, None]
     for a, b in pairs:
@@ -352,8 +359,12 @@ def main():
     if np.linalg.norm(np.cross(given.view, given.up)) < 1e-6 * np.linalg.norm(given.view):
         parser.error("--view looks along --up: give --up another direction")
 
-    with h5py.File(given.result) as file:
+    try:
+        file = h5py.File(given.result)
         part = file["tunica"]
+    except (OSError, KeyError) as error:
+        sys.exit(f"draw.py: {given.result}: no result of tunica-simulate: {error}")
+    with file:
         places = part["history/time"][:]
         scene = tomllib.loads(part["scene"].asstr()[()])
         states = [int(np.argmin(np.abs(places - place))) for place in given.at or places[-1:]]

@@ -288,11 +288,10 @@ private:
   void give_up() {
     const std::size_t shells = level_.shell_count();
     out_.reasons.push_back(
-        out_.estimate ? fmt::format("the error is estimated at {:.2g} % with {} shells, and the next level would have "
-                                    "{}, more than {}",
-                                    100 * *out_.estimate, shells, 4 * shells, request_.max_shells)
-                      : fmt::format("an estimate takes {} levels, and {} shells are followed by {}, more than {}",
-                                    fewest_levels, shells, 4 * shells, request_.max_shells));
+        out_.estimate
+            ? fmt::format("the next level would have {} shells, more than {}", 4 * shells, request_.max_shells)
+            : fmt::format("an estimate takes {} levels, and {} shells are followed by {}, more than {}", fewest_levels,
+                          shells, 4 * shells, request_.max_shells));
   }
 
   void tell_choices() {

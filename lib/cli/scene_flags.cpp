@@ -3,6 +3,7 @@
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/core/quantity.hpp"
+#include "tunica/core/spelling.hpp"
 
 #include <fmt/format.h>
 
@@ -37,7 +38,8 @@ double number(const std::optional<std::string>& text, const char* flag, double o
   }
   const auto value = parse_number(*text);
   if (!value) {
-    throw UsageError(fmt::format("{}: '{}' is not a number", flag, *text));
+    const std::string way = advice(right_numbers(*text));
+    throw UsageError(fmt::format("{}: '{}' is not a number{}{}", flag, *text, way.empty() ? "" : ": ", way));
   }
   return *value;
 }
@@ -209,12 +211,32 @@ Scene SceneFlags::scene(const std::filesystem::path& mesh) const {
     SceneFix fix;
     fix.body = shell.name;
     fix.where = parse_fix(text);
-    fix.places = {{fmt::format("{}: --fix '{}'", shell.mesh.string(), text), true}, {}};
+    fix.places = {{fmt::format("{}: --fix '{}'", shell.mesh.string(), text), true, text}, {}};
     scene.fixes.push_back(fix);
   }
   settle_solver(scene);
   check_scene(scene);
   return scene;
+}
+
+void SceneFlags::keep_typed(const CLI::App& app, Scene& scene) {
+  const auto keep = [&](Places& places, const char* key, const char* flag) {
+    if (app.count(flag) > 0) {
+      Place& place = places.keys.try_emplace(key, places.item).first->second;
+      place.typed = app.get_option(flag)->results().front();
+    }
+  };
+  for (SceneShell& shell : scene.shells) {
+    keep(shell.places, "young", "--young");
+    keep(shell.places, "thickness", "--thickness");
+    keep(shell.places, "density", "--density");
+  }
+  for (SceneLoad& load : scene.loads) {
+    keep(load.places, "value", "--pressure");
+    keep(load.places, "imaged_at", "--imaged-at");
+  }
+  keep(scene.run_places, "duration", "--duration");
+  keep(scene.run_places, "step", "--step");
 }
 
 void AccuracyFlags::declare(Tool& tool) {

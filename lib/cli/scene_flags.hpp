@@ -26,6 +26,9 @@ struct SceneFlags {
 
   /// The scene that they describe. Errors: UsageError.
   [[nodiscard]] Scene scene(const std::filesystem::path& mesh) const;
+
+  /// Notes in the scene that they describe how its quantities were written.
+  static void keep_typed(const CLI::App& app, Scene& scene);
 };
 
 /// How accurate the answer is to be.

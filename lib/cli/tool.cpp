@@ -1,12 +1,16 @@
 #include "tunica/cli/tool.hpp"
 
 #include "tunica/cli/detail/documentation.hpp"
+#include "tunica/cli/detail/own_stack.hpp"
+#include "tunica/cli/detail/stop_watch.hpp"
 #include "tunica/cli/usage.hpp"
 #include "tunica/core/instruction_set.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/core/threads.hpp"
 #include "tunica/core/version.hpp"
 #include "tunica/core/words.hpp"
+#include "tunica/io/file/report_file.hpp"
+#include "tunica/io/result/run_journal.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -35,11 +39,13 @@ namespace tunica::cli {
 namespace {
 
 constexpr const char* report_flag = "--report";
+constexpr const char* resume_flag = "--resume";
 constexpr const char* standard_output = "-";  // as its value
 constexpr const char* no_memory = "out of memory: give it more, or a smaller input";
 
 extern "C" void on_signal(int signal) {
   request_stop(signal);
+  StopWatch::on_stop_signal(signal);
   // The second signal ends the program at once: somebody is waiting.
   std::signal(signal, SIG_DFL);
 }
@@ -84,8 +90,18 @@ double peak_mebibytes() {
   return real(usage.ru_maxrss) / 1024.0;
 }
 
+// Where the words of a command line end that may be options.
+std::vector<std::string>::const_iterator end_of_options(const std::vector<std::string>& words) {
+  return std::ranges::find(words, "--");
+}
+
+bool is_given(const std::vector<std::string>& words, const char* flag) {
+  return std::find(words.begin(), end_of_options(words), flag) != end_of_options(words);
+}
+
 // The report of a run whose command line could not be parsed: then no option has been stored yet.
-std::filesystem::path report_argument(const std::vector<std::string>& words) {
+std::filesystem::path report_argument(const std::vector<std::string>& all) {
+  const std::vector<std::string> words(all.begin(), end_of_options(all));
   for (std::size_t i = 1; i < words.size(); ++i) {
     if (words[i - 1] == report_flag) {
       return words[i];
@@ -161,6 +177,26 @@ void require_no_other_file(const std::filesystem::path& report) {
   }
 }
 
+// The report is written last: where the process may open no file beside those it has, that is told before the work.
+void require_descriptor(const std::filesystem::path& report) {
+  const int spare = ::dup(STDERR_FILENO);
+  if (spare < 0) {
+    throw OutputError(
+        fmt::format("{}: cannot be written: {}: allow more (ulimit -n)", report.string(), std::strerror(errno)));
+  }
+  ::close(spare);
+}
+
+// Whether there is a report in which this tool says that it did not come to its end: a run that goes on replaces it.
+bool tells_of_failure(const std::filesystem::path& report, const std::string& tool) {
+  try {
+    const Report before = read_report(report);
+    return before.tool() == tool && !before.ok();
+  } catch (const InputError&) {
+    return false;
+  }
+}
+
 }  // namespace
 
 Tool::Tool(std::string verb, std::string summary, std::string example)
@@ -170,6 +206,8 @@ Tool::Tool(std::string verb, std::string summary, std::string example)
   app_.set_help_flag();
   app_.formatter(help_layout());
 }
+
+Tool::~Tool() = default;
 
 void Tool::declare_common() {
   const char* const common = "Options of every tool";
@@ -283,7 +321,7 @@ std::optional<int> Tool::parse(int argc, char** argv) {
     }
   } catch (const CLI::ParseError& error) {
     report_ = report_argument(words_);
-    force_ = std::ranges::find(words_, "--force") != words_.end();
+    force_ = is_given(words_, "--force");
     return finish(ExitCode::usage, fmt::format("{} (see tunica-{} --help)", usage_message(app_, error), verb_));
   } catch (const UsageError& error) {
     return finish(error.code(), fmt::format("{} (see tunica-{} --help)", error.what(), verb_));
@@ -302,7 +340,7 @@ int Tool::run(int argc, char** argv, const std::function<void()>& body) {
   said.resize(std::max<std::size_t>(said.size(), 1));
   said[0] = "tunica-" + verb_;
   provenance_ = Provenance(std::move(said));
-  no_paths_ = std::ranges::find(words_, "--no-paths") != words_.end();
+  no_paths_ = is_given(words_, "--no-paths");
   if (no_paths_) {
     provenance_.hide_paths();  // before anything fails: the report of that must not name them either
   }
@@ -310,6 +348,7 @@ int Tool::run(int argc, char** argv, const std::function<void()>& body) {
   std::signal(SIGXFSZ, SIG_IGN);  // writing past a limit on file sizes is then an error like a full disk
   declare_common();
   tidy_options(app_);
+  stop_watch_ = std::make_unique<StopWatch>([this](int signal) { end_unseen(signal); });
   std::signal(SIGINT, on_signal);
   std::signal(SIGTERM, on_signal);
   if (std::signal(SIGHUP, on_signal) == SIG_IGN) {
@@ -322,11 +361,16 @@ int Tool::run(int argc, char** argv, const std::function<void()>& body) {
   int code = 0;
   try {
     const auto ended = parse(argc, argv);
-    code = ended ? *ended : perform(body);
+    if (ended) {
+      code = *ended;
+    } else {
+      with_enough_stack([&] { code = perform(body); });
+    }
   } catch (const std::bad_alloc&) {
     code = end_without_memory();
   }
   end_without_memory = nullptr;
+  stop_watch_.reset();
   return code;
 }
 
@@ -342,7 +386,7 @@ int Tool::perform(const std::function<void()>& body) {
   } catch (const Error& error) {
     return finish(error.code(), error.what());
   } catch (const Interrupted& interrupted) {
-    finish(ExitCode::ok, fmt::format("stopped by signal {}", interrupted.signal()));
+    finish(ExitCode::ok, stopped_by(interrupted.signal()));
     return 128 + interrupted.signal();
   } catch (const std::bad_alloc&) {
     return finish(ExitCode::memory, out_of_memory(no_memory));
@@ -377,10 +421,15 @@ void Tool::register_report() {
   }
   // A report that is refused is not to be written by finish() either.
   const std::filesystem::path report = std::exchange(report_, {});
-  require_writable(report, force_);
+  replaces_failed_ = goes_on() && tells_of_failure(report, "tunica-" + verb_);
+  if (app_.get_option_no_throw(resume_flag) != nullptr && !force_) {
+    std::ranges::for_each(words_, [&](const std::string& word) { require_none_to_go_on_with(word); });
+  }
+  require_writable(report, force_ || replaces_failed_);
   require_no_other_file(report);
   report_lock_ = PartLock::take(part_of(report));
-  require_writable(report, force_);
+  require_descriptor(report);
+  require_writable(report, force_ || replaces_failed_);
   report_ = report;
   // However this run ends, an older report must not speak for it. Where the command line names that file once more, it
   // may be an input, which is yet to be refused.
@@ -393,14 +442,74 @@ void Tool::register_report() {
   std::filesystem::remove(report, ignored);
 }
 
+bool Tool::goes_on() const {
+  const CLI::Option* const resume = app_.get_option_no_throw(resume_flag);
+  return resume != nullptr && resume->count() > 0;
+}
+
+// What a run leaves that was stopped an hour after its start is not to be lost by a slip.
+void Tool::require_none_to_go_on_with(const std::filesystem::path& path) const {
+  if (!force_ && !goes_on() && RunJournal::can_go_on(part_of(path))) {
+    throw OutputError(
+        fmt::format("{0}: an interrupted run is kept in {1}: go on with it by {2} {1}, or pass --force to begin again",
+                    path.string(), part_of(path).string(), resume_flag));
+  }
+}
+
+std::string Tool::stopped_by(int signal) const {
+  const auto kept = std::ranges::find_if(
+      outputs_, [](const std::filesystem::path& path) { return RunJournal::can_go_on(part_of(path)); });
+  return fmt::format("stopped by signal {}{}", signal,
+                     kept == outputs_.end()
+                         ? ""
+                         : fmt::format(": go on by tunica-{} {} {}", verb_, resume_flag, part_of(*kept).string()));
+}
+
+// In the thread that watches, while the work goes on: of what that changes only what is guarded is read, so the report
+// has no result. Nothing but what can go on is left under the names of the outputs.
+void Tool::end_unseen(int signal) {
+  memory_limit_.lift();
+  const std::unique_lock guard(recording_, std::try_to_lock);
+  const std::string message = guard ? stopped_by(signal) : fmt::format("stopped by signal {}", signal);
+  std::fprintf(stderr, "%stunica-%s: %s\n", bar_open_ ? "\n" : "", verb_.c_str(), one_line(message).c_str());
+  if (!guard) {
+    return;
+  }
+  const auto remove_parts = [&] {
+    for (const std::filesystem::path& path : outputs_) {
+      const std::filesystem::path part = part_of(path);
+      std::error_code missing;
+      const auto written = std::filesystem::last_write_time(part, missing);
+      const auto bytes = std::filesystem::file_size(part, missing);
+      if (!missing && (bytes == 0 || written >= start_on_disk_) && !RunJournal::can_go_on(part)) {
+        std::filesystem::remove(part, missing);
+      }
+    }
+  };
+  remove_parts();
+  if (!report_.empty()) {
+    try {
+      write_report(false, message, Json::object());
+    } catch (const std::exception& failure) {
+      std::fprintf(stderr, "tunica-%s: %s\n", verb_.c_str(), one_line(failure.what()).c_str());
+    }
+  }
+  report_lock_.reset();
+  remove_parts();  // the work went on meanwhile
+}
+
 int Tool::finish(ExitCode code, const std::string& error) {
+  if (stop_watch_) {
+    stop_watch_->stand_down();
+  }
   memory_limit_.lift();
   locks_.clear();
   const std::string message = one_line(error);
   say_line(message.empty() ? "" : fmt::format("tunica-{}: {}\n", verb_, message));
   if (!report_.empty()) {
     try {
-      write_report(message.empty(), message);
+      const std::lock_guard guard(recording_);
+      write_report(message.empty(), message, result_);
     } catch (const std::exception& failure) {
       say_line(fmt::format("tunica-{}: {}\n", verb_, one_line(failure.what())));
       code = code == ExitCode::ok ? ExitCode::output : code;
@@ -437,7 +546,7 @@ Json Tool::describe_outputs(bool ok) const {
   return outputs;
 }
 
-void Tool::write_report(bool ok, const std::string& error) {
+void Tool::write_report(bool ok, const std::string& error, const Json& result) {
   Json seconds{{"total", seconds_since(start_)}};  // without the hashes of the outputs
   seconds.update(seconds_);
   std::vector<Warning> warnings = warnings_;
@@ -447,7 +556,10 @@ void Tool::write_report(bool ok, const std::string& error) {
   warnings.erase(first_note, warnings.end());
   std::vector<std::string> kinds;
   std::ranges::transform(warnings, std::back_inserter(kinds), &Warning::kind);
-  const Json report{
+  std::vector<std::string> weights;
+  std::ranges::transform(warnings, std::back_inserter(weights),
+                         [](const Warning& warning) { return warning.weight == Weight::major ? "major" : "minor"; });
+  Json report{
       {"tool", "tunica-" + verb_},
       {"version", version},
       {"instruction_set", instruction_set()},
@@ -455,6 +567,7 @@ void Tool::write_report(bool ok, const std::string& error) {
       {"error", error.empty() ? Json() : Json(error)},
       {"warnings", texts_of(warnings)},
       {"warning_kinds", kinds},
+      {"warning_weights", weights},
       {"notes", texts_of(notes)},
       {"command", provenance_.command()},
       {"inputs", inputs_},
@@ -462,8 +575,11 @@ void Tool::write_report(bool ok, const std::string& error) {
       {"seconds", seconds},
       {"peak_mib", peak_mebibytes()},
       {"threads", thread_count()},
-      {"result", result_},
+      {"result", result},
   };
+  if (!stated_.is_null()) {
+    report["stated"] = stated_;
+  }
   // A file name need not be UTF-8; the report has to be.
   const std::string text = told(report).dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
   if (report_ == standard_output) {
@@ -471,7 +587,7 @@ void Tool::write_report(bool ok, const std::string& error) {
     return;
   }
   require_no_other_file(report_);
-  write_file(report_, text, force_);
+  write_file(report_, text, force_ || replaces_failed_);
 }
 
 void Tool::claim(const std::filesystem::path& path, bool written) {
@@ -500,7 +616,9 @@ const std::filesystem::path& Tool::input(const std::filesystem::path& path) {
   at_hand_ = path.string();
   provenance_.add_input(path);
   // A missing input or a folder is for the reader to refuse; the report still has to be written.
-  inputs_.push_back({{"path", path.string()}, {"sha256", report_.empty() ? Json() : hash_if_readable(path)}});
+  const Json hash = report_.empty() ? Json() : hash_if_readable(path);
+  const std::lock_guard guard(recording_);
+  inputs_.push_back({{"path", path.string()}, {"sha256", hash}});
   return path;
 }
 
@@ -532,9 +650,15 @@ const std::filesystem::path& Tool::output(const std::filesystem::path& path, con
   at_hand_ = at_hand_.empty() ? name : at_hand_;
   locks_.push_back(PartLock::take(part_of(path)));
   require_writable(path, force_);  // another run may have finished it before the lock was ours
+  require_none_to_go_on_with(path);
+  wrote(path);
+  return path;
+}
+
+void Tool::wrote(const std::filesystem::path& path) {
+  const std::lock_guard guard(recording_);
   outputs_.push_back(path);
   provenance_.add_output(path);
-  return path;
 }
 
 Tool::Stage::Stage(Tool& tool, std::string name) : tool_(tool), name_(std::move(name)), start_(Clock::now()) {
@@ -542,6 +666,7 @@ Tool::Stage::Stage(Tool& tool, std::string name) : tool_(tool), name_(std::move(
 }
 
 Tool::Stage::~Stage() {
+  const std::lock_guard guard(tool_.recording_);
   Json& entry = tool_.seconds_[name_];
   entry = (entry.is_number() ? entry.get<double>() : 0.0) + seconds_since(start_);
 }
@@ -604,6 +729,7 @@ void Tool::warn(Warning warning) const {
     say_line(
         fmt::format("tunica-{}: {}: {}\n", verb_, warning.weight == Weight::note ? "note" : "warning", warning.text));
   }
+  const std::lock_guard guard(recording_);
   warnings_.push_back(std::move(warning));
 }
 

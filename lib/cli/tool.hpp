@@ -18,6 +18,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <utility>
@@ -39,12 +40,17 @@
 ///   }
 namespace tunica::cli {
 
+class StopWatch;
+
 class Tool {
 public:
   /// @param verb     the tool is `tunica-<verb>`
   /// @param summary  one or two sentences for --help
   /// @param example  command lines that work, one per line, for --help and the man page
   Tool(std::string verb, std::string summary, std::string example);
+  ~Tool();
+  Tool(const Tool&) = delete;
+  Tool& operator=(const Tool&) = delete;
 
   /// Where the tool declares its own arguments, before run().
   [[nodiscard]] CLI::App& arguments() { return app_; }
@@ -71,15 +77,13 @@ public:
   /// registered: what was read need not be what the hash is of.
   void require_unchanged_inputs() const;
 
-  /// Registers an output for the report; OutputError when it exists and --force was not given, or cannot be written;
+  /// Registers an output for the report; OutputError when it exists and --force was not given, or cannot be written, or
+  /// when an interrupted run under this name can go on (unless --force or --resume was given);
   /// UsageError when it is also an input, another output or the report, or ends with none of `endings`, where given.
   /// From here on to the end of the run no other one can write it: the PartLock is held.
   const std::filesystem::path& output(const std::filesystem::path& path, const std::vector<std::string>& endings = {});
   /// Names in the report a file whose name follows from an output's, once it is there.
-  void wrote(const std::filesystem::path& path) {
-    outputs_.push_back(path);
-    provenance_.add_output(path);
-  }
+  void wrote(const std::filesystem::path& path);
 
   /// Times a stage: the seconds until the returned object dies are added to report key `seconds.<name>`.
   class Stage {
@@ -114,6 +118,9 @@ public:
   /// The `result` object of the report. A value that is undefined is set to null (`Json()`).
   [[nodiscard]] Json& result() { return result_; }
 
+  /// The `stated` object of the report: what the user said of the organ, as numbers. Null: the tool is told nothing.
+  [[nodiscard]] Json& stated() { return stated_; }
+
   /// Whether standard output belongs to the report (`--report -`).
   [[nodiscard]] bool reports_to_standard_output() const { return report_ == "-"; }
 
@@ -131,9 +138,13 @@ private:
   std::optional<int> parse(int argc, char** argv);
   int perform(const std::function<void()>& body);
   int finish(ExitCode code, const std::string& error);
+  void end_unseen(int signal);
+  [[nodiscard]] std::string stopped_by(int signal) const;
+  [[nodiscard]] bool goes_on() const;
   void register_report();
+  void require_none_to_go_on_with(const std::filesystem::path& path) const;
   [[nodiscard]] Json describe_outputs(bool ok) const;
-  void write_report(bool ok, const std::string& error);
+  void write_report(bool ok, const std::string& error, const Json& result);
   void parse_common();
   [[nodiscard]] Json told(const Json& json) const;
   void claim(const std::filesystem::path& path, bool written);
@@ -165,6 +176,11 @@ private:
   std::vector<Claim> claimed_;                    ///< files of the run
   std::vector<std::shared_ptr<PartLock>> locks_;  ///< of the outputs
   std::shared_ptr<PartLock> report_lock_;
+  bool replaces_failed_ = false;  ///< an older one of this name
+  /// Guards what the report tells but `result_`: a StopWatch may have to write it. Recursive, because memory may end
+  /// where it is held, and the report is then written from there.
+  mutable std::recursive_mutex recording_;
+  std::unique_ptr<StopWatch> stop_watch_;
   std::string at_hand_;  ///< the input registered last
   std::string running_;  ///< the stage begun last
   Json inputs_ = Json::array();
@@ -172,6 +188,7 @@ private:
   std::vector<std::filesystem::path> outputs_;
   Json seconds_ = Json::object();
   Json result_ = Json::object();
+  Json stated_;
   std::vector<std::function<void()>> after_parse_;
   std::filesystem::file_time_type start_on_disk_;
   Clock::time_point start_ = Clock::now();

@@ -17,6 +17,7 @@ struct Dimension {
 namespace dimension {
 inline constexpr Dimension number{0, 0, 0};
 inline constexpr Dimension length{0, 1, 0};
+inline constexpr Dimension volume{0, 3, 0};
 inline constexpr Dimension time{0, 0, 1};
 inline constexpr Dimension rate{0, 0, -1};
 inline constexpr Dimension force{1, 1, -2};
@@ -31,7 +32,8 @@ inline constexpr Dimension acceleration{0, 1, -2};
 /// Grammar: number (C notation, decimal), optional spaces, unit = base units joined by `/` and `*`, each with an
 /// optional integer power; a leading `/` is allowed ("0.1/s").
 /// @return the value in tunica's units (tonne, mm, s).
-/// Errors: UsageError names the text, says what is expected and shows a right spelling; a bare number is such an error.
+/// Errors: UsageError names the text, says what is expected and shows the nearest right spelling (spelling.hpp): a bare
+/// number, another case, a decimal comma are such errors, never read as another unit.
 double parse_quantity(std::string_view text, Dimension expected);
 
 /// Reads a bare unit of length, "um", "mm", "cm" or "m"; @return its size in mm. Errors: UsageError.

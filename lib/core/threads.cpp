@@ -2,6 +2,7 @@
 
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
+#include "tunica/core/progress.hpp"
 
 #include <fmt/format.h>
 #include <tbb/global_control.h>
@@ -108,7 +109,10 @@ void parallel_for_blocks(std::size_t size, std::size_t grain,
                          const std::function<void(std::size_t begin, std::size_t end)>& body) {
   TUNICA_ASSERT(grain >= 1);
   const std::size_t blocks = (size + grain - 1) / grain;
-  const auto run = [&](std::size_t block) { body(block * grain, std::min(size, (block + 1) * grain)); };
+  const auto run = [&](std::size_t block) {
+    check_interrupt();
+    body(block * grain, std::min(size, (block + 1) * grain));
+  };
   if (blocks <= 1 || thread_count() == 1) {
     for (std::size_t block = 0; block < blocks; ++block) {
       run(block);

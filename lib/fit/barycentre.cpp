@@ -2,8 +2,11 @@
 
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
+#include "tunica/core/require.hpp"
 #include "tunica/core/threads.hpp"
 #include "tunica/surface/mesh/incidence.hpp"
+
+#include <fmt/format.h>
 
 #include <Eigen/Geometry>
 
@@ -191,6 +194,13 @@ double misfit(const ClosedCurve& curve, const TriangleMesh& mesh, const std::vec
 
 std::vector<std::optional<std::size_t>> match_boundaries(const Target& target, const TriangleMesh& mesh,
                                                          const std::vector<std::vector<Index>>& loops) {
+  for (const std::vector<Index>& loop : loops) {
+    for (const Index v : loop) {
+      if (v >= mesh.vertices.size()) {
+        throw InputError(fmt::format("a boundary loop names vertex {}, but there are {}", v, mesh.vertices.size()));
+      }
+    }
+  }
   struct Pair {
     double distance;
     std::size_t loop, curve;
@@ -219,6 +229,7 @@ std::vector<std::optional<std::size_t>> match_boundaries(const Target& target, c
 }
 
 NodeMoves move_by_barycentre(const Target& target, TriangleMesh& mesh, double off_target) {
+  require_not_negative(off_target, "the distance that a node may lie off the target");
   NodeMoves moves;
   const std::size_t count = mesh.vertices.size();
   const auto sides = vertex_normals(mesh);

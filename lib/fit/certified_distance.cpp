@@ -1,3 +1,4 @@
+#include "tunica/core/require.hpp"
 #include "tunica/fit/relax.hpp"
 #include "tunica/shell/distance/boundary_distance.hpp"
 
@@ -17,6 +18,7 @@ Interval intersection(const Interval& a, const Interval& b) {
 
 ShellDistance certified_distance(const RelaxResult& relaxed, const Target& whole, double moved,
                                  const ShellDistanceOptions& measuring) {
+  require_not_negative(moved, "how far the target was moved");
   const auto widened = [&](const Interval& known) {
     return Interval{std::max(0.0, known.lower - moved), known.upper + moved};
   };

@@ -416,14 +416,25 @@ private:
   RelaxResult result_;
 };
 
+void require_min_angle(double degrees) {
+  if (!(degrees >= 1 && degrees <= 30)) {
+    throw InputError(fmt::format("angles of {} degrees cannot be kept: choose 1 to 30", degrees));
+  }
+}
+
 }  // namespace
 
 RelaxResult fit(const TriangleMesh& coarse, const Target& target, const FitOptions& options) {
+  require_surface(coarse);
+  require_valid(options);
+  require_min_angle(options.min_angle);
   return Fitting(coarse, target, options).run();
 }
 
 ShellMesh refit(const ShellMesh& shell, const Target& target, double min_angle,
                 std::vector<std::array<Index, 2>>* halved) {
+  require_shells(shell);
+  require_min_angle(min_angle);
   FitMesh mesh(split_shells(shell, std::vector<Split>(shell.triangles.size(), Split::all_edges), halved));
   const FitSamples samples(target, mesh.alive, true);
   SquaresOptions squares;
@@ -441,6 +452,10 @@ ShellMesh refit(const ShellMesh& shell, const Target& target, double min_angle,
 }
 
 void fit_normals(const Target& target, ShellMesh& shell) {
+  require_shells(shell);
+  if (!shell.corner_normals.empty()) {
+    throw InputError("normals at corners cannot be fitted: take those of the target, one at each vertex");
+  }
   FitMesh mesh(shell);
   const FitSamples samples(target, mesh.alive, true);
   SquaresOptions squares;

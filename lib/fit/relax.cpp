@@ -3,6 +3,7 @@
 #include "tunica/core/clock.hpp"
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
+#include "tunica/core/require.hpp"
 #include "tunica/fit/detail/edits.hpp"
 #include "tunica/fit/detail/start.hpp"
 #include "tunica/fit/fit.hpp"
@@ -187,7 +188,20 @@ private:
 
 }  // namespace
 
+void require_valid(const RelaxOptions& options) {
+  if (options.tolerance) {
+    require_positive(*options.tolerance, "the tolerance");
+  }
+  if (options.width) {
+    require_positive(*options.width, "the width of the interval");
+  }
+  if (options.max_iterations && *options.max_iterations < 0) {
+    throw InputError(fmt::format("{} iterations at most: none or more are needed", *options.max_iterations));
+  }
+}
+
 bool faces_other_way(const TriangleMesh& mesh, const Target& target) {
+  require_valid(mesh);
   const std::size_t stride = std::max<std::size_t>(1, mesh.triangles.size() / triangles_judged);
   double agreement = 0;
   for (std::size_t t = 0; t < mesh.triangles.size(); t += stride) {
@@ -206,6 +220,8 @@ TriangleMesh turned_around(TriangleMesh mesh) {
 }
 
 RelaxResult relax_by_barycentre(const TriangleMesh& coarse, const Target& target, const RelaxOptions& options) {
+  require_surface(coarse);
+  require_valid(options);
   return Relaxation(coarse, target, options).run();
 }
 

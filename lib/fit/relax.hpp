@@ -37,6 +37,9 @@ struct RelaxOptions {
   Progress progress;
 };
 
+/// Errors: InputError where a number is negative, not finite, or zero and no tolerance.
+void require_valid(const RelaxOptions& options);
+
 struct RelaxResult {
   ShellMesh shell;         ///< the best iterate, without unused nodes
   ShellDistance distance;  ///< of its curved surface

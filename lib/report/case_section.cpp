@@ -19,18 +19,30 @@ std::string text_at(const PipelineCase& one, const std::string& stage, const std
   return value.is_string() ? value.get<std::string>() : "";
 }
 
+Markup next_lines(const CaseReport& one) {
+  Markup lines;
+  for (const NextStep& next : next_steps(one)) {
+    lines += html("<p class=\"next\">{}: <code>{}</code></p>\n", next.what, next.command);
+  }
+  return lines;
+}
+
 Markup verdict(const CaseReport& one) {
   const PipelineCase& source = one.source;
   const std::string status = status_of(one);
+  if (is_inaccurate(source)) {
+    Markup line = html(
+        "<p class=\"verdict failed\"><strong>Accuracy not reached</strong>: {}. Why: {}. The numbers below are those "
+        "that "
+        "were reached.</p>\n",
+        one.redacted(accuracy_reached(source)->text()), why_inaccurate(one));
+    return line += next_lines(one);
+  }
   if (status == "failed") {
     Markup line =
         html("<p class=\"verdict failed\"><strong>Failed</strong> at {}{}: {}</p>\n",
              source.stage == "none" ? "the start" : source.stage, told_exit(source), one.redacted(source.message));
-    const std::string next = next_command(one);
-    if (!next.empty()) {
-      line += html("<p class=\"next\">Next: <code>{}</code></p>\n", next);
-    }
-    return line;
+    return line += next_lines(one);
   }
   const std::string warnings = one.warnings.empty()       ? "no warning"
                                : one.warnings.size() == 1 ? "1 warning"
@@ -54,22 +66,33 @@ bool is_fitted_to_middle(const CaseReport& one) {
 
 bool is_unloaded(const CaseReport& one) { return one.source.at("simulate", "result.unloaded").is_object(); }
 
+// How far a number may be off by its mesh and model, where that is known.
+std::string plus_minus(const CaseReport& one, const char* key) {
+  const auto percent = measure(key).value(one.source);
+  return percent ? "estimated error " + figure_above(*percent) + " %; " : "";
+}
+
 Markup three_numbers(const CaseReport& one) {
   const auto maximum = measure("stress_max_kpa").value(one.source);
   const auto percent = measure("distance_percent").value(one.source);
-  const auto pressure = measure("pressure_kpa").value(one.source);
+  const std::string pressure = shown(one.source, "pressure_kpa");
   const std::string whence = is_unloaded(one) ? ", from the shape without load" : "";
   Markup list = html("<dl class=\"three\">\n");
   list += big_number("stress_p99_kpa", "Wall stress, 99th percentile", one,
-                     maximum ? "von Mises, at either face; largest " + figure(*maximum) + " kPa" : "not computed");
-  list += big_number("max_displacement_mm", "Largest displacement", one,
-                     !measure("max_displacement_mm").value(one.source) ? "not computed"
-                     : pressure                                        ? "under " + figure(*pressure) + " kPa" + whence
-                                                                       : "of the curved surface");
+                     maximum ? plus_minus(one, "stress_error_percent") + "von Mises, at either face; largest " +
+                                   figure(*maximum) + " kPa"
+                             : "not computed");
+  list +=
+      big_number("max_displacement_mm", "Largest displacement", one,
+                 !measure("max_displacement_mm").value(one.source)
+                     ? "not computed"
+                     : plus_minus(one, "displacement_error_percent") +
+                           (pressure.empty() ? "of the curved surface" : "under " + one.redacted(pressure) + whence));
   const bool in_middle = is_fitted_to_middle(one);
   list +=
       big_number("distance_mm", in_middle ? "Shells to middle of the wall, at most" : "Shells to surface, at most", one,
-                 percent ? "certified, both ways; " + measure("distance_percent").text(*percent) + " % of the diagonal"
+                 percent ? "certified, both ways; " + measure("distance_percent").text(*percent) +
+                               " % of the organ's diagonal; of the shape, not of stress"
                          : "not certified");
   return list += html("</dl>\n");
 }
@@ -79,8 +102,8 @@ Markup discretisation(const CaseReport& one) {
   if (!measure("max_displacement_mm").value(one.source)) {
     return {};
   }
-  const Json accuracy = one.source.at("simulate", "result.accuracy");
-  if (!accuracy.is_object()) {
+  const auto reached = accuracy_reached(one.source);
+  if (!reached) {
     if (is_fitted_to_middle(one) || is_unloaded(one)) {
       return html(
           "<p>How far stress and displacement depend on the number of shells was not estimated: a second run with other"
@@ -90,13 +113,14 @@ Markup discretisation(const CaseReport& one) {
         "<p>How far stress and displacement depend on the number of shells was not estimated: <code>--accuracy</code> "
         "(<code>ACCURACY=5% OF=stress</code> in the pipeline) does that.</p>\n");
   }
-  const Json of = accuracy.value("of", Json());
-  const Json estimate = accuracy.value("estimate_percent", Json());
-  const std::string quantity = of.is_string() ? of.get<std::string>() : "asked-for displacement";
-  return accuracy.value("credible", Json()) == true && estimate.is_number()
-             ? html("<p>The error of the {} by the number of shells is credibly below {} %.</p>\n", quantity,
-                    figure_above(estimate.get<double>()))
-             : html("<p>The error of the {} by the number of shells is not credibly known.</p>\n", quantity);
+  const std::string of = one.redacted(reached->of);
+  const bool credible = one.source.at("simulate", "result.accuracy.credible") == true;
+  if (!reached->percent) {
+    return html("<p>The error of the {} by number of shells and model was not estimated.</p>\n", of);
+  }
+  return html("<p>The error of the {} by number of shells and model is {} {} % ({} % were asked for){}.</p>\n", of,
+              credible ? "credibly below" : "estimated at", figure_above(*reached->percent), figure(reached->asked),
+              credible ? "" : ", which is not credible");
 }
 
 // The colour bar, whose texts the page's script changes with the colours.
@@ -233,6 +257,33 @@ Markup mechanics(const CaseReport& one) {
   return table_of("Mechanics", lines);
 }
 
+// As the user wrote them, in his units.
+std::vector<Line> stated_lines(const CaseReport& one) {
+  std::vector<Line> lines;
+  for (const char* key :
+       {"pressure_kpa", "imaged_at_kpa", "thickness_mm", "young_mpa", "poisson", "density_kg_per_m3"}) {
+    if (const std::string text = shown(one.source, key); !text.empty()) {
+      lines.push_back({measure(key).title, one.redacted(text)});
+    }
+  }
+  const Json fixes = one.source.at("simulate", "stated.fix");
+  for (const Json& fix : fixes.is_array() ? fixes : Json::array()) {
+    if (fix.is_string()) {
+      lines.push_back({"Held", one.redacted(fix.get<std::string>())});
+    }
+  }
+  return lines;
+}
+
+// A quantity of the resolved scene, whose digits are those that give the same number again, for people.
+std::string rounded_quantity(const std::string& text) {
+  const std::size_t end = text.find_first_not_of("+-.0123456789");
+  const std::size_t unit =
+      end != std::string::npos && text[end] == 'e' ? text.find_first_not_of("+-0123456789", end + 1) : end;
+  const auto value = unit == std::string::npos ? std::nullopt : parse_number(text.substr(0, unit));
+  return value ? fmt::format("{:.6g} {}", *value, text.substr(unit)) : text;
+}
+
 // The lines of the resolved scene: heads without the mesh's own path come out as they are.
 Markup inputs(const CaseReport& one) {
   std::vector<Line> lines;
@@ -246,10 +297,11 @@ Markup inputs(const CaseReport& one) {
     } else if (equals != std::string::npos && !line.starts_with("mesh = ")) {
       std::string value = line.substr(equals + 3);
       const bool quoted = value.size() >= 2 && value.front() == '"' && value.back() == '"';
-      lines.push_back({table + " · " + line.substr(0, equals), quoted ? value.substr(1, value.size() - 2) : value});
+      lines.push_back({table + " · " + line.substr(0, equals),
+                       quoted ? rounded_quantity(value.substr(1, value.size() - 2)) : value});
     }
   }
-  return table_of("Inputs as resolved, SI units", lines);
+  return table_of("Inputs as stated", stated_lines(one)) += table_of("All settings as resolved, SI units", lines);
 }
 
 Markup costs(const CaseReport& one) {
@@ -270,6 +322,20 @@ Markup costs(const CaseReport& one) {
                                  "scope=\"col\">Stage</th><th scope=\"col\">s</th><th scope=\"col\">MiB</th><th "
                                  "scope=\"col\">Threads</th></tr></thead><tbody>\n{}</tbody></table>\n",
                                  rows);
+}
+
+Markup warnings_section(const CaseReport& one, int level) {
+  if (one.warnings.empty()) {
+    return {};
+  }
+  Markup made = heading(level, "Warnings");
+  made += html("<ul class=\"warnings\">\n");
+  for (const ToldWarning& told : one.warnings) {
+    made += html("<li>{}<small>{}{}</small>: {}</li>\n",
+                 told.warning.kind.empty() ? Markup{} : html("<b>{}</b> ", told.warning.kind), told.stage,
+                 told.warning.weight == Weight::major ? ", serious" : "", told.warning.text);
+  }
+  return made += html("</ul>\n");
 }
 
 Markup list_section(const std::string& title, const std::vector<std::string>& texts, int level) {
@@ -327,15 +393,68 @@ Markup commands(const CaseReport& one, int level) {
 
 }  // namespace
 
+std::string why_inaccurate(const CaseReport& one) {
+  std::string why;
+  const Json reasons = one.source.at("simulate", "result.accuracy.reasons");
+  for (const Json& reason : reasons.is_array() ? reasons : Json::array()) {
+    why += reason.is_string() ? (why.empty() ? "" : "; ") + one.redacted(reason.get<std::string>()) : "";
+  }
+  return why.empty() ? one.redacted(one.source.message) : why;
+}
+
 std::string told_exit(const PipelineCase& one) {
   return one.exit.empty() || one.exit == "0" ? "" : ", exit code " + one.exit;
 }
 
-std::string next_command(const CaseReport& one) {
+namespace {
+
+// With another value of a flag, which is added where it is not there. Values of these flags hold no blanks.
+std::string with_flag(const std::string& command, const std::string& flag, const std::string& value) {
+  std::string made = command;
+  for (const char* const mark : {" ", "="}) {
+    const std::string given = " " + flag + mark;
+    if (const std::size_t at = made.find(given); at != std::string::npos) {
+      const std::size_t end = std::min(made.find(' ', at + given.size()), made.size());
+      return made.replace(at, end - at, given + value);
+    }
+  }
+  return made + " " + flag + " " + value;
+}
+
+// Of a run whose accuracy was not reached: finer shells, or what was reached as the request.
+std::vector<NextStep> steps_to_accuracy(const CaseReport& one, const std::string& command) {
+  constexpr double margin = 1.25;  // of the estimate, which is to be below the request
+  const Json levels = one.source.at("simulate", "result.accuracy.levels");
+  const Json last = levels.is_array() && !levels.empty() && levels.back().is_object() ? levels.back() : Json::object();
+  const Json shells = last.value("shells", Json());
+  std::vector<NextStep> steps;
+  if (shells.is_number_unsigned()) {
+    constexpr std::size_t split = 4;  // each shell of a level in the next one
+    // Two levels more, as the next one alone may fall short.
+    const std::size_t most = split * split * shells.get<std::size_t>();
+    steps.push_back({fmt::format("Next, finer (up to {} shells)", most),
+                     one.redacted(with_flag(command, "--max-shells", std::to_string(most)))});
+  }
+  const Json reasons = one.source.at("simulate", "result.accuracy.reasons");
+  const auto percent = accuracy_reached(one.source)->percent;
+  // With more than one reason another one than the number of shells stands against any accuracy.
+  if (percent && reasons.is_array() && reasons.size() == 1) {
+    steps.push_back({"Or, content with what was reached",
+                     one.redacted(with_flag(command, "--accuracy", figure_above(margin * *percent) + "%"))});
+  }
+  return steps;
+}
+
+}  // namespace
+
+std::vector<NextStep> next_steps(const CaseReport& one) {
   const PipelineCase& source = one.source;
   const std::string command = text_at(source, source.stage, "command");
   if (command.empty()) {
     return {};
+  }
+  if (is_inaccurate(source)) {
+    return steps_to_accuracy(one, command);
   }
   const Json volumes = source.at("extract", "inputs");
   if (source.stage == "extract" && source.exit == "3" && volumes.is_array() && !volumes.empty()) {
@@ -344,21 +463,23 @@ std::string next_command(const CaseReport& one) {
     const std::vector<std::string> words = command_words(command);
     const std::size_t quoted =
         command.find(" '") == blank ? command.find("' ", blank + 2) + 1 : command.find(' ', blank + 1);
-    return words.size() > 1 && !words[1].starts_with("-") ? one.redacted(command.substr(0, quoted) + " --info")
-                                                          : one.redacted(command + " --verbose");
+    return {{"Next", words.size() > 1 && !words[1].starts_with("-")
+                         ? one.redacted(command.substr(0, quoted) + " --info")
+                         : one.redacted(command + " --verbose")}};
   }
-  return one.redacted(command + " --verbose");
+  return {{"Next", one.redacted(command + " --verbose")}};
 }
 
 Markup case_section(const CaseReport& one, int level, bool paths) {
   Markup made = verdict(one);
   made += three_numbers(one);
   made += discretisation(one);
-  made += list_section("Warnings", one.warnings, level);
+  made += warnings_section(one, level);
   made += list_section("Outputs that are not what the reports say", one.different, level);
   made += organ_figure(one, level);
   made += slices_figure(one, level);
   made += list_section("Not drawn", one.missing, level);
+  made += list_section("Notes", one.notes, level);
   made += heading(level, "Numbers");
   made +=
       html("<div class=\"tables\">\n{}{}{}{}</div>\n", geometry_and_mesh(one), mechanics(one), inputs(one), costs(one));

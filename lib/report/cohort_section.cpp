@@ -1,4 +1,3 @@
-#include "tunica/report/detail/command_words.hpp"
 #include "tunica/report/detail/measures.hpp"
 #include "tunica/report/detail/sections.hpp"
 
@@ -6,14 +5,10 @@
 
 #include <algorithm>
 #include <array>
-#include <filesystem>
 #include <map>
-#include <set>
 
 namespace tunica::report {
 namespace {
-
-namespace fs = std::filesystem;
 
 // Columns of the page's table: fewer than the file's.
 constexpr std::array shown_keys{"volume_ml",
@@ -21,8 +16,10 @@ constexpr std::array shown_keys{"volume_ml",
                                 "distance_percent",
                                 "min_angle_deg",
                                 "stress_p99_kpa",
+                                "stress_error_percent",
                                 "strain_p99_percent",
                                 "max_displacement_mm",
+                                "displacement_error_percent",
                                 "volume_change_percent",
                                 "pressure_kpa",
                                 "thickness_mm",
@@ -48,22 +45,60 @@ Markup failures(const std::vector<CaseReport>& cases) {
     if (one.source.done()) {
       continue;
     }
-    const std::string next = next_command(one);
+    Markup steps;
+    for (const NextStep& next : next_steps(one)) {
+      steps += html("<br>{}: <code>{}</code>", next.what, next.command);
+    }
+    const std::string why = is_inaccurate(one.source)
+                                ? one.redacted(accuracy_reached(one.source)->text()) + ": " + why_inaccurate(one)
+                                : one.redacted(one.source.message);
     items += html("<li>{}: {}{}: {}{}</li>\n", link_to(one),
-                  one.source.stage == "none" ? "not begun" : one.source.stage, told_exit(one.source),
-                  one.redacted(one.source.message), next.empty() ? Markup{} : html("<br>Next: <code>{}</code>", next));
+                  one.source.stage == "none" ? "not begun" : one.source.stage, told_exit(one.source), why, steps);
   }
   return items.text.empty() ? Markup{} : heading(2, "Failures") += html("<ul class=\"failures\">\n{}</ul>\n", items);
 }
 
-Markup row_of(const CaseReport& one) {
+// Which kinds of warnings there are, of how many cases, with an example.
+Markup warnings_table(const std::vector<CaseReport>& cases) {
+  std::vector<std::vector<ToldWarning>> warnings;
+  std::ranges::transform(cases, std::back_inserter(warnings), &CaseReport::warnings);
+  Markup rows;
+  for (const WarningKind& kind : kinds_of(warnings)) {
+    const CaseReport& first = cases[kind.cases.front()];
+    rows += html("<tr><th scope=\"row\">{}{}</th><td class=\"number\">{}</td><td>{}: {}: {}</td></tr>\n",
+                 shown_kind(kind.kind), kind.weight == Weight::major ? " (serious)" : "", kind.cases.size(),
+                 link_to(first), kind.example.stage, kind.example.warning.text);
+  }
+  if (rows.text.empty()) {
+    return {};
+  }
+  return heading(2, "Warnings by kind") += html(
+             "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"Warnings by kind\"><table "
+             "class=\"facts grid kinds\"><caption>The heaviest first; each case counts once for a kind</caption>"
+             "<thead><tr><th scope=\"col\">Kind</th><th scope=\"col\">Cases</th><th scope=\"col\">Example</th></tr>"
+             "</thead><tbody>\n{}</tbody></table></div>\n",
+             rows);
+}
+
+// Measures that some case knows.
+std::vector<const char*> known_keys(const std::vector<CaseReport>& cases) {
+  std::vector<const char*> keys;
+  std::ranges::copy_if(shown_keys, std::back_inserter(keys), [&](const char* key) {
+    return !std::string_view(key).ends_with("_error_percent") || std::ranges::any_of(cases, [&](const CaseReport& one) {
+      return measure(key).value(one.source).has_value();
+    });
+  });
+  return keys;
+}
+
+Markup row_of(const CaseReport& one, const std::vector<const char*>& keys) {
   const std::string status = status_of(one);
   Markup row = html("<tr class=\"{}\"><td class=\"thumb\">{}</td><th scope=\"row\">{}</th><td>{}</td>", status,
                     one.picture.empty()
                         ? Markup{}
                         : html("<img src=\"{}\" alt=\"\" loading=\"lazy\">", data_address("image/png", one.picture)),
                     link_to(one), status);
-  for (const char* key : shown_keys) {
+  for (const char* key : keys) {
     const Measure& what = measure(key);
     const auto value = what.value(one.source);
     const bool none = !value || (std::string_view(key) == "seconds" && *value == 0);
@@ -73,18 +108,39 @@ Markup row_of(const CaseReport& one) {
   return row += html("</tr>\n");
 }
 
+// What the colours of the pictures mean, label by label.
+Markup scale_note(const std::vector<CaseReport>& cases) {
+  std::map<std::string, const CaseReport*> organs;
+  for (const CaseReport& one : cases) {
+    if (one.picture_top > 0) {
+      organs.emplace(one.organ_kind, &one);
+    }
+  }
+  std::string text;
+  for (const auto& [organ, one] : organs) {
+    text += fmt::format("{}{}0 to {} kPa", text.empty() ? "" : "; ", organs.size() > 1 ? one->organ_name + ": " : "",
+                        figure(one->picture_top * 1e3));
+  }
+  return text.empty() ? Markup{}
+                      : html(
+                            "<p class=\"more\">Pictures of one label share one scale of stress, up to the largest 99th "
+                            "percentile among them: {}. What is above has the last colour.</p>\n",
+                            text);
+}
+
 Markup table(const std::vector<CaseReport>& cases, const std::string& tsv) {
   Markup heads = html(
       "<th scope=\"col\"><span class=\"hidden\">Picture</span></th><th scope=\"col\">Case</th><th "
       "scope=\"col\">Status</th>");
-  for (const char* key : shown_keys) {
+  const std::vector<const char*> keys = known_keys(cases);
+  for (const char* key : keys) {
     const Measure& what = measure(key);
     heads += html("<th scope=\"col\" title=\"{}\">{}{}</th>", what.description, what.title,
                   what.unit.empty() ? Markup{} : html(" <small>{}</small>", what.unit));
   }
   Markup rows;
   for (const CaseReport& one : cases) {
-    rows += row_of(one);
+    rows += row_of(one, keys);
   }
   Markup made = heading(2, "Cases");
   made += html(
@@ -92,16 +148,12 @@ Markup table(const std::vector<CaseReport>& cases, const std::string& tsv) {
       "class=\"cohort sortable\"><caption class=\"hidden\">Cases and their measures</caption><thead><tr>{}</tr></thead>"
       "<tbody>\n{}</tbody></table></div>\n",
       heads, rows);
+  made += scale_note(cases);
   return made += html("<p class=\"more\"><a download=\"cohort.tsv\" href=\"{}\">The whole table as TSV</a></p>\n",
                       data_address("text/tab-separated-values", tsv));
 }
 
 using CaseGroup = std::vector<const CaseReport*>;
-
-// The label that was extracted as the command names it; empty: at an isovalue, or not known.
-std::string label_of(const CaseReport& one) {
-  return one.redacted(flag_value(words_of(one.source, "extract"), "--label").value_or(""));
-}
 
 Markup spread_of(const CaseGroup& cases) {
   Markup strips;
@@ -132,24 +184,11 @@ Markup spread_of(const CaseGroup& cases) {
   return made += html("<div class=\"strips\">\n{}</div>\n", strips);
 }
 
-fs::path volume_of(const CaseReport& one) {
-  const std::vector<ReportedFile> inputs = one.source.files("extract", "inputs");
-  return inputs.empty() ? fs::path() : inputs.front().path;
-}
-
-// One organ is compared with its like: cases of a label by themselves. A file name that comes back in other folders, as
-// in TotalSegmentator's patient/segmentations/aorta.nii.gz, says which organ its label is.
 Markup spread(const std::vector<CaseReport>& cases) {
-  std::map<fs::path, std::set<fs::path>> folders_of;
-  for (const CaseReport& one : cases) {
-    const fs::path volume = volume_of(one);
-    folders_of[volume.filename()].insert(volume.parent_path().lexically_normal());
-  }
-  std::map<std::array<std::string, 2>, CaseGroup> organs;
+  std::map<std::string, CaseGroup> organs;
   for (const CaseReport& one : cases) {
     if (one.source.done()) {
-      const fs::path file = volume_of(one).filename();
-      organs[{label_of(one), folders_of[file].size() > 1 ? file.string() : ""}].push_back(&one);
+      organs[one.organ_kind].push_back(&one);
     }
   }
   Markup made = heading(2, "Spread and outliers");
@@ -159,9 +198,7 @@ Markup spread(const std::vector<CaseReport>& cases) {
       "whose file names come back from folder to folder are compared name by name.</p>\n");
   for (const auto& [organ, group] : organs) {
     if (organs.size() > 1) {
-      const auto& [label, file] = organ;
-      made += heading(3, (label.empty() ? "No label" : "Label " + label) +
-                             (file.empty() ? "" : " of " + group.front()->redacted(file)));
+      made += heading(3, group.front()->organ_name);
     }
     made += spread_of(group);
   }
@@ -173,13 +210,14 @@ Markup spread(const std::vector<CaseReport>& cases) {
 Markup cohort_section(const std::vector<CaseReport>& cases, const std::string& tsv) {
   Markup made = counts(cases);
   made += failures(cases);
+  made += warnings_table(cases);
   made += table(cases, tsv);
   made += spread(cases);
   return made;
 }
 
 std::string cohort_tsv(const std::vector<CaseReport>& cases) {
-  std::string text = "case\tstatus\tstage\texit\tmessage\twarnings";
+  std::string text = "case\tstatus\tstage\texit\tmessage\twarnings\twarning_kinds";
   for (const Measure& what : measures()) {
     text += "\t" + what.key;
   }
@@ -189,7 +227,8 @@ std::string cohort_tsv(const std::vector<CaseReport>& cases) {
          {one.name, status_of(one), one.source.stage, one.source.exit, one.redacted(one.source.message)}) {
       text += (field.empty() ? "n/a" : in_one_line(field)) + "\t";
     }
-    text += std::to_string(one.warnings.size());
+    const std::string kinds = kinds_in_one_line(one.warnings);
+    text += fmt::format("{}\t{}", one.warnings.size(), kinds.empty() ? "n/a" : in_one_line(kinds));
     for (const Measure& what : measures()) {
       const auto value = what.value(one.source);
       text += value ? fmt::format("\t{:.9g}", *value) : "\tn/a";
@@ -210,6 +249,8 @@ std::string cohort_columns() {
   columns["exit"] = column("Its exit code.", "", "pipeline");
   columns["message"] = column("done, or why it is not.", "", "error of that stage");
   columns["warnings"] = column("Number of warnings of all stages.", "", "all stages: warnings");
+  columns["warning_kinds"] =
+      column("Their kinds, the heaviest first, and how often each is there.", "", "all stages: warning_kinds");
   for (const Measure& what : measures()) {
     columns[what.key] = column(what.description, what.unit, what.source);
   }

@@ -31,25 +31,58 @@ Value reported(const char* stage, const char* key, double scale = 1) {
 // Of a run that came to its end: the last state of one that did not is under another load than the stated one.
 Value answered(const char* key, double scale = 1) {
   return [value = reported("simulate", key, scale)](const PipelineCase& one) {
-    return one.at("simulate", "ok") == true ? value(one) : std::nullopt;
+    return is_answered(one) ? value(one) : std::nullopt;
   };
 }
 
-// A quantity that the command of tunica-simulate states.
-Value stated(const char* flag, Dimension dimension, double scale = 1) {
-  return [=](const PipelineCase& one) -> std::optional<double> {
-    const auto text = flag_value(words_of(one, "simulate"), flag);
-    try {
-      return text ? std::optional(parse_quantity(*text, dimension) * scale) : std::nullopt;
-    } catch (const UsageError&) {
-      return std::nullopt;
-    }
+// The estimated error of the quantity that an accuracy was asked of.
+Value estimated(const char* of) {
+  return [of = std::string(of)](const PipelineCase& one) {
+    const auto reached = is_answered(one) ? accuracy_reached(one) : std::nullopt;
+    return reached && reached->of == of ? reached->percent : std::nullopt;
   };
+}
+
+// An input as it was written, where that is known; of tools that told no `stated` the command says it.
+std::optional<std::string> written(const PipelineCase& one, const StatedInput& input) {
+  const Json typed = one.at("simulate", "stated.typed." + input.key);
+  if (typed.is_string()) {
+    return typed.get<std::string>();
+  }
+  std::string flag = "--" + input.key;
+  std::ranges::replace(flag, '_', '-');
+  return flag_value(words_of(one, "simulate"), flag);
+}
+
+std::optional<double> quantity(const std::optional<std::string>& text, Dimension dimension) {
+  try {
+    return text ? std::optional(parse_quantity(*text, dimension)) : std::nullopt;
+  } catch (const UsageError&) {
+    return std::nullopt;
+  }
+}
+
+// An input as a number. @param key  in the report's `stated`, @param scale  of that to the column's unit, @param
+// of_typed of tunica's unit to it, where it is another
+Measure stated(Measure column, const char* key, const StatedInput& input, double scale = 1,
+               std::optional<double> of_typed = std::nullopt) {
+  column.source = fmt::format("simulate: stated.{}; of older tools the command", key);
+  column.input = input;
+  column.value = [=, place = fmt::format("stated.{}", key)](const PipelineCase& one) -> std::optional<double> {
+    const auto value = number(one.at("simulate", place));
+    const auto typed = value ? std::nullopt : quantity(written(one, input), input.dimension);
+    return value   ? std::optional(*value * scale)
+           : typed ? std::optional(*typed * of_typed.value_or(scale))
+                   : std::nullopt;
+  };
+  return column;
 }
 
 std::optional<double> shells(const PipelineCase& one) {
   return number(one.at(is_refitted(one) ? "simulate" : "relax", "result.shells"));
 }
+
+constexpr double kg_per_m3 = 1e12;  // in a tonne / mm^3
 
 // Of the shells that carry the load: those that relax left, or finer ones that an accuracy asked for.
 Value of_shells(const std::string& key) {
@@ -131,25 +164,34 @@ std::vector<Measure> make_mechanics() {
        "simulate: result.wall.stress_p99_mpa × 1000", true, answered("result.wall.stress_p99_mpa", 1e3)},
       {"stress_max_kpa", "Stress max.", "kPa", "Largest von Mises stress at either face of the wall.",
        "simulate: result.wall.stress_max_mpa × 1000", false, answered("result.wall.stress_max_mpa", 1e3)},
+      {"stress_error_percent", "Error of stress", "%",
+       "Estimated error of the 99th percentile of stress by number of shells and model.",
+       "simulate: result.accuracy.estimate_percent, where the accuracy is one of stress", false, estimated("stress"),
+       true},
       {"strain_p99_percent", "Strain p99", "%",
        "99th percentile, by area, of the largest principal strain at either face of the wall.",
        "simulate: result.wall.strain_p99_percent", true, answered("result.wall.strain_p99_percent")},
       {"max_displacement_mm", "Displacement", "mm", "Largest displacement of the curved surface.",
        "simulate: result.max_displacement_mm", true, answered("result.max_displacement_mm")},
+      {"displacement_error_percent", "Error of displacement", "%",
+       "Estimated error of the largest displacement by number of shells and model.",
+       "simulate: result.accuracy.estimate_percent, where the accuracy is one of displacement", false,
+       estimated("displacement"), true},
       {"volume_change_percent", "Volume change", "%", "Change of the volume that a closed organ encloses.",
        "simulate: result.volume_after_mm3 / result.volume_before_mm3 - 1", true, volume_change},
-      {"pressure_kpa", "Pressure", "kPa", "Pressure on the wall, as stated.", "simulate: command, --pressure", false,
-       stated("--pressure", dimension::pressure, 1e3)},
-      {"thickness_mm", "Thickness", "mm", "Thickness of the wall, as stated.", "simulate: command, --thickness", false,
-       stated("--thickness", dimension::length)},
-      {"young_mpa", "Young's modulus", "MPa", "Young's modulus of the wall, as stated.", "simulate: command, --young",
-       false, stated("--young", dimension::pressure)},
-      {"poisson", "Poisson's ratio", "", "Poisson's ratio of the wall, as stated.", "simulate: command, --poisson",
-       false,
-       [](const PipelineCase& one) -> std::optional<double> {
-         const auto text = flag_value(words_of(one, "simulate"), "--poisson");
-         return text ? parse_number(*text) : std::nullopt;
-       }},
+      stated({"pressure_kpa", "Pressure", "kPa", "Pressure on the wall, as stated.", "", false, {}}, "pressure_mpa",
+             {"pressure", dimension::pressure}, 1e3),
+      stated(
+          {"imaged_at_kpa", "Imaged at", "kPa", "Pressure under which the organ was imaged, as stated.", "", false, {}},
+          "imaged_at_mpa", {"imaged_at", dimension::pressure}, 1e3),
+      stated({"thickness_mm", "Thickness", "mm", "Thickness of the wall, as stated.", "", false, {}}, "thickness_mm",
+             {"thickness", dimension::length}),
+      stated({"young_mpa", "Young's modulus", "MPa", "Young's modulus of the wall, as stated.", "", false, {}},
+             "young_mpa", {"young", dimension::pressure}),
+      stated({"poisson", "Poisson's ratio", "", "Poisson's ratio of the wall, as stated.", "", false, {}}, "poisson",
+             {"poisson", dimension::number}),
+      stated({"density_kg_per_m3", "Density", "kg/m3", "Density of the wall, as stated.", "", false, {}},
+             "density_kg_per_m3", {"density", dimension::density}, 1, kg_per_m3),
       {"seconds", "Time", "s", "Seconds of all stages.", "all stages: seconds.total", false, seconds},
       {"peak_mib", "Memory", "MiB", "Largest memory that a stage had in use.", "all stages: peak_mib", false, memory}};
 }
@@ -175,11 +217,69 @@ std::string Measure::text(double of) const {
   return is_bound ? figure_above(of) : unit.empty() && of == std::floor(of) ? fmt::format("{:.0f}", of) : figure(of);
 }
 
+std::string shown(const PipelineCase& one, const std::string& key) {
+  const Measure& what = measure(key);
+  const auto value = what.value(one);
+  if (!value) {
+    return {};
+  }
+  const std::string own = what.text(*value) + (what.unit.empty() || what.unit == "%" ? "" : " ") + what.unit;
+  const auto text = what.input ? written(one, *what.input) : std::nullopt;
+  if (what.unit.empty() || !quantity(text, what.input ? what.input->dimension : Dimension())) {
+    return own;
+  }
+  // What follows the number, its exponent too, is the unit.
+  std::size_t end = text->find_first_not_of("+-.0123456789 ");
+  if ((*text)[end] == 'e' || (*text)[end] == 'E') {
+    end = text->find_first_not_of("+-.0123456789 ", end + 1);
+  }
+  const std::size_t last = text->find_last_not_of(' ', end - 1);
+  const std::string said = text->substr(0, last + 1) + " " + text->substr(end);
+  return said.ends_with(" " + what.unit) ? said : fmt::format("{} ({})", said, own);
+}
+
+std::string Reached::text() const {
+  return fmt::format("{} {}, {}, {} % asked", of, value,
+                     percent ? fmt::format("estimated error {} %", figure_above(*percent)) : "error not estimated",
+                     figure(asked));
+}
+
+std::optional<Reached> accuracy_reached(const PipelineCase& one) {
+  const Json of = one.at("simulate", "result.accuracy.of");
+  const auto value = number(one.at("simulate", "result.accuracy.value"));
+  if (!value) {
+    return std::nullopt;
+  }
+  Reached reached;
+  const std::string name = of.is_string() ? of.get<std::string>() : "";
+  if (of.is_object() && of.value("probe", Json()).is_string() && of.value("axis", Json()).is_string()) {
+    reached.of =
+        fmt::format("displacement of {} along {}", of["probe"].get<std::string>(), of["axis"].get<std::string>());
+  } else {
+    reached.of = name.empty() ? "answer" : name;
+  }
+  reached.value = name == "stress"   ? figure(*value * 1e3) + " kPa"
+                  : name == "energy" ? figure(*value) + " mJ"
+                  : name == "volume" ? figure(*value * 1e-3) + " ml"
+                                     : figure(*value) + " mm";
+  reached.percent = number(one.at("simulate", "result.accuracy.estimate_percent"));
+  reached.asked = number(one.at("simulate", "result.accuracy.requested_percent")).value_or(0);
+  return reached;
+}
+
+bool is_inaccurate(const PipelineCase& one) {
+  return one.at("simulate", "ok") == false && one.at("simulate", "result.accuracy.credible") == false &&
+         accuracy_reached(one).has_value();
+}
+
+bool is_answered(const PipelineCase& one) { return one.at("simulate", "ok") == true || is_inaccurate(one); }
+
 bool is_refitted(const PipelineCase& one) {
-  // A run that did not come to its accuracy leaves no shells under their own name.
-  return one.at("simulate", "ok") == true && one.at("simulate", "result.accuracy").is_object() &&
+  return is_answered(one) && one.at("simulate", "result.accuracy").is_object() &&
          one.at("simulate", "result.shells") != one.at("relax", "result.shells");
 }
+
+bool has_refined_shells(const PipelineCase& one) { return one.at("simulate", "ok") == true && is_refitted(one); }
 
 double median(std::vector<double> values) {
   TUNICA_ASSERT(!values.empty());

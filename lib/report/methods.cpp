@@ -1,118 +1,222 @@
-#include "tunica/core/error.hpp"
-#include "tunica/core/quantity.hpp"
 #include "tunica/report/detail/command_words.hpp"
 #include "tunica/report/detail/measures.hpp"
 #include "tunica/report/detail/sections.hpp"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
 #include <array>
+#include <string>
+#include <vector>
 
 namespace tunica::report {
 namespace {
 
-constexpr std::array references{
-    "O. Comas, C. Duriez, S. Cotin: Shell Model for Reconstruction and Real-Time Simulation of Thin Anatomical "
-    "Structures. MICCAI 2010.",
-    "W. E. Lorensen, H. E. Cline: Marching Cubes: A High Resolution 3D Surface Construction Algorithm. SIGGRAPH 1987.",
-    "M. Garland, P. S. Heckbert: Surface Simplification Using Quadric Error Metrics. SIGGRAPH 1997."};
+/// What a paragraph cites, numbered in the order of its first citations.
+class References {
+public:
+  enum Work : std::size_t { comas, marching_cubes, quadrics, andes, dkt };
 
-std::string with_unit(const CaseReport& one, const char* key) {
-  const Measure& what = measure(key);
-  const auto value = what.value(one.source);
-  return value ? what.text(*value) + (what.unit.empty() || what.unit == "%" ? "" : " ") + what.unit : "";
+  /// "[2]".
+  std::string cite(Work work) {
+    auto found = std::ranges::find(cited_, work);
+    if (found == cited_.end()) {
+      cited_.push_back(work);
+      found = cited_.end() - 1;
+    }
+    return fmt::format("[{}]", found - cited_.begin() + 1);
+  }
+  [[nodiscard]] Markup list() const {
+    static constexpr std::array texts{
+        "O. Comas, C. Duriez, S. Cotin: Shell Model for Reconstruction and Real-Time Simulation of Thin Anatomical "
+        "Structures. MICCAI 2010.",
+        "W. E. Lorensen, H. E. Cline: Marching Cubes: A High Resolution 3D Surface Construction Algorithm. SIGGRAPH "
+        "1987.",
+        "M. Garland, P. S. Heckbert: Surface Simplification Using Quadric Error Metrics. SIGGRAPH 1997.",
+        "C. A. Felippa: A Study of Optimal Membrane Triangles with Drilling Freedoms. Comput. Methods Appl. Mech. "
+        "Engrg. 192, 2003.",
+        "J.-L. Batoz, K.-J. Bathe, L.-W. Ho: A Study of Three-Node Triangular Plate Bending Elements. Int. J. Numer. "
+        "Methods Eng. 15, 1980."};
+    Markup items;
+    for (const Work work : cited_) {
+      items += html("<li>{}</li>\n", texts[work]);
+    }
+    return html("<ol class=\"references\">\n{}</ol>\n", items);
+  }
+
+private:
+  std::vector<Work> cited_;
+};
+
+// The value of a key of the resolved scene, without quotation marks; empty where it has none.
+std::string setting(const CaseReport& one, const std::string& key) {
+  const std::string line = "\n" + key + " = ";
+  const std::size_t at = one.scene.find(line);
+  if (at == std::string::npos) {
+    return {};
+  }
+  const std::size_t begin = at + line.size();
+  std::string value = one.scene.substr(begin, std::min(one.scene.find('\n', begin), one.scene.size()) - begin);
+  std::erase(value, '"');
+  return value;
 }
 
-std::string surface_sentence(const CaseReport& one) {
+// The versions of the tools; one where they are all of the same.
+std::string versions(const CaseReport& one) {
+  std::vector<std::string> found;
+  for (const char* stage : pipeline_stages) {
+    const Json version = one.source.at(stage, "version");
+    if (version.is_string() && std::ranges::find(found, version.get<std::string>()) == found.end()) {
+      found.push_back(version.get<std::string>());
+    }
+  }
+  return fmt::format("{}", fmt::join(found, " and "));
+}
+
+std::string surface_sentence(const CaseReport& one, References& works) {
   const std::vector<std::string> words = words_of(one.source, "extract");
-  const Json version = one.source.at("extract", "version");
   const auto label = flag_value(words, "--label");
   const auto level = flag_value(words, "--isovalue");
   const auto smoothing = flag_value(words, "--smooth");
-  std::string text = "The surface of the organ was extracted with tunica " +
-                     (version.is_string() ? version.get<std::string>() : std::string()) + " by marching cubes [2]";
+  std::string text = "The surface of the organ was extracted with tunica " + versions(one) + " by marching cubes " +
+                     works.cite(References::marching_cubes);
   text += label ? " from label " + *label + " of the segmentation" : level ? " at the isovalue " + *level : "";
   return text + (smoothing == "staircase" ? " and smoothed within half a voxel. " : ". ");
 }
 
-std::string shell_sentence(const CaseReport& one) {
-  const std::string count = with_unit(one, "shells");
-  const std::string distance = with_unit(one, "distance_mm");
+std::string shell_sentence(const CaseReport& one, References& works) {
+  const std::string count = shown(one.source, "shells");
+  const std::string distance = shown(one.source, "distance_mm");
   if (count.empty()) {
     return {};
   }
-  const auto method = flag_value(words_of(one.source, "relax"), "--method");
+  const std::vector<std::string> words = words_of(one.source, "relax");
   const Json middle = one.source.at("relax", "result.mid_surface");
   const bool in_middle = middle.is_object() && middle.value("error_mm", Json()).is_object();
   const std::string target = in_middle ? "surface half of the wall's thickness " +
                                              std::string(middle.value("target", "") == "inner" ? "outside" : "inside") +
                                              " of the extracted one"
                                        : "extracted surface";
-  const std::string text = "It was decimated by quadric edge collapse [3] and " +
-                           std::string(method == "barycentre" ? "relaxed to" : "fitted by") + " " + count +
-                           " curved triangular shells with one cubic shape function each [1]";
-  const std::string mean = with_unit(one, "mean_distance_mm");
+  std::string text = "It was decimated by quadric edge collapse " + works.cite(References::quadrics) + " and " +
+                     std::string(flag_value(words, "--method") == "barycentre" ? "relaxed to" : "fitted by") + " " +
+                     count + " curved triangular shells, each ";
+  text += flag_value(words, "--surface") == "comas"
+              ? "a cubic over its facet " + works.cite(References::comas)
+              : "a cubic patch that meets its neighbours without a gap, after " + works.cite(References::comas);
+  const std::string mean = shown(one.source, "mean_distance_mm");
   if (!distance.empty()) {
     return text + "; the two-sided Hausdorff distance of the curved shells to the " + target +
-           " is certified to be at most " + distance + " (" + with_unit(one, "distance_percent") +
+           " is certified to be at most " + distance + " (" + shown(one.source, "distance_percent") +
            " of its diagonal). ";
   }
   return text + (mean.empty() ? ". " : ", " + mean + " from the " + target + " in the mean. ");
 }
 
-// As the resolved scene states it; empty: unloaded.
-std::string imaging_pressure(const CaseReport& one) {
-  const std::string_view key = "imaged_at = \"";
-  const std::size_t said = one.scene.find(key);
-  if (said == std::string::npos) {
+// Which finite elements carry the load; empty where no scene tells.
+std::string element_sentence(const CaseReport& one, References& works) {
+  const std::string membrane = setting(one, "membrane");
+  const std::string bending = setting(one, "bending");
+  if (membrane.empty() || bending.empty()) {
     return {};
   }
-  const std::size_t begin = said + key.size();
-  const std::string stated = one.scene.substr(begin, one.scene.find('"', begin) - begin);
-  try {
-    return figure(parse_quantity(stated, dimension::pressure) * 1e3) + " kPa";
-  } catch (const UsageError&) {
-    return stated;
+  std::string text = "As finite elements they have six degrees of freedom per node; in their plane they are ";
+  text += membrane == "cst"   ? "constant-strain triangles"
+          : membrane == "opt" ? "optimal ANDES triangles with drilling freedoms " + works.cite(References::andes)
+                              : "optimal ANDES triangles with drilling freedoms " + works.cite(References::andes) +
+                                    ", whose higher-order part is reduced where the shell curves within an element";
+  text += " (" + membrane + "), in bending ";
+  if (bending == "comas") {
+    text += "the 9-term cubic of " + works.cite(References::comas);
+  } else if (bending == "comas-consistent") {
+    text += "the 9-term cubic of " + works.cite(References::comas) + " with the mean curvature that its boundary gives";
+  } else if (bending == "dkt") {
+    text += "discrete Kirchhoff triangles " + works.cite(References::dkt);
+  } else {
+    text += "four fifths discrete Kirchhoff triangles " + works.cite(References::dkt) +
+            " and one fifth the 9-term cubic of " + works.cite(References::comas) +
+            " with the mean curvature that its boundary gives";
   }
+  return text + " (" + bending + "). ";
+}
+
+// What holds the organ, "with … held".
+std::string support_words(const CaseReport& one) {
+  std::vector<std::string> held;
+  const Json fixes = one.source.at("simulate", "stated.fix");
+  for (const Json& fix : fixes.is_array() ? fixes : Json::array()) {
+    if (fix.is_string()) {
+      held.push_back(fix.get<std::string>());
+    }
+  }
+  if (held.empty()) {
+    if (const auto flag = flag_value(words_of(one.source, "simulate"), "--fix")) {
+      held.push_back(*flag);
+    }
+  }
+  for (std::string& what : held) {
+    what = what == "boundary"        ? "the nodes of its boundary"
+           : what == "rigid-motions" ? "only its six rigid motions"
+                                     : "the region '" + what + "'";
+  }
+  return held.empty() ? "" : fmt::format(" with {} held", fmt::join(held, " and "));
+}
+
+std::string solution_words(const CaseReport& one) {
+  const std::string kind = setting(one, "kind");
+  const std::string solver = setting(one, "solver");
+  std::string text = setting(one, "geometry") == "linear"
+                         ? "; the equations were solved linearly"
+                         : "; the equations were solved with large rotations (co-rotational), by Newton's method";
+  text += kind == "dynamic"  ? ", in time (" + setting(one, "integrator") + ", steps of " + setting(one, "step") + ")"
+          : kind == "static" ? ", in statics"
+                             : "";
+  return text + (solver == "cg"       ? ", with a conjugate gradient solver"
+                 : solver == "direct" ? ", with a direct solver"
+                                      : "");
 }
 
 std::string load_sentence(const CaseReport& one) {
-  const std::string stress = with_unit(one, "stress_p99_kpa");
-  if (stress.empty()) {
+  if (shown(one.source, "stress_p99_kpa").empty()) {
     return {};
   }
-  const std::string young = with_unit(one, "young_mpa");
-  const std::string pressure = with_unit(one, "pressure_kpa");
-  const auto fixed = flag_value(words_of(one.source, "simulate"), "--fix");
-  const bool dynamic = one.scene.find("kind = \"dynamic\"") != std::string::npos;
-  const bool linear = one.scene.find("geometry = \"linear\"") != std::string::npos;
+  const std::string young = shown(one.source, "young_mpa");
+  const std::string pressure = shown(one.source, "pressure_kpa");
   std::string text = "The wall was linear elastic and isotropic";
-  text += young.empty() ? "" : " (Young's modulus " + young + ", Poisson's ratio " + with_unit(one, "poisson") + ")";
-  const std::string thickness = with_unit(one, "thickness_mm");
+  text += young.empty() ? "" : " (Young's modulus " + young + ", Poisson's ratio " + shown(one.source, "poisson") + ")";
+  const std::string thickness = shown(one.source, "thickness_mm");
   text += thickness.empty() ? ". " : " and " + thickness + " thick. ";
-  const std::string imaged = imaging_pressure(one);
-  text += imaged.empty()
+  // Reports of older tools tell no inputs, but the scene does.
+  const std::string said = shown(one.source, "imaged_at_kpa");
+  const std::string imaged = said.empty() ? setting(one, "imaged_at") : said;
+  text += imaged.empty() || measure("imaged_at_kpa").value(one.source) == 0
               ? "The image was taken as unloaded. "
               : "The image was taken under a pressure of " + imaged + "; the shape without it was found first. ";
-  text += pressure.empty() ? "It was loaded" : "A pressure of " + pressure + " was put on it";
-  text += fixed ? " with " + std::string(*fixed == "boundary"        ? "the boundary held"
-                                         : *fixed == "rigid-motions" ? "only its rigid motions held"
-                                                                     : "the region '" + *fixed + "' held")
-                : "";
-  text += std::string("; the equations were solved ") +
-          (linear ? "linearly" : "with large rotations (co-rotational), by Newton's method") +
-          (dynamic ? ", in time" : ", in statics") + ". ";
-  return text + "Stresses are von Mises stresses at either face of the wall, as the 99th percentile by area.";
+  text += pressure.empty() ? "It was loaded" : "A pressure of " + pressure;
+  text += pressure.empty()                      ? ""
+          : setting(one, "follower") == "false" ? " was put on it"
+                                                : " that follows the surface was put on it";
+  text += support_words(one) + solution_words(one) + ". ";
+  text += "Stresses are von Mises stresses at either face of the wall, as the 99th percentile by area.";
+  const auto reached = accuracy_reached(one.source);
+  if (reached && reached->percent) {
+    text += fmt::format(" The error of the {} by number of shells and model is estimated at {} %.", reached->of,
+                        figure_above(*reached->percent));
+  }
+  return text;
 }
 
 }  // namespace
 
 Markup methods_section(const CaseReport& one, int level) {
+  References works;
+  std::string text = surface_sentence(one, works);
+  text += shell_sentence(one, works);
+  text += shown(one.source, "stress_p99_kpa").empty() ? "" : element_sentence(one, works);
+  text += load_sentence(one);
   Markup made = heading(level, "Methods, to paste");
-  made += html("<p class=\"methods\">{}</p>\n<ol class=\"references\">\n",
-               one.redacted(surface_sentence(one)) + shell_sentence(one) + load_sentence(one));
-  for (const char* reference : references) {
-    made += html("<li>{}</li>\n", reference);
-  }
-  return made += html("</ol>\n");
+  made += html("<p class=\"methods\">{}</p>\n", one.redacted(text));
+  return made += works.list();
 }
 
 }  // namespace tunica::report

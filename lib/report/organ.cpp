@@ -2,16 +2,19 @@
 
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
+#include "tunica/core/progress.hpp"
 #include "tunica/draw/picture.hpp"
 #include "tunica/draw/thumbnail.hpp"
 #include "tunica/io/file/encoding.hpp"
 #include "tunica/io/mesh/mesh_file.hpp"
 #include "tunica/report/detail/drawn_shells.hpp"
+#include "tunica/report/detail/measures.hpp"
 #include "tunica/shell/patch/curved_surface.hpp"
 #include "tunica/surface/distance/closest_point.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <optional>
 
 namespace tunica::report {
@@ -249,12 +252,6 @@ DrawnResult unloaded(const fs::path& path) {
   return drawn;
 }
 
-// As it stands in 3-D, which is decided by the shape without load.
-void take_picture(CaseReport& one, const TriangleMesh& mesh, const std::vector<double>& values,
-                  const TriangleMesh& reference, int longest) {
-  one.picture = thumbnail(mesh, values, {longest, one.picture_top, picture_axes(reference.vertices)});
-}
-
 void draw_shells(CaseReport& one, const Room& room, DrawnShells shells, const std::optional<TriangleMesh>& surface,
                  bool loaded) {
   // Without its load the organ is not where it was imaged.
@@ -273,7 +270,11 @@ void draw_shells(CaseReport& one, const Room& room, DrawnShells shells, const st
   for (std::size_t v = 0; v < seen.vertices.size(); ++v) {
     seen.vertices[v] += one.magnification * shells.states.back().displacement[v];
   }
-  take_picture(one, seen, shells.states.back().von_mises, shells.mesh, room.picture_longest);
+  // As it stands in 3-D, which is decided by the shape without load.
+  one.seen = {std::move(seen), {}, picture_axes(shells.mesh.vertices)};
+  if (loaded) {
+    one.seen.stress = shells.states.back().von_mises;
+  }
   TriangleMesh coarse;
   if (surface) {
     try {
@@ -319,7 +320,30 @@ void draw_organ(CaseReport& one, const Room& room) {
       one.missing.push_back(one.redacted(error.what()));
     }
   } else if (surface && !surface->triangles.empty()) {
-    take_picture(one, *surface, {}, *surface, room.picture_longest);
+    one.picture = thumbnail(*surface, {}, {room.picture_longest, 0, picture_axes(surface->vertices)});
+  }
+}
+
+void take_pictures(std::vector<CaseReport>& cases, const Room& room) {
+  std::map<std::string, double> tops;
+  for (const CaseReport& one : cases) {
+    const auto stress = measure("stress_p99_kpa").value(one.source);
+    if (cases.size() > 1 && !one.seen.stress.empty() && stress) {
+      double& top = tops.try_emplace(one.organ_kind, 0).first->second;
+      top = std::max(top, *stress * 1e-3);
+    }
+  }
+  for (CaseReport& one : cases) {
+    check_interrupt();
+    if (one.seen.mesh.triangles.empty()) {
+      continue;
+    }
+    const auto shared = tops.find(one.organ_kind);
+    if (shared != tops.end() && shared->second > 0 && !one.seen.stress.empty()) {
+      one.picture_top = shared->second;
+    }
+    one.picture = thumbnail(one.seen.mesh, one.seen.stress, {room.picture_longest, one.picture_top, one.seen.axes});
+    one.seen = {};
   }
 }
 

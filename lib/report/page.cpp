@@ -4,6 +4,7 @@
 #include "tunica/core/narrow.hpp"
 #include "tunica/core/version.hpp"
 #include "tunica/io/file/encoding.hpp"
+#include "tunica/report/detail/command_words.hpp"
 #include "tunica/report/detail/embedded.hpp"
 #include "tunica/report/detail/organ.hpp"
 #include "tunica/report/detail/sections.hpp"
@@ -12,21 +13,37 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
+#include <map>
+#include <set>
 
 namespace tunica::report {
 namespace {
 
-std::vector<std::string> warnings_of(const CaseReport& one) {
-  std::vector<std::string> all;
-  for (const char* stage : pipeline_stages) {
-    const Json warnings = one.source.at(stage, "warnings");
-    for (const Json& warning : warnings.is_array() ? warnings : Json::array()) {
-      if (warning.is_string()) {
-        all.push_back(std::string(stage) + ": " + one.redacted(warning.get<std::string>()));
-      }
-    }
+namespace fs = std::filesystem;
+
+fs::path volume_of(const CaseReport& one) {
+  const std::vector<ReportedFile> inputs = one.source.files("extract", "inputs");
+  return inputs.empty() ? fs::path() : inputs.front().path;
+}
+
+// One organ is compared with its like: cases of a label by themselves. A file name that comes back in other folders, as
+// in TotalSegmentator's patient/segmentations/aorta.nii.gz, says which organ its label is.
+void name_organs(std::vector<CaseReport>& cases) {
+  std::map<fs::path, std::set<fs::path>> folders_of;
+  for (const CaseReport& one : cases) {
+    const fs::path volume = volume_of(one);
+    folders_of[volume.filename()].insert(volume.parent_path().lexically_normal());
   }
-  return all;
+  for (CaseReport& one : cases) {
+    // The label that was extracted as the command names it; empty: at an isovalue, or not known.
+    const std::string label = flag_value(words_of(one.source, "extract"), "--label").value_or("");
+    const fs::path file = volume_of(one).filename();
+    const std::string name = folders_of[file].size() > 1 ? file.string() : "";
+    one.organ_kind = label + "\n" + name;
+    one.organ_name = (label.empty() ? "No label" : "Label " + one.redacted(label)) +
+                     (name.empty() ? "" : " of " + one.redacted(name));
+  }
 }
 
 CaseReport report_of(PipelineCase source, std::size_t number, const PageOptions& options) {
@@ -35,7 +52,12 @@ CaseReport report_of(PipelineCase source, std::size_t number, const PageOptions&
   one.number = number;
   one.name = options.with_names ? one.source.name : fmt::format("case {}", number);
   one.redacted = options.with_names ? Redaction() : Redaction(one.source, number);
-  one.warnings = warnings_of(one);
+  one.warnings = told_warnings(one.source);
+  for (ToldWarning& told : one.warnings) {
+    told.warning.text = one.redacted(told.warning.text);
+  }
+  one.notes = told_notes(one.source);
+  std::ranges::transform(one.notes, one.notes.begin(), one.redacted);
   for (const std::string& unreadable : one.source.unreadable) {
     one.missing.push_back(one.redacted(unreadable));
   }
@@ -122,6 +144,8 @@ Page make_page(std::vector<PipelineCase> cases, const PageOptions& options) {
       options.progress(real(i + 1) / real(cases.size()));
     }
   }
+  name_organs(reports);
+  take_pictures(reports, room);
   std::ranges::stable_partition(reports, [](const CaseReport& one) { return !one.source.done(); });
   Page page;
   page.tsv = cohort_tsv(reports);

@@ -34,11 +34,13 @@ struct Page {
 /// Limits: below 25 MB up to 200 cases: surfaces and pictures are made coarser for that.
 Page make_page(std::vector<PipelineCase> cases, const PageOptions& options);
 
-/// The table that ends a run of the pipeline: case, stage reached, exit code, message, shells, error, seconds.
+/// The table that ends a run of the pipeline: case, stage reached, exit code, message, shells, certified distance,
+/// stress, displacement and strain, estimated errors where they are known, number of warnings, seconds.
 /// @return tab-separated, a line per case, blanks instead of control characters
 std::string summary_tsv(const std::vector<PipelineCase>& cases);
 
-/// The same for a terminal, in columns; and where the results of what is done lie.
+/// The same for a terminal, in columns; what the heads mean, the warnings by kind, and where the results of what is
+/// done lie.
 std::string summary_text(const std::vector<PipelineCase>& cases);
 
 /// Time against distance of the cases whose shells were made, as SVG; none where there are none.

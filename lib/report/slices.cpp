@@ -232,7 +232,7 @@ void draw_slices(CaseReport& one, const Room& room) {
   if (one.source.folder.empty() || !fs::exists(one.source.folder / "shell.ply", error)) {
     return;
   }
-  const fs::path shells = one.source.folder / (is_refitted(one.source) ? "refined.ply" : "shell.ply");
+  const fs::path shells = one.source.folder / (has_refined_shells(one.source) ? "refined.ply" : "shell.ply");
   try {
     const Image image = read_image(one.source);
     one.slices = sheet_of(image, shells_in_voxels(shells, image.volume), room.slice);

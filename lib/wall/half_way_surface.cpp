@@ -1,6 +1,7 @@
 #include "tunica/core/disjoint_sets.hpp"
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
+#include "tunica/core/require.hpp"
 #include "tunica/core/threads.hpp"
 #include "tunica/surface/mesh/checks.hpp"
 #include "tunica/surface/mesh/measure.hpp"
@@ -201,7 +202,7 @@ HalfWaySurface with_cells(const Target& face, std::size_t pieces, WallFace which
 }  // namespace
 
 HalfWaySurface half_way_surface(const Target& face, WallFace which, double thickness, const Progress& progress) {
-  TUNICA_ASSERT(thickness > 0);
+  require_positive(thickness, "the thickness");
   if (thickness < thinnest * face.diagonal()) {
     throw RequirementError(fmt::format(
         "the wall, {:.3g} mm thick, is thinner than a ten-thousandth of the diagonal, {:.4g} mm: its face is "

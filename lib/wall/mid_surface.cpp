@@ -2,7 +2,9 @@
 
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
+#include "tunica/core/require.hpp"
 #include "tunica/shell/patch/curved_surface.hpp"
+#include "tunica/surface/mesh/checks.hpp"
 #include "tunica/surface/mesh/measure.hpp"
 
 #include <fmt/format.h>
@@ -17,7 +19,6 @@ namespace {
 
 constexpr int pieces_per_edge = 4;   // where distances are sampled
 constexpr double least_stand = 0.2;  // of a normal on its facet: less is no shell
-constexpr double small_rims = 0.3;   // of the area: what closes them
 
 void require_unfolded(const ShellMesh& before, const ShellMesh& after) {
   for (std::size_t t = 0; t < after.triangles.size(); ++t) {
@@ -39,25 +40,10 @@ void require_unfolded(const ShellMesh& before, const ShellMesh& after) {
 
 }  // namespace
 
-bool faces_inward(const Target& face) {
-  TriangleMesh closed = face.mesh();
-  for (const auto& rim : face.boundary_vertices()) {
-    Vec3 middle = Vec3::Zero();
-    for (const Index v : rim) {
-      middle += closed.vertices[v] / real(rim.size());
-    }
-    const auto centre = narrow<Index>(closed.vertices.size());
-    closed.vertices.push_back(middle);
-    for (std::size_t i = 0; i < rim.size(); ++i) {
-      closed.triangles.push_back({rim[(i + 1) % rim.size()], rim[i], centre});
-    }
-  }
-  const double open = area(face.mesh());
-  return area(closed) - open <= small_rims * open && signed_volume(closed) < 0;
-}
-
 TriangleMesh moved_half_way(TriangleMesh coarse, const Target& face, WallFace which, double thickness,
                             const Target& half_way) {
+  require_positive(thickness, "the thickness");
+  require_valid(coarse);
   const double way = which == WallFace::inner ? thickness / 2 : -thickness / 2;
   for (Vec3& p : coarse.vertices) {
     const Target::Foot foot = face.closest(p);
@@ -67,6 +53,10 @@ TriangleMesh moved_half_way(TriangleMesh coarse, const Target& face, WallFace wh
 }
 
 MidSurface mid_surface_between(const ShellMesh& face, WallFace which, const Target& other) {
+  require_shells(face);
+  if (face.normals.size() != face.vertices.size()) {
+    throw InputError("the middle of a wall needs a normal at each vertex of its face");
+  }
   MidSurface middle{face, {}};
   const std::vector<Vec3> its_normals = vertex_normals(other.mesh());
   const auto facets = facet_normals(other.mesh());
@@ -95,6 +85,8 @@ MidSurface mid_surface_between(const ShellMesh& face, WallFace which, const Targ
 }
 
 std::array<double, 2> half_wall_error(const ShellMesh& shell, const Target& face, double thickness) {
+  require_shells(shell);
+  require_positive(thickness, "the thickness");
   const Tessellation fine = tessellate_uniformly(shell, pieces_per_edge);
   const std::vector<Vec3>& x = fine.mesh.vertices;
   std::vector<double> off(x.size());

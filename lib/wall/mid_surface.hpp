@@ -1,4 +1,3 @@
-// wall: from one face of a wall to its middle, where a shell lies.
 #pragma once
 
 #include "tunica/core/progress.hpp"
@@ -36,9 +35,6 @@ struct HalfWaySurface {
 /// grid, of which there are at most 150 million. Limits: parts thinner than a cell may be lost; a rim that is cut at
 /// less than 30 degrees to the wall counts as one that lies in no plane.
 HalfWaySurface half_way_surface(const Target& face, WallFace which, double thickness, const Progress& progress = {});
-
-/// Whether a face that is closed, but for rims that are small beside it, has its normals inward.
-bool faces_inward(const Target& face);
 
 /// A coarse mesh of the face, each vertex moved to the surface half of the wall away. Cost: linear.
 TriangleMesh moved_half_way(TriangleMesh coarse, const Target& face, WallFace which, double thickness,

@@ -306,6 +306,48 @@ class WholeTools(unittest.TestCase):
                 self.assertIn(done.returncode, (0, 6), (verb, kibibytes, done.stderr))
                 self.assertNotIn("terminate", done.stderr)
 
+    def every_command(self):
+        """As COMMANDS, with the one tool that reads a folder."""
+        os.makedirs(self.path("cases/ball/1"), exist_ok=True)
+        for name in ("relax.json", "shell.ply"):
+            shutil.copy(self.path(name), self.path("cases/ball/1"))
+        return {**self.COMMANDS, "report": (["cases", "-o", "out.html"], "out.html")}
+
+    def limited(self, kind, most, verb, *words):
+        return subprocess.run([tool(verb), *words], cwd=self.folder, capture_output=True, text=True, check=False,
+                              preexec_fn=lambda: resource.setrlimit(kind, (most, most)))
+
+    def test_a_report_that_no_descriptor_is_left_for(self):
+        """ulimit -n 4: told before the work."""
+        for verb, (arguments, output) in self.every_command().items():
+            done = self.limited(resource.RLIMIT_NOFILE, 4, verb, *arguments, "--report", "report.json")
+            self.assertEqual((done.returncode, done.stderr), (5, f"tunica-{verb}: report.json: cannot be written: Too many open "
+                                                                 "files: allow more (ulimit -n)\n"), verb)
+            self.assertFalse([name for name in os.listdir(self.folder) if name.startswith(("report.json", output))])
+
+    def test_a_small_stack_does(self):
+        for verb, (arguments, output) in self.every_command().items():
+            done = self.limited(resource.RLIMIT_STACK, 64 << 10, verb, *arguments, "--force", "--report", "report.json")
+            self.assertEqual(done.returncode, 0, (verb, done.stderr))
+            self.assertTrue(os.path.getsize(self.path(output)))
+            for words, code in ((["--help"], 0), (["--nonsense"], 2)):
+                self.assertEqual(self.limited(resource.RLIMIT_STACK, 64 << 10, verb, *words).returncode, code, verb)
+
+    def test_two_hyphens_end_the_options(self):
+        files = {"phantom": 2, "extract": 2, "decimate": 2, "relax": 3, "compare": 2, "simulate": 2, "chart": 1, "report": 1}
+        for verb, (arguments, output) in self.every_command().items():
+            count = files[verb]
+            words = [*arguments[count:], "--force", "--report", "report.json", "--", *arguments[:count]]
+            done = subprocess.run([tool(verb), *words], cwd=self.folder, capture_output=True, text=True, check=False)
+            self.assertEqual(done.returncode, 0, (verb, done.stderr))
+            self.assertTrue(os.path.getsize(self.path(output)))
+            # What stands behind them is a name, also where it is that of an option.
+            for name in ("--report", "--no-paths", "--help", "--version"):
+                done = subprocess.run([tool(verb), "--", name, "a", "b", "c"], cwd=self.folder, capture_output=True, text=True,
+                                      check=False)
+                self.assertIn(done.returncode, (2, 3), (verb, name, done.stderr))
+                self.assertEqual((done.stdout, os.path.exists(self.path("a"))), ("", False), (verb, name))
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -1,6 +1,7 @@
 #include "tunica/core/quantity.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/core/spelling.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,6 +9,7 @@
 namespace tunica {
 namespace {
 
+using testing::EndsWith;
 using testing::HasSubstr;
 
 TEST(Quantity, EveryUnitOfTheContract) {
@@ -24,6 +26,15 @@ TEST(Quantity, EveryUnitOfTheContract) {
   same("1cmH2O", "98.0665Pa", dimension::pressure);
   same("1bar", "1e5Pa", dimension::pressure);
   same("1N/mm2", "1MPa", dimension::pressure);
+  same("1dyn/cm2", "0.1Pa", dimension::pressure);
+  same("1psi", "6894.757293168Pa", dimension::pressure);
+  same("760Torr", "101325Pa", dimension::pressure);
+  same("1mbar", "100Pa", dimension::pressure);
+  same("1hPa", "100Pa", dimension::pressure);
+  same("1ml", "1000mm3", dimension::volume);
+  same("1cm3", "1000mm3", dimension::volume);
+  same("1l", "1000cm3", dimension::volume);
+  same("1.1kg/l", "1.1g/cm3", dimension::density);
   same("1e6uN", "1N", dimension::force);
   same("1e3mN", "1N", dimension::force);
   same("1kN", "1000N", dimension::force);
@@ -60,6 +71,100 @@ TEST(Quantity, WhatIsNotAQuantityIsRefused) {
   for (const char* text : {"", " ", "kPa", "1 kpa", "1kPa kPa", "nankPa", "infPa", "0x10Pa", "1e999Pa", "1kPa*", "1mm",
                            "1Pa0", "--1Pa", "+-1Pa", "1kPa/", "1kPax", "1e308GPa", "1,5kPa"}) {
     EXPECT_THROW(parse_quantity(text, dimension::pressure), UsageError) << text;
+  }
+}
+
+std::string refusal(std::string_view text, Dimension dimension) {
+  try {
+    (void)parse_quantity(text, dimension);
+  } catch (const UsageError& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+TEST(Quantity, WhatPeopleWriteGetsTheNearestRightSpelling) {
+  struct Slip {
+    const char* text;
+    Dimension dimension;
+    const char* right;
+  };
+  for (const Slip& slip : {Slip{"120mmhg", dimension::pressure, "120mmHg"},
+                           {"120 mm Hg", dimension::pressure, "120mmHg"},
+                           {"120MMHG", dimension::pressure, "120mmHg"},
+                           {"120 mm", dimension::pressure, "120mmHg"},
+                           {"10cmH20", dimension::pressure, "10cmH2O"},
+                           {"10 cmH\u2082O", dimension::pressure, "10cmH2O"},
+                           {"16KPA", dimension::pressure, "16kPa"},
+                           {"2 kilopascals", dimension::pressure, "2kPa"},
+                           {"1.2Mpa", dimension::pressure, "1.2MPa"},
+                           {"1.2MPA", dimension::pressure, "1.2MPa"},
+                           {"2PSI", dimension::pressure, "2psi"},
+                           {"2torr", dimension::pressure, "2Torr"},
+                           {"5 dynes/cm\u00b2", dimension::pressure, "5dyn/cm2"},
+                           {"5 N per mm2", dimension::pressure, "5N/mm2"},
+                           {"1,5kPa", dimension::pressure, "1.5kPa"},
+                           {"1,5", dimension::pressure, "1.5kPa"},
+                           {"-2,5e3Pa", dimension::pressure, "-2.5e3Pa"},
+                           {"1.000,5 Pa", dimension::pressure, "1000.5Pa"},
+                           {"15 998 Pa", dimension::pressure, "15998Pa"},
+                           {"1.5MM", dimension::length, "1.5mm"},
+                           {"1,5 Mm", dimension::length, "1.5mm"},
+                           {",5mm", dimension::length, "0.5mm"},
+                           {"300\u00b5m", dimension::length, "300um"},
+                           {"300 microns", dimension::length, "300um"},
+                           {"1.1 g/cm\u00b3", dimension::density, "1.1g/cm3"},
+                           {"1.1 g/cc", dimension::density, "1.1g/ml"},
+                           {"1100KG/M3", dimension::density, "1100kg/m3"},
+                           {"1100kg", dimension::density, "1100kg/m3"},
+                           {"10 milliseconds", dimension::time, "10ms"},
+                           {"10 MSEC", dimension::time, "10ms"},
+                           {"400 mL", dimension::volume, "400ml"}}) {
+    const std::string said = refusal(slip.text, slip.dimension);
+    EXPECT_THAT(said, EndsWith(std::string(": write ") + slip.right)) << slip.text;
+    EXPECT_NO_THROW(parse_quantity(slip.right, slip.dimension)) << slip.right;
+  }
+  EXPECT_THAT(refusal("5atm", dimension::pressure), HasSubstr("kPa, Pa, hPa, MPa, GPa, mmHg, cmH2O"));
+  EXPECT_THAT(refusal("5xPa", dimension::pressure), HasSubstr("units of pressure are")) << "more than one is near";
+  for (const char* other : {"10mmH2O", "1ksi"}) {
+    EXPECT_THAT(refusal(other, dimension::pressure), HasSubstr("units of pressure are")) << "units of their own";
+  }
+  EXPECT_THAT(refusal("12.5.3kPa", dimension::pressure), testing::Not(HasSubstr("write 1253")));
+  EXPECT_THAT(refusal("1,25,3kPa", dimension::pressure), testing::Not(HasSubstr("write 1253")));
+  EXPECT_THAT(refusal("1.250.300Pa", dimension::pressure), EndsWith("write 1250300Pa"));
+  EXPECT_THAT(refusal("5ms", dimension::length), HasSubstr("is a time, not a length: units of length are"));
+  EXPECT_THAT(refusal("5e400kPa", dimension::pressure), HasSubstr("is not a pressure"));
+}
+
+TEST(Quantity, WhatHasTwoMeaningsIsToldBoth) {
+  EXPECT_THAT(refusal("3mpa", dimension::pressure), EndsWith("write 3MPa (megapascal) or 0.003Pa (millipascal)"));
+  EXPECT_THAT(refusal("3 mPa", dimension::pressure), EndsWith("write 3MPa (megapascal) or 0.003Pa (millipascal)"));
+  EXPECT_THAT(refusal("2MN", dimension::force), EndsWith("write 2mN (millinewton) or 2000kN (meganewton)"));
+  EXPECT_THAT(refusal("1,000mm", dimension::length),
+              EndsWith("write 1000mm (the comma groups thousands) or 1.000mm (the comma is decimal)"));
+}
+
+TEST(Quantity, NumbersAndPercentagesWithACommaToo) {
+  EXPECT_THAT(right_numbers("0,45"), testing::ElementsAre("0.45"));
+  EXPECT_TRUE(right_numbers("half").empty());
+  EXPECT_THROW(
+      {
+        try {
+          (void)parse_length_tolerance("0,5%");
+        } catch (const UsageError& error) {
+          EXPECT_THAT(error.what(), EndsWith("write 0.5%"));
+          throw;
+        }
+      },
+      UsageError);
+}
+
+TEST(Quantity, UnitsOfMeshesToo) {
+  try {
+    (void)parse_length_unit("MM");
+    FAIL();
+  } catch (const UsageError& error) {
+    EXPECT_THAT(error.what(), EndsWith("write mm"));
   }
 }
 

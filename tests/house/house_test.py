@@ -38,6 +38,15 @@ def twice_defined(files):
     return {name: sorted(paths) for name, paths in where.items() if len(paths) > 1}
 
 
+def kinds_without_a_row(files):
+    """Kinds of warnings in the code that docs/warnings.md does not have: {kind: path}."""
+    files = list(files)
+    rows = [line.split("|")[1] for path, text in files if path == "docs/warnings.md" for line in text.splitlines() if line.startswith("| ")]
+    known = {kind.strip() for row in rows for kind in row.split(",")}
+    return {kind: path for path, text in files if path.startswith(("lib/", "tools/")) and path.endswith(".cpp")
+            for kind in re.findall(r'(?:Weight::(?:note|minor|major)|\{weight),\s*"([^"]+)"', text) if kind not in known}
+
+
 class House(unittest.TestCase):
     """Every rule on every file."""
 
@@ -52,6 +61,12 @@ class House(unittest.TestCase):
                     if path != "tests/house/house_test.py":
                         found += rule(path, text)
                 self.assertEqual(found, [], f"{rule.__doc__}\n" + "\n".join(found))
+
+    def test_every_kind_of_warning_is_explained(self):
+        self.assertEqual(kinds_without_a_row(text_files()), {})
+        page = ("docs/warnings.md", "| kind | means |\n| no load, thick wall | nothing |\n")
+        code = 'tool.warn({Weight::minor,\n "no load", text});\nfound.push_back({Weight::major : Weight::minor, "bent rim", text});\n'
+        self.assertEqual(kinds_without_a_row([page, ("tools/a.cpp", code)]), {"bent rim": "tools/a.cpp"})
 
     def test_one_definition(self):
         """Two types of one name in the library's namespace break the one-definition rule without a word."""

@@ -275,5 +275,54 @@ TEST(MeshFile, RefusesWhatIsNoMesh) {
   EXPECT_EQ(read_mesh(folder.file("misnamed.obj", test::tetrahedron_glb())).units, "m") << "the content decides";
 }
 
+/// What a file of these bytes says of its axes.
+std::string space_of(const TemporaryFolder& folder, const std::string& name, const std::string& bytes) {
+  return read_mesh(folder.file(name, bytes)).space.value_or("none");
+}
+
+TEST(Space, IsReadWhereverAFormatHasRoomForIt) {
+  const TemporaryFolder folder;
+  EXPECT_EQ(space_of(folder, "a.stl", test::binary_stl("3D Slicer output. SPACE=RAS")), "RAS");
+  EXPECT_EQ(space_of(folder, "b.stl", with(test::ascii_stl(), "a name with words", "Slicer output. SPACE=LPS")), "LPS");
+  EXPECT_EQ(space_of(folder, "c.obj", "# exported, space = ras, today\n" + test::tetrahedron_obj), "RAS");
+  EXPECT_EQ(space_of(folder, "f.obj", test::tetrahedron_obj + "\ng organ # SPACE=RAS\n"), "RAS");
+  EXPECT_EQ(space_of(folder, "g.stl", with(test::ascii_stl(), "endsolid", "endsolid organ SPACE=RAS")), "RAS");
+  EXPECT_EQ(space_of(folder, "d.off", with(test::tetrahedron_off, "made by hand", "SPACE: Right-Anterior-Superior.")),
+            "RAS");
+  for (const auto& [from, to] : {std::pair(R"("version":"2.0")", R"("version":"2.0","extras":{"SPACE":"RAS"})"),
+                                 {R"("asset":)", R"("extras":{"SPACE":"RAS"},"asset":)"},
+                                 {R"("name":"parent")", R"("name":"SPACE=RAS; made by a program")"},
+                                 {R"("meshes":[{)", R"("meshes":[{"name":"SPACE=RAS",)"},
+                                 {R"("meshes":[{)", R"("meshes":[{"extras":{"note":"in SPACE=RAS"},)"}}) {
+    EXPECT_EQ(
+        space_of(folder, "e.glb", test::glb(with(test::tetrahedron_glb_json, from, to), test::tetrahedron_glb_data())),
+        "RAS");
+  }
+}
+
+TEST(Space, IsNoPartOfOtherWords) {
+  const TemporaryFolder folder;
+  for (const char* text : {"whitespace=RAS", "SPACE=RASTER", "SPACE RAS", "spaces=LPS", "my_space=LPS",
+                           "SPACE=", "a space", "--space ras", "SPACE=RAS-like"}) {
+    EXPECT_EQ(space_of(folder, "a.stl", test::binary_stl(text)), "none") << text;
+    EXPECT_EQ(space_of(folder, "a.obj", "# " + std::string(text) + "\n" + test::tetrahedron_obj), "none") << text;
+  }
+}
+
+TEST(Space, OneFileSaysOne) {
+  const TemporaryFolder folder;
+  EXPECT_THAT(test::refusal(folder, "# SPACE=RAS\n# SPACE=LPS\n" + test::tetrahedron_obj, "a.obj"),
+              HasSubstr("says both"));
+  EXPECT_THAT(test::refusal(folder, test::binary_stl("SPACE=RAS SPACE=LPS"), "a.stl"), HasSubstr("says both"));
+}
+
+TEST(Glb, IsInTheUnitThatIsStated) {
+  const TemporaryFolder folder;
+  const auto path = folder.file("a.glb", test::tetrahedron_glb());
+  const MeshFile in_mm = read_mesh(path, 1.0);
+  require_no_other_unit(in_mm, 1.0, path);
+  EXPECT_NEAR((read_mesh(path).mesh.vertices[1] - 1000 * in_mm.mesh.vertices[1]).norm(), 0, 1e-9);
+}
+
 }  // namespace
 }  // namespace tunica

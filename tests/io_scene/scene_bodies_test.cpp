@@ -217,7 +217,7 @@ TEST_F(BodiesTest, rigidMeshesAreTurnedOutwardAndIdleBodiesNoted) {
       load(with_plate("[[rigid]]\nname = \"in\"\nmesh = \"inward.ply\"\n" + sphere("idle") + contact("in", "plate")));
   const auto& surface = std::get<RigidMesh>(loaded.model.rigids.at(0).shape).surface;
   EXPECT_GT(signed_volume(surface), 0);
-  EXPECT_THAT(loaded.notes, Contains(HasSubstr("face inward")));
+  EXPECT_THAT(texts_of(loaded.warnings), ElementsAre(HasSubstr("its normals point inward")));
   EXPECT_THAT(loaded.notes, Contains(HasSubstr("no [[contact]] names \"idle\"")));
   EXPECT_EQ(std::count_if(loaded.notes.begin(), loaded.notes.end(),
                           [](const std::string& note) { return note.find("[[contact]]") != std::string::npos; }),

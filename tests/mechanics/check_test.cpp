@@ -211,7 +211,7 @@ TEST(Doubts, AWallThickerThanTheRadiusOfCurvatureOfMostOfTheBodyButNotOfACrease)
   EXPECT_THAT(doubts_of(tube(0.3, 0.5)), ElementsAre(HasSubstr("a quarter of a vessel's radius")));
   EXPECT_THAT(doubts_of(tube(0.06, 0.5)), IsEmpty());
   // Long shells on so thin a wall bend too little: h^2 = 4 R t at a thickness of .031.
-  EXPECT_THAT(doubts_of(tube(0.02, 0.5)), ElementsAre(HasSubstr("h^2 = 6.2 R t")));
+  EXPECT_THAT(doubts_of(tube(0.02, 0.5)), ElementsAre(HasSubstr("coarse for so thin a curved wall")));
   // Two flat walls that meet in an edge: there the radius is small, elsewhere there is none.
   Model angle;
   const Grid grid = make_grid(

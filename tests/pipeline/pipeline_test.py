@@ -94,7 +94,7 @@ class Rules(WithStubs):
                               "decimate.json", "relax.json", "simulate.json"}, present)
         row = self.summary()["a/3"]
         self.assertEqual((row["stage"], row["exit"], row["message"]), ("simulate", "0", "done"))
-        self.assertEqual((row["shells"], row["error_percent"], row["seconds"]), ("42", "0.625", "1.00"))
+        self.assertEqual((row["shells"], row["distance_percent"], row["seconds"]), ("42", "0.625", "1.00"))
         for name in ("result.hdf", "map.png"):
             self.assertIn(str(self.out / "a" / "3" / name), done.stdout)
         self.assertIn(str(self.out / "chart.svg"), done.stdout)

@@ -87,6 +87,21 @@ TEST(Summary, RoundsBoundsUp) {
   EXPECT_THAT(summary_tsv({one}), testing::HasSubstr("\t0.1147\t"));
 }
 
+TEST(Measures, InputsAreShownAsTheyWereStated) {
+  PipelineCase one{"a/1", "out/a/1", "simulate", "0", "done", {}, {}};
+  const auto pressure = [&](double megapascals, const char* typed) {
+    one.reports["simulate"] = {{"stated", {{"pressure_mpa", megapascals}, {"typed", {{"pressure", typed}}}}}};
+    return shown(one, "pressure_kpa");
+  };
+  EXPECT_EQ(pressure(0.0159986865, "120mmHg"), "120 mmHg (16.0 kPa)");
+  EXPECT_EQ(pressure(0.016, "16 kPa"), "16 kPa");
+  EXPECT_EQ(pressure(0.016, "1.6e4Pa"), "1.6e4 Pa (16 kPa)");
+  EXPECT_EQ(pressure(0.016, "<b>"), "16 kPa") << "no quantity";
+  one.reports["simulate"] = {{"command", "tunica-simulate s.ply r.hdf --pressure 120mmHg"}};
+  EXPECT_EQ(shown(one, "pressure_kpa"), "120 mmHg (16.0 kPa)") << "a report of an older tool";
+  EXPECT_EQ(shown(one, "imaged_at_kpa"), "");
+}
+
 TEST(CommandWords, AreThoseTheShellSees) {
   EXPECT_THAT(command_words("tunica-extract 'my scan.nii' --label 3 'it'\\''s' ''"),
               ElementsAre("tunica-extract", "my scan.nii", "--label", "3", "it's", ""));

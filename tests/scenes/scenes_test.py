@@ -5,10 +5,14 @@ another vessel."""
 import json
 import os
 import re
+import struct
 import subprocess
 import tempfile
 import unittest
+import zlib
 from pathlib import Path
+
+import numpy as np
 
 SCENES = Path(os.environ["TUNICA_SOURCE"]) / "examples" / "scenes"
 BIN = Path(os.environ["TUNICA_BIN"])
@@ -59,6 +63,73 @@ class Scenes(unittest.TestCase):
 
     def test_no_state_has_bodies_inside_each_other(self):
         self.assertGreater(min(gap["lower"] for gap in self.contact["smallest_gap_mm"]), 0)
+
+
+class Pictures(unittest.TestCase):
+    """draw.py draws any result, without what --export pvd leaves beside it."""
+
+    WALL = 'thickness = "1mm"\nyoung = "1MPa"\npoisson = 0.45\ndensity = "1100kg/m3"\n'
+    HELD = '[[fix]]\nbody = "disc"\nwhere = {boundary = true}\ntranslation = "xyz"\nrotation = ""\n'
+    PRESSED = '[[load]]\nbody = "disc"\nkind = "pressure"\nvalue = "1kPa"\n'
+    DISC = '[[shell]]\nname = "disc"\nmesh = "membrane.ply"\n' + WALL
+    RING = '[[solid]]\nname = "ring"\nmesh = "deposit.vtk"\nunit = "mm"\nyoung = "60kPa"\npoisson = 0.3\n'
+    RING_HELD = HELD.replace("disc", "ring").replace("{boundary = true}", '{above = {axis = "z", at = "0mm"}}')
+
+    @classmethod
+    def setUpClass(cls):
+        folder = tempfile.TemporaryDirectory(prefix="tunica-test-")
+        cls.addClassCleanup(folder.cleanup)
+        cls.folder = Path(folder.name)
+        with_meshes("membrane", folder.name, "4")
+        with_meshes("angioplasty", folder.name)
+
+    def run_in_folder(self, *command, code=0):
+        done = subprocess.run([str(word) for word in command], cwd=self.folder, capture_output=True, text=True, check=False)
+        self.assertEqual(done.returncode, code, done.stderr)
+        return done.stderr
+
+    def drawn(self, text, *words):
+        """Runs a scene and draws it. @return pixels, height x width x 3"""
+        (self.folder / "any.toml").write_text(text, encoding="utf-8")
+        self.run_in_folder(SIMULATE, "--scene", "any.toml", "any.hdf", "--quiet", "--force")
+        self.draw("any.hdf", *words)
+        data = (self.folder / "any.png").read_bytes()
+        width, height = struct.unpack(">II", data[16:24])
+        start = data.index(b"IDAT")
+        rows = zlib.decompress(data[start + 4:start + 4 + struct.unpack(">I", data[start - 4:start])[0]])
+        return np.frombuffer(rows, np.uint8).reshape(height, 1 + 3 * width)[:, 1:].reshape(height, width, 3)
+
+    def draw(self, result, *words, code=0):
+        return self.run_in_folder("/usr/bin/python3", "-B", SCENES / "draw.py", result, "any.png", *words, code=code)
+
+    def test_of_every_kind(self):
+        steps = '[run]\nkind = "static"\nload_steps = 2\n'
+        ball = ('[[rigid]]\nname = "ball"\nshape = "sphere"\nradius = "0.2cm"\n'
+                'centre = [["0s", ["0mm", "0mm", "9mm"]], ["0.1s", ["0mm", "0mm", "8mm"]]]\n')
+        two = self.DISC.replace('"disc"', '"other"') + self.HELD.replace("disc", "other")
+        scenes = {
+            "static": (steps + self.DISC + self.HELD + self.PRESSED, "--at", "0", "0.5", "--cut", "y"),
+            "dynamic": ('[run]\nkind = "dynamic"\nduration = "0.1s"\nstep = "20ms"\n' + self.DISC + two + self.HELD + self.PRESSED + ball,
+                        "--at", "0.1", "--cut=-x=1"),
+            "frequencies": ('[run]\nkind = "frequencies"\ncount = 2\n' + self.DISC + self.HELD,),
+            "solids alone": (steps + self.RING + self.RING_HELD + '[[load]]\nbody = "ring"\nkind = "pressure"\nvalue = "10Pa"\n',
+                             "--cut", "x"),
+            "shells and solids": (steps + self.DISC + self.HELD + self.PRESSED + self.RING + self.RING_HELD,),
+        }
+        for kind, (text, *words) in scenes.items():
+            with self.subTest(kind=kind):
+                pixels = self.drawn(text, *words)
+                self.assertEqual(pixels.shape[1] // 560, max(1, len([w for w in words[1:] if re.fullmatch("[0-9.]+", w)])))
+                self.assertGreater(len(np.unique(pixels.reshape(-1, 3), axis=0)), 100)
+                self.assertGreater(np.mean(np.any(pixels < 250, axis=2)), 0.05)
+
+    def test_what_cannot_be_drawn_is_said(self):
+        self.run_in_folder(SIMULATE, "membrane.ply", "one.hdf", "--young", "1MPa", "--poisson", "0.45", "--thickness", "1mm", "--pressure",
+                           "1kPa", "--fix", "boundary", "--static", "--quiet")
+        self.assertIn("leaves nothing", self.draw("one.hdf", "--cut", "y=-100", code=1))
+        self.assertIn("write it like", self.draw("one.hdf", "--cut", "w", code=2))
+        self.assertIn("looks along", self.draw("one.hdf", "--view", "0", "0", "1", code=2))
+        self.assertIn("absent.hdf", self.draw("absent.hdf", code=1))
 
 
 class OwnVessel(unittest.TestCase):

@@ -58,7 +58,7 @@ TriangleMesh box(const Vec3& size) {
   return mesh;
 }
 
-TriangleMesh turned(TriangleMesh mesh) {
+TriangleMesh reversed(TriangleMesh mesh) {
   for (auto& corners : mesh.triangles) {
     std::swap(corners[1], corners[2]);
   }
@@ -108,8 +108,8 @@ TEST(Fill, SharpEdgesAreKept) {
 
 TEST(Fill, SurfacesWithinOthersAreCavitiesWhicheverWayTheyFace) {
   const double volume = signed_volume(sphere(4, 10)) - signed_volume(sphere(3, 5));
-  for (const TriangleMesh& inner : {sphere(3, 5), turned(sphere(3, 5))}) {
-    for (const TriangleMesh& outer : {sphere(4, 10), turned(sphere(4, 10))}) {
+  for (const TriangleMesh& inner : {sphere(3, 5), reversed(sphere(3, 5))}) {
+    for (const TriangleMesh& outer : {sphere(4, 10), reversed(sphere(4, 10))}) {
       const TetMesh mesh = fill(shapes::together(outer, inner), 2);
       EXPECT_NEAR(shapes::volume(mesh), volume, 0.02 * volume);
       EXPECT_EQ(examine(boundary_of(mesh)).components, 2U);

@@ -1,6 +1,7 @@
 """tunica-compare as its users run it: analytic distances, maps, curved shells, each exit code."""
 import math
 import os
+import struct
 import unittest
 
 import meshes
@@ -70,6 +71,50 @@ class Compare(WholeTool):
         self.run_tool("lps.ply", "ras.ply", code=3, says="SPACE=RAS")
         self.run_tool("ras.ply", "sphere.ply", "--map", "map.ply")  # the sphere names none
         self.assertIn("comment SPACE=RAS", meshes.read_ply(self.path("map.ply"))[0])
+
+    def test_shells_that_are_read_flat_are_said(self):
+        for files, flags, kinds in [(["shell.ply", "sphere.ply"], [], 1), (["shell.ply", "sphere.ply"], ["--shell"], 0),
+                                    (["sphere.ply", "shell.ply"], [], 1), (["sphere.ply", "sphere.ply"], [], 0)]:
+            report = self.run_tool(*files, *flags)
+            self.assertEqual(report["warning_kinds"], kinds * ["shell read flat"])
+            self.assertTrue(all("--shell" in text for text in report["warnings"]))
+
+    def test_spaces_are_read_in_every_format(self):
+        vertices, triangles = meshes.sphere(3, 10.0, (30, 20, 5))
+        turned = [(-x, -y, z) for x, y, z in vertices]
+        meshes.write_ply(self.path("lps.ply"), vertices, triangles, comments=["made by a program. SPACE=LPS"])
+        meshes.write_ply(self.path("ras.ply"), turned, triangles, comments=["made by a program. SPACE=RAS"])
+        meshes.write_obj(self.path("plain.obj"), turned, triangles)
+        with open(self.path("plain.obj")) as file, open(self.path("ras.obj"), "w") as to:
+            to.write("# made by a program. SPACE=RAS\n" + file.read())
+        with open(self.path("ras.stl"), "wb") as file:
+            file.write(b"made by a program. SPACE=RAS".ljust(80) + struct.pack("<I", len(triangles)))
+            for t in triangles:
+                file.write(struct.pack("<12fH", 0, 0, 0, *(x for i in t for x in turned[i]), 0))
+        for name in "ras.ply", "ras.obj", "ras.stl":
+            self.run_tool(name, "lps.ply", "--mesh-unit", "mm", code=3, says="SPACE=RAS")
+            self.run_tool("lps.ply", name, "--mesh-unit", "mm", code=3, says="SPACE=RAS")
+        self.run_tool("ras.stl", "ras.obj", "--max", "0.01%")
+
+    def test_own_files_say_their_space(self):
+        vertices, triangles = meshes.sphere(2, 10.0)
+        meshes.write_ply(self.path("ras.ply"), vertices, triangles, self.normals, ["SPACE=RAS", "surface=comas"])
+        meshes.write_ply(self.path("lps.ply"), *meshes.sphere(4, 10.0), comments=["SPACE=LPS"])
+        meshes.write_ply(self.path("fine.ply"), *meshes.sphere(4, 10.0), comments=["SPACE=RAS"])
+        for ending in "stl", "obj", "glb":
+            self.run_tool("ras.ply", "fine.ply", "--shell", "--curved", "curved." + ending)
+            unit = [] if ending == "glb" else ["--mesh-unit", "mm"]
+            self.run_tool("curved." + ending, "fine.ply", *unit)
+            self.run_tool("curved." + ending, "lps.ply", *unit, code=3, says="SPACE=RAS")
+
+    def test_open_seams_are_said(self):
+        vertices, triangles = meshes.sphere(3, 10.0)
+        count = len(vertices)
+        glued = [tuple(i + count * (sum(vertices[j][2] for j in t) < 0) for i in t) for t in triangles]
+        meshes.write_ply(self.path("glued.ply"), vertices + vertices, glued)
+        report = self.run_tool("glued.ply", "sphere.ply")
+        self.assertEqual(report["warning_kinds"], ["open seam"])
+        self.assertIn("64 of its 64 boundary edges", report["warnings"][0])
 
     def test_threads_change_nothing(self):
         one = self.run_tool("shell.ply", "sphere.ply", "--shell", "--threads", 1)["result"]

@@ -287,7 +287,7 @@ class Choices(ExtractTest):
         array[2:6, 2:6, 0] = 0
         array[2:4, 2, 0] = 1
         record, _ = self.run_tool(self.nifti(array, name="tip.nii"), self.out, "--label", 1, "--open-border", "--force")
-        self.assertIn("leaves 1 of its 1 opening(s) a few voxels wide", record["warnings"][-1])
+        self.assertIn("1 of its 1 opening(s) are only a few voxels wide, at (-2.5, -2.0, -0.5) mm", record["warnings"][-1])
         self.refuse_full_image()
 
     def test_the_outside_of_a_level_set_is_told(self):

@@ -341,6 +341,61 @@ class Contract(Case):
             self.assertIn("SPACE=RAS", comments)
             self.assertNotIn("SPACE=LPS", comments)
 
+    def test_normals_that_point_inward_are_turned_outward(self):
+        ball, faces = sphere(3)
+        hollow, inner = sphere(3, 14.0)
+        tube, sides = cylinder(32, 20)
+        wall = np.vstack([faces, inner[:, ::-1] + len(ball)])
+        for vertices, triangles in [(ball, faces), (tube, sides), (np.vstack([ball, hollow]), wall)]:
+            write_ply(self.path("outward.ply"), vertices, triangles)
+            write_ply(self.path("inward.ply"), vertices, triangles[:, ::-1])
+            made = []
+            for name, kinds in ("outward.ply", []), ("inward.ply", ["faces inward"]):
+                for method in "fit", "barycentre":
+                    for coarse in {"outward.ply", name}:
+                        record, error = self.relax(self.path(coarse), self.path(name), self.out, "--method", method,
+                                                   "--max-iterations", 1, "--force")
+                        given = kinds if coarse == "outward.ply" else kinds[:1]
+                        self.assertEqual([k for k in record["warning_kinds"] if "faces" in k], given, error)
+                        made.append(self.flux(*read_ply(self.out)[:2]))
+            self.assertEqual(set(made), {made[0]})
+
+    @staticmethod
+    def flux(points, triangles):
+        """Which way the facets face, in the mean, along the way from the middle."""
+        places = columns(points, ("x", "y", "z"))
+        a, b, c = (places[triangles[:, k]] for k in range(3))
+        middle = places.mean(0)
+        return np.sign(np.einsum("ij,ij->", np.cross(b - a, c - a), (a + b + c) / 3 - middle))
+
+    def test_half_a_ball_has_no_inside(self):
+        ball, faces = sphere(4)
+        half = faces[ball[faces].mean(1)[:, 2] > 0]
+        for name, triangles in ("half.ply", half), ("other.ply", half[:, ::-1]):
+            write_ply(self.path(name), ball, triangles)
+            record, error = self.relax(self.path(name), self.path(name), self.out, "--shells", 200,
+                                       "--max-iterations", 1, "--force")
+            self.assertNotIn("inward", error)
+            self.assertEqual(self.flux(*read_ply(self.out)[:2]), 1 if name == "half.ply" else -1)
+
+    def test_open_seams_are_said(self):
+        ball, faces = sphere(3)
+        below = (ball[faces].mean(1)[:, 2] < 0)[:, None]
+        write_ply(self.path("glued.ply"), np.vstack([ball, ball + 1e-6]), faces + below * len(ball))
+        record, error = self.relax(self.path("glued.ply"), self.path("glued.ply"), self.out, "--shells", 200,
+                                   "--max-iterations", 1)
+        self.assertIn("open seam", record["warning_kinds"])
+        self.assertIn("--repair", error)
+
+    def test_what_is_said_of_voxels_goes_on(self):
+        for name in "target.ply", "coarse.ply":
+            with open(self.path(name), "rb") as file:
+                content = file.read()
+            with open(self.path(name), "wb") as file:
+                file.write(content.replace(b"comment units mm", b"comment units mm\ncomment voxel 0.5 0.5 2 mm", 1))
+            self.relax(self.coarse, self.target, self.out, "--max-iterations", 1, "--force")
+            self.assertIn("voxel 0.5 0.5 2 mm", read_ply(self.out)[2])
+
     def test_existing_output_is_5_unless_forced(self):
         with open(self.out, "w") as file:
             file.write("kept")
@@ -484,6 +539,25 @@ class Fit(Case):
                 self.assertIn("no shells reach the target's spikes without area", said)
                 self.assertLess(len(read_ply(self.out + ".part")[1]), 60)
 
+    def test_caps_without_area_make_no_creases(self):
+        ball, faces = sphere(3)
+        vertices, owner, used, capped = list(ball), {}, set(), []
+        for t in map(tuple, faces):
+            owner.update({(t[k], t[(k + 1) % 3]): t for k in range(3)})
+        for t in map(tuple, faces):
+            a, b, c = t
+            if len(vertices) < len(ball) + 40 and t not in used and owner[b, a] not in used:
+                used |= {t, owner[b, a]}
+                capped += [(a, len(vertices), c), (len(vertices), b, c), (a, b, len(vertices))]
+                vertices.append((vertices[a] + vertices[b]) / 2)
+            else:
+                capped.append(t)
+        write_ply(self.path("plain.ply"), ball, faces)
+        write_ply(self.path("caps.ply"), vertices, capped)
+        plain, caps = [self.relax(self.path(name), self.path(name), self.out, "--shells", 300, "--force")[0]["result"]
+                       for name in ("plain.ply", "caps.ply")]
+        self.assertLess(caps["hausdorff_mm"]["upper"], 1.5 * plain["hausdorff_mm"]["upper"])
+
     def test_angles_below_the_usual_are_told(self):
         wedge = self.path("wedge.ply")
         write_ply(wedge, [[0, 0, 0], [40, 0, 0], [40, 4, 0], [20, 6, 0]], [[0, 1, 2], [0, 2, 3]])
@@ -494,6 +568,8 @@ class Fit(Case):
     def test_more_shells_than_the_target_has_triangles_are_the_target(self):
         record, _ = self.relax(self.target, self.target, self.out, "--shells", 100000)
         self.assertEqual(record["result"]["shells"], 5120)
+        self.assertIn("fewer than asked for", record["warning_kinds"])
+        self.assertIn("5120 shells instead of 100000", "".join(record["warnings"]))
         self.assertLess(record["result"]["hausdorff_percent"]["upper"], 0.1)
 
     def test_pieces_sheets_and_crumbs_are_kept(self):
@@ -596,7 +672,7 @@ class Fit(Case):
         write_ply(wedge, corners, [[0, 1, 2], [0, 2, 3]])
         record, err = self.relax(wedge, wedge, self.out, "--tolerance", "0.5%", "--min-angle", 20)
         self.assertLess(record["result"]["min_angle_deg"], 20)
-        self.assertIn("the smallest angle is", err)
+        self.assertIn("the smallest angle of the shells is", err)
 
     def test_a_limit_of_shells_that_only_a_search_for_the_fewest_keeps_is_kept(self):
         record, _ = self.relax(self.target, self.target, self.out, "--tolerance", "0.6%")
@@ -665,7 +741,7 @@ class MidSurface(Case):
         points, triangles = sphere(4, 10.0)
         write_ply(self.ball, points, triangles[:, ::-1])
         _, error = self.relax(self.ball, self.ball, self.out, "--shells", 300, "--mid-surface", "inner", "--thickness", "2mm")
-        self.assertIn("TARGET's triangles face inward", error)
+        self.assertIn("its normals point inward", error)
         np.testing.assert_allclose(np.linalg.norm(self.points(), axis=1), 11, atol=0.02)
 
     def narrow_torus(self):
@@ -800,7 +876,7 @@ class Organs(Case):
                 lumen = os.path.join(MESHES, name)
                 record, error = self.relax(lumen, lumen, self.path("shell.ply"), "--mesh-unit", "mm", "--tolerance", "1%",
                                            "--mid-surface", "inner", "--thickness", "1.5mm", "--force")
-                self.assertIn("face inward", error)
+                self.assertIn("its normals point inward", error)
                 self.assertNotIn("rim(s)", error)
                 result = record["result"]
                 self.assertEqual(result["self_intersections"], 0)

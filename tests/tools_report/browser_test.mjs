@@ -63,11 +63,12 @@ const changes = async (act) => {
   await page.waitForTimeout(100);
   return before !== await look();
 };
-const box = await canvas.boundingBox();
 seen.changes = {
   key: await changes(() => canvas.press("ArrowLeft")),
   zoom: await changes(() => canvas.press("+")),
   pointer: await changes(async () => {
+    await canvas.scrollIntoViewIfNeeded();
+    const box = await canvas.boundingBox();
     await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
     await page.mouse.down();
     await page.mouse.move(box.x + box.width / 2 + 90, box.y + box.height / 2 + 30, { steps: 4 });

@@ -10,6 +10,7 @@ import json
 import os
 import pathlib
 import re
+import shlex
 import shutil
 import struct
 import tempfile
@@ -122,7 +123,7 @@ class CasePage(ReportTest):
             self.assertAlmostEqual(float(told) / value, 1, delta=0.005)
         self.assertEqual(len(numbers), 3)
         self.assertEqual(len(page.of("h1")), 1)
-        for needed in ("Done and converged", "Not a medical device", "Comas", "SHA-256", "Inputs as resolved",
+        for needed in ("Done and converged", "Not a medical device", "Comas", "SHA-256", "Inputs as stated", "as resolved, SI units",
                        "Time and memory", "MIT", "certified to be at most", "GPL-3.0-or-later", "Young's modulus"):
             self.assertIn(needed, page.text)
         self.assertIn("was not estimated: --accuracy", page.text)
@@ -133,6 +134,107 @@ class CasePage(ReportTest):
         self.assertEqual(len(page.of("caption")), len(page.of("table")))
         levels = [int(tag[1]) for tag, _ in page.elements if re.fullmatch("h[1-6]", tag)]
         self.assertTrue(all(after - before <= 1 for before, after in zip(levels, levels[1:])), levels)
+
+    def test_methods_name_the_elements(self):
+        folder = self.copy("aneurysm")
+        _, _, page = self.report()
+        methods = page.text[page.text.index("Methods, to paste"):]
+        for told in ("optimal ANDES triangles with drilling freedoms [4], whose higher-order part is reduced where the shell "
+                     "curves within an element (adapt)", "four fifths discrete Kirchhoff triangles [5] and one fifth the 9-term "
+                     "cubic of [3] with the mean curvature that its boundary gives (dkt-comas)", "Batoz", "Felippa",
+                     "with the nodes of its boundary held", "A pressure of 1 kPa that follows the surface"):
+            self.assertIn(told, methods)
+        self.assertNotIn("one cubic shape function", methods)
+        load = ["--pressure", "1kPa", "--young", "1MPa", "--poisson", "0.45", "--thickness", "1.5mm", "--fix", "boundary", "--static"]
+        cases.run("simulate", folder / "shell.ply", folder / "result.hdf", *load, "--bending", "comas", "--membrane", "cst",
+                  "--report", folder / "simulate.json", "--quiet", "--force")
+        _, _, page = self.report()
+        methods = page.text[page.text.index("Methods, to paste"):]
+        self.assertIn("constant-strain triangles (cst), in bending the 9-term cubic of [3] (comas)", methods)
+        self.assertNotIn("Batoz", methods, "only what is used is cited")
+
+    def test_inputs_are_told_as_they_were_stated(self):
+        report = json.loads((self.case / "simulate.json").read_text())
+        stated = report["stated"]
+        self.assertEqual({key: stated[key] for key in ("young_mpa", "poisson", "thickness_mm", "imaged_at_mpa", "law", "support",
+                                                       "fix", "kind", "geometry")},
+                         {"young_mpa": 1, "poisson": 0.45, "thickness_mm": 1.5, "imaged_at_mpa": None, "law": "linear",
+                          "support": None, "fix": ["boundary"], "kind": "static", "geometry": "nonlinear"})
+        self.assertAlmostEqual(stated["pressure_mpa"], 1e-3)
+        self.assertAlmostEqual(stated["density_kg_per_m3"], 1100)
+        self.assertEqual([stated["typed"][key] for key in ("young", "thickness", "pressure", "imaged_at")],
+                         ["1MPa", "1.5mm", "1kPa", None])
+
+        def in_mercury(reports):
+            reports["simulate"]["stated"].update(pressure_mpa=120 * 133.322387415e-6, imaged_at_mpa=80 * 133.322387415e-6)
+            reports["simulate"]["stated"]["typed"].update(pressure="120mmHg", imaged_at="80 mmHg", thickness="1500um")
+        self.copy("aneurysm", in_mercury)
+        _, _, page = self.report("--tsv", self.folder / "cohort.tsv")
+        for told in ("under 120 mmHg (16.0 kPa)", "Pressure120 mmHg (16.0 kPa)", "Imaged at80 mmHg (10.7 kPa)",
+                     "Thickness1500 um (1.5 mm)", "A pressure of 120 mmHg (16.0 kPa) that", "under a pressure of 80 mmHg (10.7 kPa)"):
+            self.assertIn(told, page.text)
+        with open(self.folder / "cohort.tsv", encoding="utf-8", newline="") as file:
+            row, = csv.DictReader(file, delimiter="\t")
+        self.assertAlmostEqual(float(row["pressure_kpa"]), 15.9986865, delta=1e-6)
+        self.assertAlmostEqual(float(row["imaged_at_kpa"]), 10.6657910, delta=1e-6)
+        self.assertEqual((row["young_mpa"], row["density_kg_per_m3"]), ("1", "1100"))
+
+    def test_settings_are_not_told_with_all_digits(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = cases.make_case(pathlib.Path(folder), pressure="7mmHg")
+            _, _, page = self.report(folder=path)
+        self.assertIn("load \u00b7 value933.257 Pa", page.text)
+        self.assertIn("under 7 mmHg (0.933 kPa)", page.text)
+        self.assertNotIn("933.2567", page.text)
+
+    def test_scenes_state_their_inputs_too(self):
+        with tempfile.TemporaryDirectory() as folder:
+            case = cases.make_case(pathlib.Path(folder), "sphere")
+            cases.add_solid(case)
+            stated = json.loads((case / "simulate.json").read_text())["stated"]
+        self.assertEqual((stated["typed"]["pressure"], stated["typed"]["young"], stated["poisson"]), ("1kPa", "1MPa", 0.3))
+        self.assertEqual(stated["fix"], ["organ: rigid-motions", "block: below x=61mm"])
+        self.assertAlmostEqual(stated["pressure_mpa"], 1e-3)
+
+    def test_an_accuracy_that_was_not_reached_has_its_numbers(self):
+        """The answer stands there with its error, and what is next helps."""
+        def missed(reports):
+            command = reports["simulate"]["command"] + " --accuracy 5% --max-shells 4000"
+            reports["simulate"].update(ok=False, command=command, error="shell.ply: stress 159 kPa with 3200 shells, ...")
+            reports["simulate"]["result"]["wall"]["stress_p99_mpa"] = 0.159
+            reports["simulate"]["result"]["shells"] = 3200
+            reports["simulate"]["result"]["accuracy"] = {
+                "of": "stress", "value": 0.159, "requested_percent": 5, "estimate_percent": 12, "credible": False,
+                "reasons": ["the next level would have 12800 shells, more than 4000"], "levels": [{"shells": 3200}]}
+        self.copy("missed", missed)
+        table = self.folder / "cohort.tsv"
+        done, text, page = self.report("--tsv", table)
+        self.assertIn("Accuracy not reached: stress 159 kPa, estimated error 12 %, 5 % asked. Why: the next level would have",
+                      page.text)
+        self.assertEqual(re.findall(r"<dd><b>([^<]*)</b>", text)[0], "159")
+        self.assertNotIn("not computed", page.text)
+        self.assertIn("estimated error 12 %; von Mises", page.text)
+        self.assertRegex(page.text, r"Next, finer \(up to 51200 shells\): tunica-simulate .* --accuracy 5% --max-shells 51200\n")
+        self.assertRegex(page.text, r"Or, content with what was reached: tunica-simulate .* --accuracy 15% --max-shells 4000\n")
+        self.assertRegex(done.stdout, r"missed/1 +simulate .* 3200 .* 159 +12 ")
+        with open(table, encoding="utf-8", newline="") as file:
+            row, = csv.DictReader(file, delimiter="\t")
+        self.assertEqual((row["stress_p99_kpa"], row["stress_error_percent"], row["status"]), ("159", "12", "failed"))
+
+    def test_what_is_next_reaches_an_accuracy(self):
+        """Of a run that was stopped by the number of shells, with the tools."""
+        folder = self.copy("aneurysm")
+        load = ["--pressure", "1kPa", "--young", "1MPa", "--poisson", "0.45", "--thickness", "4mm", "--fix", "boundary", "--static",
+                "--accuracy", "0.02%", "--of", "displacement", "--target", folder / "surface.ply", "--max-shells", 3500]
+        cases.run("simulate", folder / "shell.ply", folder / "result.hdf", *load, "--report", folder / "simulate.json", "--quiet",
+                  "--force", code=4)
+        _, _, page = self.report()
+        found = re.search(r"Or, content with what was reached: (tunica-simulate .*)\n", page.text)
+        if found is None:
+            self.assertIn("Next, finer", page.text, "another reason than the number of shells")
+            return
+        words = shlex.split(found[1])[1:]
+        cases.run("simulate", *words, "--force")
 
     def test_a_run_that_ended_early_has_no_answer(self):
         """Its last state is one under a part of the load."""
@@ -149,8 +251,12 @@ class CasePage(ReportTest):
         self.assertNotEqual(row["distance_mm"], "n/a")
 
     def test_an_unloaded_shape_is_told(self):
-        self.copy("aneurysm", lambda reports: reports["simulate"]["result"].update(
-            unloaded={"volume_mm3": 4321.0, "distance_mm": {"mean": 0.0125, "max": 0.05}, "iterations": 7}))
+        def change(reports):
+            reports["simulate"]["result"].update(
+                unloaded={"volume_mm3": 4321.0, "distance_mm": {"mean": 0.0125, "max": 0.05}, "iterations": 7})
+            reports["simulate"].update(warnings=[], warning_kinds=[], warning_weights=[])  # of another run
+
+        self.copy("aneurysm", change)
         _, _, page = self.report()
         self.assertIn(" kPa, from the shape without load", page.text)
         self.assertIn("Volume within the shells, without load4.32 ml", page.text)
@@ -350,6 +456,68 @@ class CohortPage(ReportTest):
         self.assertEqual(text.count('<svg viewBox="0 0 320 58" role="img"'), 7)
         self.assertEqual(len(page.of("caption")), len(page.of("table")))
 
+    def test_warnings_are_counted_by_kind(self):
+        def warn(*kinds, stage="relax"):
+            def change(reports):
+                for report in reports.values():
+                    report.update(warnings=[], warning_kinds=[], warning_weights=[], notes=[])
+                reports[stage].update(warnings=[f"shell.ply: of {kind}" for kind, _ in kinds], warning_kinds=[kind for kind, _ in kinds],
+                                      warning_weights=[weight for _, weight in kinds], notes=["units are taken as mm"])
+            return change
+        both = self.copy("a-both", warn(("coarse shells", "minor"), ("thick wall", "minor")))
+        report = json.loads((both / "simulate.json").read_text())
+        report.update(warnings=["shell.ply: of limit load"], warning_kinds=["limit load"], warning_weights=["major"])
+        (both / "simulate.json").write_text(json.dumps(report))
+        self.copy("b-one", warn(("thick wall", "minor")))
+        self.copy("c-note", warn())
+
+        def older(reports):
+            for report in reports.values():
+                for key in ("warning_kinds", "warning_weights", "notes"):
+                    report.pop(key, None)
+                report["warnings"] = []
+            reports["relax"]["warnings"] = ["shells wave"]
+        self.copy("d-older", older)
+        table = self.folder / "cohort.tsv"
+        done, text, page = self.report("--tsv", table)
+        self.assertEqual(re.findall(r"<dd>(\d+)</dd>", text), ["1", "0", "3"], "notes alone are no warning")
+        lines = done.stdout[done.stdout.index("warnings, by kind:"):].splitlines()[1:5]
+        self.assertEqual(lines, ["  limit load, 1 of 4 cases: e.g. a-both/1: simulate: shell.ply: of limit load",
+                                 "  thick wall, 2 of 4 cases: e.g. a-both/1: relax: shell.ply: of thick wall",
+                                 "  of an older report, 1 of 4 cases: e.g. d-older/1: relax: shells wave",
+                                 "  coarse shells, 1 of 4 cases: e.g. a-both/1: relax: shell.ply: of coarse shells"])
+        for told in ("Warnings by kind", "limit load (serious)1a-both/1: simulate: shell.ply: of limit load",
+                     "thick wall2a-both/1: relax: shell.ply: of thick wall", "relax: units are taken as mm"):
+            self.assertIn(told, page.text)
+        own = page.text[page.text.index("Case by case"):]
+        self.assertLess(own.index("of limit load"), own.index("of coarse shells"), "the heaviest first")
+        with open(table, newline="", encoding="utf-8") as file:
+            rows = list(csv.DictReader(file, delimiter="\t", quoting=csv.QUOTE_NONE))
+        self.assertEqual([(row["status"], row["warnings"], row["warning_kinds"]) for row in rows],
+                         [("warned", "3", "limit load (1); coarse shells (1); thick wall (1)"), ("warned", "1", "thick wall (1)"),
+                          ("done", "0", "n/a"), ("warned", "1", "of an older report (1)")])
+
+    def test_the_table_of_a_run_has_the_answer(self):
+        self.cohort(2)
+        summary = self.folder / "summary.tsv"
+        done, _, page = self.report("--summary", summary)
+        with open(summary, newline="", encoding="utf-8") as file:
+            rows = list(csv.DictReader(file, delimiter="\t", quoting=csv.QUOTE_NONE))
+        self.assertEqual(list(rows[0]), ["case", "stage", "exit", "message", "shells", "distance_percent", "stress_p99_kpa",
+                                         "stress_error_percent", "max_displacement_mm", "displacement_error_percent",
+                                         "strain_p99_percent", "warnings", "seconds"])
+        self.assertEqual([(row["stress_p99_kpa"], row["stress_error_percent"], row["warnings"]) for row in rows],
+                         [("20", "", "0"), ("20.1", "", "0")])
+        result = json.loads((self.case / "simulate.json").read_text())["result"]
+        self.assertAlmostEqual(float(rows[0]["max_displacement_mm"]) / result["max_displacement_mm"], 1, delta=1e-5)
+        head = done.stdout.splitlines()[0]
+        for name in ("stress kPa", "displ. mm", "strain %", "distance %"):
+            self.assertIn(name, head)
+        self.assertNotIn("+-", head, "no error is known")
+        self.assertNotIn("error", head)
+        self.assertIn("not the error of stress", done.stdout)
+        self.assertRegex(page.text, r"share one scale of stress, up to the largest 99th percentile among them: 0 to 20\.1 kPa\.")
+
     def test_labels_are_compared_apart(self):
         self.cohort(10)
         _, text, _ = self.report()
@@ -386,7 +554,8 @@ class CohortPage(ReportTest):
         def asked(credible, **distance):
             return lambda reports: reports["simulate"]["result"].update(
                 shells=4 * reports["relax"]["result"]["shells"],
-                accuracy={"of": "stress", "estimate_percent": 4.2, "credible": credible, **distance,
+                accuracy={"of": "stress", "value": 0.159, "requested_percent": 5, "estimate_percent": 4.2, "credible": credible,
+                          "reasons": [], **distance,
                           "levels": [{"mean_distance_mm": 0.5}, {"mean_distance_mm": 0.125}]})
         known = self.copy("known", asked(True))
         shutil.copy(known / "shell.ply", known / "refined.ply")
@@ -395,15 +564,16 @@ class CohortPage(ReportTest):
         self.assertEqual([image["alt"] for image in page.of("img") if "slices" in image["alt"]],
                          ["Nine slices of the image with the outline of the shells"])
         self.assertIn("vain/1/refined.ply: ", page.text, "the shells before are not those that the page is about")
-        self.assertIn("The error of the stress by the number of shells is credibly below 4.2 %.", page.text)
-        self.assertIn("The error of the stress by the number of shells is not credibly known.", page.text)
+        self.assertIn("The error of the stress by number of shells and model is credibly below 4.2 % (5 % were asked for).", page.text)
+        self.assertIn("The error of the stress by number of shells and model is estimated at 4.2 % (5 % were asked for), "
+                      "which is not credible.", page.text)
         self.assertNotIn("certified to be at most", page.text, "that is known of the shells before")
         self.assertIn(", 0.125 mm from the extracted surface in the mean", page.text)
         self.assertNotIn("Normals, mean error", page.text)
         self.copy("certified", asked(True, hausdorff_mm={"upper": 0.625}, hausdorff_percent={"upper": 1.375}))
         done, _, page = self.report()
         self.assertIn("is certified to be at most 0.625 mm (1.38% of its diagonal)", page.text)
-        self.assertRegex(done.stdout, r"certified/1 .* 1.375 ")
+        self.assertRegex(done.stdout, r"certified/1 .* 1.38 ")
         self.assertNotIn("certified/1/map.png", done.stdout, "that is of the shells before")
         self.assertIn("Too few cases to tell outliers.", page.text)
 
@@ -412,7 +582,7 @@ class CohortPage(ReportTest):
             reports["simulate"].update(ok=False, error="5% of stress is not credible")
         shells = json.loads((self.copy("missed", missed) / "relax.json").read_text())["result"]["shells"]
         done, _, page = self.report()
-        self.assertRegex(done.stdout, rf"missed/1 +simulate .* {shells} ", "the finer ones stay under a partial name")
+        self.assertRegex(done.stdout, rf"missed/1 +simulate .* {4 * shells} ", "the answer is that of the finer ones")
 
     def test_table_and_what_its_columns_mean(self):
         self.cohort(3)

@@ -110,7 +110,7 @@ class BadScenes(SimulateTest):
         self.write("scene.toml", RUN + shell() + ball(5) + contact("plate", "ball", 'name = "c"\n') +
                    "[[load]]\nbody = \"plate\"\nkind = \"pressure\"\nvalue = \"-1Pa\"\n")
         self.run_tool("--scene", "scene.toml", "out.hdf")
-        self.assertIn("c: nothing touches in any step", self.done.stderr)
+        self.assertIn("c: nothing touches at the end of any step", self.done.stderr)
 
     def test_a_body_that_crosses_itself(self):
         points, triangles, normals = sphere(1, 2)
@@ -157,6 +157,21 @@ class BadScenes(SimulateTest):
     def test_friction_without_contact(self):
         self.named(RUN + shell() + ball(5, more="friction = 0.2\n"), "unknown key 'friction' in [[rigid]]", place="friction")
         self.named(RUN + shell() + ball(5) + "[[contact]]\nfriction = 0.2\n", "between", place="[[contact]]")
+
+    def test_loads_that_no_number_holds(self):
+        """Neither are they taken, nor does a message print what is left of them."""
+        points, triangles = grid(2, 2, 10, 10)
+        write_ply(self.path("plate.ply"), points, triangles, np.tile([0, 0, 1.0], (len(points), 1)))
+        for value, factor, code in (("1e306MPa", "1", 3), ("1kPa", "1e300", 3), ("1kPa", "1e150", 4)):
+            ramp = f"ramp = [[0, 0], [0.5, {factor}], [1, 0]]\n" if factor != "1" else ""
+            self.write("scene.toml", '[run]\nkind = "static"\nload_steps = 1\n[[shell]]\nname = "p"\nmesh = "plate.ply"\n'
+                       'thickness = "1mm"\nyoung = "1MPa"\npoisson = 0.3\n[[fix]]\nbody = "p"\nwhere = {boundary = true}\ntranslation = "xyz"\nrotation = "xyz"\n'
+                       f'[[load]]\nbody = "p"\nkind = "pressure"\nvalue = "{value}"\n{ramp}')
+            self.run_tool("--scene", "scene.toml", "out.hdf", "--force", expect=code)
+            self.assertNotRegex(self.done.stderr, r"\b(inf|nan)\b")
+            if code == 3:
+                self.assertIn("scene.toml:", self.done.stderr)
+                self.assertRegex(self.done.stderr, "is too large|is larger than any force: is its unit right")
 
     def test_two_bodies_of_one_name(self):
         for more in (ball(5, "plate"), shell("plate", "above.ply"), solid("cube.vtk", "plate")):

@@ -119,10 +119,47 @@ class Robust(SimulateTest):
                 moved((0, (0, 0, 0)), (1, (0, 0, -80))))
         self.write("scene.toml", run("static", 1) + self.plate + ball + contact("b", "p"))
         report = self.run_tool("--scene", "scene.toml", "out.hdf", expect=4)
-        self.assertRegex(self.done.stderr, r"in contact c they are closest at \([-0-9.e+]+, [-0-9.e+]+, [-0-9.e+]+\) mm")
+        self.assertRegex(self.done.stderr, r"in contact c they are closest at \([-0-9.e+]+, [-0-9.e+]+, [-0-9.e+]+\) mm, "
+                                           "where b meets p")
         record = report["result"]["contacts"]["c"]
         self.assertGreater(record["smallest_gap_mm"][-1]["lower"], 0)
         self.assertLess(abs(record["force_n"][-1][2]), 100)
+
+    def test_memory_is_that_of_what_is_near(self):
+        """Many small bodies on a plate: each contact is near few of its shells. Samples of all shells for all of them
+        take 1.4 GiB."""
+        points, triangles = grid(12, 12, 20, 20)
+        write_ply(self.path("many.ply"), points - [10, 10, 0], triangles, np.tile([0, 0, 1.0], (len(points), 1)))
+        scene = run("static", 1) + shell("p", "many.ply", 0.5, "{boundary = true}")
+        for k in range(30):
+            x, y = -7.5 + 3 * (k % 6), -6 + 3 * (k // 6)
+            scene += (f'[[rigid]]\nname = "b{k}"\nshape = "sphere"\ncentre = ["{x}mm", "{y}mm", "0.46mm"]\nradius = "0.2mm"\n' +
+                      moved((0, (0, 0, 0)), (1, (0, 0, -0.02))) + f'[[contact]]\nname = "c{k}"\nbetween = ["b{k}", "p"]\n')
+        self.write("scene.toml", scene)
+        report = self.run_tool("--scene", "scene.toml", "out.hdf", "--memory-limit", "1GB")
+        self.assertLess(report["peak_mib"], 400)
+        self.assertGreater(report["result"]["contacts"]["c14"]["force_n"][-1][2], 0)
+
+    def test_a_step_that_hardly_gets_on_says_where_and_why(self):
+        """A tube that its load flattens: its wall buckles, and comes to touch itself."""
+        columns, rows = 16, 3
+        sheet, triangles = grid(columns, rows, 2 * np.pi, 10)
+        around = np.stack([np.cos(sheet[:, 0]), np.sin(sheet[:, 0]), 0 * sheet[:, 0]], axis=1)
+        closed = np.arange(len(sheet)).reshape(rows + 1, columns + 1)
+        closed[:, -1] = closed[:, 0]
+        used, numbers = np.unique(closed, return_inverse=True)
+        triangles = numbers.reshape(-1)[triangles]
+        write_ply(self.path("tube.ply"), 5 * around[used] + sheet[used] * [0, 0, 0] + np.outer(sheet[used, 1], [0, 0, 1]),
+                  triangles, around[used])
+        self.write("scene.toml", run("static", 1) + shell("t", "tube.ply", 0.3, '{below = {axis = "z", at = "0.01mm"}}') +
+                   '[[load]]\nbody = "t"\nkind = "pressure"\nvalue = "-2kPa"\n' + contact("t", "t"))
+        report = self.run_tool("--scene", "scene.toml", "out.hdf", expect=4)
+        notes = [note for note in report["notes"] if "hardly gets on" in note]
+        self.assertEqual(len(notes), 1)
+        self.assertRegex(notes[0], r"^scene.toml: load factor [0-9.]+ of 1: this step hardly gets on: [12]\d\d iterations so far; "
+                                   r"in a part of [0-9.e-]+ (the stiffness is not positive|bodies|Newton).*(; it yields most at|they "
+                                   r"are closest at) \([-0-9.e+]+, [-0-9.e+]+, [-0-9.e+]+\) mm.*; if it takes too long, stop it and let ")
+        self.assertRegex(report["error"], r"(; it yields most at|they are closest at) \([-0-9.e+]+, [-0-9.e+]+, [-0-9.e+]+\) mm")
 
 
 if __name__ == "__main__":

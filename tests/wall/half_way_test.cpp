@@ -213,12 +213,3 @@ TEST(HalfWay, Refusals) {
   }
   EXPECT_THROW((void)half_way_surface(Target(two), WallFace::outer, 2), RequirementError);
 }
-
-TEST(HalfWay, TurnedFacesAreKnown) {
-  TriangleMesh mesh = surface_of(capsule({0, 0, -100}, {0, 0, 100}, 3), {-5, -5, -12}, {5, 5, 12}, 0.5, true);
-  EXPECT_FALSE(faces_inward(Target(mesh)));
-  for (auto& v : mesh.triangles) {
-    std::swap(v[1], v[2]);
-  }
-  EXPECT_TRUE(faces_inward(Target(mesh)));
-}

@@ -123,6 +123,31 @@ public:
     return std::move(mesh_);
   }
 
+  /// The world axes, where the file, its asset, scenes, nodes or meshes say them: in names, in `extras`, in what made
+  /// it.
+  void say_space(MeshFile& file) const {
+    const auto say = [&](const SortedJson& object) {
+      for (const char* key : {"name", "generator", "copyright", "extras"}) {
+        if (const auto found = object.find(key); found != object.end()) {
+          constexpr auto replace = SortedJson::error_handler_t::replace;
+          take_space(file, found->is_string() ? found->get<std::string>() : found->dump(-1, ' ', false, replace),
+                     name_);
+        }
+      }
+    };
+    say(in_);
+    if (const auto asset = in_.find("asset"); asset != in_.end() && asset->is_object()) {
+      say(*asset);
+    }
+    for (const char* list : {"scenes", "nodes", "meshes"}) {
+      for (const SortedJson& object : member(in_, list, SortedJson::value_t::array)) {
+        if (object.is_object()) {
+          say(object);
+        }
+      }
+    }
+  }
+
 private:
   [[noreturn]] void fail(const std::string& what) const { throw InputError(fmt::format("{}: {}", name_, what)); }
 
@@ -392,7 +417,9 @@ private:
 MeshFile read_glb(std::string_view bytes, const std::string& name) {
   MeshFile file;
   file.units.emplace("m");
-  file.mesh = SceneReader(split_chunks(bytes, name), bytes.size(), name).read();
+  SceneReader reader(split_chunks(bytes, name), bytes.size(), name);
+  reader.say_space(file);
+  file.mesh = reader.read();
   weld_exactly(file.mesh);
   return file;
 }

@@ -122,6 +122,7 @@ MeshFile read_mesh(const std::filesystem::path& path, std::optional<double> unit
   MeshFile file = read_as(format, bytes, name);
   if (format == Format::glb && unit_mm) {
     scale(file, *unit_mm);
+    file.units.reset();
   } else if (file.units) {
     scale(file, size_of_unit(*file.units, name));
   } else if (unit_mm) {
@@ -163,18 +164,24 @@ ShellMesh shell_of(const MeshFile& file, const std::filesystem::path& path) {
 
 std::string common_space(const MeshFile& a, const std::filesystem::path& path_a, const MeshFile& b,
                          const std::filesystem::path& path_b) {
+  return common_space(a.space, path_a, b.space, path_b);
+}
+
+std::string common_space(const std::optional<std::string>& a, const std::filesystem::path& path_a,
+                         const std::optional<std::string>& b, const std::filesystem::path& path_b) {
   const auto upper_case = [](std::string text) {
     std::transform(text.begin(), text.end(), text.begin(),
                    [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
     return text;
   };
-  if (a.space && b.space && upper_case(*a.space) != upper_case(*b.space)) {
+  if (a && b && upper_case(*a) != upper_case(*b)) {
     throw InputError(
-        fmt::format("{}: its axes are SPACE={}, those of {} are SPACE={}; make both in the same space, e.g. with "
-                    "tunica-extract --space",
-                    path_a.string(), *a.space, path_b.string(), *b.space));
+        fmt::format("{}: its axes are SPACE={}, those of {} are SPACE={}: they would lie in different places; make "
+                    "both in the same space (tunica-extract --space, or what exported the mesh), or change the sign "
+                    "of x and y in one of them and what it says of its space",
+                    path_a.string(), *a, path_b.string(), *b));
   }
-  return a.space.value_or(b.space.value_or("LPS"));
+  return a.value_or(b.value_or("LPS"));
 }
 
 }  // namespace tunica

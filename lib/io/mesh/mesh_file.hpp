@@ -16,11 +16,12 @@ struct MeshFile {
   std::vector<Vec3> normals;                        ///< empty, or #V unit vectors (PLY nx ny nz)
   std::vector<std::array<Vec3, 3>> corner_normals;  ///< empty, or #F
   std::optional<Patch> patch;                       ///< `surface=` comment
-  std::optional<std::string> units;                 ///< what the file said: "mm", …; none for OBJ, STL, OFF
+  std::optional<std::string> units;                 ///< what holds by the file: "mm", …; none for OBJ, STL, OFF
   bool unit_unknown = false;                        ///< no unit in the file's format, and none was given
   std::optional<double> voxel;                      ///< mm, longest edge: `voxel` comment, of the image behind it
-  std::optional<std::string> space;                 ///< `SPACE=` comment: world axes, "LPS" or "RAS"
-  std::vector<std::string> comments;                ///< all PLY comments, for provenance
+  std::optional<double> shortest_voxel;             ///< mm, its shortest edge
+  std::optional<std::string> space;   ///< world axes, "LPS" or "RAS": `SPACE=` in a comment, header or name
+  std::vector<std::string> comments;  ///< all PLY comments, for provenance
   std::vector<std::pair<std::string, std::vector<double>>> vertex_properties;  ///< further scalar ones, e.g. thickness
 };
 
@@ -47,6 +48,10 @@ ShellMesh shell_of(const MeshFile& file, const std::filesystem::path& path);
 /// Errors: InputError when both say and differ: every distance between them would be wrong.
 std::string common_space(const MeshFile& a, const std::filesystem::path& path_a, const MeshFile& b,
                          const std::filesystem::path& path_b);
+
+/// The same of what they say.
+std::string common_space(const std::optional<std::string>& a, const std::filesystem::path& path_a,
+                         const std::optional<std::string>& b, const std::filesystem::path& path_b);
 
 struct PlyOptions {
   std::vector<std::string> comments = {};  ///< further comments (provenance), one line each

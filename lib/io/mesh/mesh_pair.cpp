@@ -2,6 +2,7 @@
 
 #include "tunica/core/error.hpp"
 #include "tunica/core/quantity.hpp"
+#include "tunica/io/mesh/surface_doubts.hpp"
 #include "tunica/surface/mesh/measure.hpp"
 
 #include <fmt/format.h>
@@ -66,7 +67,7 @@ std::optional<std::string> likely_unit(const MeshFile& file, std::optional<doubl
 
 MeshFacts require_surface(const MeshFile& file, const std::filesystem::path& path) {
   MeshFacts facts = examine(file.mesh);
-  if (const auto why = why_unfit(facts)) {
+  if (const auto why = why_unfit_surface(file.mesh, facts)) {
     throw InputError(
         fmt::format("{}: {}; mend it with tunica-decimate --repair, --triangles as many as it has to keep all",
                     path.string(), *why));

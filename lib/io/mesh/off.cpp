@@ -19,8 +19,7 @@ public:
 
   MeshFile read() {
     const auto [vertices, faces] = read_header();
-    MeshFile file;
-    file.mesh.vertices.reserve(vertices);
+    file_.mesh.vertices.reserve(vertices);
     for (std::size_t v = 0; v < vertices; ++v) {
       next_line("vertex", v);
       Vec3 vertex;
@@ -31,7 +30,7 @@ public:
         }
         vertex[axis] = *value;
       }
-      file.mesh.vertices.push_back(vertex);
+      file_.mesh.vertices.push_back(vertex);
     }
     FaceCollector collector(name_);
     collector.reserve(faces);
@@ -44,8 +43,8 @@ public:
     if (next_content()) {
       fail("text follows the last face, so the counts of the header are wrong");
     }
-    collector.finish(file);
-    return file;
+    collector.finish(file_);
+    return std::move(file_);
   }
 
 private:
@@ -58,6 +57,7 @@ private:
       if (scanner_.rest().front() != '#') {
         return true;
       }
+      take_space(file_, scanner_.rest(), name_);
     }
     return false;
   }
@@ -124,6 +124,7 @@ private:
 
   TextScanner scanner_;
   const std::string& name_;
+  MeshFile file_;
 };
 
 }  // namespace

@@ -50,13 +50,13 @@ public:
       if (keyword == "format") {
         read_format(words);
         has_format = true;
-      } else if (keyword == "comment") {
+      } else if (keyword == "comment" || keyword == "obj_info") {
         header_.comments.emplace_back(words.rest());
       } else if (keyword == "element") {
         read_element(words);
       } else if (keyword == "property") {
         read_property(words);
-      } else if (keyword != "obj_info" && !keyword.empty()) {
+      } else if (!keyword.empty()) {
         fail(fmt::format("\"{}\" is no keyword of PLY", keyword.substr(0, 40)));
       }
     }

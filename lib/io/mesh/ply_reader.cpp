@@ -400,13 +400,14 @@ void require_bytes(std::string_view bytes, const Header& header, const std::stri
 
 void understand_comments(MeshFile& file, const std::string& name) {
   for (const std::string& comment : file.comments) {
+    take_space(file, comment, name);
     TextScanner words(comment);
     if (!words.next_line()) {
       continue;
     }
     const std::string_view first = words.token();
-    if (first.starts_with("SPACE=")) {
-      file.space = first.substr(6);
+    if (first.starts_with("SPACE=") && !file.space) {
+      file.space = first.substr(6);  // other axes, which it goes on to say
     } else if (first == "surface=comas") {
       file.patch = Patch::comas;
     } else if (first == "surface=watertight") {
@@ -419,6 +420,7 @@ void understand_comments(MeshFile& file, const std::string& name) {
         const auto edge = parse_number(words.token());
         if (edge && *edge > 0 && std::isfinite(*edge)) {
           file.voxel = std::max(file.voxel.value_or(0), *edge);
+          file.shortest_voxel = std::min(file.shortest_voxel.value_or(*edge), *edge);
         }
       }
     } else if (first == "units") {

@@ -318,6 +318,8 @@ private:
         !patches.empty() && patches[0] == static_cast<int>(Patch::watertight) ? Patch::watertight : Patch::comas;
     for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
       mesh.corner_normals.push_back({normals[3 * t], normals[3 * t + 1], normals[3 * t + 2]});
+    }
+    for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
       if (!(normal_agreement(mesh, t) >= least_normal_agreement)) {
         reader_.fail("tunica/elements/normals make no curved surface");
       }

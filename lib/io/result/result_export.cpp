@@ -257,7 +257,7 @@ struct ResultExport::Implementation {
 
   void write_models_and_surfaces() const {
     for (const std::string& ending : options.surfaces) {
-      write_result_surface(beside(result, ending), grid, last, options.made_by, options.overwrite);
+      write_result_surface(beside(result, ending), grid, last, options.made_by, options.space, options.overwrite);
     }
     for (const Deck deck : decks()) {
       write_file(beside(result, deck == Deck::inp ? ".inp" : ".feb"),

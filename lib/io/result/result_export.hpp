@@ -23,6 +23,7 @@ struct ExportOptions {
   bool series = false;       ///< as ResultOptions
   int tessellation = 0;      ///< as ResultOptions
   bool overwrite = false;
+  std::string space = "LPS";  ///< world axes of the shells, which surfaces say
 };
 
 /// A result for readers that know no VTKHDF with time, beside the result file: OUT.hdf gives OUT.pvd, OUT_0000.vtu …,

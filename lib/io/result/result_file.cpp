@@ -170,6 +170,7 @@ constexpr std::array about{
     About{"tunica/history/newton_iterations", "1", "linear systems of the step"},
     About{"tunica/history/cg_iterations", "1", "iterations of conjugate gradients in the step"},
     About{"tunica/history/max_displacement", "mm", "largest of the curved surfaces"},
+    About{"tunica/history/displacement_p99", "mm", "passed on 1 % of the shells' area"},
     About{"tunica/history/stress_p99", "MPa", "von Mises stress, averaged at the nodes, passed on 1 % of the area"},
     About{"tunica/history/stress_max", "MPa", "largest von Mises stress, averaged at the nodes"},
     About{"tunica/history/stress_max_at", "mm", "the node where it is, reference"},
@@ -409,8 +410,9 @@ struct ResultFile::Implementation {
     node_rotation = Series(writer, group.get(), "rotation", H5T_NATIVE_DOUBLE, {nodes, 3}, nodes_chunk_rows, true);
 
     const Handle history = writer.group(tunica_group.get(), "history");
-    for (const char* name : {"time", "load_factor", "volume", "strain_energy", "kinetic_energy", "residual",
-                             "max_displacement", "stress_p99", "stress_max", "strain_p99", "strain_max"}) {
+    for (const char* name :
+         {"time", "load_factor", "volume", "strain_energy", "kinetic_energy", "residual", "max_displacement",
+          "displacement_p99", "stress_p99", "stress_max", "strain_p99", "strain_max"}) {
       numbers.emplace_back(writer, history.get(), name, H5T_NATIVE_DOUBLE, std::vector<Size>{}, history_chunk, false);
     }
     for (const char* name : {"newton_iterations", "cg_iterations"}) {
@@ -530,13 +532,14 @@ struct ResultFile::Implementation {
     node_displacement.append(writer, 1, flattened(state.displacement).data());
     node_rotation.append(writer, 1, flattened(state.rotation).data());
     const Wall& wall = of_elements.wall;
-    const std::array<double, 11> history{state.time,
+    const std::array<double, 12> history{state.time,
                                          state.load_factor,
                                          state.volume.value_or(std::numeric_limits<double>::quiet_NaN()),
                                          state.strain_energy,
                                          state.kinetic_energy,
                                          state.residual,
                                          of_elements.largest_displacement,
+                                         of_elements.displacement_p99,
                                          wall.stress_p99,
                                          wall.stress_max,
                                          1e2 * wall.strain_p99,

@@ -178,11 +178,8 @@ ShownQuantity quantity_of(const Model& model, const State& state, const ElementF
       break;
     }
     case Colouring::stress:
-      q = {{of_points[2].begin(), of_points[2].end()}, "Von Mises stress", "Von Mises stress", "MPa", 1};
-      if (options.range.value_or(*std::ranges::max_element(q.values)) < 1) {
-        q.unit = "kPa";
-        q.per_unit = 1000;
-      }
+      // As on the report's page, whatever its size: pictures of a cohort stand beside each other.
+      q = {{of_points[2].begin(), of_points[2].end()}, "Von Mises stress", "Von Mises stress", "kPa", 1000};
       break;
   }
   for (double& value : q.values) {

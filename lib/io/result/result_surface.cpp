@@ -40,7 +40,8 @@ std::vector<Vec3> shading_normals(const TriangleMesh& mesh) {
 }  // namespace
 
 void write_result_surface(const std::filesystem::path& path, const ResultGrid& grid,
-                          const std::vector<std::vector<float>>& values, const std::string& made_by, bool overwrite) {
+                          const std::vector<std::vector<float>>& values, const std::string& made_by,
+                          const std::string& space, bool overwrite) {
   const Floats& moved = field_of(grid, values, "displacement");
   const Floats& stress = field_of(grid, values, "von_mises");
   constexpr Index none = max_index;
@@ -70,6 +71,7 @@ void write_result_surface(const std::filesystem::path& path, const ResultGrid& g
                          [&](double value) { return bar_colour(largest > 0 ? value / largest : 0); });
   PlyOptions options;
   options.comments = {"made by " + made_by, fmt::format("colours: von Mises stress from 0 to {:.4g} MPa", largest)};
+  options.space = space;
   options.overwrite = overwrite;
   write_surface(path, mesh, options, look);
 }

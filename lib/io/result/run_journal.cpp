@@ -16,6 +16,7 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <fstream>
 #include <sstream>
 #include <string_view>
 #include <type_traits>
@@ -25,7 +26,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::string_view states_magic = "TUNICA STATES 2\n";
-constexpr std::string_view checkpoint_magic = "TUNICA CHECKPOINT 2\n";
+constexpr std::string_view checkpoint_magic = "TUNICA CHECKPOINT 3\n";
 /// Time between checkpoints, as a multiple of what the last one took.
 constexpr int spacing = 20;
 constexpr std::uint64_t largest_record = std::uint64_t{1} << 40;
@@ -509,6 +510,21 @@ RunJournal RunJournal::open(const fs::path& part) {
   journal->read_checkpoint();
   journal->require_whole_states();  // before anybody replaces NAME.part
   return RunJournal(std::move(journal));
+}
+
+bool RunJournal::can_go_on(const fs::path& part) {
+  const auto begins = [&](const char* ending, std::string_view magic) {
+    fs::path file = part;
+    file += ending;
+    std::error_code error;
+    if (!fs::is_regular_file(file, error)) {
+      return false;
+    }
+    std::string start(magic.size(), '\0');
+    std::ifstream bytes(file, std::ios::binary);
+    return bytes.read(start.data(), narrow<std::streamsize>(start.size())) && start == magic;
+  };
+  return begins(".states", states_magic) && begins(".checkpoint", checkpoint_magic);
 }
 
 const RunIdentity& RunJournal::identity() const { return implementation_->identity; }

@@ -45,6 +45,10 @@ public:
   /// OutputError when another process is at work on it.
   static RunJournal open(const std::filesystem::path& part);
 
+  /// Whether an interrupted run under this name has a checkpoint, from which open() would go on if it is whole. Looks
+  /// at how the files begin, and locks nothing.
+  static bool can_go_on(const std::filesystem::path& part);
+
   RunJournal(RunJournal&&) noexcept;
   RunJournal& operator=(RunJournal&&) = delete;
   RunJournal(const RunJournal&) = delete;

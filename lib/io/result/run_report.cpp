@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <initializer_list>
+#include <numbers>
 
 namespace tunica {
 namespace {
@@ -99,6 +100,7 @@ void prepare_result(Json& result, const Model& model) {
             {"step_parts", 0},
             {"converged", false},
             {"max_displacement_mm", nullptr},
+            {"displacement_p99_mm", nullptr},
             {"max_node_displacement_mm", nullptr},
             {"wall", nullptr},
             {"volume_before_mm3", nullptr},
@@ -136,6 +138,7 @@ void report_state(Json& result, const Model& model, const State& state, const El
   result["max_displacement_mm"] = fields.largest_displacement;
   result["max_node_displacement_mm"] = most;
   if (!model.shells.empty()) {
+    result["displacement_p99_mm"] = fields.displacement_p99;
     result["wall"] = {{"stress_p99_mpa", fields.wall.stress_p99},
                       {"stress_max_mpa", fields.wall.stress_max},
                       {"stress_max_at_mm", triple(fields.wall.stress_max_at)},
@@ -200,8 +203,8 @@ void report_summary(Json& result, const Summary& summary, bool converged, std::o
 }
 
 void report_modes(Json& result, const Summary& summary) {
-  for (const char* key :
-       {"max_displacement_mm", "max_node_displacement_mm", "wall", "volume_after_mm3", "strain_energy_mj"}) {
+  for (const char* key : {"max_displacement_mm", "displacement_p99_mm", "max_node_displacement_mm", "wall",
+                          "volume_after_mm3", "strain_energy_mj"}) {
     result[key] = nullptr;
   }
   result["frequencies_hz"] = summary.frequencies;
@@ -245,12 +248,29 @@ Json unloaded_report(const Unloaded& unloaded) {
           {"iterations", unloaded.iterations}};
 }
 
+namespace {
+
+// Stress in kPa, as pictures and pages have it.
+std::string value_text(Quantity of, double value) {
+  return of == Quantity::stress ? fmt::format("{:.5g} kPa", 1e3 * value) : fmt::format("{:.5g} {}", value, unit_of(of));
+}
+
+}  // namespace
+
 std::string level_note(const AccuracyLevel& level, const AccuracyRequest& request) {
   if (!level.failure.empty()) {
     return fmt::format("{:>7} shells: {}", level.shells, level.failure);
   }
-  return fmt::format("{:>7} shells: {} {:.5g} {}, {:.2g} s", level.shells, name_of(request.of), level.value,
-                     unit_of(request.of), level.seconds);
+  return fmt::format("{:>7} shells: {} {}, {:.2g} s", level.shells, name_of(request.of),
+                     value_text(request.of, level.value), level.seconds);
+}
+
+std::string missed_accuracy(const Accuracy& accuracy) {
+  return fmt::format(
+      "accuracy not reached: {} {} with {} shells, {}, {:.3g} % asked: {}", name_of(accuracy.request.of),
+      value_text(accuracy.request.of, accuracy.levels.back().value), accuracy.levels.back().shells,
+      accuracy.estimate ? fmt::format("estimated error {:.2g} %", 100 * *accuracy.estimate) : "error not estimated",
+      100 * accuracy.request.within, fmt::join(accuracy.reasons, "; "));
 }
 
 std::vector<std::string> accuracy_notes(const Accuracy& accuracy) {
@@ -293,24 +313,32 @@ std::vector<Warning> contact_warnings(const Json& result) {
   for (const auto& [name, record] : result["contacts"].items()) {
     const Json& points = record["points"];
     if (!points.empty() && std::all_of(points.begin(), points.end(), [](const Json& n) { return n == 0; })) {
-      warnings.push_back({Weight::major, "no contact",
-                          fmt::format("{}: nothing touches in any step: do these bodies come together?", name)});
+      warnings.push_back(
+          {Weight::major, "no contact",
+           fmt::format("{}: nothing touches at the end of any step: do these bodies come together?", name)});
     }
   }
   return warnings;
 }
 
-std::vector<Warning> run_warnings(const RunSettings& run, const Summary& summary, const Wall& wall,
-                                  std::size_t unresolved) {
+std::vector<Warning> run_warnings(const RunSettings& run, const Summary& summary, const LastState& last) {
   std::vector<Warning> warnings;
   constexpr double small_strain = 0.1;
-  if (wall.strain_p99 > small_strain) {
+  if (last.wall.strain_p99 > small_strain) {
     warnings.push_back(
         {Weight::major, "large strain",
          fmt::format(
              "1 % of the wall is strained by more than {:.3g} %: linear elasticity is meant for strains of up to "
              "about 10 %",
-             1e2 * wall.strain_p99)});
+             1e2 * last.wall.strain_p99)});
+  }
+  constexpr double notable_turn = 0.02, large_turn = 0.1;
+  if (const double error = 1 - std::cos(std::min(last.turn_p99, std::numbers::pi / 2)); error > notable_turn) {
+    warnings.push_back(
+        {error > large_turn ? Weight::major : Weight::minor, "large rotation",
+         fmt::format("1 % of the body turns by more than {:.0f} degrees, and a linear run takes rotations for small: "
+                     "its displacements may be off by {:.0f} % or more; write geometry = \"nonlinear\"",
+                     last.turn_p99 * 180 / std::numbers::pi, 1e2 * error)});
   }
   for (const Snap& snap : summary.snaps) {
     warnings.push_back(
@@ -362,12 +390,12 @@ std::vector<Warning> run_warnings(const RunSettings& run, const Summary& summary
                      "smaller steps, or leave newton_max at its default",
                      summary.residual)});
   }
-  if (unresolved > 0) {
+  if (last.unresolved > 0) {
     warnings.push_back(
         {Weight::minor, "coarse shells",
          fmt::format("{} shells bend by more than 30 degrees within themselves: the mesh is too coarse for "
                      "this load, refine it there",
-                     unresolved)});
+                     last.unresolved)});
   }
   return warnings;
 }

@@ -33,16 +33,25 @@ Json unloaded_report(const Unloaded& unloaded);
 /// A level on a line.
 std::string level_note(const AccuracyLevel& level, const AccuracyRequest& request);
 
+/// What a run came to whose accuracy was not reached, and why: "accuracy not reached: stress 159 kPa with 3200
+/// shells, estimated error 12 %, 5 % asked: …".
+std::string missed_accuracy(const Accuracy& accuracy);
+
 /// Claim and choices as lines for a terminal.
 std::vector<std::string> accuracy_notes(const Accuracy& accuracy);
 
 /// A line on the modes found.
 std::string modes_note(const Summary& summary, std::size_t asked);
 
+/// What of the last state tells how far it may be trusted.
+struct LastState {
+  Wall wall;
+  std::size_t unresolved = 0;  ///< count_unresolved()
+  double turn_p99 = 0;         ///< rad, as in ElementFields
+};
+
 /// What a user should know of a run that has ended well.
-/// @param wall  of the last state, as `unresolved`: count_unresolved()
-std::vector<Warning> run_warnings(const RunSettings& run, const Summary& summary, const Wall& wall,
-                                  std::size_t unresolved);
+std::vector<Warning> run_warnings(const RunSettings& run, const Summary& summary, const LastState& last);
 
 /// Contacts in which nothing ever touches.
 /// @param result  of a run that has ended

@@ -2,6 +2,7 @@
 
 #include "tunica/io/mesh/mesh_file.hpp"
 #include "tunica/io/mesh/mesh_pair.hpp"
+#include "tunica/io/mesh/surface_doubts.hpp"
 #include "tunica/io/mesh/tet_file.hpp"
 #include "tunica/io/scene/detail/scene_names.hpp"
 #include "tunica/surface/filling/fill.hpp"
@@ -12,6 +13,9 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <Eigen/Geometry>
+
+#include <algorithm>
+#include <iterator>
 
 namespace tunica {
 namespace {
@@ -64,10 +68,20 @@ struct BodyMesh {
   ShellMesh shell;
 };
 
-BodyMesh read_body_mesh(const SceneShell& shell) {
+// Meshes in different spaces are in different places.
+void join_space(const MeshFile& file, const std::filesystem::path& path, BodyFindings& found) {
+  common_space(file.space, path, found.space, found.space_of);
+  if (file.space && !found.space) {
+    found.space = file.space;
+    found.space_of = path;
+  }
+}
+
+BodyMesh read_body_mesh(const SceneShell& shell, BodyFindings& found) {
   return read_at(shell.places, "mesh", shell.mesh, [&] {
     BodyMesh mesh{read_mesh(shell.mesh, shell.unit_mm, true), false, {}};
     const MeshFile& file = mesh.file;
+    join_space(file, shell.mesh, found);
     require_no_other_unit(file, shell.unit_mm, shell.mesh);
     mesh.curved = shell.rest == Rest::curved && !(file.normals.empty() && file.corner_normals.empty());
     mesh.shell = mesh.curved
@@ -100,8 +114,10 @@ std::vector<double> thickness_of(const SceneShell& shell, const MeshFile& file) 
 }
 
 // A surface that encloses something, in mm.
-TriangleMesh read_closed_surface(const std::filesystem::path& path, std::optional<double> unit_mm, double scale) {
+TriangleMesh read_closed_surface(const std::filesystem::path& path, std::optional<double> unit_mm, double scale,
+                                 BodyFindings& found) {
   MeshFile file = read_mesh(path, unit_mm, true);
+  join_space(file, path, found);
   require_no_other_unit(file, unit_mm, path);
   const MeshFacts facts = require_surface(file, path);
   if (const auto why = why_unfit(facts, Boundary::forbidden)) {
@@ -113,21 +129,10 @@ TriangleMesh read_closed_surface(const std::filesystem::path& path, std::optiona
   return std::move(file.mesh);
 }
 
-// The normals of a closed surface outward. @return whether they were not
-bool turn_outward(TriangleMesh& surface) {
-  if (signed_volume(surface) >= 0) {
-    return false;
-  }
-  for (auto& triangle : surface.triangles) {
-    std::swap(triangle[1], triangle[2]);
-  }
-  return true;
-}
-
-TetMesh fill_surface(const SceneSolid& solid) {
+TetMesh fill_surface(const SceneSolid& solid, BodyFindings& found) {
   TriangleMesh surface = read_at(solid.places, "fill", solid.mesh,
-                                 [&] { return read_closed_surface(solid.mesh, solid.unit_mm, solid.scale); });
-  (void)turn_outward(surface);
+                                 [&] { return read_closed_surface(solid.mesh, solid.unit_mm, solid.scale, found); });
+  surface = turned_outward(surface, facing_of(surface));
   const double size = *solid.fill_size;
   // A regular tetrahedron has the volume edge^3 / (6 sqrt 2).
   const double expected = 6 * std::sqrt(2.0) * signed_volume(surface) / (size * size * size);
@@ -138,21 +143,25 @@ TetMesh fill_surface(const SceneSolid& solid) {
   return read_at(solid.places, "fill", solid.mesh, [&] { return fill(surface, size); });
 }
 
-RigidMesh load_shape(const SceneRigidMesh& mesh, const SceneRigid& rigid, std::vector<std::string>& notes) {
+RigidMesh load_shape(const SceneRigidMesh& mesh, const SceneRigid& rigid, BodyFindings& found) {
   RigidMesh shape{read_at(rigid.places, "mesh", mesh.mesh,
-                          [&] { return read_closed_surface(mesh.mesh, mesh.unit_mm, mesh.scale); }),
+                          [&] { return read_closed_surface(mesh.mesh, mesh.unit_mm, mesh.scale, found); }),
                   mesh.turn, mesh.expansion};
-  if (turn_outward(shape.surface)) {
-    notes.push_back(fmt::format("{}: its triangles face inward; they were turned, so that the inside is the rigid body",
-                                mesh.mesh.string()));
+  if (const Facing facing = facing_of(shape.surface); facing.inward > 0) {
+    shape.surface = turned_outward(std::move(shape.surface), facing);
+    found.warnings.push_back({Weight::minor, "faces inward",
+                              fmt::format("{}: {}: they are turned around, so that the inside is the rigid body",
+                                          mesh.mesh.string(), facing_phrase(facing))});
   }
   return shape;
 }
 
 }  // namespace
 
-ShellBody load_shell(const SceneShell& shell, std::vector<std::string>& notes) {
-  BodyMesh read = read_body_mesh(shell);
+ShellBody load_shell(const SceneShell& shell, BodyFindings& found) {
+  BodyMesh read = read_body_mesh(shell, found);
+  const TriangleMesh& flat = read.file.mesh;
+  std::ranges::copy(seam_warnings(flat, examine(flat), shell.mesh, Weight::major), std::back_inserter(found.warnings));
   ShellBody body;
   body.name = shell.name;
   body.said_at = shell.places.item.flag ? shell.mesh.string() : shell.places.item.text;
@@ -164,13 +173,16 @@ ShellBody load_shell(const SceneShell& shell, std::vector<std::string>& notes) {
   if (!body.curved) {
     make_flat(body.mesh);
     if (shell.rest == Rest::curved) {
-      notes.push_back(
+      found.notes.push_back(
           fmt::format("{}: has no normals, so its flat facets are the shell (as rest = \"flat\"); "
                       "tunica-relax makes curved shells",
                       shell.mesh.string()));
     }
   }
   body.thickness = thickness_of(shell, read.file);
+  if (read.file.voxel) {
+    body.voxel = {shell.scale * *read.file.shortest_voxel, shell.scale * *read.file.voxel};
+  }
   body.material = shell.material;
   body.membrane = shell.membrane;
   body.bending = shell.bending;
@@ -178,10 +190,10 @@ ShellBody load_shell(const SceneShell& shell, std::vector<std::string>& notes) {
   return body;
 }
 
-SolidBody load_solid(const SceneSolid& solid, std::vector<std::string>& notes) {
+SolidBody load_solid(const SceneSolid& solid, BodyFindings& found) {
   SolidBody body{solid.name, {}, solid.material, solid.law, solid.places.item.text};
   if (solid.fill_size) {
-    body.mesh = fill_surface(solid);
+    body.mesh = fill_surface(solid, found);
   } else {
     TetFile file = read_at(solid.places, "mesh", solid.mesh, [&] {
       TetFile read = read_tetrahedra(solid.mesh, solid.unit_mm, solid.scale);
@@ -189,17 +201,17 @@ SolidBody load_solid(const SceneSolid& solid, std::vector<std::string>& notes) {
       return read;
     });
     body.mesh = std::move(file.mesh);
-    notes.insert(notes.end(), file.notes.begin(), file.notes.end());
+    found.notes.insert(found.notes.end(), file.notes.begin(), file.notes.end());
   }
   return body;
 }
 
-RigidBody load_rigid(const SceneRigid& rigid, std::vector<std::string>& notes) {
+RigidBody load_rigid(const SceneRigid& rigid, BodyFindings& found) {
   RigidBody body{rigid.name, RigidSphere{}, rigid.motion, rigid.places.item.text};
   std::visit(
       [&]<typename Shape>(const Shape& shape) {
         if constexpr (std::is_same_v<Shape, SceneRigidMesh>) {
-          body.shape = load_shape(shape, rigid, notes);
+          body.shape = load_shape(shape, rigid, found);
         } else {
           body.shape = shape;
         }

@@ -1,6 +1,7 @@
 #include "tunica/io/scene/scene.hpp"
 
 #include "tunica/core/narrow.hpp"
+#include "tunica/io/mesh/surface_doubts.hpp"
 #include "tunica/io/scene/detail/body_files.hpp"
 #include "tunica/io/scene/detail/scene_names.hpp"
 #include "tunica/io/scene/detail/selection.hpp"
@@ -9,6 +10,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <iterator>
 #include <map>
 
 namespace tunica {
@@ -206,19 +208,30 @@ void settle_until(Scene& scene) {
 
 LoadedScene load_scene(const Scene& scene) {
   require_load(scene);
-  LoadedScene loaded;
-  loaded.notes = scene.notes;
+  BodyFindings found;
+  found.notes = scene.notes;
   SceneBodies bodies;
   for (const SceneShell& shell : scene.shells) {
-    bodies.shells.push_back(load_shell(shell, loaded.notes));
+    bodies.shells.push_back(load_shell(shell, found));
   }
   for (const SceneSolid& solid : scene.solids) {
-    bodies.solids.push_back(load_solid(solid, loaded.notes));
+    bodies.solids.push_back(load_solid(solid, found));
   }
   for (const SceneRigid& rigid : scene.rigids) {
-    bodies.rigids.push_back(load_rigid(rigid, loaded.notes));
+    bodies.rigids.push_back(load_rigid(rigid, found));
   }
-  loaded.model = resolve_scene(scene, std::move(bodies));
+  LoadedScene loaded{resolve_scene(scene, std::move(bodies)), std::move(found.notes), std::move(found.warnings)};
+  std::vector<bool> is_looked_at(loaded.model.shells.size(), false);
+  for (const Load& load : loaded.model.loads) {
+    const auto* const pressure = std::get_if<PressureLoad>(&load.kind);
+    if (pressure != nullptr && load.body < is_looked_at.size() && !is_looked_at[load.body]) {
+      is_looked_at[load.body] = true;
+      const ShellMesh& mesh = loaded.model.shells[load.body].mesh;
+      std::ranges::copy(
+          pressed_side_warnings({mesh.vertices, mesh.triangles}, pressure->value, scene.shells[load.body].mesh),
+          std::back_inserter(loaded.warnings));
+    }
+  }
   return loaded;
 }
 

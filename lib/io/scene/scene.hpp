@@ -3,6 +3,7 @@
 
 #include "tunica/accuracy/accuracy.hpp"
 #include "tunica/core/error.hpp"
+#include "tunica/core/warning.hpp"
 #include "tunica/mechanics/model/model.hpp"
 
 #include <filesystem>
@@ -19,7 +20,8 @@ namespace tunica {
 /// Where something was said: "FILE:line:column" or a flag. Every message about it starts with this.
 struct Place {
   std::string text;
-  bool flag = false;  ///< said on the command line: what is wrong with the value itself is a UsageError
+  bool flag = false;    ///< said on the command line: what is wrong with the value itself is a UsageError
+  std::string typed{};  ///< the value as it was written, such as "120mmHg"; empty: not a text, or not known
 
   /// Throws InputError, or UsageError for a flag, with "text: what".
   [[noreturn]] void fail(const std::string& what) const;
@@ -204,6 +206,7 @@ void check_scene(const Scene& scene);
 struct LoadedScene {
   Model model;
   std::vector<std::string> notes;  ///< of the scene and of its meshes (flat facets)
+  std::vector<Warning> warnings;   ///< of its meshes: which way they face, where they are open unawares
 };
 
 /// The meshes of a scene at hand: shells, solids and rigid bodies each in the scene's order.
@@ -214,14 +217,19 @@ struct SceneBodies {
 };
 
 /// Reads the meshes and resolves every name and selection. A mesh without normals is simulated as the flat facets it
-/// holds; a note says so. A rigid mesh that faces inward is turned; a note says that too.
-/// Errors: InputError: as read_mesh; a selection that is empty, a node that does not exist, or that two bodies carry.
+/// holds; a note says so. A rigid mesh that faces inward is turned; a warning says so. Shells stay as they are: a
+/// warning says where a pressure meets normals that point inward. Errors: InputError: as read_mesh; meshes that say
+/// different spaces; a selection that is empty, a node that does not exist, or that two bodies carry.
 LoadedScene load_scene(const Scene& scene);
 
 /// The same on bodies that are at hand, such as finer meshes of the same.
 Model resolve_scene(const Scene& scene, SceneBodies bodies);
 /// Of a scene of shells alone.
 Model resolve_scene(const Scene& scene, std::vector<ShellBody> shells);
+
+/// As scenes and flags name them.
+std::string_view name_of(Membrane membrane);
+std::string_view name_of(Bending bending);
 
 /// The scene as a scene file with everything resolved: SI units, defaults written out. Reading it gives the same scene.
 /// Paths are absolute; those within the folder of `file` are relative to it, so that both may move together.

@@ -13,7 +13,8 @@ SceneTable::SceneTable(const toml::table& table, const std::string& file, std::s
     : table_(table), file_(file), name_(std::move(name)) {
   for (const auto& [key, value] : table) {
     const Place place = at(key.source());
-    places_.keys.emplace(std::string(key.str()), at(value.source()));
+    Place& of_value = places_.keys.emplace(std::string(key.str()), at(value.source())).first->second;
+    of_value.typed = value.value_exact<std::string>().value_or("");
     if (std::find(known.begin(), known.end(), key.str()) == known.end()) {
       place.fail(fmt::format("unknown key '{}' in {}: {}", key.str(), name_, suggestion(key.str(), known)));
     }

@@ -220,6 +220,8 @@ void write_run(const Scene& scene, Text& text) {
   text.line("every", std::to_string(run.every));
 }
 
+}  // namespace
+
 std::string_view name_of(Membrane membrane) {
   switch (membrane) {
     case Membrane::cst:
@@ -245,6 +247,8 @@ std::string_view name_of(Bending bending) {
   }
   return {};
 }
+
+namespace {
 
 void write_file(std::string_view key, const std::filesystem::path& mesh, std::optional<double> unit_mm, double scale,
                 Text& text) {

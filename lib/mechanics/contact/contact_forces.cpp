@@ -185,15 +185,16 @@ Vec3 ContactSystem::relative_motion(const Group& group, const Sample& sample, co
   return (x + lever.own - before) - (there + lever.other - there_before);
 }
 
-std::vector<std::vector<ContactSystem::Touch>> ContactSystem::all_touches(
-    const FaceMaps& maps, const std::vector<std::vector<std::size_t>>& near) const {
-  std::vector<std::vector<Touch>> touches(groups_.size());
+std::vector<ContactSystem::Touches> ContactSystem::all_touches(const FaceMaps& maps,
+                                                               const std::vector<std::vector<std::size_t>>& near) {
+  std::vector<Touches> touches(groups_.size());
   for (std::size_t g = 0; g < groups_.size(); ++g) {
-    const Group& group = groups_[g];
-    if (!is_close(group, near[g], maps)) {
+    Group& group = groups_[g];
+    group.close = is_close(group, near[g], maps);
+    if (!group.close) {
       continue;
     }
-    touches[g].resize(group.samples.size());
+    wake(group);
     if (!group.point) {
       maps.prepare(group.face);
     }
@@ -203,9 +204,12 @@ std::vector<std::vector<ContactSystem::Touch>> ContactSystem::all_touches(
   }
   parallel_for_blocks(groups_.size(), groups_per_task, [&](std::size_t begin, std::size_t end) {
     for (std::size_t g = begin; g < end; ++g) {
-      for (std::size_t i = 0; i < touches[g].size(); ++i) {
-        const Group& group = groups_[g];
-        touches[g][i] = touch(group, place(group, group.samples[i], maps), near[g], maps);
+      const Group& group = groups_[g];
+      for (std::size_t i = 0; group.close && i < group.samples.size(); ++i) {
+        const Touch found = touch(group, place(group, group.samples[i], maps), near[g], maps);
+        if (found.gap < group.resolution) {
+          touches[g].emplace_back(i, found);
+        }
       }
     }
   });
@@ -414,13 +418,14 @@ bool ContactSystem::add(const Configuration& configuration, VectorX& external, B
   for (std::size_t g = 0; g < groups_.size(); ++g) {
     Group& group = groups_[g];
     Acting acting;
-    for (std::size_t i = 0; i < touches[g].size(); ++i) {
+    auto pressing = touches[g].begin();
+    for (std::size_t i = 0; i < group.samples.size(); ++i) {
       Sample& sample = group.samples[i];
-      const Touch& t = touches[g][i];
       sample.active = sample.active && tangent == nullptr;
-      if (t.gap >= group.resolution) {
+      if (pressing == touches[g].end() || pressing->first != i) {
         continue;
       }
+      const Touch& t = (pressing++)->second;
       if (t.gap < closest_.gap) {
         closest_ = {t.gap, group.contact, place(group, sample, maps)};
       }
@@ -454,11 +459,6 @@ bool ContactSystem::add(const Configuration& configuration, VectorX& external, B
           acting.paper_stiffness +=
               area * transfer * (here.derivative * maps.linearised(group.face).derivative(sample.weights));
         }
-      }
-    }
-    if (touches[g].empty() && tangent != nullptr) {
-      for (Sample& sample : group.samples) {
-        sample.active = false;
       }
     }
     if (acting.any) {

@@ -1,8 +1,10 @@
 #include "tunica/core/error.hpp"
-#include "tunica/mechanics/contact/detail/contact_parts.hpp"
+#include "tunica/mechanics/contact/detail/box_tree.hpp"
 #include "tunica/surface/distance/signed_distance.hpp"
 
 #include <fmt/format.h>
+
+#include <algorithm>
 
 namespace tunica {
 namespace {
@@ -29,6 +31,104 @@ struct Overlap {
   }
 };
 
+/// Where a body passes through itself at a node that lies on faces of another part of it. Such parts are nought apart,
+/// so that contact, which leaves what is near in the reference alone, does not see them.
+class OwnCrossing {
+public:
+  OwnCrossing(const Surfaces& surfaces, std::size_t body, const std::vector<Vec3>& reference)
+      : surfaces_(surfaces), reference_(reference) {
+    std::vector<std::size_t> faces;
+    std::vector<Bounds> boxes(surfaces.faces.size());
+    for (std::size_t f = surfaces.first[body]; f < surfaces.first[body + 1]; ++f) {
+      const auto [a, b, c] = corners(f);
+      boxes[f] = {a.cwiseMin(b).cwiseMin(c), a.cwiseMax(b).cwiseMax(c)};
+      faces.push_back(f);
+      for (const Index node : surfaces.faces[f].nodes) {
+        around_[node].push_back(f);
+      }
+      edge_ += (b - a).norm();
+    }
+    edge_ /= real(std::max<std::size_t>(1, faces.size()));
+    tree_ = BoxTree(std::move(faces), boxes);
+  }
+
+  /// The first node, if any, whose neighbours lie on both sides of the faces that it lies on.
+  [[nodiscard]] std::optional<Vec3> find() const {
+    for (const auto& [node, own] : around_) {
+      const std::vector<std::size_t> met = met_at(node, own);
+      bool above = false, below = false;
+      for (std::size_t k = 0; !met.empty() && k < 3 * own.size(); ++k) {
+        const Vec3 way = reference_[surfaces_.faces[own[k / 3]].nodes[k % 3]] - reference_[node];
+        const double side = way.isZero(0) ? 0 : side_of(reference_[node], way.normalized(), met);
+        above = above || side > clear;
+        below = below || side < -clear;
+      }
+      if (above && below) {
+        return reference_[node];
+      }
+    }
+    return std::nullopt;
+  }
+
+private:
+  static constexpr double near = 1e-6;   // of the mean edge: files keep seven digits
+  static constexpr double clear = 1e-3;  // sine between a way and a face
+  static constexpr double step = 0.05;   // of the mean edge
+
+  [[nodiscard]] std::array<Vec3, 3> corners(std::size_t f) const {
+    const auto& nodes = surfaces_.faces[f].nodes;
+    return {reference_[nodes[0]], reference_[nodes[1]], reference_[nodes[2]]};
+  }
+
+  /// The faces on which a node lies, but for those next to it.
+  [[nodiscard]] std::vector<std::size_t> met_at(Index node, const std::vector<std::size_t>& own) const {
+    const Vec3& x = reference_[node];
+    std::vector<std::size_t> met;
+    tree_.find({x, x}, near * edge_, met);
+    std::erase_if(met, [&](std::size_t f) {
+      const auto& nodes = surfaces_.faces[f].nodes;
+      const auto [a, b, c] = corners(f);
+      return (closest_point_on_triangle(x, a, b, c) - x).norm() > near * edge_ ||
+             std::ranges::any_of(own, [&](std::size_t mine) {
+               return std::ranges::find_first_of(surfaces_.faces[mine].nodes, nodes) !=
+                      surfaces_.faces[mine].nodes.end();
+             });
+    });
+    return met;
+  }
+
+  /// The sine by which a way from a point on faces leaves them, above zero towards their normals; 0 beside their rim.
+  [[nodiscard]] double side_of(const Vec3& from, const Vec3& way, const std::vector<std::size_t>& met) const {
+    const Vec3 p = from + step * edge_ * way;
+    double nearest = infinity;
+    for (const std::size_t f : met) {
+      const auto [a, b, c] = corners(f);
+      nearest = std::min(nearest, (p - closest_point_on_triangle(p, a, b, c)).norm());
+    }
+    std::size_t ties = 0;
+    double side = 0;
+    bool over_a_face = false;
+    for (const std::size_t f : met) {
+      const auto [a, b, c] = corners(f);
+      const Vec3 off = p - closest_point_on_triangle(p, a, b, c);
+      if (off.norm() > nearest + near * edge_) {
+        continue;
+      }
+      ++ties;
+      const double height = (b - a).cross(c - a).normalized().dot(off);
+      over_a_face = over_a_face || std::abs(height) > (1 - near) * off.norm();
+      side = std::abs(height) > std::abs(side) ? height : side;
+    }
+    return over_a_face || ties > 1 ? side / (step * edge_) : 0;
+  }
+
+  const Surfaces& surfaces_;
+  const std::vector<Vec3>& reference_;
+  std::map<Index, std::vector<std::size_t>> around_;  ///< the faces at each node
+  double edge_ = 0;                                   ///< mm, mean
+  BoxTree tree_;
+};
+
 }  // namespace
 
 /// Of solids the distance of every sample from the whole surface counts, so that a body wholly inside is found.
@@ -53,7 +153,7 @@ void ContactSystem::require_apart(const Model& model) {
   };
   Overlap deepest;
   for (std::size_t g = 0; g < groups_.size(); ++g) {
-    const Group& group = groups_[g];
+    Group& group = groups_[g];
     if (group.point && model.is_solid(group.other.index)) {
       deepest.look(solid(group.other.index).first.at(place(group, group.samples[0], maps)).distance,
                    same_distance * group.wall, group.contact);
@@ -64,12 +164,16 @@ void ContactSystem::require_apart(const Model& model) {
                           group.other.index != face.body && !is_carried(face, group.other.index);
     if (in_solid) {
       const auto& [distance, box] = solid(group.other.index);
-      for (std::size_t i = 0; box.meets(maps.bounds(group.face), face.half_thickness) && i < group.samples.size();
-           ++i) {
-        const Vec3 x = maps[group.face].point(group.samples[i].weights);
+      if (!box.meets(maps.bounds(group.face), face.half_thickness)) {
+        continue;
+      }
+      wake(group);
+      for (const Sample& sample : group.samples) {
+        const Vec3 x = maps[group.face].point(sample.weights);
         deepest.look(distance.at(x).distance - face.half_thickness, same_distance * group.wall, group.contact);
       }
     } else if (is_close(group, near[g], maps)) {
+      wake(group);
       for (const Sample& sample : group.samples) {
         const double gap = touch(group, place(group, sample, maps), near[g], maps).gap + group.sag;
         deepest.look(gap, same_distance * group.wall, group.contact);
@@ -87,6 +191,7 @@ void ContactSystem::require_apart(const Model& model) {
     }
   }
   if (deepest.contact == SIZE_MAX) {
+    require_no_own_crossing(model);
     return;
   }
   const Contact& contact = contacts_[deepest.contact];
@@ -97,6 +202,21 @@ void ContactSystem::require_apart(const Model& model) {
       fmt::format("{}{} and {} overlap by {:.4g} mm in the reference (walls have thickness): move them apart",
                   contact.said_at.empty() ? "" : contact.said_at + ": ", name(contact.between[0]),
                   name(contact.between[1]), deepest.depth));
+}
+
+void ContactSystem::require_no_own_crossing(const Model& model) const {
+  for (const Contact& contact : contacts_) {
+    const auto& [a, b] = contact.between;
+    if (a.rigid || b.rigid || a.index != b.index) {
+      continue;
+    }
+    if (const auto at = OwnCrossing(surfaces_, a.index, reference_).find()) {
+      throw InputError(fmt::format(
+          "{}{} passes through itself in the reference at ({:.4g}, {:.4g}, {:.4g}) mm: move its parts "
+          "apart, or mend the mesh",
+          contact.said_at.empty() ? "" : contact.said_at + ": ", model.name_of(a.index), at->x(), at->y(), at->z()));
+    }
+  }
 }
 
 }  // namespace tunica

@@ -7,7 +7,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <ranges>
 #include <set>
+#include <utility>
 
 namespace tunica {
 namespace {
@@ -56,6 +58,13 @@ ContactSystem::ContactSystem(const Model& model, Surfaces surfaces, std::vector<
         face.curved = face.curved && face.body != party.index;
       }
     }
+  }
+  const auto name = [&](const ContactParty& party) {
+    return party.rigid ? model.rigids[party.index].name : model.name_of(party.index);
+  };
+  for (const auto& [one, other] : contacts_ | std::views::transform(&Contact::between)) {
+    const bool self = !one.rigid && !other.rigid && one.index == other.index;
+    meetings_.push_back(fmt::format("{} meets {}", name(one), self ? "itself" : name(other)));
   }
   make_groups();
   accepted_ = maps_at(rest_);
@@ -161,7 +170,19 @@ Vec3 ContactSystem::place(const Group& group, const Sample& sample, const FaceMa
 }
 
 bool ContactSystem::is_close(const Group& group, const std::vector<std::size_t>& near, const FaceMaps& maps) const {
-  return group.other.rigid ? is_near(group, maps[group.face]) : !near.empty();
+  return group.other.rigid ? is_near(group, maps) : !near.empty();
+}
+
+void ContactSystem::wake(Group& group) const {
+  if (group.samples.empty()) {
+    sample(group, group.level);
+  }
+}
+
+void ContactSystem::let_sleep(Group& group) {
+  if (!group.point && !group.close && !group.samples.empty() && !group.samples.front().followed) {
+    std::vector<Sample>().swap(group.samples);
+  }
 }
 
 void ContactSystem::sample(Group& group, int level) const {
@@ -227,8 +248,11 @@ void ContactSystem::refine(const FaceMaps& maps) {
     }
     const double wanted = std::sqrt(bend / (sag_of_resolution * group.resolution));
     const auto level = narrow<int>(std::lround(std::clamp(std::ceil(wanted), real(least_level), real(most_level))));
-    if (group.samples.empty() || level > group.level) {
-      sample(group, level);
+    if (level > group.level) {
+      group.level = level;
+      if (!group.samples.empty()) {
+        sample(group, level);
+      }
     }
     group.sag = bend / (group.level * group.level);
   }
@@ -359,8 +383,8 @@ std::vector<std::vector<std::size_t>> ContactSystem::near_faces(const FaceMaps& 
   return near;
 }
 
-bool ContactSystem::is_near(const Group& group, const PatchMap& map) const {
-  const Bounds bounds = bounds_of(surfaces_.faces[group.face], map);
+bool ContactSystem::is_near(const Group& group, const FaceMaps& maps) const {
+  const Bounds& bounds = maps.bounds(group.face);
   const Vec3 centre = (bounds.lower + bounds.upper) / 2;
   const double radius = (bounds.upper - centre).norm();
   return shapes_[group.other.index].at(centre).distance - radius < group.resolution + group.sag + offset(group, 0);
@@ -432,6 +456,7 @@ ContactSystem::Touch ContactSystem::touch(const Group& group, const Vec3& x, con
 
 void ContactSystem::set_step(double from, double to, const Configuration& configuration) {
   stiffness_ = accepted_stiffness_;
+  std::ranges::for_each(groups_, let_sleep);
   refine(*maps_at(configuration));
   begin_ = from;
   end_ = to;
@@ -480,11 +505,11 @@ bool ContactSystem::find_pairs(const Configuration& configuration) {
       }
     }
   }
-  if (all.size() == pairs_.size()) {
-    return false;
+  if (all.size() != pairs_.size()) {
+    pairs_.assign(all.begin(), all.end());
+    pairs_are_new_ = true;
   }
-  pairs_.assign(all.begin(), all.end());
-  return true;
+  return std::exchange(pairs_are_new_, false);
 }
 
 void ContactSystem::accept(const Configuration& configuration) {
@@ -514,8 +539,9 @@ std::string ContactSystem::closest_place() const {
   if (!std::isfinite(closest_.gap)) {
     return "";
   }
-  return fmt::format("; in contact {} they are closest at ({:.4g}, {:.4g}, {:.4g}) mm",
-                     contacts_[closest_.contact].name, closest_.at.x(), closest_.at.y(), closest_.at.z());
+  return fmt::format("; in contact {} they are closest at ({:.4g}, {:.4g}, {:.4g}) mm, where {}",
+                     contacts_[closest_.contact].name, closest_.at.x(), closest_.at.y(), closest_.at.z(),
+                     meetings_[closest_.contact]);
 }
 
 void ContactSystem::keep_slip(const Configuration& configuration) {
@@ -528,6 +554,9 @@ void ContactSystem::keep_slip(const Configuration& configuration) {
       continue;
     }
     const bool close = is_close(group, near[g], maps);
+    if (close) {
+      wake(group);
+    }
     for (Sample& sample : group.samples) {
       if (!close) {
         sample.followed = false;
@@ -554,10 +583,19 @@ void ContactSystem::keep_slip(const Configuration& configuration) {
 }
 
 std::vector<double> ContactSystem::memory() const {
-  std::vector<double> values = stiffness_;
+  std::vector<double> values = accepted_stiffness_;
+  values.push_back(real(pairs_.size()));
+  for (const auto& [i, j] : pairs_) {
+    values.insert(values.end(), {real(i), real(j)});
+  }
   for (const Group& group : groups_) {
-    values.push_back(real(group.level));
-    for (const Sample& sample : group.samples) {
+    values.insert(values.end(), {real(group.level), group.sag});
+    const bool rubs = contacts_[group.contact].friction > 0;
+    if (rubs) {
+      values.push_back(real(group.samples.size()));
+    }
+    for (std::size_t i = 0; rubs && i < group.samples.size(); ++i) {
+      const Sample& sample = group.samples[i];
       values.push_back(sample.followed ? 1 : 0);
       values.insert(values.end(), sample.slip.begin(), sample.slip.end());
       values.push_back(sample.slipped);
@@ -567,28 +605,46 @@ std::vector<double> ContactSystem::memory() const {
 }
 
 void ContactSystem::recall(const std::vector<double>& memory, const Configuration& configuration, double time) {
-  std::size_t next = contacts_.size();
-  TUNICA_ASSERT(memory.size() >= next);
-  for (Group& group : groups_) {
-    TUNICA_ASSERT(next < memory.size());
-    sample(group, truncated<int>(memory[next]));
-    next += 1 + 5 * group.samples.size();
+  std::size_t read = 0;
+  const auto next = [&] {
+    TUNICA_ASSERT(read < memory.size());
+    return memory[read++];
+  };
+  std::ranges::generate(accepted_stiffness_, next);
+  stiffness_ = accepted_stiffness_;
+  std::vector<std::array<Index, 2>> pairs(truncated<std::size_t>(next()));
+  for (auto& [i, j] : pairs) {
+    i = truncated<Index>(next());
+    j = truncated<Index>(next());
   }
-  TUNICA_ASSERT(memory.size() == next);
-  set_step(time, time, configuration);
-  accept(configuration);
-  next = contacts_.size();
+  pairs_are_new_ = pairs_are_new_ || pairs != pairs_;
+  pairs_ = std::move(pairs);
+  begin_ = end_ = time;
+  left_ = 0;
+  for (std::size_t r = 0; r < shapes_.size(); ++r) {
+    shapes_[r].set_time(time);
+    shapes_end_[r].set_time(time);
+  }
+  shapes_before_ = shapes_;
+  accepted_ = maps_at(configuration);
   for (Group& group : groups_) {
-    ++next;
-    for (Sample& sample : group.samples) {
-      sample.followed = memory[next] != 0;
-      sample.slip = Vec3(memory[next + 1], memory[next + 2], memory[next + 3]);
-      sample.slipped = memory[next + 4];
-      next += 5;
+    group.level = truncated<int>(next());
+    group.sag = next();
+    if (!group.point) {
+      group.samples.clear();
+    }
+    if (contacts_[group.contact].friction > 0 && next() > 0) {
+      wake(group);
+    }
+    for (std::size_t i = 0; contacts_[group.contact].friction > 0 && i < group.samples.size(); ++i) {
+      Sample& sample = group.samples[i];
+      sample.followed = next() != 0;
+      sample.slip = Vec3::NullaryExpr([&] { return next(); });
+      sample.slipped = next();
+      sample.before = place(group, sample, *accepted_);
     }
   }
-  std::copy_n(memory.begin(), contacts_.size(), stiffness_.begin());
-  accepted_stiffness_ = stiffness_;
+  TUNICA_ASSERT(read == memory.size());
 }
 
 }  // namespace tunica

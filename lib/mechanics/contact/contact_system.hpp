@@ -10,6 +10,8 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <string>
+#include <utility>
 #include <vector>
 
 /// Contact of curved surfaces with each other and with rigid bodies, inside the implicit step.
@@ -63,7 +65,7 @@ public:
   void set_left(double left);
 
   /// Which nodes may come to act on each other, beyond those of one element.
-  /// @return whether there are more than before
+  /// @return whether they are others than at the last call
   bool find_pairs(const Configuration& configuration);
   [[nodiscard]] const std::vector<std::array<Index, 2>>& pairs() const { return pairs_; }
 
@@ -99,8 +101,8 @@ public:
   /// Back to the last accepted state, after attempts that came to nothing.
   void go_back();
 
-  /// Where bodies were closest at the last forces: "; in contact NAME they are closest at (x, y, z) mm". Empty where
-  /// nothing came near.
+  /// Where bodies were closest at the last forces: "; in contact NAME they are closest at (x, y, z) mm, where BODY
+  /// meets OTHER". Empty where nothing came near.
   [[nodiscard]] std::string closest_place() const;
 
   /// What acts in a configuration, per contact of the model; gaps as intervals.
@@ -115,9 +117,12 @@ public:
     double area = 0;      ///< mm^2
   };
 
-  /// What is kept between steps, so that a run that goes on repeats the uninterrupted one.
+  /// What is kept between steps, so that a run that goes on repeats the uninterrupted one: of the last accepted state
+  /// how stiff the barrier is, who may meet, how finely what is near is sampled, and with friction how far each sample
+  /// has slipped. Cost: two numbers per face, with friction five per sample.
   [[nodiscard]] std::vector<double> memory() const;
-  /// @param memory  of the same model; configuration, time  of the last accepted state
+  /// Puts the contact back to an accepted state.
+  /// @param memory  of the same model; configuration, time  of that state
   void recall(const std::vector<double>& memory, const Configuration& configuration, double time);
 
 private:
@@ -138,8 +143,9 @@ private:
     std::size_t other = SIZE_MAX;
     PatchWeights other_weights;
   };
-  /// The samples of one face towards one other party of a contact; or one point of a rigid mesh, whose corners and
-  /// edges may lie between the samples of what it meets.
+  /// One face towards one other party of a contact; or one point of a rigid mesh, whose corners and edges may lie
+  /// between the samples of what it meets. There is one for each face in each contact, so that it holds samples only
+  /// while something is near.
   struct Group {
     std::size_t face = 0;
     std::optional<Vec3> point;  ///< of the rigid mesh, as it is given
@@ -151,8 +157,9 @@ private:
     double resolution = 0;  ///< mm, over which pressure builds up
     double elastic_slip = 0;
     int level = 0;
-    double sag = 0;  ///< mm: what the surfaces bend between samples
-    std::vector<Sample> samples;
+    double sag = 0;               ///< mm: what the surfaces bend between samples
+    bool close = false;           ///< something was near at the last forces
+    std::vector<Sample> samples;  ///< none before something comes near
   };
   struct Touch {
     double gap = infinity;
@@ -177,7 +184,14 @@ private:
   [[nodiscard]] bool is_close(const Group& group, const std::vector<std::size_t>& near, const FaceMaps& maps) const;
   /// Errors: InputError: bodies overlap in the reference.
   void require_apart(const Model& model);
+  /// Errors: InputError: a body that touches itself passes through itself at points that its parts share.
+  void require_no_own_crossing(const Model& model) const;
+  /// Makes the samples of a group.
   void sample(Group& group, int level) const;
+  /// Makes samples where there are none.
+  void wake(Group& group) const;
+  /// Takes the samples of a group away that nothing is near, nor was in the last accepted state.
+  static void let_sleep(Group& group);
   [[nodiscard]] Sample sample_at(const Group& group, const PatchMap& map, int i, int j) const;
   void keep_slip(const Configuration& configuration);
   /// Levels and sags for a configuration.
@@ -189,12 +203,14 @@ private:
   [[nodiscard]] bool is_carried(const SurfaceFace& face, std::size_t body) const;
   /// For every group towards a body that deforms: the faces that come within its reach and `more` (mm).
   [[nodiscard]] std::vector<std::vector<std::size_t>> near_faces(const FaceMaps& maps, double more) const;
-  [[nodiscard]] bool is_near(const Group& group, const PatchMap& map) const;
+  [[nodiscard]] bool is_near(const Group& group, const FaceMaps& maps) const;
   [[nodiscard]] Touch touch(const Group& group, const Vec3& x, const std::vector<std::size_t>& near,
                             const FaceMaps& maps) const;
-  /// Of every sample whose face is near something; in parallel.
-  [[nodiscard]] std::vector<std::vector<Touch>> all_touches(const FaceMaps& maps,
-                                                            const std::vector<std::vector<std::size_t>>& near) const;
+  /// The samples of a group that press, by their number.
+  using Touches = std::vector<std::pair<std::size_t, Touch>>;
+  /// Of every group; wakes those that something is near. In parallel.
+  [[nodiscard]] std::vector<Touches> all_touches(const FaceMaps& maps,
+                                                 const std::vector<std::vector<std::size_t>>& near);
   /// What a sample does: traction on its surface (MPa), and the derivative of minus the traction by its place.
   struct Press {
     double law = 0, slope = 0;
@@ -230,6 +246,7 @@ private:
   Surfaces surfaces_;
   const std::vector<Vec3> reference_;
   const std::vector<Contact> contacts_;
+  std::vector<std::string> meetings_;      ///< per contact: "BODY meets OTHER"
   std::map<Index, std::size_t> carrier_;   ///< body, of carried nodes
   std::vector<RigidShape> shapes_;         ///< now
   std::vector<RigidShape> shapes_before_;  ///< in the last accepted state
@@ -250,6 +267,7 @@ private:
   Closest closest_;                       ///< at the last forces
   std::vector<double> largest_pressure_;  ///< MPa, per contact, of the last forces
   std::vector<std::array<Index, 2>> pairs_;
+  bool pairs_are_new_ = false;  ///< nobody has been told yet
   const Configuration rest_;
   std::shared_ptr<const FaceMaps> accepted_;    ///< of the last accepted state
   std::shared_ptr<const FaceMaps> at_tangent_;  ///< where the last tangent was made

@@ -243,15 +243,20 @@ std::vector<Vec3> RigidShape::corners_and_edges(double spacing) const {
   return points;
 }
 
-std::vector<double> table_times(const RigidBody& body) {
-  std::vector<double> times;
-  const auto add = [&](const auto&... tables) {
+std::vector<Table<Vec3>> tables_of(const RigidBody& body) {
+  std::vector<Table<Vec3>> tables;
+  const auto add = [&](const auto&... of_shape) {
     const auto from = [&](const auto& table) {
-      for (const auto& point : table.points) {
-        times.push_back(point.first);
+      Table<Vec3>& added = tables.emplace_back();
+      for (const auto& [time, value] : table.points) {
+        if constexpr (std::is_same_v<std::decay_t<decltype(value)>, double>) {
+          added.points.emplace_back(time, Vec3(value, 0, 0));
+        } else {
+          added.points.emplace_back(time, value);
+        }
       }
     };
-    (from(tables), ...);
+    (from(of_shape), ...);
   };
   std::visit(
       Overloaded{[&](const RigidSphere& s) { add(s.centre, s.radius); }, [&](const RigidPlane& s) { add(s.point); },
@@ -268,7 +273,7 @@ std::vector<double> table_times(const RigidBody& body) {
   if (body.motion) {
     add(*body.motion);
   }
-  return times;
+  return tables;
 }
 
 double RigidShape::largest_curvature() const {

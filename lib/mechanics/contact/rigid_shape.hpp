@@ -79,7 +79,7 @@ private:
   double angle_ = 0, factor_ = 1;
 };
 
-/// When a body's motion may change its direction or speed: the times of its tables.
-std::vector<double> table_times(const RigidBody& body);
+/// All that a body's tables say over time, mm or 1; of numbers the first component.
+std::vector<Table<Vec3>> tables_of(const RigidBody& body);
 
 }  // namespace tunica

@@ -4,6 +4,7 @@
 #include "tunica/shell/patch/shell_mesh.hpp"
 #include "tunica/surface/mesh/tet_mesh.hpp"
 
+#include <array>
 #include <optional>
 #include <string>
 #include <utility>
@@ -49,7 +50,8 @@ struct ShellBody {
   Membrane membrane = Membrane::adapt;
   Bending bending = Bending::dkt_comas;
   Rest rest = Rest::curved;
-  std::string said_at{};  ///< where the user said it, for messages; may be empty, here and below
+  std::optional<std::array<double, 2>> voxel{};  ///< mm, shortest and longest edge, of the image behind it
+  std::string said_at{};                         ///< where the user said it, for messages; may be empty, here and below
 };
 
 enum class SolidLaw {

@@ -136,6 +136,17 @@ void check_triangles(const ShellBody& body) {
   }
 }
 
+/// Half a wall stands on either side of its middle.
+void check_inner_face(const ShellBody& body) {
+  constexpr double most_of_it = 0.5;
+  if (const double share = share_without_inner_face(body); share > most_of_it) {
+    refuse(body,
+           fmt::format("its thickness, {:.6g} mm, is more than twice the radius of curvature over {:.0f} % of its "
+                       "area, so that no inner face is left: is its unit right?",
+                       *std::max_element(body.thickness.begin(), body.thickness.end()), 100 * share));
+  }
+}
+
 void check_selections(const Model& model) {
   const auto check = [&](std::size_t body, const std::vector<Index>& nodes, const char* what) {
     if (body >= model.body_count()) {
@@ -178,6 +189,29 @@ void check_selections(const Model& model) {
   }
   for (const Probe& probe : model.probes) {
     check(probe.body, {probe.node}, "probe");
+  }
+}
+
+double size_of(const PressureLoad& load) { return std::abs(load.value); }
+double size_of(const ForceLoad& load) { return load.total.cwiseAbs().maxCoeff(); }
+double size_of(const MomentLoad& load) { return load.total.cwiseAbs().maxCoeff(); }
+double size_of(const EdgeLoad& load) { return load.per_length.cwiseAbs().maxCoeff(); }
+double size_of(const AreaLoad& load) { return load.per_area.cwiseAbs().maxCoeff(); }
+double size_of(const GravityLoad& load) { return load.acceleration.cwiseAbs().maxCoeff(); }
+
+/// Norms take squares of loads, which have to be numbers.
+void check_sizes(const Model& model, const RunSettings& settings) {
+  const auto* run = std::get_if<StaticRun>(&settings.kind);
+  for (const Load& load : model.loads) {
+    double factor = load.ramp.points.empty() && run != nullptr ? run->load_factors.back() : 1;
+    for (const auto& point : load.ramp.points) {
+      factor = std::max(factor, std::abs(point.second));
+    }
+    const double most = factor * std::visit([](const auto& kind) { return size_of(kind); }, load.kind);
+    if (!std::isfinite(most * most)) {
+      throw InputError(fmt::format("{}this load on {}, with its ramp, is larger than any force: is its unit right?",
+                                   load.said_at.empty() ? "" : load.said_at + ": ", model.name_of(load.body)));
+    }
   }
 }
 
@@ -355,10 +389,12 @@ ShellSystem make_checked_system(const Model& model, const RunSettings& settings)
   for (const ShellBody& body : model.shells) {
     check_body(body);
     check_triangles(body);
+    check_inner_face(body);
   }
   check_solids(model, settings);
   check_selections(model);
   check_run(model, settings);
+  check_sizes(model, settings);
   ShellSystem system = make_system(model);
   if (std::holds_alternative<FrequencyRun>(settings.kind) || std::holds_alternative<BucklingRun>(settings.kind)) {
     stiffen_short_waves(system);

@@ -16,12 +16,19 @@ bool is_loaded(const Model& model);
 
 /// What of a model can be solved but hardly be meant, a sentence each that begins with where it was said: walls thicker
 /// than a quarter of a vessel's radius or an eighth of a ball's over most of a body, or than a twentieth of its
-/// diagonal; shells that are coarse for a curved wall so thin, long or narrow, or with normals that do not fit the
-/// nodes; bodies that cannot move; forces and moments that only held nodes bear; loads that are zero or stay so during
-/// the run, or jump within a step; nothing that loads at all (static and dynamic runs). The model must have passed
-/// check_model(). Cost: linear.
+/// diagonal; stiffness and density that no material has; pressure on a cavity inside the body; images whose voxels are
+/// large for the wall; shells that are coarse for a curved wall so thin; bodies that cannot move; forces and moments
+/// that only held nodes bear; loads that are zero or stay so during the run, or jump within a step; nothing that loads
+/// at all (static and dynamic runs). The model must have passed check_model(). Cost: linear.
 /// @param are_shells_chosen  for an accuracy: its estimate says more of them than their shape
 std::vector<Warning> doubts(const Model& model, const RunSettings& settings, bool are_shells_chosen = false);
+
+/// A pressure or a stiffness (MPa) with the unit that suits it, Pa to TPa: "16 kPa".
+std::string pressure_text(double mpa);
+
+/// The part of a body's area on which the wall is thicker than twice the radius of curvature, so that no inner face is
+/// left.
+double share_without_inner_face(const ShellBody& body);
 
 struct Curvature {
   double largest = 0;  ///< 1/mm, of the principal ones

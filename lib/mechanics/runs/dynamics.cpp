@@ -4,6 +4,7 @@
 #include "tunica/mechanics/runs/detail/settle.hpp"
 #include "tunica/mechanics/runs/detail/stepped_run.hpp"
 #include "tunica/mechanics/runs/detail/supports.hpp"
+#include "tunica/mechanics/runs/detail/table_turns.hpp"
 #include "tunica/mechanics/runs/detail/time_scheme.hpp"
 
 #include <fmt/format.h>
@@ -11,18 +12,19 @@
 #include <Eigen/Dense>
 
 #include <cmath>
+#include <limits>
 
 namespace tunica {
 namespace {
 
 /// Smallest part of a step's change that is tried on its own.
 constexpr double smallest_part = 1.0 / 256;
-/// Smallest part of a step's time that error control may ask for.
+/// Smallest part of a step's time that error control or a turn of a table may ask for.
 constexpr double shortest_part = 1.0 / 4096;
 
 /// Whether a step's result may stand.
 bool is_solved(const RunSettings& settings, const NewtonResult& result) {
-  if (!result.valid) {
+  if (!result.valid || !result.apart) {
     return false;
   }
   if (settings.cg_fixed_count) {
@@ -101,6 +103,101 @@ void find_change(const Configuration& start, const Configuration& end, VectorX& 
 
 bool acceptable(const NewtonResult& result) { return result.converged && result.valid && result.stable; }
 
+using Memory = std::map<std::string, std::vector<double>, std::less<>>;
+
+/// Damping by beta K: forces beta K times the rate of deformation, in each element's own frame. The rate at the end of
+/// a step is viscosity (deformation - zero): the backward difference, or that of second order through the step before.
+class StiffnessDamping {
+public:
+  StiffnessDamping(const ShellSystem& system, double beta, bool second_order)
+      : system_(system), beta_(beta), second_order_(second_order) {}
+
+  /// @param start deformation at the start of the step; @param length s, of the step.
+  void begin(const std::vector<ElementState>& start, double length) {
+    if (beta_ == 0) {
+      return;
+    }
+    if (!second_order_ || before_.empty()) {
+      zero_ = start;
+      viscosity_ = beta_ / length;
+      return;
+    }
+    const double r = length / length_before_;
+    const double leading = (1 + 2 * r) / (1 + r);
+    zero_.resize(start.size());
+    for (std::size_t e = 0; e < start.size(); ++e) {
+      zero_[e] = ((1 + r) * start[e] - r * r / (1 + r) * before_[e]) / leading;
+    }
+    viscosity_ = beta_ * leading / length;
+  }
+
+  [[nodiscard]] ViscousState state() const { return {viscosity_, viscosity_ > 0 ? &zero_ : nullptr}; }
+
+  /// @return the work of these forces over the step, mJ: by the mean of those at both of its ends.
+  double accept(const std::vector<ElementState>& start, const std::vector<ElementState>& end, double length) {
+    if (beta_ == 0) {
+      return 0;
+    }
+    double work = 0;
+    rate_.resize(system_.elements.size(), ElementState::Zero());
+    for (std::size_t e = 0; e < system_.elements.size(); ++e) {
+      const ShellElement& element = system_.elements[e];
+      const ElementState rate = viscosity_ * (end[e] - zero_[e]);
+      const ElementState mean = 0.5 * (rate_[e] + rate);
+      const ElementState change = end[e] - start[e];
+      // The energy is a quadratic form: of what belongs to it, the product of both.
+      work += strain_energy(element, mean + change) - strain_energy(element, mean) - strain_energy(element, change);
+      rate_[e] = rate;
+    }
+    if (second_order_) {
+      before_ = start;
+      length_before_ = length;
+    }
+    return work;
+  }
+
+  void remember(Memory& memory) const {
+    memory["viscous_rate"] = numbers_of(rate_);
+    memory["deformation_before"] = numbers_of(before_);
+    memory["length_before"] = {length_before_};
+  }
+
+  void recall(const Memory& memory) {
+    rate_ = of_elements(memory.at("viscous_rate"));
+    before_ = of_elements(memory.at("deformation_before"));
+    length_before_ = memory.at("length_before").at(0);
+  }
+
+private:
+  static std::vector<double> numbers_of(const std::vector<ElementState>& of_elements) {
+    std::vector<double> numbers;
+    for (const ElementState& d : of_elements) {
+      numbers.insert(numbers.end(), d.begin(), d.end());
+    }
+    return numbers;
+  }
+
+  /// Of the elements, or of none.
+  [[nodiscard]] std::vector<ElementState> of_elements(const std::vector<double>& numbers) const {
+    constexpr std::size_t size = ElementState::SizeAtCompileTime;
+    TUNICA_ASSERT(numbers.empty() || numbers.size() == size * system_.elements.size());
+    std::vector<ElementState> result(numbers.size() / size);
+    for (std::size_t e = 0; e < result.size(); ++e) {
+      result[e] = Eigen::Map<const ElementState>(numbers.data() + size * e);
+    }
+    return result;
+  }
+
+  const ShellSystem& system_;
+  double beta_;  ///< s
+  bool second_order_;
+  double viscosity_ = 0;              ///< beta / s: of the rate by the deformation
+  std::vector<ElementState> zero_;    ///< the deformation at which these forces vanish
+  std::vector<ElementState> before_;  ///< at the start of the step before
+  std::vector<ElementState> rate_;    ///< beta times the rate of deformation, at the start of the step
+  double length_before_ = 0;          ///< s
+};
+
 /// M a1 + alpha M v1 + f_int(x1) = f_ext(x1, t1), with velocity and acceleration at the end of a step as the scheme
 /// says. Masses are lumped; rotary inertia is rho t^3 / 12 per area about every axis (that of a plate about the axes in
 /// its plane), so it needs no gyroscopic term. Damping is alpha M and, in each element's own frame, beta K times the
@@ -113,8 +210,10 @@ public:
         settings_(settings),
         run_(run),
         scheme_(run),
+        damping_(system, run.damping.stiffness, scheme_.second_order()),
         matrix_(system.pattern),
         mass_(lumped_masses(system)),
+        longest_side_(longest_side(system)),
         part_(run.step) {
     solver_.emplace(system, settings);
     if (run.adaptive) {
@@ -140,6 +239,7 @@ public:
   void start(Motion& motion) {
     evaluate(system_, model_, motion.configuration, load_factors(model_, false, 0), {}, forces_, nullptr);
     keep_acting(motion);
+    braking_ = VectorX::Zero(mass_.size());
     if (!scheme_.second_order()) {
       return;
     }
@@ -153,8 +253,10 @@ public:
   /// One step, with error control in as many parts as it takes.
   StepResult advance(double time, double length, Motion& motion) {
     if (tolerance_ == 0) {
-      const StepResult result = step(time, length, true, motion);
-      accept(length, motion);
+      StepResult result = step(time, length, true, motion);
+      if (is_solved(settings_, result.newton)) {
+        accept(length, motion);
+      }
       return result;
     }
     StepResult total;
@@ -162,6 +264,7 @@ public:
     std::size_t iterations = 0;
     std::size_t cg_iterations = 0;
     for (double done = 0; done < length * (1 - 1e-12);) {
+      const std::vector<double> contact = remembered_contact();
       const double left = length - done;
       // No tiny rest: what is between one and two parts is halved.
       const double h = part_ >= left * (1 - 1e-9) ? left : part_ > left / 2 ? left / 2 : part_;
@@ -187,6 +290,7 @@ public:
         total.newton = result.newton;
         break;
       } else {
+        recall_contact(contact, motion, time + done);
         part_ = std::max(solved && std::isfinite(wanted) ? std::min(wanted, h / 2) : h / 4, length * shortest_part);
         continue;
       }
@@ -198,25 +302,19 @@ public:
   }
 
   /// What a run must keep between its steps to go on as if nothing had happened, beyond the configuration.
-  [[nodiscard]] std::map<std::string, std::vector<double>, std::less<>> memory(const Motion& motion) const {
+  [[nodiscard]] Memory memory(const Motion& motion) const {
     const auto values = [](const VectorX& v) { return std::vector<double>(v.begin(), v.end()); };
-    std::map<std::string, std::vector<double>, std::less<>> result{{"velocity", values(motion.rates.velocity)},
-                                                                   {"acceleration", values(motion.rates.acceleration)},
-                                                                   {"auxiliary", values(motion.rates.auxiliary)},
-                                                                   {"acting", values(acting_)},
-                                                                   {"part", {part_}},
-                                                                   {"at_rest", {at_rest_ ? 1.0 : 0.0}}};
-    if (!before_.empty()) {
-      std::vector<double>& before = result["deformation_before"];
-      for (const ElementState& d : before_) {
-        before.insert(before.end(), d.begin(), d.end());
-      }
-      result["length_before"] = {length_before_};
-    }
+    Memory result{{"velocity", values(motion.rates.velocity)},
+                  {"acceleration", values(motion.rates.acceleration)},
+                  {"auxiliary", values(motion.rates.auxiliary)},
+                  {"acting", values(acting_)},
+                  {"part", {part_}},
+                  {"at_rest", {at_rest_ ? 1.0 : 0.0}}};
+    damping_.remember(result);
     return result;
   }
 
-  void recall(const std::map<std::string, std::vector<double>, std::less<>>& memory, Motion& motion) {
+  void recall(const Memory& memory, Motion& motion) {
     for (auto [name, vector] :
          {std::pair{"velocity", &motion.rates.velocity}, std::pair{"acceleration", &motion.rates.acceleration},
           std::pair{"auxiliary", &motion.rates.auxiliary}, std::pair{"acting", &acting_}}) {
@@ -226,18 +324,11 @@ public:
       std::copy(values.begin(), values.end(), vector->begin());
     }
     deformation_.clear();
-    before_.clear();
     work_ = damped_ = 0;
     part_ = memory.at("part").at(0);
     at_rest_ = memory.at("at_rest").at(0) != 0;
-    if (const auto found = memory.find("deformation_before"); found != memory.end()) {
-      TUNICA_ASSERT(found->second.size() == ElementState::SizeAtCompileTime * system_.elements.size());
-      before_.resize(system_.elements.size());
-      for (std::size_t e = 0; e < before_.size(); ++e) {
-        before_[e] = Eigen::Map<const ElementState>(found->second.data() + ElementState::SizeAtCompileTime * e);
-      }
-      length_before_ = memory.at("length_before").at(0);
-    }
+    damping_.recall(memory);
+    braking_ = run_.damping.mass * mass_.cwiseProduct(motion.rates.velocity);
   }
 
   [[nodiscard]] double kinetic_energy(const VectorX& velocity) const {
@@ -261,8 +352,6 @@ public:
     }
   }
 
-  /// Displacements and rotations of the last step.
-  [[nodiscard]] const VectorX& change() const { return change_; }
   [[nodiscard]] std::size_t freedom_count() const { return solver_->freedom_count(); }
   void tell_direct_error(bool tell) { solver_->tell_direct_error(tell); }
   [[nodiscard]] double tolerance() const { return tolerance_; }
@@ -278,7 +367,6 @@ private:
     VectorX left_at_start;  ///< unbalanced forces of the start, for a path that begins there
     VectorX change;
     Rates rates;
-    double viscosity = 0;  ///< beta / s: of the deformation's rate by the deformation
   };
 
   /// One step or part of one. Where Newton's method does not lead from the state before to the end at once, and it
@@ -298,7 +386,7 @@ private:
       evaluate(system_, model_, s.start, s.factors_before, {}, forces_, nullptr);
       deformation_ = forces_.deformation;
     }
-    s.viscosity = find_viscosity(length);
+    damping_.begin(deformation_, length);
     s.held = VectorX::Zero(motion.rates.velocity.size());
     for (const PrescribedFreedom& p : system_.prescribed) {
       const Ramp& ramp = model_.fixes[p.fix].ramp;
@@ -319,40 +407,17 @@ private:
     return result;
   }
 
-  /// Beta times the derivative of the rate of deformation, and `viscous_zero_`, from which on it resists: the backward
-  /// difference, or that of second order through the step before.
-  double find_viscosity(double length) {
-    if (run_.damping.stiffness == 0) {
-      return 0;
-    }
-    if (!scheme_.second_order() || before_.empty()) {
-      viscous_zero_ = deformation_;
-      return run_.damping.stiffness / length;
-    }
-    const double r = length / length_before_;
-    const double leading = (1 + 2 * r) / (1 + r);
-    viscous_zero_.resize(deformation_.size());
-    for (std::size_t e = 0; e < deformation_.size(); ++e) {
-      viscous_zero_[e] = ((1 + r) * deformation_[e] - r * r / (1 + r) * before_[e]) / leading;
-    }
-    return run_.damping.stiffness * leading / length;
-  }
-
-  /// The step is done: its end is where the next one starts.
+  /// The step is done: its end is where the next one starts. What acts does work by the mean of both ends, forces of
+  /// damping as all others: else one of them gains what another loses.
   void accept(double length, const Motion& motion) {
     const VectorX acted = std::move(acting_);
     keep_acting(motion);
     accept_contact(system_, motion.configuration);
     work_ += 0.5 * (acted + acting_).dot(change_);
-    damped_ += run_.damping.mass * length * 2 * kinetic_energy(change_ / length);
-    for (std::size_t e = 0; run_.damping.stiffness > 0 && e < system_.elements.size(); ++e) {
-      damped_ += run_.damping.stiffness / length * 2 *
-                 strain_energy(system_.elements[e], forces_.deformation[e] - deformation_[e]);
-    }
-    if (run_.damping.stiffness > 0 && scheme_.second_order()) {
-      before_.swap(deformation_);
-      length_before_ = length;
-    }
+    const VectorX braked = std::move(braking_);
+    braking_ = run_.damping.mass * mass_.cwiseProduct(motion.rates.velocity);
+    damped_ += 0.5 * (braked + braking_).dot(change_);
+    damped_ += damping_.accept(deformation_, forces_.deformation, length);
     deformation_ = forces_.deformation;
   }
 
@@ -371,12 +436,11 @@ private:
   /// Balance of the step with a part of its change; 1: the equation of the step itself.
   Balance balance(Step& s, double part, const Configuration& c, BlockMatrix* tangent,
                   const std::vector<ElementState>& predicted) {
-    const ViscousState viscous{s.viscosity, s.viscosity > 0 ? &viscous_zero_ : nullptr};
     std::vector<double> factors = s.factors;
     for (std::size_t l = 0; part < 1 && l < factors.size(); ++l) {
       factors[l] = s.factors_before[l] + part * (s.factors[l] - s.factors_before[l]);
     }
-    evaluate(system_, model_, c, factors, viscous, forces_, tangent, predicted);
+    evaluate(system_, model_, c, factors, damping_.state(), forces_, tangent, predicted);
     find_change(s.start, c, s.change);
     scheme_.end_rates(s.length, system_.held, s.rates_before, s.change, s.rates);
     const VectorX inertia = mass_.cwiseProduct(s.rates.acceleration + run_.damping.mass * s.rates.velocity);
@@ -393,9 +457,18 @@ private:
     mask(system_.held, reactions);
     result.scale =
         std::max({force_norm(system_, forces_.external), force_norm(system_, inertia), force_norm(system_, reactions)});
-    result.floor = round_off(system_, c);
+    result.floor = round_off(system_, c) + round_off_of_inertia(s.length);
     condense(system_, c, result.unbalanced, tangent);
     return result;
+  }
+
+  /// Of a short step: what the digits of places leave of accelerations.
+  [[nodiscard]] double round_off_of_inertia(double length) const {
+    VectorX noise = mass_;
+    for (std::size_t i = 0; i < system_.node_count(); ++i) {
+      noise.segment<3>(first_freedom(i)) *= longest_side_;
+    }
+    return std::numeric_limits<double>::epsilon() * scheme_.acceleration_factor(length) * force_norm(system_, noise);
   }
 
   NewtonResult run(Step& s, double from, double to, Configuration& configuration) {
@@ -408,10 +481,21 @@ private:
     NewtonResult result =
         newton(system_, settings_, *solver_, function, (to - from) * s.held, matrix_, configuration, at_rest_);
     at_rest_ = result.iterations == 0;
-    if (system_.contact && result.converged && !system_.contact->is_certain(configuration)) {
+    if (system_.contact && is_solved(settings_, result) && !system_.contact->is_certain(configuration)) {
       result.converged = result.apart = false;
     }
     return result;
+  }
+
+  [[nodiscard]] std::vector<double> remembered_contact() const {
+    return system_.contact ? system_.contact->memory() : std::vector<double>();
+  }
+
+  /// Attempts that came to nothing may have been followed in parts.
+  void recall_contact(const std::vector<double>& memory, const Motion& motion, double time) {
+    if (system_.contact) {
+      system_.contact->recall(memory, motion.configuration, time);
+    }
   }
 
   void follow(Step& s, StepResult& result, Configuration& configuration) {
@@ -479,21 +563,21 @@ private:
   const RunSettings& settings_;
   const DynamicRun& run_;
   const TimeScheme scheme_;
+  StiffnessDamping damping_;
   std::optional<TangentSolver> solver_;
   BlockMatrix matrix_;
   VectorX mass_;
   Forces forces_;
   std::vector<ElementState> deformation_;  ///< at the start of the step
-  std::vector<ElementState> before_;       ///< at the start of the step before, where damping asks for it
-  VectorX change_;                         ///< displacements and rotations of the last step
+  VectorX change_;                         ///< displacements and rotations of the last part of a step
   VectorX acting_;                         ///< at the start of the step
+  VectorX braking_;                        ///< forces of damping by mass, likewise
   double work_ = 0;                        ///< mJ, since energies were last balanced
   double damped_ = 0;
-  std::vector<ElementState> viscous_zero_;  ///< the deformation at which damping by beta K vanishes
-  double length_before_ = 0;                ///< s
-  double tolerance_ = 0;                    ///< mm, of error control; 0: none
-  double part_ = 0;                         ///< s: length of the next part under error control
-  bool at_rest_ = false;                    ///< the last step changed nothing
+  double longest_side_ = 0;  ///< mm
+  double tolerance_ = 0;     ///< mm, of error control; 0: none
+  double part_ = 0;          ///< s: length of the next part under error control
+  bool at_rest_ = false;     ///< the last step changed nothing
 };
 
 double first_load_factor(const Model& model, double time) {
@@ -508,6 +592,7 @@ public:
       : SteppedRun(system, model, settings, on_state, step_count(run)),
         run_(run),
         stepper_(system, model, settings, run),
+        turns_(model),
         motion_{reference_configuration(system), Rates::zero(first_freedom(system.node_count()))} {}
 
 private:
@@ -544,70 +629,77 @@ private:
     stepper_.tell_direct_error(summary_.steps == 1 || is_last());
     // The last step may be shorter: the run ends at its duration.
     const double end = is_last() ? run_.duration : real(summary_.steps + 1) * run_.step;
-    const Motion before = motion_;
-    const TimeStepper::StepResult step = advance_stiffening(end);
-    const NewtonResult& result = step.newton;
-    if (!step.precise) {
-      throw RequirementError(fmt::format(
-          "the step from {:.6g} s to {:.6g} s adds more than the tolerance of {:.3g} mm to the error however "
-          "short its parts are: allow a larger one (adaptive), or put the load on by a ramp",
-          time_, end, stepper_.tolerance()));
+    const Configuration before = motion_.configuration;
+    NewtonResult result;
+    std::size_t iterations = 0;
+    std::size_t cg_iterations = 0;
+    while (time_ != end) {
+      result = take_part(system_.contact ? turns_.next(time_, end, shortest_part * run_.step) : end);
+      iterations += result.iterations;
+      cg_iterations += result.cg_iterations;
+      tell_slow_step(iterations, fmt::format("{:.6g} s of {:.6g} s", time_, run_.duration),
+                     "it is taken in short parts" + (system_.contact ? system_.contact->closest_place() : ""));
     }
-    if (!is_solved(settings_, result)) {
-      fail(step, before, end);
-    }
-    time_ = end;
     stepper_.balance_energy(summary_.steps + 1, end, motion_, *summary_.energy);
-    look_for_swing();
-    summary_.parts += step.parts;
+    look_for_swing(before);
     State state = wants_state() ? state_now() : State();
     state.residual = result.residual;
-    state.newton_iterations = result.iterations;
-    state.cg_iterations = result.cg_iterations;
+    state.newton_iterations = iterations;
+    state.cg_iterations = cg_iterations;
     set_algebraic_error(result.algebraic_error, state);
     state.converged = settings_.newton_max == 1 ? result.linear_converged : result.converged;
     return state;
   }
 
+  /// A part of a step in which no table turns. Errors: RequirementError.
+  NewtonResult take_part(double end) {
+    const Checkpoint start = checkpoint();
+    const TimeStepper::StepResult part = advance_stiffening(start, end);
+    if (!part.precise) {
+      throw RequirementError(fmt::format(
+          "the step from {:.6g} s to {:.6g} s adds more than the tolerance of {:.3g} mm to the error however "
+          "short its parts are: allow a larger one (adaptive), or put the load on by a ramp",
+          time_, end, stepper_.tolerance()));
+    }
+    if (!is_solved(settings_, part.newton)) {
+      fail(part, start, end);
+    }
+    time_ = end;
+    summary_.parts += part.parts;
+    return part.newton;
+  }
+
   /// How far a step of a second-order scheme bends the motion, where no error control looks: a mode of which it is x
   /// radians turns by 4 sin^2(x / 2) of its amplitude, however small its share in the motion is.
-  void look_for_swing() {
+  void look_for_swing(const Configuration& before) {
     if (run_.integrator == Integrator::backward_euler || run_.adaptive) {
       return;
     }
     VectorX moved;
     find_change(reference_configuration(system_), motion_.configuration, moved);
     summary_.largest_motion = std::max(summary_.largest_motion, increment_size(system_, moved));
-    const VectorX bend = last_change_.size() > 0 ? VectorX(stepper_.change() - last_change_) : stepper_.change();
+    find_change(before, motion_.configuration, moved);
+    const VectorX bend = last_change_.size() > 0 ? VectorX(moved - last_change_) : moved;
     summary_.largest_bend = std::max(summary_.largest_bend, increment_size(system_, bend));
-    last_change_ = stepper_.change();
+    last_change_ = std::move(moved);
   }
 
-  /// A step that fails is taken again with its short waves made stiff, where the mesh is coarse for the thickness.
-  TimeStepper::StepResult advance_stiffening(double end) {
-    if (summary_.stiffened_from || !soft_waves_) {
-      return stepper_.advance(time_, end - time_, motion_);
-    }
-    const Motion before = motion_;
-    const auto memory = stepper_.memory(motion_);
-    const TimeStepper::StepResult step = stepper_.advance(time_, end - time_, motion_);
-    if (step.precise && is_solved(settings_, step.newton)) {
-      return step;
+  /// A part that fails is taken again with its short waves made stiff, where the mesh is coarse for the thickness.
+  TimeStepper::StepResult advance_stiffening(const Checkpoint& start, double end) {
+    const TimeStepper::StepResult part = stepper_.advance(time_, end - time_, motion_);
+    if (summary_.stiffened_from || !soft_waves_ || (part.precise && is_solved(settings_, part.newton))) {
+      return part;
     }
     stiffen_short_waves(system_);
     summary_.stiffened_from = time_;
-    motion_ = before;
-    stepper_.recall(memory, motion_);
+    resume(start);
     return stepper_.advance(time_, end - time_, motion_);
   }
 
-  [[noreturn]] void fail(const TimeStepper::StepResult& step, const Motion& before, double end) {
+  [[noreturn]] void fail(const TimeStepper::StepResult& step, const Checkpoint& start, double end) {
     const std::string place = system_.contact ? system_.contact->closest_place() : "";
-    if (system_.contact) {
-      system_.contact->go_back();
-    }
-    if (summary_.steps > shown_) {  // the last good state, also where it is none of every `every` steps
-      motion_ = before;
+    if (time_ != real(shown_) * run_.step) {  // the last good state, also within a step or between those asked for
+      resume(start);
       hand_over(state_now());
     }
     const NewtonResult& result = step.newton;
@@ -626,10 +718,10 @@ private:
     if (step.reached < 1 && carried != wanted) {
       throw RequirementError(fmt::format(
           "no equilibrium in the step from {:.6g} s to {:.6g} s: the limit load is reached at "
-          "{:.3g} of its change of load ({}); beyond it {}{}; the last good state is at {:.6g} s",
+          "{:.3g} of its change of load ({}); beyond it {}{}; the last good state is at {:.6g} s{}",
           time_, end, step.reached, describe_loads(model_, carried, wanted),
           step.ran_away ? "the shell yields without bound" : "no state was found that the shell could rest in", place,
-          time_));
+          time_, doubt_of_stiffness(model_, carried)));
     }
     throw RequirementError(
         fmt::format("the step from {:.6g} s to {:.6g} s {} (relative residual {:.3g} after {} "
@@ -657,6 +749,7 @@ private:
 
   const DynamicRun& run_;
   TimeStepper stepper_;
+  const TableTurns turns_;
   Motion motion_;
   VectorX last_change_;  ///< of the step before, where look_for_swing() looks
   const bool soft_waves_ = has_soft_waves(system_);

@@ -148,7 +148,9 @@ void begin_contact(ShellSystem& system, const RunSettings& settings, double from
   system.contact->set_step(from, to, configuration);
   if (system.contact->find_pairs(configuration)) {
     make_pattern(system, system.contact->pairs());
+    const bool tells = solver->tells_direct_error();
     solver.emplace(system, settings);
+    solver->tell_direct_error(tells);
     matrix = system.pattern;
   }
 }

@@ -10,7 +10,11 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Dense>
+
 #include <algorithm>
+#include <cmath>
+#include <functional>
 
 namespace tunica {
 
@@ -55,16 +59,19 @@ std::string describe_loads(const Model& model, const std::vector<double>& reache
   std::string text;
   for (std::size_t l = 0; l < model.loads.size(); ++l) {
     if (const auto* pressure = std::get_if<PressureLoad>(&model.loads[l].kind)) {
+      // kPa are what organs bear; what is out of all bounds is told as it is kept, for it may be the last number.
+      constexpr double most_in_kpa = 1e6;
+      const double part = reached[l] * pressure->value;
+      const double whole = wanted[l] * pressure->value;
+      const bool in_kpa = std::max(std::abs(part), std::abs(whole)) < most_in_kpa;
+      text += fmt::format("{}{:.4g} {} of {:.4g} {} on {}", text.empty() ? "" : "; ", (in_kpa ? 1e3 : 1) * part,
+                          in_kpa ? "kPa" : "MPa", (in_kpa ? 1e3 : 1) * whole, in_kpa ? "kPa" : "MPa",
+                          model.name_of(model.loads[l].body));
       if (model.is_solid(model.loads[l].body)) {
-        text += fmt::format("{}{:.4g} kPa of {:.4g} kPa on {}", text.empty() ? "" : "; ",
-                            1e3 * reached[l] * pressure->value, 1e3 * wanted[l] * pressure->value,
-                            model.name_of(model.loads[l].body));
         continue;
       }
       const ShellBody& body = model.shells[model.loads[l].body];
-      text += fmt::format("{}{:.4g} kPa of {:.4g} kPa on {}, {:.4g} mm thick{}", text.empty() ? "" : "; ",
-                          1e3 * reached[l] * pressure->value, 1e3 * wanted[l] * pressure->value, body.name,
-                          *std::min_element(body.thickness.begin(), body.thickness.end()),
+      text += fmt::format(", {:.4g} mm thick{}", *std::min_element(body.thickness.begin(), body.thickness.end()),
                           body.thickness.size() > 1 ? " at its thinnest" : "");
     }
   }
@@ -73,6 +80,27 @@ std::string describe_loads(const Model& model, const std::vector<double>& reache
     return of_nodes ? "of the prescribed displacements" : "of the rigid bodies' motion";
   }
   return text.empty() ? fmt::format("{:.4g} of {:.4g} times the loads", reached.front(), wanted.front()) : text;
+}
+
+std::string doubt_of_stiffness(const Model& model, const std::vector<double>& reached) {
+  constexpr double far_below = 0.05;
+  for (std::size_t l = 0; l < model.loads.size(); ++l) {
+    const Load& load = model.loads[l];
+    double most = load.ramp.points.empty() ? 1 : 0;
+    for (const auto& [time, factor] : load.ramp.points) {
+      most = std::max(most, std::abs(factor));
+    }
+    if (!std::holds_alternative<PressureLoad>(load.kind) || std::abs(reached[l]) >= far_below * most) {
+      continue;
+    }
+    const double young = model.is_solid(load.body) ? model.solids[load.body - model.shells.size()].material.young
+                                                   : model.shells[load.body].material.young;
+    return fmt::format(
+        "; the pressure that {} bears grows with its Young's modulus, {}: is the unit of one of them "
+        "wrong?",
+        model.name_of(load.body), pressure_text(young));
+  }
+  return {};
 }
 
 void set_algebraic_error(const std::optional<AlgebraicError>& error, State& state) {
@@ -126,9 +154,47 @@ Summary solve(const Model& model, const RunSettings& settings, const std::functi
 
 namespace {
 
+constexpr double rare = 0.01;  // of the area, on which a 99th percentile is passed
+
+std::vector<double> lengths(const std::vector<Vec3>& vectors) {
+  std::vector<double> result;
+  for (const Vec3& v : vectors) {
+    result.push_back(v.norm());
+  }
+  return result;
+}
+
+/// By which angle the shells' nodes or the tetrahedra of a linear state turn at least where they turn most.
+double turn_of(const Model& model, const ShellSystem& system, const State& state) {
+  double turn = system.elements.empty() ? 0 : area_quantile(model, lengths(state.rotation), rare);
+  std::vector<std::pair<double, double>> turns;  // with the volumes
+  double left = 0;
+  for (const SolidElement& element : system.solids) {
+    Mat3 displacement;
+    for (int k = 0; k < 3; ++k) {
+      displacement.col(k) = state.displacement[element.nodes[k + 1]] - state.displacement[element.nodes[0]];
+    }
+    Mat3 edges;
+    for (int k = 0; k < 3; ++k) {
+      edges.col(k) = system.reference[element.nodes[k + 1]] - system.reference[element.nodes[0]];
+    }
+    const Mat3 gradient = displacement * edges.inverse();
+    const double volume = std::abs(edges.determinant()) / 6;
+    turns.emplace_back((gradient - gradient.transpose()).norm() / std::sqrt(8.0), volume);
+    left += rare * volume;
+  }
+  std::ranges::sort(turns, std::greater());
+  for (const auto& [of_element, volume] : turns) {
+    left -= volume;
+    if (left <= 0) {
+      return std::max(turn, of_element);
+    }
+  }
+  return turn;
+}
+
 /// From the fields of the elements what of them is large.
 void find_wall(const Model& model, ElementFields& fields) {
-  constexpr double above = 0.01;
   constexpr double equal_stress = 1e-6;
   const auto larger = [&](std::vector<double> top, const std::vector<double>& bottom) {
     top = averaged_at_nodes(model, top);
@@ -151,7 +217,7 @@ void find_wall(const Model& model, ElementFields& fields) {
   const auto highest = std::ranges::find_if(
       fields.von_mises, [&](double stress) { return stress >= (1 - equal_stress) * wall.stress_max; });
   auto node = narrow<std::size_t>(highest - fields.von_mises.begin());
-  wall.stress_p99 = area_quantile(model, fields.von_mises, above);
+  wall.stress_p99 = area_quantile(model, fields.von_mises, rare);
   for (const ShellBody& body : model.shells) {
     if (node < body.mesh.vertices.size()) {
       wall.stress_max_at = body.mesh.vertices[node];
@@ -161,7 +227,7 @@ void find_wall(const Model& model, ElementFields& fields) {
   }
   const std::vector<double> strain = larger(first(fields.principal_strain_top), first(fields.principal_strain_bottom));
   wall.strain_max = *std::max_element(strain.begin(), strain.end());
-  wall.strain_p99 = area_quantile(model, strain, above);
+  wall.strain_p99 = area_quantile(model, strain, rare);
 }
 
 }  // namespace
@@ -243,6 +309,10 @@ ElementFields ElementFieldEvaluator::operator()(const State& state) const {
   }
   if (!system.elements.empty()) {
     find_wall(model, fields);
+    fields.displacement_p99 = area_quantile(model, lengths(state.displacement), rare);
+  }
+  if (state.linear) {
+    fields.turn_p99 = turn_of(model, system, state);
   }
   fields.largest_displacement = largest_displacement(model, state);
   return fields;

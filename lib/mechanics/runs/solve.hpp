@@ -65,7 +65,10 @@ struct ElementFields {
   std::vector<double> pressure;   ///< MPa, of this state
   std::vector<double> von_mises;  ///< MPa, #nodes: the larger of both faces' averages at the nodes
   Wall wall;
-  double largest_displacement = 0;      ///< mm, of the curved surfaces, also between the nodes
+  double largest_displacement = 0;  ///< mm, of the curved surfaces, also between the nodes
+  double displacement_p99 = 0;      ///< mm, passed on 1 % of the area of the shells
+  /// rad, by which 1 % of the shells' area or of the solids' volume turns at least; of a linear state, else 0.
+  double turn_p99 = 0;
   std::vector<double> solid_von_mises;  ///< MPa, #tetrahedra of all solids in order; of the true (Cauchy) stress
   std::vector<double> solid_pressure;   ///< MPa, the same; minus the mean stress: positive in compression
 };
@@ -133,7 +136,7 @@ struct Checkpoint {
   std::map<std::string, std::vector<double>, std::less<>> memory;
 };
 
-/// How a run is made to outlive its process.
+/// How a run is made to outlive its process, and what it says on the way.
 struct Resumption {
   std::optional<Checkpoint> from;  ///< goes on here; the reference state is then not handed over again
   /// Called after every step, when what `on_state` got is complete up to it; `make` builds the checkpoint, so that none
@@ -142,6 +145,9 @@ struct Resumption {
   /// Of a nonlinear static run: a configuration near that of the first load step, such as a coarser mesh's. Newton's
   /// method begins there; where it does not converge, at the reference.
   std::optional<Checkpoint> near{};
+  /// Called once, with a sentence, where a step of a model with contact takes far more iterations than others: how far
+  /// it has come, why its parts are short, where bodies are closest, and what to do.
+  std::function<void(const std::string&)> on_slow_step{};
 
   void offer(const std::function<Checkpoint()>& make) const {
     if (on_step) {

@@ -1,11 +1,11 @@
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
-#include "tunica/mechanics/contact/rigid_shape.hpp"
 #include "tunica/mechanics/elements/rotation.hpp"
 #include "tunica/mechanics/model/wall.hpp"
 #include "tunica/mechanics/runs/detail/settle.hpp"
 #include "tunica/mechanics/runs/detail/stepped_run.hpp"
 #include "tunica/mechanics/runs/detail/supports.hpp"
+#include "tunica/mechanics/runs/detail/table_turns.hpp"
 
 #include <fmt/format.h>
 
@@ -42,6 +42,8 @@ namespace {
 /// load, and of a load step.
 constexpr double smallest_of_load = 1.0 / 4096;
 constexpr double smallest_of_step = 1.0 / 16;
+/// Turns of tables nearer to the ends of an increment than this part of a load step stand there.
+constexpr double smallest_turn = 1e-12;
 /// Where a path breaks off, the shell is let go this many smallest increments beyond, so that it does not come back.
 constexpr double beyond_the_limit = 4;
 /// A step whose change is more than this times its linear prediction has left the path: up to a limit point a quadratic
@@ -201,20 +203,9 @@ Failure why(const NewtonResult& result, const SettleResult& let_go, bool prescri
                                                       : "elements collapse or fold"};
 }
 
-/// The times of the rigid bodies' tables, sorted, and infinity.
-std::vector<double> rigid_times(const Model& model) {
-  std::vector<double> times{infinity};
-  for (const RigidBody& body : model.rigids) {
-    const std::vector<double> own = table_times(body);
-    times.insert(times.end(), own.begin(), own.end());
-  }
-  std::sort(times.begin(), times.end());
-  return times;
-}
-
 /// What load control does: the load grows to one load factor after the other, each in one step, which is cut only where
-/// Newton's method fails. Where the path of equilibria breaks off, the shell goes on from the state of rest that it
-/// then finds.
+/// a table of the scene turns, and where Newton's method fails. Where the path of equilibria breaks off, the shell goes
+/// on from the state of rest that it then finds.
 class LoadControl final : public SteppedRun {
 public:
   LoadControl(ShellSystem& system, const Model& model, const RunSettings& settings, const StaticRun& run,
@@ -224,7 +215,7 @@ public:
         near_(near),
         step_(system, model, settings),
         thickness_(model.shells.empty() ? system.length : least_thickness(model)),
-        turns_(rigid_times(model)),
+        turns_(model),
         configuration_(reference_configuration(system)) {}
 
 private:
@@ -294,7 +285,7 @@ private:
     std::size_t cg_iterations = 0;
     while (factor_ != target) {
       const double before = factor_;
-      const double end = std::min(target, *std::upper_bound(turns_.begin(), turns_.end(), factor_));
+      const double end = turns_.next(factor_, target, smallest_turn * step);
       const double next = increment_ >= end - factor_ - 1e-12 * step ? end : factor_ + increment_;
       Configuration attempt = configuration_;
       result = step_.run(next, factor_, attempt);
@@ -308,6 +299,8 @@ private:
         increment_ *= 2;
         continue;
       }
+      tell_slow_step(iterations, fmt::format("load factor {:.6g} of {:.6g}", factor_, run_.load_factors.back()),
+                     why_short(result, next - before) + place_of_yielding(attempt));
       increment_ = (next - before) / 2;
       if (increment_ >= smallest) {
         continue;
@@ -328,6 +321,16 @@ private:
     result.iterations = iterations;
     result.cg_iterations = cg_iterations;
     return result;
+  }
+
+  /// Of an attempt that came to nothing.
+  [[nodiscard]] std::string why_short(const NewtonResult& result, double part) const {
+    return fmt::format("in a part of {:.3g} {}", part,
+                       !result.apart       ? "bodies would pass through each other"
+                       : !result.valid     ? "bodies would overlap, or elements fold"
+                       : !result.converged ? "Newton's method does not come to rest"
+                       : !result.stable    ? "the stiffness is not positive"
+                                           : "the shell leaves its path");
   }
 
   [[nodiscard]] bool is_apart(const Configuration& attempt) const {
@@ -352,7 +355,7 @@ private:
     NewtonResult told = failed;
     told.apart = failed.apart && (!settled.settled || is_apart(attempt));
     if (!settled.settled || !told.apart) {
-      fail(told, settled, settled.ran_away ? loose_body(attempt) : "");
+      fail(told, settled, settled.ran_away ? loose_body(attempt) : "", place_of_yielding(attempt));
     }
     const bool unstable = !failed.stable || settled.lost_stability;
     if (unstable && distance(attempt, configuration_) > largest_branch * thickness_) {
@@ -380,8 +383,24 @@ private:
     return "";
   }
 
-  [[noreturn]] void fail(const NewtonResult& failed, const SettleResult& let_go, const std::string& loose) {
-    const std::string place = system_.contact ? system_.contact->closest_place() : "";
+  /// Where bodies were closest; where nothing is near, which node has moved most since the last state of rest.
+  [[nodiscard]] std::string place_of_yielding(const Configuration& ended) const {
+    if (const std::string closest = system_.contact ? system_.contact->closest_place() : ""; !closest.empty()) {
+      return closest;
+    }
+    std::size_t most = 0;
+    const auto moved = [&](std::size_t i) {
+      return (ended.displacement[i] - configuration_.displacement[i]).squaredNorm();
+    };
+    for (std::size_t i = 0; i < system_.node_count(); ++i) {
+      most = moved(i) > moved(most) ? i : most;
+    }
+    const Vec3 at = system_.reference[most] + configuration_.displacement[most];
+    return fmt::format("; it yields most at ({:.4g}, {:.4g}, {:.4g}) mm", at.x(), at.y(), at.z());
+  }
+
+  [[noreturn]] void fail(const NewtonResult& failed, const SettleResult& let_go, const std::string& loose,
+                         const std::string& place) {
     if (system_.contact) {
       system_.contact->go_back();
     }
@@ -393,9 +412,9 @@ private:
     const double last = run_.load_factors.back();
     const auto [found, reason] = why(failed, let_go, !system_.prescribed.empty(), loose);
     throw RequirementError(fmt::format(
-        "{} beyond load factor {:.6g} of {:.6g} ({}): {}{}; the last good state is at {:.6g}", found, factor_, last,
+        "{} beyond load factor {:.6g} of {:.6g} ({}): {}{}; the last good state is at {:.6g}{}", found, factor_, last,
         describe_loads(model_, load_factors(model_, true, factor_), load_factors(model_, true, last)), reason, place,
-        factor_));
+        factor_, loose.empty() ? doubt_of_stiffness(model_, load_factors(model_, true, factor_)) : ""));
   }
 
   [[nodiscard]] State state_of(const NewtonResult& result) const {
@@ -413,7 +432,7 @@ private:
   const std::optional<Checkpoint>& near_;
   LoadStep step_;
   const double thickness_;
-  const std::vector<double> turns_;  ///< where a rigid body's motion changes its direction or speed, and infinity
+  const TableTurns turns_;
   Configuration configuration_;
   double factor_ = 0;
   double increment_ = infinity;  ///< of the load factor, to be tried next

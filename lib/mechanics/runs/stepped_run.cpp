@@ -3,9 +3,14 @@
 #include "tunica/core/clock.hpp"
 #include "tunica/core/narrow.hpp"
 
+#include <fmt/format.h>
+
+#include <utility>
+
 namespace tunica {
 
 Summary SteppedRun::follow(const Progress& progress, const Resumption& resumption) {
+  on_slow_step_ = resumption.on_slow_step;
   if (resumption.from) {
     summary_ = resumption.from->summary;
     if (summary_.stiffened_from) {
@@ -65,6 +70,18 @@ Configuration SteppedRun::recall(const Checkpoint& from) {
     system_.contact->recall(from.memory.at("contact"), configuration, from.position);
   }
   return configuration;
+}
+
+void SteppedRun::tell_slow_step(std::size_t iterations, const std::string& at, const std::string& why) {
+  constexpr std::size_t slow = 100;  // iterations: a step with contact that goes well takes 5 to 20
+  if (!system_.contact || !on_slow_step_ || iterations < slow) {
+    return;
+  }
+  std::exchange(on_slow_step_, nullptr)(
+      fmt::format("{}: this step hardly gets on: {} iterations so far; {}; if it takes too long, stop it and {}", at,
+                  iterations, why,
+                  system_.contact->closest_place().empty() ? "let the wall move there by a dynamic run with damping"
+                                                           : "let that [[contact]] be softer by a larger resolution"));
 }
 
 void SteppedRun::hand_over(const State& state) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "tunica/core/quantity.hpp"
 #include "tunica/report/detail/case_report.hpp"
 
 #include <functional>
@@ -9,6 +10,12 @@
 #include <vector>
 
 namespace tunica::report {
+
+/// An input that the user states with a unit of his own.
+struct StatedInput {
+  std::string key;  ///< in the report's `stated.typed`; with '-' for '_' the flag of tunica-simulate
+  Dimension dimension;
+};
 
 /// A number of a case: a column of the table.
 struct Measure {
@@ -20,6 +27,7 @@ struct Measure {
   bool compared = false;    ///< shown as a strip, and searched for outliers
   std::function<std::optional<double>(const PipelineCase&)> value;
   bool is_bound = false;  ///< certainly not passed: rounded up
+  std::optional<StatedInput> input{};
 
   /// A value for people: whole where it has no unit, else three digits.
   [[nodiscard]] std::string text(double of) const;
@@ -34,8 +42,35 @@ const std::vector<Measure>& measures();
 /// By its key. Errors: TUNICA_ASSERT where there is none.
 const Measure& measure(const std::string& key);
 
+/// The value of a measure with its unit, empty where it is not known: an input in the unit in which it was stated, with
+/// its value in the measure's unit in parentheses, where that is another: "120 mmHg (16.0 kPa)".
+std::string shown(const PipelineCase& one, const std::string& key);
+
+/// What a run for an accuracy came to.
+struct Reached {
+  std::string of;                 ///< "stress"; of a probe "displacement of NAME along x"
+  std::string value;              ///< with its unit
+  std::optional<double> percent;  ///< the estimated error; none: no estimate
+  double asked = 0;               ///< percent
+
+  /// "stress 159 kPa, estimated error 12 %, 5 % asked".
+  [[nodiscard]] std::string text() const;
+};
+
+/// None where no accuracy was asked for, or no level was solved.
+std::optional<Reached> accuracy_reached(const PipelineCase& one);
+
+/// Whether a run answers under its whole load, and only the accuracy that was asked for was not reached.
+bool is_inaccurate(const PipelineCase& one);
+
+/// Whether there is an answer: a run that came to its end, or an inaccurate one.
+bool is_answered(const PipelineCase& one);
+
 /// Whether an accuracy that was asked for put other shells in the place of those that relax left.
 bool is_refitted(const PipelineCase& one);
+
+/// Whether these are there under their own name: an inaccurate run leaves a partial file.
+bool has_refined_shells(const PipelineCase& one);
 
 /// A value among those of a cohort that does not belong to them.
 struct Outlier {

@@ -22,8 +22,17 @@ Markup cohort_section(const std::vector<CaseReport>& cases, const std::string& t
 /// A paragraph on how the numbers were made, to paste into a paper, with its references.
 Markup methods_section(const CaseReport& one, int level);
 
-/// The command that looks further into a failed case; empty where there is none.
-std::string next_command(const CaseReport& one);
+/// A command that helps further with a failed case, and what for.
+struct NextStep {
+  std::string what;  ///< "Next"
+  std::string command;
+};
+
+/// The likeliest first; none where no stage was run.
+std::vector<NextStep> next_steps(const CaseReport& one);
+
+/// Why an accuracy was not reached.
+std::string why_inaccurate(const CaseReport& one);
 
 /// How a failed stage ended, ", exit code N"; empty where no code tells of a failure.
 std::string told_exit(const PipelineCase& one);

@@ -1,6 +1,8 @@
 #include "tunica/shell/distance/boundary_distance.hpp"
 
+#include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
+#include "tunica/core/require.hpp"
 #include "tunica/surface/distance/boundary_curves.hpp"
 #include "tunica/surface/distance/hausdorff.hpp"
 #include "tunica/surface/mesh/incidence.hpp"
@@ -37,6 +39,7 @@ Vec2 place_on_edge(std::size_t k, double s) {
 }
 
 std::vector<CubicCurve> boundary_curves(const ShellMesh& shell) {
+  require_valid(shell);
   const auto edges = boundary_edges(neighbours(flat_facets(shell), incidence(flat_facets(shell))));
   std::vector<CubicCurve> curves;
   if (!edges.empty()) {
@@ -49,6 +52,9 @@ std::vector<CubicCurve> boundary_curves(const ShellMesh& shell) {
 }
 
 Chords chords_of(std::span<const CubicCurve> curves, int pieces) {
+  if (pieces < 1) {
+    throw InputError("a curve has one chord at least");
+  }
   std::vector<std::array<Vec3, 2>> segments;
   segments.reserve(curves.size() * narrow<std::size_t>(pieces));
   for (const CubicCurve& curve : curves) {
@@ -64,12 +70,16 @@ Chords chords_of(std::span<const CubicCurve> curves, int pieces) {
 
 std::optional<BoundaryDistance> boundary_distance(std::span<const CubicCurve> curves, const Target& target,
                                                   double width, std::optional<double> limit) {
+  require_positive(width, "the width of the interval");
   if (curves.empty() || !target.boundary_tree()) {
     return {};
   }
   double largest = 0;
   for (const CubicCurve& curve : curves) {
     largest = std::max(largest, bulge(curve));
+    if (!std::all_of(curve.begin(), curve.end(), [](const Vec3& p) { return p.allFinite(); })) {
+      throw InputError("a boundary curve is not finite");
+    }
   }
   const double needed = std::ceil(std::sqrt(largest / (part_for_chords * width)));
   const Chords chords = chords_of(curves, truncated<int>(std::clamp(needed, 1.0, real(most_pieces))));

@@ -1,7 +1,9 @@
 #include "tunica/shell/distance/curved_hausdorff.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/core/require.hpp"
 #include "tunica/shell/distance/detail/certificate.hpp"
+#include "tunica/shell/patch/curved_surface.hpp"
 #include "tunica/surface/mesh/measure.hpp"
 
 #include <fmt/core.h>
@@ -40,6 +42,11 @@ void require_finite(const ShellMesh& shell, const std::vector<CubicPatch>& patch
 }  // namespace
 
 ShellDistance curved_hausdorff(const ShellMesh& shell, const Target& target, const ShellDistanceOptions& options) {
+  require_shells(shell);
+  require_not_negative(options.width, "the width of the interval");
+  if (options.limit) {
+    require_not_negative(*options.limit, "the limit of the distance");
+  }
   const std::vector<CubicPatch> patches = curved_patches(shell);
   require_finite(shell, patches);
   const Aim aim{options.width, options.limit, rounding_of(shell, target), options.list_beyond && options.limit};

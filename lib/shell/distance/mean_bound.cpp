@@ -1,5 +1,6 @@
 #include "tunica/shell/distance/mean_bound.hpp"
 
+#include "tunica/core/require.hpp"
 #include "tunica/core/threads.hpp"
 #include "tunica/shell/patch/curved_surface.hpp"
 #include "tunica/surface/mesh/measure.hpp"
@@ -89,6 +90,8 @@ private:
 }  // namespace
 
 double mean_distance_bound(const ShellMesh& shell, const Target& target, double slack) {
+  require_shells(shell);
+  require_positive(slack, "how far the bound may lie above the mean");
   const double deviation = deviation_share * slack;
   const TriangleMesh drawn = tessellate(shell, deviation).mesh;
   const ClosestPoint tree(drawn);

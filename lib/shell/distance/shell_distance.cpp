@@ -59,6 +59,7 @@ ShellDistance shell_distance(const ShellMesh& shell, const Target& target, const
 }
 
 std::pair<double, double> mean_distance(const ShellMesh& shell, const Target& target) {
+  require_shells(shell);
   // By the midpoints of pieces of the patches.
   const std::vector<CubicPatch> patches = curved_patches(shell);
   struct Sum {

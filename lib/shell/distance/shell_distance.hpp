@@ -47,7 +47,8 @@ struct ShellDistanceOptions {
 };
 
 /// Certified, see curved_hausdorff.hpp. Where a patch is so wild that this would take some million cuts the intervals
-/// come out wider.
+/// come out wider. Errors of all functions here: InputError as require_shells(), and where a width, limit or
+/// deviation is negative or not finite.
 ShellDistance shell_distance(const ShellMesh& shell, const Target& target, const ShellDistanceOptions& options);
 
 /// Mean and root mean square (mm) of the distance from the curved surface to the target, over its area, by some 20,000

@@ -4,6 +4,7 @@
 #include "tunica/core/threads.hpp"
 #include "tunica/shell/distance/boundary_distance.hpp"
 #include "tunica/shell/distance/shell_distance.hpp"
+#include "tunica/shell/patch/curved_surface.hpp"
 #include "tunica/surface/mesh/measure.hpp"
 
 #include <Eigen/Geometry>
@@ -121,6 +122,7 @@ double mean_from_target(const ShellMesh& shell, const Target& target) {
 }  // namespace
 
 ShellQuality shell_quality(const ShellMesh& shell, const Target& target) {
+  require_shells(shell);
   ShellQuality quality;
   const auto patches = curved_patches(shell);
   quality.mean_distance = std::max(mean_distance(shell, target).first, mean_from_target(shell, target));

@@ -51,6 +51,7 @@ Vec3 barycentric(const Vec3& p, const std::array<Vec3, 3>& corners) {
 }  // namespace
 
 std::vector<Vec3> facet_normals(const TriangleMesh& mesh) {
+  require_valid(mesh);
   std::vector<Vec3> out;
   out.reserve(mesh.triangles.size());
   for (const auto& [a, b, c] : mesh.triangles) {
@@ -61,7 +62,7 @@ std::vector<Vec3> facet_normals(const TriangleMesh& mesh) {
 }
 
 std::vector<Vec3> vertex_normals(const TriangleMesh& mesh) {
-  const auto facets = facet_normals(mesh);
+  const auto facets = facet_normals(mesh);  // which asks for a valid mesh
   std::vector<Vec3> out(mesh.vertices.size(), Vec3::Zero());
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     for (std::size_t i = 0; i < 3; ++i) {

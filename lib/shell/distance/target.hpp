@@ -1,9 +1,9 @@
 #pragma once
 
-#include "tunica/shell/distance/point_tree.hpp"
 #include "tunica/surface/distance/closest_point.hpp"
 #include "tunica/surface/distance/cover_bound.hpp"
 #include "tunica/surface/mesh/incidence.hpp"
+#include "tunica/surface/mesh/point_tree.hpp"
 #include "tunica/surface/mesh/triangle_mesh.hpp"
 
 #include <optional>
@@ -14,7 +14,7 @@ namespace tunica {
 /// Cost: build n log n, about 200 bytes per triangle; a query a few microseconds.
 class Target {
 public:
-  /// Vertices that belong to no triangle are left out. Errors: TUNICA_ASSERT on a mesh without triangles. Limits: an
+  /// Vertices that belong to no triangle are left out. Errors: InputError as require_surface(). Limits: an
   /// oriented manifold; the caller checks.
   explicit Target(TriangleMesh mesh);
   Target(const Target&) = delete;

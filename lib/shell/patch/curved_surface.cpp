@@ -4,8 +4,10 @@
 
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
+#include "tunica/core/require.hpp"
 #include "tunica/core/threads.hpp"
 #include "tunica/shell/patch/shape_function.hpp"
+#include "tunica/surface/mesh/checks.hpp"
 #include "tunica/surface/mesh/incidence.hpp"
 
 #include <fmt/core.h>
@@ -17,6 +19,8 @@
 
 namespace tunica {
 namespace {
+
+constexpr int most_pieces_per_edge = 10'000;
 
 constexpr std::size_t patches_per_task = 64;
 constexpr double least_height = 1e-6;  // of the longest edge: less has no usable stiffness in double precision
@@ -158,6 +162,14 @@ double flux_volume(const CubicPatch& patch, const Vec3& origin) {
   return sum;
 }
 
+/// One at each vertex, or at each corner of each triangle.
+void require_normals(const ShellMesh& shell) {
+  if (shell.corner_normals.empty() ? shell.normals.size() != shell.vertices.size()
+                                   : shell.corner_normals.size() != shell.triangles.size()) {
+    throw InputError("has no normals; a shell mesh needs a unit normal per vertex (make one by tunica-relax)");
+  }
+}
+
 }  // namespace
 
 std::array<double, 10> bernstein(const Vec2& b) {
@@ -283,7 +295,27 @@ CubicPatch smooth_patch(Patch kind, const std::array<Vec3, 3>& corners, const st
                               : watertight_patch(corners, normals, own_normals_across(normals));
 }
 
+void require_valid(const ShellMesh& shell) {
+  require_valid(shell.vertices, shell.triangles);
+  require_normals(shell);
+  for (std::size_t t = 0; t < shell.triangles.size(); ++t) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      if (!shell.normal(t, c).allFinite()) {
+        throw InputError(fmt::format("the normal at vertex {} of triangle {} is not finite", shell.triangles[t][c], t));
+      }
+    }
+  }
+}
+
+void require_shells(const ShellMesh& shell) {
+  require_valid(shell);
+  if (shell.triangles.empty()) {
+    throw InputError("the shell mesh has no triangles");
+  }
+}
+
 std::vector<CubicPatch> curved_patches(const ShellMesh& shell) {
+  require_valid(shell);
   const bool creased = shell.patch == Patch::watertight && !shell.corner_normals.empty();
   std::vector<std::array<Index, 3>> beside;
   if (creased) {
@@ -326,6 +358,11 @@ double normal_agreement(const std::array<Vec3, 3>& corners, const std::array<Vec
 }
 
 double normal_agreement(const ShellMesh& shell, std::size_t triangle) {
+  if (triangle >= shell.triangles.size()) {
+    throw InputError(fmt::format("there is no triangle {}, but {}", triangle, shell.triangles.size()));
+  }
+  require_corners(shell.vertices.size(), {&shell.triangles[triangle], 1});
+  require_normals(shell);
   return normal_agreement(corners_of(shell, triangle), normals_of(shell, triangle));
 }
 
@@ -335,6 +372,7 @@ bool has_area(const std::array<Vec3, 3>& corners) {
 }
 
 std::size_t count_without_area(const ShellMesh& shell) {
+  require_valid(shell.vertices, shell.triangles);
   std::size_t count = 0;
   for (std::size_t t = 0; t < shell.triangles.size(); ++t) {
     count += has_area(corners_of(shell, t)) ? 0 : 1;
@@ -344,9 +382,7 @@ std::size_t count_without_area(const ShellMesh& shell) {
 
 void require_fit(const ShellMesh& shell, const std::string& name) {
   const auto is_unit = [](const Vec3& n) { return std::abs(n.squaredNorm() - 1) < 1e-6; };  // false for NaN
-  if (shell.normals.size() != shell.vertices.size() && shell.corner_normals.size() != shell.triangles.size()) {
-    throw InputError(name + ": has no normals; a shell mesh needs a unit normal per vertex (make one by tunica-relax)");
-  }
+  naming(name, [&] { require_normals(shell); });
   for (std::size_t t = 0; t < shell.triangles.size(); ++t) {
     for (int c = 0; c < 3; ++c) {
       const Index v = shell.triangles[t][c];
@@ -387,6 +423,7 @@ void require_fit(const ShellMesh& shell, const std::string& name) {
 double flatness(const CubicPatch& patch, int level) { return coarsest_flatness(patch) / (real(level) * real(level)); }
 
 double tessellation_size(const ShellMesh& shell, double deviation) {
+  require_positive(deviation, "the deviation of the fine triangles");
   double total = 0;
   for (const CubicPatch& patch : curved_patches(shell)) {
     total += std::pow(level_for(patch, deviation), 2);
@@ -395,7 +432,7 @@ double tessellation_size(const ShellMesh& shell, double deviation) {
 }
 
 Tessellation tessellate(const ShellMesh& shell, double deviation, std::size_t most_triangles) {
-  TUNICA_ASSERT(deviation > 0);
+  require_positive(deviation, "the deviation of the fine triangles");
   const auto patches = curved_patches(shell);
   std::vector<int> levels(patches.size());
   double total = 0;
@@ -414,7 +451,9 @@ Tessellation tessellate(const ShellMesh& shell, double deviation, std::size_t mo
 }
 
 Tessellation tessellate_uniformly(const ShellMesh& shell, int level) {
-  TUNICA_ASSERT(level >= 1 && level <= 10000);
+  if (level < 1 || level > most_pieces_per_edge) {
+    throw InputError(fmt::format("{} pieces per edge: choose 1 to {}", level, most_pieces_per_edge));
+  }
   const auto patches = curved_patches(shell);
   return tessellate_by(shell, patches, std::vector<int>(patches.size(), level));
 }
@@ -427,6 +466,7 @@ double curved_volume(const ShellMesh& shell) {
     double from_start, from_end;  // the two inner ordinates along the edge, as its first triangle runs
     Vec3 normal;
   };
+  require_valid(shell);
   if (shell.triangles.empty()) {
     return 0;
   }

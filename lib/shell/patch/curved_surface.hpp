@@ -90,6 +90,15 @@ std::vector<CubicPatch> curved_patches(const ShellMesh& shell);
 double normal_agreement(const std::array<Vec3, 3>& corners, const std::array<Vec3, 3>& normals);
 double normal_agreement(const ShellMesh& shell, std::size_t triangle);
 
+/// What every function of a shell mesh relies on: require_valid() of its facets, and a normal of finite length at each
+/// corner, as `corner_normals` or `normals` have it. The public functions of this room ask it of the shell meshes that
+/// they are given. Errors: InputError that names the first triangle at fault. Cost: linear, some nanoseconds per
+/// triangle.
+void require_valid(const ShellMesh& shell);
+
+/// require_valid() of a shell mesh that has a triangle. Errors: InputError.
+void require_shells(const ShellMesh& shell);
+
 /// Everything a curved surface needs: finite positions, unit normals, indices in range, facets with area, and
 /// N·n >= least_normal_agreement at every corner.
 /// @param name  what the message starts with: the file
@@ -116,7 +125,8 @@ struct Tessellation {
 
 /// As fine as needed, patch by patch, that `deviation` (mm, > 0) certainly holds both ways: every point of the curved
 /// surface has a point of the mesh within it, and the reverse, at the same parameters.
-/// Errors: RequirementError when this would take more than `most_triangles`.
+/// Errors: RequirementError when this would take more than `most_triangles`; InputError where the deviation is not
+/// finite or not above zero.
 /// Source: linear interpolation of a cubic Bezier triangle, bounded by second differences of its control points.
 /// Cost: O(#F), about (3/4 second difference / deviation) triangles per patch.
 Tessellation tessellate(const ShellMesh& shell, double deviation, std::size_t most_triangles = 100'000'000);
@@ -124,7 +134,7 @@ Tessellation tessellate(const ShellMesh& shell, double deviation, std::size_t mo
 /// How many triangles tessellate() would make.
 double tessellation_size(const ShellMesh& shell, double deviation);
 
-/// level >= 1 pieces per edge: level^2 triangles per patch. Its `deviation` is certified too.
+/// level pieces per edge, 1 to 10,000 (else InputError): level^2 triangles per patch. Its `deviation` is certified too.
 Tessellation tessellate_uniformly(const ShellMesh& shell, int level);
 
 /// Upper bound, mm, of the distance at equal parameters between a patch and its level^2 flat triangles.

@@ -1,8 +1,12 @@
 #include "tunica/shell/patch/refine.hpp"
 
+#include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
+#include "tunica/core/require.hpp"
 #include "tunica/shell/patch/curved_surface.hpp"
 #include "tunica/surface/mesh/measure.hpp"
+
+#include <fmt/format.h>
 
 #include <Eigen/Geometry>
 
@@ -197,6 +201,11 @@ Triangles pieces_of(const ShellMesh& shell, const Edges& edges, const std::vecto
 
 ShellMesh split_shells(const ShellMesh& shell, const std::vector<Split>& wanted,
                        std::vector<std::array<Index, 2>>* halved) {
+  require_valid(shell);
+  if (wanted.size() != shell.triangles.size()) {
+    throw InputError(
+        fmt::format("{} splits for {} shells: one for each is needed", wanted.size(), shell.triangles.size()));
+  }
   const Edges edges = edges_of(shell);
   ShellMesh out{shell.vertices, {}, shell.normals, {}, shell.patch};
   const std::vector<Middle> middles = add_middles(shell, edges, edges_to_cut(shell, edges, wanted), out);
@@ -226,6 +235,7 @@ ShellMesh split_shells(const ShellMesh& shell, const std::vector<Split>& wanted,
 }
 
 ShellMesh refine_where(const ShellMesh& shell, const std::vector<double>& errors, double tolerance, std::size_t most) {
+  require_not_negative(tolerance, "the tolerance");
   std::vector<std::size_t> order;
   for (std::size_t t = 0; t < errors.size(); ++t) {
     if (errors[t] > tolerance) {

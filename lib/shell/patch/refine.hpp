@@ -15,6 +15,7 @@ enum class Split : std::uint8_t {
 /// edge has its longest edge cut too, so that angles do not get smaller from split to split. Of the ways to join the
 /// cuts the one with the better worst triangle is taken. New nodes lie on the curved patches (the mean of two
 /// neighbours' edge curves), with their normals: one for each side along creases.
+/// Errors: InputError as require_valid(), or where `wanted` is not of these shells.
 /// @param wanted  #F; neighbours may get split as well
 /// @param halved  gets the ends of the edge that each new node halves; the others keep their numbers
 /// Source: Rivara, "Algorithms for refining triangular grids", IJNME 20, 1984. Cost: linear.

@@ -2,6 +2,7 @@
 
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
+#include "tunica/core/require.hpp"
 #include "tunica/surface/decimation/degenerate.hpp"
 #include "tunica/surface/decimation/detail/edge_collapse.hpp"
 #include "tunica/surface/decimation/detail/levelling.hpp"
@@ -37,7 +38,8 @@ constexpr std::size_t least_splits = 100'000;
 constexpr std::size_t splits_per_triangle = 4;  // of the target
 /// Of the error asked for: what spikes may take, so that something is left for the collapses.
 constexpr double most_for_spikes = 0.9;
-constexpr double least_size = 1e-100;  // mm: squares of edges below vanish
+constexpr double largest_min_angle = 40;  // degrees: of shaped()
+constexpr double least_size = 1e-100;     // mm: squares of edges below vanish
 
 // The mesh after the first `steps` collapses; `origins` tells which vertices and triangles came from where.
 TriangleMesh replay(const TriangleMesh& mesh, const std::vector<Collapse>& history, std::size_t steps,
@@ -379,6 +381,13 @@ DecimateResult decimate_sound(const TriangleMesh& mesh, const DecimateOptions& o
 }  // namespace
 
 DecimateResult decimate(const TriangleMesh& mesh, const DecimateOptions& options) {
+  if (options.max_error) {
+    require_not_negative(*options.max_error, "the largest error");
+  }
+  if (options.min_angle && !(*options.min_angle >= 0 && *options.min_angle <= largest_min_angle)) {
+    throw InputError(fmt::format("the smallest angle is {} degrees: it must be from 0 to {}", *options.min_angle,
+                                 largest_min_angle));
+  }
   const double size = diagonal(mesh);
   if (count_degenerate(mesh) == 0 || !(size > least_size && size < 1 / least_size) || why_unfit(examine(mesh))) {
     return decimate_sound(mesh, options);

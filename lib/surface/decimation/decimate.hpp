@@ -41,10 +41,11 @@ struct DecimateResult {
 /// triangle faces; but boundary loops that are a point are closed. Degenerate triangles go, see
 /// without_degenerate_triangles(), also spikes, up to nine tenths of `max_error`: `error` counts them. Deterministic,
 /// independent of the number of threads, of the unit and of the place of the mesh. Errors: InputError when the mesh is
-/// not fit (says where); Interrupted. Source: Garland, Heckbert, Surface simplification using quadric error metrics,
-/// SIGGRAPH 1997. Cost: n log n; with `max_error` some twenty distance measurements more. With `min_angle` about 5 ms
-/// per triangle of the result more, and some eight times that with `max_error`. Limits: greedy; `max_error` looks among
-/// the meshes that the greedy order passes through, and some of them levelled.
+/// not fit (says where), the error negative or not finite, or the angle out of its range; Interrupted. Source: Garland,
+/// Heckbert, Surface simplification using quadric error metrics, SIGGRAPH 1997. Cost: n log n; with `max_error` some
+/// twenty distance measurements more. With `min_angle` about 5 ms per triangle of the result more, and some eight times
+/// that with `max_error`. Limits: greedy; `max_error` looks among the meshes that the greedy order passes through, and
+/// some of them levelled.
 DecimateResult decimate(const TriangleMesh& mesh, const DecimateOptions& options);
 
 }  // namespace tunica

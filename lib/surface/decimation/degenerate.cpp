@@ -1,8 +1,12 @@
 #include "tunica/surface/decimation/degenerate.hpp"
 
+#include "tunica/core/error.hpp"
 #include "tunica/surface/decimation/detail/edit_mesh.hpp"
 #include "tunica/surface/distance/closest_point.hpp"
+#include "tunica/surface/mesh/checks.hpp"
 #include "tunica/surface/mesh/incidence.hpp"
+
+#include <fmt/format.h>
 
 #include <Eigen/Geometry>
 
@@ -295,12 +299,17 @@ bool is_degenerate(const Vec3& a, const Vec3& b, const Vec3& c) {
 }
 
 std::size_t count_degenerate(const TriangleMesh& mesh) {
+  require_valid(mesh);
   return std::count_if(mesh.triangles.begin(), mesh.triangles.end(), [&](const auto& c) {
     return is_degenerate(mesh.vertices[c[0]], mesh.vertices[c[1]], mesh.vertices[c[2]]);
   });
 }
 
 WithoutDegenerate without_degenerate_triangles(const TriangleMesh& mesh, double longest_spike) {
+  require_valid(mesh);
+  if (!(longest_spike >= 0)) {
+    throw InputError(fmt::format("spikes of {} mm cannot be taken away: give a length, or infinity", longest_spike));
+  }
   return Cleaner(mesh, longest_spike).run();
 }
 

@@ -1,6 +1,7 @@
 #include "tunica/surface/distance/boundary_curves.hpp"
 
 #include "tunica/core/narrow.hpp"
+#include "tunica/surface/mesh/checks.hpp"
 #include "tunica/surface/mesh/incidence.hpp"
 
 #include <algorithm>
@@ -22,6 +23,7 @@ TriangleMesh segments_as_triangles(const std::vector<std::array<Vec3, 2>>& segme
 }
 
 BoundaryCurves::BoundaryCurves(const TriangleMesh& mesh) {
+  require_valid(mesh);
   for (const auto& loop : boundary_loops(mesh)) {
     Curve curve;
     double length = 0;

@@ -3,7 +3,10 @@
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/core/threads.hpp"
+#include "tunica/surface/mesh/checks.hpp"
 #include "tunica/surface/mesh/measure.hpp"
+
+#include <fmt/format.h>
 
 #include <Eigen/Geometry>
 
@@ -63,6 +66,13 @@ Lanes squared_distances(const Lanes3& ap, const Lanes3& ab, const Lanes3& ac) {
   const Lanes3 rest{ap.x - v1 * ab.x - w1 * ac.x, ap.y - v1 * ab.y - w1 * ac.y, ap.z - v1 * ab.z - w1 * ac.z};
   const Lanes inside = dot(rest, rest);
   return (squared_n > 0 && v >= 0 && w >= 0 && v + w <= squared_n).select(squared.min(inside), squared);
+}
+
+/// Among distances that are no numbers none is the least.
+void require_place(const Vec3& p) {
+  if (!p.allFinite()) {
+    throw InputError("the closest point of a place that is not finite was asked for");
+  }
 }
 
 struct Primitive {
@@ -345,7 +355,7 @@ struct ClosestPoint::Builder {
 };
 
 ClosestPoint::ClosestPoint(const TriangleMesh& mesh) : vertices_(mesh.vertices), triangles_(mesh.triangles) {
-  TUNICA_ASSERT(!triangles_.empty() && triangles_.size() <= max_index);
+  require_surface(mesh);
   Builder builder{*this, {}};
   builder.primitives.reserve(triangles_.size());
   for (std::size_t t = 0; t < triangles_.size(); ++t) {
@@ -486,10 +496,15 @@ ClosestPoint::Hit ClosestPoint::search(const Vec3& p, double best, Index triangl
 }
 
 ClosestPoint::Hit ClosestPoint::closest(const Vec3& p) const {
+  require_place(p);
   return search(p, infinity, leaves_.front().triangle[0]);
 }
 
 ClosestPoint::Hit ClosestPoint::closest(const Vec3& p, Index guess) const {
+  require_place(p);
+  if (guess >= triangles_.size()) {
+    throw InputError(fmt::format("there is no triangle {} to begin at, but {}", guess, triangles_.size()));
+  }
   const double squared = squared_distance_to(p, guess);
   // A little more than its distance: the guess itself may come out again, in whatever rounding.
   return search(p, squared * (1 + 1e-12), guess);

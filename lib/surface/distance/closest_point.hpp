@@ -23,10 +23,11 @@ public:
     double squared_distance = infinity;
   };
 
-  /// Copies what it needs: the mesh may go away. Errors: TUNICA_ASSERT on a mesh without triangles.
+  /// Copies what it needs: the mesh may go away. Errors: InputError as require_surface().
   explicit ClosestPoint(const TriangleMesh& mesh);
 
   /// Of several triangles at the same distance any may be named; the same question has always the same answer.
+  /// Errors: InputError where the place is not finite, or the triangle to begin with does not exist.
   [[nodiscard]] Hit closest(const Vec3& p) const;
 
   /// The same, faster, when a triangle that is probably close is known, such as the answer for a nearby point.

@@ -2,6 +2,7 @@
 
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
+#include "tunica/core/require.hpp"
 #include "tunica/core/threads.hpp"
 #include "tunica/surface/distance/cover_bound.hpp"
 #include "tunica/surface/mesh/measure.hpp"
@@ -411,7 +412,12 @@ private:
 }  // namespace
 
 HausdorffResult hausdorff(const ClosestPoint& a, const ClosestPoint& b, const HausdorffOptions& options) {
-  TUNICA_ASSERT(options.width >= 0 && options.deviation_a >= 0 && options.deviation_b >= 0);
+  require_not_negative(options.width, "the width of the interval");
+  require_not_negative(options.deviation_a, "the deviation of the first surface");
+  require_not_negative(options.deviation_b, "the deviation of the second surface");
+  if (options.limit) {
+    require_not_negative(*options.limit, "the limit of the distance");
+  }
   HausdorffResult result;
   const auto half = [&](double offset) -> Progress {
     if (!options.progress) {

@@ -39,7 +39,8 @@ struct HausdorffResult {
 /// over a few triangles bounds the piece. Pieces are cut where two triangles of the other surface tie, or in half.
 /// The result does not depend on the number of threads.
 /// @return intervals of at most `width` plus 2 (deviation_a + deviation_b) plus rounding, unless max_splits was
-/// reached. Errors: Interrupted. Source: bounds as in Tang, Lee, Kim, Interactive Hausdorff distance computation for
+/// reached. Errors: InputError: a surface as for ClosestPoint, a width, deviation or limit that is negative or not
+/// finite; Interrupted. Source: bounds as in Tang, Lee, Kim, Interactive Hausdorff distance computation for
 /// general polygonal models (2009). Cost: the distance query of each vertex that is not near enough by its neighbour's
 /// answer, then a few thousand splits on smooth surfaces. Limits: mean and rms come from samples (systematic over the
 /// area).

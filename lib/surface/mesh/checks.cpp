@@ -1,6 +1,7 @@
 #include "tunica/surface/mesh/checks.hpp"
 
 #include "tunica/core/disjoint_sets.hpp"
+#include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/surface/mesh/incidence.hpp"
 
@@ -9,6 +10,7 @@
 #include <Eigen/Geometry>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <numeric>
 
@@ -195,9 +197,45 @@ std::string phrase(std::size_t count, const char* one, const char* many, const s
 
 }  // namespace
 
+void require_corners(std::size_t vertices, std::span<const std::array<Index, 3>> triangles) {
+  if (vertices > max_index || triangles.size() > max_index) {
+    throw InputError(fmt::format("a mesh of {} vertices and {} triangles: at most {} of each are understood", vertices,
+                                 triangles.size(), max_index));
+  }
+  for (const auto& corners : triangles) {
+    const Index largest = std::max({corners[0], corners[1], corners[2]});
+    if (largest >= vertices) {
+      throw InputError(
+          fmt::format("triangle {} names vertex {}, but there are {}", &corners - triangles.data(), largest, vertices));
+    }
+  }
+}
+
+void require_valid(std::span<const Vec3> vertices, std::span<const std::array<Index, 3>> triangles) {
+  require_corners(vertices.size(), triangles);
+  for (const auto& corners : triangles) {
+    for (const Index v : corners) {
+      if (!std::isfinite(vertices[v].squaredNorm())) {
+        throw InputError(fmt::format(
+            "{}: vertex {} of triangle {} is at ({:.6g}, {:.6g}, {:.6g})",
+            vertices[v].allFinite() ? "its vertices are too far apart to reckon with" : "a vertex is not finite", v,
+            &corners - triangles.data(), vertices[v].x(), vertices[v].y(), vertices[v].z()));
+      }
+    }
+  }
+}
+
+void require_surface(const TriangleMesh& mesh) {
+  require_valid(mesh);
+  if (mesh.triangles.empty()) {
+    throw InputError("the surface has no triangles");
+  }
+}
+
 MeshFacts examine(const TriangleMesh& mesh) { return Examiner(mesh).run(); }
 
 TriangleMesh without_unused(TriangleMesh mesh) {
+  require_corners(mesh.vertices.size(), mesh.triangles);
   std::vector<std::uint8_t> used(mesh.vertices.size(), 0);
   for (const auto& corners : mesh.triangles) {
     for (const Index v : corners) {

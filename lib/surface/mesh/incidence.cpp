@@ -1,13 +1,16 @@
 #include "tunica/surface/mesh/incidence.hpp"
 
+#include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/core/threads.hpp"
+#include "tunica/surface/mesh/checks.hpp"
 
 #include <algorithm>
 
 namespace tunica {
 
 Incidence incidence(std::size_t vertices, std::span<const std::array<Index, 3>> triangles) {
+  require_corners(vertices, triangles);
   Incidence result;
   result.offsets.assign(vertices + 1, 0);
   for (const auto& triangle : triangles) {
@@ -29,6 +32,7 @@ Incidence incidence(std::size_t vertices, std::span<const std::array<Index, 3>> 
 }
 
 std::vector<std::array<Index, 3>> neighbours(std::span<const std::array<Index, 3>> triangles, const Incidence& around) {
+  require_corners(around.offsets.empty() ? 0 : around.offsets.size() - 1, triangles);
   std::vector<std::array<Index, 3>> result(triangles.size(), {no_neighbour, no_neighbour, no_neighbour});
   parallel_for_blocks(triangles.size(), 4096, [&](std::size_t begin, std::size_t end) {
     for (std::size_t t = begin; t < end; ++t) {
@@ -100,6 +104,7 @@ std::vector<std::array<Index, 2>> boundary_edges(std::span<const std::array<Inde
 }
 
 std::vector<std::vector<Index>> boundary_loops(const TriangleMesh& mesh) {
+  require_corners(mesh.vertices.size(), mesh.triangles);
   // The edges known so far in a list at their end with fewer triangles, each with the number of its triangles.
   struct Edge {
     Index far, before, triangles;
@@ -146,6 +151,9 @@ std::vector<std::vector<Index>> boundary_loops(const TriangleMesh& mesh) {
 
 std::vector<std::vector<Index>> boundary_loops(std::span<const std::array<Index, 3>> triangles,
                                                std::span<const std::array<Index, 3>> across) {
+  if (across.size() != triangles.size()) {
+    throw InputError("the neighbours are not those of the triangles: their numbers differ");
+  }
   std::vector<DirectedEdge> edges;
   for (const auto& [t, k] : boundary_edges(across)) {
     edges.emplace_back(triangles[t][k], triangles[t][(k + 1) % 3]);

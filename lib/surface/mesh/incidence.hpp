@@ -16,7 +16,7 @@ struct Incidence {
   }
 };
 
-/// Cost: linear.
+/// Errors: InputError where a corner does not exist; of neighbours() and boundary_loops(), too. Cost: linear.
 Incidence incidence(std::size_t vertices, std::span<const std::array<Index, 3>> triangles);
 inline Incidence incidence(const TriangleMesh& mesh) { return incidence(mesh.vertices.size(), mesh.triangles); }
 

@@ -1,5 +1,10 @@
 #include "tunica/surface/mesh/measure.hpp"
+
+#include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
+#include "tunica/surface/mesh/checks.hpp"
+
+#include <fmt/format.h>
 
 #include <Eigen/Geometry>
 
@@ -11,6 +16,7 @@
 namespace tunica {
 
 Box bounding_box(const TriangleMesh& mesh) {
+  require_valid(mesh);
   if (mesh.triangles.empty()) {
     return {};
   }
@@ -30,6 +36,7 @@ double diagonal(const TriangleMesh& mesh) { return bounding_box(mesh).diagonal()
 double triangle_area(const Vec3& a, const Vec3& b, const Vec3& c) { return 0.5 * (b - a).cross(c - a).norm(); }
 
 double area(const TriangleMesh& mesh) {
+  require_valid(mesh);
   double sum = 0;
   for (const auto& [i, j, k] : mesh.triangles) {
     sum += triangle_area(mesh.vertices[i], mesh.vertices[j], mesh.vertices[k]);
@@ -49,6 +56,10 @@ double signed_volume(const TriangleMesh& mesh) {
 }
 
 double longest_edge(const TriangleMesh& mesh, Index triangle) {
+  if (triangle >= mesh.triangles.size()) {
+    throw InputError(fmt::format("there is no triangle {}, but {}", triangle, mesh.triangles.size()));
+  }
+  require_valid(mesh.vertices, {&mesh.triangles[triangle], 1});
   const auto& [i, j, k] = mesh.triangles[triangle];
   const Vec3 &a = mesh.vertices[i], &b = mesh.vertices[j], &c = mesh.vertices[k];
   return std::sqrt(std::max({(b - a).squaredNorm(), (c - a).squaredNorm(), (c - b).squaredNorm()}));
@@ -81,6 +92,7 @@ double radius_ratio(const Vec3& a, const Vec3& b, const Vec3& c) {
 }
 
 double min_angle_degrees(const TriangleMesh& mesh) {
+  require_valid(mesh);
   double smallest = 60;
   for (const auto& [i, j, k] : mesh.triangles) {
     smallest = std::min(smallest, smallest_angle_degrees(mesh.vertices[i], mesh.vertices[j], mesh.vertices[k]));
@@ -89,6 +101,7 @@ double min_angle_degrees(const TriangleMesh& mesh) {
 }
 
 double mean_quality(const TriangleMesh& mesh) {
+  require_valid(mesh);
   if (mesh.triangles.empty()) {
     return 1;
   }

@@ -3,6 +3,9 @@
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/core/progress.hpp"
+#include "tunica/surface/mesh/checks.hpp"
+
+#include <fmt/format.h>
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/Intersections_3/Segment_3_Triangle_3.h>
@@ -149,10 +152,16 @@ bool triangles_cross_beside_corner(const std::array<Vec3, 3>& one, const std::ar
 }
 
 std::vector<std::array<Index, 2>> overlapping_boxes(const std::vector<Vec3>& lower, const std::vector<Vec3>& upper) {
+  if (lower.size() != upper.size()) {
+    throw InputError(fmt::format("{} lower and {} upper corners make no boxes", lower.size(), upper.size()));
+  }
   std::vector<TriangleBox> boxes;
   boxes.reserve(lower.size());
   for (std::size_t i = 0; i < lower.size(); ++i) {
     const Vec3 &l = lower[i], &u = upper[i];
+    if (!l.allFinite() || !u.allFinite()) {
+      throw InputError(fmt::format("a corner of box {} is not finite", i));
+    }
     boxes.emplace_back(CGAL::Bbox_3(l.x(), l.y(), l.z(), u.x(), u.y(), u.z()), narrow<Index>(i));
   }
   std::vector<std::array<Index, 2>> found;
@@ -163,7 +172,11 @@ std::vector<std::array<Index, 2>> overlapping_boxes(const std::vector<Vec3>& low
 
 std::vector<std::array<Index, 2>> find_self_intersections(const TriangleMesh& mesh, const std::vector<Index>& patch,
                                                           const std::vector<std::array<Index, 3>>& patch_corners) {
-  TUNICA_ASSERT(patch.empty() || patch.size() == mesh.triangles.size());
+  require_valid(mesh);
+  if (!patch.empty() && (patch.size() != mesh.triangles.size() ||
+                         *std::max_element(patch.begin(), patch.end()) >= patch_corners.size())) {
+    throw InputError("the patches are not those of the triangles: one for each is needed, with its corners");
+  }
   Bodies bodies(mesh);
   std::vector<std::array<Index, 2>> found;
   if (!patch.empty()) {

@@ -1,7 +1,8 @@
 #include "tunica/surface/mesh/subdivide.hpp"
 
-#include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
+#include "tunica/core/require.hpp"
+#include "tunica/surface/mesh/checks.hpp"
 #include "tunica/surface/mesh/measure.hpp"
 
 #include <algorithm>
@@ -26,7 +27,8 @@ std::size_t count(const TriangleMesh& mesh, double longest_edge) {
 }  // namespace
 
 TriangleMesh subdivided(const TriangleMesh& mesh, double longest_edge, std::size_t most_triangles) {
-  TUNICA_ASSERT(longest_edge > 0);
+  require_valid(mesh);
+  require_positive(longest_edge, "the length of the longest edge");
   while (count(mesh, longest_edge) > std::max(most_triangles, mesh.triangles.size())) {
     longest_edge *= 1.25;
   }

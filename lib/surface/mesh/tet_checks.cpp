@@ -140,7 +140,21 @@ std::size_t require_sound(TetMesh& mesh, const std::string& name) {
   return turned;
 }
 
+void require_valid(const TetMesh& mesh) {
+  for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t) {
+    for (const Index v : mesh.tetrahedra[t]) {
+      if (v >= mesh.vertices.size()) {
+        throw InputError(fmt::format("tetrahedron {} names vertex {}, but there are {}", t, v, mesh.vertices.size()));
+      }
+      if (!std::isfinite(mesh.vertices[v].squaredNorm())) {
+        throw InputError(fmt::format("vertex {} of tetrahedron {} is not finite, or too far out to reckon with", v, t));
+      }
+    }
+  }
+}
+
 std::vector<std::array<Index, 3>> boundary_triangles(const TetMesh& mesh) {
+  require_valid(mesh);
   const std::vector<SortedFace> faces = sorted_faces(mesh);
   std::vector<SortedFace> outer;
   for (auto begin = faces.begin(); begin != faces.end();) {
@@ -169,6 +183,7 @@ std::vector<std::array<Index, 3>> boundary_triangles(const TetMesh& mesh) {
 }
 
 double smallest_dihedral(const TetMesh& mesh) {
+  require_valid(mesh);
   double smallest = std::numbers::pi;
   for (const std::array<Index, 4>& tet : mesh.tetrahedra) {
     std::array<Vec3, 4> normals;  // outward, as long as twice the areas

@@ -9,6 +9,10 @@ namespace tunica {
 /// Volume of a tetrahedron, mm^3; negative when it is inside out.
 double tet_volume(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d);
 
+/// What every function of a mesh relies on: corners that exist, and vertices of tetrahedra at finite places, so near
+/// that their squares are numbers, too. Errors: InputError that names the first tetrahedron at fault. Cost: linear.
+void require_valid(const TetMesh& mesh);
+
 /// Makes a mesh from anywhere one to compute with: indices in range, positions finite, every tetrahedron with a volume,
 /// and that positive: one that is inside out is turned by exchanging its last two corners.
 /// @param name  of the file, or whatever the mesh came from: messages begin with it

@@ -3,6 +3,8 @@
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/surface/decimation/degenerate.hpp"
+#include "tunica/surface/mesh/checks.hpp"
+#include "tunica/surface/mesh/seams.hpp"
 
 #include <Eigen/Geometry>
 
@@ -73,6 +75,7 @@ public:
     if (mesh_.triangles.empty()) {
       throw InputError("no triangle is left when those without corners of their own are dropped");
     }
+    close_seams();
     join();
     turn();
     split();
@@ -94,8 +97,19 @@ private:
         kept.push_back(t);
       }
     }
-    repairs_.dropped_triangles = mesh_.triangles.size() - kept.size();
+    repairs_.dropped_triangles += mesh_.triangles.size() - kept.size();
     mesh_.triangles = std::move(kept);
+  }
+
+  // What coincides becomes one; triangles narrower than that, and those that lie on others, go.
+  void close_seams() {
+    WithoutSeams whole = without_seams(std::move(mesh_));
+    mesh_ = std::move(whole.mesh);
+    repairs_.joined_edges = whole.joined_edges;
+    repairs_.split_edges = whole.split_edges;
+    if (whole.joined_edges > 0) {
+      drop();
+    }
   }
 
   [[nodiscard]] Index from(Side s) const { return mesh_.triangles[s / 3][s % 3]; }
@@ -343,6 +357,9 @@ private:
 
 }  // namespace
 
-Repaired repaired(const TriangleMesh& mesh) { return Repairer(mesh).run(); }
+Repaired repaired(const TriangleMesh& mesh) {
+  require_corners(mesh.vertices.size(), mesh.triangles);
+  return Repairer(mesh).run();
+}
 
 }  // namespace tunica

@@ -556,7 +556,9 @@ private:
     if (crossings_ == nullptr) {
       const Samples::Place half = Samples::padded(0.5 * along);
       for (std::size_t i = 0; i < count; ++i) {
-        const Samples::Place place = in_.samples(edges[i]) + half;
+        const std::array<std::size_t, 3> first{edges[i].column, edges[i].row, slice};
+        const Samples::Place start = in_.samples(edges[i]);
+        const Samples::Place place = grid_.starts_on_lid(first[axis], axis) ? start : start + half;
         out[i] = place.head<3>();
       }
       return;
@@ -587,6 +589,10 @@ private:
                     Vec3& vertex, std::size_t number) {
     std::array<std::size_t, 3> second = first;
     ++second[axis];
+    if (grid_.starts_on_lid(first[axis], axis)) {
+      vertex = start;
+      return;
+    }
     // Between a sample and the padding there is nothing to interpolate.
     if (grid_.is_padding(first[axis], axis) || grid_.is_padding(second[axis], axis)) {
       t = 0.5;

@@ -79,7 +79,7 @@ public:
       window_.first = {0, bounds->rows[0], bounds->slices[0]};
       window_.size = {mask.dims()[0], bounds->rows[1] - bounds->rows[0], bounds->slices[1] - bounds->slices[0]};
     }
-    const PaddedGrid grid(mask, window_, options.open_border);
+    const PaddedGrid grid(mask, window_, options.open_border, options.lids);
     const std::size_t slices = grid.size(2);
     counts_.resize(slices + 1);
     for_each_block(grid, slices, [&](Layers& layers, std::size_t begin, std::size_t end) {
@@ -111,7 +111,7 @@ public:
   void write(std::size_t begin, std::size_t end, const Crossings* crossings, std::size_t first_slice) {
     cell_layers::Window window = window_;
     window.first_slice = first_slice;
-    const PaddedGrid grid(mask_, window, options_.open_border);
+    const PaddedGrid grid(mask_, window, options_.open_border, options_.lids);
     std::array<Index, 3>* const triangles = mesh_.triangles.data();
     std::vector<std::vector<PinchedVertex>> pinched((end - begin + slices_per_block - 1) / slices_per_block);
     for_each_block(grid, end - begin, [&](Layers& layers, std::size_t from, std::size_t to) {

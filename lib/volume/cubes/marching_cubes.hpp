@@ -2,6 +2,7 @@
 
 #include "tunica/core/progress.hpp"
 #include "tunica/surface/mesh/triangle_mesh.hpp"
+#include "tunica/volume/labels/border_lids.hpp"
 #include "tunica/volume/labels/mask.hpp"
 #include "tunica/volume/labels/volume.hpp"
 
@@ -21,6 +22,8 @@ struct MarchingCubesOptions {
   /// image's border. true: beyond the image everything continues as it was, and the surface ends, open and flat, on
   /// the image's border (the outer faces of the outermost voxels).
   bool open_border = false;
+  /// With open_border: where the border closes the surface all the same. Lives until the mesh is there.
+  const BorderLids* lids = nullptr;
   /// The rest of the mask is not looked at; the mesh is the same.
   std::optional<MaskBounds> bounds;
   Progress progress;

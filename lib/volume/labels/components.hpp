@@ -1,4 +1,3 @@
-// volume/labels: volumes of voxels, and the bits that say which of them are inside.
 #pragma once
 
 #include "tunica/volume/labels/mask.hpp"

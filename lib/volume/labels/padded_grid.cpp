@@ -5,7 +5,8 @@
 
 namespace tunica::cell_layers {
 
-PaddedGrid::PaddedGrid(const Mask& mask, const Window& window, bool open) : mask_(mask), window_(window) {
+PaddedGrid::PaddedGrid(const Mask& mask, const Window& window, bool open, const BorderLids* lids)
+    : mask_(mask), window_(window), lids_(lids) {
   TUNICA_ASSERT(window.first[0] == 0 && window.size[0] == mask.dims()[0]);
   for (int axis = 0; axis < 3; ++axis) {
     size_[axis] = window.size[axis] + 2;
@@ -58,20 +59,40 @@ void PaddedGrid::load(std::size_t slice, Word* out, std::uint8_t* inside) const 
     if (given < words) {
       out[given] = carry;
     }
+    if (lids_ != nullptr) {
+      put_lids(out, 2, slice, in_image(row, 1));
+      put_lids(out, 1, row, in_image(slice, 2));
+    }
     if (open) {
-      continue_row(out);
+      continue_row(out, row, slice);
     }
   }
 }
 
-void PaddedGrid::continue_row(Word* row) const {
+void PaddedGrid::put_lids(Word* out, int axis, std::size_t padded, std::size_t other) const {
+  if (!is_padding(padded, axis)) {
+    return;
+  }
+  const std::vector<bool>& closed = lids_->closed[axis][padded == 0 ? 0 : 1];
+  for (std::size_t i = 0; !closed.empty() && i < mask_.dims()[0]; ++i) {
+    if (closed[i + mask_.dims()[0] * other]) {
+      out[(i + 1) / word_bits] &= ~(Word{1} << ((i + 1) % word_bits));
+    }
+  }
+}
+
+void PaddedGrid::continue_row(Word* row, std::size_t padded_row, std::size_t slice) const {
+  const std::size_t at = in_image(padded_row, 1) + mask_.dims()[1] * in_image(slice, 2);
+  const auto has_lid = [&](std::size_t side) {
+    return lids_ != nullptr && !lids_->closed[0][side].empty() && lids_->closed[0][side][at];
+  };
   const auto copy = [row](std::size_t from, std::size_t to) {
     row[to / word_bits] |= (row[from / word_bits] >> (from % word_bits) & 1) << (to % word_bits);
   };
-  if (open_[0][0]) {
+  if (open_[0][0] && !has_lid(0)) {
     copy(1, 0);
   }
-  if (open_[0][1]) {
+  if (open_[0][1] && !has_lid(1)) {
     copy(size_[0] - 2, size_[0] - 1);
     copy(size_[0] - 1, size_[0]);
   }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "tunica/volume/labels/border_lids.hpp"
 #include "tunica/volume/labels/mask.hpp"
 
 #include <Eigen/Core>
@@ -28,7 +29,8 @@ struct Window {
 /// edge towards it is crossed.
 class PaddedGrid {
 public:
-  PaddedGrid(const Mask& mask, const Window& window, bool open);
+  /// @param lids  where the padding is outside although the border is open; null: nowhere. Lives as long as this
+  PaddedGrid(const Mask& mask, const Window& window, bool open, const BorderLids* lids = nullptr);
 
   [[nodiscard]] std::size_t size(int axis) const { return size_[axis]; }
   [[nodiscard]] std::size_t words() const { return samples_.size(); }
@@ -47,6 +49,12 @@ public:
     return std::ranges::any_of(open_, [](const auto& sides) { return sides[0] || sides[1]; });
   }
 
+  /// Whether an edge along an axis from a padded sample lies on the image's border: where a lid closes an open border
+  /// at the lower side of an axis, the padding itself lies there.
+  [[nodiscard]] bool starts_on_lid(std::size_t padded, int axis) const {
+    return lids_ != nullptr && padded == 0 && open_[axis][0];
+  }
+
   /// The padded rows of a slice: size(1) x words() words, and for each row whether any sample in it is inside.
   /// @param inside  before: where it is 0 the row is 0 already
   void load(std::size_t slice, Word* out, std::uint8_t* inside) const;
@@ -63,13 +71,16 @@ public:
 
 private:
   /// Fills the bits around the image's samples, where the border is open.
-  void continue_row(Word* row) const;
+  void continue_row(Word* row, std::size_t padded_row, std::size_t slice) const;
+  /// Takes out of a row of the padding what lids close. @param axis  1 or 2: across which the row is padding
+  void put_lids(Word* out, int axis, std::size_t padded, std::size_t other) const;
   [[nodiscard]] std::size_t in_image(std::size_t padded, int axis) const {
     return std::clamp<std::size_t>(padded, 1, size_[axis] - 2) - 1 + window_.first[axis];
   }
 
   const Mask& mask_;
   Window window_;
+  const BorderLids* lids_;
   std::array<std::array<bool, 2>, 3> open_{};  ///< by axis and side
   std::array<std::size_t, 3> size_{};
   std::vector<Word> samples_;

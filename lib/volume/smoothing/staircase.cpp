@@ -100,7 +100,10 @@ public:
   }
 
   StaircaseResult run(const Progress& progress) {
-    const VertexNeighbours neighbours(mesh_, boundary_);
+    VertexNeighbours neighbours(mesh_, boundary_);
+    if (free_lids(neighbours)) {
+      neighbours = VertexNeighbours(mesh_, boundary_);
+    }
     std::tie(component_, components_) = label_components(mesh_);
     // The boundary first, as curves in their planes; then the rest, with the boundary given.
     relax(neighbours, boundary_, most_iterations, {});
@@ -147,6 +150,18 @@ public:
   }
 
 private:
+  /// The vertices of lids lie on the image's border, but have no edge of the boundary. @return whether there are any
+  bool free_lids(const VertexNeighbours& neighbours) {
+    bool any = false;
+    for (std::size_t v = 0; v < boundary_.size(); ++v) {
+      if (boundary_[v] && neighbours.alone(v)) {
+        boundary_[v] = false;
+        any = true;
+      }
+    }
+    return any;
+  }
+
   static constexpr int most_iterations = 60;
   static constexpr int most_last_iterations = 3;
   static constexpr int most_corrections = 8;
@@ -427,7 +442,7 @@ private:
   bool mirrored_ = false;
   std::vector<Vec3> start_;     ///< voxel coordinates of the input
   std::vector<Vec3> now_;       ///< and of the surface as it is
-  std::vector<bool> boundary_;  ///< on the image's border, with open_border
+  std::vector<bool> boundary_;  ///< vertices where the surface ends, on the image's border, with open_border
   std::vector<Vec3> low_;       ///< limits of each vertex
   std::vector<Vec3> high_;
   std::vector<Index> component_;

@@ -17,6 +17,13 @@ MeshFile read_stl(std::string_view bytes, const std::string& name);
 MeshFile read_off(std::string_view bytes, const std::string& name);
 MeshFile read_glb(std::string_view bytes, const std::string& name);
 
+/// The world axes that a text names anywhere, as in "3D Slicer output. SPACE=LPS": "LPS" or "RAS", in any case and also
+/// in full ("right-anterior-superior"); not as a part of other words. Errors: InputError when it names both.
+std::optional<std::string> space_in(std::string_view text, const std::string& name);
+
+/// Notes the world axes that a comment, header or name in the file says. Errors: InputError when it said others before.
+void take_space(MeshFile& file, std::string_view text, const std::string& name);
+
 /// Gathers the faces of a file and turns them into triangles in the order of the faces.
 class FaceCollector {
 public:

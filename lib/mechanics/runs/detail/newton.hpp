@@ -37,6 +37,7 @@ public:
 
   /// Whether the direct solver tells the error of its solutions, for one more solve each.
   void tell_direct_error(bool tell) { tell_direct_error_ = tell; }
+  [[nodiscard]] bool tells_direct_error() const { return tell_direct_error_; }
 
   [[nodiscard]] const FreeMask& free() const { return free_; }
   [[nodiscard]] std::size_t freedom_count() const;

@@ -22,6 +22,11 @@ State make_state(const ShellSystem& system, const Model& model, const Configurat
 /// or the factor of the loads where there is none.
 std::string describe_loads(const Model& model, const std::vector<double>& reached, const std::vector<double>& wanted);
 
+/// For the message of a run that found no equilibrium: where that is at a small part of a pressure, that Young's
+/// modulus may have another unit; else nothing.
+/// @param reached  factors of the loads
+std::string doubt_of_stiffness(const Model& model, const std::vector<double>& reached);
+
 /// Tells a state the error of its linear solve.
 void set_algebraic_error(const std::optional<AlgebraicError>& error, State& state);
 

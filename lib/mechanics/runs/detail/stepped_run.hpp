@@ -39,6 +39,11 @@ protected:
   [[nodiscard]] bool wants_state() const { return (summary_.steps + 1) % settings_.every == 0 || is_last(); }
   void hand_over(const State& state);
 
+  /// Tells whoever waits, once a run, that a step takes long; of models with contact.
+  /// @param iterations  of Newton's method in this step; at  "load factor 0.2 of 1"; why  its parts are short, and
+  /// where
+  void tell_slow_step(std::size_t iterations, const std::string& at, const std::string& why);
+
   ShellSystem& system_;
   const Model& model_;
   const RunSettings& settings_;
@@ -48,6 +53,7 @@ protected:
   bool ended_ = false;     ///< by the step that is being taken
 
 private:
+  std::function<void(const std::string&)> on_slow_step_;  ///< empty: nobody listens, or it has been told
   const StateCallback& on_state_;
 };
 

@@ -1,4 +1,4 @@
-#include "tunica/shell/distance/point_tree.hpp"
+#include "tunica/surface/mesh/point_tree.hpp"
 
 #include <gtest/gtest.h>
 
@@ -45,6 +45,33 @@ TEST(PointTree, FindsWhatAFullSortFinds) {
 TEST(PointTree, OfEqualDistancesTheSmallerIndexComesFirst) {
   const std::vector<Vec3> points(40, Vec3(1, 2, 3));
   EXPECT_EQ(PointTree(points).nearest(Vec3(0, 0, 0), 3), (std::vector<Index>{0, 1, 2}));
+}
+
+TEST(PointTree, BesideALineIsWhatLiesWithinReachOfIt) {
+  std::mt19937 random(11);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  const auto point = [&] { return Vec3(uniform(random), uniform(random), uniform(random)); };
+  for (const std::size_t count : {0u, 1u, 9u, 1000u}) {
+    std::vector<Vec3> points(count);
+    std::ranges::generate(points, point);
+    const PointTree tree(points);
+    for (int i = 0; i < 60; ++i) {
+      const Vec3 from = point();
+      // Along an axis and of no length, too.
+      const Vec3 to = i % 3 == 0 ? Vec3(from + Vec3::UnitY()) : i % 3 == 1 ? point() : from;
+      for (const double reach : {0.0, 0.1, 0.5}) {
+        std::vector<Index> expected;
+        for (Index v = 0; v < count; ++v) {
+          const Vec3 way = to - from;
+          const double at = way.isZero() ? 0 : std::clamp((points[v] - from).dot(way) / way.squaredNorm(), 0.0, 1.0);
+          if ((points[v] - from - at * way).norm() <= reach) {
+            expected.push_back(v);
+          }
+        }
+        EXPECT_EQ(tree.beside(from, to, reach), expected);
+      }
+    }
+  }
 }
 
 TEST(PointTree, AsksForNoMoreThanThereAre) {

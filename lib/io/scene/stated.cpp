@@ -1,0 +1,109 @@
+#include "tunica/io/scene/stated.hpp"
+
+#include <fmt/format.h>
+
+#include <string>
+
+namespace tunica {
+namespace {
+
+// What all items have in common; null where they differ, or where there is none.
+template <typename Items, typename Value>
+Json common(const Items& items, const Value& value_of) {
+  Json value;
+  for (const auto& item : items) {
+    const Json own = value_of(item);
+    if (&item != &items.front() && own != value) {
+      return {};
+    }
+    value = own;
+  }
+  return value;
+}
+
+Json known_or_null(const std::optional<double>& value, double scale = 1) {
+  return value ? Json(scale * *value) : Json();
+}
+
+Json typed(const Places& places, std::string_view key) {
+  const auto place = places.keys.find(key);
+  return place == places.keys.end() || place->second.typed.empty() ? Json() : Json(place->second.typed);
+}
+
+struct NameOfRegion {
+  std::string operator()(const AllNodes&) const { return "all"; }
+  std::string operator()(const BoundaryNodes&) const { return "boundary"; }
+  std::string operator()(const RigidMotions&) const { return "rigid-motions"; }
+  std::string operator()(const BoxNodes&) const { return "a box"; }
+  std::string operator()(const HalfSpaceNodes& half) const {
+    return fmt::format("{} {}={:g}mm", half.below ? "below" : "above", "xyz"[half.axis], half.at);
+  }
+  std::string operator()(const SphereNodes&) const { return "a sphere"; }
+  std::string operator()(const ListedNodes& list) const { return fmt::format("{} nodes", list.nodes.size()); }
+  std::string operator()(const NearestNode&) const { return "a node"; }
+  std::string operator()(const TouchingNodes&) const { return "what touches"; }
+};
+
+// What is held, with its body where there are several.
+std::string text_of(const SceneFix& fix, bool alone) {
+  const std::string& written = fix.places.item.typed;
+  const std::string region = written.empty() ? std::visit(NameOfRegion(), fix.where) : written;
+  return alone ? region : fmt::format("{}: {}", fix.body, region);
+}
+
+struct KindOfRun {
+  Json operator()(const StaticRun& run) const { return of("static", run.linear); }
+  Json operator()(const ArcLengthRun&) const { return of("static", false); }
+  Json operator()(const DynamicRun&) const { return of("dynamic", false); }
+  Json operator()(const FrequencyRun& run) const { return of("frequencies", run.preload.linear); }
+  Json operator()(const BucklingRun&) const { return of("buckling", true); }
+
+  static Json of(const char* kind, bool linear) {
+    return {{"kind", kind}, {"geometry", linear ? "linear" : "nonlinear"}};
+  }
+};
+
+}  // namespace
+
+Json stated_inputs(const Scene& scene) {
+  constexpr double kg_per_m3 = 1e12;  // in a tonne / mm^3
+  std::vector<SceneLoad> pressures;
+  for (const SceneLoad& load : scene.loads) {
+    if (std::holds_alternative<PressureLoad>(load.kind)) {
+      pressures.push_back(load);
+    }
+  }
+  const auto of_pressure = [](const SceneLoad& load) { return std::get<PressureLoad>(load.kind); };
+  const auto of_shells = [&](const auto& value) { return common(scene.shells, value); };
+  Json stated = std::visit(KindOfRun(), scene.run.kind);
+  stated["young_mpa"] = of_shells([](const SceneShell& shell) { return Json(shell.material.young); });
+  stated["poisson"] = of_shells([](const SceneShell& shell) { return Json(shell.material.poisson); });
+  stated["thickness_mm"] =
+      of_shells([](const SceneShell& shell) { return shell.thickness_from ? Json() : Json(shell.thickness); });
+  stated["density_kg_per_m3"] =
+      of_shells([](const SceneShell& shell) { return known_or_null(shell.material.density, kg_per_m3); });
+  stated["pressure_mpa"] = common(pressures, [&](const SceneLoad& load) { return Json(of_pressure(load).value); });
+  stated["imaged_at_mpa"] =
+      common(pressures, [&](const SceneLoad& load) { return known_or_null(of_pressure(load).imaged_at); });
+  stated["law"] = scene.shells.empty() ? Json() : Json("linear");
+  stated["support"] = nullptr;
+  stated["membrane"] = of_shells([](const SceneShell& shell) { return Json(name_of(shell.membrane)); });
+  stated["bending"] = of_shells([](const SceneShell& shell) { return Json(name_of(shell.bending)); });
+  stated["solver"] = scene.run.solver == Solver::cg ? "cg" : scene.run.solver == Solver::direct ? "direct" : "auto";
+  stated["fix"] = Json::array();
+  const bool alone = scene.shells.size() + scene.solids.size() == 1;
+  for (const SceneFix& fix : scene.fixes) {
+    stated["fix"].push_back(text_of(fix, alone));
+  }
+  Json& written = stated["typed"] = Json::object();
+  for (const char* key : {"young", "thickness", "density"}) {
+    written[key] = of_shells([&](const SceneShell& shell) { return typed(shell.places, key); });
+  }
+  written["pressure"] = common(pressures, [](const SceneLoad& load) { return typed(load.places, "value"); });
+  written["imaged_at"] = common(pressures, [](const SceneLoad& load) { return typed(load.places, "imaged_at"); });
+  written["duration"] = typed(scene.run_places, "duration");
+  written["step"] = typed(scene.run_places, "step");
+  return stated;
+}
+
+}  // namespace tunica
