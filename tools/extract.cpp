@@ -542,9 +542,8 @@ std::array<Selection, 2> both_faces(cli::Tool& tool, const Subject& subject, con
   if (hollows.sizes.empty()) {
     throw InputError(fmt::format(
         "{}: {} is no wall around a hollow, so it has no inner and no outer face: leave out --face; where it "
-        "is a wall with a hole, close that in the segmentation, and where it ends within the image, crop the image so "
-        "that "
-        "its border cuts the wall",
+        "is a wall with a hole or a slit, close that in the segmentation, and where it ends within the image, crop the "
+        "image so that its border cuts the wall",
         arguments.volume.string(), wall.target.name));
   }
   warn_all(tool, doubt_wall(subject, hollows));

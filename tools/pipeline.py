@@ -77,9 +77,9 @@ def stage_flags(case):
         relax += flag("--mid-surface", setting("MID_SURFACE")) + flag_if("--thickness", "THICKNESS")
     simulate = [word for fix in setting("FIX").split(";") if fix.strip() for word in flag("--fix", fix.strip())]
     simulate += flag_if("--accuracy", "ACCURACY") + flag_if("--of", "OF")
+    simulate += flag_if("--imaged-at", "IMAGED_AT")
     for name in ("pressure", "young", "poisson", "thickness", "density"):
         simulate += flag_if("--" + name, name.upper())
-    simulate += flag_if("--imaged-at", "IMAGED_AT")
     if setting("KIND") == "static":
         simulate += ["--static", *flag_if("--load-steps", "LOAD_STEPS")]
     else:
@@ -93,7 +93,9 @@ def stage_commands(case, binaries, flags):
     surface, coarse, shell, error_map, result, picture, refined, facts = (
         os.path.join(case.folder, name) for name in ("surface.ply", "coarse.ply", "shell.ply", "map.png", "result.hdf",
                                                      "picture.png", REFINED, "extract.json"))
-    refinement = ["--target", surface, "--shell-out", refined] if case.setting("ACCURACY") else []
+    # What the shells were fitted to tells the error of the mesh; with MID_SURFACE they lie half a wall from it.
+    refinement = ["--target", surface] if not case.setting("MID_SURFACE") and case.setting("KIND") == "static" else []
+    refinement += ["--shell-out", refined] if case.setting("ACCURACY") else []
     words = {"extract": [path_word(case.volume), surface], "decimate": [surface, coarse],
              "relax": [coarse, surface, shell, "--picture", error_map],
              "simulate": [shell, result, "--picture", picture, *refinement]}

@@ -17,7 +17,7 @@ _tunica_batch() {
         MEM= RUN= EXTRACT= DECIMATE= RELAX= SIMULATE= -j -k -n -h --help --version help' ;;
     SMOOTH) words='none staircase' ;;
     LARGEST | FILL | OPEN) words='0 1' ;;
-    OF) words='displacement energy volume stress' ;;
+    OF) words='membrane tension stress displacement energy volume' ;;
     METHOD) words='fit barycentre' ;;
     MID_SURFACE) words='inner outer' ;;
     KIND) words='static dynamic' ;;

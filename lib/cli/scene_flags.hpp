@@ -27,6 +27,9 @@ struct SceneFlags {
   /// The scene that they describe. Errors: UsageError.
   [[nodiscard]] Scene scene(const std::filesystem::path& mesh) const;
 
+  /// Nothing but the pressure of the image acts.
+  [[nodiscard]] bool pressure_is_imaged() const;
+
   /// Notes in the scene that they describe how its quantities were written.
   static void keep_typed(const CLI::App& app, Scene& scene);
 };
@@ -34,6 +37,7 @@ struct SceneFlags {
 /// How accurate the answer is to be.
 struct AccuracyFlags {
   std::optional<std::string> within, of, max_shells;
+  std::optional<double> max_seconds;
   std::optional<std::filesystem::path> target, shell_out;
 
   void declare(Tool& tool);

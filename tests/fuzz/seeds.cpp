@@ -203,7 +203,8 @@ void results(const Seeds& seeds) {
   ElementFields fields;
   fields.membrane_force.assign(shells, Vec3::Ones());
   fields.bending_moment.assign(shells, Vec3::Ones());
-  for (auto* list : {&fields.von_mises_top, &fields.von_mises_bottom, &fields.pressure}) {
+  for (auto* list : {&fields.von_mises_top, &fields.von_mises_bottom, &fields.membrane_von_mises, &fields.tension,
+                     &fields.pressure}) {
     list->assign(shells, 0.5);
   }
   fields.von_mises.assign(model.node_count(), 0.5);

@@ -61,7 +61,8 @@ protected:
     ElementFields result;
     result.membrane_force.assign(shells, Vec3::Constant(value));
     result.bending_moment.assign(shells, Vec3::Constant(2 * value));
-    for (auto* list : {&result.von_mises_top, &result.von_mises_bottom, &result.pressure}) {
+    for (auto* list : {&result.von_mises_top, &result.von_mises_bottom, &result.membrane_von_mises, &result.tension,
+                       &result.pressure}) {
       list->assign(shells, value);
     }
     result.von_mises.assign(model_.node_count(), value);

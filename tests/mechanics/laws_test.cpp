@@ -3,6 +3,7 @@
 #include "benchmarks.hpp"
 #include "tunica/mechanics/elements/rotation.hpp"
 #include "tunica/mechanics/runs/detail/shell_system.hpp"
+#include "tunica/mechanics/runs/fields.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Eigenvalues>

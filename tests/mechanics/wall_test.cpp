@@ -2,6 +2,7 @@
 
 #include "tunica/mechanics/model/wall.hpp"
 #include "benchmarks.hpp"
+#include "tunica/mechanics/runs/fields.hpp"
 
 #include <gtest/gtest.h>
 

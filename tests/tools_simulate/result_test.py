@@ -20,7 +20,7 @@ STATIC = MATERIAL + ["--fix", "rigid-motions", "--static", "--load-steps", "3"]
 DYNAMIC = MATERIAL + ["--density", "1100kg/m3", "--duration", "40ms", "--step", "10ms"]
 POINT_FIELDS = {"displacement": 3, "rotation": 3, "von_mises": 1, "normal": 3, "thickness": 1}
 ELEMENT_FIELDS = {"pressure": 1, "von_mises_top": 1, "von_mises_bottom": 1, "membrane_force": 3, "bending_moment": 3,
-                  "principal_strain_top": 2, "principal_strain_bottom": 2}
+                  "principal_strain_top": 2, "principal_strain_bottom": 2, "membrane_von_mises": 1, "tension": 1}
 CELL_FIELDS = {"body": 1, **ELEMENT_FIELDS}
 
 
@@ -265,8 +265,8 @@ nearest = ["0mm", "0mm", "{RADIUS}mm"]
             self.assertEqual(history["load_factor"][:].tolist(), [0, 0.25, 0.5, 1])
             self.assertEqual(set(history), {"time", "load_factor", "volume", "strain_energy", "kinetic_energy",
                                             "residual", "newton_iterations", "cg_iterations", "max_displacement",
-                                            "displacement_p99", "stress_p99", "stress_max", "stress_max_at",
-                                            "strain_p99", "strain_max"})
+                                            "displacement_p99", "membrane_p99", "membrane_max", "tension_p99",
+                                            "stress_p99", "stress_max", "stress_max_at", "strain_p99", "strain_max"})
             self.assertTrue(all(len(history[name]) == 4 for name in history))
             self.assertTrue((np.diff(history["volume"]) > 0).all())
             self.assertTrue((np.diff(history["strain_energy"]) > 0).all())

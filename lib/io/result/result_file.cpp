@@ -171,17 +171,23 @@ constexpr std::array about{
     About{"tunica/history/cg_iterations", "1", "iterations of conjugate gradients in the step"},
     About{"tunica/history/max_displacement", "mm", "largest of the curved surfaces"},
     About{"tunica/history/displacement_p99", "mm", "passed on 1 % of the shells' area"},
-    About{"tunica/history/stress_p99", "MPa", "von Mises stress, averaged at the nodes, passed on 1 % of the area"},
-    About{"tunica/history/stress_max", "MPa", "largest von Mises stress, averaged at the nodes"},
+    About{"tunica/history/membrane_p99", "MPa",
+          "von Mises stress of the mean over the wall, passed on 1 % of the area"},
+    About{"tunica/history/membrane_max", "MPa", "largest von Mises stress of the mean over the wall"},
+    About{"tunica/history/tension_p99", "N/mm", "largest principal membrane force, passed on 1 % of the area"},
+    About{"tunica/history/stress_p99", "MPa", "von Mises stress of either face, passed on 1 % of the area"},
+    About{"tunica/history/stress_max", "MPa", "largest von Mises stress of either face"},
     About{"tunica/history/stress_max_at", "mm", "the node where it is, reference"},
     About{"tunica/history/strain_p99", "%", "largest principal strain of either face, passed on 1 % of the area"},
-    About{"tunica/history/strain_max", "%", "largest principal strain of either face, averaged at the nodes"}};
+    About{"tunica/history/strain_max", "%", "largest principal strain of either face"}};
 
 // Of the shells' fields, in CellData and in tunica/elements.
 constexpr std::array about_shell_fields{
     About{"pressure", "MPa", "pressure on the shell"},
     About{"von_mises_top", "MPa", "von Mises stress at the face the normal points to, constant in each shell"},
     About{"von_mises_bottom", "MPa", "von Mises stress at the other face, constant in each shell"},
+    About{"membrane_von_mises", "MPa", "von Mises stress of the mean over the wall, constant in each shell"},
+    About{"tension", "N/mm", "largest principal membrane force, per current length, constant in each shell"},
     About{"membrane_force", "N/mm", "xx, yy, xy in the shell's own frame, x along its first edge"},
     About{"bending_moment", "N", "moment per length: xx, yy, xy in the same frame"},
     About{"principal_strain_top", "1", "largest and smallest strain at the face the normal points to"},
@@ -410,9 +416,9 @@ struct ResultFile::Implementation {
     node_rotation = Series(writer, group.get(), "rotation", H5T_NATIVE_DOUBLE, {nodes, 3}, nodes_chunk_rows, true);
 
     const Handle history = writer.group(tunica_group.get(), "history");
-    for (const char* name :
-         {"time", "load_factor", "volume", "strain_energy", "kinetic_energy", "residual", "max_displacement",
-          "displacement_p99", "stress_p99", "stress_max", "strain_p99", "strain_max"}) {
+    for (const char* name : {"time", "load_factor", "volume", "strain_energy", "kinetic_energy", "residual",
+                             "max_displacement", "displacement_p99", "membrane_p99", "membrane_max", "tension_p99",
+                             "stress_p99", "stress_max", "strain_p99", "strain_max"}) {
       numbers.emplace_back(writer, history.get(), name, H5T_NATIVE_DOUBLE, std::vector<Size>{}, history_chunk, false);
     }
     for (const char* name : {"newton_iterations", "cg_iterations"}) {
@@ -532,7 +538,7 @@ struct ResultFile::Implementation {
     node_displacement.append(writer, 1, flattened(state.displacement).data());
     node_rotation.append(writer, 1, flattened(state.rotation).data());
     const Wall& wall = of_elements.wall;
-    const std::array<double, 12> history{state.time,
+    const std::array<double, 15> history{state.time,
                                          state.load_factor,
                                          state.volume.value_or(std::numeric_limits<double>::quiet_NaN()),
                                          state.strain_energy,
@@ -540,6 +546,9 @@ struct ResultFile::Implementation {
                                          state.residual,
                                          of_elements.largest_displacement,
                                          of_elements.displacement_p99,
+                                         wall.membrane_p99,
+                                         wall.membrane_max,
+                                         wall.tension_p99,
                                          wall.stress_p99,
                                          wall.stress_max,
                                          1e2 * wall.strain_p99,

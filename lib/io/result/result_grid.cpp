@@ -24,6 +24,8 @@ constexpr std::array point_fields{GridField{"displacement", 3, false}, GridField
 constexpr std::array shell_fields{GridField{"pressure", 1, true},
                                   GridField{"von_mises_top", 1, true},
                                   GridField{"von_mises_bottom", 1, true},
+                                  GridField{"membrane_von_mises", 1, true},
+                                  GridField{"tension", 1, true},
                                   GridField{"membrane_force", 3, true},
                                   GridField{"bending_moment", 3, true},
                                   GridField{"principal_strain_top", 2, true},
@@ -320,6 +322,8 @@ std::vector<std::vector<float>> ResultGrid::element_values(const ElementFields& 
     put(fields.pressure);
     put(fields.von_mises_top);
     put(fields.von_mises_bottom);
+    put(fields.membrane_von_mises);
+    put(fields.tension);
     put(fields.membrane_force);
     put(fields.bending_moment);
     put(fields.principal_strain_top);

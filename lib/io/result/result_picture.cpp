@@ -5,7 +5,6 @@
 #include "tunica/draw/picture.hpp"
 #include "tunica/io/result/detail/result_grid.hpp"
 #include "tunica/mechanics/contact/rigid_shape.hpp"
-#include "tunica/mechanics/model/wall.hpp"
 #include "tunica/surface/mesh/measure.hpp"
 #include "tunica/surface/mesh/tet_checks.hpp"
 
@@ -72,19 +71,10 @@ void add_solid_strain(const SolidBody& solid, const Vec3* displacement, double* 
 }
 
 std::vector<double> strain_at_nodes(const Model& model, const State& state, const ElementFields& fields) {
-  const auto averaged = [&](const std::vector<Vec2>& principal) {
-    std::vector<double> largest;
-    for (const Vec2& of_element : principal) {
-      largest.push_back(of_element[0]);
-    }
-    std::vector<double> means = averaged_at_nodes(model, largest);
-    means.resize(model.node_count(), 0);
-    return means;
-  };
-  std::vector<double> strain = averaged(fields.principal_strain_top);
-  const std::vector<double> bottom = averaged(fields.principal_strain_bottom);
-  for (std::size_t v = 0; v < strain.size(); ++v) {
-    strain[v] = std::max({strain[v], bottom[v], 0.0});
+  std::vector<double> strain = fields.strain;
+  strain.resize(model.node_count(), 0);
+  for (double& value : strain) {
+    value = std::max(value, 0.0);
   }
   for (std::size_t s = 0; s < model.solids.size(); ++s) {
     const std::size_t first = model.first_node(model.shells.size() + s);

@@ -67,6 +67,9 @@ void require_expressible(const Model& model, const RunSettings& run, Deck deck) 
       refuse(deck, "a fix has a ramp, and the file has one step in which displacements grow in proportion");
     }
   }
+  if (model.is_imaged_under_pressure()) {
+    refuse(deck, "the file has no prestress, and the wall is imaged under pressure");
+  }
   require_loads(model, statics->linear, deck);
   if (deck == Deck::feb) {
     require_no_lone_rotations(model);

@@ -169,6 +169,9 @@ struct SceneAccuracy {
   Places places;
 };
 
+/// MPa: the stiffness of a wall of which none is stated, because none is needed.
+inline constexpr double any_young = 1;
+
 struct Scene {
   RunSettings run;
   std::optional<SceneAccuracy> accuracy;
@@ -202,6 +205,9 @@ void settle_until(Scene& scene);
 /// Checks all that can be checked without a mesh: ranges, signs, required densities, names, duplicates.
 /// Errors: InputError or UsageError that starts with the place.
 void check_scene(const Scene& scene);
+
+/// Whether what a scene says of places, loads and supports can be said of finer meshes of the same bodies.
+bool holds_for_finer_meshes(const Scene& scene);
 
 struct LoadedScene {
   Model model;

@@ -236,7 +236,9 @@ void read_accuracy(const toml::table& node, const std::string& file, const fs::p
                            {{"displacement", Quantity::displacement},
                             {"energy", Quantity::energy},
                             {"volume", Quantity::volume},
-                            {"stress", Quantity::stress}});
+                            {"stress", Quantity::stress},
+                            {"membrane", Quantity::membrane},
+                            {"tension", Quantity::tension}});
   }
   if (table.has("target")) {
     for (const auto& [name, path] : table.table("target", R"({vessel = "surface.ply"})")) {
@@ -277,7 +279,8 @@ void read_fix(const SceneTable& table, bool dynamic, Scene& scene) {
 }
 
 void read_load(const toml::table& node, const std::string& file, bool dynamic, Scene& scene) {
-  constexpr std::array<std::string_view, 7> all{"body", "kind", "value", "follower", "ramp", "where", "imaged_at"};
+  constexpr std::array<std::string_view, 8> all{"body", "kind",  "value",     "follower",
+                                                "ramp", "where", "imaged_at", "unload"};
   const SceneTable table(node, file, "[[load]]", all);
   SceneLoad load;
   load.places = table.places();
@@ -292,7 +295,7 @@ void read_load(const toml::table& node, const std::string& file, bool dynamic, S
                       {"edge", Kind::edge},
                       {"area", Kind::area},
                       {"gravity", Kind::gravity}});
-  for (const char* key : {"follower", "imaged_at"}) {
+  for (const char* key : {"follower", "imaged_at", "unload"}) {
     if (kind != Kind::pressure && table.has(key)) {
       table.place(key).fail(fmt::format("{} belongs to a pressure: remove it", key));
     }
@@ -311,7 +314,11 @@ void read_load(const toml::table& node, const std::string& file, bool dynamic, S
     case Kind::pressure:
       load.kind = PressureLoad{
           table.quantity("value", dimension::pressure), !table.has("follower") || table.flag("follower"),
-          table.has("imaged_at") ? std::optional(table.quantity("imaged_at", dimension::pressure)) : std::nullopt};
+          table.has("imaged_at") ? std::optional(table.quantity("imaged_at", dimension::pressure)) : std::nullopt,
+          table.has("unload") && table.flag("unload")};
+      if (table.has("unload") && !table.has("imaged_at")) {
+        table.place("unload").fail("unload takes off the pressure of the image: add imaged_at, or remove unload");
+      }
       break;
     case Kind::force:
       load.kind = ForceLoad{{}, table.vector("value", dimension::force, R"(["0N", "0N", "-1N"])")};

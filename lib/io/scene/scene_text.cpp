@@ -260,7 +260,9 @@ void write_file(std::string_view key, const std::filesystem::path& mesh, std::op
 }
 
 void write_material(const Material& material, Text& text) {
-  text.value("young", material.young, "Pa", dimension::pressure);
+  if (material.young_stated) {
+    text.value("young", material.young, "Pa", dimension::pressure);
+  }
   text.line("poisson", number(material.poisson));
   if (material.density) {
     text.value("density", *material.density, "kg/m3", dimension::density);
@@ -388,6 +390,7 @@ void write_kind(const PressureLoad& load, Text& text) {
   text.line("follower", load.follower ? "true" : "false");
   if (load.imaged_at) {
     text.value("imaged_at", *load.imaged_at, "Pa", dimension::pressure);
+    text.line("unload", load.unload ? "true" : "false");
   }
 }
 void write_kind(const ForceLoad& load, Text& text) {

@@ -76,7 +76,8 @@ Json stated_inputs(const Scene& scene) {
   const auto of_pressure = [](const SceneLoad& load) { return std::get<PressureLoad>(load.kind); };
   const auto of_shells = [&](const auto& value) { return common(scene.shells, value); };
   Json stated = std::visit(KindOfRun(), scene.run.kind);
-  stated["young_mpa"] = of_shells([](const SceneShell& shell) { return Json(shell.material.young); });
+  stated["young_mpa"] = of_shells(
+      [](const SceneShell& shell) { return shell.material.young_stated ? Json(shell.material.young) : Json(); });
   stated["poisson"] = of_shells([](const SceneShell& shell) { return Json(shell.material.poisson); });
   stated["thickness_mm"] =
       of_shells([](const SceneShell& shell) { return shell.thickness_from ? Json() : Json(shell.thickness); });

@@ -159,6 +159,7 @@ struct DirectSolver::Implementation {
   std::vector<int> negative;  ///< per front: negative pivots, or -1
   double factor_work = 0;
   double solve_work = 0;
+  std::size_t values = 0;  ///< of the matrix
 
   Panel panel(const Front& f) { return {factor.get() + f.panel, f.rows, f.columns, Eigen::OuterStride<>(f.rows)}; }
   [[nodiscard]] ConstantPanel panel(const Front& f) const {
@@ -178,6 +179,7 @@ struct DirectSolver::Implementation {
 };
 
 void DirectSolver::Implementation::analyse(const BlockMatrix& pattern, const FreeMask& free) {
+  values = pattern.values.size();
   components.resize(pattern.node_count());
   std::vector<Index> nodes;
   std::vector<int> number(pattern.node_count(), -1);
@@ -474,7 +476,8 @@ int DirectSolver::Implementation::eliminate(std::size_t index, const BlockMatrix
 
 DirectSolver::DirectSolver(const BlockMatrix& pattern, const FreeMask& free)
     : implementation_(std::make_unique<Implementation>()) {
-  TUNICA_ASSERT(pattern.column.size() < UINT32_MAX);
+  require_freedoms(free.size(), pattern.node_count());
+  TUNICA_ASSERT(pattern.column.size() < UINT32_MAX);  // its values alone would be a terabyte
   try {
     implementation_->analyse(pattern, free);
   } catch (const std::bad_alloc&) {
@@ -487,6 +490,9 @@ DirectSolver::DirectSolver(DirectSolver&&) noexcept = default;
 
 DirectSolver::Factored DirectSolver::factor(const BlockMatrix& matrix) {
   Implementation& s = *implementation_;
+  if (matrix.values.size() != s.values || matrix.node_count() != s.components.size()) {
+    throw InputError("a matrix of another pattern cannot be factored");
+  }
   if (s.fronts.empty()) {
     return {};
   }
@@ -513,6 +519,7 @@ DirectSolver::Factored DirectSolver::factor(const BlockMatrix& matrix) {
 
 void DirectSolver::solve(const VectorX& b, VectorX& x) const {
   const Implementation& s = *implementation_;
+  require_freedoms(narrow<std::size_t>(b.size()), s.components.size());
   Eigen::VectorXd y(s.freedoms.size());
   for (std::size_t k = 0; k < s.freedoms.size(); ++k) {
     y[k] = b[s.freedoms[k]];

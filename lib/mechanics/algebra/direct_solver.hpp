@@ -16,7 +16,9 @@ using FreeMask = std::vector<bool>;
 /// Source: Duff, Reid 1983, "The multifrontal solution of indefinite sparse symmetric linear equations".
 class DirectSolver {
 public:
-  /// Errors: MemoryError when the factor does not fit into the memory.
+  /// @param pattern  as make_block_matrix() makes it
+  /// Errors: InputError when `free` has not 6 entries per node; MemoryError when the factor does not fit into the
+  /// memory.
   DirectSolver(const BlockMatrix& pattern, const FreeMask& free);
   ~DirectSolver();
   DirectSolver(DirectSolver&&) noexcept;
@@ -28,9 +30,10 @@ public:
     std::size_t negative_pivots = 0;
     bool regular = true;  ///< false: a pivot vanished, there is no factor to solve with
   };
+  /// Errors: InputError when the matrix has not the size of the pattern; Interrupted.
   Factored factor(const BlockMatrix& matrix);
 
-  /// x = A^-1 b on the free freedoms, with the last factor.
+  /// x = A^-1 b on the free freedoms, with the last factor. Errors: InputError when b has another size.
   void solve(const VectorX& b, VectorX& x) const;
 
   /// Multiplications of one factor() and of one solve().

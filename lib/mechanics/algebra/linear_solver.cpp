@@ -3,7 +3,10 @@
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/core/progress.hpp"
+#include "tunica/core/require.hpp"
 #include "tunica/core/threads.hpp"
+
+#include <fmt/format.h>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Dense>
@@ -13,6 +16,9 @@
 namespace tunica {
 
 void mask(const FreeMask& free, VectorX& v) {
+  if (narrow<std::size_t>(v.size()) != free.size()) {
+    throw InputError(fmt::format("{} marks for {} numbers", free.size(), v.size()));
+  }
   for (std::size_t i = 0; i < free.size(); ++i) {
     if (!free[i]) {
       v[i] = 0;
@@ -57,10 +63,19 @@ struct BlockJacobi {
   }
 };
 
+void require_solvable(const BlockMatrix& matrix, const FreeMask& free, const VectorX& b, const CgOptions& options) {
+  require_freedoms(free.size(), matrix.node_count());
+  require_freedoms(narrow<std::size_t>(b.size()), matrix.node_count());
+  if (!options.fixed_count) {
+    require_not_negative(options.tolerance, "the tolerance of conjugate gradients");
+  }
+}
+
 }  // namespace
 
 CgResult conjugate_gradients(const BlockMatrix& matrix, const FreeMask& free, const VectorX& b,
                              const CgOptions& options, VectorX& x) {
+  require_solvable(matrix, free, b, options);
   const BlockJacobi preconditioner(matrix, free);
   std::vector<Eigen::Index> held;
   for (std::size_t i = 0; i < free.size(); ++i) {
@@ -140,6 +155,7 @@ CgResult conjugate_gradients(const BlockMatrix& matrix, const FreeMask& free, co
 
 AlgebraicError error_by_factor(const BlockMatrix& matrix, const FreeMask& free, const DirectSolver& solver,
                                const VectorX& b, const VectorX& x) {
+  require_freedoms(narrow<std::size_t>(b.size()), matrix.node_count());
   VectorX product;
   multiply(matrix, x, product);
   VectorX r = b - product;
@@ -153,6 +169,7 @@ double gmres(const BlockMatrix& matrix, const FreeMask& free, const DirectSolver
              VectorX& x) {
   constexpr double tolerance = 1e-4;
   constexpr std::size_t most = 30;
+  require_freedoms(narrow<std::size_t>(b.size()), matrix.node_count());
   const double norm = std::sqrt(dot(b, b));
   VectorX product;
   const auto residual = [&] {

@@ -112,20 +112,26 @@ public:
   /// Of the last results(): the sum over all bodies of forces and moments, relative to the sum of their magnitudes.
   [[nodiscard]] std::array<double, 2> imbalance() const { return imbalance_; }
 
+  /// Per contact the largest pressure of any accepted state so far, also of those within a step, MPa.
+  [[nodiscard]] const std::vector<double>& pressed() const { return pressed_; }
+
   struct Pressing {
     double pressure = 0;  ///< MPa
     double area = 0;      ///< mm^2
   };
 
   /// What is kept between steps, so that a run that goes on repeats the uninterrupted one: of the last accepted state
-  /// how stiff the barrier is, who may meet, how finely what is near is sampled, and with friction how far each sample
-  /// has slipped. Cost: two numbers per face, with friction five per sample.
+  /// how stiff the barrier is, what has pressed so far, who may meet, how finely what is near is sampled, and with
+  /// friction how far each sample has slipped. Cost: two numbers per face, with friction five per sample.
   [[nodiscard]] std::vector<double> memory() const;
   /// Puts the contact back to an accepted state.
   /// @param memory  of the same model; configuration, time  of that state
   void recall(const std::vector<double>& memory, const Configuration& configuration, double time);
 
 private:
+  /// Two surfaces of one body are as far apart as they were in the reference: this part of it counts as no contact.
+  static constexpr double own_distance = 0.9;
+
   struct Sample {
     Vec2 at;
     PatchWeights weights;
@@ -184,8 +190,12 @@ private:
   [[nodiscard]] bool is_close(const Group& group, const std::vector<std::size_t>& near, const FaceMaps& maps) const;
   /// Errors: InputError: bodies overlap in the reference.
   void require_apart(const Model& model);
-  /// Errors: InputError: a body that touches itself passes through itself at points that its parts share.
+  /// Errors: InputError: a body that touches itself passes through itself at points that its parts share, or lies in
+  /// itself.
   void require_no_own_crossing(const Model& model) const;
+  /// Where, if anywhere, faces of one piece of a body that touches itself are nearer than contact can hold them apart,
+  /// though it is far from one to the other along the surface. Of solids none is looked for.
+  [[nodiscard]] std::optional<Vec3> first_fold(const Model& model, std::size_t contact) const;
   /// Makes the samples of a group.
   void sample(Group& group, int level) const;
   /// Makes samples where there are none.
@@ -266,6 +276,7 @@ private:
   };
   Closest closest_;                       ///< at the last forces
   std::vector<double> largest_pressure_;  ///< MPa, per contact, of the last forces
+  std::vector<double> pressed_;           ///< MPa, per contact, of all accepted states
   std::vector<std::array<Index, 2>> pairs_;
   bool pairs_are_new_ = false;  ///< nobody has been told yet
   const Configuration rest_;

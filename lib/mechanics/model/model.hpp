@@ -38,6 +38,7 @@ struct Material {
   double young = 0;               ///< MPa
   double poisson = 0;             ///< in (-1, 0.5)
   std::optional<double> density;  ///< tonne / mm^3; required by dynamics and gravity
+  bool young_stated = true;       ///< false: `young` is any number, and the stress does not depend on it
 };
 
 struct ShellBody {
@@ -73,6 +74,7 @@ template <typename Value>
 struct Table {
   std::vector<std::pair<double, Value>> points;  ///< (time s, value), times increasing, at least one
 
+  /// Errors: InputError: no point.
   [[nodiscard]] Value at(double time) const;
 };
 
@@ -178,7 +180,14 @@ struct RigidMotionsFix {
 struct PressureLoad {
   double value = 0;                   ///< MPa
   bool follower = true;               ///< turns and grows with the surface
-  std::optional<double> imaged_at{};  ///< MPa, under which the shells were imaged
+  std::optional<double> imaged_at{};  ///< MPa, under which the shells were imaged: the load begins there
+  bool unload = false;                ///< the shape without that pressure is to be found, and the load begins at zero
+
+  /// MPa, at a factor of the load: from what it begins with to `value`.
+  [[nodiscard]] double at(double factor) const {
+    const double begin = imaged_at.value_or(0);
+    return begin + factor * (value - begin);
+  }
 };
 struct ForceLoad {
   std::vector<Index> nodes;
@@ -226,8 +235,11 @@ struct Model {
   std::vector<Load> loads;
   std::vector<Probe> probes;
 
+  /// Whether some pressure, other than zero, says that the bodies were imaged under it.
+  [[nodiscard]] bool is_imaged_under_pressure() const;
   [[nodiscard]] std::size_t body_count() const { return shells.size() + solids.size(); }
   [[nodiscard]] bool is_solid(std::size_t body) const { return body >= shells.size(); }
+  // Errors: InputError: there is no such body.
   [[nodiscard]] const std::string& name_of(std::size_t body) const;
   /// Reference positions of a body's nodes.
   [[nodiscard]] const std::vector<Vec3>& vertices_of(std::size_t body) const;

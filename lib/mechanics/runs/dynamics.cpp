@@ -162,10 +162,10 @@ public:
     memory["length_before"] = {length_before_};
   }
 
-  void recall(const Memory& memory) {
-    rate_ = of_elements(memory.at("viscous_rate"));
-    before_ = of_elements(memory.at("deformation_before"));
-    length_before_ = memory.at("length_before").at(0);
+  void recall(const Checkpoint& from) {
+    rate_ = of_elements(from, "viscous_rate");
+    before_ = of_elements(from, "deformation_before");
+    length_before_ = remembered(from, "length_before", 1)[0];
   }
 
 private:
@@ -178,9 +178,11 @@ private:
   }
 
   /// Of the elements, or of none.
-  [[nodiscard]] std::vector<ElementState> of_elements(const std::vector<double>& numbers) const {
+  [[nodiscard]] std::vector<ElementState> of_elements(const Checkpoint& from, std::string_view name) const {
     constexpr std::size_t size = ElementState::SizeAtCompileTime;
-    TUNICA_ASSERT(numbers.empty() || numbers.size() == size * system_.elements.size());
+    const auto found = from.memory.find(name);
+    const bool none = found != from.memory.end() && found->second.empty();
+    const std::vector<double>& numbers = remembered(from, name, none ? 0 : size * system_.elements.size());
     std::vector<ElementState> result(numbers.size() / size);
     for (std::size_t e = 0; e < result.size(); ++e) {
       result[e] = Eigen::Map<const ElementState>(numbers.data() + size * e);
@@ -314,20 +316,19 @@ public:
     return result;
   }
 
-  void recall(const Memory& memory, Motion& motion) {
+  void recall(const Checkpoint& from, Motion& motion) {
     for (auto [name, vector] :
          {std::pair{"velocity", &motion.rates.velocity}, std::pair{"acceleration", &motion.rates.acceleration},
           std::pair{"auxiliary", &motion.rates.auxiliary}, std::pair{"acting", &acting_}}) {
-      const std::vector<double>& values = memory.at(name);
-      TUNICA_ASSERT(values.size() == narrow<std::size_t>(mass_.size()));
+      const std::vector<double>& values = remembered(from, name, narrow<std::size_t>(mass_.size()));
       vector->resize(mass_.size());
       std::copy(values.begin(), values.end(), vector->begin());
     }
     deformation_.clear();
     work_ = damped_ = 0;
-    part_ = memory.at("part").at(0);
-    at_rest_ = memory.at("at_rest").at(0) != 0;
-    damping_.recall(memory);
+    part_ = remembered(from, "part", 1)[0];
+    at_rest_ = remembered(from, "at_rest", 1)[0] != 0;
+    damping_.recall(from);
     braking_ = run_.damping.mass * mass_.cwiseProduct(motion.rates.velocity);
   }
 
@@ -610,9 +611,10 @@ private:
   void resume(const Checkpoint& from) override {
     time_ = from.position;
     motion_.configuration = recall(from);
-    stepper_.recall(from.memory, motion_);
-    if (const auto found = from.memory.find("last_change"); found != from.memory.end()) {
-      last_change_ = Eigen::Map<const VectorX>(found->second.data(), narrow<Eigen::Index>(found->second.size()));
+    stepper_.recall(from, motion_);
+    if (from.memory.contains("last_change")) {
+      const Eigen::Index size = first_freedom(system_.node_count());
+      last_change_ = Eigen::Map<const VectorX>(remembered(from, "last_change", narrow<std::size_t>(size)).data(), size);
     }
   }
 

@@ -13,12 +13,13 @@ std::array<Vec3, 3> reference_corners(const ShellElement& e) {
   return {e.from_centroid.col(0), e.from_centroid.col(1), e.from_centroid.col(2)};
 }
 
-void add_dead_pressure(const ShellSystem& system, std::size_t element, double value, DeadLoad& load) {
+/// A pressure of 1 MPa.
+void add_dead_pressure(const ShellSystem& system, std::size_t element, DeadLoad& load) {
   const ShellElement& e = system.elements[element];
   Vector9 force;
   unit_pressure(reference_corners(e), system.heights[element], force, nullptr);
   for (int k = 0; k < 3; ++k) {
-    load.force.segment<3>(first_freedom(e.nodes[k])) += value * force.segment<3>(3 * k);
+    load.force.segment<3>(first_freedom(e.nodes[k])) += force.segment<3>(3 * k);
   }
 }
 
@@ -57,7 +58,7 @@ void add_edge_load(const ShellSystem& system, const Model& model, std::size_t bo
   }
 }
 
-/// Pressure that keeps its direction, or a force per area, on the surface of a solid.
+/// Pressure of 1 MPa that keeps its direction, or a force per area, on the surface of a solid.
 void add_solid_surface_load(const ShellSystem& system, const Load& load, DeadLoad& dead) {
   const auto* pressure = std::get_if<PressureLoad>(&load.kind);
   const auto* area = std::get_if<AreaLoad>(&load.kind);
@@ -68,8 +69,7 @@ void add_solid_surface_load(const ShellSystem& system, const Load& load, DeadLoa
     const auto& v = system.surfaces.faces[f].nodes;
     const Vec3 twice =
         (system.reference[v[1]] - system.reference[v[0]]).cross(system.reference[v[2]] - system.reference[v[0]]);
-    const Vec3 force =
-        pressure != nullptr ? Vec3(pressure->value / 6 * twice) : Vec3(twice.norm() / 6 * area->per_area);
+    const Vec3 force = pressure != nullptr ? Vec3(twice / 6) : Vec3(twice.norm() / 6 * area->per_area);
     for (const Index node : v) {
       dead.force.segment<3>(first_freedom(node)) += force;
     }
@@ -98,8 +98,10 @@ void make_loads(ShellSystem& system, const Model& model) {
       dead.director.assign(system.node_count(), Mat3::Zero());
     }
     if (const auto* pressure = std::get_if<PressureLoad>(&load.kind)) {
+      dead.begin = pressure->at(0);
+      dead.end = pressure->at(1);
       for (std::size_t e = begin; e < end; ++e) {
-        add_dead_pressure(system, e, pressure->value, dead);
+        add_dead_pressure(system, e, dead);
       }
     } else if (const auto* area = std::get_if<AreaLoad>(&load.kind)) {
       for (std::size_t e = begin; e < end; ++e) {

@@ -3,6 +3,7 @@
 #include "tunica/core/narrow.hpp"
 #include "tunica/mechanics/algebra/lanczos.hpp"
 #include "tunica/mechanics/elements/rotation.hpp"
+#include "tunica/mechanics/runs/detail/linear_statics.hpp"
 #include "tunica/mechanics/runs/detail/run.hpp"
 #include "tunica/mechanics/runs/detail/supports.hpp"
 
@@ -31,7 +32,7 @@ constexpr double largest_linear_strain = 0.2;
 /// The shift of a free body, of its lowest eigenvalue.
 constexpr double near_part = 0.2;
 
-void require_freedoms(std::size_t wanted, std::size_t there) {
+void require_modes(std::size_t wanted, std::size_t there) {
   if (wanted > there) {
     throw InputError(fmt::format("count = {}, but the model has only {} modes: ask for fewer", wanted, there));
   }
@@ -39,14 +40,9 @@ void require_freedoms(std::size_t wanted, std::size_t there) {
 
 /// The linear displacements and rotations (6 per node) under the loads and prescribed displacements at full value.
 VectorX linear_solution(ShellSystem& system, const Model& model, const RunSettings& settings) {
-  State last;
-  run_linear(system, model, settings, {true, {1}}, [&](const State& state) { last = state; }, {}, {});
-  VectorX solution(first_freedom(system.node_count()));
-  for (std::size_t i = 0; i < system.node_count(); ++i) {
-    solution.segment<3>(first_freedom(i)) = last.displacement[i];
-    solution.segment<3>(first_freedom(i) + 3) = last.rotation[i];
-  }
-  return solution;
+  return LinearSolver(system, model, settings)
+      .solve(load_factors(model, true, 1), prescribed_positions(system, model, 1))
+      .moved;
 }
 
 /// Largest stretch of an edge in a linear solution.
@@ -85,6 +81,18 @@ BlockMatrix tangent_change(const ShellSystem& system, const Model& model, const 
   }
   symmetrise(tangent[0]);
   return std::move(tangent[0]);
+}
+
+/// The tangent at the reference, before the loads act: with what the wall bears there already.
+void reference_tangent(const ShellSystem& system, const Model& model, BlockMatrix& tangent) {
+  if (!system.prestress_residual) {
+    linear_stiffness(system, tangent);
+    return;
+  }
+  Forces forces;
+  evaluate(system, model, reference_configuration(system), std::vector<double>(model.loads.size(), 0.0), {}, forces,
+           &tangent);
+  symmetrise(tangent);
 }
 
 void add(BlockMatrix& matrix, double factor, const VectorX& diagonal) {
@@ -298,7 +306,7 @@ BlockMatrix stiffness_at_rest(ShellSystem& system, const Model& model, const Run
     return stiffness;
   }
   if (run.preload.linear) {
-    linear_stiffness(system, stiffness);
+    reference_tangent(system, model, stiffness);
     const VectorX solution = linear_solution(system, model, settings);
     if (solution.squaredNorm() > 0) {
       const BlockMatrix change = tangent_change(system, model, solution);
@@ -335,7 +343,7 @@ Summary run_frequencies(ShellSystem& system, const Model& model, const RunSettin
   summary.dof = narrow<std::size_t>(std::count(free.begin(), free.end(), true));
 
   const std::vector<VectorX> rigid = idle_rigid_modes(system, configuration, stiffness);
-  require_freedoms(run.count, summary.dof - rigid.size());
+  require_modes(run.count, summary.dof - rigid.size());
   const VectorX mass = lumped_masses(system);
   // Where a body is free the first shift is only known to be small against the lowest value; one that is near it keeps
   // the rigid motions, which the inverse enlarges, from drowning the modes in round-off.
@@ -380,7 +388,7 @@ Summary run_buckling(ShellSystem& system, const Model& model, const RunSettings&
   on_state(reference_state(system, model, summary));
   const FreeMask free = free_freedoms(system);
   summary.dof = narrow<std::size_t>(std::count(free.begin(), free.end(), true));
-  require_freedoms(run.count, summary.dof);
+  require_modes(run.count, summary.dof);
 
   const VectorX solution = linear_solution(system, model, settings);
   const double strain = largest_strain(system, solution);
@@ -391,7 +399,7 @@ Summary run_buckling(ShellSystem& system, const Model& model, const RunSettings&
   const BlockMatrix change = tangent_change(system, model, solution);
   advance(progress, 0.3);
   BlockMatrix stiffness = system.pattern;
-  linear_stiffness(system, stiffness);
+  reference_tangent(system, model, stiffness);
   ShiftedPencil pencil(
       system, free, std::move(stiffness),
       [&](BlockMatrix& matrix, double by) {

@@ -92,9 +92,6 @@ FreeMask free_freedoms(const ShellSystem& system) {
 
 TangentSolver::TangentSolver(const ShellSystem& system, const RunSettings& settings)
     : settings_(settings), free_(free_freedoms(system)) {
-  if (!uses_cg(settings)) {
-    direct_.emplace(system.pattern, free_);
-  }
   for (std::size_t i = system.first_solid_node; i < system.node_count(); ++i) {
     pressures_ += free_[freedom(i, 3)] ? 1 : 0;
   }
@@ -108,7 +105,7 @@ TangentSolver::Result TangentSolver::solve(BlockMatrix& matrix, const VectorX& b
     x.setZero(b.size());
     return {true, true, true, 0, 0, AlgebraicError{}};
   }
-  if (!direct_) {
+  if (uses_cg(settings_)) {
     symmetrise(matrix);
     const CgOptions options{settings_.cg_tolerance, settings_.cg_iterations, settings_.cg_fixed_count};
     const CgResult cg = conjugate_gradients(matrix, free_, b, options, x);
@@ -119,6 +116,9 @@ TangentSolver::Result TangentSolver::solve(BlockMatrix& matrix, const VectorX& b
     result.cg_iterations = cg.iterations;
     result.error = cg.error;
     return result;
+  }
+  if (!direct_) {
+    direct_.emplace(matrix, free_);
   }
   if (!same_matrix) {
     factored_ = direct_->factor(matrix);

@@ -123,7 +123,7 @@ void add_dead_loads(const ShellSystem& system, const Configuration& configuratio
                     VectorX& external, BlockMatrix* tangent) {
   for (std::size_t l = 0; l < system.dead.size(); ++l) {
     const DeadLoad& load = system.dead[l];
-    const double factor = factors[l];
+    const double factor = load.begin + factors[l] * (load.end - load.begin);
     if (load.force.size() == 0 || factor == 0) {
       continue;
     }
@@ -200,7 +200,7 @@ std::vector<double> follower_pressures(const ShellSystem& system, const Model& m
                                        const std::vector<double>& factors) {
   std::vector<double> pressure(model.body_count(), 0);
   for (const auto& [load, body] : system.follower_pressures) {
-    pressure[body] += factors[load] * std::get<PressureLoad>(model.loads[load].kind).value;
+    pressure[body] += std::get<PressureLoad>(model.loads[load].kind).at(factors[load]);
   }
   return pressure;
 }
@@ -416,7 +416,7 @@ void linear_forces(const ShellSystem& system, const VectorX& displacement, Vecto
     for (int k = 0; k < 4; ++k) {
       motion.segment<4>(4 * k) = displacement.segment<4>(first_freedom(element.nodes[k]));
     }
-    const Vector16 force = linear_stiffness(element) * motion;
+    const Vector16 force = linear_force(element, motion);
     for (int k = 0; k < 4; ++k) {
       forces.segment<4>(first_freedom(element.nodes[k])) += force.segment<4>(4 * k);
     }

@@ -73,7 +73,9 @@ public:
     const VectorX held =
         prescribed_positions(system_, model_, factor) - prescribed_positions(system_, model_, previous_factor);
     begin_contact(system_, settings_, previous_factor, factor, configuration, solver_, matrix_);
-    NewtonResult result = newton(system_, settings_, *solver_, balance, held, matrix_, configuration);
+    // What was imaged under pressure may be there already.
+    NewtonResult result = newton(system_, settings_, *solver_, balance, held, matrix_, configuration,
+                                 system_.prestress_residual.has_value());
     const VectorX still = VectorX::Zero(held.size());
     for (int round = 0; round < 8 && result.converged; ++round) {
       bool changed = false;
@@ -86,7 +88,7 @@ public:
       if (!changed) {
         break;
       }
-      const NewtonResult again = newton(system_, settings_, *solver_, balance, still, matrix_, configuration);
+      const NewtonResult again = newton(system_, settings_, *solver_, balance, still, matrix_, configuration, true);
       result.converged = again.converged;
       result.valid = again.valid;
       result.residual = again.residual;
@@ -227,7 +229,7 @@ private:
   void resume(const Checkpoint& from) override {
     configuration_ = recall(from);
     factor_ = from.position;
-    increment_ = from.memory.at("increment").at(0);
+    increment_ = remembered(from, "increment", 1)[0];
   }
 
   State take_step() override {

@@ -29,6 +29,9 @@ Summary SteppedRun::follow(const Progress& progress, const Resumption& resumptio
     const State state = take_step();
     const bool wanted = wants_state();
     record_step(state, seconds_since(start), summary_);
+    if (system_.contact) {
+      summary_.contact_pressures = system_.contact->pressed();
+    }
     if (wanted) {
       hand_over(state);
     }
@@ -63,11 +66,11 @@ Checkpoint SteppedRun::keep(double position, const Configuration& configuration,
 
 Configuration SteppedRun::recall(const Checkpoint& from) {
   Configuration configuration{from.displacement, from.rotation};
-  if (const auto found = from.memory.find("solid_pressure"); found != from.memory.end()) {
-    configuration.pressure = found->second;
+  if (!system_.solids.empty()) {
+    configuration.pressure = remembered(from, "solid_pressure", system_.node_count());
   }
   if (system_.contact) {
-    system_.contact->recall(from.memory.at("contact"), configuration, from.position);
+    system_.contact->recall(remembered(from, "contact"), configuration, from.position);
   }
   return configuration;
 }

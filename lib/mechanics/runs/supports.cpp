@@ -132,6 +132,22 @@ void make_supports(ShellSystem& system, const Model& model) {
   }
 }
 
+void hold_free_motions(ShellSystem& system, const Piece& piece) {
+  const std::vector<VectorX> modes = free_rigid_modes(system, piece, reference_configuration(system));
+  Eigen::MatrixXd moves(modes.size(), 3 * piece.nodes.size());
+  for (Eigen::Index k = 0; k < moves.rows(); ++k) {
+    for (std::size_t i = 0; i < piece.nodes.size(); ++i) {
+      moves.block<1, 3>(k, narrow<Eigen::Index>(3 * i)) =
+          modes[k].segment<3>(first_freedom(piece.nodes[i])).transpose();
+    }
+  }
+  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(moves);
+  for (Eigen::Index k = 0; k < moves.rows(); ++k) {
+    const auto chosen = narrow<std::size_t>(qr.colsPermutation().indices()[k]);
+    system.held[freedom(piece.nodes[chosen / 3], chosen % 3)] = true;
+  }
+}
+
 void release_rigid_motion_supports(ShellSystem& system, const Model& model) {
   for (const Piece& piece : system.pieces) {
     if (held_by_rigid_motions(model, piece.body)) {

@@ -17,7 +17,8 @@ inline constexpr int most_cuts_in_contact = 20;
 /// Which freedoms no support holds.
 FreeMask free_freedoms(const ShellSystem& system);
 
-/// One linear system after another with the same pattern, by the solver that the settings ask for.
+/// One linear system after another with the same pattern, by the solver that the settings ask for. What only depends on
+/// the pattern is made ready by the first.
 class TangentSolver {
 public:
   TangentSolver(const ShellSystem& system, const RunSettings& settings);

@@ -16,11 +16,14 @@
 /// A model made ready for solving: elements, loads, masses and supports by global node, and the sums over them.
 namespace tunica {
 
-/// A load that keeps its direction, for a factor of 1. `director` of a node is the sum over the triangles around it of
-/// n g', for normals n that turn with the node and vectors g fixed in space: its energy is -trace(R n g').
+/// A load that keeps its direction, times a number that goes from `begin` to `end` with the load factor. `director` of
+/// a node is the sum over the triangles around it of n g', for normals n that turn with the node and vectors g fixed in
+/// space: its energy is -trace(R n g').
 struct DeadLoad {
   VectorX force;               ///< 6 per node: force, moment about fixed axes
   std::vector<Mat3> director;  ///< empty, or #nodes
+  double begin = 0;
+  double end = 1;
 };
 
 struct PrescribedFreedom {
@@ -70,7 +73,8 @@ struct ShellSystem {
   VectorX inertia;         ///< tonne mm^2 per node, about every axis: rho t^3 / 12 times the area
   std::vector<bool> held;  ///< 6 per node
   std::vector<PrescribedFreedom> prescribed;
-  double length = 0;  ///< mean edge, mm: what makes moments comparable with forces
+  std::optional<double> prestress_residual;  ///< of the balance of the stress that the reference bears, relative
+  double length = 0;                         ///< mean edge, mm: what makes moments comparable with forces
   /// Norms of the elements' stiffness, moments divided by `length`: forces by displacements (N/mm), by rotations (N).
   double translation_stiffness = 0;
   double rotation_stiffness = 0;

@@ -9,6 +9,10 @@ namespace tunica {
 /// Errors: InputError when two fixes ask for different displacements of one component.
 void make_supports(ShellSystem& system, const Model& model);
 
+/// Holds as many translations of nodes far apart as a piece has free rigid motions, and stops nothing else: their
+/// reactions vanish when the loads are in balance.
+void hold_free_motions(ShellSystem& system, const Piece& piece);
+
 /// Number of rigid motions of a piece that its held freedoms leave free (0 ... 6).
 int free_rigid_motions(const ShellSystem& system, const Piece& piece);
 
