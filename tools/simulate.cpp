@@ -18,6 +18,7 @@
 #include "tunica/io/scene/stated.hpp"
 #include "tunica/mechanics/runs/curved_displacement.hpp"
 #include "tunica/mechanics/runs/doubts.hpp"
+#include "tunica/mechanics/runs/prestress.hpp"
 #include "tunica/mechanics/runs/solve.hpp"
 #include "tunica/mechanics/runs/unloaded.hpp"
 #include "tunica/shell/distance/shell_distance.hpp"
@@ -72,7 +73,9 @@ void declare(cli::Tool& tool, Arguments& a) {
   app.add_option("--tessellation", a.tessellation,
                  "pieces per edge into which a curved shell is cut for drawing (default 4, less for many shells)")
       ->type_name("N");
-  app.add_option("--unloaded", a.unloaded, "with --imaged-at: the shells without that pressure")->type_name("OUT.ply");
+  app.add_option("--unloaded", a.unloaded,
+                 "with --imaged-at: find the shape without that pressure, begin there, and write it")
+      ->type_name("OUT.ply");
   app.add_option("--export", a.exports,
                  "write beside OUT.hdf, may repeat: pvd (OUT.pvd with a .vtu per state) | xmf (OUT.xmf, XDMF) | "
                  "inp (the model for CalculiX and Abaqus) | feb (the model for FEBio) | "
@@ -301,19 +304,23 @@ void require_own_target(const ShellMesh& shell, const Target& target, const fs::
   }
 }
 
-/// The unloaded shells as an output, where they can be one.
-void name_unloaded(cli::Tool& tool, const Arguments& given, const Scene& scene) {
+/// Asks the scene for the unloaded shells, and names them as an output.
+void name_unloaded(cli::Tool& tool, const Arguments& given, Scene& scene) {
   if (!given.unloaded) {
     return;
   }
-  const bool imaged = std::any_of(scene.loads.begin(), scene.loads.end(), [](const SceneLoad& load) {
-    const auto* pressure = std::get_if<PressureLoad>(&load.kind);
-    return pressure != nullptr && pressure->imaged_at.has_value();
-  });
+  bool imaged = false;
+  for (SceneLoad& load : scene.loads) {
+    if (auto* pressure = std::get_if<PressureLoad>(&load.kind); pressure != nullptr && pressure->imaged_at) {
+      pressure->unload = imaged = true;
+      load.places.keys.try_emplace("unload", Place{"--unloaded", true});
+    }
+  }
   if (!imaged || scene.shells.size() > 1) {
     throw UsageError(imaged ? "--unloaded: the scene has more than one body, one can be written"
                             : "--unloaded belongs to --imaged-at, or imaged_at in a scene: give that too");
   }
+  check_scene(scene);
   tool.output(*given.unloaded, {".ply"});
 }
 
@@ -358,7 +365,7 @@ public:
       return;
     }
     if (is_imaged_under_pressure(model())) {
-      unload();
+      take_as_imaged();
     }
     begin();
     const Summary summary = accuracy_ ? recorded() : solved();
@@ -547,9 +554,20 @@ private:
     tool_.result()["accuracy"] = accuracy_report(*accuracy_);
   }
 
-  /// Takes the shells back to what they are without the pressure under which they were imaged.
-  void unload() {
+  /// Puts the stress of the image into the walls, or takes the shells back to what they are without its pressure.
+  void take_as_imaged() {
     stage("solve");
+    const bool unload = std::ranges::any_of(model().loads, [](const Load& load) {
+      const auto* pressure = std::get_if<PressureLoad>(&load.kind);
+      return pressure != nullptr && pressure->unload;
+    });
+    if (!unload) {
+      if (!accuracy_) {
+        loaded_->model = naming(subject().string(), [&] { return prestressed(std::move(loaded_->model), scene_.run); });
+      }
+      tool_.result()["prestress"] = prestress_report(model());
+      return;
+    }
     Unloaded found = naming(subject().string(), [&] {
       return find_unloaded(model(), scene_.run, [&](double part, double change) {
         tool_.detail(

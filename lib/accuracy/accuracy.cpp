@@ -4,6 +4,7 @@
 #include "tunica/accuracy/detail/levels.hpp"
 #include "tunica/core/clock.hpp"
 #include "tunica/core/error.hpp"
+#include "tunica/core/require.hpp"
 #include "tunica/mechanics/model/wall.hpp"
 #include "tunica/mechanics/runs/curved_displacement.hpp"
 #include "tunica/shell/distance/shell_distance.hpp"
@@ -335,6 +336,22 @@ std::string_view unit_of(Quantity quantity) { return names.at(static_cast<std::s
 Accuracy solve_within(std::vector<ShellBody> bodies, const std::vector<const Target*>& targets,
                       const AccuracyRequest& request, const RunSettings& settings, const ModelOf& model_of,
                       const std::function<void(const AccuracyLevel&)>& on_level) {
+  if (bodies.empty() || targets.size() != bodies.size()) {
+    throw InputError(fmt::format("{} targets for {} bodies: one for each is needed", targets.size(), bodies.size()));
+  }
+  for (const ShellBody& body : bodies) {
+    require_valid(body);
+  }
+  if (!std::holds_alternative<StaticRun>(settings.kind) && !std::holds_alternative<DynamicRun>(settings.kind)) {
+    throw InputError("an accuracy is for statics and dynamics: leave it out, or change the kind of the run");
+  }
+  require_positive(request.within, "the accuracy");
+  if (request.voxel) {
+    require_positive(*request.voxel, "the edge of a voxel");
+  }
+  if (request.axis < 0 || request.axis > 2) {
+    throw InputError(fmt::format("there is no axis {}: choose 0 to 2", request.axis));
+  }
   return Ladder(std::move(bodies), targets, request, settings, model_of, on_level).run();
 }
 

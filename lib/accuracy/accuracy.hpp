@@ -88,10 +88,12 @@ using ModelOf = std::function<Model(std::vector<ShellBody>)>;
 /// @param bodies   the coarsest level; all of the model
 /// @param targets  one for each body; null: splits lie on the body's own patches, and its geometry's error is not seen
 /// @param settings  a static run in one load step, or a dynamic run without error control
-/// Errors: InputError: no volume is enclosed, the quantity is zero; RequirementError: a level has no answer, unless the
-/// coarsest alone. Source: Roache, "Perspective: a method for uniform reporting of grid refinement studies", 1994
-/// (convergence index with a factor of 3 for two grids). Cost: the last level's, times about 1.4. Limits: no difference
-/// of levels sees what no level resolves, beyond the doubts above. All states of a motion are kept in memory.
+/// Errors: InputError: a body as require_valid(), not a target for each, another kind of run, an accuracy or voxel that
+/// is not finite and above zero, no volume is enclosed, the quantity is zero; RequirementError: a level has no answer,
+/// unless the coarsest alone. Source: Roache, "Perspective: a method for uniform reporting of grid refinement studies",
+/// 1994 (convergence index with a factor of 3 for two grids). Cost: the last level's, times about 1.4. Limits: no
+/// difference of levels sees what no level resolves, beyond the doubts above. All states of a motion are kept in
+/// memory.
 Accuracy solve_within(std::vector<ShellBody> bodies, const std::vector<const Target*>& targets,
                       const AccuracyRequest& request, const RunSettings& settings, const ModelOf& model_of,
                       const std::function<void(const AccuracyLevel&)>& on_level = {});

@@ -4,6 +4,7 @@
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/mechanics/runs/curved_displacement.hpp"
+#include "tunica/mechanics/runs/prestress.hpp"
 
 #include <fmt/format.h>
 
@@ -79,8 +80,8 @@ std::optional<double> end_of(const Ramp& ramp, double duration) {
 Answer answer_of(Model model, const RunSettings& settings, const AccuracyRequest& request,
                  const std::optional<Checkpoint>& near) {
   Answer answer;
-  answer.model = std::move(model);
   const auto start = Clock::now();
+  answer.model = prestressed(std::move(model), settings);
   Measure measure(answer.model, request);
   const bool moves = std::holds_alternative<DynamicRun>(settings.kind);
   RunSettings all = settings;

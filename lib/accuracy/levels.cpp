@@ -179,11 +179,16 @@ void carry_selections(const Model& coarse, const Level& level, Model& fine) {
   for (std::size_t i = 0; i < coarse.fixes.size(); ++i) {
     carriers[coarse.fixes[i].body].carry(coarse.fixes[i].nodes, fine.fixes[i].nodes);
   }
+  for (std::size_t i = 0; i < coarse.supports.size(); ++i) {
+    carriers[coarse.supports[i].body].carry(coarse.supports[i].nodes, fine.supports[i].nodes);
+  }
   for (std::size_t i = 0; i < coarse.loads.size(); ++i) {
     const Carrier& carrier = carriers[coarse.loads[i].body];
     const auto& from = coarse.loads[i].kind;
     auto& to = fine.loads[i].kind;
-    if (const auto* force = std::get_if<ForceLoad>(&from)) {
+    if (const auto* pressure = std::get_if<PressureLoad>(&from); pressure != nullptr && !pressure->nodes.empty()) {
+      carrier.carry(pressure->nodes, std::get<PressureLoad>(to).nodes);
+    } else if (const auto* force = std::get_if<ForceLoad>(&from)) {
       carrier.carry(force->nodes, std::get<ForceLoad>(to).nodes);
     } else if (const auto* moment = std::get_if<MomentLoad>(&from)) {
       carrier.carry(moment->nodes, std::get<MomentLoad>(to).nodes);

@@ -52,9 +52,9 @@ Places flags_as_places(std::initializer_list<const char*> keys) {
   return places;
 }
 
-// "boundary", "rigid-motions", "below z=-10mm", "above x = 3cm".
-Selection parse_fix(const std::string& text) {
-  if (text == "boundary") {
+// "boundary", "rims", "rigid-motions", "below z=-10mm", "above x = 3cm".
+Selection parse_where(const std::string& text) {
+  if (text == "boundary" || text == "rims") {
     return BoundaryNodes{};
   }
   if (text == "rigid-motions") {
@@ -62,7 +62,8 @@ Selection parse_fix(const std::string& text) {
   }
   const auto unknown = [&] {
     throw UsageError(fmt::format(
-        "--fix: '{}' is not understood: write boundary, rigid-motions, 'below z=-10mm' or 'above x=3cm'", text));
+        "--fix: '{}' is not understood: write boundary, rims:slide, rigid-motions, 'below z=-10mm' or 'above x=3cm'",
+        text));
   };
   HalfSpaceNodes half;
   half.below = text.starts_with("below ");
@@ -126,14 +127,17 @@ void SceneFlags::declare(Tool& tool) {
   tool.quantity("--pressure", pressure, dimension::pressure,
                 "pressure that follows the surface; positive pushes along the normals, outward");
   tool.quantity("--imaged-at", imaged_at, dimension::pressure,
-                "the organ was under this pressure when it was imaged: the shape without it is found first");
+                "the organ was under this pressure when it was imaged: there it is at rest, and its wall bears that "
+                "already. Without --pressure, or with the same, --young can be left out");
   app.add_option("--fix", fixes,
-                 "what is held, may repeat: boundary | 'below z=-10mm' | 'above x=3cm' | rigid-motions (a closed organ "
-                 "under its own pressure)")
+                 "what is held, may repeat: boundary | rims:slide (they widen and turn freely, and stay in their planes) "
+                 "| 'below z=-10mm' | 'above x=3cm' | rigid-motions (a closed organ under its own pressure)")
       ->type_name("WHERE")
       ->expected(1)
       ->allow_extra_args(false)  // the next word is a file
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  tool.quantity("--support", support, dimension::bedding,
+                "stiffness of the tissue around, an elastic bed per area, e.g. 1e5N/m3; without force in the shape given");
   tool.group("Run");
   app.add_flag("--static", is_static, "solve for the state of rest");
   app.add_option("--load-steps", load_steps,
@@ -163,6 +167,10 @@ void SceneFlags::declare(Tool& tool) {
       ->type_name("mm|cm|m|um");
 }
 
+bool SceneFlags::pressure_is_imaged() const {
+  return imaged_at && is_static && pressure.value_or(*imaged_at) == *imaged_at;
+}
+
 Scene SceneFlags::scene(const std::filesystem::path& mesh) const {
   Scene scene;
   SceneLoad load{"shell", std::nullopt, PressureLoad{}, {}, flags_as_places({})};
@@ -188,7 +196,8 @@ Scene SceneFlags::scene(const std::filesystem::path& mesh) const {
   if (mesh_unit) {
     shell.unit_mm = parse_length_unit(*mesh_unit);
   }
-  shell.material.young = required(young, "--young", "1MPa");
+  shell.material.young_stated = young || !pressure_is_imaged();
+  shell.material.young = shell.material.young_stated ? required(young, "--young", "1MPa") : any_young;
   (void)required(poisson, "--poisson", "0.45");
   shell.material.poisson = number(poisson, "--poisson", 0);
   shell.thickness = required(thickness, "--thickness", "1.5mm");
@@ -205,14 +214,28 @@ Scene SceneFlags::scene(const std::filesystem::path& mesh) const {
                    {"dkt-comas", Bending::dkt_comas}});
   scene.shells.push_back(shell);
 
-  load.kind = PressureLoad{required(pressure, "--pressure", "100mmHg"), true, imaged_at};
+  load.kind = PressureLoad{required(pressure ? pressure : imaged_at, "--pressure", "100mmHg"), true, imaged_at};
   scene.loads.push_back(load);
   for (const std::string& text : fixes) {
     SceneFix fix;
     fix.body = shell.name;
-    fix.where = parse_fix(text);
+    constexpr std::string_view slide = ":slide";
+    fix.slide = text.ends_with(slide);
+    fix.where = parse_where(fix.slide ? text.substr(0, text.size() - slide.size()) : text);
+    if (fix.slide && std::holds_alternative<RigidMotions>(fix.where)) {
+      throw UsageError("--fix: rigid motions do not slide: write rims:slide");
+    }
     fix.places = {{fmt::format("{}: --fix '{}'", shell.mesh.string(), text), true, text}, {}};
     scene.fixes.push_back(fix);
+  }
+  if (support) {
+    SceneSupport bed;
+    bed.body = shell.name;
+    bed.stiffness = *support;
+    bed.places = flags_as_places({});
+    bed.places.item.text = "--support";
+    bed.places.keys["stiffness"] = {"--support", true};
+    scene.supports.push_back(bed);
   }
   settle_solver(scene);
   check_scene(scene);

@@ -10,7 +10,7 @@ namespace tunica::cli {
 
 /// What tunica-simulate can be told of a scene without a file: one shell under pressure.
 struct SceneFlags {
-  std::optional<double> young, thickness, density, pressure, imaged_at, duration, step, ramp;
+  std::optional<double> young, thickness, density, pressure, imaged_at, support, duration, step, ramp;
   std::optional<std::string> poisson, mesh_unit, membrane, bending, solver, cg_tolerance, converge;
   std::optional<std::string> load_steps, cg_iterations, every;
   std::vector<std::string> fixes;
@@ -26,6 +26,9 @@ struct SceneFlags {
 
   /// The scene that they describe. Errors: UsageError.
   [[nodiscard]] Scene scene(const std::filesystem::path& mesh) const;
+
+  /// Nothing but the pressure of the image acts.
+  [[nodiscard]] bool pressure_is_imaged() const;
 
   /// Notes in the scene that they describe how its quantities were written.
   static void keep_typed(const CLI::App& app, Scene& scene);

@@ -378,7 +378,7 @@ DrawnResult read_drawn_result(const std::filesystem::path& path, std::size_t mos
   const Reader reader(path);
   DrawnResult result;
   result.scene = reader.text("tunica/scene");
-  result.is_unloaded = says(result.scene, "imaged_at = ");
+  result.is_unloaded = says(result.scene, "unload = true");
   const OuterFaces outer = read_geometry(reader, result);
   const std::size_t points = result.reference.vertices.size();
   const auto displacements = reader.shape("VTKHDF/PointData/displacement");

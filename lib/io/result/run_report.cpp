@@ -248,6 +248,16 @@ Json unloaded_report(const Unloaded& unloaded) {
           {"iterations", unloaded.iterations}};
 }
 
+Json prestress_report(const Model& prestressed) {
+  Json pressure;
+  for (const Load& load : prestressed.loads) {
+    if (const auto* p = std::get_if<PressureLoad>(&load.kind); p != nullptr && p->imaged_at) {
+      pressure = pressure.is_null() || pressure == *p->imaged_at ? Json(*p->imaged_at) : Json();
+    }
+  }
+  return {{"pressure_mpa", pressure}, {"residual", prestressed.prestress->residual}};
+}
+
 namespace {
 
 // Stress in kPa, as pictures and pages have it.

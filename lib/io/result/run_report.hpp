@@ -30,6 +30,9 @@ Json accuracy_report(const Accuracy& accuracy);
 /// The shape without the pressure under which the organ was imaged.
 Json unloaded_report(const Unloaded& unloaded);
 
+/// What the wall bears where the image shows it.
+Json prestress_report(const Model& prestressed);
+
 /// A level on a line.
 std::string level_note(const AccuracyLevel& level, const AccuracyRequest& request);
 

@@ -27,7 +27,8 @@ void read_size(const SceneTable& table, Body& body) {
 
 Material read_material(const SceneTable& table) {
   Material material;
-  material.young = table.quantity("young", dimension::pressure);
+  material.young_stated = table.has("young");
+  material.young = material.young_stated ? table.quantity("young", dimension::pressure) : any_young;
   material.poisson = table.number("poisson");
   if (table.has("density")) {
     material.density = table.quantity("density", dimension::density);

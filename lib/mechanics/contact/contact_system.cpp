@@ -607,7 +607,9 @@ std::vector<double> ContactSystem::memory() const {
 void ContactSystem::recall(const std::vector<double>& memory, const Configuration& configuration, double time) {
   std::size_t read = 0;
   const auto next = [&] {
-    TUNICA_ASSERT(read < memory.size());
+    if (read == memory.size()) {
+      throw InputError("what contact remembers is of another model");
+    }
     return memory[read++];
   };
   std::ranges::generate(accepted_stiffness_, next);
@@ -644,7 +646,9 @@ void ContactSystem::recall(const std::vector<double>& memory, const Configuratio
       sample.before = place(group, sample, *accepted_);
     }
   }
-  TUNICA_ASSERT(read == memory.size());
+  if (read != memory.size()) {
+    throw InputError("what contact remembers is of another model");
+  }
 }
 
 }  // namespace tunica

@@ -1,6 +1,10 @@
 #include "tunica/mechanics/model/wall.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/core/require.hpp"
+#include "tunica/surface/mesh/checks.hpp"
+
+#include <fmt/format.h>
 
 #include <Eigen/Geometry>
 
@@ -14,6 +18,7 @@ template <typename Visit>
 void for_each_facet(const Model& model, const Visit& visit) {
   for (std::size_t b = 0; b < model.shells.size(); ++b) {
     const ShellMesh& mesh = model.shells[b].mesh;
+    require_corners(mesh.vertices.size(), mesh.triangles);
     const std::size_t first = model.first_node(b);
     for (const auto& [i, j, k] : mesh.triangles) {
       const Vec3& origin = mesh.vertices[i];
@@ -42,12 +47,22 @@ double part_above(std::array<double, 3> corners, double level) {
 double least_thickness(const Model& model) {
   double least = infinity;
   for (const ShellBody& body : model.shells) {
+    if (body.thickness.empty()) {
+      throw InputError(body.name + ": has no thickness");
+    }
     least = std::min(least, *std::min_element(body.thickness.begin(), body.thickness.end()));
   }
   return least;
 }
 
 std::vector<double> averaged_at_nodes(const Model& model, std::span<const double> of_triangles) {
+  std::size_t triangles = 0;
+  for (const ShellBody& body : model.shells) {
+    triangles += body.mesh.triangles.size();
+  }
+  if (of_triangles.size() != triangles) {
+    throw InputError(fmt::format("{} values for {} triangles", of_triangles.size(), triangles));
+  }
   std::vector<double> sum(model.node_count(), 0);
   std::vector<double> weight(model.node_count(), 0);
   std::size_t triangle = 0;
@@ -58,7 +73,6 @@ std::vector<double> averaged_at_nodes(const Model& model, std::span<const double
     }
     ++triangle;
   });
-  TUNICA_ASSERT(triangle == of_triangles.size());
   for (std::size_t i = 0; i < sum.size(); ++i) {
     sum[i] = weight[i] > 0 ? sum[i] / weight[i] : 0;
   }
@@ -66,6 +80,10 @@ std::vector<double> averaged_at_nodes(const Model& model, std::span<const double
 }
 
 double area_quantile(const Model& model, std::span<const double> of_nodes, double above) {
+  require_not_negative(above, "the part of the area");
+  if (of_nodes.size() != model.node_count()) {
+    throw InputError(fmt::format("{} values for {} nodes", of_nodes.size(), model.node_count()));
+  }
   constexpr int halvings = 40;
   std::vector<std::pair<double, std::array<double, 3>>> facets;
   double whole = 0;

@@ -5,6 +5,7 @@
 #include <span>
 
 /// Fields that shells hold constant, made continuous: what their neighbours say at the nodes, and what of it is large.
+/// Errors: InputError: a corner that does not exist, no thickness, or not as many values as said.
 namespace tunica {
 
 /// The thinnest place of all bodies, mm.
@@ -17,6 +18,7 @@ std::vector<double> averaged_at_nodes(const Model& model, std::span<const double
 
 /// The value that a field, linear between the nodes, passes on the part `above` of the area of all bodies' facets.
 /// Exact but for the halving of an interval, to 1e-12 of the field's range.
+/// @param of_nodes  #nodes of all bodies
 double area_quantile(const Model& model, std::span<const double> of_nodes, double above);
 
 }  // namespace tunica

@@ -129,6 +129,11 @@ private:
     return static_balance(system_, model_, configuration, factor, forces_, &matrix_);
   }
 
+  const VectorX& external(const Configuration& configuration, double factor) {
+    evaluate(system_, model_, configuration, std::vector<double>(model_.loads.size(), factor), {}, forces_, nullptr);
+    return forces_.external;
+  }
+
   bool factor_matrix(std::size_t& negative_pivots) {
     const DirectSolver::Factored factored = solver_.factor(matrix_);
     negative_pivots = factored.negative_pivots;
@@ -146,10 +151,11 @@ private:
 
   /// How displacements and spins follow the factor.
   bool respond(const Configuration& configuration, VectorX& response) {
-    evaluate(system_, model_, configuration, std::vector<double>(model_.loads.size(), 1.0), {}, forces_, nullptr);
+    VectorX right = -external(configuration, 0);
+    right += external(configuration, 1);
     VectorX moved;
     multiply(matrix_, prescribed_, moved);
-    VectorX right = forces_.external - moved;
+    right -= moved;
     mask(free_, right);
     if (!solve(right, response)) {
       return false;
@@ -273,7 +279,7 @@ private:
       return false;
     }
     for (const Piece& piece : system_.pieces) {
-      if (only_follows_ && held_by_rigid_motions(model_, piece.body)) {
+      if (only_follows_ && piece.balanced) {
         take_out_rigid_motion(system_, piece, state.configuration);
       }
     }

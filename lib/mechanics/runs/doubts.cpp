@@ -1,8 +1,10 @@
 #include "tunica/mechanics/runs/doubts.hpp"
 
+#include "tunica/core/error.hpp"
 #include "tunica/mechanics/contact/rigid_shape.hpp"
-#include "tunica/mechanics/runs/unloaded.hpp"
+#include "tunica/mechanics/runs/prestress.hpp"
 #include "tunica/shell/distance/target.hpp"
+#include "tunica/shell/patch/curved_surface.hpp"
 #include "tunica/surface/mesh/measure.hpp"
 
 #include <fmt/format.h>
@@ -51,11 +53,14 @@ double area_of(const ShellMesh& mesh, std::size_t triangle) {
 }
 
 /// The corners' own normals, or those of the vertices where a mesh has none (`curved` false: flat facets).
+/// Errors: InputError: as require_valid() of what it takes them from.
 class CornerNormals {
 public:
   CornerNormals(const ShellMesh& mesh, bool curved) : mesh_(mesh) {
     if (!curved || (mesh.corner_normals.empty() && mesh.normals.size() != mesh.vertices.size())) {
-      of_vertices_ = vertex_normals(flat_facets(mesh));
+      of_vertices_ = vertex_normals(flat_facets(mesh));  // which asks the same of its mesh
+    } else {
+      require_valid(mesh);
     }
   }
 
@@ -264,7 +269,7 @@ void doubt_coarseness(const ShellBody& body, bool may_be_chosen, std::vector<War
 std::vector<std::array<bool, 6>> held_freedoms(const Model& model, std::size_t body) {
   std::vector<std::array<bool, 6>> held(model.vertices_of(body).size());
   for (const Fix& fix : model.fixes) {
-    if (fix.body != body) {
+    if (fix.body != body || fix.across) {
       continue;
     }
     for (const Index node : fix.nodes) {
@@ -446,6 +451,7 @@ bool is_loaded(const Model& model) {
 }
 
 std::vector<Warning> doubts(const Model& model, const RunSettings& settings, bool are_shells_chosen) {
+  require_valid(model);
   std::vector<Warning> found;
   std::vector<std::vector<std::array<bool, 6>>> held;
   for (std::size_t b = 0; b < model.shells.size(); ++b) {
@@ -494,6 +500,10 @@ std::string pressure_text(double mpa) {
 }
 
 double share_without_inner_face(const ShellBody& body) {
+  if (body.thickness.size() != 1 && body.thickness.size() != body.mesh.vertices.size()) {
+    throw InputError(fmt::format("{}: {} thicknesses for {} nodes: give one, or one per node", body.name,
+                                 body.thickness.size(), body.mesh.vertices.size()));
+  }
   return share_thicker(body, curvatures_of(body.mesh, body.curved), 2);
 }
 

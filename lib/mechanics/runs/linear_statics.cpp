@@ -115,7 +115,7 @@ private:
       }
       require_digits(unseen_error(right, solution, external, moved));
     }
-    take_out_linear_rigid_motion(system_, model_, moved);
+    take_out_linear_rigid_motion(system_, moved);
     State state = state_of(moved, external, factor);
     state.cg_iterations = solved.cg_iterations;
     state.converged = solved.converged;
@@ -165,7 +165,9 @@ private:
     const double scale = std::max(force_norm(system_, external), force_norm(system_, internal));
     state.linear = true;
     state.load_factor = factor;
-    state.strain_energy = 0.5 * moved.dot(internal);
+    VectorX at_rest;
+    linear_forces(system_, VectorX::Zero(moved.size()), at_rest);
+    state.strain_energy = 0.5 * moved.dot(internal + at_rest);
     state.residual = scale > 0 ? force_norm(system_, left) / scale : 0;
     state.newton_iterations = 1;
     return state;

@@ -6,6 +6,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 namespace tunica {
 namespace {
 
@@ -13,12 +15,34 @@ std::array<Vec3, 3> reference_corners(const ShellElement& e) {
   return {e.from_centroid.col(0), e.from_centroid.col(1), e.from_centroid.col(2)};
 }
 
-void add_dead_pressure(const ShellSystem& system, std::size_t element, double value, DeadLoad& load) {
+/// The elements of a shell, or faces of a solid, all of whose nodes are among some; empty where all are meant.
+std::vector<char> pressed_parts(const ShellSystem& system, const Model& model, std::size_t body,
+                                const std::vector<Index>& nodes) {
+  if (nodes.empty()) {
+    return {};
+  }
+  if (!model.is_solid(body)) {
+    return triangles_within(model.shells[body].mesh, nodes);
+  }
+  std::vector<char> chosen(system.node_count(), 0);
+  for (const Index node : nodes) {
+    chosen[model.first_node(body) + node] = 1;
+  }
+  std::vector<char> on;
+  for (std::size_t f = system.surfaces.first[body]; f < system.surfaces.first[body + 1]; ++f) {
+    const auto& v = system.surfaces.faces[f].nodes;
+    on.push_back(std::all_of(v.begin(), v.end(), [&](Index i) { return chosen[i] != 0; }) ? 1 : 0);
+  }
+  return on;
+}
+
+/// A pressure of 1 MPa.
+void add_dead_pressure(const ShellSystem& system, std::size_t element, DeadLoad& load) {
   const ShellElement& e = system.elements[element];
   Vector9 force;
   unit_pressure(reference_corners(e), system.heights[element], force, nullptr);
   for (int k = 0; k < 3; ++k) {
-    load.force.segment<3>(first_freedom(e.nodes[k])) += value * force.segment<3>(3 * k);
+    load.force.segment<3>(first_freedom(e.nodes[k])) += force.segment<3>(3 * k);
   }
 }
 
@@ -57,19 +81,24 @@ void add_edge_load(const ShellSystem& system, const Model& model, std::size_t bo
   }
 }
 
-/// Pressure that keeps its direction, or a force per area, on the surface of a solid.
-void add_solid_surface_load(const ShellSystem& system, const Load& load, DeadLoad& dead) {
+/// Pressure of 1 MPa that keeps its direction, or a force per area, on the surface of a solid.
+void add_solid_surface_load(const ShellSystem& system, const Model& model, const Load& load, DeadLoad& dead) {
   const auto* pressure = std::get_if<PressureLoad>(&load.kind);
   const auto* area = std::get_if<AreaLoad>(&load.kind);
   if (pressure == nullptr && area == nullptr) {
     return;
   }
-  for (std::size_t f = system.surfaces.first[load.body]; f < system.surfaces.first[load.body + 1]; ++f) {
+  const std::vector<char> on = pressure == nullptr ? std::vector<char>()
+                                                   : pressed_parts(system, model, load.body, pressure->nodes);
+  const std::size_t first = system.surfaces.first[load.body];
+  for (std::size_t f = first; f < system.surfaces.first[load.body + 1]; ++f) {
+    if (!on.empty() && on[f - first] == 0) {
+      continue;
+    }
     const auto& v = system.surfaces.faces[f].nodes;
     const Vec3 twice =
         (system.reference[v[1]] - system.reference[v[0]]).cross(system.reference[v[2]] - system.reference[v[0]]);
-    const Vec3 force =
-        pressure != nullptr ? Vec3(pressure->value / 6 * twice) : Vec3(twice.norm() / 6 * area->per_area);
+    const Vec3 force = pressure != nullptr ? Vec3(twice / 6) : Vec3(twice.norm() / 6 * area->per_area);
     for (const Index node : v) {
       dead.force.segment<3>(first_freedom(node)) += force;
     }
@@ -87,19 +116,24 @@ void make_loads(ShellSystem& system, const Model& model) {
     const std::size_t begin = solid ? 0 : system.first_element[load.body];
     const std::size_t end = solid ? 0 : system.first_element[load.body + 1];
     if (const auto* pressure = std::get_if<PressureLoad>(&load.kind); pressure != nullptr && pressure->follower) {
-      system.follower_pressures.emplace_back(l, load.body);
+      system.follower_pressures.push_back({l, load.body, pressed_parts(system, model, load.body, pressure->nodes)});
       continue;
     }
     dead.force = VectorX::Zero(first_freedom(system.node_count()));
     if (solid) {
-      add_solid_surface_load(system, load, dead);
+      add_solid_surface_load(system, model, load, dead);
     }
     if (std::holds_alternative<AreaLoad>(load.kind) && !solid) {
       dead.director.assign(system.node_count(), Mat3::Zero());
     }
     if (const auto* pressure = std::get_if<PressureLoad>(&load.kind)) {
+      dead.begin = pressure->at(0);
+      dead.end = pressure->at(1);
+      const std::vector<char> on = pressed_parts(system, model, load.body, pressure->nodes);
       for (std::size_t e = begin; e < end; ++e) {
-        add_dead_pressure(system, e, pressure->value, dead);
+        if (on.empty() || on[e - begin] != 0) {
+          add_dead_pressure(system, e, dead);
+        }
       }
     } else if (const auto* area = std::get_if<AreaLoad>(&load.kind)) {
       for (std::size_t e = begin; e < end; ++e) {
@@ -123,6 +157,23 @@ void make_loads(ShellSystem& system, const Model& model) {
       }
     }
   }
+}
+
+std::vector<double> shell_pressures(const ShellSystem& system, const Model& model, const std::vector<double>& factors) {
+  std::vector<double> pressures(system.elements.size(), 0);
+  for (std::size_t l = 0; l < model.loads.size(); ++l) {
+    const auto* pressure = std::get_if<PressureLoad>(&model.loads[l].kind);
+    const std::size_t body = model.loads[l].body;
+    if (pressure == nullptr || model.is_solid(body)) {
+      continue;
+    }
+    const std::vector<char> on = pressed_parts(system, model, body, pressure->nodes);
+    const std::size_t first = system.first_element[body];
+    for (std::size_t e = first; e < system.first_element[body + 1]; ++e) {
+      pressures[e] += on.empty() || on[e - first] != 0 ? pressure->at(factors[l]) : 0;
+    }
+  }
+  return pressures;
 }
 
 }  // namespace tunica

@@ -1,9 +1,12 @@
 #include "tunica/core/disjoint_sets.hpp"
+#include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/mechanics/runs/detail/loads.hpp"
 #include "tunica/mechanics/runs/detail/shell_system.hpp"
 #include "tunica/mechanics/runs/detail/supports.hpp"
 #include "tunica/shell/patch/curved_surface.hpp"
+
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
@@ -130,6 +133,7 @@ void add_stiffness_norms(ShellSystem& system) {
   for (const SolidElement& element : system.solids) {
     add(linear_stiffness(element), 4);
   }
+  translation += system.bed ? system.bed->squared_norm() : 0;
   system.translation_stiffness = std::sqrt(translation);
   system.rotation_stiffness = std::sqrt(rotation);
 }
@@ -161,6 +165,20 @@ void add_solids(ShellSystem& system, const Model& model, double& edges) {
 }
 
 }  // namespace
+
+void set_prestress(ShellSystem& system, const Prestress& prestress) {
+  if (prestress.shells.size() != system.elements.size() || prestress.solids.size() != system.solids.size()) {
+    throw InputError(fmt::format("a prestress of {} shells and {} tetrahedra is not of a model of {} and {}",
+                                 prestress.shells.size(), prestress.solids.size(), system.elements.size(),
+                                 system.solids.size()));
+  }
+  for (std::size_t e = 0; e < system.elements.size(); ++e) {
+    system.elements[e].prestrain = prestress.shells[e];
+  }
+  for (std::size_t e = 0; e < system.solids.size(); ++e) {
+    system.solids[e].prestress = prestress.solids[e];
+  }
+}
 
 void stiffen_short_waves(ShellSystem& system) {
   for (ShellElement& element : system.elements) {
@@ -259,6 +277,12 @@ ShellSystem make_system(const Model& model) {
     system.first_element.push_back(system.elements.size());
   }
   add_solids(system, model, edges);
+  if (model.prestress) {
+    set_prestress(system, *model.prestress);
+  }
+  if (!model.supports.empty()) {
+    system.bed.emplace(model, system.elements, system.normals);
+  }
   system.length = edges / real(std::max<std::size_t>(1, 3 * system.elements.size() + 6 * system.solids.size()));
   add_stiffness_norms(system);
   if (!model.solids.empty() || !model.attachments.empty() || !model.contacts.empty()) {

@@ -31,7 +31,7 @@ constexpr double largest_linear_strain = 0.2;
 /// The shift of a free body, of its lowest eigenvalue.
 constexpr double near_part = 0.2;
 
-void require_freedoms(std::size_t wanted, std::size_t there) {
+void require_modes(std::size_t wanted, std::size_t there) {
   if (wanted > there) {
     throw InputError(fmt::format("count = {}, but the model has only {} modes: ask for fewer", wanted, there));
   }
@@ -87,6 +87,18 @@ BlockMatrix tangent_change(const ShellSystem& system, const Model& model, const 
   return std::move(tangent[0]);
 }
 
+/// The tangent at the reference, before the loads act: with what the wall bears there already.
+void reference_tangent(const ShellSystem& system, const Model& model, BlockMatrix& tangent) {
+  if (!model.prestress) {
+    linear_stiffness(system, tangent);
+    return;
+  }
+  Forces forces;
+  evaluate(system, model, reference_configuration(system), std::vector<double>(model.loads.size(), 0.0), {}, forces,
+           &tangent);
+  symmetrise(tangent);
+}
+
 void add(BlockMatrix& matrix, double factor, const VectorX& diagonal) {
   for (std::size_t i = 0; i < matrix.node_count(); ++i) {
     auto block = matrix.block(matrix.find(narrow<Index>(i), narrow<Index>(i)));
@@ -114,7 +126,7 @@ void hand_over(const ShellSystem& system, const Model& model, const RunSettings&
   for (std::size_t k = 0; k < values.size(); ++k) {
     VectorX mode = pairs.vectors[k];
     if (take_out_rigid) {
-      take_out_linear_rigid_motion(system, model, mode);
+      take_out_linear_rigid_motion(system, mode);
     }
     Eigen::Index top = 0;
     double largest = 0;
@@ -182,7 +194,7 @@ public:
                                    multiply_b_(x, y);
                                    mask(free_, y);
                                  }};
-    return largest_eigenpairs(pencil, free_, deflated, options);
+    return largest_eigenpairs(pencil, along_world(free_), deflated, options);
   }
 
   /// The values found, checked by Sturm's count: none below the last that is less than `most` is missing.
@@ -298,7 +310,7 @@ BlockMatrix stiffness_at_rest(ShellSystem& system, const Model& model, const Run
     return stiffness;
   }
   if (run.preload.linear) {
-    linear_stiffness(system, stiffness);
+    reference_tangent(system, model, stiffness);
     const VectorX solution = linear_solution(system, model, settings);
     if (solution.squaredNorm() > 0) {
       const BlockMatrix change = tangent_change(system, model, solution);
@@ -330,12 +342,12 @@ Summary run_frequencies(ShellSystem& system, const Model& model, const RunSettin
   Configuration configuration = reference_configuration(system);
   BlockMatrix stiffness = stiffness_at_rest(system, model, settings, run, configuration);
   advance(progress, 0.3);
-  release_rigid_motion_supports(system, model);
+  release_rigid_motion_supports(system);
   const FreeMask free = free_freedoms(system);
   summary.dof = narrow<std::size_t>(std::count(free.begin(), free.end(), true));
 
   const std::vector<VectorX> rigid = idle_rigid_modes(system, configuration, stiffness);
-  require_freedoms(run.count, summary.dof - rigid.size());
+  require_modes(run.count, summary.dof - rigid.size());
   const VectorX mass = lumped_masses(system);
   // Where a body is free the first shift is only known to be small against the lowest value; one that is near it keeps
   // the rigid motions, which the inverse enlarges, from drowning the modes in round-off.
@@ -380,7 +392,7 @@ Summary run_buckling(ShellSystem& system, const Model& model, const RunSettings&
   on_state(reference_state(system, model, summary));
   const FreeMask free = free_freedoms(system);
   summary.dof = narrow<std::size_t>(std::count(free.begin(), free.end(), true));
-  require_freedoms(run.count, summary.dof);
+  require_modes(run.count, summary.dof);
 
   const VectorX solution = linear_solution(system, model, settings);
   const double strain = largest_strain(system, solution);
@@ -391,7 +403,7 @@ Summary run_buckling(ShellSystem& system, const Model& model, const RunSettings&
   const BlockMatrix change = tangent_change(system, model, solution);
   advance(progress, 0.3);
   BlockMatrix stiffness = system.pattern;
-  linear_stiffness(system, stiffness);
+  reference_tangent(system, model, stiffness);
   ShiftedPencil pencil(
       system, free, std::move(stiffness),
       [&](BlockMatrix& matrix, double by) {

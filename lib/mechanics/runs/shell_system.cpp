@@ -123,7 +123,7 @@ void add_dead_loads(const ShellSystem& system, const Configuration& configuratio
                     VectorX& external, BlockMatrix* tangent) {
   for (std::size_t l = 0; l < system.dead.size(); ++l) {
     const DeadLoad& load = system.dead[l];
-    const double factor = factors[l];
+    const double factor = load.begin + factors[l] * (load.end - load.begin);
     if (load.force.size() == 0 || factor == 0) {
       continue;
     }
@@ -168,41 +168,49 @@ void evaluate_solids(const ShellSystem& system, const Configuration& configurati
   forces.energy += std::accumulate(energies.begin(), energies.end(), 0.0);
 }
 
-/// Follower pressure on the surfaces of solids.
+/// Follower pressure on the surfaces of solids. @param pressure  per face, MPa; zero on the faces of shells
 void push_solids(const ShellSystem& system, const Configuration& configuration, const std::vector<double>& pressure,
                  VectorX& external, BlockMatrix* tangent) {
-  for (std::size_t body = system.first_element.size() - 1; body < pressure.size(); ++body) {
-    if (pressure[body] == 0) {
+  for (std::size_t f = 0; f < pressure.size(); ++f) {
+    if (pressure[f] == 0) {
       continue;
     }
-    for (std::size_t f = system.surfaces.first[body]; f < system.surfaces.first[body + 1]; ++f) {
-      const auto& v = system.surfaces.faces[f].nodes;
-      std::array<Vec3, 3> corners;
-      for (std::size_t k = 0; k < 3; ++k) {
-        corners[k] = system.reference[v[k]] + configuration.displacement[v[k]];
-      }
-      Vector9 force;
-      Matrix9 stiffness;
-      unit_pressure(corners, {}, force, tangent == nullptr ? nullptr : &stiffness);
-      for (int i = 0; i < 3; ++i) {
-        external.segment<3>(first_freedom(v[i])) += pressure[body] * force.segment<3>(3 * i);
-        for (int j = 0; tangent != nullptr && j < 3; ++j) {
-          tangent->block(tangent->find(v[i], v[j])).block<3, 3>(0, 0) -=
-              pressure[body] * stiffness.block<3, 3>(3 * i, 3 * j);
-        }
+    const auto& v = system.surfaces.faces[f].nodes;
+    std::array<Vec3, 3> corners;
+    for (std::size_t k = 0; k < 3; ++k) {
+      corners[k] = system.reference[v[k]] + configuration.displacement[v[k]];
+    }
+    Vector9 force;
+    Matrix9 stiffness;
+    unit_pressure(corners, {}, force, tangent == nullptr ? nullptr : &stiffness);
+    for (int i = 0; i < 3; ++i) {
+      external.segment<3>(first_freedom(v[i])) += pressure[f] * force.segment<3>(3 * i);
+      for (int j = 0; tangent != nullptr && j < 3; ++j) {
+        tangent->block(tangent->find(v[i], v[j])).block<3, 3>(0, 0) -= pressure[f] * stiffness.block<3, 3>(3 * i, 3 * j);
       }
     }
   }
 }
 
-/// Per body, MPa.
-std::vector<double> follower_pressures(const ShellSystem& system, const Model& model,
-                                       const std::vector<double>& factors) {
-  std::vector<double> pressure(model.body_count(), 0);
-  for (const auto& [load, body] : system.follower_pressures) {
-    pressure[body] += factors[load] * std::get<PressureLoad>(model.loads[load].kind).value;
+/// MPa: per element, and per face of the solids' surfaces.
+struct Pressures {
+  std::vector<double> elements, faces;
+};
+
+Pressures follower_pressures(const ShellSystem& system, const Model& model, const std::vector<double>& factors) {
+  Pressures pressures;
+  pressures.elements.assign(system.elements.size(), 0);
+  pressures.faces.assign(system.surfaces.faces.size(), 0);
+  for (const FollowerPressure& follower : system.follower_pressures) {
+    const double value = std::get<PressureLoad>(model.loads[follower.load].kind).at(factors[follower.load]);
+    const bool solid = model.is_solid(follower.body);
+    std::vector<double>& values = solid ? pressures.faces : pressures.elements;
+    const std::vector<std::size_t>& first = solid ? system.surfaces.first : system.first_element;
+    for (std::size_t k = first[follower.body]; k < first[follower.body + 1]; ++k) {
+      values[k] += follower.on.empty() || follower.on[k - first[follower.body]] != 0 ? value : 0;
+    }
   }
-  return pressure;
+  return pressures;
 }
 
 }  // namespace
@@ -314,7 +322,7 @@ void evaluate_shells(const ShellSystem& system, const Configuration& configurati
           valid = false;
           continue;
         }
-        Lanes p = Lanes([&](auto l) { return pressure[group[l]->body]; });
+        Lanes p = Lanes([&](auto l) { return pressure[batch.elements[l]]; });
         const bool is_pushed = any_of(p != 0);
         if (is_pushed) {
           LaneMatrix18* const its_stiffness = tangent == nullptr ? nullptr : &push_stiffness;
@@ -363,14 +371,21 @@ void evaluate(const ShellSystem& system, const Model& model, const Configuration
   if (tangent != nullptr) {
     std::fill(tangent->values.begin(), tangent->values.end(), 0.0);
   }
-  const std::vector<double> pressure = follower_pressures(system, model, factors);
+  const Pressures pressure = follower_pressures(system, model, factors);
   std::atomic<bool> valid{true};
-  evaluate_shells(system, configuration, pressure, viscous, predicted, forces, tangent, valid);
+  evaluate_shells(system, configuration, pressure.elements, viscous, predicted, forces, tangent, valid);
   if (!system.solids.empty()) {
     evaluate_solids(system, configuration, forces, tangent, valid);
-    push_solids(system, configuration, pressure, forces.external, tangent);
+    push_solids(system, configuration, pressure.faces, forces.external, tangent);
   }
   add_dead_loads(system, configuration, factors, forces.external, tangent);
+  if (system.bed) {
+    system.bed->add_forces(configuration.displacement, forces.internal);
+    forces.energy += system.bed->energy(configuration.displacement);
+    if (tangent != nullptr) {
+      system.bed->add_stiffness(*tangent);
+    }
+  }
   if (system.contact) {
     valid = system.contact->add(configuration, forces.external, tangent) && valid;
   }
@@ -390,6 +405,9 @@ void linear_stiffness(const ShellSystem& system, BlockMatrix& matrix) {
   }
   for (std::size_t e = 0; e < system.solids.size(); ++e) {
     scatter(system, narrow<Index>(e), linear_stiffness(system.solids[e]), matrix);
+  }
+  if (system.bed) {
+    system.bed->add_stiffness(matrix);
   }
 }
 
@@ -416,10 +434,13 @@ void linear_forces(const ShellSystem& system, const VectorX& displacement, Vecto
     for (int k = 0; k < 4; ++k) {
       motion.segment<4>(4 * k) = displacement.segment<4>(first_freedom(element.nodes[k]));
     }
-    const Vector16 force = linear_stiffness(element) * motion;
+    const Vector16 force = linear_force(element, motion);
     for (int k = 0; k < 4; ++k) {
       forces.segment<4>(first_freedom(element.nodes[k])) += force.segment<4>(4 * k);
     }
+  }
+  if (system.bed) {
+    system.bed->add_forces(displacement, forces);
   }
 }
 

@@ -5,8 +5,10 @@
 #include "tunica/mechanics/elements/rotation.hpp"
 #include "tunica/mechanics/model/wall.hpp"
 #include "tunica/mechanics/runs/curved_displacement.hpp"
+#include "tunica/mechanics/runs/detail/loads.hpp"
 #include "tunica/mechanics/runs/detail/run.hpp"
 #include "tunica/mechanics/runs/doubts.hpp"
+#include "tunica/mechanics/runs/prestress.hpp"
 
 #include <fmt/format.h>
 
@@ -46,6 +48,9 @@ State make_state(const ShellSystem& system, const Model& model, const Configurat
       state.strain_energy += response.energy;
     }
   }
+  if (system.bed) {
+    state.strain_energy += system.bed->energy(configuration.displacement);
+  }
   if (system.contact) {
     state.contacts = system.contact->results(configuration);
     state.rigids = system.contact->on_rigids();
@@ -61,8 +66,8 @@ std::string describe_loads(const Model& model, const std::vector<double>& reache
     if (const auto* pressure = std::get_if<PressureLoad>(&model.loads[l].kind)) {
       // kPa are what organs bear; what is out of all bounds is told as it is kept, for it may be the last number.
       constexpr double most_in_kpa = 1e6;
-      const double part = reached[l] * pressure->value;
-      const double whole = wanted[l] * pressure->value;
+      const double part = pressure->at(reached[l]);
+      const double whole = pressure->at(wanted[l]);
       const bool in_kpa = std::max(std::abs(part), std::abs(whole)) < most_in_kpa;
       text += fmt::format("{}{:.4g} {} of {:.4g} {} on {}", text.empty() ? "" : "; ", (in_kpa ? 1e3 : 1) * part,
                           in_kpa ? "kPa" : "MPa", (in_kpa ? 1e3 : 1) * whole, in_kpa ? "kPa" : "MPa",
@@ -132,9 +137,27 @@ void record_step(const State& state, double seconds, Summary& summary) {
   }
 }
 
+const std::vector<double>& remembered(const Checkpoint& from, std::string_view name, std::optional<std::size_t> count) {
+  const auto found = from.memory.find(name);
+  if (found == from.memory.end() || found->second.size() != count.value_or(found->second.size())) {
+    throw InputError(fmt::format("a checkpoint without \"{}\", or with that of another model", name));
+  }
+  return found->second;
+}
+
 Summary solve(const Model& model, const RunSettings& settings, const std::function<void(const State&)>& on_state,
               const Progress& progress, const Resumption& resumption) {
+  if (is_imaged_under_pressure(model) && !model.prestress) {
+    throw InputError("a pressure has an imaged_at, and the model is not prestressed: call prestressed()");
+  }
   ShellSystem system = make_checked_system(model, settings);
+  for (const auto* checkpoint : {&resumption.from, &resumption.near}) {
+    if (*checkpoint && ((*checkpoint)->displacement.size() != model.node_count() ||
+                        (*checkpoint)->rotation.size() != model.node_count())) {
+      throw InputError(fmt::format("a checkpoint of {} nodes is not of a model of {}",
+                                   (*checkpoint)->displacement.size(), model.node_count()));
+    }
+  }
   if (const auto* dynamic = std::get_if<DynamicRun>(&settings.kind)) {
     return run_dynamic(system, model, settings, *dynamic, on_state, progress, resumption);
   }
@@ -193,6 +216,11 @@ double turn_of(const Model& model, const ShellSystem& system, const State& state
   return turn;
 }
 
+const Model& checked(const Model& model) {
+  require_valid(model);
+  return model;
+}
+
 /// From the fields of the elements what of them is large.
 void find_wall(const Model& model, ElementFields& fields) {
   constexpr double equal_stress = 1e-6;
@@ -238,7 +266,7 @@ struct ElementFieldEvaluator::Implementation {
 };
 
 ElementFieldEvaluator::ElementFieldEvaluator(const Model& model)
-    : implementation_(new Implementation{model, make_system(model)}) {}
+    : implementation_(new Implementation{checked(model), make_system(model)}) {}
 ElementFieldEvaluator::~ElementFieldEvaluator() = default;
 
 ElementFields element_fields(const Model& model, const State& state) { return ElementFieldEvaluator(model)(state); }
@@ -247,14 +275,16 @@ ElementFields ElementFieldEvaluator::operator()(const State& state) const {
   const auto& [model, system] = *implementation_;
   ElementFields fields;
   const std::size_t nodes = model.node_count();
-  TUNICA_ASSERT(state.displacement.size() == nodes && state.rotation.size() == nodes);
-  std::vector<double> pressure(model.body_count(), 0);
-  for (const Load& load : model.loads) {
-    if (const auto* p = std::get_if<PressureLoad>(&load.kind)) {
-      pressure[load.body] += p->value * factor_of(load.ramp, state.velocity.empty(),
-                                                  state.velocity.empty() ? state.load_factor : state.time);
-    }
+  require_valid(model, state);
+  if (!system.solids.empty() && state.pressure.size() != nodes) {
+    throw InputError(fmt::format("a state with {} pressures for {} nodes", state.pressure.size(), nodes));
   }
+  std::vector<double> factors;
+  for (const Load& load : model.loads) {
+    factors.push_back(
+        factor_of(load.ramp, state.velocity.empty(), state.velocity.empty() ? state.load_factor : state.time));
+  }
+  fields.pressure = shell_pressures(system, model, factors);
   const auto von_mises = [](const Vec3& s) {
     return std::sqrt(std::max(0.0, s[0] * s[0] - s[0] * s[1] + s[1] * s[1] + 3 * s[2] * s[2]));
   };
@@ -286,15 +316,15 @@ ElementFields ElementFieldEvaluator::operator()(const State& state) const {
     const Mat3 elasticity = plane_stress(model.shells[element.body].material);
     const Vec3 strain = d.head<3>();
     const Vec3 curvature = element.curvature * d.segment<9>(3);
-    const Vec3 force = t * elasticity * strain;
-    const Vec3 moment = t * t * t / 12 * elasticity * curvature;
+    const ElementState stressed = d + element.prestrain;
+    const Vec3 force = t * elasticity * stressed.head<3>();
+    const Vec3 moment = t * t * t / 12 * elasticity * (element.curvature * stressed.segment<9>(3));
     fields.membrane_force.push_back(force);
     fields.bending_moment.push_back(moment);
     fields.von_mises_top.push_back(von_mises(force / t + 6 / (t * t) * moment));
     fields.von_mises_bottom.push_back(von_mises(force / t - 6 / (t * t) * moment));
     fields.principal_strain_top.push_back(principal(strain + t / 2 * curvature));
     fields.principal_strain_bottom.push_back(principal(strain - t / 2 * curvature));
-    fields.pressure.push_back(pressure[element.body]);
   }
   for (const SolidElement& element : system.solids) {
     SolidMotion motion;

@@ -25,7 +25,8 @@ struct State {
   std::vector<Vec3> rotation;          ///< rotation vectors, rad, #nodes
   std::vector<Vec3> velocity;          ///< mm/s, dynamic only
   std::vector<Vec3> angular_velocity;  ///< rad/s, dynamic only
-  std::vector<double> pressure;  ///< of the nodes of solids, in units of their shear modulus; empty without solids
+  /// Of the nodes of solids, in units of their shear modulus, #nodes; empty without solids.
+  std::vector<double> pressure;
   std::optional<double> volume;  ///< mm^3 of the closed bodies' curved surfaces together; none when one is open
   double strain_energy = 0;      ///< N mm = mJ
   double kinetic_energy = 0;     ///< mJ
@@ -156,6 +157,16 @@ struct Resumption {
   }
 };
 
+/// What every function of a model relies on: shells and solids with meshes to compute with (as require_valid() of
+/// these, all nodes at finite places), material and thickness; nodes and bodies that fixes, loads, contacts,
+/// attachments and probes name; numbers that are finite, and tables whose times increase. check_model() begins with it.
+/// Errors: InputError. Cost: linear.
+void require_valid(const Model& model);
+void require_valid(const ShellBody& body);
+
+/// That a state has as many displacements and rotations as a model has nodes. Errors: InputError.
+void require_valid(const Model& model, const State& state);
+
 /// Finds what makes a model unsolvable before any time is spent, and names it: degenerate or non-manifold elements,
 /// inconsistent orientation, a normal nearly in its facet's plane, pieces that can move freely (static), a
 /// non-positive thickness, net force on a body held by its rigid motions only.
@@ -165,14 +176,15 @@ void check_model(const Model& model, const RunSettings& settings);
 /// Runs a model. Every `settings.every`-th state, the reference state (time 0) and the last one go to `on_state`. After
 /// the reference, a run for frequencies or buckling hands over its modes: linear states, their largest displacement 1 %
 /// of the model's longest side.
-/// Errors: InputError as check_model; RequirementError when a step does not converge, has no equilibrium, or becomes
-/// unstable (the last good state has been handed over). With `cg_fixed_count` a run ends normally, `converged` false.
-/// A run that goes on from a checkpoint must have the model and the settings of the run that made it.
+/// Errors: InputError as check_model, and where a checkpoint is not of so many nodes; RequirementError when a step does
+/// not converge, has no equilibrium, or becomes unstable (the last good state has been handed over). With
+/// `cg_fixed_count` a run ends normally, `converged` false. A run that goes on from a checkpoint must have the model
+/// and the settings of the run that made it.
 Summary solve(const Model& model, const RunSettings& settings, const std::function<void(const State&)>& on_state,
               const Progress& progress = {}, const Resumption& resumption = {});
 
 /// Forces, moments and stresses of every triangle in one state, and what is largest. For many states of one model: the
-/// elements are made ready once. The model must outlive it.
+/// elements are made ready once. The model must outlive it. Errors: InputError as require_valid().
 class ElementFieldEvaluator {
 public:
   explicit ElementFieldEvaluator(const Model& model);

@@ -78,7 +78,7 @@ public:
     for (int round = 0; round < 8 && result.converged; ++round) {
       bool changed = false;
       for (const Piece& piece : system_.pieces) {
-        if (held_by_rigid_motions(model_, piece.body)) {
+        if (piece.balanced) {
           take_out_rigid_motion(system_, piece, configuration);
           changed = true;
         }
@@ -128,7 +128,7 @@ private:
   void require_balance(const Configuration& configuration, double factor) {
     static_balance(system_, model_, configuration, factor, forces_, nullptr);
     for (const Piece& piece : system_.pieces) {
-      if (held_by_rigid_motions(model_, piece.body) && imbalance_of(piece, configuration) > largest_imbalance) {
+      if (piece.balanced && imbalance_of(piece, configuration) > largest_imbalance) {
         throw RequirementError(
             fmt::format("{}: at load factor {:.6g} the loads are no longer in balance on the deformed body, which only "
                         "its rigid motions hold: hold it by a [[fix]]",
@@ -227,7 +227,7 @@ private:
   void resume(const Checkpoint& from) override {
     configuration_ = recall(from);
     factor_ = from.position;
-    increment_ = from.memory.at("increment").at(0);
+    increment_ = remembered(from, "increment", 1)[0];
   }
 
   State take_step() override {
@@ -248,18 +248,16 @@ private:
   /// Equilibrium from the configuration that is said to be near, supports and prescribed displacements put right.
   std::optional<NewtonResult> from_near(double target) {
     Configuration attempt{near_->displacement, near_->rotation};
-    VectorX positions = prescribed_positions(system_, model_, target);
+    VectorX moved(first_freedom(system_.node_count()));
     for (std::size_t i = 0; i < system_.node_count(); ++i) {
-      Vec3 turned = logarithm(attempt.rotation[i]);
-      for (int axis = 0; axis < 3; ++axis) {
-        if (system_.held[freedom(i, axis)]) {
-          attempt.displacement[i][axis] = positions[first_freedom(i) + axis];
-        }
-        if (system_.held[freedom(i, axis + 3)]) {
-          turned[axis] = 0;
-        }
-      }
-      attempt.rotation[i] = exponential(turned);
+      moved.segment<3>(first_freedom(i)) = attempt.displacement[i];
+      moved.segment<3>(first_freedom(i) + 3) = logarithm(attempt.rotation[i]);
+    }
+    mask(free_freedoms(system_), moved);
+    moved += prescribed_positions(system_, model_, target);
+    for (std::size_t i = 0; i < system_.node_count(); ++i) {
+      attempt.displacement[i] = moved.segment<3>(first_freedom(i));
+      attempt.rotation[i] = exponential(moved.segment<3>(first_freedom(i) + 3));
     }
     RunSettings few = settings_;
     few.newton_max = std::min(settings_.newton_max, near_iterations);
@@ -375,7 +373,7 @@ private:
     const auto node = narrow<Index>(farthest - u.begin());
     for (const Piece& piece : system_.pieces) {
       if (std::find(piece.nodes.begin(), piece.nodes.end(), node) != piece.nodes.end()) {
-        return !held_by_rigid_motions(model_, piece.body) && free_rigid_motions(system_, piece) > 0
+        return !piece.balanced && free_rigid_motions(system_, piece) > 0
                    ? model_.name_of(piece.body)
                    : "";
       }

@@ -63,11 +63,11 @@ Checkpoint SteppedRun::keep(double position, const Configuration& configuration,
 
 Configuration SteppedRun::recall(const Checkpoint& from) {
   Configuration configuration{from.displacement, from.rotation};
-  if (const auto found = from.memory.find("solid_pressure"); found != from.memory.end()) {
-    configuration.pressure = found->second;
+  if (!system_.solids.empty()) {
+    configuration.pressure = remembered(from, "solid_pressure", system_.node_count());
   }
   if (system_.contact) {
-    system_.contact->recall(from.memory.at("contact"), configuration, from.position);
+    system_.contact->recall(remembered(from, "contact"), configuration, from.position);
   }
   return configuration;
 }

@@ -5,6 +5,7 @@
 #include "tunica/mechanics/elements/rotation.hpp"
 #include "tunica/mechanics/runs/detail/run.hpp"
 #include "tunica/mechanics/runs/detail/supports.hpp"
+#include "tunica/mechanics/runs/prestress.hpp"
 
 #include <fmt/format.h>
 
@@ -28,24 +29,6 @@ constexpr double mixed = 0.5;  // of the residual that they leave: waves as shor
 constexpr double smallest_part = 1.0 / 32;
 constexpr std::string_view key = "imaged_at";
 
-/// The imaged model under the pressures of the image alone, held where the image shows it.
-Model as_imaged(Model model) {
-  std::erase_if(model.loads, [](const Load& load) {
-    const auto* pressure = std::get_if<PressureLoad>(&load.kind);
-    return pressure == nullptr || !pressure->imaged_at;
-  });
-  for (Load& load : model.loads) {
-    auto& pressure = std::get<PressureLoad>(load.kind);
-    pressure.value = *pressure.imaged_at;
-    load.ramp = {};
-  }
-  for (Fix& fix : model.fixes) {
-    fix.displacement.setZero();
-    fix.ramp = {};
-  }
-  return model;
-}
-
 RunSettings for_statics(RunSettings settings) {
   settings.kind = StaticRun{false, {1}};
   settings.cg_fixed_count = false;
@@ -62,7 +45,7 @@ class InverseStatics {
 public:
   InverseStatics(const Model& imaged, const RunSettings& settings)
       : imaged_(imaged),
-        pressed_(as_imaged(imaged)),
+        pressed_(under_imaging_pressure(imaged)),
         settings_(for_statics(settings)),
         image_(make_checked_system(pressed_, settings_)),
         solver_(image_, settings_),
@@ -103,7 +86,7 @@ public:
     factored_ = true;
     advance_configuration(image_, increment, there);
     for (const Piece& piece : system->pieces) {
-      if (held_by_rigid_motions(model, piece.body)) {
+      if (piece.balanced) {
         take_out_rigid_motion(*system, piece, there);
       }
     }
@@ -208,8 +191,7 @@ private:
   [[nodiscard]] Model under(double part, const VectorX& motion) const {
     Model model = moved_back(pressed_, motion);
     for (Load& load : model.loads) {
-      auto& pressure = std::get<PressureLoad>(load.kind);
-      pressure.value = part * *pressure.imaged_at;
+      std::get<PressureLoad>(load.kind).value *= part;
     }
     return model;
   }
@@ -318,15 +300,9 @@ Approach approach(InverseStatics& inverse, VectorX motion, double enough,
 
 }  // namespace
 
-bool is_imaged_under_pressure(const Model& model) {
-  return std::any_of(model.loads.begin(), model.loads.end(), [](const Load& load) {
-    const auto* pressure = std::get_if<PressureLoad>(&load.kind);
-    return pressure != nullptr && pressure->imaged_at.has_value();
-  });
-}
-
 Unloaded find_unloaded(const Model& imaged, const RunSettings& settings,
                        const std::function<void(double, double)>& on_iteration) {
+  require_valid(imaged);
   require_shells_only(imaged);
   InverseStatics inverse(imaged, settings);
   VectorX found = inverse.no_motion();
@@ -362,6 +338,7 @@ Unloaded find_unloaded(const Model& imaged, const RunSettings& settings,
   for (Load& load : unloaded.model.loads) {
     if (auto* pressure = std::get_if<PressureLoad>(&load.kind)) {
       pressure->imaged_at.reset();
+      pressure->unload = false;
     }
   }
   return unloaded;

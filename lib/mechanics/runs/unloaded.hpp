@@ -29,7 +29,4 @@ struct Unloaded {
 Unloaded find_unloaded(const Model& imaged, const RunSettings& settings,
                        const std::function<void(double part, double mean_change)>& on_iteration = {});
 
-/// Whether some pressure says that the image was taken under it.
-bool is_imaged_under_pressure(const Model& model);
-
 }  // namespace tunica

@@ -8,4 +8,7 @@ namespace tunica {
 /// Errors: InputError: a load on a node that no element uses.
 void make_loads(ShellSystem& system, const Model& model);
 
+/// All pressures on the shell elements, MPa. @param factors  of the loads
+std::vector<double> shell_pressures(const ShellSystem& system, const Model& model, const std::vector<double>& factors);
+
 }  // namespace tunica

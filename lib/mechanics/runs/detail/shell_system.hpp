@@ -1,7 +1,7 @@
 #pragma once
 
 #include "tunica/core/lane_count.hpp"
-#include "tunica/mechanics/algebra/block_matrix.hpp"
+#include "tunica/mechanics/algebra/free_mask.hpp"
 #include "tunica/mechanics/contact/carried.hpp"
 #include "tunica/mechanics/contact/contact_system.hpp"
 #include "tunica/mechanics/elements/pressure.hpp"
@@ -9,6 +9,7 @@
 #include "tunica/mechanics/model/configuration.hpp"
 #include "tunica/mechanics/model/model.hpp"
 #include "tunica/mechanics/solids/solid_element.hpp"
+#include "tunica/mechanics/terms/support.hpp"
 
 #include <memory>
 #include <optional>
@@ -16,11 +17,14 @@
 /// A model made ready for solving: elements, loads, masses and supports by global node, and the sums over them.
 namespace tunica {
 
-/// A load that keeps its direction, for a factor of 1. `director` of a node is the sum over the triangles around it of
-/// n g', for normals n that turn with the node and vectors g fixed in space: its energy is -trace(R n g').
+/// A load that keeps its direction, times a number that goes from `begin` to `end` with the load factor. `director` of
+/// a node is the sum over the triangles around it of n g', for normals n that turn with the node and vectors g fixed in
+/// space: its energy is -trace(R n g').
 struct DeadLoad {
   VectorX force;               ///< 6 per node: force, moment about fixed axes
   std::vector<Mat3> director;  ///< empty, or #nodes
+  double begin = 0;
+  double end = 1;
 };
 
 struct PrescribedFreedom {
@@ -33,6 +37,18 @@ struct PrescribedFreedom {
 struct Piece {
   std::size_t body = 0;
   std::vector<Index> nodes;  ///< global
+  /// Held by its rigid motions; those that nothing else holds are the translations and the rotations onto which these
+  /// project.
+  bool balanced = false;
+  Mat3 shifts = Mat3::Identity();
+  Mat3 turns = Mat3::Identity();
+};
+
+/// A pressure that follows the surface.
+struct FollowerPressure {
+  std::size_t load = 0;
+  std::size_t body = 0;
+  std::vector<char> on;  ///< per element, or face of a solid, of the body; empty: on all
 };
 
 /// Elements that are computed at once; those beyond `count` repeat another.
@@ -63,12 +79,14 @@ struct ShellSystem {
   std::shared_ptr<ContactSystem> contact;  ///< none where nothing touches
 
   std::vector<DeadLoad> dead;  ///< per load; empty vectors for follower pressure
-  std::vector<std::pair<std::size_t, std::size_t>> follower_pressures;  ///< (load, body)
+  std::vector<FollowerPressure> follower_pressures;
+  std::optional<SupportTerm> bed;  ///< none where nothing is supported
 
   VectorX area;            ///< per node: a third of the triangles around it
   VectorX mass;            ///< tonne per node
   VectorX inertia;         ///< tonne mm^2 per node, about every axis: rho t^3 / 12 times the area
-  std::vector<bool> held;  ///< 6 per node
+  FreeMask held;           ///< 6 per node; what is not free
+  std::vector<std::size_t> balancing;  ///< of those, what holds only rigid motions of bodies whose loads are in balance
   std::vector<PrescribedFreedom> prescribed;
   double length = 0;  ///< mean edge, mm: what makes moments comparable with forces
   /// Norms of the elements' stiffness, moments divided by `length`: forces by displacements (N/mm), by rotations (N).
@@ -81,6 +99,9 @@ struct ShellSystem {
 /// Errors: InputError for what only shows when loads and supports are put on the nodes (a load on a node without
 /// triangles, an edge load on an edge that is not there).
 ShellSystem make_system(const Model& model);
+
+/// Puts stress into the reference. Errors: InputError: of another model.
+void set_prestress(ShellSystem& system, const Prestress& prestress);
 
 /// Makes the pattern, with further pairs of nodes that may act on each other.
 void make_pattern(ShellSystem& system, const std::vector<std::array<Index, 2>>& pairs);
