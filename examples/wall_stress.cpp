@@ -1,7 +1,7 @@
 // A vessel under pressure: a model made in memory, solved, and its wall stress beside Laplace's law.
 //
 //   wall_stress
-#include <tunica/mechanics/runs/solve.hpp>
+#include <tunica/mechanics/runs/fields.hpp>
 
 #include <cmath>
 #include <iostream>

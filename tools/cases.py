@@ -18,15 +18,18 @@ WALL = ("PRESSURE", "YOUNG", "POISSON", "THICKNESS")
 IMAGE = ("IMAGED_AT", "MID_SURFACE")
 MOTION = ("DENSITY", "DURATION", "STEP")
 WITH_UNIT = {"PRESSURE": "80mmHg", "YOUNG": "1MPa", "THICKNESS": "1.5mm", "DENSITY": "1100kg/m3", "IMAGED_AT": "80mmHg",
-             "DURATION": "1s", "STEP": "10ms"}
+             "DURATION": "1s", "STEP": "10ms", "SUPPORT": "1e5N/m3"}
 NUMBERS = (*WITH_UNIT, "POISSON", "TOLERANCE", "ACCURACY", "ISOVALUE", "SMOOTH", "SHELLS", "LOAD_STEPS")
 FURTHER = ("EXTRACT", "DECIMATE", "RELAX", "SIMULATE")
 SWITCHES = ("LARGEST", "FILL", "OPEN")
 ON, OFF = ("1", "yes", "on", "true"), ("", "0", "no", "off", "false")
 # Variables that a case may have of its own, and those that a run has.
-OF_A_CASE = ("LABEL", "ISOVALUE", "NAMES", "SMOOTH", "LARGEST", "FILL", "OPEN", "SHELLS", "TOLERANCE", "ACCURACY", "OF",
-             "METHOD", *WALL, *IMAGE, "KIND", "LOAD_STEPS", *MOTION, "FIX", "MEM", *FURTHER)
+OF_A_CASE = ("LABEL", "ISOVALUE", "NAMES", "SMOOTH", "LARGEST", "FILL", "OPEN", "CUT", "SHELLS", "TOLERANCE", "ACCURACY", "OF",
+             "METHOD", *WALL, *IMAGE, "KIND", "LOAD_STEPS", *MOTION, "FIX", "SUPPORT", "MEM", *FURTHER)
 OF_A_RUN = ("VOLUMES", "LABELS", "CASES", "OUT", "THREADS", "RUN", "BIN")
+# The columns of a table of label names, as the tools know them.
+NAME_HEADS = {"name", "labelname", "label_name", "structure", "structure_name", "region", "organ"}
+VALUE_HEADS = {"index", "labelvalue", "label_value", "voxel_value", "value", "id", "labelid", "label_id"}
 # What a case says of the one side takes the place of what make says of the other.
 INSTEAD = ((("LABEL",), ("ISOVALUE",)), (("ACCURACY",), ("SHELLS", "TOLERANCE")))
 
@@ -214,6 +217,8 @@ def read_rows(path):
     if not lines:
         raise Refused(f"{path}: is empty: its first line names the columns, such as case, volume, label, pressure")
     heads = lines[0][1][:max(at for at, head in enumerate(lines[0][1], 1) if head)]  # spreadsheets add blank ones
+    if is_of_label_names(heads):
+        raise Refused(f"{path}: is a table of label names, not of cases: give it as NAMES, and the volumes as VOLUMES")
     columns = [check_column(path, heads, name) for name in heads]
     rows = []
     for number, line in lines[1:]:
@@ -224,6 +229,12 @@ def read_rows(path):
     if not rows:
         raise Refused(f"{path}: has columns but no case")
     return rows
+
+
+def is_of_label_names(heads):
+    """Whether these are the columns of a table for NAMES: those of a value and of a name, and no case and no volume."""
+    words = set(BLANKS.split(" ".join(heads).lower()))
+    return bool(words & NAME_HEADS and words & VALUE_HEADS) and not words & {"case", "volume"}
 
 
 def check_column(path, heads, head):
@@ -287,19 +298,30 @@ def misstated():
     return wrong
 
 
+def rests_as_imaged(setting_of):
+    """Whether nothing but the pressure of the image acts, so that equilibrium decides the stress: no stiffness is needed."""
+    imaged, pressure = setting_of("IMAGED_AT"), setting_of("PRESSURE")
+    return setting_of("KIND") == "static" and not is_zero(imaged) and pressure in ("", imaged)
+
+
+def is_zero(quantity):
+    """Whether a quantity is nothing, in whatever unit."""
+    return re.match(r"[-+]?(0+\.?0*|\.0+)(e[-+]?\d+)?\s*[^\d.]", quantity + " ", re.I) is not None
+
+
 def missing_of(case):
     """What a case still needs, by words."""
-    needed = list(WALL)
+    needed = ["IMAGED_AT", "POISSON", "THICKNESS"]
     kind = case.setting("KIND")
-    if kind == "dynamic":
-        needed += MOTION
-    elif kind != "static":
+    if kind not in ("static", "dynamic"):
         return [f"kind: '{shown(kind)}' is not understood: static or dynamic"]
     if case.setting("ACCURACY") and case.setting("MID_SURFACE"):
         return ["accuracy refits the shells to the face that mid_surface leaves: give shells or tolerance instead"]
-    if case.setting("ACCURACY") and case.setting("IMAGED_AT"):
-        return ["accuracy loads the shells as imaged, imaged_at unloads them first: give shells or tolerance instead"]
-    missing = [name for name in needed if not case.setting(name)]
+    if kind == "dynamic":
+        needed += ["YOUNG", *MOTION, *(["PRESSURE"] if is_zero(case.setting("IMAGED_AT")) else [])]
+    elif not rests_as_imaged(case.setting):
+        needed += ["PRESSURE", "YOUNG"]
+    missing = [name for name in dict.fromkeys(needed) if not case.setting(name)]
     if not missing:
         return []
     return [f"{', '.join(missing).lower()} not given: fill the cell, or give {missing[0]} to make for all such cases"]
@@ -354,4 +376,6 @@ def find_cases(out):
     if not volumes:
         raise Refused("VOLUMES is empty: name segmented volumes, or leave it out to see a shipped sample")
     volumes = list(reversed(volumes.values()))
+    if is_zero(setting("IMAGED_AT")) and not setting("PRESSURE"):
+        raise Refused("IMAGED_AT is zero and PRESSURE is not given, so that nothing loads the wall: give PRESSURE and YOUNG")
     return [Case(out, volume, name, label) for volume, name in zip(volumes, name_volumes(volumes)) for label in labels]

@@ -1,4 +1,5 @@
 #include "tunica/cli/label_choice.hpp"
+#include "tunica/cli/scene_flags.hpp"
 #include "tunica/cli/surface_result.hpp"
 #include "tunica/cli/tool.hpp"
 #include "tunica/cli/usage.hpp"
@@ -7,6 +8,7 @@
 #include "tunica/core/version.hpp"
 #include "tunica/io/mesh/surface_file.hpp"
 #include "tunica/io/volume/volume_file.hpp"
+#include "tunica/surface/mesh/cut_open.hpp"
 #include "tunica/surface/mesh/incidence.hpp"
 #include "tunica/surface/mesh/measure.hpp"
 #include "tunica/volume/cubes/doubts.hpp"
@@ -47,6 +49,7 @@ struct Arguments {
   bool largest = false;
   bool fill_cavities = false;
   bool open_border = false;
+  std::vector<std::string> cuts;    // as they are written
   std::optional<std::string> face;  // of a wall
   std::optional<fs::path> other_face;
   std::string smooth = "none";
@@ -97,6 +100,13 @@ void declare(cli::Tool& tool, Arguments& arguments) {
   app.add_flag("--fill-cavities", arguments.fill_cavities, "drop the surfaces of cavities");
   app.add_flag("--open-border", arguments.open_border,
                "leave open, trimmed flat, the ends of vessels that the image's border cuts, instead of closing them");
+  app.add_option("--cut", arguments.cuts,
+                 "cut the surface open along a plane and drop what lies beyond, may repeat: 'above z=40mm', 'below "
+                 "x=-2cm', in the axes of --space")
+      ->type_name("WHERE")
+      ->expected(1)
+      ->allow_extra_args(false)  // the next word is a file
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
   app.add_option("--face", arguments.face,
                  "of a label that is the wall itself: this face alone, closed or open as a vessel, normals outward")
       ->check(CLI::IsMember({"inner", "outer"}))
@@ -172,6 +182,14 @@ Smoothing parse_smoothing(const std::string& text) {
   throw UsageError(fmt::format("--smooth: sigma has to be above 0, '{}' is not", text));
 }
 
+HalfSpaceNodes parse_cut(const std::string& text) {
+  const auto half = cli::parse_half_space(text, "--cut");
+  if (!half) {
+    throw UsageError(fmt::format("--cut: '{}' is not understood: write 'above z=40mm' or 'below x=-2cm'", text));
+  }
+  return *half;
+}
+
 void refuse_contradictions(const Arguments& arguments) {
   const auto refuse = [](const char* message) { throw UsageError(message); };
   if (arguments.label && arguments.isovalue) {
@@ -185,6 +203,9 @@ void refuse_contradictions(const Arguments& arguments) {
   }
   if (arguments.isovalue && !parse_number(*arguments.isovalue)) {
     throw UsageError(fmt::format("--isovalue: '{}' is not a number", *arguments.isovalue));
+  }
+  for (const std::string& cut : arguments.cuts) {
+    (void)parse_cut(cut);
   }
   if (arguments.face && arguments.all_labels) {
     refuse("--face is of one wall: name it by --label instead of --all-labels");
@@ -290,6 +311,7 @@ VolumeContents contents_of(cli::Tool& tool, const Arguments& arguments, const cl
   }
   for (const Label& label : *contents.labels) {
     contents.surface_vertices.push_back(index->surface_vertices(label.value));
+    contents.places.push_back(cli::place_of(index->mask(label.value)));
   }
   return contents;
 }
@@ -439,6 +461,27 @@ std::function<TriangleMesh(const MarchingCubesOptions&)> smoothed_surface(cli::T
   };
 }
 
+// Along planes in the axes of the output.
+void cut_open(TriangleMesh& mesh, const Subject& subject, const Arguments& arguments) {
+  for (const std::string& text : arguments.cuts) {
+    const HalfSpaceNodes half = parse_cut(text);
+    const double turned = subject.ras && half.axis < 2 ? -1 : 1;
+    Interval range{infinity, -infinity};
+    for (const Vec3& x : mesh.vertices) {
+      range.lower = std::min(range.lower, turned * x[half.axis]);
+      range.upper = std::max(range.upper, turned * x[half.axis]);
+    }
+    if (!(range.lower < half.at && half.at < range.upper)) {
+      throw InputError(
+          fmt::format("{}: --cut '{}' does not meet the surface of {}, which reaches from {:.6g} to {:.6g} "
+                      "mm along {}",
+                      arguments.volume.string(), text, subject.name, range.lower, range.upper, "xyz"[half.axis]));
+    }
+    const double kept = half.below ? -1 : 1;  // what lies beyond is above the plane along this normal
+    mesh = tunica::cut_open(mesh, kept * turned * Vec3::Unit(half.axis), kept * half.at);
+  }
+}
+
 Surface extract(cli::Tool& tool, const Subject& subject, Selection selection, const Arguments& arguments,
                 const Smoothing& smoothing) {
   const bool gaussian = smoothing.kind == Smoothing::Kind::gaussian;
@@ -480,6 +523,7 @@ Surface extract(cli::Tool& tool, const Subject& subject, Selection selection, co
     const StaircaseOptions staircase{arguments.open_border, tool.progress("smooth")};
     surface.staircase = smooth_staircase(surface.mesh, surface.mask, staircase);
   }
+  cut_open(surface.mesh, subject, arguments);
   return surface;
 }
 
@@ -542,9 +586,8 @@ std::array<Selection, 2> both_faces(cli::Tool& tool, const Subject& subject, con
   if (hollows.sizes.empty()) {
     throw InputError(fmt::format(
         "{}: {} is no wall around a hollow, so it has no inner and no outer face: leave out --face; where it "
-        "is a wall with a hole, close that in the segmentation, and where it ends within the image, crop the image so "
-        "that "
-        "its border cuts the wall",
+        "is a wall with a hole or a slit, close that in the segmentation, and where it ends within the image, crop the "
+        "image so that its border cuts the wall",
         arguments.volume.string(), wall.target.name));
   }
   warn_all(tool, doubt_wall(subject, hollows));
@@ -571,7 +614,8 @@ Json extract_to_file(cli::Tool& tool, Selection selection, const Arguments& argu
   }
   const std::string name = selection.target.name;
   const Surface surface = extract(tool, subject, std::move(selection), arguments, smoothing);
-  Json result = cli::measure_surface(surface.mesh, surface.outward, arguments.open_border);
+  Json result = cli::measure_surface(surface.mesh, surface.outward, arguments.open_border || !arguments.cuts.empty());
+  result["openings"] = boundary_loops(surface.mesh).size();
   result["voxel_volume_mm3"] = voxel_volume;
   if (surface.staircase) {
     result["staircase"] = {{"largest_move_voxels", surface.staircase->largest_move},

@@ -39,7 +39,7 @@ STAGES = ("extract", "decimate", "relax", "simulate")
 PRODUCTS = {"extract": ["surface.ply"], "decimate": ["coarse.ply"], "relax": ["shell.ply", "map.png"],
             "simulate": ["result.hdf", "picture.png"]}
 TABLES = (".tsv", ".csv", ".txt", ".json", ".xml", ".ctbl", ".label", ".lut")  # of label names, beside a volume
-REFINED = "refined.ply"  # with ACCURACY: the shells that carried the load
+REFINED = "refined.ply"  # of an accuracy: the shells that carried the load
 
 
 # ------------------------------------------------------------------------------------------------------ what they run
@@ -54,6 +54,19 @@ def path_word(path):
     return os.path.join(".", path) if path.startswith("-") else path
 
 
+def accuracy_flags(case):
+    """The flags by which the shells are chosen for an accuracy; none where the case says how many it wants. One that says
+    neither aims at 5 % of the membrane stress within a minute of solution, and says what it reached."""
+    setting = case.setting
+    of = flag("--of", setting("OF") or "membrane")
+    if setting("ACCURACY"):
+        return [*flag("--accuracy", setting("ACCURACY")), *of]
+    is_stated = any(setting(name) for name in ("SHELLS", "TOLERANCE", "MID_SURFACE", "LOAD_STEPS"))
+    if is_stated or setting("KIND") != "static" or re.search(r"--(unloaded|load-steps|accuracy|target)\b", setting("SIMULATE")):
+        return []
+    return ["--accuracy", "5%", *of, "--max-seconds", "60s"]
+
+
 def stage_flags(case):
     """Per stage what changes its result, as text for the shell."""
     setting = case.setting
@@ -61,29 +74,33 @@ def stage_flags(case):
     def flag_if(name, setting_name):
         return flag(name, setting(setting_name)) if setting(setting_name) else []
 
+    def several(name, setting_name):
+        parts = [part.strip() for part in setting(setting_name).split(";")]
+        return [word for part in parts if part for word in flag(name, part)]
+
     extract = flag_if("--isovalue", "ISOVALUE") or flag("--label", case.label)
-    extract += flag_if("--names", "NAMES") + flag_if("--smooth", "SMOOTH")
+    extract += several("--cut", "CUT") + flag_if("--names", "NAMES") + flag_if("--smooth", "SMOOTH")
     for name, word in zip(SWITCHES, ("--largest", "--fill-cavities", "--open-border")):
         extract += [word] if case.switched_on(name) else []
-    shells = setting("SHELLS") or ("190" if setting("ACCURACY") else "800")
+    accuracy = accuracy_flags(case)
+    shells = setting("SHELLS") or ("190" if accuracy else "800")
     decimate = ["--triangles", shells]
     if not re.search(r"--min-angle\b", setting("DECIMATE")):
         decimate += ["--min-angle", "20", "--soft-angle"]  # needles would bend too stiffly
     relax = flag("--tolerance", setting("TOLERANCE")) + ["--refine"] if setting("TOLERANCE") else []
-    if setting("ACCURACY"):
+    if accuracy:
         relax = ["--shells", shells, "--max-iterations", "1"]  # the coarsest of the levels, near enough to be refitted
     relax += flag_if("--method", "METHOD")
     if setting("MID_SURFACE"):
         relax += flag("--mid-surface", setting("MID_SURFACE")) + flag_if("--thickness", "THICKNESS")
-    simulate = [word for fix in setting("FIX").split(";") if fix.strip() for word in flag("--fix", fix.strip())]
-    simulate += flag_if("--accuracy", "ACCURACY") + flag_if("--of", "OF")
+    simulate = several("--fix", "FIX") + flag_if("--support", "SUPPORT")
+    simulate += flag_if("--imaged-at", "IMAGED_AT")
     for name in ("pressure", "young", "poisson", "thickness", "density"):
         simulate += flag_if("--" + name, name.upper())
-    simulate += flag_if("--imaged-at", "IMAGED_AT")
     if setting("KIND") == "static":
-        simulate += ["--static", *flag_if("--load-steps", "LOAD_STEPS")]
+        simulate += ["--static", *flag_if("--load-steps", "LOAD_STEPS"), *accuracy]
     else:
-        simulate += flag_if("--duration", "DURATION") + flag_if("--step", "STEP")
+        simulate += flag_if("--duration", "DURATION") + flag_if("--step", "STEP") + accuracy
     words = {"extract": extract, "decimate": decimate, "relax": relax, "simulate": simulate}
     return {stage: shlex.join(words[stage] + shlex.split(setting(stage.upper()))) for stage in words}
 
@@ -93,7 +110,9 @@ def stage_commands(case, binaries, flags):
     surface, coarse, shell, error_map, result, picture, refined, facts = (
         os.path.join(case.folder, name) for name in ("surface.ply", "coarse.ply", "shell.ply", "map.png", "result.hdf",
                                                      "picture.png", REFINED, "extract.json"))
-    refinement = ["--target", surface, "--shell-out", refined] if case.setting("ACCURACY") else []
+    # What the shells were fitted to tells the error of the mesh; with MID_SURFACE they lie half a wall from it.
+    refinement = ["--target", surface] if not case.setting("MID_SURFACE") and case.setting("KIND") == "static" else []
+    refinement += ["--shell-out", refined] if accuracy_flags(case) else []
     words = {"extract": [path_word(case.volume), surface], "decimate": [surface, coarse],
              "relax": [coarse, surface, shell, "--picture", error_map],
              "simulate": [shell, result, "--picture", picture, *refinement]}
@@ -214,7 +233,7 @@ def is_up_to_date(case, stage, remembered):
     own[os.fsencode(os.path.basename(case.volume)).decode("utf-8", "replace")] = case.volume
     try:
         files = [(os.path.basename(entry["path"]), entry) for entry in [*report["inputs"], *report["outputs"]]]
-        wanted = {*PRODUCTS[stage], *([REFINED] if stage == "simulate" and case.setting("ACCURACY") else [])}
+        wanted = {*PRODUCTS[stage], *([REFINED] if stage == "simulate" and accuracy_flags(case) else [])}
         return report["ok"] is True and wanted <= {name for name, _ in files} and all(
             entry["sha256"] is None or sha256(own.get(name, entry["path"])) == entry["sha256"] for name, entry in files)
     except (OSError, KeyError, TypeError, ValueError):

@@ -1,4 +1,5 @@
 #include "tunica/accuracy/accuracy.hpp"
+#include "tunica/accuracy/estimates.hpp"
 #include "tunica/cli/picture_flags.hpp"
 #include "tunica/cli/scene_flags.hpp"
 #include "tunica/cli/tool.hpp"
@@ -18,6 +19,8 @@
 #include "tunica/io/scene/stated.hpp"
 #include "tunica/mechanics/runs/curved_displacement.hpp"
 #include "tunica/mechanics/runs/doubts.hpp"
+#include "tunica/mechanics/runs/fields.hpp"
+#include "tunica/mechanics/runs/hold_doubts.hpp"
 #include "tunica/mechanics/runs/solve.hpp"
 #include "tunica/mechanics/runs/unloaded.hpp"
 #include "tunica/shell/distance/shell_distance.hpp"
@@ -32,6 +35,7 @@
 #include <cmath>
 #include <functional>
 #include <iterator>
+#include <map>
 #include <numbers>
 
 namespace tunica {
@@ -72,7 +76,9 @@ void declare(cli::Tool& tool, Arguments& a) {
   app.add_option("--tessellation", a.tessellation,
                  "pieces per edge into which a curved shell is cut for drawing (default 4, less for many shells)")
       ->type_name("N");
-  app.add_option("--unloaded", a.unloaded, "with --imaged-at: the shells without that pressure")->type_name("OUT.ply");
+  app.add_option("--unloaded", a.unloaded,
+                 "with --imaged-at: find the shape without that pressure, begin there, and write it")
+      ->type_name("OUT.ply");
   app.add_option("--export", a.exports,
                  "write beside OUT.hdf, may repeat: pvd (OUT.pvd with a .vtu per state) | xmf (OUT.xmf, XDMF) | "
                  "inp (the model for CalculiX and Abaqus) | feb (the model for FEBio) | "
@@ -254,6 +260,14 @@ RunIdentity identity_of_run(const cli::Tool& tool, const Scene& scene, const std
   return identity;
 }
 
+std::vector<std::pair<std::string, std::string>> shown_inputs(const cli::Tool& tool, const RunIdentity& origin) {
+  std::vector<std::pair<std::string, std::string>> inputs = origin.inputs;
+  for (auto& [path, hash] : inputs) {
+    path = tool.provenance().told(path);
+  }
+  return inputs;
+}
+
 /// What the meshes of a scene say beside what they hold.
 void tell_findings(const cli::Tool& tool, const LoadedScene& loaded) {
   for (const std::string& note : loaded.notes) {
@@ -301,19 +315,23 @@ void require_own_target(const ShellMesh& shell, const Target& target, const fs::
   }
 }
 
-/// The unloaded shells as an output, where they can be one.
-void name_unloaded(cli::Tool& tool, const Arguments& given, const Scene& scene) {
+/// Asks the scene for the unloaded shells, and names them as an output.
+void name_unloaded(cli::Tool& tool, const Arguments& given, Scene& scene) {
   if (!given.unloaded) {
     return;
   }
-  const bool imaged = std::any_of(scene.loads.begin(), scene.loads.end(), [](const SceneLoad& load) {
-    const auto* pressure = std::get_if<PressureLoad>(&load.kind);
-    return pressure != nullptr && pressure->imaged_at.has_value();
-  });
+  bool imaged = false;
+  for (SceneLoad& load : scene.loads) {
+    if (auto* pressure = std::get_if<PressureLoad>(&load.kind); pressure != nullptr && pressure->imaged_at) {
+      pressure->unload = imaged = true;
+      load.places.keys.try_emplace("unload", Place{"--unloaded", true});
+    }
+  }
   if (!imaged || scene.shells.size() > 1) {
     throw UsageError(imaged ? "--unloaded: the scene has more than one body, one can be written"
                             : "--unloaded belongs to --imaged-at, or imaged_at in a scene: give that too");
   }
+  check_scene(scene);
   tool.output(*given.unloaded, {".ply"});
 }
 
@@ -337,6 +355,115 @@ std::string space_of_shells(const Scene& scene, const std::string& otherwise) {
              : read_mesh(scene.shells.front().mesh, scene.shells.front().unit_mm).space.value_or(otherwise);
 }
 
+/// The surfaces that the bodies' meshes were fitted to, by body.
+std::map<std::string, fs::path> target_paths(const Scene& scene, const Arguments& given) {
+  if (scene.accuracy) {
+    return scene.accuracy->targets;
+  }
+  return given.accuracy.target && !scene.shells.empty()
+             ? std::map<std::string, fs::path>{{scene.shells.front().name, *given.accuracy.target}}
+             : std::map<std::string, fs::path>();
+}
+
+struct ReadTarget {
+  std::unique_ptr<Target> target;
+  std::string space;
+  std::optional<double> voxel;  ///< mm, longest edge, of the image behind it
+};
+
+ReadTarget read_target(const cli::Tool& tool, const SceneShell& shell, const ShellMesh& mesh, const fs::path& path) {
+  MeshFile file = read_mesh(path, shell.unit_mm, true);
+  require_surface(file, path);
+  const MeshFile own = read_mesh(shell.mesh, shell.unit_mm);
+  require_same_scale(own, shell.mesh, file, path, shell.unit_mm);
+  require_near(own, shell.mesh, file, path);
+  ReadTarget read;
+  read.space = common_space(own, shell.mesh, file, path);
+  if (file.voxel) {
+    read.voxel = shell.scale * *file.voxel;
+  }
+  for (Vec3& vertex : file.mesh.vertices) {
+    vertex *= shell.scale;
+  }
+  read.target = target_like(tool, mesh, std::move(file.mesh), path);
+  require_own_target(mesh, *read.target, path);
+  return read;
+}
+
+/// The shells without the pressure of the image, which is told.
+Model unloaded_model(cli::Tool& tool, const Model& imaged, const RunSettings& run, const fs::path& subject) {
+  Unloaded found = naming(subject.string(), [&] {
+    return find_unloaded(imaged, run, [&](double part, double change) {
+      tool.detail(fmt::format("unloaded shape: {:.3g} of the pressure, moved by {:.3g} mm in the mean", part, change));
+    });
+  });
+  tool.result()["unloaded"] = unloaded_report(found);
+  warn_of(tool, subject, unloaded_warnings(found));
+  tool.note(fmt::format(
+      "the unloaded shape is found: under the pressure of the image it lies {:.2g} mm from the image, {:.2g} "
+      "mm at most",
+      found.mean_distance, found.largest_distance));
+  return std::move(found.model);
+}
+
+/// How far the answers of a static run may be off, by one refinement solved besides.
+Estimates refined_estimates(const cli::Tool& tool, const System& system, const Scene& scene, const Target& target,
+                            const std::pair<State, ElementFields>& last, const fs::path& subject) {
+  RefinedAnswers refined = naming(subject.string(), [&] {
+    return estimate_by_refinement(
+        system.model(), last.first, answers_of(last.first, last.second), {&target}, system.settings(),
+        [&](std::vector<ShellBody> bodies) { return resolve_scene(scene, std::move(bodies)); });
+  });
+  if (!refined.reason.empty()) {
+    tool.warn(
+        {Weight::minor, "error of the mesh",
+         fmt::format("{}: how far the answers may be off by the mesh is not known, for on shells split in four {}: "
+                     "take more shells (SHELLS)",
+                     subject.string(), refined.reason)});
+  }
+  return std::move(refined.estimates);
+}
+
+/// Sentences that name their places themselves.
+void tell_doubts(const cli::Tool& tool, const std::vector<Warning>& some, const std::vector<Warning>& more) {
+  for (const auto* doubts : {&some, &more}) {
+    for (const Warning& doubt : *doubts) {
+      tool.warn(doubt);
+    }
+  }
+}
+
+void write_shells(const cli::Tool& tool, const fs::path& out, const ShellMesh& mesh, const std::string& space,
+                  bool partial) {
+  PlyOptions options;
+  options.comments = {"made by " + tool.made_by()};
+  options.space = space;
+  options.overwrite = tool.force();
+  options.partial = partial;
+  write_ply(out, mesh, options);
+}
+
+/// Of which state a picture is: the last one, or the first mode.
+std::string when(const RunSettings& run, const State& state) {
+  return std::holds_alternative<FrequencyRun>(run.kind) || std::holds_alternative<BucklingRun>(run.kind)
+             ? "of the first mode (only the shape counts)"
+         : std::holds_alternative<DynamicRun>(run.kind) ? fmt::format("after {:.4g} s", state.time)
+         : state.load_factor == 1                       ? "under the whole load"
+                                                        : fmt::format("under {:.4g} times the load", state.load_factor);
+}
+
+void tell_modes(cli::Tool& tool, const Summary& summary, const RunSettings& run, const fs::path& subject) {
+  const auto* frequencies = std::get_if<FrequencyRun>(&run.kind);
+  report_modes(tool.result(), summary);
+  tool.note(modes_note(summary, frequencies != nullptr ? frequencies->count : std::get<BucklingRun>(run.kind).count));
+  if (summary.stiffened_from && frequencies == nullptr) {
+    tool.warn({Weight::major, "coarse shells",
+               fmt::format("{}: the mesh is coarse for so thin a curved shell (h^2 > 3 R t): buckles shorter than its "
+                           "elements are not seen, and the factors may be too high: refine it",
+                           subject.string())});
+  }
+}
+
 class Simulation {
 public:
   Simulation(cli::Tool& tool, const Arguments& given) : tool_(tool), given_(given) {}
@@ -346,19 +473,17 @@ public:
     read();
     stage("setup");
     prepare_result(tool_.result(), model());
-    naming(subject().string(), [&] { check_model(model(), scene_.run); });
+    naming(subject().string(), [&] { system_.emplace(std::move(loaded_->model), scene_.run); });
     if (scene_.accuracy && !given_.check) {
       choose_model();
     }
-    for (const Warning& doubt : doubts(model(), scene_.run, accuracy_.has_value())) {
-      tool_.warn(doubt);
-    }
+    tell_doubts(tool_, doubts(model(), scene_.run, accuracy_ || may_refine()), doubts_of_ends(model()));
     if (given_.check) {
       tool_.print(scene_text(scene_));
       return;
     }
-    if (is_imaged_under_pressure(model())) {
-      unload();
+    if (model().is_imaged_under_pressure()) {
+      take_as_imaged();
     }
     begin();
     const Summary summary = accuracy_ ? recorded() : solved();
@@ -366,17 +491,18 @@ public:
     if (given_.accuracy.shell_out) {
       certify(model().shells.front().mesh, targets_.front().get(), tool_.progress("certify"),
               tool_.result()["accuracy"]);
-      write_shells(*given_.accuracy.shell_out, model().shells.front().mesh, !accuracy_->reasons.empty());
+      write_shells(tool_, *given_.accuracy.shell_out, model().shells.front().mesh, space_, !accuracy_->reasons.empty());
     }
     // A fixed count of iterations asks for no convergence, so none is claimed.
     const bool converged = summary.converged && !scene_.run.cg_fixed_count;
     const auto* dynamic = kind<DynamicRun>();
     report_summary(tool_.result(), summary, converged,
                    dynamic != nullptr ? std::optional(dynamic->duration) : std::nullopt);
+    estimate();
     require_accuracy();
     if (given_.unloaded) {
       space_ = space_of_shells(scene_, space_);
-      write_shells(*given_.unloaded, model().shells.front().mesh, false);
+      write_shells(tool_, *given_.unloaded, model().shells.front().mesh, space_, false);
     }
     if (given_.picture.out) {
       draw();
@@ -387,7 +513,7 @@ public:
     file_->commit(converged);  // last: what is not renamed can still be resumed
     journal_->remove();
     if (is_modes()) {
-      tell_modes(summary);
+      tell_modes(tool_, summary, scene_.run, subject());
     } else {
       tell(summary, converged);
     }
@@ -396,7 +522,7 @@ public:
 private:
   void stage(const char* name) { stage_.emplace(tool_, name); }
 
-  [[nodiscard]] const Model& model() const { return loaded_->model; }
+  [[nodiscard]] const Model& model() const { return system_ ? system_->model() : loaded_->model; }
   [[nodiscard]] const fs::path& subject() const { return inputs_.front(); }
 
   template <typename Kind>
@@ -493,35 +619,29 @@ private:
 
   void read_targets() {
     targets_.resize(scene_.shells.size());
-    for (std::size_t b = 0; scene_.accuracy && b < scene_.shells.size(); ++b) {
-      const SceneShell& shell = scene_.shells[b];
-      const auto found = scene_.accuracy->targets.find(shell.name);
-      if (found == scene_.accuracy->targets.end()) {
-        continue;
-      }
-      const fs::path& path = found->second;
+    for (const auto& [name, path] : target_paths(scene_, given_)) {
+      const auto found = std::ranges::find(scene_.shells, name, &SceneShell::name);
+      const std::size_t b = found - scene_.shells.begin();
       inputs_.push_back(tool_.input(path));
-      MeshFile file = read_mesh(path, shell.unit_mm, true);
-      require_surface(file, path);
-      const MeshFile own = read_mesh(shell.mesh, shell.unit_mm);
-      require_same_scale(own, shell.mesh, file, path, shell.unit_mm);
-      require_near(own, shell.mesh, file, path);
-      space_ = common_space(own, shell.mesh, file, path);
-      if (file.voxel) {
-        voxel_ = std::max(voxel_.value_or(0), shell.scale * *file.voxel);
+      ReadTarget read = read_target(tool_, *found, model().shells[b].mesh, path);
+      space_ = read.space;
+      if (read.voxel) {
+        voxel_ = std::max(voxel_.value_or(0), *read.voxel);
       }
-      for (Vec3& vertex : file.mesh.vertices) {
-        vertex *= shell.scale;
-      }
-      targets_[b] = target_like(tool_, model().shells[b].mesh, std::move(file.mesh), path);
-      require_own_target(model().shells[b].mesh, *targets_[b], path);
+      targets_[b] = std::move(read.target);
     }
   }
 
   [[nodiscard]] AccuracyRequest request() const {
     const SceneAccuracy& asked = *scene_.accuracy;
     const auto most = cli::count_of(given_.accuracy.max_shells, "--max-shells", real(max_index));
-    return {asked.within, asked.of, most.value_or(AccuracyRequest().max_shells), asked.probe, asked.axis, voxel_};
+    return {asked.within,
+            asked.of,
+            most.value_or(AccuracyRequest().max_shells),
+            asked.probe,
+            asked.axis,
+            voxel_,
+            given_.accuracy.max_seconds};
   }
 
   /// Goes from level to level; the model is then the last one's.
@@ -538,7 +658,7 @@ private:
           [&](std::vector<ShellBody> bodies) { return resolve_scene(scene_, std::move(bodies)); },
           [&](const AccuracyLevel& level) { tool_.note(level_note(level, request)); });
     });
-    loaded_->model = std::move(accuracy_->model);
+    system_ = accuracy_->system;
     if (kind<DynamicRun>() != nullptr && std::holds_alternative<StaticRun>(accuracy_->settings.kind)) {
       tool_.note("the loads rise so slowly that rest under them serves: the result holds that state, not the motion");
     }
@@ -547,21 +667,19 @@ private:
     tool_.result()["accuracy"] = accuracy_report(*accuracy_);
   }
 
-  /// Takes the shells back to what they are without the pressure under which they were imaged.
-  void unload() {
+  /// Puts the stress of the image into the walls, or takes the shells back to what they are without its pressure.
+  void take_as_imaged() {
     stage("solve");
-    Unloaded found = naming(subject().string(), [&] {
-      return find_unloaded(model(), scene_.run, [&](double part, double change) {
-        tool_.detail(
-            fmt::format("unloaded shape: {:.3g} of the pressure, moved by {:.3g} mm in the mean", part, change));
-      });
+    const bool unload = std::ranges::any_of(model().loads, [](const Load& load) {
+      const auto* pressure = std::get_if<PressureLoad>(&load.kind);
+      return pressure != nullptr && pressure->unload;
     });
-    loaded_->model = std::move(found.model);
-    tool_.result()["unloaded"] = unloaded_report(found);
-    tool_.note(
-        fmt::format("the unloaded shape is found: under the pressure of the image it lies {:.2g} mm from the "
-                    "image, {:.2g} mm at most",
-                    found.mean_distance, found.largest_distance));
+    if (!unload) {
+      const double residual = naming(subject().string(), [&] { return *system_->prestress_residual(); });
+      tool_.result()["prestress"] = prestress_report(model(), residual);
+      return;
+    }
+    system_.emplace(unloaded_model(tool_, model(), scene_.run, subject()), scene_.run);
   }
 
   /// What choose_model() has solved, as solved() hands it over.
@@ -574,25 +692,32 @@ private:
     return accuracy_->summary;
   }
 
-  /// The last state, or the first mode.
   void draw() const {
-    const auto* dynamic = kind<DynamicRun>();
     ResultPictureOptions options = picture_;
-    options.when = is_modes()           ? "of the first mode (only the shape counts)"
-                   : dynamic != nullptr ? fmt::format("after {:.4g} s", drawn_->first.time)
-                   : drawn_->first.load_factor == 1
-                       ? "under the whole load"
-                       : fmt::format("under {:.4g} times the load", drawn_->first.load_factor);
+    options.when = when(scene_.run, drawn_->first);
     write_file(*given_.picture.out, result_picture(model(), drawn_->first, drawn_->second, options), tool_.force());
   }
 
-  void write_shells(const fs::path& out, const ShellMesh& mesh, bool partial) const {
-    PlyOptions options;
-    options.comments = {"made by " + tool_.made_by()};
-    options.space = space_;
-    options.overwrite = tool_.force();
-    options.partial = partial;
-    write_ply(out, mesh, options);
+  /// Whether one refinement can be solved besides.
+  [[nodiscard]] bool may_refine() const {
+    return kind<StaticRun>() != nullptr && !targets_.empty() && targets_.front() && !given_.unloaded &&
+           holds_for_finer_meshes(scene_);
+  }
+
+  /// Says how far the answers may be off: by the levels of an accuracy, or by one refinement solved besides.
+  void estimate() {
+    Estimates estimates;
+    if (accuracy_) {
+      estimates = accuracy_->estimates;
+    } else if (may_refine() && drawn_) {
+      stage("solve");
+      estimates = refined_estimates(tool_, *system_, scene_, *targets_.front(), *drawn_, subject());
+      stage("write");
+    }
+    tool_.result()["estimates"] = estimates_report(estimates);
+    if (!accuracy_) {
+      warn_of(tool_, subject(), estimate_warnings(estimates));
+    }
   }
 
   void require_accuracy() {
@@ -602,7 +727,11 @@ private:
     for (const std::string& line : accuracy_notes(*accuracy_)) {
       tool_.note(line);
     }
-    if (!accuracy_->reasons.empty()) {
+    if (!accuracy_->reasons.empty() && accuracy_->request.max_seconds) {
+      tool_.warn({Weight::minor, "accuracy not reached",
+                  fmt::format("{}: {}; a longer --max-seconds, or more --max-shells, may reach it", subject().string(),
+                              missed_accuracy(*accuracy_))});
+    } else if (!accuracy_->reasons.empty()) {
       journal_->remove();
       throw RequirementError(fmt::format("{}: {}; what there is stays in {}.part", subject().string(),
                                          missed_accuracy(*accuracy_), out_.string()));
@@ -623,22 +752,15 @@ private:
     file_.emplace(out_, model(),
                   ResultOptions{is_series(), time_units, told(origin.command), told(origin.scene),
                                 accuracy_ ? told(without_times(tool_.result()["accuracy"]).dump(1)) : "",
-                                shown_inputs(origin), drawing_.level(), tool_.force()});
+                                shown_inputs(tool_, origin), drawing_.level(), tool_.force()});
     if (drawing_.any()) {
       exported_.emplace(out_, model(), exports());
     }
-    fields_.emplace(model());
+    fields_.emplace(*system_);
+    crossings_.emplace(model());
   }
 
   [[nodiscard]] std::string told(const std::string& text) const { return tool_.provenance().told(text); }
-
-  [[nodiscard]] std::vector<std::pair<std::string, std::string>> shown_inputs(const RunIdentity& origin) const {
-    std::vector<std::pair<std::string, std::string>> inputs = origin.inputs;
-    for (auto& [path, hash] : inputs) {
-      path = told(path);
-    }
-    return inputs;
-  }
 
   void record(const State& state) {
     constexpr double most_bending = std::numbers::pi / 6;
@@ -648,8 +770,12 @@ private:
     if (const auto written = exported_ ? exported_->append(state, of_state) : std::nullopt) {
       tool_.wrote(*written);
     }
-    if (given_.picture.out && (!is_modes() || !drawn_ || drawn_->first.time == 0)) {
+    if (!is_modes() || !drawn_ || drawn_->first.time == 0) {
       drawn_.emplace(state, of_state);
+    }
+    ended_ = state;
+    if (!is_modes()) {
+      crossings_->see(state);
     }
     last_ = {of_state.wall, count_unresolved(model(), state, most_bending), of_state.turn_p99};
   }
@@ -676,8 +802,7 @@ private:
       stage("solve");
     };
     try {
-      return naming(subject().string(),
-                    [&] { return solve(model(), scene_.run, on_state, tool_.progress("solve"), resumption); });
+      return naming(subject().string(), [&] { return solve(*system_, on_state, tool_.progress("solve"), resumption); });
     } catch (const InputError&) {
       journal_->remove();
       throw;
@@ -687,25 +812,14 @@ private:
     }
   }
 
-  void tell_modes(const Summary& summary) {
-    const auto* frequencies = kind<FrequencyRun>();
-    report_modes(tool_.result(), summary);
-    tool_.note(modes_note(summary, frequencies != nullptr ? frequencies->count : kind<BucklingRun>()->count));
-    if (summary.stiffened_from && frequencies == nullptr) {
-      tool_.warn(
-          {Weight::major, "coarse shells",
-           fmt::format("{}: the mesh is coarse for so thin a curved shell (h^2 > 3 R t): buckles shorter than its "
-                       "elements are not seen, and the factors may be too high: refine it",
-                       subject().string())});
-    }
-  }
-
   void tell(const Summary& summary, bool converged) {
     const Json& result = tool_.result();
     std::string found = fmt::format("largest displacement {:.4g} mm", result["max_displacement_mm"].get<double>());
     if (!model().shells.empty()) {
-      found += fmt::format(" (99 % of the wall below {:.4g} mm), stress of the wall {} (99th percentile)",
-                           result["displacement_p99_mm"].get<double>(), pressure_text(last_.wall.stress_p99));
+      found += fmt::format(
+          " (99 % of the wall below {:.4g} mm), membrane stress of the wall {} (99th percentile), at its faces {}",
+          result["displacement_p99_mm"].get<double>(), pressure_text(last_.wall.membrane_p99),
+          pressure_text(last_.wall.stress_p99));
     }
     tool_.note(fmt::format("{} nodes in {} steps, {}: {}", model().node_count(), summary.steps,
                            converged ? "converged" : "not asked to converge", found));
@@ -713,7 +827,11 @@ private:
       last_.turn_p99 = 0;  // a linear model was held against a nonlinear one
     }
     warn_of(tool_, subject(), run_warnings(scene_.run, summary, last_));
-    warn_of(tool_, subject(), contact_warnings(tool_.result()));
+    warn_of(tool_, subject(), contact_warnings(model(), summary, tool_.result()));
+    if (crossings_->found()) {
+      tool_.warn(*crossings_->found());
+    }
+    tell_doubts(tool_, swings_of(model(), ended_), doubts_of_suction(model(), scene_.run));
   }
 
   cli::Tool& tool_;
@@ -722,7 +840,8 @@ private:
   fs::path out_;
   std::vector<fs::path> inputs_;
   Scene scene_;
-  std::optional<LoadedScene> loaded_;
+  std::optional<LoadedScene> loaded_;  // its model moves on into the system
+  std::optional<System> system_;
   std::string asked_;                             // the scene as a text, before an accuracy chose of it
   std::vector<std::unique_ptr<Target>> targets_;  // of each body, or none
   std::optional<double> voxel_;                   // mm, longest edge, of the image behind them
@@ -730,12 +849,14 @@ private:
   std::optional<Accuracy> accuracy_;
   Drawing drawing_;
   ResultPictureOptions picture_;
-  std::optional<std::pair<State, ElementFields>> drawn_;  // of the picture
+  std::optional<std::pair<State, ElementFields>> drawn_;  // the last state, or the first mode
   std::optional<RunJournal> journal_;
   std::optional<ResultFile> file_;
   std::optional<ResultExport> exported_;
   std::optional<ElementFieldEvaluator> fields_;
+  std::optional<CrossingWatch> crossings_;
   LastState last_;
+  State ended_;
 };
 
 }  // namespace

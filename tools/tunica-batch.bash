@@ -12,16 +12,16 @@ _tunica_batch() {
   local words='' kind=-W
   case $name in
     '')
-      words='CASES= VOLUMES= LABELS= LABEL= NAMES= ISOVALUE= SMOOTH= LARGEST= FILL= OPEN= SHELLS= TOLERANCE= ACCURACY= OF= METHOD=
-        PRESSURE= YOUNG= POISSON= THICKNESS= IMAGED_AT= MID_SURFACE= KIND= LOAD_STEPS= DENSITY= DURATION= STEP= FIX= OUT= THREADS=
+      words='CASES= VOLUMES= LABELS= LABEL= NAMES= ISOVALUE= SMOOTH= LARGEST= FILL= OPEN= CUT= SHELLS= TOLERANCE= ACCURACY= OF= METHOD=
+        PRESSURE= YOUNG= POISSON= THICKNESS= IMAGED_AT= MID_SURFACE= KIND= LOAD_STEPS= DENSITY= DURATION= STEP= FIX= SUPPORT= OUT= THREADS=
         MEM= RUN= EXTRACT= DECIMATE= RELAX= SIMULATE= -j -k -n -h --help --version help' ;;
     SMOOTH) words='none staircase' ;;
     LARGEST | FILL | OPEN) words='0 1' ;;
-    OF) words='displacement energy volume stress' ;;
+    OF) words='membrane tension stress displacement energy volume' ;;
     METHOD) words='fit barycentre' ;;
     MID_SURFACE) words='inner outer' ;;
     KIND) words='static dynamic' ;;
-    FIX) words='boundary rigid-motions' ;;
+    FIX) words='boundary rims:slide rigid-motions' ;;
     CASES | VOLUMES | NAMES) kind=-f ;;
     OUT) kind=-d ;;
   esac

@@ -2,10 +2,13 @@
 
 #include "tunica/accuracy/detail/answer.hpp"
 #include "tunica/accuracy/detail/levels.hpp"
+#include "tunica/accuracy/estimates.hpp"
 #include "tunica/core/clock.hpp"
 #include "tunica/core/error.hpp"
+#include "tunica/core/require.hpp"
 #include "tunica/mechanics/model/wall.hpp"
 #include "tunica/mechanics/runs/curved_displacement.hpp"
+#include "tunica/mechanics/runs/disturbed.hpp"
 #include "tunica/shell/distance/shell_distance.hpp"
 
 #include <fmt/format.h>
@@ -18,11 +21,10 @@ namespace tunica {
 namespace {
 
 constexpr std::size_t fewest_levels = 3;               // two changes: one may be small by chance
-constexpr double left_by_second_order = 0.25;          // of the change before
 constexpr double model_share = 0.25;                   // of the request: what a cheaper model may be off by
-constexpr double slowest_fall = 1.0 / 3;               // of changes, minus 1: slower is counted as this
 constexpr std::size_t most_from_near = 5;              // iterations; more, and the start was none
 constexpr double largest_distance = 1;                 // of the wall, of any place: above, it is another shape there
+constexpr double cost_of_next = 5;                     // a level's time, of the one before
 constexpr double settled_share = 0.1;                  // of the request: the last increment of Newton's method
 constexpr double residual_share = 0.01;                // of the request: where a looser one was asked for
 constexpr double fewest_edges_per_layer = 2;           // below, stresses in it are a tenth off and more
@@ -31,8 +33,13 @@ constexpr double largest_bend = std::numbers::pi / 6;  // of a shell: strains wi
 /// Mean distance of an extracted surface to the true one, in voxels (docs/tables/staircase.md).
 constexpr double voxels_off = 0.1;
 
-constexpr std::array<std::pair<std::string_view, std::string_view>, 5> names{
-    {{"displacement", "mm"}, {"energy", "mJ"}, {"volume", "mm^3"}, {"stress", "MPa"}, {"probe", "mm"}}};
+constexpr std::array<std::pair<std::string_view, std::string_view>, 7> names{{{"displacement", "mm"},
+                                                                              {"energy", "mJ"},
+                                                                              {"volume", "mm^3"},
+                                                                              {"stress", "MPa"},
+                                                                              {"membrane", "MPa"},
+                                                                              {"tension", "N/mm"},
+                                                                              {"probe", "mm"}}};
 
 class Ladder {
 public:
@@ -58,7 +65,8 @@ public:
   }
 
   Accuracy run() {
-    auto start = Clock::now();
+    const auto begin = Clock::now();
+    auto start = begin;
     for (;;) {
       std::optional<Answer> answer = tried();
       if (answer) {
@@ -67,8 +75,8 @@ public:
           break;
         }
       }
-      if (4 * level_.shell_count() > request_.max_shells) {
-        give_up();
+      if (const std::string bound = passes_a_bound(seconds_since(begin)); !bound.empty()) {
+        give_up(bound);
         break;
       }
       start = Clock::now();
@@ -84,8 +92,13 @@ public:
       carry_selections(coarse, level_, model_);
     }
     tell_choices();
+    std::vector<Answers> answers;
+    for (const AccuracyLevel& level : out_.levels) {
+      answers.push_back(level.answers);
+    }
+    out_.estimates = estimates_of(answers, error_besides(), is_doubtful_);
     out_.settings = settings_;
-    out_.model = std::move(last_->model);
+    out_.system = last_->system;
     out_.summary = std::move(last_->summary);
     out_.states = std::move(last_->states);
     return std::move(out_);
@@ -143,6 +156,7 @@ private:
 
   void take(Answer&& answer, double seconds) {
     AccuracyLevel level{level_.shell_count(), answer.value, seconds, {}, answer.summary.newton_iterations};
+    level.answers = answers_of(answer.at, ElementFieldEvaluator(answer.system)(answer.at));
     for (std::size_t b = 0; b < level_.bodies.size(); ++b) {
       if (targets_[b] != nullptr) {
         level.mean_distance =
@@ -210,17 +224,17 @@ private:
     if (n < fewest_levels) {
       return false;
     }
-    const auto change = [&](std::size_t level) {
-      return std::abs(out_.levels[level].value - out_.levels[level - 1].value) / std::abs(out_.levels[n - 1].value);
-    };
-    // Where changes fall more slowly than by two, all that are to come add up to more than the last.
-    const double fall = change(n - 2) / change(n - 1);
-    const double to_come = fall < 2 ? change(n - 1) / std::max(fall - 1, slowest_fall) : change(n - 1);
-    out_.estimate = std::max(to_come, left_by_second_order * change(n - 2)) + model_error_ +
-                    last_->summary.algebraic_error.value_or(0);
+    std::vector<double> values;
+    for (const AccuracyLevel& level : out_.levels) {
+      values.push_back(level.value);
+    }
+    out_.estimate = error_of_last(values) + error_besides();
     doubt();
     return *out_.estimate < request_.within && out_.reasons.empty();
   }
+
+  /// Of the model and the solver.
+  [[nodiscard]] double error_besides() const { return model_error_ + last_->summary.algebraic_error.value_or(0); }
 
   void doubt() {
     out_.reasons.clear();
@@ -230,8 +244,10 @@ private:
                                          request_.of == Quantity::probe ? "probe" : "largest displacement",
                                          100 * field_change_));
     }
-    if (request_.of == Quantity::stress) {
-      const double edges = edges_per_layer(last_->model);
+    // Stresses are those away from such layers, where there is any place away from them.
+    if (is_stress(request_.of) &&
+        std::ranges::all_of(near_disturbances(last_->system.model()), [](std::uint8_t near) { return near != 0; })) {
+      const double edges = edges_per_layer(last_->system.model());
       if (edges < fewest_edges_per_layer) {
         out_.reasons.push_back(
             fmt::format("the bending layer at supports, rims and loads, sqrt(R t) / 1.24 wide, is {:.2g} "
@@ -239,7 +255,7 @@ private:
                         edges, fewest_edges_per_layer));
       }
     }
-    const double thinnest = least_thickness(last_->model);
+    const double thinnest = least_thickness(last_->system.model());
     const double off = out_.levels.back().mean_distance.value_or(0) / thinnest;
     if (off >= request_.within) {  // the error of an answer is one to three times that
       out_.reasons.push_back(fmt::format(
@@ -255,7 +271,7 @@ private:
                       "depends on what no mesh knows",
                       100 * other_state_));
     }
-    if (const std::size_t bent = count_unresolved(last_->model, last_->at, largest_bend); bent > 0) {
+    if (const std::size_t bent = count_unresolved(last_->system.model(), last_->at, largest_bend); bent > 0) {
       out_.reasons.push_back(fmt::format("{} shell(s) bend by more than 30 degrees", bent));
     }
     if (last_->summary.stiffened_from) {
@@ -264,6 +280,7 @@ private:
     if (!last_->summary.snaps.empty()) {
       out_.reasons.emplace_back("the shell snaps through on its way: where it rests then may depend on the mesh");
     }
+    is_doubtful_ = !out_.reasons.empty();
   }
 
   /// A place that no level comes close to shows in no difference of levels.
@@ -285,13 +302,23 @@ private:
     }
   }
 
-  void give_up() {
-    const std::size_t shells = level_.shell_count();
-    out_.reasons.push_back(
-        out_.estimate
-            ? fmt::format("the next level would have {} shells, more than {}", 4 * shells, request_.max_shells)
-            : fmt::format("an estimate takes {} levels, and {} shells are followed by {}, more than {}", fewest_levels,
-                          shells, 4 * shells, request_.max_shells));
+  /// Why there is no next level; empty: there may be one.
+  [[nodiscard]] std::string passes_a_bound(double spent) const {
+    const std::size_t next = 4 * level_.shell_count();
+    if (next > request_.max_shells) {
+      return fmt::format("the next level would have {} shells, more than {}", next, request_.max_shells);
+    }
+    const double will_take = out_.levels.empty() ? 0 : cost_of_next * out_.levels.back().seconds;
+    if (request_.max_seconds && spent + will_take > *request_.max_seconds) {
+      return fmt::format("the next level, of {} shells, would take about {:.2g} s, past the {:.4g} s allowed", next,
+                         will_take, *request_.max_seconds);
+    }
+    return {};
+  }
+
+  void give_up(const std::string& bound) {
+    out_.reasons.push_back(out_.estimate ? bound
+                                         : fmt::format("an estimate takes {} levels, and {}", fewest_levels, bound));
   }
 
   void tell_choices() {
@@ -324,7 +351,8 @@ private:
   bool near_serves_ = true;  // as a start of Newton's method
   std::optional<Answer> last_;
   double field_change_ = infinity;
-  double other_state_ = 0;  // relative distance of another answer of the second level
+  bool is_doubtful_ = false;  // the last level, for other reasons than its cost
+  double other_state_ = 0;    // relative distance of another answer of the second level
 };
 
 }  // namespace
@@ -335,6 +363,22 @@ std::string_view unit_of(Quantity quantity) { return names.at(static_cast<std::s
 Accuracy solve_within(std::vector<ShellBody> bodies, const std::vector<const Target*>& targets,
                       const AccuracyRequest& request, const RunSettings& settings, const ModelOf& model_of,
                       const std::function<void(const AccuracyLevel&)>& on_level) {
+  if (bodies.empty() || targets.size() != bodies.size()) {
+    throw InputError(fmt::format("{} targets for {} bodies: one for each is needed", targets.size(), bodies.size()));
+  }
+  for (const ShellBody& body : bodies) {
+    require_valid(body);
+  }
+  if (!std::holds_alternative<StaticRun>(settings.kind) && !std::holds_alternative<DynamicRun>(settings.kind)) {
+    throw InputError("an accuracy is for statics and dynamics: leave it out, or change the kind of the run");
+  }
+  require_positive(request.within, "the accuracy");
+  if (request.voxel) {
+    require_positive(*request.voxel, "the edge of a voxel");
+  }
+  if (request.axis < 0 || request.axis > 2) {
+    throw InputError(fmt::format("there is no axis {}: choose 0 to 2", request.axis));
+  }
   return Ladder(std::move(bodies), targets, request, settings, model_of, on_level).run();
 }
 

@@ -5,6 +5,7 @@
 #include "tunica/shell/distance/target.hpp"
 
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -18,11 +19,18 @@ enum class Quantity {
   displacement,  ///< the largest, of the curved surfaces
   energy,        ///< strain energy
   volume,        ///< change of the enclosed volume
-  stress,        ///< von Mises stress that 1 % of the area passes (Wall::stress_p99)
+  stress,        ///< von Mises stress of the faces that 1 % of the area passes (Wall::stress_p99)
+  membrane,      ///< the same of the mean over the wall (Wall::membrane_p99)
+  tension,       ///< of the largest principal membrane force (Wall::tension_p99)
   probe,         ///< displacement of a node along an axis
 };
 
-/// "displacement" and so on, as flags and reports name them; mm, mJ, mm^3 or MPa.
+/// Whether it is one of what the wall bears.
+inline bool is_stress(Quantity quantity) {
+  return quantity == Quantity::stress || quantity == Quantity::membrane || quantity == Quantity::tension;
+}
+
+/// "displacement" and so on, as flags and reports name them; mm, mJ, mm^3, MPa or N/mm.
 std::string_view name_of(Quantity quantity);
 std::string_view unit_of(Quantity quantity);
 
@@ -33,16 +41,30 @@ struct AccuracyRequest {
   std::string probe{};            ///< the name of a probe of the model
   int axis = 0;                   ///< of its displacement
   std::optional<double> voxel{};  ///< mm, longest edge, of the image that the targets come from
+  /// s, of all levels together: no level is begun that would pass it.
+  std::optional<double> max_seconds{};
 };
+
+/// Answers of a run by the keys of its report (estimates.hpp).
+using Answers = std::vector<std::pair<std::string, double>>;
+
+/// How far an answer may be off by the mesh.
+struct Estimate {
+  double error = 0;  ///< relative
+  bool credible = false;
+  std::string from;  ///< the solutions it was taken from
+};
+using Estimates = std::map<std::string, Estimate>;
 
 /// One mesh of the hierarchy and what it says.
 struct AccuracyLevel {
   std::size_t shells = 0;
-  double value = 0;                     ///< mm, mJ, mm^3 or MPa
+  double value = 0;                     ///< mm, mJ, mm^3, MPa or N/mm
   double seconds = 0;                   ///< of splits, fit and solve
   std::optional<double> mean_distance;  ///< mm, to the targets, the largest of all bodies
   std::size_t newton_iterations = 0;
   std::string failure{};  ///< of the coarsest, which on_level is told of: why it has no value
+  Answers answers{};      ///< all that the level says
 };
 
 /// A decision, the error it leaves (relative), and what was not chosen.
@@ -58,12 +80,13 @@ struct Accuracy {
   std::optional<double> estimate;    ///< of the error, relative; none with fewer than three levels
   std::vector<std::string> reasons;  ///< why that is not credible, or not enough; empty: accepted
   std::vector<AccuracyLevel> levels;
+  Estimates estimates;  ///< of all answers
   std::vector<AccuracyChoice> choices;
   std::vector<std::string> not_included;  ///< other errors of the answer
   /// mm, by which the surface itself is uncertain, where the image's voxels are known.
   std::optional<double> surface_error;
-  RunSettings settings;  ///< of the last level
-  Model model;           ///< its model
+  RunSettings settings;          ///< of the last level
+  std::optional<System> system;  ///< its model, as it was solved
   Summary summary;
   std::vector<State> states;  ///< as solve() hands them over
 };
@@ -81,17 +104,19 @@ using ModelOf = std::function<Model(std::vector<ShellBody>)>;
 /// else the longest step, of those that halve the one given (first level). The solver's error is added too; Newton's
 /// method ends with an increment of a tenth of the request.
 ///
-/// Doubtful are: a small change beside a large one of the displacement field; for stresses a bending layer at supports,
-/// rims, point and edge loads and thickness jumps, sqrt(R t) / 1.24 wide, with less than two edges; shells that bend by
-/// more than 30 degrees; short waves that had to be made stiff; snaps. Every state is one of a positive definite
-/// tangent: others are not equilibria that solve() accepts.
+/// Doubtful are: a small change beside a large one of the displacement field; for stresses, where all of the wall is
+/// near, a bending layer at supports, rims, point and edge loads and thickness jumps, sqrt(R t) / 1.24 wide, with less
+/// than two edges; shells that bend by more than 30 degrees; short waves that had to be made stiff; snaps. Every state
+/// is one of a positive definite tangent: others are not equilibria that solve() accepts.
 /// @param bodies   the coarsest level; all of the model
 /// @param targets  one for each body; null: splits lie on the body's own patches, and its geometry's error is not seen
 /// @param settings  a static run in one load step, or a dynamic run without error control
-/// Errors: InputError: no volume is enclosed, the quantity is zero; RequirementError: a level has no answer, unless the
-/// coarsest alone. Source: Roache, "Perspective: a method for uniform reporting of grid refinement studies", 1994
-/// (convergence index with a factor of 3 for two grids). Cost: the last level's, times about 1.4. Limits: no difference
-/// of levels sees what no level resolves, beyond the doubts above. All states of a motion are kept in memory.
+/// Errors: InputError: a body as require_valid(), not a target for each, another kind of run, an accuracy or voxel that
+/// is not finite and above zero, no volume is enclosed, the quantity is zero; RequirementError: a level has no answer,
+/// unless the coarsest alone. Source: Roache, "Perspective: a method for uniform reporting of grid refinement studies",
+/// 1994 (convergence index with a factor of 3 for two grids). Cost: the last level's, times about 1.4. Limits: no
+/// difference of levels sees what no level resolves, beyond the doubts above. All states of a motion are kept in
+/// memory.
 Accuracy solve_within(std::vector<ShellBody> bodies, const std::vector<const Target*>& targets,
                       const AccuracyRequest& request, const RunSettings& settings, const ModelOf& model_of,
                       const std::function<void(const AccuracyLevel&)>& on_level = {});

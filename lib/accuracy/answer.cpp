@@ -4,6 +4,7 @@
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/mechanics/runs/curved_displacement.hpp"
+#include "tunica/mechanics/runs/fields.hpp"
 
 #include <fmt/format.h>
 
@@ -19,9 +20,10 @@ constexpr std::size_t fewest_runs = 3;    // two changes: one may be small by ch
 /// Values of one model's states.
 class Measure {
 public:
-  Measure(const Model& model, const AccuracyRequest& request) : model_(model), request_(request) {
-    if (request.of == Quantity::stress) {
-      fields_.emplace(model);
+  Measure(const System& system, const AccuracyRequest& request) : model_(system.model()), request_(request) {
+    const Model& model = model_;
+    if (is_stress(request.of)) {
+      fields_.emplace(system);
     } else if (request.of == Quantity::probe) {
       const auto probe = std::find_if(model.probes.begin(), model.probes.end(),
                                       [&](const Probe& candidate) { return candidate.name == request.probe; });
@@ -49,6 +51,10 @@ public:
         return *state.volume - *volume_before_;
       case Quantity::stress:
         return (*fields_)(state).wall.stress_p99;
+      case Quantity::membrane:
+        return (*fields_)(state).wall.membrane_p99;
+      case Quantity::tension:
+        return (*fields_)(state).wall.tension_p99;
       case Quantity::probe:
         return state.displacement[node_][request_.axis];
     }
@@ -78,19 +84,18 @@ std::optional<double> end_of(const Ramp& ramp, double duration) {
 
 Answer answer_of(Model model, const RunSettings& settings, const AccuracyRequest& request,
                  const std::optional<Checkpoint>& near) {
-  Answer answer;
-  answer.model = std::move(model);
   const auto start = Clock::now();
-  Measure measure(answer.model, request);
-  const bool moves = std::holds_alternative<DynamicRun>(settings.kind);
   RunSettings all = settings;
   all.every = 1;
+  Answer answer{System(std::move(model), all), {}, {}, {}};
+  Measure measure(answer.system, request);
+  const bool moves = std::holds_alternative<DynamicRun>(settings.kind);
   std::size_t count = 0;
   State last;
   Resumption resumption;
   resumption.near = near;
   answer.summary = solve(
-      answer.model, all,
+      answer.system,
       [&](const State& state) {
         const double value = measure(state);
         if (!moves || count == 0 || std::abs(value) > std::abs(answer.value)) {
@@ -109,7 +114,7 @@ Answer answer_of(Model model, const RunSettings& settings, const AccuracyRequest
   answer.seconds = seconds_since(start);
   if (!(std::abs(answer.value) > 0)) {
     throw InputError(fmt::format("{}: the quantity asked for is zero: no part of it can be kept within",
-                                 answer.model.shells.front().name));
+                                 answer.system.model().shells.front().name));
   }
   return answer;
 }

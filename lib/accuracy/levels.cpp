@@ -3,6 +3,7 @@
 #include "tunica/core/narrow.hpp"
 #include "tunica/fit/fit.hpp"
 #include "tunica/mechanics/elements/rotation.hpp"
+#include "tunica/mechanics/runs/disturbed.hpp"
 #include "tunica/mechanics/runs/doubts.hpp"
 #include "tunica/shell/patch/refine.hpp"
 #include "tunica/surface/mesh/incidence.hpp"
@@ -17,44 +18,6 @@ namespace tunica {
 namespace {
 
 constexpr double refit_angle = 20;  // degrees
-constexpr double jump = 1.25;       // of the thickness within a shell, from which on it bends the wall
-
-/// Nodes of a body at which its wall bends over a short length.
-std::vector<std::uint8_t> disturbed_nodes(const Model& model, std::size_t b) {
-  const ShellBody& body = model.shells[b];
-  std::vector<std::uint8_t> disturbed(body.mesh.vertices.size(), 0);
-  const auto mark = [&](const std::vector<Index>& nodes) {
-    for (const Index node : nodes) {
-      disturbed[node] = 1;
-    }
-  };
-  for (const Fix& fix : model.fixes) {
-    if (fix.body == b) {
-      mark(fix.nodes);
-    }
-  }
-  for (const Load& load : model.loads) {
-    if (load.body != b) {
-      continue;
-    }
-    if (const auto* force = std::get_if<ForceLoad>(&load.kind)) {
-      mark(force->nodes);
-    } else if (const auto* moment = std::get_if<MomentLoad>(&load.kind)) {
-      mark(moment->nodes);
-    }
-  }
-  const TriangleMesh facets = flat_facets(body.mesh);
-  for (const auto& [t, k] : boundary_edges(neighbours(facets, incidence(facets)))) {  // edge loads act there too
-    mark({facets.triangles[t][k], facets.triangles[t][(k + 1) % 3]});
-  }
-  for (const auto& t : body.thickness.size() > 1 ? body.mesh.triangles : decltype(body.mesh.triangles){}) {
-    const auto [least, most] = std::minmax({body.thickness[t[0]], body.thickness[t[1]], body.thickness[t[2]]});
-    if (most > jump * least) {
-      mark({t[0], t[1], t[2]});
-    }
-  }
-  return disturbed;
-}
 
 }  // namespace
 
@@ -179,11 +142,16 @@ void carry_selections(const Model& coarse, const Level& level, Model& fine) {
   for (std::size_t i = 0; i < coarse.fixes.size(); ++i) {
     carriers[coarse.fixes[i].body].carry(coarse.fixes[i].nodes, fine.fixes[i].nodes);
   }
+  for (std::size_t i = 0; i < coarse.supports.size(); ++i) {
+    carriers[coarse.supports[i].body].carry(coarse.supports[i].nodes, fine.supports[i].nodes);
+  }
   for (std::size_t i = 0; i < coarse.loads.size(); ++i) {
     const Carrier& carrier = carriers[coarse.loads[i].body];
     const auto& from = coarse.loads[i].kind;
     auto& to = fine.loads[i].kind;
-    if (const auto* force = std::get_if<ForceLoad>(&from)) {
+    if (const auto* pressure = std::get_if<PressureLoad>(&from); pressure != nullptr && !pressure->nodes.empty()) {
+      carrier.carry(pressure->nodes, std::get<PressureLoad>(to).nodes);
+    } else if (const auto* force = std::get_if<ForceLoad>(&from)) {
       carrier.carry(force->nodes, std::get<ForceLoad>(to).nodes);
     } else if (const auto* moment = std::get_if<MomentLoad>(&from)) {
       carrier.carry(moment->nodes, std::get<MomentLoad>(to).nodes);

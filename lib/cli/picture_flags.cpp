@@ -13,7 +13,7 @@ namespace tunica::cli {
 namespace {
 
 // In the order of Colouring.
-constexpr std::array<std::string_view, 3> colour_names{"stress", "displacement", "strain"};
+constexpr std::array<std::string_view, 4> colour_names{"membrane", "stress", "displacement", "strain"};
 
 Colouring colouring_of(const std::string& word) {
   const auto found = std::ranges::find(colour_names, word);
@@ -25,9 +25,9 @@ Colouring colouring_of(const std::string& word) {
 
 double range_of(const std::string& text, Colouring colour) {
   try {
-    const double value = colour == Colouring::stress         ? parse_quantity(text, dimension::pressure)
-                         : colour == Colouring::displacement ? parse_quantity(text, dimension::length)
-                                                             : parse_percent(text);
+    const double value = colour == Colouring::displacement ? parse_quantity(text, dimension::length)
+                         : colour == Colouring::strain     ? parse_percent(text)
+                                                           : parse_quantity(text, dimension::pressure);
     if (!(value > 0)) {
       throw UsageError(fmt::format("'{}' is not above zero", text));
     }
@@ -44,7 +44,10 @@ void PictureFlags::declare(Tool& tool) {
   tool.group("Output");
   app.add_option("--picture", out, "picture of the loaded bodies, PNG: the last state, or the first mode")
       ->type_name("OUT.png");
-  app.add_option("--colour", colour, "what its colours show: stress (von Mises, the default) | displacement | strain")
+  app.add_option(
+         "--colour", colour,
+         "what its colours show: membrane (von Mises stress, mean over the wall; the default) | stress (at either "
+         "face) | displacement | strain")
       ->type_name("NAME");
   app.add_option("--magnify", magnify, "draw displacements N times as large (default 1)")->type_name("N");
   app.add_option("--picture-range", range,

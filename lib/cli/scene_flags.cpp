@@ -22,6 +22,27 @@ std::optional<std::size_t> count_of(const std::optional<std::string>& text, cons
   return truncated<std::size_t>(*value);
 }
 
+std::optional<HalfSpaceNodes> parse_half_space(const std::string& text, const char* flag) {
+  HalfSpaceNodes half;
+  half.below = text.starts_with("below ");
+  if (!half.below && !text.starts_with("above ")) {
+    return std::nullopt;
+  }
+  const std::size_t axis = text.find_first_not_of(' ', 6);
+  const std::size_t equals = text.find('=');
+  if (axis == std::string::npos || text[axis] < 'x' || text[axis] > 'z' || equals == std::string::npos ||
+      text.find_first_not_of(' ', axis + 1) != equals) {
+    return std::nullopt;
+  }
+  half.axis = text[axis] - 'x';
+  try {
+    half.at = parse_quantity(text.substr(equals + 1), dimension::length);
+  } catch (const UsageError& error) {
+    throw UsageError(fmt::format("{} '{}': {}", flag, text, error.what()));
+  }
+  return half;
+}
+
 namespace {
 
 template <typename Value>
@@ -52,36 +73,21 @@ Places flags_as_places(std::initializer_list<const char*> keys) {
   return places;
 }
 
-// "boundary", "rigid-motions", "below z=-10mm", "above x = 3cm".
-Selection parse_fix(const std::string& text) {
-  if (text == "boundary") {
+// "boundary", "rims", "rigid-motions", "below z=-10mm", "above x = 3cm".
+Selection parse_where(const std::string& text) {
+  if (text == "boundary" || text == "rims") {
     return BoundaryNodes{};
   }
   if (text == "rigid-motions") {
     return RigidMotions{};
   }
-  const auto unknown = [&] {
+  const auto half = parse_half_space(text, "--fix");
+  if (!half) {
     throw UsageError(fmt::format(
-        "--fix: '{}' is not understood: write boundary, rigid-motions, 'below z=-10mm' or 'above x=3cm'", text));
-  };
-  HalfSpaceNodes half;
-  half.below = text.starts_with("below ");
-  if (!half.below && !text.starts_with("above ")) {
-    unknown();
+        "--fix: '{}' is not understood: write boundary, rims:slide, rigid-motions, 'below z=-10mm' or 'above x=3cm'",
+        text));
   }
-  const std::size_t axis = text.find_first_not_of(' ', 6);
-  const std::size_t equals = text.find('=');
-  if (axis == std::string::npos || text[axis] < 'x' || text[axis] > 'z' || equals == std::string::npos ||
-      text.find_first_not_of(' ', axis + 1) != equals) {
-    unknown();
-  }
-  half.axis = text[axis] - 'x';
-  try {
-    half.at = parse_quantity(text.substr(equals + 1), dimension::length);
-  } catch (const UsageError& error) {
-    throw UsageError(fmt::format("--fix '{}': {}", text, error.what()));
-  }
-  return half;
+  return *half;
 }
 
 void set_kind(const SceneFlags& a, Scene& scene, Ramp& load_ramp) {
@@ -126,14 +132,19 @@ void SceneFlags::declare(Tool& tool) {
   tool.quantity("--pressure", pressure, dimension::pressure,
                 "pressure that follows the surface; positive pushes along the normals, outward");
   tool.quantity("--imaged-at", imaged_at, dimension::pressure,
-                "the organ was under this pressure when it was imaged: the shape without it is found first");
-  app.add_option("--fix", fixes,
-                 "what is held, may repeat: boundary | 'below z=-10mm' | 'above x=3cm' | rigid-motions (a closed organ "
-                 "under its own pressure)")
+                "the organ was under this pressure when it was imaged: there it is at rest, and its wall bears that "
+                "already. Without --pressure, or with the same, --young can be left out");
+  app.add_option(
+         "--fix", fixes,
+         "what is held, may repeat: boundary | rims:slide (they widen and turn freely, and stay in their planes) "
+         "| 'below z=-10mm' | 'above x=3cm' | rigid-motions (a closed organ under its own pressure)")
       ->type_name("WHERE")
       ->expected(1)
       ->allow_extra_args(false)  // the next word is a file
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  tool.quantity(
+      "--support", support, dimension::bedding,
+      "stiffness of the tissue around, an elastic bed per area, e.g. 1e5N/m3; without force in the shape given");
   tool.group("Run");
   app.add_flag("--static", is_static, "solve for the state of rest");
   app.add_option("--load-steps", load_steps,
@@ -163,6 +174,10 @@ void SceneFlags::declare(Tool& tool) {
       ->type_name("mm|cm|m|um");
 }
 
+bool SceneFlags::pressure_is_imaged() const {
+  return imaged_at.value_or(0) != 0 && is_static && pressure.value_or(*imaged_at) == *imaged_at;
+}
+
 Scene SceneFlags::scene(const std::filesystem::path& mesh) const {
   Scene scene;
   SceneLoad load{"shell", std::nullopt, PressureLoad{}, {}, flags_as_places({})};
@@ -188,7 +203,8 @@ Scene SceneFlags::scene(const std::filesystem::path& mesh) const {
   if (mesh_unit) {
     shell.unit_mm = parse_length_unit(*mesh_unit);
   }
-  shell.material.young = required(young, "--young", "1MPa");
+  shell.material.young_stated = young || !pressure_is_imaged();
+  shell.material.young = shell.material.young_stated ? required(young, "--young", "1MPa") : any_young;
   (void)required(poisson, "--poisson", "0.45");
   shell.material.poisson = number(poisson, "--poisson", 0);
   shell.thickness = required(thickness, "--thickness", "1.5mm");
@@ -205,14 +221,28 @@ Scene SceneFlags::scene(const std::filesystem::path& mesh) const {
                    {"dkt-comas", Bending::dkt_comas}});
   scene.shells.push_back(shell);
 
-  load.kind = PressureLoad{required(pressure, "--pressure", "100mmHg"), true, imaged_at};
+  load.kind = PressureLoad{required(pressure ? pressure : imaged_at, "--pressure", "100mmHg"), true, imaged_at};
   scene.loads.push_back(load);
   for (const std::string& text : fixes) {
     SceneFix fix;
     fix.body = shell.name;
-    fix.where = parse_fix(text);
+    constexpr std::string_view slide = ":slide";
+    fix.slide = text.ends_with(slide);
+    fix.where = parse_where(fix.slide ? text.substr(0, text.size() - slide.size()) : text);
+    if (fix.slide && std::holds_alternative<RigidMotions>(fix.where)) {
+      throw UsageError("--fix: rigid motions do not slide: write rims:slide");
+    }
     fix.places = {{fmt::format("{}: --fix '{}'", shell.mesh.string(), text), true, text}, {}};
     scene.fixes.push_back(fix);
+  }
+  if (support) {
+    SceneSupport bed;
+    bed.body = shell.name;
+    bed.stiffness = *support;
+    bed.places = flags_as_places({});
+    bed.places.item.text = "--support";
+    bed.places.keys["stiffness"] = {"--support", true};
+    scene.supports.push_back(bed);
   }
   settle_solver(scene);
   check_scene(scene);
@@ -245,22 +275,29 @@ void AccuracyFlags::declare(Tool& tool) {
   app.add_option("--accuracy", within,
                  "choose mesh and model: finer shells, until the error of the answer is credibly below this, e.g. 2%")
       ->type_name("PERCENT");
-  app.add_option("--of", of, "the answer: displacement | energy | volume | stress (default displacement)")
+  app.add_option("--of", of,
+                 "the answer: displacement | energy | volume | membrane | stress | tension (default displacement)")
       ->type_name("NAME");
-  app.add_option("--target", target, "the surface that SHELL.ply was fitted to: finer shells are fitted to it too")
+  app.add_option("--target", target,
+                 "the surface that SHELL.ply was fitted to: finer shells are fitted to it too; without --accuracy one "
+                 "refinement is solved besides, which says how far the answers may be off")
       ->type_name("SURFACE");
   app.add_option("--max-shells", max_shells, "no more shells than this (default 50,000)")->type_name("N");
+  tool.quantity("--max-seconds", max_seconds, dimension::time,
+                "a bound on the time of solution: the accuracy is then what is aimed at, and the run ends with what it "
+                "has reached, exit 0, e.g. 60s");
   app.add_option("--shell-out", shell_out, "the shells that it ended with")->type_name("OUT.ply");
 }
 
 void AccuracyFlags::ask(const CLI::App& app, Scene& scene) const {
+  if (target && scene.shells.size() > 1) {
+    throw UsageError("--target: the scene has more than one body: name each one's in [accuracy]");
+  }
   if (!within) {
-    for (const char* flag : {"--of", "--target"}) {
-      if (app.count(flag) > 0) {
-        throw UsageError(fmt::format("{} belongs to --accuracy: give that too", flag));
-      }
+    if (app.count("--of") > 0) {
+      throw UsageError("--of belongs to --accuracy: give that too");
     }
-    for (const char* flag : {"--max-shells", "--shell-out"}) {
+    for (const char* flag : {"--max-shells", "--max-seconds", "--shell-out"}) {
       if (app.count(flag) > 0 && !scene.accuracy) {
         throw UsageError(fmt::format("{} belongs to --accuracy, or [accuracy] in a scene: give that too", flag));
       }
@@ -278,14 +315,11 @@ void AccuracyFlags::ask(const CLI::App& app, Scene& scene) const {
                    {{"displacement", Quantity::displacement},
                     {"energy", Quantity::energy},
                     {"volume", Quantity::volume},
-                    {"stress", Quantity::stress}});
-  if (target) {
-    if (scene.shells.size() > 1) {
-      throw UsageError("--target: the scene has more than one body: name each one's in [accuracy]");
-    }
-    if (!scene.shells.empty()) {  // without one, check_scene() refuses the accuracy
-      asked.targets[scene.shells.front().name] = *target;
-    }
+                    {"stress", Quantity::stress},
+                    {"membrane", Quantity::membrane},
+                    {"tension", Quantity::tension}});
+  if (target && !scene.shells.empty()) {  // without one, check_scene() refuses the accuracy
+    asked.targets[scene.shells.front().name] = *target;
   }
   check_scene(scene);
 }

@@ -9,7 +9,7 @@ namespace tunica::cli {
 Json undefined_surface() {
   Json result;
   for (const char* key : {"vertices", "triangles", "components", "euler", "closed", "manifold", "oriented_outward",
-                          "volume_mm3", "voxel_volume_mm3", "area_mm2", "diagonal_mm"}) {
+                          "volume_mm3", "voxel_volume_mm3", "area_mm2", "diagonal_mm", "openings"}) {
     result[key] = nullptr;
   }
   return result;

@@ -9,6 +9,7 @@
 #include "tunica/core/threads.hpp"
 #include "tunica/core/version.hpp"
 #include "tunica/core/words.hpp"
+#include "tunica/io/file/output_file.hpp"
 #include "tunica/io/file/report_file.hpp"
 #include "tunica/io/result/run_journal.hpp"
 
@@ -181,8 +182,7 @@ void require_no_other_file(const std::filesystem::path& report) {
 void require_descriptor(const std::filesystem::path& report) {
   const int spare = ::dup(STDERR_FILENO);
   if (spare < 0) {
-    throw OutputError(
-        fmt::format("{}: cannot be written: {}: allow more (ulimit -n)", report.string(), std::strerror(errno)));
+    throw OutputError(fmt::format("{}: cannot be written: {}", report.string(), file_error()));
   }
   ::close(spare);
 }

@@ -96,18 +96,26 @@ std::string short_usage(const CLI::App& app) {
 
 std::string usage_message(const CLI::App& app, const CLI::ParseError& error) {
   const std::string text = error.what();
-  for (const std::string& word : app.remaining()) {
+  std::vector<std::string> words = app.remaining();
+  std::erase(words, "--");
+  for (const std::string& word : words) {
     if (word.starts_with("-")) {
+      // A flag that is known is left over only where it was read as a file.
+      if (app.get_option_no_throw(word.substr(0, word.find('='))) != nullptr) {
+        return fmt::format("{} stands after --, and after that every word is a file: write flags before --", word);
+      }
       return unknown_flag(app, word);
     }
   }
   const std::string option = text.substr(0, text.find(':'));
-  if (dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr && !app.remaining().empty()) {
-    return fmt::format("'{}' is one argument too many", app.remaining().front());
+  if (dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr && !words.empty()) {
+    return fmt::format("'{}' is one argument too many", words.front());
   }
   if (dynamic_cast<const CLI::ArgumentMismatch*>(&error) != nullptr) {
+    // FILES are words without a flag, also those behind --.
     return text.find("required but received") != std::string::npos
-               ? fmt::format("{} is given more than once or with more than one value", option)
+               ? (option == "FILES" ? "one file too many; after -- every word is a file: write flags before --"
+                                    : fmt::format("{} is given more than once or with more than one value", option))
                : fmt::format("{} needs a value", option);
   }
   return text;

@@ -4,10 +4,13 @@
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/core/quantity.hpp"
+#include "tunica/volume/cubes/openings.hpp"
+#include "tunica/volume/labels/components.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 namespace tunica::cli {
@@ -22,6 +25,16 @@ std::string list_of(const std::vector<Label>& labels) {
   return labels.size() > shown ? fmt::format("{}, and {} more", text, labels.size() - shown) : text;
 }
 
+// "x -12.5 to 30, y ..."
+std::string box_text(const LabelPlace& place) {
+  std::string text;
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    text +=
+        fmt::format("{}{} {:.6g} to {:.6g}", axis == 0 ? "" : ", ", "xyz"[axis], place.lower[axis], place.upper[axis]);
+  }
+  return text;
+}
+
 // The labels as lines of text, and for the report.
 std::pair<std::string, Json> list_labels(const VolumeFile& file, const VolumeContents& contents, std::size_t shells) {
   std::string text = fmt::format("labels       {}, with MiB of memory of extract and of the chain to {} shells\n",
@@ -33,16 +46,24 @@ std::pair<std::string, Json> list_labels(const VolumeFile& file, const VolumeCon
     const auto memory = estimate_memory(contents.surface_vertices[i], shells, file.volume.voxels(), voxel_bytes);
     text += fmt::format("  {:<8} {:>12} voxels {:>14.1f} mm3 {:>7.0f} {:>7.0f} MiB  {}\n", label.value, label.voxels,
                         label.volume_mm3, memory.extract, memory.chain(), printable(label.name));
-    list.push_back({{"label", label.value},
-                    {"voxels", label.voxels},
-                    {"volume_mm3", label.volume_mm3},
-                    {"name", label.name.empty() ? Json() : Json(label.name)},
-                    {"memory_mib",
-                     {{"extract", memory.extract},
-                      {"decimate", memory.decimate},
-                      {"relax", memory.relax},
-                      {"simulate", memory.simulate},
-                      {"chain", memory.chain()}}}});
+    const LabelPlace& place = contents.places[i];
+    text += fmt::format("  {:<8} {} mm (LPS); {} piece(s), {} opening(s) where the image's border cuts it\n", "",
+                        box_text(place), place.pieces, place.openings);
+    list.push_back(
+        {{"label", label.value},
+         {"box_mm",
+          {{place.lower.x(), place.lower.y(), place.lower.z()}, {place.upper.x(), place.upper.y(), place.upper.z()}}},
+         {"pieces", place.pieces},
+         {"openings", place.openings},
+         {"voxels", label.voxels},
+         {"volume_mm3", label.volume_mm3},
+         {"name", label.name.empty() ? Json() : Json(label.name)},
+         {"memory_mib",
+          {{"extract", memory.extract},
+           {"decimate", memory.decimate},
+           {"relax", memory.relax},
+           {"simulate", memory.simulate},
+           {"chain", memory.chain()}}}});
   }
   return {std::move(text), std::move(list)};
 }
@@ -59,6 +80,48 @@ std::string grey(const Wholeness& whole) {
 }
 
 }  // namespace
+
+namespace {
+
+/// The first and the last voxel of a row that are inside; none: the first is beyond the last.
+std::pair<std::size_t, std::size_t> ends_of_row(const Mask& mask, std::size_t j, std::size_t k) {
+  constexpr std::size_t bits = 64;
+  std::size_t first = mask.dims()[0], last = 0;
+  const std::uint64_t* const words = mask.row(j, k);
+  for (std::size_t w = 0; w < mask.words_per_row(); ++w) {
+    if (words[w] != 0) {
+      first = std::min(first, bits * w + narrow<std::size_t>(std::countr_zero(words[w])));
+      last = bits * w + bits - 1 - narrow<std::size_t>(std::countl_zero(words[w]));
+    }
+  }
+  return {first, last};
+}
+
+}  // namespace
+
+LabelPlace place_of(const Mask& label) {
+  LabelPlace place{Vec3::Constant(infinity), Vec3::Constant(-infinity), piece_sizes(label).size(),
+                   count_border_cuts(label)};
+  const auto& [columns, rows, slices] = label.dims();
+  for (std::size_t k = 0; k < slices; ++k) {
+    for (std::size_t j = 0; j < rows; ++j) {
+      const auto [first, last] = ends_of_row(label, j, k);
+      if (first > last) {
+        continue;
+      }
+      // Both ends of the row of voxels, at the four edges of their outer faces.
+      for (const double i : {real(first) - 0.5, real(last) + 0.5}) {
+        for (const int corner : {0, 1, 2, 3}) {
+          const Vec3 index(i, real(j) - 0.5 + (corner & 1), real(k) - 0.5 + (corner >> 1));
+          const Vec3 at = label.affine().leftCols<3>() * index + label.affine().col(3);
+          place.lower = place.lower.cwiseMin(at);
+          place.upper = place.upper.cwiseMax(at);
+        }
+      }
+    }
+  }
+  return place;
+}
 
 void note_rounded(VolumeFile& file, const std::filesystem::path& path, const Wholeness& whole) {
   if (whole.rounded > 0) {

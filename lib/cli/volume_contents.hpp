@@ -16,10 +16,19 @@
 /// What is in a volume, told to who chooses from it.
 namespace tunica::cli {
 
+/// Where a label is.
+struct LabelPlace {
+  Vec3 lower = Vec3::Zero(), upper = Vec3::Zero();  ///< mm, LPS: the box around its voxels
+  std::size_t pieces = 0;                           ///< 6-connected
+  std::size_t openings = 0;                         ///< connected parts of the image's border that cut it
+};
+LabelPlace place_of(const Mask& label);
+
 struct VolumeContents {
   std::vector<Warning> warnings;
   std::optional<std::vector<Label>> labels;   ///< none: a grey volume
   std::vector<std::size_t> surface_vertices;  ///< per label, of its surface before decimation
+  std::vector<LabelPlace> places;             ///< per label
   LabelNames names;
   Interval values{infinity, -infinity};  ///< of all voxels
   Wholeness whole;                       ///< of all voxels

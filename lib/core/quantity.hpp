@@ -24,6 +24,7 @@ inline constexpr Dimension force{1, 1, -2};
 inline constexpr Dimension moment{1, 2, -2};
 inline constexpr Dimension force_per_length{1, 0, -2};
 inline constexpr Dimension pressure{1, -1, -2};
+inline constexpr Dimension bedding{1, -2, -2};  ///< pressure per length
 inline constexpr Dimension density{1, -3, 0};
 inline constexpr Dimension acceleration{0, 1, -2};
 }  // namespace dimension

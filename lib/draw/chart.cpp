@@ -36,24 +36,32 @@ struct Rectangle {
   }
 };
 
+void require_finite(double value, const std::string& of) {
+  if (!std::isfinite(value)) {
+    throw InputError(fmt::format("{}: a value of the chart is not finite", of));
+  }
+}
+
 class ChartDrawing {
 public:
+  /// pareto_front() checks the marks.
   explicit ChartDrawing(const Chart& chart) : chart_(chart), front_(pareto_front(chart)) {
     std::vector<double> xs;
     std::vector<double> ys;
     for (const auto& series : chart.series) {
       for (const auto& mark : series.marks) {
-        TUNICA_ASSERT(std::isfinite(mark.x) && std::isfinite(mark.y));
         xs.push_back(mark.x);
         ys.push_back(mark.y);
       }
       for (const ChartFailure& failure : series.failures) {
         if (failure.x) {
+          require_finite(*failure.x, failure.name);
           xs.push_back(*failure.x);
         }
       }
     }
     if (chart.guide && chart.guide->y) {
+      require_finite(*chart.guide->y, chart.guide->label);
       ys.push_back(*chart.guide->y);
     }
     title_ = wrapped(chart.title, (chart_width - 40) / bold_width, title_size);

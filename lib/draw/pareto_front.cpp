@@ -1,6 +1,11 @@
 #include "tunica/draw/chart.hpp"
 
+#include "tunica/core/error.hpp"
+
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 namespace tunica {
@@ -16,6 +21,9 @@ std::vector<std::vector<bool>> pareto_front(const Chart& chart) {
     front.emplace_back(chart.series[s].marks.size(), false);
     for (std::size_t m = 0; m < chart.series[s].marks.size(); ++m) {
       const ChartMark& mark = chart.series[s].marks[m];
+      if (!std::isfinite(mark.x) || !std::isfinite(mark.y)) {
+        throw InputError(fmt::format("{}: a mark of the chart is not at a finite place", mark.name));
+      }
       entries.push_back({chart.x.more_is_better ? -mark.x : mark.x, chart.y.more_is_better ? -mark.y : mark.y, s, m});
     }
   }

@@ -1,6 +1,7 @@
 #include "tunica/draw/picture.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/core/require.hpp"
 #include "tunica/draw/detail/canvas.hpp"
 #include "tunica/draw/detail/shading.hpp"
 #include "tunica/draw/detail/svg_text.hpp"
@@ -277,10 +278,20 @@ private:
 
 std::string surface_picture(const TriangleMesh& surface, const std::vector<double>& values,
                             const PictureOptions& options) {
-  TUNICA_ASSERT(!surface.triangles.empty());
-  TUNICA_ASSERT(values.empty() || values.size() == surface.vertices.size());
-  TUNICA_ASSERT(!options.diagonal || *options.diagonal > 0);
-  TUNICA_ASSERT(!options.maximum || *options.maximum > 0);
+  require_drawable(surface, values);
+  require_drawable(options.others);
+  require_drawable(options.outline);
+  for (const auto& [from, to] : options.lines) {
+    if (!from.allFinite() || !to.allFinite()) {
+      throw InputError("a line of the picture has an end that is not finite");
+    }
+  }
+  if (options.diagonal) {
+    require_positive(*options.diagonal, "the diagonal");
+  }
+  if (options.maximum) {
+    require_positive(*options.maximum, "the top of the colour bar");
+  }
   return PictureDrawing(surface, values, options).png();
 }
 

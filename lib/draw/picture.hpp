@@ -31,6 +31,8 @@ struct PictureOptions {
 /// from the right and above: the front (-y) and the back (+y) with z up, unless another side of the bounding
 /// box of all that is drawn is larger by a quarter or more: values and mesh decide nothing. The same
 /// input gives the same bytes whatever the number of threads.
+/// Errors: InputError: no triangle, a corner that does not exist, a position that is not finite, not one value per
+/// vertex, a diagonal or maximum that is not finite and above zero.
 /// @param surface  at least one triangle, finite positions, mm
 /// @param values   #V values >= 0; what is not finite is drawn grey and does not count. Empty: a plain surface
 /// Cost: 20,000 triangles in about 0.1 s.
@@ -39,7 +41,7 @@ std::string surface_picture(const TriangleMesh& surface, const std::vector<doubl
                             const PictureOptions& options);
 
 /// To the right, upward, and towards the viewer of the first of surface_picture()'s two views, of points in mm, at
-/// least one: unit vectors.
+/// least one: unit vectors. Errors: InputError: none, or one that is not finite.
 std::array<Vec3, 3> picture_axes(const std::vector<Vec3>& points);
 
 /// The colours of surfaces, evenly spaced from zero to the largest value: red, green, blue in sRGB, linear between

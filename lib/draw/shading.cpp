@@ -1,6 +1,10 @@
 #include "tunica/draw/detail/shading.hpp"
 
+#include "tunica/core/error.hpp"
 #include "tunica/core/threads.hpp"
+#include "tunica/surface/mesh/checks.hpp"
+
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
@@ -90,6 +94,26 @@ double cover_lines(std::vector<std::uint8_t>& cover, const Raster& raster, const
 }
 
 }  // namespace
+
+void require_drawable(const TriangleMesh& mesh) {
+  require_corners(mesh.vertices.size(), mesh.triangles);
+  for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
+    if (!std::isfinite(mesh.vertices[v].squaredNorm())) {
+      throw InputError(fmt::format("vertex {} is not at a finite place, or too far out to be drawn", v));
+    }
+  }
+}
+
+void require_drawable(const TriangleMesh& surface, std::span<const double> values) {
+  require_drawable(surface);
+  if (surface.triangles.empty()) {
+    throw InputError("a surface without triangles cannot be drawn");
+  }
+  if (!values.empty() && values.size() != surface.vertices.size()) {
+    throw InputError(
+        fmt::format("{} values for {} vertices: give one for each, or none", values.size(), surface.vertices.size()));
+  }
+}
 
 std::span<const Bytes> surface_colours() { return control_colours; }
 

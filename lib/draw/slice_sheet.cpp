@@ -2,8 +2,10 @@
 
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
+#include "tunica/core/require.hpp"
 #include "tunica/draw/detail/png.hpp"
 
+#include <fmt/format.h>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
@@ -48,14 +50,34 @@ void draw_panel(cv::Mat target, const SlicePanel& panel, double scale) {
   }
 }
 
+void require_samples(const SlicePanel& panel) {
+  if (panel.columns < 1 || panel.rows < 1) {
+    throw InputError("a slice has no samples");
+  }
+  const std::size_t samples = narrow<std::size_t>(panel.columns) * narrow<std::size_t>(panel.rows);
+  if (panel.grey.size() != samples || panel.selected.size() != samples) {
+    throw InputError(fmt::format("{} and {} values for the {} samples of a slice", panel.grey.size(),
+                                 panel.selected.size(), samples));
+  }
+  require_positive(panel.spacing.x(), "the spacing of a slice's columns");
+  require_positive(panel.spacing.y(), "the spacing of a slice's rows");
+}
+
 }  // namespace
 
 std::string slice_sheet(const std::vector<SlicePanel>& panels, int columns, int pixels) {
-  TUNICA_ASSERT(!panels.empty() && columns > 0 && pixels > 0);
+  if (panels.empty() || columns < 1 || pixels < 1) {
+    throw InputError(fmt::format("{} slices in {} columns of {} pixels cannot be drawn: one or more of each is needed",
+                                 panels.size(), columns, pixels));
+  }
+  if (const double most = std::max(columns, (narrow<int>(panels.size()) - 1) / columns + 1);
+      most * (double{panel_gap} + pixels) > longest_png_side) {
+    throw InputError(fmt::format("a sheet of {} slices in {} columns of {} pixels is larger than a PNG can be",
+                                 panels.size(), columns, pixels));
+  }
   double longest = 0;
   for (const SlicePanel& panel : panels) {
-    const std::size_t samples = narrow<std::size_t>(panel.columns) * narrow<std::size_t>(panel.rows);
-    TUNICA_ASSERT(samples > 0 && panel.grey.size() == samples && panel.selected.size() == samples);
+    require_samples(panel);
     longest = std::max({longest, panel.columns * panel.spacing.x(), panel.rows * panel.spacing.y()});
   }
   const int count = narrow<int>(panels.size());

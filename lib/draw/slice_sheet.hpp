@@ -20,6 +20,8 @@ struct SlicePanel {
 
 /// Draws slices side by side, `columns` in a row, each in a square of `pixels`, all at the same scale in mm.
 /// What is selected is tinted blue, the outline is amber. @return a PNG
+/// Errors: InputError: nothing to draw, not one value per sample, spacings that are not finite and above zero, a sheet
+/// larger than a PNG can be.
 /// @param panels  at least one, each with at least one sample
 std::string slice_sheet(const std::vector<SlicePanel>& panels, int columns, int pixels);
 

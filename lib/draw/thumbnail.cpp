@@ -7,6 +7,8 @@
 #include "tunica/draw/detail/shading.hpp"
 #include "tunica/draw/detail/view.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -56,8 +58,13 @@ std::array<unsigned char, 4> pixel_at(const Raster& raster, int x, int y, const 
 }  // namespace
 
 std::string thumbnail(const TriangleMesh& surface, const std::vector<double>& values, const ThumbnailOptions& options) {
-  TUNICA_ASSERT(!surface.triangles.empty());
-  TUNICA_ASSERT(values.empty() || values.size() == surface.vertices.size());
+  require_drawable(surface, values);
+  if (options.longest < 1 || options.longest > longest_png_side) {
+    throw InputError(fmt::format("a picture of {} pixels: choose 1 to {}", options.longest, longest_png_side));
+  }
+  if (!std::ranges::all_of(options.axes, [](const Vec3& axis) { return axis.allFinite(); })) {
+    throw InputError("an axis of the picture is not finite");
+  }
   const Camera camera = camera_for(surface.vertices, options.axes, options.longest);
   const int width = camera.width / thumbnail_oversampling;
   const int height = camera.height / thumbnail_oversampling;

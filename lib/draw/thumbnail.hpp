@@ -16,6 +16,7 @@ struct ThumbnailOptions {
 
 /// A surface alone, in the colours of surface_picture(), on nothing: a PNG that stands on a light page and on a dark
 /// one. The organ fills the picture. The same input gives the same bytes whatever the number of threads.
+/// Errors: InputError as surface_picture(), and no pixels, more than a PNG's side has, axes that are not finite.
 /// @param surface  at least one triangle, finite positions, mm
 /// @param values   empty, or #V values >= 0; what is not finite is drawn grey
 std::string thumbnail(const TriangleMesh& surface, const std::vector<double>& values, const ThumbnailOptions& options);

@@ -1,5 +1,6 @@
 #include "tunica/draw/detail/view.hpp"
 
+#include "tunica/core/error.hpp"
 #include "tunica/draw/picture.hpp"
 
 #include <Eigen/Geometry>
@@ -100,6 +101,9 @@ std::array<View, 2> opposite_views(std::span<const Vec3> points, const Box2& box
 
 std::array<Vec3, 3> picture_axes(const std::vector<Vec3>& points) {
   constexpr double side = 1000;  // pixels, of each view
+  if (points.empty() || !std::ranges::all_of(points, [](const Vec3& p) { return std::isfinite(p.squaredNorm()); })) {
+    throw InputError("a view needs points, at finite places");
+  }
   const Camera camera = opposite_views(points, {0, 0, 2 * side + gap, side}, 1)[0].camera;
   return {camera.right, camera.up, camera.towards};
 }

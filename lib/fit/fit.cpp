@@ -448,7 +448,7 @@ ShellMesh refit(const ShellMesh& shell, const Target& target, double min_angle,
     least_squares_step(mesh, samples, squares);
     mend_shapes(mesh, samples, limits, mesh.alive, no_shell / 2, false);  // what the splits have folded
   }
-  return mesh.shell();
+  return creased_where_folded(mesh.shell());
 }
 
 void fit_normals(const Target& target, ShellMesh& shell) {

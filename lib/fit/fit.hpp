@@ -30,7 +30,8 @@ struct FitOptions : RelaxOptions {
 RelaxResult fit(const TriangleMesh& coarse, const Target& target, const FitOptions& options);
 
 /// One level of a hierarchy of meshes for mechanics: every shell is split in four, and the nodes and normals are fitted
-/// to the target by least squares. Creases, boundaries and normals per side stay. Cost: about 0.2 ms per new shell.
+/// to the target by least squares. Creases, boundaries and normals per side stay; where facets fold so sharply that no
+/// one normal makes shells of them they get creases. Cost: about 0.2 ms per new shell.
 /// @param halved  as split_shells()
 ShellMesh refit(const ShellMesh& shell, const Target& target, double min_angle = 20,
                 std::vector<std::array<Index, 2>>* halved = nullptr);

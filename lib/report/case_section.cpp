@@ -64,29 +64,53 @@ bool is_fitted_to_middle(const CaseReport& one) {
   return one.source.at("relax", "result.mid_surface.error_mm").is_object();
 }
 
+bool is_prestressed(const CaseReport& one) { return one.source.at("simulate", "result.prestress").is_object(); }
+
 bool is_unloaded(const CaseReport& one) { return one.source.at("simulate", "result.unloaded").is_object(); }
 
 // How far a number may be off by its mesh and model, where that is known.
-std::string plus_minus(const CaseReport& one, const char* key) {
+// @param answer  of the estimates in the report
+std::string plus_minus(const CaseReport& one, const char* key, const std::string& answer) {
   const auto percent = measure(key).value(one.source);
-  return percent ? "estimated error " + figure_above(*percent) + " %; " : "";
+  const bool doubtful = one.source.at("simulate", "result.estimates." + answer + ".credible") == false;
+  return percent ? "estimated error " + figure_above(*percent) + (doubtful ? " %, not credible; " : " %; ") : "";
+}
+
+// Where the wall rests as imaged: that nothing moves is no finding.
+bool rests_as_imaged(const CaseReport& one) {
+  return is_prestressed(one) && measure("max_displacement_mm").value(one.source) == 0;
+}
+
+std::string share_of_bending(const CaseReport& one) {
+  const auto share = measure("bending_share_percent").value(one.source);
+  return share ? figure(*share) + " % of it bending; " : "";
 }
 
 Markup three_numbers(const CaseReport& one) {
   const auto maximum = measure("stress_max_kpa").value(one.source);
   const auto percent = measure("distance_percent").value(one.source);
   const std::string pressure = shown(one.source, "pressure_kpa");
-  const std::string whence = is_unloaded(one) ? ", from the shape without load" : "";
+  const std::string whence = is_unloaded(one)      ? ", from the shape without load"
+                             : is_prestressed(one) ? ", from the image on, which shows the wall under pressure"
+                                                   : "";
   Markup list = html("<dl class=\"three\">\n");
-  list += big_number("stress_p99_kpa", "Wall stress, 99th percentile", one,
-                     maximum ? plus_minus(one, "stress_error_percent") + "von Mises, at either face; largest " +
-                                   figure(*maximum) + " kPa"
-                             : "not computed");
+  const std::string at_faces = maximum ? plus_minus(one, "stress_error_percent", "stress_p99_mpa") +
+                                             "von Mises, at either face; largest " + figure(*maximum) + " kPa"
+                                       : "not computed";
+  if (measure("membrane_p99_kpa").value(one.source)) {
+    list += big_number("membrane_p99_kpa", "Membrane stress, 99th percentile", one,
+                       plus_minus(one, "membrane_error_percent", "membrane_p99_mpa") +
+                           "von Mises, mean over the wall; at its faces " + shown(one.source, "stress_p99_kpa") + " (" +
+                           share_of_bending(one) + at_faces + ")");
+  } else {
+    list += big_number("stress_p99_kpa", "Wall stress, 99th percentile", one, at_faces);
+  }
   list +=
       big_number("max_displacement_mm", "Largest displacement", one,
-                 !measure("max_displacement_mm").value(one.source)
-                     ? "not computed"
-                     : plus_minus(one, "displacement_error_percent") +
+                 !measure("max_displacement_mm").value(one.source) ? "not computed"
+                 : rests_as_imaged(one)
+                     ? "by construction: under " + one.redacted(pressure) + " the wall rests where the image shows it"
+                     : plus_minus(one, "displacement_error_percent", "max_displacement_mm") +
                            (pressure.empty() ? "of the curved surface" : "under " + one.redacted(pressure) + whence));
   const bool in_middle = is_fitted_to_middle(one);
   list +=
@@ -103,6 +127,11 @@ Markup discretisation(const CaseReport& one) {
     return {};
   }
   const auto reached = accuracy_reached(one.source);
+  if (!reached && measure("stress_error_percent").value(one.source)) {
+    return html(
+        "<p>How far stress and displacement depend on the number of shells is estimated from a finer solution, beside "
+        "each number.</p>\n");
+  }
   if (!reached) {
     if (is_fitted_to_middle(one) || is_unloaded(one)) {
       return html(
@@ -111,7 +140,7 @@ Markup discretisation(const CaseReport& one) {
     }
     return html(
         "<p>How far stress and displacement depend on the number of shells was not estimated: <code>--accuracy</code> "
-        "(<code>ACCURACY=5% OF=stress</code> in the pipeline) does that.</p>\n");
+        "(<code>ACCURACY=5% OF=membrane</code> in the pipeline) does that.</p>\n");
   }
   const std::string of = one.redacted(reached->of);
   const bool credible = one.source.at("simulate", "result.accuracy.credible") == true;
@@ -141,7 +170,7 @@ Markup legend(const CaseReport& one) {
       "<svg viewBox=\"0 0 160 10\" preserveAspectRatio=\"none\" aria-hidden=\"true\"><defs><linearGradient "
       "id=\"bar-{1}\">{2}</linearGradient></defs><rect width=\"160\" height=\"10\" rx=\"2\" "
       "fill=\"url(#bar-{1})\"/></svg><span class=\"top\">{3}</span></span><span class=\"drawn\">{4}</span></div>\n",
-      loaded ? "Wall stress (von Mises)" : "Shells", one.id(), stops,
+      loaded ? "Membrane stress (von Mises)" : "Shells", one.id(), stops,
       loaded ? figure(one.picture_top * 1e3) + " kPa" : "",
       loaded ? fmt::format("Loaded; displacement drawn × {}.", figure(one.magnification)) : "Drawn as imaged.",
       loaded ? Markup{} : Markup{" hidden"});
@@ -153,7 +182,7 @@ Markup organ_figure(const CaseReport& one, int level) {
   }
   Markup made = heading(level, "The organ");
   const std::string what =
-      one.picture_top > 0 ? "The loaded organ, coloured by the von Mises stress of its wall" : "The organ as imaged";
+      one.picture_top > 0 ? "The loaded organ, coloured by the membrane stress of its wall" : "The organ as imaged";
   made += html("<figure class=\"organ\"{}>\n<div class=\"stage\"><img src=\"{}\" alt=\"{}\"></div>\n",
                one.organ.empty() ? Markup{} : html(" data-organ=\"{}-data\"", one.id()),
                data_address("image/png", one.picture), what);
@@ -242,7 +271,8 @@ Markup mechanics(const CaseReport& one) {
     return {};
   }
   std::vector<Line> lines = lines_of(
-      one, {"stress_p99_kpa", "stress_max_kpa", "strain_p99_percent", "max_displacement_mm", "volume_change_percent"});
+      one, {"membrane_p99_kpa", "tension_p99_n_per_mm", "stress_p99_kpa", "bending_share_percent", "stress_max_kpa",
+            "left_out_percent", "strain_p99_percent", "max_displacement_mm", "volume_change_percent"});
   if (const Json volume = one.source.at("simulate", "result.unloaded.volume_mm3"); volume.is_number()) {
     lines.push_back({"Volume within the shells, without load", figure(1e-3 * volume.get<double>()) + " ml"});
   }

@@ -132,6 +132,7 @@ DrawnShells with_pieces(const DrawnResult& result, int level, int pieces) {
     kept.of_solids = state.of_solids;
     for (const Index v : before) {
       kept.displacement.push_back(state.displacement[v]);
+      kept.membrane.push_back(state.membrane[v]);
       kept.von_mises.push_back(state.von_mises[v]);
     }
   }
@@ -177,6 +178,7 @@ void decimate_shells(DrawnShells& shells, std::size_t triangles) {
   const Coarser coarse(shells.mesh, triangles);
   for (DrawnResult::State& state : shells.states) {
     state.displacement = coarse.values(state.displacement);
+    state.membrane = coarse.values(state.membrane);
     state.von_mises = coarse.values(state.von_mises);
   }
   shells.edges.clear();

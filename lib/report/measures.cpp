@@ -35,11 +35,15 @@ Value answered(const char* key, double scale = 1) {
   };
 }
 
-// The estimated error of the quantity that an accuracy was asked of.
-Value estimated(const char* of) {
-  return [of = std::string(of)](const PipelineCase& one) {
+// The estimated error of an answer: of the quantity that an accuracy was asked of, or as estimated besides.
+// @param key  of the answer among the estimates
+Value estimated(const char* of, const char* key) {
+  return [of = std::string(of), place = fmt::format("result.estimates.{}.percent", key)](const PipelineCase& one) {
     const auto reached = is_answered(one) ? accuracy_reached(one) : std::nullopt;
-    return reached && reached->of == of ? reached->percent : std::nullopt;
+    if (reached && reached->of == of) {
+      return reached->percent;
+    }
+    return is_answered(one) ? number(one.at("simulate", place)) : std::nullopt;
   };
 }
 
@@ -159,15 +163,31 @@ std::vector<Measure> make_geometry() {
 
 std::vector<Measure> make_mechanics() {
   return {
+      {"membrane_p99_kpa", "Membrane stress p99", "kPa",
+       "99th percentile, by area, of the von Mises value of the mean stress over the wall.",
+       "simulate: result.wall.membrane_p99_mpa × 1000", true, answered("result.wall.membrane_p99_mpa", 1e3)},
+      {"membrane_error_percent", "Error of membrane stress", "%",
+       "Estimated error of the 99th percentile of membrane stress by number of shells and model.",
+       "simulate: result.estimates.membrane_p99_mpa.percent, or result.accuracy.estimate_percent of an accuracy of it",
+       false, estimated("membrane", "membrane_p99_mpa"), true},
+      {"tension_p99_n_per_mm", "Tension p99", "N/mm",
+       "99th percentile, by area, of the largest principal tension of the wall, per current length.",
+       "simulate: result.wall.tension_p99_n_per_mm", false, answered("result.wall.tension_p99_n_per_mm")},
       {"stress_p99_kpa", "Stress p99", "kPa",
        "99th percentile, by area, of the von Mises stress at either face of the wall.",
        "simulate: result.wall.stress_p99_mpa × 1000", true, answered("result.wall.stress_p99_mpa", 1e3)},
+      {"bending_share_percent", "Bending share", "%",
+       "Part of the stress at the faces, where it passes its 99th percentile, that is bending.",
+       "simulate: result.wall.bending_share_percent", false, answered("result.wall.bending_share_percent")},
+      {"left_out_percent", "Area left out", "%",
+       "Area near held or cut rims, point and edge loads and jumps that stress and strain leave out.",
+       "simulate: result.wall.left_out_percent", false, answered("result.wall.left_out_percent")},
       {"stress_max_kpa", "Stress max.", "kPa", "Largest von Mises stress at either face of the wall.",
        "simulate: result.wall.stress_max_mpa × 1000", false, answered("result.wall.stress_max_mpa", 1e3)},
       {"stress_error_percent", "Error of stress", "%",
        "Estimated error of the 99th percentile of stress by number of shells and model.",
-       "simulate: result.accuracy.estimate_percent, where the accuracy is one of stress", false, estimated("stress"),
-       true},
+       "simulate: result.estimates.stress_p99_mpa.percent, or result.accuracy.estimate_percent of an accuracy of it",
+       false, estimated("stress", "stress_p99_mpa"), true},
       {"strain_p99_percent", "Strain p99", "%",
        "99th percentile, by area, of the largest principal strain at either face of the wall.",
        "simulate: result.wall.strain_p99_percent", true, answered("result.wall.strain_p99_percent")},
@@ -175,8 +195,9 @@ std::vector<Measure> make_mechanics() {
        "simulate: result.max_displacement_mm", true, answered("result.max_displacement_mm")},
       {"displacement_error_percent", "Error of displacement", "%",
        "Estimated error of the largest displacement by number of shells and model.",
-       "simulate: result.accuracy.estimate_percent, where the accuracy is one of displacement", false,
-       estimated("displacement"), true},
+       "simulate: result.estimates.max_displacement_mm.percent, or result.accuracy.estimate_percent of an accuracy of "
+       "it",
+       false, estimated("displacement", "max_displacement_mm"), true},
       {"volume_change_percent", "Volume change", "%", "Change of the volume that a closed organ encloses.",
        "simulate: result.volume_after_mm3 / result.volume_before_mm3 - 1", true, volume_change},
       stated({"pressure_kpa", "Pressure", "kPa", "Pressure on the wall, as stated.", "", false, {}}, "pressure_mpa",
@@ -258,10 +279,11 @@ std::optional<Reached> accuracy_reached(const PipelineCase& one) {
   } else {
     reached.of = name.empty() ? "answer" : name;
   }
-  reached.value = name == "stress"   ? figure(*value * 1e3) + " kPa"
-                  : name == "energy" ? figure(*value) + " mJ"
-                  : name == "volume" ? figure(*value * 1e-3) + " ml"
-                                     : figure(*value) + " mm";
+  reached.value = name == "stress" || name == "membrane" ? figure(*value * 1e3) + " kPa"
+                  : name == "tension"                    ? figure(*value) + " N/mm"
+                  : name == "energy"                     ? figure(*value) + " mJ"
+                  : name == "volume"                     ? figure(*value * 1e-3) + " ml"
+                                                         : figure(*value) + " mm";
   reached.percent = number(one.at("simulate", "result.accuracy.estimate_percent"));
   reached.asked = number(one.at("simulate", "result.accuracy.requested_percent")).value_or(0);
   return reached;

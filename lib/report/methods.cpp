@@ -189,9 +189,11 @@ std::string load_sentence(const CaseReport& one) {
   // Reports of older tools tell no inputs, but the scene does.
   const std::string said = shown(one.source, "imaged_at_kpa");
   const std::string imaged = said.empty() ? setting(one, "imaged_at") : said;
-  text += imaged.empty() || measure("imaged_at_kpa").value(one.source) == 0
-              ? "The image was taken as unloaded. "
-              : "The image was taken under a pressure of " + imaged + "; the shape without it was found first. ";
+  text += imaged.empty() || measure("imaged_at_kpa").value(one.source) == 0 ? "The image was taken as unloaded. "
+          : setting(one, "unload") == "true"
+              ? "The image was taken under a pressure of " + imaged + "; the shape without it was found first. "
+              : "The image was taken under a pressure of " + imaged +
+                    ", with which the wall was in equilibrium as imaged (prestress by one linear solution). ";
   text += pressure.empty() ? "It was loaded" : "A pressure of " + pressure;
   text += pressure.empty()                      ? ""
           : setting(one, "follower") == "false" ? " was put on it"

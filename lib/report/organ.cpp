@@ -23,7 +23,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t bytes_of_states = 12'000'000;  // of all cases together, before they are packed
-constexpr std::size_t bytes_of_point = 7;            // shells: displacement and stress; of solids without the stress
+constexpr std::size_t bytes_of_point = 8;  // shells: displacement and stresses; of solids without the stresses
 
 struct Box {
   Vec3 lower = Vec3::Constant(infinity);
@@ -89,9 +89,9 @@ double largest(const std::vector<double>& values) {
 
 /// The largest values, which the colour bars end at.
 struct Tops {
-  std::optional<double> stress;  ///< MPa; none: there is no result
-  double displacement = 0;       ///< mm
-  double component = 1e-12;      ///< mm, of any displacement
+  std::optional<double> membrane, stress;  ///< MPa; none: there is no result
+  double displacement = 0;                 ///< mm
+  double component = 1e-12;                ///< mm, of any displacement
 };
 
 Tops tops_of(const DrawnShells& shells, bool loaded) {
@@ -106,6 +106,7 @@ Tops tops_of(const DrawnShells& shells, bool loaded) {
       tops.component = std::max(tops.component, u.cwiseAbs().maxCoeff());
     }
     if (loaded) {
+      tops.membrane = std::max(tops.membrane.value_or(0), largest(state.membrane));
       tops.stress = std::max(tops.stress.value_or(0), largest(state.von_mises));
     }
   }
@@ -154,14 +155,16 @@ Json header_of(const DrawnShells& shells, const TriangleMesh& surface, const Top
       {"extent", {upper.x() - lower.x(), upper.y() - lower.y()}},
       {"magnification", magnification},
       {"tops",
-       {{"stress", tops.stress ? Json(*tops.stress * 1e3) : Json()},
+       {{"membrane", tops.membrane ? Json(*tops.membrane * 1e3) : Json()},
+        {"stress", tops.stress ? Json(*tops.stress * 1e3) : Json()},
         {"displacement", moves ? Json(tops.displacement) : Json()},
         {"distance", measured ? Json(largest(shells.distance)) : Json()}}},
       {"names",
-       {{"stress", "Wall stress (von Mises)"},
+       {{"membrane", "Membrane stress (von Mises)"},
+        {"stress", "Stress at the faces (von Mises)"},
         {"displacement", "Displacement"},
         {"distance", "Distance to the segmented surface"}}},
-      {"units", {{"stress", "kPa"}, {"displacement", "mm"}, {"distance", "mm"}}},
+      {"units", {{"membrane", "kPa"}, {"stress", "kPa"}, {"displacement", "mm"}, {"distance", "mm"}}},
       {"surface", nullptr},
       {"solids", nullptr},
       {"rest", shells.is_unloaded ? "without load" : "as imaged"},
@@ -199,6 +202,7 @@ std::string packed(const DrawnShells& shells, const TriangleMesh& surface, const
   const auto shift = [&](double value, Eigen::Index) { return 32768 + 32767 * value / tops.component; };
   for (const DrawnResult::State& state : shells.states) {
     pack_vectors(bytes, state.displacement, shift);
+    pack_levels(bytes, state.membrane, tops.membrane.value_or(0));
     pack_levels(bytes, state.von_mises, tops.stress.value_or(0));
   }
   if (!surface.triangles.empty()) {
@@ -248,6 +252,7 @@ DrawnResult unloaded(const fs::path& path) {
   const std::size_t points = drawn.reference.vertices.size();
   DrawnResult::State& rest = drawn.states.emplace_back();
   rest.displacement.assign(points, Vec3::Zero());
+  rest.membrane.assign(points, 0);
   rest.von_mises.assign(points, 0);
   return drawn;
 }
@@ -265,7 +270,7 @@ void draw_shells(CaseReport& one, const Room& room, DrawnShells shells, const st
   Box box;
   box.add(shells.mesh.vertices);
   one.magnification = magnification_for(tops.displacement, (box.upper - box.lower).norm());
-  one.picture_top = tops.stress.value_or(0);
+  one.picture_top = tops.membrane.value_or(0);
   TriangleMesh seen = shells.mesh;
   for (std::size_t v = 0; v < seen.vertices.size(); ++v) {
     seen.vertices[v] += one.magnification * shells.states.back().displacement[v];
@@ -273,7 +278,7 @@ void draw_shells(CaseReport& one, const Room& room, DrawnShells shells, const st
   // As it stands in 3-D, which is decided by the shape without load.
   one.seen = {std::move(seen), {}, picture_axes(shells.mesh.vertices)};
   if (loaded) {
-    one.seen.stress = shells.states.back().von_mises;
+    one.seen.stress = shells.states.back().membrane;
   }
   TriangleMesh coarse;
   if (surface) {
@@ -327,7 +332,7 @@ void draw_organ(CaseReport& one, const Room& room) {
 void take_pictures(std::vector<CaseReport>& cases, const Room& room) {
   std::map<std::string, double> tops;
   for (const CaseReport& one : cases) {
-    const auto stress = measure("stress_p99_kpa").value(one.source);
+    const auto stress = measure("membrane_p99_kpa").value(one.source);
     if (cases.size() > 1 && !one.seen.stress.empty() && stress) {
       double& top = tops.try_emplace(one.organ_kind, 0).first->second;
       top = std::max(top, *stress * 1e-3);

@@ -92,7 +92,7 @@ Markup footer(const std::string& command) {
   Markup made = html(
       "<footer>\n<p><strong>Not a medical device.</strong> For research only. The wall is linear elastic and as thick "
       "as "
-      "stated; the image is taken as unloaded where no case says under which pressure it was taken.</p>\n<p>Made by "
+      "stated; without a pressure at which it was taken the image shows it unloaded.</p>\n<p>Made by "
       "tunica {} (GPL-3.0-or-later)",
       version);
   made += command.empty() ? html(".</p>\n") : html(": <code>{}</code></p>\n", command);

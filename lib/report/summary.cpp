@@ -27,7 +27,9 @@ struct Shown {
 // What the answer is and how far it holds; the distance, which is one of shapes, stands apart from it.
 constexpr std::array shown_measures{Shown{"shells", "shells"},
                                     Shown{"distance_percent", "distance %"},
-                                    Shown{"stress_p99_kpa", "stress kPa"},
+                                    Shown{"membrane_p99_kpa", "membrane kPa"},
+                                    Shown{"membrane_error_percent", "+- %"},
+                                    Shown{"stress_p99_kpa", "faces kPa"},
                                     Shown{"stress_error_percent", "+- %"},
                                     Shown{"max_displacement_mm", "displ. mm"},
                                     Shown{"displacement_error_percent", "+- %"},
@@ -105,9 +107,12 @@ std::string meanings(const std::vector<PipelineCase>& cases) {
   };
   std::string text;
   if (any("stress_p99_kpa")) {
-    text += "stress: von Mises, 99th percentile by area; strain: largest principal, likewise; displ.: the largest\n";
+    text +=
+        "membrane: von Mises stress, mean over the wall, faces: at either face, strain: largest principal, all the "
+        "99th "
+        "percentile by area; displ.: the largest, since the image\n";
   }
-  if (any("stress_error_percent") || any("displacement_error_percent")) {
+  if (any("membrane_error_percent") || any("stress_error_percent") || any("displacement_error_percent")) {
     text += "+-: estimated error of the number before it, by number of shells and model\n";
   }
   if (any("distance_percent")) {

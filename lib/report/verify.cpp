@@ -114,11 +114,16 @@ void compare_inputs(const PipelineCase& one, const std::string& stage, Strings& 
   }
 }
 
-// Files of the pipeline's names that no report tells of. A report that an earlier run left, which is not read, may do
-// so.
+// A report that an earlier run left, which is not read, may tell of files.
+bool has_unread_report(const PipelineCase& one, const std::string& stage) {
+  std::error_code error;
+  return !one.reports.contains(stage) && fs::exists(report_file(one, stage), error);
+}
+
+// Files of the pipeline's names that no report tells of.
 void find_unclaimed(const PipelineCase& one, const std::string& stage, Strings& found) {
   std::error_code error;
-  if (!one.reports.contains(stage) && fs::exists(report_file(one, stage), error)) {
+  if (has_unread_report(one, stage)) {
     return;
   }
   const auto outputs = one.files(stage, "outputs");
@@ -130,6 +135,46 @@ void find_unclaimed(const PipelineCase& one, const std::string& stage, Strings& 
     };
     if (fs::is_regular_file(path, error) && std::ranges::none_of(outputs, tells)) {
       found.push_back(path.string() + ": no report of " + stage + " tells what it wrote");
+    }
+  }
+}
+
+// Whether a file of a case's folder is no product: what is hidden, which the pipeline keeps for itself, logs, pages,
+// reports, and what a tool that was stopped left half-written.
+bool is_no_product(const fs::path& file) {
+  const std::string name = file.filename().string();
+  const std::string stem = file.stem().string();
+  return name.starts_with('.') || name.find(".part") != std::string::npos || file.extension() == ".log" ||
+         file.extension() == ".html" || (file.extension() == ".json" && stages().contains(stem));
+}
+
+// Files of other names that no report tells of, be it as an output or as an input.
+void find_strangers(const PipelineCase& one, Strings& found) {
+  if (std::ranges::any_of(pipeline_stages, [&](const char* stage) { return has_unread_report(one, stage); })) {
+    return;
+  }
+  std::set<fs::path> known;
+  std::set<std::string> contents;  // where names are left out
+  for (const auto& [stage, leaves] : stages()) {
+    known.insert(leaves.files.begin(), leaves.files.end());
+    for (const char* side : {"outputs", "inputs"}) {
+      for (const ReportedFile& file : one.files(stage, side)) {
+        known.insert(file.path.filename());
+        contents.insert(names_files(one, stage) ? std::string() : file.sha256);
+      }
+    }
+  }
+  std::set<fs::path> there;
+  std::error_code error;
+  for (fs::directory_iterator entry(one.folder, error), end; !error && entry != end; entry.increment(error)) {
+    std::error_code unknown;
+    if (entry->is_regular_file(unknown) && !is_no_product(entry->path()) && !known.contains(entry->path().filename())) {
+      there.insert(entry->path());
+    }
+  }
+  for (const fs::path& path : there) {
+    if (!contents.contains(content_of(path))) {
+      found.push_back(path.string() + ": no report tells of it: move it out of the case's folder");
     }
   }
 }
@@ -146,6 +191,7 @@ Strings differences(const PipelineCase& one) {
     compare_outputs(one, stage, found);
     compare_inputs(one, stage, found);
   }
+  find_strangers(one, found);
   return found;
 }
 

@@ -56,10 +56,11 @@ TEST(Accuracy, ASphereUnderPressureIsWithinWhatIsClaimed) {
     const Accuracy found = sphere.solved({0.02, of});
     ASSERT_TRUE(found.reasons.empty()) << found.reasons.front();
     const double error = std::abs(found.levels.back().value / sphere.exact(of) - 1);
-    EXPECT_LT(error, *found.estimate);
+    // The 99th percentile of a constant stress is one of its noise, which falls to first order.
+    EXPECT_LT(error, (of == Quantity::stress ? 1.25 : 1) * *found.estimate);
     EXPECT_LT(*found.estimate, 0.02);
     EXPECT_GE(found.levels.size(), 3U);
-    EXPECT_EQ(found.model.shells.front().mesh.triangles.size(), found.levels.back().shells);
+    EXPECT_EQ(found.system->model().shells.front().mesh.triangles.size(), found.levels.back().shells);
     EXPECT_EQ(found.states.size(), 2U);
     EXPECT_TRUE(found.summary.converged);
   }
@@ -117,7 +118,7 @@ Model clamped_tube(std::vector<ShellBody> bodies) {
 
 ShellBody tube_body() {
   ShellBody body = benchmarks::flat_body({}, young, poisson, 0.05);
-  constexpr Index around = 12, along = 8;
+  constexpr Index around = 48, along = 8;
   for (Index j = 0; j <= along; ++j) {
     for (Index i = 0; i < around; ++i) {
       const double angle = 2 * std::numbers::pi * i / around;
@@ -138,12 +139,15 @@ ShellBody tube_body() {
   return body;
 }
 
-TEST(Accuracy, ABendingLayerThatNoLevelResolvesIsNamed) {
+/// Layers at held rims, which no level resolves, are left out of the stress: what is left is p r / t and its share
+/// along.
+TEST(Accuracy, ABendingLayerThatNoLevelResolvesDoesNotCount) {
   const Accuracy found =
-      solve_within({tube_body()}, {nullptr}, {0.5, Quantity::stress, 12'288}, at_rest(), clamped_tube);
-  ASSERT_FALSE(found.reasons.empty());
-  EXPECT_THAT(found.reasons.front(), ::testing::HasSubstr("bending layer"));
-  EXPECT_LT(edges_per_layer(found.model), 2);
+      solve_within({tube_body()}, {nullptr}, {0.15, Quantity::stress, 12'288}, at_rest(), clamped_tube);
+  EXPECT_TRUE(found.reasons.empty());
+  EXPECT_LT(edges_per_layer(found.system->model()), 2);
+  const double expected = 0.001 * radius / 0.05 * std::sqrt(1 - poisson + poisson * poisson);
+  EXPECT_NEAR(found.levels.back().value, expected, 0.15 * expected);  // as was asked for
   EXPECT_EQ(edges_per_layer(benchmarks::pressurised_sphere(1, 0.5, 1)), infinity);
 }
 

@@ -1,4 +1,4 @@
-"""Meshes and names that nobody means, for every tool: a million triangles that are no surface, none, a single one; names of
+"""Meshes and names that nobody means, for every tool: many triangles that are no surface, none, a single one; names of
 files with blanks, quotation marks, line ends, signs of any script and bytes that are no text.
 
     TUNICA_BIN=build/release/bin PYTHONPATH=tests/support tests/cli/hostile_test.py [CLASS]
@@ -19,7 +19,7 @@ import meshes
 import numpy as np
 
 BIN = pathlib.Path(os.environ["TUNICA_BIN"])
-MILLION = 1_000_000
+MANY = 200_000
 LOAD = ["--young", "1MPa", "--poisson", "0.3", "--thickness", "1mm", "--pressure", "1kPa", "--static"]
 
 
@@ -55,7 +55,7 @@ class Hostile(unittest.TestCase):
         self.addCleanup(shutil.rmtree, self.folder, ignore_errors=True)
         meshes.write_ply(self.folder / "ball.ply", *meshes.sphere(3, 40.0, (50.0, 50.0, 50.0)), comments=["units mm"])
 
-    def run_tool(self, verb, *words, seconds=300):
+    def run_tool(self, verb, *words, seconds=60):
         """@return the exit code and what was said, which is an answer or one line. Time is that of the processor, so that
         a busy machine does not matter"""
         def limit():
@@ -73,27 +73,27 @@ class Hostile(unittest.TestCase):
 
 
 class Soups(Hostile):
-    """A million triangles that are no surface: bounded time and memory, and an answer or a refusal that says why."""
+    """Many triangles that are no surface: bounded time and memory, and an answer or a refusal that says why."""
 
-    def expect(self, verb, *words, code, says="", seconds=300, memory="4GB"):
-        found, said = self.run_tool(verb, *words, "--memory-limit", memory, seconds=seconds)
+    def expect(self, verb, *words, code, says="", memory="800MB"):
+        found, said = self.run_tool(verb, *words, "--memory-limit", memory)
         self.assertIn(found, code if isinstance(code, tuple) else (code,), said)
         self.assertIn(says, said)
 
     def test_triangles_between_any_vertices(self):
-        write_soup(self.folder / "soup.ply", *tangled(MILLION))
+        write_soup(self.folder / "soup.ply", *tangled(MANY))
         self.expect("decimate", "soup.ply", "out.ply", "--triangles", "800", code=3, says="soup.ply: ")
         self.expect("relax", "soup.ply", "ball.ply", "out.ply", code=3, says="soup.ply: ")
         self.expect("relax", "ball.ply", "soup.ply", "out.ply", code=3, says="soup.ply: ")
         self.expect("simulate", "soup.ply", "out.hdf", *LOAD, "--fix", "rigid-motions", code=3, says="soup.ply: ")
 
     def test_triangles_apart(self):
-        write_soup(self.folder / "fewer.ply", *apart(MILLION // 10, 1.0))  # a million take a minute
+        write_soup(self.folder / "fewer.ply", *apart(MANY // 4, 1.0))
         self.expect("decimate", "fewer.ply", "out.ply", "--triangles", "800", code=4)
-        write_soup(self.folder / "soup.ply", *apart(MILLION, 1.0))
-        # A surface of a million pieces is one; a limit on memory may end it.
-        self.expect("relax", "soup.ply", "ball.ply", "out.ply", code=(3, 6), memory="1GB")
-        self.expect("relax", "ball.ply", "soup.ply", "out.ply", code=(3, 6), memory="1GB")
+        write_soup(self.folder / "soup.ply", *apart(MANY, 1.0))
+        # A surface of so many pieces is one; a limit on memory may end it.
+        self.expect("relax", "soup.ply", "ball.ply", "out.ply", code=(3, 6), memory="200MB")
+        self.expect("relax", "ball.ply", "soup.ply", "out.ply", code=(3, 6), memory="200MB")
         self.assertFalse((self.folder / "out.ply").exists())
         self.expect("compare", "soup.ply", "ball.ply", code=0)
 
@@ -182,8 +182,8 @@ class Names(Hostile):
         run("decimate", path("-surface.ply"), path("-coarse.ply"), "--triangles", "60")
         case = folder / "out" / name / "1"
         case.mkdir(parents=True)
-        run("relax", path("-coarse.ply"), path("-surface.ply"), path(".ply"), "--picture", path(".png"), "--map",
-            path("-map.ply"))
+        run("relax", path("-coarse.ply"), path("-surface.ply"), path(".ply"), "--max-iterations", "1", "--picture",
+            path(".png"), "--map", path("-map.ply"))
         shutil.copy(self.folder / "report.json", case / "relax.json")
         shutil.copy(folder / f"{name}.ply", case / "shell.ply")
         self.assertEqual(os.fsencode(json.loads((case / "relax.json").read_text())["inputs"][0]["path"]).decode(errors="replace"),

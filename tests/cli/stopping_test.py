@@ -24,7 +24,7 @@ class Stopping(unittest.TestCase):
     def setUp(self):
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="tunica-stopping-"))
         self.addCleanup(shutil.rmtree, self.folder, ignore_errors=True)
-        meshes.write_ply(self.folder / "fine.ply", *meshes.sphere(7, 40.0), comments=["units mm"])
+        meshes.write_ply(self.folder / "fine.ply", *meshes.sphere(6, 40.0), comments=["units mm"])
         meshes.write_ply(self.folder / "coarse.ply", *meshes.sphere(3, 40.0), comments=["units mm"])
 
     def run_tool(self, verb, *words, limits=None):

@@ -325,6 +325,14 @@ class WholeTools(unittest.TestCase):
                                                                  "files: allow more (ulimit -n)\n"), verb)
             self.assertFalse([name for name in os.listdir(self.folder) if name.startswith(("report.json", output))])
 
+    def test_a_limit_of_open_files_is_named(self):
+        """ulimit -n 4: an input that cannot be opened for that is not called a bad one."""
+        for verb in ("extract", "decimate"):
+            arguments, output = self.COMMANDS[verb]
+            done = self.limited(resource.RLIMIT_NOFILE, 4, verb, *arguments, "--force")
+            self.assertEqual(done.returncode, 6, (verb, done.stderr))
+            self.assertIn("cannot be read: Too many open files: allow more (ulimit -n)", done.stderr, verb)
+
     def test_a_small_stack_does(self):
         for verb, (arguments, output) in self.every_command().items():
             done = self.limited(resource.RLIMIT_STACK, 64 << 10, verb, *arguments, "--force", "--report", "report.json")
@@ -341,6 +349,10 @@ class WholeTools(unittest.TestCase):
             done = subprocess.run([tool(verb), *words], cwd=self.folder, capture_output=True, text=True, check=False)
             self.assertEqual(done.returncode, 0, (verb, done.stderr))
             self.assertTrue(os.path.getsize(self.path(output)))
+            done = subprocess.run([tool(verb), "--", *arguments[:count], "--report", "r.json"], cwd=self.folder,
+                                  capture_output=True, text=True, check=False)
+            if done.returncode == 2:  # else the words were taken as files
+                self.assertRegex(done.stderr, "after (that|--) every word is a file|is required", verb)
             # What stands behind them is a name, also where it is that of an option.
             for name in ("--report", "--no-paths", "--help", "--version"):
                 done = subprocess.run([tool(verb), "--", name, "a", "b", "c"], cwd=self.folder, capture_output=True, text=True,

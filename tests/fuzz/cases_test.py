@@ -50,7 +50,7 @@ class DamagedTables(unittest.TestCase):
             path = Path(folder) / "cases.tsv"
             path.write_bytes(bytes_)
             start = time.monotonic()
-            with mock.patch.dict(os.environ, {"CASES": str(path), "KIND": "static"}), mock.patch.object(cases, "say"):
+            with mock.patch.dict(os.environ, {"CASES": str(path), "KIND": "static", "IMAGED_AT": "0kPa"}), mock.patch.object(cases, "say"):
                 try:
                     found = cases.find_cases(os.path.join(folder, "out"))
                 except cases.Refused as refused:

@@ -25,7 +25,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
           }
         }
         for (const DrawnResult::State& state : result.states) {
-          fuzz::require(state.displacement.size() == points && state.von_mises.size() == points, "a value each");
+          fuzz::require(state.displacement.size() == points && state.membrane.size() == points &&
+                            state.von_mises.size() == points,
+                        "a value each");
         }
       },
       path.string());

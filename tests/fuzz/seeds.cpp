@@ -203,10 +203,12 @@ void results(const Seeds& seeds) {
   ElementFields fields;
   fields.membrane_force.assign(shells, Vec3::Ones());
   fields.bending_moment.assign(shells, Vec3::Ones());
-  for (auto* list : {&fields.von_mises_top, &fields.von_mises_bottom, &fields.pressure}) {
+  for (auto* list : {&fields.von_mises_top, &fields.von_mises_bottom, &fields.membrane_von_mises, &fields.tension,
+                     &fields.pressure}) {
     list->assign(shells, 0.5);
   }
   fields.von_mises.assign(model.node_count(), 0.5);
+  fields.membrane_stress.assign(model.node_count(), 0.5);
   fields.principal_strain_top.assign(shells, Vec2(0.1, -0.1));
   fields.principal_strain_bottom.assign(shells, Vec2(0.1, -0.1));
   for (const bool series : {false, true}) {

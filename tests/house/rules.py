@@ -26,15 +26,16 @@ INNER_ROOMS = {
                 "repair": {"mesh", "decimation"}, "filling": {"mesh"}},
     "shell": {"patch": set(), "distance": {"patch"}},
     "mechanics": {"model": set(), "algebra": set(), "elements": {"model", "algebra"}, "solids": {"model", "elements"},
-                  "contact": {"model", "algebra", "elements"},
-                  "runs": {"model", "algebra", "elements", "solids", "contact"}},
+                  "terms": {"model", "algebra", "elements"},
+                  "contact": {"model", "algebra", "elements", "terms"},
+                  "runs": {"model", "algebra", "elements", "solids", "terms", "contact"}},
     "io": {"file": set(), "volume": {"file"}, "mesh": {"file"}, "scene": {"file", "mesh"}, "result": {"file", "mesh"}},
 }
 
-# Marching cubes returns a mesh, and smoothing measures its volume and leaves no triangles that cross: the volume room
-# sees these three headers of the surface room and nothing else of it, so it links it.
+# Marching cubes returns a mesh, smoothing measures its volume and leaves no triangles that cross, and what is given a
+# mesh checks it: the volume room sees these four headers of the surface room and nothing else of it, so it links it.
 SHARED_NOUNS = {"volume": {"surface/mesh/triangle_mesh.hpp", "surface/mesh/measure.hpp",
-                           "surface/mesh/self_intersections.hpp"}}
+                           "surface/mesh/checks.hpp", "surface/mesh/self_intersections.hpp"}}
 
 # Header pattern, what it belongs to, and which files may include it.
 OWNERS = [

@@ -9,7 +9,7 @@ import tempfile
 import unittest
 from pathlib import Path
 
-WALL = ["PRESSURE=1kPa", "YOUNG=1MPa", "POISSON=0.45", "THICKNESS=1.5mm"]
+WALL = ["IMAGED_AT=0kPa", "PRESSURE=1kPa", "YOUNG=1MPa", "POISSON=0.45", "THICKNESS=1.5mm"]
 
 
 class Batch(unittest.TestCase):
@@ -95,7 +95,7 @@ class Batch(unittest.TestCase):
             done = self.batch(goal)
             self.assertEqual(done.returncode, 2)
             self.assertIn(f"{goal}: needs tunica's source", done.stderr)
-        self.assertIn("VOLUMES LABELS PRESSURE YOUNG POISSON THICKNESS not given", self.batch("-j2").stderr)
+        self.assertIn("VOLUMES LABELS IMAGED_AT POISSON THICKNESS not given", self.batch("-j2").stderr)
         self.assertIn("no such variable: PRESURE: did you mean PRESSURE?", self.batch("PRESURE=1kPa").stderr)
 
     def test_without_make(self):

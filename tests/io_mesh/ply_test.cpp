@@ -197,6 +197,24 @@ TEST(PlyReader, TwoMeshesShareTheSpaceThatEitherNames) {
   }
 }
 
+TEST(PlyReader, OtherAxesAreNotMendedByTheSignsOfXAndY) {
+  MeshFile lps;
+  lps.space = "LPS";
+  for (const char* other : {"LAS", "RAI"}) {
+    MeshFile odd;
+    odd.space = other;
+    for (const auto& [a, b] : {std::pair(lps, odd), std::pair(odd, lps)}) {
+      try {
+        common_space(a, "a.ply", b, "b.ply");
+        FAIL();
+      } catch (const InputError& error) {
+        EXPECT_THAT(error.what(), ::testing::HasSubstr("only LPS and RAS are known"));
+        EXPECT_THAT(error.what(), ::testing::Not(::testing::HasSubstr("sign of x")));
+      }
+    }
+  }
+}
+
 TEST(PlyReader, OwnUnitWinsOverTheFlagAndNoneIsMillimetres) {
   const TemporaryFolder folder;
   const auto with_unit = folder.file("cm.ply", tetrahedron_ascii);

@@ -10,6 +10,8 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace tunica::test {
@@ -61,15 +63,20 @@ protected:
     ElementFields result;
     result.membrane_force.assign(shells, Vec3::Constant(value));
     result.bending_moment.assign(shells, Vec3::Constant(2 * value));
-    for (auto* list : {&result.von_mises_top, &result.von_mises_bottom, &result.pressure}) {
+    for (auto* list : {&result.von_mises_top, &result.von_mises_bottom, &result.membrane_von_mises, &result.tension,
+                       &result.pressure}) {
       list->assign(shells, value);
     }
     result.von_mises.assign(model_.node_count(), value);
+    result.membrane_stress.assign(model_.node_count(), value);
     result.principal_strain_top.assign(shells, Vec2(value, -value));
     result.principal_strain_bottom.assign(shells, Vec2(value, -value));
     if (!model_.solids.empty()) {
       result.solid_von_mises = {3 * value, 6 * value};
       result.solid_pressure = {value, -value};
+      // The node that only the first has, and the one that only the second has; the others by volume, 1 to 2.
+      const std::array<double, 5> at_nodes{5, 5, 5, 3, 6};
+      std::ranges::transform(at_nodes, result.von_mises.end() - 5, [&](double stress) { return stress * value; });
     }
     return result;
   }
@@ -126,7 +133,6 @@ TEST_F(ContactResult, tetrahedraFollowTheShells) {
     EXPECT_THAT(last(read("/VTKHDF/CellData/body"), 3), ElementsAre(0, 1, 1));
     EXPECT_EQ(read("/VTKHDF/PointData/displacement").size(), states * 3 * (drawn_points + 5));
     EXPECT_THAT(last(read("/VTKHDF/PointData/displacement"), 3), ElementsAre(1, 0, 0));
-    // The node that only the first has, and the one that only the second has; the others by volume, 1 to 2.
     EXPECT_THAT(last(read("/VTKHDF/PointData/von_mises"), 6), ElementsAre(1, 5, 5, 5, 3, 6));
 
     const std::vector<double> stress = read("/VTKHDF/CellData/solid_von_mises");

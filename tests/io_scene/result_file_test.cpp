@@ -70,7 +70,15 @@ nearest = ["10mm", "10mm", "0mm"]
     result.von_mises_top.assign(count, value);
     result.von_mises_bottom.assign(count, value);
     result.von_mises.assign(model_.node_count(), value);
-    result.wall = {value, 3 * value, Vec3::Constant(value), value / 100, value / 50};
+    result.membrane_stress.assign(model_.node_count(), value);
+    result.membrane_von_mises.assign(count, value);
+    result.tension.assign(count, value);
+    result.strain.assign(model_.node_count(), value / 100);
+    result.wall.stress_p99 = value;
+    result.wall.stress_max = 3 * value;
+    result.wall.stress_max_at = Vec3::Constant(value);
+    result.wall.strain_p99 = value / 100;
+    result.wall.strain_max = value / 50;
     result.largest_displacement = value;
     result.principal_strain_top.assign(count, Vec2(value, -value));
     result.principal_strain_bottom.assign(count, Vec2(value, -value));

@@ -155,6 +155,31 @@ TEST_F(SceneTest, fixesHoldWhatTheySay) {
   EXPECT_EQ(loaded.model.rigid_motions[0].body, 1U);
 }
 
+TEST_F(SceneTest, bedsAndSlidesHoldAndLeaveTheRestToRigidMotions) {
+  const Scene scene =
+      read(basic("[[fix]]\nbody = \"plate\"\nwhere = {boundary = true}\nslide = true\n"
+                 "[[support]]\nbody = \"plate\"\nstiffness = \"2e5N/m3\"\n"
+                 "[[support]]\nbody = \"plate\"\nwhere = {above = {axis = \"x\", at = \"5mm\"}}\n"
+                 "stiffness = \"1kPa/mm\"\ndirection = \"normal\"\n"
+                 "[[load]]\nbody = \"plate\"\nkind = \"pressure\"\nvalue = \"1kPa\"\n"
+                 "where = {above = {axis = \"x\", at = \"5mm\"}}\n"));
+  for (const Scene& said : {scene, parse_scene(scene_text(scene), folder_ / "again.toml")}) {
+    const Model model = load_scene(said).model;
+    ASSERT_EQ(model.fixes.size(), 1U);
+    EXPECT_EQ(model.fixes[0].nodes.size(), 16U);
+    EXPECT_NEAR(std::abs(model.fixes[0].across->z()), 1, 1e-12);
+    EXPECT_EQ(model.rigid_motions.size(), 1U);
+    ASSERT_EQ(model.supports.size(), 2U);
+    EXPECT_DOUBLE_EQ(model.supports[0].stiffness, 2e-4);
+    EXPECT_FALSE(model.supports[0].normal_only);
+    EXPECT_EQ(model.supports[0].nodes.size(), 25U);
+    EXPECT_DOUBLE_EQ(model.supports[1].stiffness, 1e-3);
+    EXPECT_TRUE(model.supports[1].normal_only);
+    EXPECT_EQ(model.supports[1].nodes.size(), 15U);
+    EXPECT_EQ(std::get<PressureLoad>(model.loads[0].kind).nodes.size(), 15U);
+  }
+}
+
 TEST_F(SceneTest, aMeshWithoutNormalsIsFlatFacetsAndANoteSaysSo) {
   const LoadedScene loaded = load(basic());
   const ShellBody& body = loaded.model.shells.at(0);
@@ -463,8 +488,23 @@ const std::vector<Wrong> wrong_scenes{
     {"loadValueShort", load_with("kind = \"force\"\nwhere = {all = true}\nvalue = [\"1N\", \"1N\"]"),
      ":13:9: ", "three"},
     {"loadWhereMissing", load_with("kind = \"force\"\nvalue = [\"1N\", \"1N\", \"1N\"]"), ":9:1: ", "no 'where'"},
-    {"loadWhereOfPressure", load_with("kind = \"pressure\"\nwhere = {all = true}\nvalue = \"1kPa\""),
+    {"loadWhereOfArea", load_with("kind = \"area\"\nwhere = {all = true}\nvalue = [\"1Pa\", \"1Pa\", \"1Pa\"]"),
      ":12:9: ", "whole body"},
+    {"pressureOnNoTriangle", load_with("kind = \"pressure\"\nwhere = {nodes = [3]}\nvalue = \"1kPa\""),
+     ":12:9: ", "no triangle has all its nodes"},
+    {"slideWithTranslation",
+     basic("[[fix]]\nbody = \"plate\"\nwhere = {boundary = true}\nslide = true\ntranslation = \"x\"\n"),
+     ":13:15: ", "beside slide"},
+    {"slideOfNoRim", basic("[[fix]]\nbody = \"plate\"\nwhere = {nodes = [0, 1]}\nslide = true\n"),
+     ":11:9: ", "no rim has all its nodes"},
+    {"slideOfRigidMotions", basic("[[fix]]\nbody = \"plate\"\nwhere = {rigid_motions = true}\nslide = true\n"),
+     ":12:9: ", "rigid_motions"},
+    {"rigidMotionsAndMore", basic("[[fix]]\nbody = \"plate\"\nwhere = {rigid_motions = true}\n") + clamped,
+     ":11:9: ", "keep one of them"},
+    {"supportUnit", basic("[[support]]\nbody = \"plate\"\nstiffness = \"1kPa\"\n"), ":11:13: ", "1kPa/mm"},
+    {"supportNone", basic("[[support]]\nbody = \"plate\"\nstiffness = \"0N/m3\"\n"), ":11:13: ", "greater than zero"},
+    {"supportDirection", basic("[[support]]\nbody = \"plate\"\nstiffness = \"1N/m3\"\ndirection = \"normals\"\n"),
+     ":12:13: ", "did you mean 'normal'?"},
     {"loadWhereRigid", load_with("kind = \"force\"\nwhere = {rigid_motions = true}\nvalue = [\"1N\", \"1N\", \"1N\"]"),
      ":12:9: ", "select nodes"},
     {"loadFollowerOfForce",

@@ -238,6 +238,14 @@ TEST(NiftiTransform, NotFiniteOrSingularIsRefused) {
   options.sform = {2, 4, 0, 0, 1, 2, 0, 0, 0, 0, 1, 0};
   folder.file("v.nii", nifti_file(options));
   EXPECT_THAT(error_of(folder / "v.nii"), HasSubstr("singular"));
+  // Two axes, of 1 mm each, that are nearly one: what parts them is far above rounding.
+  for (const double apart : {1e-5, 1e-3, 9e-3}) {
+    options.sform = {1, 0, 0, 0, 0, 1, 1, 0, 0, 0, apart, 0};
+    folder.file("v.nii", nifti_file(options));
+    EXPECT_THAT(error_of(folder / "v.nii"), HasSubstr("sform is singular or nearly so")) << apart;
+  }
+  options.sform = {1, 0, 0, 0, 0, 1, 0.6, 0, 0, 0, 1, 0};  // a tilted gantry
+  EXPECT_NO_THROW(read_volume(folder.file("tilted.nii", nifti_file(options))));
 }
 
 TEST(NiftiTransform, AnSformThatCannotBeGivesWayToTheQform) {

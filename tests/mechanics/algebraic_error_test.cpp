@@ -48,7 +48,7 @@ struct Problem {
       free.push_back(!held);
     }
     Forces forces;
-    evaluate(system, model, reference_configuration(system), {1}, {}, forces, nullptr);
+    evaluate(system, reference_configuration(system), {1}, {}, forces, nullptr);
     right = forces.external;
     mask(free, right);
     DirectSolver solver(matrix, free);

@@ -124,7 +124,7 @@ TEST(Carried, RigidMotionsGiveNoForce) {
       ASSERT_LT((moved.displacement[i] - exact.displacement[i]).norm(), 1e-13) << i;
     }
     Forces forces;
-    evaluate(system, model, moved, load_factors(model, true, 1), {}, forces, nullptr);
+    evaluate(system, moved, load_factors(model, true, 1), {}, forces, nullptr);
     VectorX unbalanced = forces.external - forces.internal;
     condense(system, moved, unbalanced, nullptr);
     EXPECT_LT(force_norm(system, unbalanced), 1e-11);
@@ -185,7 +185,7 @@ TEST(Carried, TheCondensedTangentIsTheDerivativeOfTheCondensedForces) {
     }
     const auto left = [&](const Configuration& where, BlockMatrix* tangent) {
       Forces forces;
-      evaluate(system, model, where, load_factors(model, true, 1), {}, forces, tangent);
+      evaluate(system, where, load_factors(model, true, 1), {}, forces, tangent);
       EXPECT_TRUE(forces.valid);
       VectorX unbalanced = forces.external - forces.internal;
       condense(system, where, unbalanced, tangent);

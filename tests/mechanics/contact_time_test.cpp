@@ -105,6 +105,19 @@ TEST(ContactInTime, AWayThatTurnsWithinAStepIsFollowed) {
   EXPECT_EQ(seen(model, motion(4e-3, 2e-3)).moved, coarse.moved);
 }
 
+TEST(ContactInTime, WhatTouchesWithinAStepOnlyIsCounted) {
+  const auto pressed = [](double lowest) {
+    const Model model = plate_and_ball({{0, {0, 0, 2.6}}, {1e-3, {0, 0, lowest}}, {2e-3, {0, 0, 2.6}}}, 0);
+    std::size_t points = 0;
+    const Summary summary =
+        solve(model, motion(4e-3, 4e-3), [&](const State& state) { points += state.contacts[0].points; });
+    EXPECT_EQ(points, 0U);
+    return summary.contact_pressures.at(0);
+  };
+  EXPECT_GT(pressed(2.0), 0);
+  EXPECT_EQ(pressed(2.4), 0);
+}
+
 TEST(ContactInTime, APrescribedWayThatTurnsWithinAStepIsFollowed) {
   // The border of the plate goes down onto a ball at rest and back.
   for (const bool moves : {false, true}) {

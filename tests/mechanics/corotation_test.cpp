@@ -30,6 +30,16 @@ ShellElement some_element(Membrane membrane = Membrane::opt, Bending bending = B
   return element;
 }
 
+/// The same, under stress where it lies.
+ShellElement some_prestressed_element() {
+  ShellElement element = some_element();
+  Random random(9);
+  for (double& strain : element.prestrain) {
+    strain = random(0.1);
+  }
+  return element;
+}
+
 /// A large rigid motion and a deformation of some 20 %.
 CornerMotion large_motion(const ShellElement& element, Random& random) {
   const Mat3 turn = exponential(Vec3(0.9, -1.4, 0.8)).toRotationMatrix();
@@ -55,22 +65,24 @@ CornerMotion moved(const CornerMotion& motion, int freedom, double amount) {
 }
 
 TEST(Corotation, ForceIsTheGradientOfTheEnergy) {
-  Random random(7);
-  const ShellElement element = some_element();
-  const CornerMotion motion = large_motion(element, random);
-  ElementResponse response, plus, minus;
-  ASSERT_TRUE(corotational_response(element, motion, {}, response, nullptr));
-  constexpr double step = 1e-5;
-  for (int i = 0; i < 18; ++i) {
-    ASSERT_TRUE(corotational_response(element, moved(motion, i, step), {}, plus, nullptr));
-    ASSERT_TRUE(corotational_response(element, moved(motion, i, -step), {}, minus, nullptr));
-    EXPECT_NEAR(response.force[i], (plus.energy - minus.energy) / (2 * step), 1e-8 * response.force.norm()) << i;
+  for (const ShellElement& element : {some_element(), some_prestressed_element()}) {
+    Random random(7);
+    const CornerMotion motion = large_motion(element, random);
+    ElementResponse response, plus, minus;
+    ASSERT_TRUE(corotational_response(element, motion, {}, response, nullptr));
+    EXPECT_NEAR(response.energy, strain_energy(element, response.deformation), 1e-12 * std::abs(response.energy));
+    constexpr double step = 1e-5;
+    for (int i = 0; i < 18; ++i) {
+      ASSERT_TRUE(corotational_response(element, moved(motion, i, step), {}, plus, nullptr));
+      ASSERT_TRUE(corotational_response(element, moved(motion, i, -step), {}, minus, nullptr));
+      EXPECT_NEAR(response.force[i], (plus.energy - minus.energy) / (2 * step), 1e-8 * response.force.norm()) << i;
+    }
   }
 }
 
 TEST(Corotation, TangentIsTheGradientOfTheForce) {
   Random random(7);
-  const ShellElement element = some_element();
+  const ShellElement element = some_prestressed_element();
   const CornerMotion motion = large_motion(element, random);
   ElementResponse response, plus, minus;
   Matrix18 tangent;

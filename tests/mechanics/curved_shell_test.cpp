@@ -1,6 +1,7 @@
 // The shell's curvature in its membrane strain and under pressure: against flat facets, and against exact solutions.
 
 #include "benchmarks.hpp"
+#include "tunica/mechanics/runs/fields.hpp"
 
 #include <gtest/gtest.h>
 

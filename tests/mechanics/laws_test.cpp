@@ -3,6 +3,7 @@
 #include "benchmarks.hpp"
 #include "tunica/mechanics/elements/rotation.hpp"
 #include "tunica/mechanics/runs/detail/shell_system.hpp"
+#include "tunica/mechanics/runs/fields.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Eigenvalues>
@@ -92,7 +93,7 @@ TEST(Laws, RigidMotionOfAShellGivesNoForces) {
       configuration.rotation[i] = Eigen::Quaterniond(turn);
     }
     Forces forces;
-    evaluate(system, model, configuration, {}, {}, forces, nullptr);
+    evaluate(system, configuration, {}, {}, forces, nullptr);
     ASSERT_TRUE(forces.valid);
     // Against the forces of displacements as large that are not rigid.
     EXPECT_LT(force_norm(system, forces.internal), 1e-12 * system.translation_stiffness * 20);

@@ -104,7 +104,7 @@ Sample advanced(const Sample& s, const Vector18& step) {
 }
 
 template <typename Check>
-void for_all(const Check& check) {
+void for_all_samples(const Check& check) {
   RandomSample random;
   for (const Edges edges : all_edges) {
     SCOPED_TRACE("edges: " + std::to_string(static_cast<int>(edges)));
@@ -119,7 +119,7 @@ CubicPatch patch_at(const std::vector<Vec3>& x, const std::array<Vec3, 3>& norma
 }
 
 TEST(PatchMap, AtTheReferenceItIsTheWatertightPatch) {
-  for_all([](const Sample& s, RandomSample& random) {
+  for_all_samples([](const Sample& s, RandomSample& random) {
     const PatchMap map(s.face, s.reference, at_rest(3));
     const CubicPatch patch = patch_at(s.reference, s.face.normals, s.face.across);
     for (int i = 0; i < 9; ++i) {
@@ -134,7 +134,7 @@ TEST(PatchMap, AtTheReferenceItIsTheWatertightPatch) {
 
 /// Edge points follow the watertight rule with the normals that the nodes carry, wherever they have gone.
 TEST(PatchMap, MovedItHasTheEdgesOfTheWatertightPatchOfTheMovedNormals) {
-  for_all([](const Sample& s, RandomSample&) {
+  for_all_samples([](const Sample& s, RandomSample&) {
     const PatchMap map = map_of(s);
     std::vector<Vec3> x = s.reference;
     std::array<Vec3, 3> normals;
@@ -153,7 +153,7 @@ TEST(PatchMap, MovedItHasTheEdgesOfTheWatertightPatchOfTheMovedNormals) {
 }
 
 TEST(PatchMap, WeightDerivativesAreThoseOfTheWeights) {
-  for_all([](const Sample& s, RandomSample& random) {
+  for_all_samples([](const Sample& s, RandomSample& random) {
     const Vec2 b = random.barycentric();
     const auto derivatives = patch_weight_derivatives(s.face, b);
     for (int along = 0; along < 2; ++along) {
@@ -167,7 +167,7 @@ TEST(PatchMap, WeightDerivativesAreThoseOfTheWeights) {
 }
 
 TEST(PatchMap, ChangeIsTheDerivativeOfThePoints) {
-  for_all([](const Sample& s, RandomSample& random) {
+  for_all_samples([](const Sample& s, RandomSample& random) {
     constexpr double step = 1e-6;
     const PatchMap map = map_of(s);
     const PatchWeights weights = patch_weights(s.face, random.barycentric());
@@ -183,7 +183,7 @@ TEST(PatchMap, ChangeIsTheDerivativeOfThePoints) {
 }
 
 TEST(PatchMap, WorkIsTheSameOnBothSides) {
-  for_all([](const Sample& s, RandomSample& random) {
+  for_all_samples([](const Sample& s, RandomSample& random) {
     const PatchMap map = map_of(s);
     const Points forces = random.points(1);
     const Vector18 motion = Vector18::NullaryExpr([&](Eigen::Index) { return random(1); });
@@ -192,7 +192,7 @@ TEST(PatchMap, WorkIsTheSameOnBothSides) {
 }
 
 TEST(PatchMap, ForcesAndMomentsAreInBalance) {
-  for_all([](const Sample& s, RandomSample& random) {
+  for_all_samples([](const Sample& s, RandomSample& random) {
     const PatchMap map = map_of(s);
     const PatchWeights weights = patch_weights(s.face, random.barycentric());
     const Vec3 force = random.vector(1), point = map.point(weights);
@@ -210,7 +210,7 @@ TEST(PatchMap, ForcesAndMomentsAreInBalance) {
 
 /// For forces that the points' places change (of_points), and for the change of the map itself.
 TEST(PatchMap, StiffnessIsTheDerivativeOfTheForcesOnTheNodes) {
-  for_all([](const Sample& s, RandomSample& random) {
+  for_all_samples([](const Sample& s, RandomSample& random) {
     constexpr double step = 1e-5;
     const PatchMap map = map_of(s);
     const Matrix27 any = Matrix27::NullaryExpr([&](Eigen::Index, Eigen::Index) { return random(1); });
@@ -234,7 +234,7 @@ TEST(PatchMap, StiffnessIsTheDerivativeOfTheForcesOnTheNodes) {
 
 /// Spins do not commute: what is not symmetric is half the moments on the nodes, and nothing else.
 TEST(PatchMap, StiffnessIsSymmetricButForTheMoments) {
-  for_all([](const Sample& s, RandomSample& random) {
+  for_all_samples([](const Sample& s, RandomSample& random) {
     const PatchMap map = map_of(s);
     const Points forces = random.points(1);
     Matrix18 stiffness = map.stiffness(Matrix27::Zero(), forces);
@@ -247,7 +247,7 @@ TEST(PatchMap, StiffnessIsSymmetricButForTheMoments) {
 }
 
 TEST(PatchMap, RigidMotionsMoveAllPointsRigidly) {
-  for_all([](const Sample& s, RandomSample& random) {
+  for_all_samples([](const Sample& s, RandomSample& random) {
     const Eigen::Quaterniond turn = random.rotation(1.7);
     const Vec3 shift = random.vector(5);
     Sample moved = s;

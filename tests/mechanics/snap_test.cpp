@@ -73,11 +73,8 @@ TEST_P(OpenCylinder, IsPulledOutWhateverTheSteps) {
   EXPECT_NEAR(-outcome.state.displacement[grid.node(24, 16)].x(), 3.269, 0.03 * 3.269);
 }
 
-class PinchedCylinder : public testing::TestWithParam<std::size_t> {};
-INSTANTIATE_TEST_SUITE_P(Snap, PinchedCylinder, testing::Values(16, 32));
-
-TEST_P(PinchedCylinder, WithDiaphragmsCarriesTheWholeLoad) {
-  const std::size_t n = GetParam();
+TEST(Snap, PinchedCylinderWithDiaphragmsCarriesTheWholeLoad) {
+  constexpr std::size_t n = 16;
   Grid grid;
   Model model = quarter_cylinder(n, n, 100, 100, 30e3, 0.3, 1, grid);
   hold(

@@ -66,7 +66,11 @@ void for_all(const Check& check) {
 
 TEST(SolidElement, ForcesAreTheDerivativeOfTheEnergyAndTheTangentThatOfTheForces) {
   constexpr double step = 1e-5;
-  for_all([&](const SolidElement& element, const Corners4& corners, Random& random) {
+  for_all([&](SolidElement element, const Corners4& corners, Random& random) {
+    for (int k = 0; k < 3; ++k) {
+      element.prestress.col(k) = random.vector(0.1);
+    }
+    element.prestress = symmetric_part(element.prestress);
     const SolidMotion motion = random_motion(random, corners, 0.12);
     SolidResponse response, before, after;
     Matrix16 tangent;
@@ -216,6 +220,23 @@ TEST(SolidElement, BothLawsAreLinearElasticityAtSmallStrains) {
 }
 
 /// Tunica's unit of pressures is the shear modulus: a stiffer material moves alike.
+/// The forces of a tetrahedron say its nominal stress P, that with F the true one: P F' / det F.
+TEST(SolidElement, StressIsCauchys) {
+  for_all([&](SolidElement element, const Corners4& corners, Random& random) {
+    element.prestress = 0.1 * Mat3::Identity();
+    const SolidMotion motion = random_motion(random, corners, 0.12);
+    SolidResponse response;
+    ASSERT_TRUE(solid_response(element, motion, response, nullptr));
+    Mat3 nominal = Mat3::Zero();
+    for (int k = 0; k < 4; ++k) {
+      nominal += response.force.segment<3>(4 * k) * corners.col(k).transpose() / element.volume;
+    }
+    const Mat3 f = Mat3::Identity() + motion.displacement * element.gradients.transpose();
+    const Mat3 expected = nominal * f.transpose() / f.determinant();
+    ASSERT_LT((solid_stress(element, motion, false) - expected).norm(), 1e-9 * (1 + expected.norm()));
+  });
+}
+
 TEST(SolidElement, ForcesAreProportionalToYoungsModulus) {
   Random random(11);
   const Corners4 corners = random_corners(random);

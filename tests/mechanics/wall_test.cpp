@@ -2,6 +2,7 @@
 
 #include "tunica/mechanics/model/wall.hpp"
 #include "benchmarks.hpp"
+#include "tunica/mechanics/runs/fields.hpp"
 
 #include <gtest/gtest.h>
 
@@ -32,19 +33,6 @@ TEST(Wall, QuantileOfALinearFieldIsExact) {
     }
     EXPECT_NEAR(area_quantile(model, sum, 0.8), std::sqrt(2 * 0.2), 1e-9);
   }
-}
-
-TEST(Wall, MeansStayWithinTheirBody) {
-  Model model = square(2);
-  model.shells.push_back(model.shells[0]);
-  std::vector<double> values(model.shells[0].mesh.triangles.size(), 1);
-  values.resize(2 * values.size(), 5);
-  const std::vector<double> at_nodes = averaged_at_nodes(model, values);
-  ASSERT_EQ(at_nodes.size(), 18U);
-  for (std::size_t i = 0; i < at_nodes.size(); ++i) {
-    EXPECT_NEAR(at_nodes[i], i < 9 ? 1 : 5, 1e-12);
-  }
-  EXPECT_EQ(area_quantile(model, at_nodes, 0.01), 5);
 }
 
 /// A strip of one cell between two hinges, bent by equal moments at its ends: w = M L^2 / (8 E I) half way.

@@ -145,7 +145,7 @@ class Chroot(unittest.TestCase):
 
     def test_the_whole_pipeline_without_the_repository(self):
         self.inside("cd ~ && tunica-batch VOLUMES=/usr/share/doc/tunica/examples/aneurysm.nii.gz LABELS=1 SHELLS=200 OPEN=1"
-                    " PRESSURE=1kPa YOUNG=1MPa POISSON=0.45 THICKNESS=1.5mm FIX=boundary OUT=batch")
+                    " IMAGED_AT=0kPa PRESSURE=1kPa YOUNG=1MPa POISSON=0.45 THICKNESS=1.5mm FIX=boundary OUT=batch")
         self.assertEqual(json.loads((self.root / "root/batch/aneurysm/1/simulate.json").read_text())["ok"], True)
         self.assertIn("</html>", (self.root / "root/batch/report.html").read_text()[-100:])
 

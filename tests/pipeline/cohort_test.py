@@ -49,11 +49,11 @@ class Table(WithStubs):
         extract, decimate, _, simulate, extract2, decimate2, _, simulate2 = self.calls()
         self.assertIn(f"{self.table.parent / 'a.nii.gz'} {self.out / 'p1' / 'aorta'}/surface.ply", extract)
         self.assertIn("--label aorta --smooth staircase", extract)
-        self.assertIn("--triangles 800", decimate)
+        self.assertIn("--triangles 190", decimate)
         self.assertIn("--pressure 2kPa --young 1MPa --poisson 0.45 --thickness 1.5mm", simulate)
         self.assertIn("--label left atrium", extract2)
         self.assertIn("--triangles 400", decimate2)
-        self.assertIn("--fix below z=-1mm --pressure 1kPa --young 1MPa --poisson 0.45 --thickness 3mm", simulate2)
+        self.assertIn("--fix below z=-1mm --imaged-at 0kPa --pressure 1kPa --young 1MPa --poisson 0.45 --thickness 3mm", simulate2)
         planned = self.run_table("-n", "-k", SMOOTH="none", RUN="env M=$(MEM)", **LOAD).stdout
         self.assertIn("env M=4000 ", planned)
         self.assertIn("env M=900 ", planned)
@@ -61,7 +61,7 @@ class Table(WithStubs):
     def test_the_table_alone(self):
         self.write("volume\tlabel\t" + WALL, "a.nii.gz\t1\t1kPa\t1MPa\t0.45\t1mm",
                    "b.seg.nrrd\t7\t2kPa\t2MPa\t0.3\t2mm")
-        self.assertEqual(self.run_table().returncode, 0)
+        self.assertEqual(self.run_table(IMAGED_AT="0kPa").returncode, 0)
         self.assertEqual(self.done_cases(), ["a/1", "b/7"])
 
     def test_as_spreadsheets_save_it(self):
@@ -117,7 +117,7 @@ class Table(WithStubs):
 
     def test_what_is_missing_is_named_by_line_and_case(self):
         stderr = self.complaints("case\tvolume\tlabel\tpressure\tthickness", "p1\ta.nii.gz\t1\t1kPa\t",
-                                 "p2\tb.seg.nrrd\t\t\t1mm", "p3\t\t1\t1kPa\t1mm", YOUNG="1MPa", POISSON="0.45")
+                                 "p2\tb.seg.nrrd\t\t\t1mm", "p3\t\t1\t1kPa\t1mm", IMAGED_AT="0kPa", YOUNG="1MPa", POISSON="0.45")
         self.assertIn(f"pipeline: {self.table}:2: p1: thickness not given: fill the cell, or give THICKNESS to make", stderr)
         self.assertIn(f"pipeline: {self.table}:3: p2: label not given", stderr)
         self.assertIn(f"pipeline: {self.table}:3: p2: pressure not given", stderr)
@@ -127,10 +127,8 @@ class Table(WithStubs):
         self.assertIn(":3: b: kind: 'slow' is not understood: static or dynamic", stderr)
         stderr = self.complaints("volume\tlabel\tmid_surface", "a.nii.gz\t1\tinner", ACCURACY="2%", **LOAD)
         self.assertIn(":2: a: accuracy refits the shells to the face", stderr)
-        stderr = self.complaints("volume\tlabel\timaged_at", "a.nii.gz\t1\t1kPa", ACCURACY="2%", **LOAD)
-        self.assertIn(":2: a: accuracy loads the shells as imaged", stderr)
         many = self.complaints("volume\tlabel", *(f"{i}.nii\t1" for i in range(30)))
-        self.assertEqual(many.count("pressure, young, poisson, thickness not given"), 20)
+        self.assertEqual(many.count("imaged_at, poisson, thickness not given"), 20)
         self.assertIn("and 10 problems more", many)
 
     def test_columns_that_are_not_known(self):
@@ -138,7 +136,10 @@ class Table(WithStubs):
                              ("volume\tlabel\tage of patient", "'age of patient': known are case, volume, label"),
                              ("volume\tlabel\tthreads", "threads is the same for a whole run: give THREADS to make"),
                              ("volume\tlabel\tLabel", "the column label is there twice"),
-                             ("volume\tlabel\t\tfix", "no such column: ''")):
+                             ("volume\tlabel\t\tfix", "no such column: ''"),
+                             ("index\tname", "is a table of label names, not of cases: give it as NAMES"),
+                             ("index name", "is a table of label names, not of cases: give it as NAMES"),
+                             ("name\tlabel", "no such column: 'name': did you mean names?")):
             self.assertIn(words, self.complaints(heads, "a.nii.gz\t1\t\t", **LOAD), heads)
 
     def test_lines_that_cannot_be_meant(self):
@@ -250,7 +251,7 @@ class WholeCohort(Pipeline):
     """The real tools on phantoms, with broken cases among them."""
 
     def run_cohort(self):
-        self.done = self.make("-j2", "-k", CASES=self.folder / "cases.tsv", SHELLS=60, THREADS=1, **cohort.WALL)
+        self.done = self.make("-j2", "-k", CASES=self.folder / "cases.tsv", SHELLS=60, THREADS=1, RELAX="--max-iterations 1", **cohort.WALL)
         self.assertNotIn("Traceback", self.done.stderr)
         with open(self.out / "summary.tsv", newline="") as file:
             return list(csv.DictReader(file, delimiter="\t", quoting=csv.QUOTE_NONE))

@@ -12,7 +12,7 @@ import unittest
 import cohort
 from pipeline_test import SOURCE, STAGES, TOOLS
 
-WALL = ("young=1MPa", "poisson=0.45")
+WALL = ("poisson=0.45",)
 
 
 @unittest.skipUnless(shutil.which("snakemake"), "Snakemake is not installed")
@@ -24,7 +24,7 @@ class Snakefile(unittest.TestCase):
         for name in ("my organ", "other"):
             cohort.phantom(TOOLS, self.folder / f"{name}.nii.gz", "sphere", 16, 0, 1)
         (self.folder / "my organ.tsv").write_text("index\tname\n1\tthe organ\n")
-        (self.folder / "cases.tsv").write_text("case\tvolume\tlabel\tpressure\tthickness\n"
+        (self.folder / "cases.tsv").write_text("case\tvolume\tlabel\timaged_at\tthickness\n"
                                                "p1\tmy organ.nii.gz\tthe organ\t0.2kPa\t1.5mm\np2\tother.nii.gz\t1\t1kPa\t1mm\n")
 
     def snakemake(self, *words):

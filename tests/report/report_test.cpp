@@ -205,8 +205,10 @@ DrawnResult sphere() {
   result.states[1].load_factor = 1;
   for (const Vec3& p : result.reference.vertices) {
     result.states[0].displacement.emplace_back(Vec3::Zero());
+    result.states[0].membrane.push_back(0);
     result.states[0].von_mises.push_back(0);
     result.states[1].displacement.emplace_back(0.1 * p);
+    result.states[1].membrane.push_back(2 + p.z());
     result.states[1].von_mises.push_back(1 + p.z());
   }
   return result;
@@ -218,6 +220,7 @@ void expect_the_same_field(const DrawnShells& drawn, double tolerance) {
   for (std::size_t v = 0; v < drawn.mesh.vertices.size(); ++v) {
     const Vec3& p = drawn.mesh.vertices[v];
     EXPECT_LT((drawn.states[1].displacement[v] - 0.1 * p).norm(), tolerance);
+    EXPECT_NEAR(drawn.states[1].membrane[v], 2 + p.z(), 10 * tolerance);
     EXPECT_NEAR(drawn.states[1].von_mises[v], 1 + p.z(), 10 * tolerance);
   }
 }

@@ -7,7 +7,7 @@ import struct
 import subprocess
 
 SHAPES = ("sphere", "tube", "aneurysm", "capsule", "bladder", "colon")
-WALL = {"YOUNG": "1MPa", "POISSON": "0.45"}
+WALL = {"IMAGED_AT": "0kPa", "YOUNG": "1MPa", "POISSON": "0.45"}
 COLUMNS = ("case", "volume", "label", "pressure", "thickness", "open", "fix", "tolerance")
 
 # Per broken case the stage that ends it, its exit code, and words of the message.

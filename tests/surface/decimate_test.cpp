@@ -252,7 +252,7 @@ TEST(Decimate, TrianglesWithoutAreaInTheInputAreNoObstacle) {
 }
 
 TEST(Decimate, ACountOutOfReachDoesNotWorsenWhatAnErrorAllows) {
-  const TriangleMesh mesh = shapes::torus(100, 50);
+  const TriangleMesh mesh = shapes::torus(60, 30);
   DecimateOptions options;
   options.max_error = 2e-4 * diagonal(mesh);
   const std::size_t fewest = decimate(mesh, options).mesh.triangles.size();

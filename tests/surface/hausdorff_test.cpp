@@ -157,8 +157,8 @@ TEST(Hausdorff, NeverBelowTheTruthOnTriangleSoup) {
 
 TEST(Hausdorff, NeverBelowTheTruthOnCoarseAgainstFine) {
   // Large triangles over many small ones, on rough, folded, open and touching surfaces.
-  const TriangleMesh fine = shapes::sphere(5);
-  const TriangleMesh strip = shapes::tube(90, 60, 1, 4);
+  const TriangleMesh fine = shapes::sphere(4);
+  const TriangleMesh strip = shapes::tube(60, 40, 1, 4);
   std::vector<std::pair<TriangleMesh, TriangleMesh>> pairs;
   for (const double roughness : {0.001, 0.01, 0.05, 0.3}) {
     pairs.emplace_back(shapes::sphere(2), shapes::shaken(fine, roughness, 3));

@@ -48,12 +48,12 @@ TEST(Seams, ThereAreNoneWhereNothingCoincides) {
     EXPECT_EQ(find_seams(mesh).edges, 0U);
     EXPECT_EQ(without_seams(mesh).mesh.triangles, mesh.triangles);
   }
-  // A slit wider than a rounding is a slit.
-  EXPECT_EQ(find_seams(glued_sphere(10, 1e-3)).edges, 0U);
+  // A slit wider than a hundredth of its edges is a slit.
+  EXPECT_EQ(find_seams(glued_sphere(10, 0.1)).edges, 0U);
 }
 
 TEST(Seams, GluedHalvesAreFoundAndJoined) {
-  for (const double moved : {0.0, 1e-6, 1e-5}) {
+  for (const double moved : {0.0, 1e-6, 1e-3}) {
     for (const bool turned : {false, true}) {
       const TriangleMesh mesh = glued_sphere(10, moved, turned);
       const Seams seams = find_seams(mesh);
@@ -70,13 +70,6 @@ TEST(Seams, GluedHalvesAreFoundAndJoined) {
       EXPECT_NEAR(std::abs(signed_volume(whole.mesh)), signed_volume(shapes::sphere(3, 10)), 0.1);
     }
   }
-}
-
-TEST(Seams, FarFromTheOriginRoundingIsCoarser) {
-  TriangleMesh mesh = glued_sphere(10, 5e-4);
-  EXPECT_EQ(find_seams(mesh).edges, 0U);
-  mesh = shapes::moved(mesh, Vec3(500, 0, 0));
-  EXPECT_EQ(find_seams(mesh).edges, examine(mesh).boundary_edges);
 }
 
 TEST(Seams, TJunctionsAreFoundAndTheirLongEdgesSplit) {

@@ -25,13 +25,13 @@ void expect_same_topology(const TriangleMesh& before, const TriangleMesh& after)
 
 TEST(Shaping, GoodTrianglesForALittleErrorOnSmoothSurfaces) {
   const TriangleMesh waves = [] {
-    TriangleMesh mesh = shapes::sphere(5, 10);
+    TriangleMesh mesh = shapes::sphere(4, 10);
     for (Vec3& v : mesh.vertices) {
       v *= 1 + 0.08 * std::sin(0.6 * v.x()) * std::cos(0.5 * v.y() + 0.4 * v.z());
     }
     return mesh;
   }();
-  for (const TriangleMesh& mesh : {shapes::sphere(5), shapes::torus(120, 60), shapes::tube(80, 60), waves}) {
+  for (const TriangleMesh& mesh : {shapes::sphere(4), shapes::torus(80, 40), shapes::tube(60, 40), waves}) {
     for (const std::size_t count : {std::size_t{900}, std::size_t{250}}) {
       const DecimateResult good = decimated_to(mesh, count, 20);
       EXPECT_TRUE(good.angle_held && good.count_reached);
@@ -84,7 +84,7 @@ TEST(Shaping, BoundaryVerticesStayOnTheBoundaryCurve) {
 
 /// An open vessel along an arch, wide at one end and narrow at the other, its section uneven.
 TriangleMesh arch() {
-  TriangleMesh mesh = shapes::tube(120, 233, 1, 1);
+  TriangleMesh mesh = shapes::tube(72, 140, 1, 1);
   for (Vec3& p : mesh.vertices) {
     const double s = p.z();
     const double bend = std::numbers::pi * s;
@@ -187,7 +187,7 @@ TEST(Shaping, EdgesOfABoxStaySharp) {
 }
 
 TEST(Shaping, AngleAndErrorTogether) {
-  const TriangleMesh mesh = shapes::torus(80, 40);
+  const TriangleMesh mesh = shapes::torus(60, 30);
   DecimateOptions options;
   options.min_angle = 20;
   options.max_error = 0.01 * diagonal(mesh);
@@ -318,7 +318,7 @@ TEST(Shaping, AMeshThatHoldsTheAngleIsTheLastResortForAnError) {
 
 TEST(Shaping, WhereTheAngleIsOutOfReachTheBestWithinTheErrorComesBack) {
   // A lens whose rim is thinner than any triangle that the error allows.
-  TriangleMesh lens = shapes::sphere(4);
+  TriangleMesh lens = shapes::sphere(3);
   for (Vec3& p : lens.vertices) {
     p.z() *= 0.025;
   }

@@ -145,6 +145,14 @@ class WholeNumbers(Kinds):
             self.refuse(3, path, self.out, "--label", label, saying="cannot be told from its neighbours")
             self.refuse(3, path, self.folder / "{label}.ply", "--all-labels", saying=["v.nii.gz", "cannot be told apart"])
 
+    def test_of_floats_beyond_2_to_53_are_no_labels(self):
+        for kind, label in ((numpy.float64, 2.0 ** 53 + 2), (numpy.float32, 1e17)):
+            path = self.nifti((ball() * label).astype(kind))
+            self.refuse(3, path, self.folder / "{label}.ply", "--all-labels", saying=["is a grey volume"])
+            self.run_tool(path, "--info")
+            self.assertIn("a grey volume", self.stdout)
+        self.run_tool(self.nifti(ball() * 2.0 ** 53), self.folder / "{label}.ply", "--all-labels")
+
 
 class Headers(Kinds):
     def test_an_sform_of_zeros_gives_way_to_the_qform(self):

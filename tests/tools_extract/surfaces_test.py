@@ -149,7 +149,7 @@ class Surfaces(unittest.TestCase):
         with h5py.File(self.folder / "r.hdf") as file:
             vtk = file["VTKHDF"]
             moved = vtk["Points"][()] + vtk["PointData/displacement"][()]
-            stress = vtk["PointData/von_mises"][()]
+            stress = vtk["PointData/membrane_stress"][()]
             corners = vtk["Connectivity"][()].reshape(-1, 3)
         np.testing.assert_allclose(1000 * positions[triangles], moved[corners], rtol=1e-6, atol=1e-5)
         vertices, faces, _, made_by = read_3mf(self.folder / "r.3mf")
@@ -158,7 +158,7 @@ class Surfaces(unittest.TestCase):
         self.assertEqual((self.folder / "r.stl").stat().st_size, 84 + 50 * len(corners))
         lines = (self.folder / "r.obj").read_text(encoding="utf-8").splitlines()
         self.assertTrue(all(len(line.split()) == 7 for line in lines if line.startswith("v ")))  # colours, too
-        # The palette grows darker, and the largest stress is its end: violet.
+        # The palette grows darker, and the largest membrane stress is its end: violet.
         green = colours[triangles][..., 1].ravel()
         self.assertLess(np.corrcoef(green, stress[corners].ravel())[0, 1], -0.9)
         red, green, blue = colours[triangles].reshape(-1, colours.shape[1])[stress[corners].argmax(), :3]

@@ -109,9 +109,23 @@ class Walls(Warnings):
         i, j, k = grid()
         r = numpy.hypot(i - 19.5, j - 19.5)
         volume = self.nifti(((r < 14) & (r >= 12) & (k > 5) & (k < 40)).astype(numpy.uint8))
-        self.warned(volume, self.out, "--label", 1, of="wall with two faces", saying=["open end or a hole within the image"])
+        self.warned(volume, self.out, "--label", 1, of="wall with two faces", saying=["it may be a wall", "at an end", "(-19.5, -19.5, "])
         self.out.unlink()
         self.refuse(3, volume, self.out, "--label", 1, "--face", "inner", saying=["no wall around a hollow", "crop"])
+
+    def test_that_are_open_along_a_slit_are_said_until_it_is_closed(self):
+        i, j, _ = grid()
+        r = numpy.hypot(i - 19.5, j - 19.5)
+        tube = (r < 15) & (r >= 12)
+        for slit in (1, 3, 10):
+            volume = self.nifti((tube & ~((numpy.abs(j - 19.5) < slit) & (i > 19))).astype(numpy.uint8))
+            for flags in ([], ["--largest", "--open-border", "--smooth", "staircase"]):
+                report, _ = self.run_tool(volume, self.out, "--label", 1, *flags)
+                self.assertEqual(report["warning_kinds"][0], "wall with two faces", (slit, flags))
+                self.assertIn("may be a wall with two faces that is open along a slit", report["warnings"][0])
+            self.out.unlink()
+            self.refuse(3, volume, self.out, "--label", 1, "--face", "inner", saying=["no wall around a hollow", "slit"])
+        self.warned(self.nifti(tube.astype(numpy.uint8)), self.out, "--label", 1, "--open-border", "--face", "inner")
 
     def test_flags(self):
         volume = self.tube()

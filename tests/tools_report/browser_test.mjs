@@ -22,8 +22,9 @@ await page.goto(pathToFileURL(file).href);
 
 // The table sorts by a number, down and up, and filters.
 if (await page.locator("table.sortable").count() > 0) {
-  const head = page.locator("table.sortable th", { hasText: "Stress p99" });
-  const column = () => page.$$eval("table.sortable tbody tr:not([hidden])", (rows) => rows.map((row) => row.cells[7].dataset.value));
+  const head = page.locator("table.sortable th", { hasText: /^Stress p99/ });
+  const at = await head.evaluate((cell) => cell.cellIndex);
+  const column = () => page.$$eval("table.sortable tbody tr:not([hidden])", (rows, i) => rows.map((row) => row.cells[i].dataset.value), at);
   seen.rows = await column();
   await head.getByRole("button").click();
   seen.ascending = [await head.getAttribute("aria-sort"), await column()];

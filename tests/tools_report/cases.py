@@ -1,11 +1,14 @@
 """Results as Makefile.pipeline leaves them, of a small phantom, and cohorts made from copies of it."""
 
+import atexit
+import functools
 import hashlib
 import json
 import os
 import pathlib
 import shutil
 import subprocess
+import tempfile
 
 import contact_scenes
 import numpy as np
@@ -21,19 +24,30 @@ def run(verb, *words, code=0):
     return done
 
 
-def make_case(folder, shape="aneurysm", pressure="1kPa", solve=()):
-    """Runs the four stages on a phantom into folder/shape/1. @param solve  further words of the last. @return that folder"""
+@functools.cache
+def shells_of(shape):
+    """Runs the first three stages on a phantom, once for all cases of a program. @return their folder"""
+    folder = pathlib.Path(tempfile.mkdtemp(prefix="tunica-cases-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
     volume, case = folder / f"{shape}.nii.gz", folder / "out" / shape / "1"
     case.mkdir(parents=True)
     run("phantom", shape, volume, "--size", 24, "--spacing", 2)
-    surface, coarse, shell, result = (case / name for name in ("surface.ply", "coarse.ply", "shell.ply", "result.hdf"))
-    load = ["--pressure", pressure, "--young", "1MPa", "--poisson", "0.45", "--thickness", "1.5mm", "--density",
-            "1100kg/m3", "--fix", "rigid-motions" if shape == "sphere" else "boundary", "--static", *solve]
+    surface, coarse, shell = (case / name for name in ("surface.ply", "coarse.ply", "shell.ply"))
     open_border = [] if shape == "sphere" else ["--open-border"]
     for stage, words in (("extract", [volume, surface, "--label", 1, "--smooth", "staircase", *open_border]),
-                         ("decimate", [surface, coarse, "--triangles", 200]), ("relax", [coarse, surface, shell]),
-                         ("simulate", [shell, result, *load])):
+                         ("decimate", [surface, coarse, "--triangles", 200]),
+                         ("relax", [coarse, surface, shell, "--max-iterations", 2])):
         run(stage, *words, "--report", case / f"{stage}.json", "--quiet")
+    return case
+
+
+def make_case(folder, shape="aneurysm", pressure="1kPa", solve=()):
+    """The four stages on a phantom in folder/shape/1. @param solve  further words of the last. @return that folder"""
+    case = folder / "out" / shape / "1"
+    shutil.copytree(shells_of(shape), case)
+    load = ["--pressure", pressure, "--young", "1MPa", "--poisson", "0.45", "--thickness", "1.5mm", "--density",
+            "1100kg/m3", "--fix", "rigid-motions" if shape == "sphere" else "boundary", "--static", *solve]
+    run("simulate", case / "shell.ply", case / "result.hdf", *load, "--report", case / "simulate.json", "--quiet")
     return case
 
 

@@ -110,7 +110,29 @@ class BadScenes(SimulateTest):
         self.write("scene.toml", RUN + shell() + ball(5) + contact("plate", "ball", 'name = "c"\n') +
                    "[[load]]\nbody = \"plate\"\nkind = \"pressure\"\nvalue = \"-1Pa\"\n")
         self.run_tool("--scene", "scene.toml", "out.hdf")
-        self.assertIn("c: nothing touches at the end of any step", self.done.stderr)
+        self.assertIn("c: nothing touches in any step: do these", self.done.stderr)
+
+    def test_a_body_that_meets_another_within_a_step_only(self):
+        ramp = 'radius = [["0s", "1mm"], ["1ms", "3.1mm"], ["2ms", "1mm"]]'
+        self.write("scene.toml", '[run]\nkind = "dynamic"\nduration = "12ms"\nstep = "4ms"\n' +
+                   shell().replace("poisson = 0.3", 'poisson = 0.3\ndensity = "1100kg/m3"') +
+                   ball(3).replace('radius = "1mm"', ramp) + contact("plate", "ball", 'name = "c"\n'))
+        report = self.run_tool("--scene", "scene.toml", "out.hdf")
+        self.assertEqual(set(report["result"]["contacts"]["c"]["points"]), {0})
+        self.assertNotIn("nothing touches", self.done.stderr)
+        self.assertIn("note: scene.toml: c: touches within steps only", self.done.stderr)
+
+    def test_pieces_of_a_solid_that_overlap(self):
+        whole, tetrahedra = block(3, np.array([4.0, 4.0, 4.0]), np.array([3.0, 3.0, -2.0]))
+        for at, code in ((4.5, 3), (6.7, 3), (7.5, 0)):  # wholly inside, in part, beside it
+            points, more = block(2, np.array([1.0, 1.0, 1.0]), np.array([at, 4.5, -0.5]))
+            write_vtk(self.path("two.vtk"), np.concatenate([whole, points]), np.concatenate([tetrahedra, more + len(whole)]))
+            scene = RUN + solid("two.vtk") + contact("cube", "cube")
+            with self.subTest(at=at):
+                if code:
+                    self.named(scene, "cube and cube overlap by ", place="[[contact]]")
+                else:
+                    self.noted(scene)
 
     def test_a_body_that_crosses_itself(self):
         points, triangles, normals = sphere(1, 2)

@@ -22,7 +22,8 @@ RESULT_KEYS = ["shells", "tetrahedra", "nodes", "dof", "steps", "step_parts", "c
                "volume_after_mm3", "strain_energy_mj", "residual", "algebraic_error_percent",
                "algebraic_error_is_lower_bound", "newton_iterations",
                "cg_iterations", "ms_per_step", "real_time_factor", "probes", "frequencies_hz", "buckling_factors",
-               "limit_load_factors", "branch_load_factors", "snaps", "energy", "short_waves_stiffened_from"]
+               "limit_load_factors", "branch_load_factors", "snaps", "energy", "estimates",
+               "short_waves_stiffened_from"]
 
 
 class Flags(SimulateTest):

@@ -68,7 +68,7 @@ class Picture(SimulateTest):
     def test_magnified_displacements_are_drawn_larger(self):
         write_ply(self.path("strip.ply"), *grid(20, 2, 10, 1))
         arguments = ["strip.ply", "out.hdf", "--young", "100MPa", "--poisson", "0.3", "--thickness", "0.1mm",
-                     "--pressure", "2Pa", "--fix", "below x=0mm", "--static", "--picture", "out.png", "--force"]
+                     "--pressure", "2Pa", "--fix", "below x=0mm", "--static", "--picture", "out.png", "--colour", "stress", "--force"]
         slopes = []
         # The first view: from above with the second one below it, from the side with the second one beside it.
         for factor, view in (("1", (slice(180, 450), slice(60, 1290))), ("20", (slice(180, 760), slice(60, 660)))):

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""`--imaged-at`: the shape that an organ has without the pressure under which it was imaged."""
+"""`--imaged-at` with `--unloaded`: the shape that an organ has without the pressure under which it was imaged."""
 import json
 import math
 import os
@@ -26,7 +26,7 @@ def read_shells(path):
 class Unloaded(SimulateTest):
     def imaged(self, mesh, pressure, *more, expect=0):
         return self.run_tool(mesh, "out.hdf", *WALL, "--pressure", f"{pressure!r}MPa", "--imaged-at", f"{pressure!r}MPa",
-                             "--force", *more, expect=expect)
+                             "--unloaded", "unloaded.ply", "--force", *more, expect=expect)
 
     def test_a_sphere_shrinks_by_its_formula(self):
         """p R0 / (E t) = 2 / (1 - nu) e / (1 + e)^2, R = (1 + e) R0: a linear law in engineering strains. By a third, too."""
@@ -40,6 +40,8 @@ class Unloaded(SimulateTest):
                 self.assertAlmostEqual(unloaded / (radius * (1 - part)), 1, delta=1e-3)
                 self.assertAlmostEqual(report["volume_after_mm3"] / (4 / 3 * math.pi * radius**3), 1, delta=3e-3)
                 self.assertLess(report["unloaded"]["distance_mm"]["mean"], 1e-3 * part * radius)
+                for shape in ("image", "unloaded"):
+                    self.assertGreater(report["unloaded"]["roundness"][shape], 0.98)
 
     def test_a_tube_shrinks_by_its_formula(self):
         """Plane strain: R / R0 - 1 = p R (1 - nu^2) / (E t). A quarter; nothing moves along the axis."""
@@ -126,14 +128,28 @@ class Unloaded(SimulateTest):
         used, upper = np.unique(upper, return_inverse=True)
         write_ply(self.path("image.ply"), points[used], upper.reshape(-1, 3), normals[used])
         self.run_tool("image.ply", "out.hdf", *WALL, "--pressure", "0MPa", "--imaged-at", "1kPa", "--thickness", "0.2mm", "--fix",
-                      "rigid-motions", expect=3)
+                      "rigid-motions", "--unloaded", "unloaded.ply", expect=3)
         self.assertIn("hold it by a", self.done.stderr)
+
+    def test_an_oval_that_flattens_is_doubted(self):
+        """An oval ball becomes flatter without its pressure: a section loses more than half of its roundness."""
+        vertices, triangles, normals = sphere(3, 10)
+        flat = np.array([1.6, 1.2, 0.45])
+        normals = np.array(normals) / flat
+        write_ply(self.path("image.ply"), vertices * flat, triangles, normals / np.linalg.norm(normals, axis=1)[:, None])
+        wall = ("--thickness", "1mm", "--fix", "rigid-motions")
+        for pressure, is_doubtful in ((5e-4, False), (1.04e-3, True)):
+            report = self.imaged("image.ply", pressure, *wall)
+            rounded = report["result"]["unloaded"]["roundness"]
+            self.assertLess(rounded["unloaded"], rounded["image"])
+            self.assertEqual(rounded["unloaded"] < 0.5 * rounded["image"], is_doubtful, rounded)
+            self.assertEqual("unloaded shape is doubtful" in " ".join(report["warnings"]), is_doubtful)
 
     def test_unloading_alone(self):
         write_ply(self.path("image.ply"), *sphere(2, 10))
         pressure = 0.1 * 2 * YOUNG * 0.2 / (10 * (1 - POISSON))
         report = self.run_tool("image.ply", "out.hdf", *WALL, "--pressure", "0MPa", "--imaged-at", f"{pressure!r}MPa", "--thickness",
-                               "0.2mm", "--fix", "rigid-motions")
+                               "0.2mm", "--fix", "rigid-motions", "--unloaded", "unloaded.ply")
         self.assertNotIn("nothing loads the model", " ".join(report["warnings"]))
         result = report["result"]
         self.assertAlmostEqual(result["volume_after_mm3"] / result["unloaded"]["volume_mm3"], 1, delta=1e-6)
@@ -179,8 +195,8 @@ class Unloaded(SimulateTest):
         self.assertIn("--unloaded belongs to --imaged-at", self.done.stderr)
         self.run_tool("image.ply", "out.hdf", *WALL, *held, "--imaged-at", "5", expect=2)
         self.run_tool("image.ply", "out.hdf", *WALL, *held, "--imaged-at", "1kPa", "--accuracy", "5%", "--target", "image.ply",
-                      expect=2)
-        self.assertIn("imaged_at and an accuracy", self.done.stderr)
+                      "--unloaded", "u.ply", expect=2)
+        self.assertIn("an unloaded shape and an accuracy", self.done.stderr)
         self.write("scene.toml", run_lines(kind="static") + shell("image.ply", 0.2, YOUNG, POISSON) +
                    load("gravity", [0.0, 0.0, -1.0], "m/s2", more='imaged_at = "1kPa"\n'))
         self.run_tool("--scene", "scene.toml", "out.hdf", expect=3)

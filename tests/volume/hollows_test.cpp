@@ -4,11 +4,13 @@
 #include "tunica/core/error.hpp"
 #include "tunica/volume/cubes/marching_cubes.hpp"
 #include "tunica/volume/labels/components.hpp"
+#include "tunica/volume/labels/shelter.hpp"
 #include "volumes.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 
 namespace tunica {
 namespace {
@@ -106,21 +108,71 @@ TEST(Hollows, SmallGapsDoNotCountAndIslandsBelongToTheLumen) {
   EXPECT_THROW(outer_solid(Mask({3, 3, 3}, wall.affine()), hollows), InputError);
 }
 
-TEST(Hollows, RingsShowAWallThatIsOpenWithinTheImage) {
+// Whatever axes it lies along, and wherever words of 64 columns end.
+Shelter shelter_turned(int turn, double shift, const std::function<bool(double, double, double)>& solid) {
+  return find_shelter(make_mask({33 + 60, 33 + 60, 33 + 60}, [&](double x, double y, double z) {
+    x -= shift;
+    y -= shift;
+    z -= shift;
+    return turn == 0 ? solid(x, y, z) : turn == 1 ? solid(y, z, x) : solid(z, x, y);
+  }));
+}
+
+TEST(Shelter, ShowsAWallThatIsOpenWithinTheImage) {
   const auto cup = [](double x, double y, double z) {
     const double r = std::hypot(x - 16, y - 16, z - 16);
     return r < 13 && r >= 11 && z < 18;
   };
   EXPECT_TRUE(find_hollows(make_mask({33, 33, 33}, cup)).sizes.empty());
+  const auto ball = [](double x, double y, double z) { return std::hypot(x - 16, y - 16, z - 16) < 13; };
   for (int turn = 0; turn < 3; ++turn) {
-    const Mask turned = make_mask({33, 33, 33}, [&](double x, double y, double z) {
-      return turn == 0 ? cup(x, y, z) : turn == 1 ? cup(y, z, x) : cup(z, x, y);
-    });
-    EXPECT_GT(find_hollows(turned).ring_share, 0.4) << turn;
+    for (const double shift : {0.0, 30.0, 60.0}) {
+      const Shelter shelter = shelter_turned(turn, shift, cup);
+      EXPECT_GT(shelter.share, 0.4) << turn;
+      EXPECT_LT((shelter.middle - Vec3(16 + shift, 16 + shift, 16 + shift)).norm(), 6);
+      EXPECT_LT(shelter_turned(turn, shift, ball).share, 0.01);
+    }
   }
-  const Mask ball =
-      make_mask({33, 33, 33}, [](double x, double y, double z) { return std::hypot(x - 16, y - 16, z - 16) < 13; });
-  EXPECT_EQ(find_hollows(ball).ring_share, 0);
+  EXPECT_EQ(find_shelter(Mask({5, 5, 5}, Eigen::Matrix<double, 3, 4>::Identity())).share, 0);
+}
+
+TEST(Shelter, ShowsATubeWithASlitAsFarAsAThirdOfItIsOpen) {
+  for (const bool cut : {true, false}) {
+    for (const double outer : {10.3, 12.0, 15.0}) {
+      for (const double open : {3.0, 30.0, 90.0, 120.0}) {
+        if (!cut && open > 90) {
+          continue;  // with its ends open too, a thick wall has too little in its shelter
+        }
+        const auto tube = [&](double x, double y, double z) {
+          const double angle = std::abs(std::atan2(y - 16, x - 16)) * 180 / 3.14159265358979;
+          return ring(x - 16, y - 16, 9, outer) && angle >= open / 2 && (cut || (z > 4 && z < 40));
+        };
+        const Mask wall = make_mask({33, 33, 45}, tube);
+        EXPECT_TRUE(find_hollows(wall).sizes.empty());
+        EXPECT_GT(find_shelter(wall).share, 0.25) << cut << " " << outer << " " << open;
+      }
+    }
+  }
+}
+
+TEST(Shelter, OfSolidsIsSmall) {
+  const auto share = [](const auto& solid) {
+    return find_shelter(
+               make_mask({41, 41, 41}, [&](double x, double y, double z) { return solid(x - 20, y - 20, z - 20); }))
+        .share;
+  };
+  const auto torus = [](double x, double y, double z) { return std::hypot(std::hypot(x, y) - 13, z) < 5; };
+  EXPECT_LT(share(torus), 0.02);
+  EXPECT_LT(share([&](auto x, auto y, auto z) { return torus(x, y, z) && x < 0; }), 0.02);
+  // A horseshoe that is nearly closed, a plate, a bent plate, a rod, and a kidney.
+  EXPECT_LT(share([&](auto x, auto y, auto z) { return torus(x, y, z) && (x < 10 || std::abs(y) > 2); }), 0.02);
+  EXPECT_LT(share([](auto x, auto y, auto z) { return std::hypot(x, y) < 18 && std::abs(z) < 3; }), 0.02);
+  EXPECT_LT(share([](auto x, auto y, auto z) { return ring(x, z, 15, 18) && std::abs(y) < 15 && z > 3; }), 0.25);
+  EXPECT_LT(share([](auto x, auto y, auto z) { return std::hypot(x - 0.4 * z, y) < 5; }), 0.02);
+  EXPECT_LT(share([](auto x, auto y, auto z) {
+              return std::hypot(x / 10, y / 8, z / 18) < 1 && std::hypot((x - 9) / 6, y / 5, z / 7) >= 1;
+            }),
+            0.1);
 }
 
 TEST(Bridge, OfOneVoxelBetweenTwoVesselsIsFound) {

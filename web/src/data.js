@@ -63,6 +63,7 @@ export async function readOrgan(base64) {
   organ.states = header.states.map((label) => ({
     label,
     displacement: reader.vectors(header.shell.points, shift),
+    membrane: reader.small(header.shell.points),
     stress: reader.small(header.shell.points),
   }));
   organ.surface = header.surface && mesh(header.surface);

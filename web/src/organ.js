@@ -156,8 +156,8 @@ class Organ {
   }
 
   #valueAt(i, state) {
-    if (this.colour === "stress") {
-      return state.stress[i];
+    if (this.colour === "membrane" || this.colour === "stress") {
+      return state[this.colour][i];
     }
     return this.colour === "distance" ? this.organ.distance[i] : this.#displacementAt(i, state.displacement);
   }

@@ -6,7 +6,7 @@ namespace tunica {
 
 /// What one mesh says by one model.
 struct Answer {
-  Model model;
+  System system;  ///< of the model and the settings
   Summary summary;
   std::vector<State> states;  ///< as solve() hands them over
   State at;                   ///< where the quantity is largest: the last state of a static run

@@ -66,6 +66,7 @@ inline constexpr std::array usages{
     Usage{dimension::moment, "a moment", "N*mm N*m"},
     Usage{dimension::force_per_length, "a force per length", "N/mm N/m"},
     Usage{dimension::pressure, "a pressure", "kPa Pa hPa MPa GPa mmHg cmH2O Torr mbar bar psi dyn/cm2 N/mm2"},
+    Usage{dimension::bedding, "a stiffness per area", "N/m3 kN/m3 N/mm3 Pa/m kPa/mm MPa/mm"},
     Usage{dimension::density, "a density", "kg/m3 g/cm3 g/mm3 t/mm3"},
     Usage{dimension::acceleration, "an acceleration", "m/s2 mm/s2"},
     Usage{dimension::number, "a plain number", ""},

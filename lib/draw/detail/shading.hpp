@@ -9,6 +9,12 @@
 /// Rasters as images: colours, light and lines.
 namespace tunica {
 
+/// What a picture needs of a mesh: corners that exist, and vertices at finite places, those of no triangle as well,
+/// which are in its frame. Errors: InputError.
+void require_drawable(const TriangleMesh& mesh);
+/// The same, and that there is a triangle, and no value or one per vertex. Errors: InputError.
+void require_drawable(const TriangleMesh& surface, std::span<const double> values);
+
 using Palette = std::array<std::array<std::uint8_t, 3>, 256>;
 
 /// From a pale sand over orange and red to a dark violet: lighter is less at every step, also for the colour-blind and

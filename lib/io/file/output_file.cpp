@@ -22,9 +22,14 @@
 
 namespace tunica {
 namespace fs = std::filesystem;
-namespace {
 
-std::string reason() { return std::strerror(errno); }
+std::string file_error() {
+  const int why = errno;
+  const char* const remedy = why == EMFILE ? ": allow more (ulimit -n)" : why == ENFILE ? ": close other programs" : "";
+  return std::strerror(why) + std::string(remedy);
+}
+
+namespace {
 
 // Where a name that is a symbolic link leads: renaming onto the link would replace the link, not the file it stands
 // for.
@@ -41,10 +46,10 @@ fs::path folder_of(const fs::path& path) { return path.has_parent_path() ? path.
 void flush_to_disk(const fs::path& path) {
   const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
   if (fd < 0) {
-    throw OutputError(fmt::format("{}: cannot be written: {}", path.string(), reason()));
+    throw OutputError(fmt::format("{}: cannot be written: {}", path.string(), file_error()));
   }
   const bool failed = ::fsync(fd) != 0 && errno != EINVAL && errno != EROFS;
-  const std::string why = failed ? reason() : std::string();
+  const std::string why = failed ? file_error() : std::string();
   ::close(fd);
   if (failed) {
     throw OutputError(fmt::format("{}: cannot be flushed to the disk: {}", path.string(), why));
@@ -75,7 +80,7 @@ void require_writable(const fs::path& path, bool overwrite) {
     }
     if (::access(place.c_str(), W_OK) != 0) {
       throw OutputError(
-          fmt::format("{}: the folder {} cannot be written to: {}", path.string(), place.string(), reason()));
+          fmt::format("{}: the folder {} cannot be written to: {}", path.string(), place.string(), file_error()));
     }
   }
   if (here.st_dev != there.st_dev) {
@@ -110,11 +115,11 @@ int open_own_file(const fs::path& path, int flags) {
     if (errno == ENOENT && (flags & O_CREAT) == 0) {
       return -1;
     }
-    throw OutputError(fmt::format("{}: cannot be created: {}", path.string(), reason()));
+    throw OutputError(fmt::format("{}: cannot be created: {}", path.string(), file_error()));
   }
   try {
     if (::fstat(descriptor, &file) != 0) {
-      throw OutputError(fmt::format("{}: cannot be read: {}", path.string(), reason()));
+      throw OutputError(fmt::format("{}: cannot be read: {}", path.string(), file_error()));
     }
     require_regular(file);
   } catch (const OutputError&) {
@@ -171,7 +176,7 @@ bool PartLock::is_at(const fs::path& path) const {
 
 void PartLock::empty() const {
   if (::ftruncate(descriptor_, 0) != 0) {
-    throw OutputError(fmt::format("{}: cannot be written: {}", part_.string(), reason()));
+    throw OutputError(fmt::format("{}: cannot be written: {}", part_.string(), file_error()));
   }
 }
 
@@ -197,7 +202,7 @@ void OutputFile::commit() {
   if (std::rename(partial_.c_str(), behind_links(path_).c_str()) != 0) {
     keep_ = true;  // it is whole: the work is not lost with its name
     throw OutputError(fmt::format("{}: cannot be written: {}; the whole of it is in {}, rename that", path_.string(),
-                                  reason(), partial_.string()));
+                                  file_error(), partial_.string()));
   }
   done_ = true;
 }
@@ -208,7 +213,7 @@ void write_file(const fs::path& path, std::string_view bytes, bool overwrite) {
   const bool written =
       file && std::fwrite(bytes.data(), 1, bytes.size(), file.get()) == bytes.size() && std::fflush(file.get()) == 0;
   if (!written) {
-    throw OutputError(fmt::format("{}: cannot be written: {}", path.string(), reason()));
+    throw OutputError(fmt::format("{}: cannot be written: {}", path.string(), file_error()));
   }
   file.reset();
   output.commit();
@@ -225,7 +230,11 @@ OpenFile open_input(const fs::path& path) {
   }
   OpenFile file(std::fopen(path.c_str(), "rb"), &std::fclose);
   if (!file) {
-    throw InputError(fmt::format("{}: cannot be read: {}", path.string(), reason()));
+    if (errno == EMFILE || errno == ENFILE) {
+      // A limit of the machine, no fault of the file.
+      throw Error(ExitCode::memory, fmt::format("{}: cannot be read: {}", path.string(), file_error()));
+    }
+    throw InputError(fmt::format("{}: cannot be read: {}", path.string(), file_error()));
   }
   return file;
 }
@@ -240,7 +249,7 @@ std::string read_file(const fs::path& path, std::size_t limit) {
   std::string bytes(narrow<std::size_t>(size), '\0');
   const std::size_t got = std::fread(bytes.data(), 1, bytes.size(), file.get());
   if (std::ferror(file.get()) != 0) {
-    throw InputError(fmt::format("{}: cannot be read to its end: {}", path.string(), reason()));
+    throw InputError(fmt::format("{}: cannot be read to its end: {}", path.string(), file_error()));
   }
   if (got != bytes.size()) {
     throw InputError(fmt::format("{}: became shorter while it was read: get the whole file again", path.string()));
@@ -258,7 +267,7 @@ std::string sha256_of_file(const fs::path& path) {
     has_memory = has_memory && EVP_DigestUpdate(context.get(), block.data(), got) == 1;
   }
   if (std::ferror(file.get()) != 0) {
-    throw InputError(fmt::format("{}: cannot be read: {}", path.string(), reason()));
+    throw InputError(fmt::format("{}: cannot be read: {}", path.string(), file_error()));
   }
   std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
   unsigned length = 0;

@@ -41,6 +41,10 @@ private:
 /// @return the descriptor. Errors: OutputError; with O_CREAT missing, a missing file is -1.
 int open_own_file(const std::filesystem::path& path, int flags);
 
+/// What errno says of a file that cannot be opened, read or written, and what helps where the machine's limits forbid
+/// it.
+std::string file_error();
+
 /// An output that is whole or not there: everything goes to `NAME.part`, which commit() flushes to the disk and
 /// renames to NAME (or to the file behind it, when NAME is a symbolic link). Without commit() the destructor removes
 /// the .part file, unless keep_partial() was called or the renaming failed. It holds the PartLock.

@@ -175,11 +175,16 @@ std::string common_space(const std::optional<std::string>& a, const std::filesys
     return text;
   };
   if (a && b && upper_case(*a) != upper_case(*b)) {
+    const auto known = [&](const std::string& space) {
+      return upper_case(space) == "LPS" || upper_case(space) == "RAS";
+    };
+    const char* const mended = known(*a) && known(*b)
+                                   ? "make both in the same space (tunica-extract --space, or what exported the mesh), "
+                                     "or change the sign of x and y in one of them and what it says of its space"
+                                   : "only LPS and RAS are known here: export both meshes again in one of these";
     throw InputError(
-        fmt::format("{}: its axes are SPACE={}, those of {} are SPACE={}: they would lie in different places; make "
-                    "both in the same space (tunica-extract --space, or what exported the mesh), or change the sign "
-                    "of x and y in one of them and what it says of its space",
-                    path_a.string(), *a, path_b.string(), *b));
+        fmt::format("{}: its axes are SPACE={}, those of {} are SPACE={}: they would lie in different places; {}",
+                    path_a.string(), *a, path_b.string(), *b, mended));
   }
   return a.value_or(b.value_or("LPS"));
 }

@@ -65,7 +65,7 @@ private:
   }
 
   [[noreturn]] void fail() const {
-    throw OutputError(fmt::format("{}: cannot be written: {}", path_.string(), std::strerror(errno)));
+    throw OutputError(fmt::format("{}: cannot be written: {}", path_.string(), file_error()));
   }
 
   std::filesystem::path path_;

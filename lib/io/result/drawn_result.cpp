@@ -28,19 +28,20 @@ constexpr std::size_t most_text = std::size_t{16} << 20;
 // What is read of a result.
 constexpr std::array datasets{"VTKHDF/Connectivity",
                               "VTKHDF/PointData/displacement",
+                              "VTKHDF/PointData/membrane_stress",
                               "VTKHDF/PointData/von_mises",
                               "VTKHDF/Points",
                               "VTKHDF/Types",
                               "tunica/elements/nodes",
                               "tunica/elements/normals",
                               "tunica/elements/patch",
-                              "tunica/elements/von_mises_bottom",
-                              "tunica/elements/von_mises_top",
                               "tunica/history/load_factor",
                               "tunica/history/time",
                               "tunica/nodes/displacement",
+                              "tunica/nodes/membrane_stress",
                               "tunica/nodes/position",
                               "tunica/nodes/rotation",
+                              "tunica/nodes/von_mises",
                               "tunica/scene"};
 
 /// One file, of which every failure is an InputError that names it.
@@ -243,15 +244,16 @@ void take_solids(const std::vector<Vec3>& displacement, const OuterFaces& outer,
 DrawnResult::State read_state(const Reader& reader, std::size_t points, const OuterFaces& outer, std::size_t row) {
   DrawnResult::State state;
   state.displacement = vectors_of(reader, reader.rows<double>("VTKHDF/PointData/displacement", row * points, points));
+  state.membrane = reader.rows<double>("VTKHDF/PointData/membrane_stress", row * points, points);
   state.von_mises = reader.rows<double>("VTKHDF/PointData/von_mises", row * points, points);
-  if (state.displacement.size() != points || state.von_mises.size() != points) {
+  if (state.displacement.size() != points || state.membrane.size() != points || state.von_mises.size() != points) {
     reader.fail("VTKHDF/PointData has not one value per point");
   }
   take_solids(state.displacement, outer, state);
   return state;
 }
 
-/// The states of a static run, of which the grid has the last alone, from displacements and rotations of the nodes.
+/// The states of a static run, of which the grid has the last alone, from what the nodes have.
 class StatesOfNodes {
 public:
   StatesOfNodes(const Reader& reader, const DrawnResult& drawn, const OuterFaces& outer)
@@ -283,18 +285,25 @@ public:
     if (moved.displacement.size() != nodes || moved.rotation.size() != nodes) {
       reader_.fail("tunica/nodes has not one value per node");
     }
-    const std::vector<double> top = stress_of_nodes("tunica/elements/von_mises_top", number);
-    const std::vector<double> bottom = stress_of_nodes("tunica/elements/von_mises_bottom", number);
+    const std::vector<double> membrane = reader_.rows<double>("tunica/nodes/membrane_stress", number, 1);
+    const std::vector<double> faces = reader_.rows<double>("tunica/nodes/von_mises", number, 1);
+    if (membrane.size() != nodes || faces.size() != nodes) {
+      reader_.fail("tunica/nodes has not one value per node");
+    }
     DrawnResult::State state;
     state.displacement.assign(points_, Vec3::Zero());
+    state.membrane.assign(points_, 0);
     state.von_mises.assign(points_, 0);
     const std::vector<Vec3> drawn = curved_displacement(model_, 0, moved, surface_);
     for (std::size_t v = 0; v < point_.size(); ++v) {
       state.displacement[point_[v]] = drawn[v];
       const auto& corners = model_.shells[0].mesh.triangles[surface_.vertex_shell[v]];
       const Vec2& b = surface_.barycentric[v];
-      const auto at = [&](std::size_t k) { return std::max(top[corners[k]], bottom[corners[k]]); };
-      state.von_mises[point_[v]] = (1 - b.x() - b.y()) * at(0) + b.x() * at(1) + b.y() * at(2);
+      const auto at = [&](const std::vector<double>& of_nodes) {
+        return (1 - b.x() - b.y()) * of_nodes[corners[0]] + b.x() * of_nodes[corners[1]] + b.y() * of_nodes[corners[2]];
+      };
+      state.membrane[point_[v]] = at(membrane);
+      state.von_mises[point_[v]] = at(faces);
     }
     // The nodes of solids are the last, of the grid's points and of all nodes.
     for (const Index point : outer_.points) {
@@ -343,14 +352,6 @@ private:
     }
   }
 
-  [[nodiscard]] std::vector<double> stress_of_nodes(const std::string& dataset, std::size_t number) const {
-    const std::vector<double> of_shells = reader_.rows<double>(dataset, number, 1);
-    if (of_shells.size() != model_.shells[0].mesh.triangles.size()) {
-      reader_.fail(dataset + " has not one value per shell");
-    }
-    return averaged_at_nodes(model_, of_shells);
-  }
-
   const Reader& reader_;
   const OuterFaces& outer_;
   std::size_t points_;
@@ -378,7 +379,7 @@ DrawnResult read_drawn_result(const std::filesystem::path& path, std::size_t mos
   const Reader reader(path);
   DrawnResult result;
   result.scene = reader.text("tunica/scene");
-  result.is_unloaded = says(result.scene, "imaged_at = ");
+  result.is_unloaded = says(result.scene, "unload = true");
   const OuterFaces outer = read_geometry(reader, result);
   const std::size_t points = result.reference.vertices.size();
   const auto displacements = reader.shape("VTKHDF/PointData/displacement");

@@ -18,7 +18,8 @@ struct DrawnResult {
     double time = 0;         ///< s; of a mode its frequency, Hz, or its factor; else as the load factor
     double load_factor = 0;
     std::vector<Vec3> displacement;  ///< #V, mm
-    std::vector<double> von_mises;   ///< #V, MPa
+    std::vector<double> membrane;    ///< #V, MPa, von Mises stress of the mean over the wall
+    std::vector<double> von_mises;   ///< #V, MPa, the larger of both faces
     std::vector<Vec3> of_solids;     ///< displacement, mm, of each vertex of `solids`
   };
   enum class Kind { statics, path, motion, frequencies, buckling };
@@ -33,7 +34,7 @@ struct DrawnResult {
 };
 
 /// Reads what tunica-simulate drew. Of a static run, which draws its last state alone, the others come from the nodes,
-/// by the same curved displacements and means.
+/// by the same curved displacements and recovered stresses.
 /// @param most_states  at most this many states, the first and the last among them; at least 2
 /// Errors: InputError naming the file: missing, not a result of tunica, damaged, inconsistent.
 /// Cost: memory for the states that are read. Limits: 2^31 - 1 points; all shells of a static run are drawn by the kind

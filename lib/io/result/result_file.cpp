@@ -141,10 +141,14 @@ constexpr std::array about{
           "deformed curved surface minus reference; solids: of the nodes"},
     About{"VTKHDF/PointData/rotation", "rad", "rotation vectors, linear between the nodes",
           "rotation vectors, linear between the nodes; those of solids mean nothing"},
+    About{"VTKHDF/PointData/membrane_stress", "MPa",
+          "von Mises stress of the mean over the wall, recovered at the nodes, linear between them",
+          "von Mises stress of the mean over the wall, recovered at the nodes, linear between them; solids: mean by "
+          "volume of the stress at the nodes"},
     About{"VTKHDF/PointData/von_mises", "MPa",
-          "von Mises stress, averaged at the nodes within a body, the larger of both faces, linear between the nodes",
-          "von Mises stress, averaged at the nodes within a body; shells: by area, the larger of both faces, linear "
-          "between the nodes; solids: by volume"},
+          "von Mises stress, the larger of both faces, recovered at the nodes, linear between them",
+          "von Mises stress, the larger of both faces, recovered at the nodes, linear between them; solids: mean by "
+          "volume at the nodes"},
     About{"VTKHDF/CellData/body", "1", "number of the body, from 0"},
     About{"tunica/scene", "1", "the resolved scene, TOML in SI units"},
     About{"tunica/command", "1", "the command of the run"},
@@ -155,6 +159,12 @@ constexpr std::array about{
     About{"tunica/nodes/position", "mm", "nodes of all bodies one after the other, in file order; reference"},
     About{"tunica/nodes/displacement", "mm", "by state and node, world axes"},
     About{"tunica/nodes/rotation", "rad", "rotation vectors by state and node, world axes"},
+    About{"tunica/nodes/membrane_stress", "MPa",
+          "von Mises stress of the mean over the wall, recovered; by state and node",
+          "von Mises stress of the mean over the wall, recovered; solids: mean by volume of the stress; by state and "
+          "node"},
+    About{"tunica/nodes/von_mises", "MPa", "von Mises stress, the larger of both faces, recovered; by state and node",
+          "von Mises stress, the larger of both faces, recovered; solids: mean by volume; by state and node"},
     About{"tunica/elements/nodes", "1", "the three nodes of each shell, rows of tunica/nodes, from 0", nullptr, true},
     About{"tunica/elements/body", "1", "the body of each shell, from 0", nullptr, true},
     About{"tunica/elements/area", "mm2", "of each shell's curved patch, reference", nullptr, true},
@@ -171,17 +181,23 @@ constexpr std::array about{
     About{"tunica/history/cg_iterations", "1", "iterations of conjugate gradients in the step"},
     About{"tunica/history/max_displacement", "mm", "largest of the curved surfaces"},
     About{"tunica/history/displacement_p99", "mm", "passed on 1 % of the shells' area"},
-    About{"tunica/history/stress_p99", "MPa", "von Mises stress, averaged at the nodes, passed on 1 % of the area"},
-    About{"tunica/history/stress_max", "MPa", "largest von Mises stress, averaged at the nodes"},
+    About{"tunica/history/membrane_p99", "MPa",
+          "von Mises stress of the mean over the wall, passed on 1 % of the area"},
+    About{"tunica/history/membrane_max", "MPa", "largest von Mises stress of the mean over the wall"},
+    About{"tunica/history/tension_p99", "N/mm", "largest principal membrane force, passed on 1 % of the area"},
+    About{"tunica/history/stress_p99", "MPa", "von Mises stress of either face, passed on 1 % of the area"},
+    About{"tunica/history/stress_max", "MPa", "largest von Mises stress of either face"},
     About{"tunica/history/stress_max_at", "mm", "the node where it is, reference"},
     About{"tunica/history/strain_p99", "%", "largest principal strain of either face, passed on 1 % of the area"},
-    About{"tunica/history/strain_max", "%", "largest principal strain of either face, averaged at the nodes"}};
+    About{"tunica/history/strain_max", "%", "largest principal strain of either face"}};
 
 // Of the shells' fields, in CellData and in tunica/elements.
 constexpr std::array about_shell_fields{
     About{"pressure", "MPa", "pressure on the shell"},
     About{"von_mises_top", "MPa", "von Mises stress at the face the normal points to, constant in each shell"},
     About{"von_mises_bottom", "MPa", "von Mises stress at the other face, constant in each shell"},
+    About{"membrane_von_mises", "MPa", "von Mises stress of the mean over the wall, constant in each shell"},
+    About{"tension", "N/mm", "largest principal membrane force, per current length, constant in each shell"},
     About{"membrane_force", "N/mm", "xx, yy, xy in the shell's own frame, x along its first edge"},
     About{"bending_moment", "N", "moment per length: xx, yy, xy in the same frame"},
     About{"principal_strain_top", "1", "largest and smallest strain at the face the normal points to"},
@@ -232,6 +248,26 @@ std::string ascii_of(std::string text) {
   std::ranges::replace_if(
       text, [](char c) { return static_cast<unsigned char>(c) > '~'; }, '?');
   return text;
+}
+
+// In the order of make_history().
+std::array<double, 15> history_of(const State& state, const ElementFields& of_elements) {
+  const Wall& wall = of_elements.wall;
+  return {state.time,
+          state.load_factor,
+          state.volume.value_or(std::numeric_limits<double>::quiet_NaN()),
+          state.strain_energy,
+          state.kinetic_energy,
+          state.residual,
+          of_elements.largest_displacement,
+          of_elements.displacement_p99,
+          wall.membrane_p99,
+          wall.membrane_max,
+          wall.tension_p99,
+          wall.stress_p99,
+          wall.stress_max,
+          1e2 * wall.strain_p99,
+          1e2 * wall.strain_max};
 }
 
 struct ProbeSeries {
@@ -408,11 +444,13 @@ struct ResultFile::Implementation {
     node_displacement =
         Series(writer, group.get(), "displacement", H5T_NATIVE_DOUBLE, {nodes, 3}, nodes_chunk_rows, true);
     node_rotation = Series(writer, group.get(), "rotation", H5T_NATIVE_DOUBLE, {nodes, 3}, nodes_chunk_rows, true);
+    node_membrane = Series(writer, group.get(), "membrane_stress", H5T_NATIVE_DOUBLE, {nodes}, nodes_chunk_rows, true);
+    node_stress = Series(writer, group.get(), "von_mises", H5T_NATIVE_DOUBLE, {nodes}, nodes_chunk_rows, true);
 
     const Handle history = writer.group(tunica_group.get(), "history");
-    for (const char* name :
-         {"time", "load_factor", "volume", "strain_energy", "kinetic_energy", "residual", "max_displacement",
-          "displacement_p99", "stress_p99", "stress_max", "strain_p99", "strain_max"}) {
+    for (const char* name : {"time", "load_factor", "volume", "strain_energy", "kinetic_energy", "residual",
+                             "max_displacement", "displacement_p99", "membrane_p99", "membrane_max", "tension_p99",
+                             "stress_p99", "stress_max", "strain_p99", "strain_max"}) {
       numbers.emplace_back(writer, history.get(), name, H5T_NATIVE_DOUBLE, std::vector<Size>{}, history_chunk, false);
     }
     for (const char* name : {"newton_iterations", "cg_iterations"}) {
@@ -531,20 +569,10 @@ struct ResultFile::Implementation {
     put_fields(state, of_elements);
     node_displacement.append(writer, 1, flattened(state.displacement).data());
     node_rotation.append(writer, 1, flattened(state.rotation).data());
-    const Wall& wall = of_elements.wall;
-    const std::array<double, 12> history{state.time,
-                                         state.load_factor,
-                                         state.volume.value_or(std::numeric_limits<double>::quiet_NaN()),
-                                         state.strain_energy,
-                                         state.kinetic_energy,
-                                         state.residual,
-                                         of_elements.largest_displacement,
-                                         of_elements.displacement_p99,
-                                         wall.stress_p99,
-                                         wall.stress_max,
-                                         1e2 * wall.strain_p99,
-                                         1e2 * wall.strain_max};
-    stress_max_at.append(writer, 1, wall.stress_max_at.data());
+    node_membrane.append(writer, 1, of_elements.membrane_stress.data());
+    node_stress.append(writer, 1, of_elements.von_mises.data());
+    const std::array<double, 15> history = history_of(state, of_elements);
+    stress_max_at.append(writer, 1, of_elements.wall.stress_max_at.data());
     for (std::size_t i = 0; i < numbers.size(); ++i) {
       numbers[i].append(writer, 1, &history[i]);
     }
@@ -637,6 +665,8 @@ struct ResultFile::Implementation {
   Series values;
   Series node_displacement;
   Series node_rotation;
+  Series node_membrane;
+  Series node_stress;
   std::vector<Series> numbers;
   Series stress_max_at;
   std::vector<Series> counts;

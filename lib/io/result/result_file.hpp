@@ -1,7 +1,7 @@
 #pragma once
 
 #include "tunica/mechanics/model/model.hpp"
-#include "tunica/mechanics/runs/solve.hpp"
+#include "tunica/mechanics/runs/fields.hpp"
 
 #include <filesystem>
 #include <memory>

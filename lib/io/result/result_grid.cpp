@@ -9,7 +9,6 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <span>
 
 namespace tunica {
 namespace {
@@ -20,10 +19,12 @@ constexpr int finest_level = 4;
 constexpr float no_value = std::numeric_limits<float>::quiet_NaN();
 constexpr std::array fixed_fields{GridField{"normal", 3, false}, GridField{"thickness", 1, false}};
 constexpr std::array point_fields{GridField{"displacement", 3, false}, GridField{"rotation", 3, false},
-                                  GridField{"von_mises", 1, false}};
+                                  GridField{"membrane_stress", 1, false}, GridField{"von_mises", 1, false}};
 constexpr std::array shell_fields{GridField{"pressure", 1, true},
                                   GridField{"von_mises_top", 1, true},
                                   GridField{"von_mises_bottom", 1, true},
+                                  GridField{"membrane_von_mises", 1, true},
+                                  GridField{"tension", 1, true},
                                   GridField{"membrane_force", 3, true},
                                   GridField{"bending_moment", 3, true},
                                   GridField{"principal_strain_top", 2, true},
@@ -55,24 +56,6 @@ template <typename Value>
 Value between(const std::array<Index, 3>& corners, const Vec2& b, const Value* of_nodes) {
   return Value((1 - b.x() - b.y()) * of_nodes[corners[0]] + b.x() * of_nodes[corners[1]] +
                b.y() * of_nodes[corners[2]]);
-}
-
-/// What is constant in each tetrahedron as means at the nodes, by volume.
-void add_node_means(const TetMesh& mesh, std::span<const double> of_tetrahedra, Floats& values) {
-  std::vector<double> sums(mesh.vertices.size(), 0);
-  std::vector<double> volumes(mesh.vertices.size(), 0);
-  for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t) {
-    const auto& nodes = mesh.tetrahedra[t];
-    const auto edge = [&](std::size_t k) { return Vec3(mesh.vertices[nodes[k]] - mesh.vertices[nodes[0]]); };
-    const double volume = std::abs(edge(1).dot(edge(2).cross(edge(3))));
-    for (const Index node : nodes) {
-      sums[node] += volume * of_tetrahedra[t];
-      volumes[node] += volume;
-    }
-  }
-  for (std::size_t v = 0; v < sums.size(); ++v) {
-    add(values, volumes[v] > 0 ? sums[v] / volumes[v] : 0);
-  }
 }
 
 }  // namespace
@@ -236,7 +219,8 @@ std::vector<std::vector<float>> ResultGrid::values(const State& state, const Ele
     add_means(
         body, [&](std::size_t v) { return moved[v]; }, values[0]);
     add_means(body, linear(state.rotation.data() + first), values[1]);
-    add_means(body, linear(fields.von_mises.data() + first), values[2]);
+    add_means(body, linear(fields.membrane_stress.data() + first), values[2]);
+    add_means(body, linear(fields.von_mises.data() + first), values[3]);
   }
   add_solid_values(state, fields, values);
   for (const Floats& of_elements : element_values(fields)) {
@@ -260,17 +244,11 @@ std::vector<std::vector<float>> ResultGrid::values(const State& state, const Ele
 
 void ResultGrid::add_solid_values(const State& state, const ElementFields& fields,
                                   std::vector<std::vector<float>>& values) const {
-  std::span<const double> stress = fields.solid_von_mises;
-  TUNICA_ASSERT(stress.size() == tetrahedra());
-  for (std::size_t s = 0; s < model_.solids.size(); ++s) {
-    const TetMesh& mesh = model_.solids[s].mesh;
-    const std::size_t first = model_.first_node(model_.shells.size() + s);
-    for (std::size_t v = first; v < first + mesh.vertices.size(); ++v) {
-      add(values[0], state.displacement[v]);
-      add(values[1], state.rotation[v]);
-    }
-    add_node_means(mesh, stress.first(mesh.tetrahedra.size()), values[2]);
-    stress = stress.subspan(mesh.tetrahedra.size());
+  for (std::size_t v = model_.first_node(model_.shells.size()); v < model_.node_count(); ++v) {
+    add(values[0], state.displacement[v]);
+    add(values[1], state.rotation[v]);
+    add(values[2], fields.membrane_stress[v]);
+    add(values[3], fields.von_mises[v]);
   }
 }
 
@@ -320,6 +298,8 @@ std::vector<std::vector<float>> ResultGrid::element_values(const ElementFields& 
     put(fields.pressure);
     put(fields.von_mises_top);
     put(fields.von_mises_bottom);
+    put(fields.membrane_von_mises);
+    put(fields.tension);
     put(fields.membrane_force);
     put(fields.bending_moment);
     put(fields.principal_strain_top);

@@ -5,7 +5,6 @@
 #include "tunica/draw/picture.hpp"
 #include "tunica/io/result/detail/result_grid.hpp"
 #include "tunica/mechanics/contact/rigid_shape.hpp"
-#include "tunica/mechanics/model/wall.hpp"
 #include "tunica/surface/mesh/measure.hpp"
 #include "tunica/surface/mesh/tet_checks.hpp"
 
@@ -72,19 +71,10 @@ void add_solid_strain(const SolidBody& solid, const Vec3* displacement, double* 
 }
 
 std::vector<double> strain_at_nodes(const Model& model, const State& state, const ElementFields& fields) {
-  const auto averaged = [&](const std::vector<Vec2>& principal) {
-    std::vector<double> largest;
-    for (const Vec2& of_element : principal) {
-      largest.push_back(of_element[0]);
-    }
-    std::vector<double> means = averaged_at_nodes(model, largest);
-    means.resize(model.node_count(), 0);
-    return means;
-  };
-  std::vector<double> strain = averaged(fields.principal_strain_top);
-  const std::vector<double> bottom = averaged(fields.principal_strain_bottom);
-  for (std::size_t v = 0; v < strain.size(); ++v) {
-    strain[v] = std::max({strain[v], bottom[v], 0.0});
+  std::vector<double> strain = fields.strain;
+  strain.resize(model.node_count(), 0);
+  for (double& value : strain) {
+    value = std::max(value, 0.0);
   }
   for (std::size_t s = 0; s < model.solids.size(); ++s) {
     const std::size_t first = model.first_node(model.shells.size() + s);
@@ -177,9 +167,16 @@ ShownQuantity quantity_of(const Model& model, const State& state, const ElementF
       q.values.assign(strain.begin(), strain.end());
       break;
     }
+    // As on the report's page, whatever its size: pictures of a cohort stand beside each other.
+    case Colouring::membrane:
+      q = {{of_points[2].begin(), of_points[2].end()}, "Membrane stress (von Mises)", "Membrane stress", "kPa", 1000};
+      break;
     case Colouring::stress:
-      // As on the report's page, whatever its size: pictures of a cohort stand beside each other.
-      q = {{of_points[2].begin(), of_points[2].end()}, "Von Mises stress", "Von Mises stress", "kPa", 1000};
+      q = {{of_points[3].begin(), of_points[3].end()},
+           "Stress at the faces (von Mises)",
+           "Stress at the faces",
+           "kPa",
+           1000};
       break;
   }
   for (double& value : q.values) {
@@ -210,7 +207,11 @@ std::string result_picture(const Model& model, const State& state, const Element
   if (moved < seen_displacement * size) {
     look.outline = {};
   }
-  look.outline_name = "unloaded";
+  const bool is_unloaded = std::ranges::any_of(model.loads, [](const Load& load) {
+    const auto* pressure = std::get_if<PressureLoad>(&load.kind);
+    return pressure != nullptr && pressure->unload;
+  });
+  look.outline_name = is_unloaded ? "unloaded" : "as imaged";
   for (const auto& [from, to] : grid.shell_edges()) {
     look.lines.push_back({surface.vertices[from], surface.vertices[to]});
   }

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "tunica/mechanics/model/model.hpp"
-#include "tunica/mechanics/runs/solve.hpp"
+#include "tunica/mechanics/runs/fields.hpp"
 
 #include <optional>
 #include <string>
@@ -9,13 +9,14 @@
 namespace tunica {
 
 enum class Colouring {
-  stress,        ///< von Mises: of shells the larger of both faces, averaged at the nodes within a body
+  membrane,      ///< von Mises stress of the mean over the wall; of solids of the stress
+  stress,        ///< von Mises: of shells the larger of both faces
   displacement,  ///< its length
   strain,        ///< the largest principal one: as stress
 };
 
 struct ResultPictureOptions {
-  Colouring colour = Colouring::stress;
+  Colouring colour = Colouring::membrane;
   double magnify = 1;           ///< > 0: displacements are drawn that many times as large; rigid bodies stay
   std::optional<double> range;  ///< MPa, mm, or 1: where the colours end; none: at the largest value
   std::string when;             ///< which state it is, e.g. "under the whole load"

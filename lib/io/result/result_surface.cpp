@@ -43,7 +43,7 @@ void write_result_surface(const std::filesystem::path& path, const ResultGrid& g
                           const std::vector<std::vector<float>>& values, const std::string& made_by,
                           const std::string& space, bool overwrite) {
   const Floats& moved = field_of(grid, values, "displacement");
-  const Floats& stress = field_of(grid, values, "von_mises");
+  const Floats& stress = field_of(grid, values, "membrane_stress");
   constexpr Index none = max_index;
   std::vector<Index> number(grid.points(), none);  // solids have points, too
   TriangleMesh mesh;
@@ -70,7 +70,8 @@ void write_result_surface(const std::filesystem::path& path, const ResultGrid& g
   std::ranges::transform(of_vertex, std::back_inserter(look.colours),
                          [&](double value) { return bar_colour(largest > 0 ? value / largest : 0); });
   PlyOptions options;
-  options.comments = {"made by " + made_by, fmt::format("colours: von Mises stress from 0 to {:.4g} MPa", largest)};
+  options.comments = {"made by " + made_by,
+                      fmt::format("colours: membrane stress (von Mises) from 0 to {:.4g} MPa", largest)};
   options.space = space;
   options.overwrite = overwrite;
   write_surface(path, mesh, options, look);

@@ -26,7 +26,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::string_view states_magic = "TUNICA STATES 2\n";
-constexpr std::string_view checkpoint_magic = "TUNICA CHECKPOINT 3\n";
+constexpr std::string_view checkpoint_magic = "TUNICA CHECKPOINT 4\n";
 /// Time between checkpoints, as a multiple of what the last one took.
 constexpr int spacing = 20;
 constexpr std::uint64_t largest_record = std::uint64_t{1} << 40;
@@ -199,10 +199,10 @@ void checkpoint_members(Archive& archive, AnyCheckpoint& checkpoint) {
   auto& [summary, position, displacement, rotation, memory] = checkpoint;
   auto& [dof, steps, parts, converged, residual, newton_iterations, cg_iterations, error, error_is_bound, volume_before,
          volume_after, strain, largest, seconds_per_step, frequencies, factors, stiffened, energy, bend, motion, snaps,
-         limits, branches] = summary;
+         limits, branches, contact_pressures] = summary;
   each(archive, dof, steps, parts, converged, residual, newton_iterations, cg_iterations, error, error_is_bound,
        volume_before, volume_after, strain, largest, seconds_per_step, frequencies, factors, stiffened, energy, bend,
-       motion, snaps, limits, branches);
+       motion, snaps, limits, branches, contact_pressures);
   each(archive, position, displacement, rotation, memory);
 }
 
@@ -296,7 +296,7 @@ struct RunJournal::Implementation {
         continue;
       }
       if (written < 0) {
-        throw OutputError(fmt::format("{}: cannot be written: {}", states_path.string(), std::strerror(errno)));
+        throw OutputError(fmt::format("{}: cannot be written: {}", states_path.string(), file_error()));
       }
       bytes.remove_prefix(narrow<std::size_t>(written));
       size += narrow<std::uint64_t>(written);
@@ -415,7 +415,7 @@ struct RunJournal::Implementation {
 
   void go_to(std::uint64_t place) {
     if (::lseek(descriptor, narrow<off_t>(place), SEEK_SET) < 0) {
-      throw InputError(fmt::format("{}: cannot be read: {}", states_path.string(), std::strerror(errno)));
+      throw InputError(fmt::format("{}: cannot be read: {}", states_path.string(), file_error()));
     }
     size = place;
   }
@@ -430,8 +430,7 @@ struct RunJournal::Implementation {
     head(checksum(pack.bytes()));
     // The states first: the checkpoint must never know more of them than the disk does.
     if (::fdatasync(descriptor) != 0 && errno != EINVAL && errno != EROFS) {
-      throw OutputError(
-          fmt::format("{}: cannot be flushed to the disk: {}", states_path.string(), std::strerror(errno)));
+      throw OutputError(fmt::format("{}: cannot be flushed to the disk: {}", states_path.string(), file_error()));
     }
     write_file(checkpoint_path, std::string(checkpoint_magic) + head.bytes() + pack.bytes(), true);
   }
@@ -474,7 +473,7 @@ RunJournal RunJournal::create(const fs::path& part, RunIdentity identity) {
   fs::remove(journal->checkpoint_path, ignored);
   journal->lock->empty();
   if (::ftruncate(journal->descriptor, 0) != 0) {
-    throw OutputError(fmt::format("{}: cannot be written: {}", journal->states_path.string(), std::strerror(errno)));
+    throw OutputError(fmt::format("{}: cannot be written: {}", journal->states_path.string(), file_error()));
   }
   Packer pack;
   identity_members(pack, identity);
@@ -563,7 +562,7 @@ std::optional<Checkpoint> RunJournal::replay(const Model& model, const std::func
     journal.fail(journal.states_path);
   }
   if (::ftruncate(journal.descriptor, narrow<off_t>(end)) != 0) {
-    throw OutputError(fmt::format("{}: cannot be written: {}", journal.states_path.string(), std::strerror(errno)));
+    throw OutputError(fmt::format("{}: cannot be written: {}", journal.states_path.string(), file_error()));
   }
   return journal.checkpoint;
 }

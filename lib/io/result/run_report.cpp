@@ -1,6 +1,7 @@
 #include "tunica/io/result/run_report.hpp"
 
 #include "tunica/io/result/detail/contact_record.hpp"
+#include "tunica/mechanics/runs/doubts.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -120,6 +121,7 @@ void prepare_result(Json& result, const Model& model) {
             {"branch_load_factors", Json::array()},
             {"snaps", Json::array()},
             {"energy", nullptr},
+            {"estimates", Json::object()},
             {"short_waves_stiffened_from", nullptr}};
   for (const Probe& probe : model.probes) {
     result["probes"][probe.name] = {{"time_s", Json::array()},
@@ -130,6 +132,22 @@ void prepare_result(Json& result, const Model& model) {
   prepare_contacts(result, model);
 }
 
+namespace {
+
+Json wall_report(const WallNumbers& wall) {
+  return {{"membrane_p99_mpa", wall.membrane_p99},
+          {"membrane_max_mpa", wall.membrane_max},
+          {"tension_p99_n_per_mm", wall.tension_p99},
+          {"stress_p99_mpa", wall.stress_p99},
+          {"stress_max_mpa", wall.stress_max},
+          {"stress_max_at_mm", triple(wall.stress_max_at)},
+          {"bending_share_percent", 1e2 * wall.bending_share},
+          {"strain_p99_percent", 1e2 * wall.strain_p99},
+          {"strain_max_percent", 1e2 * wall.strain_max}};
+}
+
+}  // namespace
+
 void report_state(Json& result, const Model& model, const State& state, const ElementFields& fields, bool dynamic) {
   double most = 0;
   for (const Vec3& u : state.displacement) {
@@ -139,11 +157,9 @@ void report_state(Json& result, const Model& model, const State& state, const El
   result["max_node_displacement_mm"] = most;
   if (!model.shells.empty()) {
     result["displacement_p99_mm"] = fields.displacement_p99;
-    result["wall"] = {{"stress_p99_mpa", fields.wall.stress_p99},
-                      {"stress_max_mpa", fields.wall.stress_max},
-                      {"stress_max_at_mm", triple(fields.wall.stress_max_at)},
-                      {"strain_p99_percent", 1e2 * fields.wall.strain_p99},
-                      {"strain_max_percent", 1e2 * fields.wall.strain_max}};
+    result["wall"] = wall_report(fields.wall);
+    result["wall"]["left_out_percent"] = 1e2 * fields.wall.left_out;
+    result["wall"]["whole"] = wall_report(fields.wall.whole);
   }
   if (result["volume_before_mm3"].is_null()) {
     result["volume_before_mm3"] = or_null(state.volume);
@@ -245,14 +261,90 @@ Json accuracy_report(const Accuracy& accuracy) {
 Json unloaded_report(const Unloaded& unloaded) {
   return {{"volume_mm3", or_null(unloaded.volume)},
           {"distance_mm", {{"mean", unloaded.mean_distance}, {"max", unloaded.largest_distance}}},
+          {"roundness", unloaded.roundness
+                            ? Json{{"image", unloaded.roundness->image}, {"unloaded", unloaded.roundness->unloaded}}
+                            : Json()},
           {"iterations", unloaded.iterations}};
+}
+
+std::vector<Warning> unloaded_warnings(const Unloaded& unloaded) {
+  constexpr double doubtful = 0.5;
+  if (!unloaded.roundness || unloaded.roundness->unloaded >= doubtful * unloaded.roundness->image) {
+    return {};
+  }
+  return {
+      {Weight::major, "unloaded shape",
+       fmt::format("without its pressure a section is no longer round (4 pi area / perimeter^2 falls from {:.2g} to "
+                   "{:.2g}): a living wall hardly folds like that, so the unloaded shape is doubtful; without "
+                   "--unloaded the wall is prestressed as imaged instead",
+                   unloaded.roundness->image, unloaded.roundness->unloaded)}};
+}
+
+Json estimates_report(const Estimates& estimates) {
+  Json report = Json::object();
+  for (const auto& [key, estimate] : estimates) {
+    report[key] = {{"percent", known(100 * estimate.error)}, {"credible", estimate.credible}, {"from", estimate.from}};
+  }
+  return report;
+}
+
+namespace {
+
+/// An answer of which a notable error is told.
+struct TellingAnswer {
+  const char* key;
+  const char* name;
+  Quantity of;
+  double notable, large;
+};
+
+// The faces' stress holds bending, of which a mesh of the same shells says less.
+constexpr std::array<TellingAnswer, 3> telling_answers{
+    {{"membrane_p99_mpa", "the membrane stress of the wall", Quantity::membrane, 0.05, 0.15},
+     {"stress_p99_mpa", "the stress at the wall's faces", Quantity::stress, 0.15, 0.3},
+     {"max_displacement_mm", "the largest displacement", Quantity::displacement, 0.05, 0.15}}};
+
+/// Calls tell(answer, estimate) for what may be off by more than is notable.
+template <typename Tell>
+void for_each_notable(const Estimates& estimates, const Tell& tell) {
+  for (const TellingAnswer& answer : telling_answers) {
+    const auto found = estimates.find(answer.key);
+    if (found != estimates.end() && !(found->second.error < answer.notable)) {
+      tell(answer, found->second);
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<Warning> estimate_warnings(const Estimates& estimates) {
+  std::vector<Warning> warnings;
+  for_each_notable(estimates, [&](const TellingAnswer& answer, const Estimate& estimate) {
+    warnings.push_back(
+        {estimate.error < answer.large ? Weight::minor : Weight::major, "error of the mesh",
+         fmt::format("{} may be off by {:.2g} % by its mesh ({}): take more shells (SHELLS), or let "
+                     "--accuracy 5% --of {} (ACCURACY=5% OF={}) choose them",
+                     answer.name, 100 * estimate.error, estimate.from, name_of(answer.of), name_of(answer.of))});
+  });
+  return warnings;
+}
+
+Json prestress_report(const Model& model, double residual) {
+  Json pressure;
+  for (const Load& load : model.loads) {
+    if (const auto* p = std::get_if<PressureLoad>(&load.kind); p != nullptr && p->imaged_at) {
+      pressure = pressure.is_null() || pressure == *p->imaged_at ? Json(*p->imaged_at) : Json();
+    }
+  }
+  return {{"pressure_mpa", pressure}, {"residual", residual}};
 }
 
 namespace {
 
 // Stress in kPa, as pictures and pages have it.
 std::string value_text(Quantity of, double value) {
-  return of == Quantity::stress ? fmt::format("{:.5g} kPa", 1e3 * value) : fmt::format("{:.5g} {}", value, unit_of(of));
+  return of == Quantity::stress || of == Quantity::membrane ? fmt::format("{:.5g} kPa", 1e3 * value)
+                                                            : fmt::format("{:.5g} {}", value, unit_of(of));
 }
 
 }  // namespace
@@ -280,6 +372,14 @@ std::vector<std::string> accuracy_notes(const Accuracy& accuracy) {
     lines.push_back(fmt::format("the error of the {} is credibly below {:.2g} % of it ({:.2g} % asked for)",
                                 name_of(request.of), 100 * *accuracy.estimate, 100 * request.within));
   }
+  for_each_notable(accuracy.estimates, [&](const TellingAnswer& answer, const Estimate& estimate) {
+    if (answer.of != request.of) {
+      lines.push_back(
+          fmt::format("{} was not asked for, and may be off by {:.2g} % by its mesh: --of {} (OF={}) asks "
+                      "for it",
+                      answer.name, 100 * estimate.error, name_of(answer.of), name_of(answer.of)));
+    }
+  });
   for (const AccuracyChoice& choice : accuracy.choices) {
     lines.push_back(
         fmt::format("{}: {}; {} instead: {}", choice.part, choice.chosen, choice.instead, choice.would_cost));
@@ -305,21 +405,45 @@ std::string modes_note(const Summary& summary, std::size_t asked) {
                      values.size() < asked ? fmt::format(", of {} asked for: there are no more", asked) : "");
 }
 
-std::vector<Warning> contact_warnings(const Json& result) {
+std::vector<Warning> contact_warnings(const Model& model, const Summary& summary, const Json& result) {
   std::vector<Warning> warnings;
-  if (!result.contains("contacts")) {
-    return warnings;
-  }
-  for (const auto& [name, record] : result["contacts"].items()) {
-    const Json& points = record["points"];
-    if (!points.empty() && std::all_of(points.begin(), points.end(), [](const Json& n) { return n == 0; })) {
-      warnings.push_back(
-          {Weight::major, "no contact",
-           fmt::format("{}: nothing touches at the end of any step: do these bodies come together?", name)});
+  for (std::size_t c = 0; c < model.contacts.size() && result.contains("contacts"); ++c) {
+    const std::string& name = model.contacts[c].name;
+    const Json& points = result["contacts"][name]["points"];
+    if (points.empty() || std::any_of(points.begin(), points.end(), [](const Json& n) { return n != 0; })) {
+      continue;
+    }
+    if (c < summary.contact_pressures.size() && summary.contact_pressures[c] > 0) {
+      warnings.push_back({Weight::note, "contact within steps",
+                          fmt::format("{}: touches within steps only, with up to {}, and at the end of none: shorter "
+                                      "steps show where",
+                                      name, pressure_text(summary.contact_pressures[c]))});
+    } else {
+      warnings.push_back({Weight::major, "no contact",
+                          fmt::format("{}: nothing touches in any step: do these bodies come together?", name)});
     }
   }
   return warnings;
 }
+
+namespace {
+
+/// What the numbers of the wall are of.
+void add_wall_notes(const Wall& wall, std::vector<Warning>& warnings) {
+  if (wall.is_all_near) {
+    warnings.push_back({Weight::note, "whole wall counted",
+                        "all of the wall lies within two bending lengths sqrt(R t) of rims, supports, point loads or "
+                        "jumps of the thickness, so nothing of it is left out of the numbers of the wall"});
+  }
+  if (wall.is_max_on_held) {
+    warnings.push_back({Weight::note, "largest stress at a support",
+                        fmt::format("the largest stress of the whole wall, {}, lies on a held rim or another support, "
+                                    "and says more of the support than of the organ",
+                                    pressure_text(wall.whole.stress_max))});
+  }
+}
+
+}  // namespace
 
 std::vector<Warning> run_warnings(const RunSettings& run, const Summary& summary, const LastState& last) {
   std::vector<Warning> warnings;
@@ -332,6 +456,7 @@ std::vector<Warning> run_warnings(const RunSettings& run, const Summary& summary
              "about 10 %",
              1e2 * last.wall.strain_p99)});
   }
+  add_wall_notes(last.wall, warnings);
   constexpr double notable_turn = 0.02, large_turn = 0.1;
   if (const double error = 1 - std::cos(std::min(last.turn_p99, std::numbers::pi / 2)); error > notable_turn) {
     warnings.push_back(

@@ -3,7 +3,7 @@
 #include "tunica/accuracy/accuracy.hpp"
 #include "tunica/core/json.hpp"
 #include "tunica/core/warning.hpp"
-#include "tunica/mechanics/runs/solve.hpp"
+#include "tunica/mechanics/runs/fields.hpp"
 #include "tunica/mechanics/runs/unloaded.hpp"
 
 /// What a report says of a simulation, key by key as the contract names them (mm, MPa, mJ, s).
@@ -30,6 +30,18 @@ Json accuracy_report(const Accuracy& accuracy);
 /// The shape without the pressure under which the organ was imaged.
 Json unloaded_report(const Unloaded& unloaded);
 
+/// Where it is hardly that of a living wall.
+std::vector<Warning> unloaded_warnings(const Unloaded& unloaded);
+
+/// How far the answers may be off, by their keys in the report.
+Json estimates_report(const Estimates& estimates);
+
+/// What a user should know of those that no accuracy was asked for: the answers that are off by more than is notable.
+std::vector<Warning> estimate_warnings(const Estimates& estimates);
+
+/// What the wall bears where the image shows it.
+Json prestress_report(const Model& model, double residual);
+
 /// A level on a line.
 std::string level_note(const AccuracyLevel& level, const AccuracyRequest& request);
 
@@ -53,8 +65,8 @@ struct LastState {
 /// What a user should know of a run that has ended well.
 std::vector<Warning> run_warnings(const RunSettings& run, const Summary& summary, const LastState& last);
 
-/// Contacts in which nothing ever touches.
+/// Contacts in which nothing ever touches; a note of those in which something does within steps only.
 /// @param result  of a run that has ended
-std::vector<Warning> contact_warnings(const Json& result);
+std::vector<Warning> contact_warnings(const Model& model, const Summary& summary, const Json& result);
 
 }  // namespace tunica

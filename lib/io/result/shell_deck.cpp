@@ -66,6 +66,15 @@ void require_expressible(const Model& model, const RunSettings& run, Deck deck) 
     if (!fix.ramp.points.empty()) {
       refuse(deck, "a fix has a ramp, and the file has one step in which displacements grow in proportion");
     }
+    if (fix.across) {
+      refuse(deck, "the file holds nodes along the axes of the world, and rims slide in planes of their own");
+    }
+  }
+  if (!model.supports.empty()) {
+    refuse(deck, "the file has no elastic beds, and a shell lies in one");
+  }
+  if (model.is_imaged_under_pressure()) {
+    refuse(deck, "the file has no prestress, and the wall is imaged under pressure");
   }
   require_loads(model, statics->linear, deck);
   if (deck == Deck::feb) {

@@ -38,7 +38,10 @@ Load resolve_load(const Scene& scene, const SceneLoad& load, std::size_t body_nu
   Load result{body_number, load.kind, load.ramp, said_at(scene, load.places.item)};
   if (load.where) {
     const std::vector<Index> nodes = nodes_of(body, *load.where, load.places);
-    if (auto* force = std::get_if<ForceLoad>(&result.kind)) {
+    if (auto* pressure = std::get_if<PressureLoad>(&result.kind)) {
+      require_triangle(body, nodes, load.places);
+      pressure->nodes = nodes;
+    } else if (auto* force = std::get_if<ForceLoad>(&result.kind)) {
       force->nodes = nodes;
     } else if (auto* moment = std::get_if<MomentLoad>(&result.kind)) {
       moment->nodes = nodes;
@@ -47,6 +50,34 @@ Load resolve_load(const Scene& scene, const SceneLoad& load, std::size_t body_nu
     }
   }
   return result;
+}
+
+// A fix per rim.
+void resolve_slide(const SceneFix& fix, std::size_t number, const SelectableBody& body, const std::string& said_at,
+                   Model& model) {
+  for (Rim& rim : rims_within(body, nodes_of(body, fix.where, fix.places), fix.places)) {
+    Fix slide;
+    slide.body = number;
+    slide.nodes = std::move(rim.nodes);
+    slide.said_at = said_at;
+    slide.across = rim.normal;
+    model.fixes.push_back(std::move(slide));
+  }
+}
+
+// Where a body lies in a bed or slides on rims, and nothing else holds it, what these leave is held by rigid motions.
+void hold_the_rest(const Scene& scene, Model& model) {
+  for (std::size_t b = 0; b < model.shells.size(); ++b) {
+    const auto names = [&](const auto& item) { return item.body == b; };
+    const bool held = std::ranges::any_of(model.fixes, [&](const Fix& fix) { return names(fix) && !fix.across; });
+    const bool partly = std::ranges::any_of(model.fixes, names) || std::ranges::any_of(model.supports, names);
+    const bool touched = std::ranges::any_of(scene.attachments, [&](const SceneAttach& attach) {
+      return attach.body == scene.shells[b].name || attach.to == scene.shells[b].name;
+    });
+    if (partly && !held && !touched && std::ranges::none_of(model.rigid_motions, names)) {
+      model.rigid_motions.push_back({b});
+    }
+  }
 }
 
 std::vector<Index> attached_nodes(const Model& model, const SceneAttach& attach, std::size_t to,
@@ -255,11 +286,20 @@ Model resolve_scene(const Scene& scene, SceneBodies parts) {
     const std::size_t b = body_index(scene, fix.body, fix.places);
     if (std::holds_alternative<RigidMotions>(fix.where)) {
       model.rigid_motions.push_back({b});
+    } else if (fix.slide) {
+      resolve_slide(fix, b, bodies[b], said_at(scene, fix.places.item), model);
     } else {
       model.fixes.push_back({b, nodes_of(bodies[b], fix.where, fix.places), fix.translation, fix.rotation,
                              fix.displacement.value_or(Vec3::Zero()), fix.ramp, said_at(scene, fix.places.item)});
     }
   }
+  for (const SceneSupport& support : scene.supports) {
+    const std::size_t b = body_index(scene, support.body, support.places);
+    const std::vector<Index> nodes = nodes_of(bodies[b], support.where.value_or(AllNodes{}), support.places);
+    require_triangle(bodies[b], nodes, support.places);
+    model.supports.push_back({b, nodes, support.stiffness, support.normal_only, said_at(scene, support.places.item)});
+  }
+  hold_the_rest(scene, model);
   for (const SceneLoad& load : scene.loads) {
     const std::size_t b = body_index(scene, load.body, load.places);
     model.loads.push_back(resolve_load(scene, load, b, bodies[b]));

@@ -123,12 +123,22 @@ struct SceneFix {
   std::array<bool, 3> rotation{true, true, true};
   std::optional<Vec3> displacement;  ///< mm
   Ramp ramp;
+  bool slide = false;  ///< the rims wholly in `where` stay in their planes, and nothing else is held
+  Places places;
+};
+
+/// An elastic bed of a shell.
+struct SceneSupport {
+  std::string body;
+  std::optional<Selection> where;  ///< none: all of it
+  double stiffness = 0;            ///< MPa/mm
+  bool normal_only = false;
   Places places;
 };
 
 struct SceneLoad {
   std::string body;
-  std::optional<Selection> where;  ///< force, moment, edge
+  std::optional<Selection> where;  ///< pressure, where it is not all; force, moment, edge
   decltype(Load::kind) kind;       ///< nodes and edges still empty
   Ramp ramp;
   Places places;
@@ -169,6 +179,9 @@ struct SceneAccuracy {
   Places places;
 };
 
+/// MPa: the stiffness of a wall of which none is stated, because none is needed.
+inline constexpr double any_young = 1;
+
 struct Scene {
   RunSettings run;
   std::optional<SceneAccuracy> accuracy;
@@ -179,6 +192,7 @@ struct Scene {
   std::vector<SceneSolid> solids;
   std::vector<SceneRigid> rigids;
   std::vector<SceneFix> fixes;
+  std::vector<SceneSupport> supports;
   std::vector<SceneLoad> loads;
   std::vector<SceneAttach> attachments;
   std::vector<SceneContact> contacts;
@@ -202,6 +216,9 @@ void settle_until(Scene& scene);
 /// Checks all that can be checked without a mesh: ranges, signs, required densities, names, duplicates.
 /// Errors: InputError or UsageError that starts with the place.
 void check_scene(const Scene& scene);
+
+/// Whether what a scene says of places, loads and supports can be said of finer meshes of the same bodies.
+bool holds_for_finer_meshes(const Scene& scene);
 
 struct LoadedScene {
   Model model;

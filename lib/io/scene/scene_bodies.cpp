@@ -25,9 +25,11 @@ void read_size(const SceneTable& table, Body& body) {
   }
 }
 
-Material read_material(const SceneTable& table) {
+/// @param needs_young  else it may be left out, where nothing depends on it
+Material read_material(const SceneTable& table, bool needs_young) {
   Material material;
-  material.young = table.quantity("young", dimension::pressure);
+  material.young_stated = needs_young || table.has("young");
+  material.young = material.young_stated ? table.quantity("young", dimension::pressure) : any_young;
   material.poisson = table.number("poisson");
   if (table.has("density")) {
     material.density = table.quantity("density", dimension::density);
@@ -139,7 +141,7 @@ void read_shell(const toml::table& node, const std::string& file, const std::fil
   if (!shell.thickness_from) {
     shell.thickness = table.quantity("thickness", dimension::length, " (nor thickness_from)");
   }
-  shell.material = read_material(table);
+  shell.material = read_material(table, false);
   table.choice<Membrane>("membrane", shell.membrane,
                          {{"cst", Membrane::cst}, {"opt", Membrane::opt}, {"adapt", Membrane::adapt}});
   table.choice<Bending>("bending", shell.bending,
@@ -167,7 +169,7 @@ void read_solid(const toml::table& node, const std::string& file, const std::fil
     solid.mesh = folder / table.text_of(table.required("mesh", " (nor fill)"), "mesh");
   }
   read_size(table, solid);
-  solid.material = read_material(table);
+  solid.material = read_material(table, true);
   table.choice<SolidLaw>("law", solid.law,
                          {{"corotational", SolidLaw::corotational}, {"neo-hookean", SolidLaw::neo_hookean}});
   scene.solids.push_back(std::move(solid));

@@ -47,6 +47,8 @@ void check_run(const Scene& scene) {
           "converge must be greater than 0 and less than 1");
 }
 
+bool is_list(const std::optional<Selection>& where) { return where && std::holds_alternative<ListedNodes>(*where); }
+
 bool any(const std::array<bool, 3>& held) { return held[0] || held[1] || held[2]; }
 
 std::string_view needs_density(const Scene& scene) {
@@ -58,12 +60,18 @@ std::string_view needs_density(const Scene& scene) {
 /// @param body  a shell or a solid of the scene; section  its name in the file
 /// @param needed_by  what of the run needs a density; empty where nothing does
 template <typename SceneBody>
-void check_material(const SceneBody& body, std::string_view section, std::string_view needed_by) {
+void check_material(const SceneBody& body, std::string_view section, std::string_view needed_by, bool needs_no_young) {
   const Places& places = body.places;
   const Material& material = body.material;
   require(!body.name.empty(), places.of("name"), "name is empty");
   require(is_positive(body.scale), places.of("scale"), "scale must be greater than zero");
   require(is_positive(material.young), places.of("young"), "young must be greater than zero");
+  require(
+      material.young_stated || needs_no_young, places.item,
+      fmt::format(
+          "[[{}]] \"{}\" has no young, for example young = \"1MPa\": it can be left out only where a static run puts "
+          "nothing on shells but the pressure that they were imaged under",
+          section, body.name));
   require(material.poisson > -1 && material.poisson < 0.5, places.of("poisson"),
           fmt::format("poisson {} is outside (-1, 0.5)", material.poisson));
   require(!material.density || is_positive(*material.density), places.of("density"),
@@ -72,11 +80,26 @@ void check_material(const SceneBody& body, std::string_view section, std::string
           fmt::format("[[{}]] \"{}\" has no density: {} needs it", section, body.name, needed_by));
 }
 
-void check_shell(const SceneShell& shell, std::string_view needed_by) {
+/// Whether the shells rest as they were imaged, so that equilibrium decides their stress, whatever their stiffness.
+bool rests_as_imaged(const Scene& scene) {
+  const bool alone =
+      scene.solids.empty() && scene.rigids.empty() && scene.contacts.empty() && scene.attachments.empty();
+  return alone && std::holds_alternative<StaticRun>(scene.run.kind) && !scene.loads.empty() &&
+         std::ranges::all_of(scene.loads,
+                             [](const SceneLoad& load) {
+                               const auto* pressure = std::get_if<PressureLoad>(&load.kind);
+                               return pressure != nullptr && pressure->value != 0 &&
+                                      pressure->imaged_at == pressure->value && !pressure->unload;
+                             }) &&
+         std::ranges::none_of(scene.fixes, [](const SceneFix& fix) { return fix.displacement.has_value(); }) &&
+         std::ranges::none_of(scene.shells, [](const SceneShell& shell) { return shell.material.young_stated; });
+}
+
+void check_shell(const SceneShell& shell, std::string_view needed_by, bool needs_no_young) {
   require(!shell.mesh.filename().empty(), shell.places.of("mesh"), "mesh names no file");
   require(shell.thickness_from || is_positive(shell.thickness), shell.places.of("thickness"),
           "thickness must be greater than zero");
-  check_material(shell, "shell", needed_by);
+  check_material(shell, "shell", needed_by, needs_no_young);
 }
 
 void check_solid(const SceneSolid& solid, std::string_view needed_by) {
@@ -84,7 +107,7 @@ void check_solid(const SceneSolid& solid, std::string_view needed_by) {
   require(!solid.mesh.filename().empty(), solid.places.of(solid.fill_size ? "fill" : "mesh"),
           fmt::format("{} names no file", solid.fill_size ? "fill" : "mesh"));
   require(!solid.fill_size || is_positive(*solid.fill_size), solid.places.of("size"), "size must be greater than zero");
-  check_material(solid, "solid", needed_by);
+  check_material(solid, "solid", needed_by, false);
   require(
       solid.material.poisson <= largest_poisson, solid.places.of("poisson"),
       fmt::format("poisson {} of a solid is above {}: choose at most that", solid.material.poisson, largest_poisson));
@@ -107,7 +130,7 @@ void check_bodies(const Scene& scene) {
             fmt::format("there are two bodies named \"{}\"", body.name));
   };
   for (const SceneShell& shell : scene.shells) {
-    check_shell(shell, needs_density(scene));
+    check_shell(shell, needs_density(scene), rests_as_imaged(scene));
     require_new(shell);
   }
   for (const SceneSolid& solid : scene.solids) {
@@ -136,6 +159,14 @@ void check_fix(const Scene& scene, const SceneFix& fix) {
     require(!any(fix.rotation), fix.places.of("rotation"),
             "the nodes of a solid have no rotation: remove it, or write \"\"");
   }
+  const bool rigid = std::holds_alternative<RigidMotions>(fix.where);
+  const bool held_besides = std::ranges::any_of(scene.fixes, [&](const SceneFix& other) {
+    return other.body == fix.body && !other.slide && !std::holds_alternative<RigidMotions>(other.where);
+  });
+  require(!rigid || !held_besides, fix.places.of("where"),
+          fmt::format("\"{}\" is held by its rigid motions and by another fix: keep one of them", fix.body));
+  require(!fix.slide || !is_solid(scene, body), fix.places.of("slide"),
+          "a slide is of the rims of shells, and this is a solid: remove it");
   require(any(fix.translation) || any(fix.rotation), fix.places.of("translation"),
           "this [[fix]] holds nothing: name an axis in translation or rotation, or remove it");
   if (fix.displacement) {
@@ -144,6 +175,12 @@ void check_fix(const Scene& scene, const SceneFix& fix) {
               fmt::format("displacement along {0} is prescribed but not held: add {0} to translation", "xyz"[axis]));
     }
   }
+}
+
+void check_support(const Scene& scene, const SceneSupport& support) {
+  require(!is_solid(scene, body_index(scene, support.body, support.places)), support.places.of("body"),
+          "a bed supports shells, and this is a solid: hold it by a [[fix]]");
+  require(is_positive(support.stiffness), support.places.of("stiffness"), "stiffness must be greater than zero");
 }
 
 // What a load can act on.
@@ -194,12 +231,15 @@ void check_accuracy(const Scene& scene) {
   // A finer mesh has nodes between those of a list, of which the list says nothing.
   const auto refuse_list = [](const std::optional<Selection>& where, const Places& of) {
     require(
-        !where || !std::holds_alternative<ListedNodes>(*where), of.of("where"),
+        !is_list(where), of.of("where"),
         "a list of nodes holds for one mesh, and an accuracy takes finer ones: select by place (box, below, sphere, "
         "nearest …)");
   };
   for (const SceneFix& fix : scene.fixes) {
     refuse_list(fix.where, fix.places);
+  }
+  for (const SceneSupport& support : scene.supports) {
+    refuse_list(support.where, support.places);
   }
   for (const SceneLoad& load : scene.loads) {
     refuse_list(load.where, load.places);
@@ -235,18 +275,21 @@ void refuse_later(const Scene& scene) {
   }
   for (const SceneLoad& load : scene.loads) {
     const auto* pressure = std::get_if<PressureLoad>(&load.kind);
-    if (pressure == nullptr || !pressure->imaged_at) {
+    if (pressure == nullptr || !pressure->unload) {
       continue;
     }
+    if (!scene.supports.empty()) {
+      scene.supports.front().places.item.fail(
+          "a bed is without force in the imaged shape, and the unloaded shape is another: remove one of them");
+    }
     if (scene.accuracy) {
-      load.places.of("imaged_at").fail_later("imaged_at and an accuracy in one run");
+      load.places.of("unload").fail_later("an unloaded shape and an accuracy in one run");
     }
     if (!(scene.solids.empty() && scene.rigids.empty() && scene.attachments.empty() && scene.contacts.empty())) {
-      load.places.of("imaged_at").fail_later("imaged_at beside [[solid]], [[rigid]], [[attach]] or [[contact]]");
+      load.places.of("unload").fail_later("an unloaded shape beside [[solid]], [[rigid]], [[attach]] or [[contact]]");
     }
   }
 }
-
 }  // namespace
 
 void check_scene(const Scene& scene) {
@@ -255,6 +298,9 @@ void check_scene(const Scene& scene) {
   check_bodies(scene);
   for (const SceneFix& fix : scene.fixes) {
     check_fix(scene, fix);
+  }
+  for (const SceneSupport& support : scene.supports) {
+    check_support(scene, support);
   }
   const bool finds_factor = std::holds_alternative<ArcLengthRun>(scene.run.kind);
   const auto refuse_ramp = [&](const Ramp& ramp, const Places& places) {
@@ -280,6 +326,12 @@ void check_scene(const Scene& scene) {
   if (scene.accuracy) {
     check_accuracy(scene);
   }
+}
+
+bool holds_for_finer_meshes(const Scene& scene) {
+  const auto listed = [](const auto& item) { return is_list(item.where); };
+  return scene.solids.empty() && scene.rigids.empty() && scene.attachments.empty() && scene.contacts.empty() &&
+         std::ranges::none_of(scene.fixes, listed) && std::ranges::none_of(scene.loads, listed);
 }
 
 }  // namespace tunica

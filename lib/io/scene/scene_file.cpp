@@ -236,7 +236,9 @@ void read_accuracy(const toml::table& node, const std::string& file, const fs::p
                            {{"displacement", Quantity::displacement},
                             {"energy", Quantity::energy},
                             {"volume", Quantity::volume},
-                            {"stress", Quantity::stress}});
+                            {"stress", Quantity::stress},
+                            {"membrane", Quantity::membrane},
+                            {"tension", Quantity::tension}});
   }
   if (table.has("target")) {
     for (const auto& [name, path] : table.table("target", R"({vessel = "surface.ply"})")) {
@@ -250,7 +252,17 @@ void read_fix(const SceneTable& table, bool dynamic, Scene& scene) {
   fix.places = table.places();
   fix.body = table.text("body");
   fix.where = read_where(table);
-  if (std::holds_alternative<RigidMotions>(fix.where)) {
+  fix.slide = table.has("slide") && table.flag("slide");
+  if (std::holds_alternative<RigidMotions>(fix.where) && table.has("slide")) {
+    table.place("slide").fail("slide means nothing beside rigid_motions: remove it");
+  }
+  if (fix.slide) {
+    for (const std::string_view key : {"translation", "rotation", "displacement", "ramp"}) {
+      if (table.has(key)) {
+        table.place(key).fail(fmt::format("{} means nothing beside slide = true: remove it", key));
+      }
+    }
+  } else if (std::holds_alternative<RigidMotions>(fix.where)) {
     for (const std::string_view key : {"translation", "rotation", "displacement", "ramp"}) {
       if (table.has(key)) {
         table.place(key).fail(fmt::format("{} means nothing beside rigid_motions: remove it", key));
@@ -276,8 +288,26 @@ void read_fix(const SceneTable& table, bool dynamic, Scene& scene) {
   scene.fixes.push_back(std::move(fix));
 }
 
+void read_support(const toml::table& node, const std::string& file, Scene& scene) {
+  constexpr std::array<std::string_view, 4> keys{"body", "where", "stiffness", "direction"};
+  const SceneTable table(node, file, "[[support]]", keys);
+  SceneSupport support;
+  support.places = table.places();
+  support.body = table.text("body");
+  if (table.has("where")) {
+    support.where = read_where(table);
+    if (std::holds_alternative<RigidMotions>(*support.where)) {
+      table.place("where").fail("rigid_motions belongs to [[fix]]: select nodes");
+    }
+  }
+  support.stiffness = table.quantity("stiffness", dimension::bedding);
+  table.choice<bool>("direction", support.normal_only, {{"all", false}, {"normal", true}});
+  scene.supports.push_back(std::move(support));
+}
+
 void read_load(const toml::table& node, const std::string& file, bool dynamic, Scene& scene) {
-  constexpr std::array<std::string_view, 7> all{"body", "kind", "value", "follower", "ramp", "where", "imaged_at"};
+  constexpr std::array<std::string_view, 8> all{"body", "kind",  "value",     "follower",
+                                                "ramp", "where", "imaged_at", "unload"};
   const SceneTable table(node, file, "[[load]]", all);
   SceneLoad load;
   load.places = table.places();
@@ -292,12 +322,13 @@ void read_load(const toml::table& node, const std::string& file, bool dynamic, S
                       {"edge", Kind::edge},
                       {"area", Kind::area},
                       {"gravity", Kind::gravity}});
-  for (const char* key : {"follower", "imaged_at"}) {
+  for (const char* key : {"follower", "imaged_at", "unload"}) {
     if (kind != Kind::pressure && table.has(key)) {
       table.place(key).fail(fmt::format("{} belongs to a pressure: remove it", key));
     }
   }
-  if (kind == Kind::force || kind == Kind::moment || kind == Kind::edge) {
+  const bool of_nodes = kind == Kind::force || kind == Kind::moment || kind == Kind::edge;
+  if (of_nodes || (kind == Kind::pressure && table.has("where"))) {
     (void)table.required("where", " (which nodes carry the load)");
     load.where = read_where(table);
     if (std::holds_alternative<RigidMotions>(*load.where)) {
@@ -311,7 +342,11 @@ void read_load(const toml::table& node, const std::string& file, bool dynamic, S
     case Kind::pressure:
       load.kind = PressureLoad{
           table.quantity("value", dimension::pressure), !table.has("follower") || table.flag("follower"),
-          table.has("imaged_at") ? std::optional(table.quantity("imaged_at", dimension::pressure)) : std::nullopt};
+          table.has("imaged_at") ? std::optional(table.quantity("imaged_at", dimension::pressure)) : std::nullopt,
+          table.has("unload") && table.flag("unload")};
+      if (table.has("unload") && !table.has("imaged_at")) {
+        table.place("unload").fail("unload takes off the pressure of the image: add imaged_at, or remove unload");
+      }
       break;
     case Kind::force:
       load.kind = ForceLoad{{}, table.vector("value", dimension::force, R"(["0N", "0N", "-1N"])")};
@@ -374,7 +409,7 @@ Scene read_scene(const fs::path& path) { return parse_scene(read_file(path, most
 Scene parse_scene(const std::string& text, const fs::path& name) {
   const std::string file = name.string();
   const toml::table root = parse_toml(text, file);
-  constexpr std::array<std::string_view, 10> sections{"run",  "shell",  "solid",   "rigid", "fix",
+  constexpr std::array<std::string_view, 11> sections{"run",  "shell",  "solid",   "rigid", "fix",     "support",
                                                       "load", "attach", "contact", "probe", "accuracy"};
   const SceneTable top(root, file, "the scene", sections);
 
@@ -396,10 +431,13 @@ Scene parse_scene(const std::string& text, const fs::path& name) {
   for (const toml::table* table : tables_of(root, "rigid", top)) {
     read_rigid(*table, file, folder, dynamic, scene);
   }
-  constexpr std::array<std::string_view, 6> fix_keys{"body",     "where",        "translation",
-                                                     "rotation", "displacement", "ramp"};
+  constexpr std::array<std::string_view, 7> fix_keys{"body",         "where", "translation", "rotation",
+                                                     "displacement", "ramp",  "slide"};
   for (const toml::table* table : tables_of(root, "fix", top)) {
     read_fix(SceneTable(*table, file, "[[fix]]", fix_keys), dynamic, scene);
+  }
+  for (const toml::table* table : tables_of(root, "support", top)) {
+    read_support(*table, file, scene);
   }
   for (const toml::table* table : tables_of(root, "load", top)) {
     read_load(*table, file, dynamic, scene);

@@ -260,7 +260,9 @@ void write_file(std::string_view key, const std::filesystem::path& mesh, std::op
 }
 
 void write_material(const Material& material, Text& text) {
-  text.value("young", material.young, "Pa", dimension::pressure);
+  if (material.young_stated) {
+    text.value("young", material.young, "Pa", dimension::pressure);
+  }
   text.line("poisson", number(material.poisson));
   if (material.density) {
     text.value("density", *material.density, "kg/m3", dimension::density);
@@ -374,6 +376,10 @@ void write_fix(const SceneFix& fix, bool dynamic, Text& text) {
   if (std::holds_alternative<RigidMotions>(fix.where)) {
     return;
   }
+  if (fix.slide) {
+    text.line("slide", "true");
+    return;
+  }
   text.word("translation", components(fix.translation));
   text.word("rotation", components(fix.rotation));
   if (fix.displacement) {
@@ -382,12 +388,23 @@ void write_fix(const SceneFix& fix, bool dynamic, Text& text) {
   text.ramp(fix.ramp, dynamic);
 }
 
+void write_support(const SceneSupport& support, Text& text) {
+  text.section("[[support]]");
+  text.word("body", support.body);
+  if (support.where) {
+    text.line("where", where_text(*support.where));
+  }
+  text.value("stiffness", support.stiffness, "N/m3", dimension::bedding);
+  text.word("direction", support.normal_only ? "normal" : "all");
+}
+
 void write_kind(const PressureLoad& load, Text& text) {
   text.word("kind", "pressure");
   text.value("value", load.value, "Pa", dimension::pressure);
   text.line("follower", load.follower ? "true" : "false");
   if (load.imaged_at) {
     text.value("imaged_at", *load.imaged_at, "Pa", dimension::pressure);
+    text.line("unload", load.unload ? "true" : "false");
   }
 }
 void write_kind(const ForceLoad& load, Text& text) {
@@ -467,6 +484,9 @@ std::string scene_text(const Scene& scene, const std::filesystem::path& file) {
   }
   for (const SceneFix& fix : scene.fixes) {
     write_fix(fix, dynamic, text);
+  }
+  for (const SceneSupport& support : scene.supports) {
+    write_support(support, text);
   }
   for (const SceneLoad& load : scene.loads) {
     text.section("[[load]]");

@@ -1,5 +1,6 @@
 #include "tunica/io/scene/detail/selection.hpp"
 
+#include "tunica/core/disjoint_sets.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/shell/distance/patch_search.hpp"
 #include "tunica/surface/distance/closest_point.hpp"
@@ -7,9 +8,10 @@
 #include "tunica/surface/mesh/tet_checks.hpp"
 
 #include <fmt/format.h>
-#include <Eigen/Geometry>
+#include <Eigen/Dense>
 
 #include <algorithm>
+#include <map>
 #include <set>
 
 namespace tunica {
@@ -151,6 +153,7 @@ double thickness_at(const ShellBody& shell, Index triangle, const Vec2& at) {
 SelectableBody::SelectableBody(const ShellBody& shell)
     : vertices_(shell.mesh.vertices),
       solid_(false),
+      triangles_(shell.mesh.triangles),
       edges_(boundary_edges_of(shell.mesh)),
       boundary_(nodes_in(edges_)),
       used_(used_by(shell.mesh.triangles, vertices_.size())) {
@@ -160,7 +163,8 @@ SelectableBody::SelectableBody(const ShellBody& shell)
 SelectableBody::SelectableBody(const SolidBody& solid)
     : vertices_(solid.mesh.vertices),
       solid_(true),
-      boundary_(nodes_in(boundary_triangles(solid.mesh))),
+      triangles_(boundary_triangles(solid.mesh)),
+      boundary_(nodes_in(triangles_)),
       used_(used_by(solid.mesh.tetrahedra, vertices_.size())) {
   measure();
 }
@@ -211,6 +215,53 @@ std::vector<std::array<Index, 2>> edges_of(const SelectableBody& body, const std
                                  places.of("where").text, nodes.size()));
   }
   return edges;
+}
+
+void require_triangle(const SelectableBody& body, const std::vector<Index>& nodes, const Places& places) {
+  std::vector<char> chosen(body.vertices().size(), 0);
+  for (const Index node : nodes) {
+    chosen[node] = 1;
+  }
+  const bool any = std::ranges::any_of(
+      body.triangles(), [&](const auto& t) { return (chosen[t[0]] & chosen[t[1]] & chosen[t[2]]) != 0; });
+  if (!any) {
+    throw InputError(fmt::format("{}: no triangle has all its nodes among the {} selected: select more",
+                                 places.of("where").text, nodes.size()));
+  }
+}
+
+std::vector<Rim> rims_within(const SelectableBody& body, const std::vector<Index>& nodes, const Places& places) {
+  DisjointSets joined(body.vertices().size());
+  for (const auto& [from, to] : body.boundary_edges()) {
+    joined.join(from, to);
+  }
+  std::map<Index, Rim> loops;  // by root
+  for (const Index node : body.boundary_nodes()) {
+    loops[joined.root(node)].nodes.push_back(node);
+  }
+  std::vector<Rim> rims;
+  for (auto& [root, rim] : loops) {
+    if (!std::ranges::includes(nodes, rim.nodes)) {
+      continue;
+    }
+    Vec3 centre = Vec3::Zero();
+    for (const Index node : rim.nodes) {
+      centre += body.vertices()[node] / real(rim.nodes.size());
+    }
+    Mat3 spread = Mat3::Zero();
+    for (const Index node : rim.nodes) {
+      const Vec3 arm = body.vertices()[node] - centre;
+      spread += arm * arm.transpose();
+    }
+    rim.normal = Eigen::SelfAdjointEigenSolver<Mat3>(spread).eigenvectors().col(0);
+    rims.push_back(std::move(rim));
+  }
+  if (rims.empty()) {
+    throw InputError(fmt::format("{}: no rim has all its nodes among the {} selected: select more, or all by boundary",
+                                 places.of("where").text, nodes.size()));
+  }
+  std::ranges::sort(rims, {}, [](const Rim& rim) { return rim.nodes.front(); });
+  return rims;
 }
 
 std::vector<Index> nodes_touching(const SelectableBody& body, double distance, const ShellBody& carrier,

@@ -48,7 +48,8 @@ struct NameOfRegion {
 std::string text_of(const SceneFix& fix, bool alone) {
   const std::string& written = fix.places.item.typed;
   const std::string region = written.empty() ? std::visit(NameOfRegion(), fix.where) : written;
-  return alone ? region : fmt::format("{}: {}", fix.body, region);
+  const std::string held = written.empty() && fix.slide ? region + ":slide" : region;
+  return alone ? held : fmt::format("{}: {}", fix.body, held);
 }
 
 struct KindOfRun {
@@ -67,6 +68,7 @@ struct KindOfRun {
 
 Json stated_inputs(const Scene& scene) {
   constexpr double kg_per_m3 = 1e12;  // in a tonne / mm^3
+  constexpr double n_per_m3 = 1e9;    // in an N / mm^3
   std::vector<SceneLoad> pressures;
   for (const SceneLoad& load : scene.loads) {
     if (std::holds_alternative<PressureLoad>(load.kind)) {
@@ -76,7 +78,8 @@ Json stated_inputs(const Scene& scene) {
   const auto of_pressure = [](const SceneLoad& load) { return std::get<PressureLoad>(load.kind); };
   const auto of_shells = [&](const auto& value) { return common(scene.shells, value); };
   Json stated = std::visit(KindOfRun(), scene.run.kind);
-  stated["young_mpa"] = of_shells([](const SceneShell& shell) { return Json(shell.material.young); });
+  stated["young_mpa"] = of_shells(
+      [](const SceneShell& shell) { return shell.material.young_stated ? Json(shell.material.young) : Json(); });
   stated["poisson"] = of_shells([](const SceneShell& shell) { return Json(shell.material.poisson); });
   stated["thickness_mm"] =
       of_shells([](const SceneShell& shell) { return shell.thickness_from ? Json() : Json(shell.thickness); });
@@ -86,7 +89,10 @@ Json stated_inputs(const Scene& scene) {
   stated["imaged_at_mpa"] =
       common(pressures, [&](const SceneLoad& load) { return known_or_null(of_pressure(load).imaged_at); });
   stated["law"] = scene.shells.empty() ? Json() : Json("linear");
-  stated["support"] = nullptr;
+  stated["support"] = common(scene.supports, [](const SceneSupport& support) {
+    return Json{{"stiffness_n_per_m3", n_per_m3 * support.stiffness},
+                {"direction", support.normal_only ? "normal" : "all"}};
+  });
   stated["membrane"] = of_shells([](const SceneShell& shell) { return Json(name_of(shell.membrane)); });
   stated["bending"] = of_shells([](const SceneShell& shell) { return Json(name_of(shell.bending)); });
   stated["solver"] = scene.run.solver == Solver::cg ? "cg" : scene.run.solver == Solver::direct ? "direct" : "auto";

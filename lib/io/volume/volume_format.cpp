@@ -489,6 +489,9 @@ std::size_t choose_frame(VolumeFile& file, const fs::path& path, std::span<const
 
 std::optional<std::string> affine_error(const Eigen::Matrix<double, 3, 4>& affine) {
   constexpr double largest = 1e9;  // mm
+  // Of the product of a voxel's edges, its volume: below it, an axis lies within .6 degrees of the plane of the others,
+  // and voxels are slivers. A gantry tilted by 30 degrees leaves .87.
+  constexpr double least_volume = 0.01;
   if (!affine.allFinite()) {
     return "is not finite";
   }
@@ -500,9 +503,9 @@ std::optional<std::string> affine_error(const Eigen::Matrix<double, 3, 4>& affin
   if (axes.isZero(0)) {
     return "is all zero";
   }
-  if (!(spacing.minCoeff() > 1e-9) || !(std::abs(axes.determinant()) > 1e-6 * spacing.prod())) {
-    return fmt::format("is singular (voxels of {:.6g} x {:.6g} x {:.6g} mm with a volume of {:.6g} mm3)", spacing.x(),
-                       spacing.y(), spacing.z(), std::abs(axes.determinant()));
+  if (!(spacing.minCoeff() > 1e-9) || !(std::abs(axes.determinant()) >= least_volume * spacing.prod())) {
+    return fmt::format("is singular or nearly so (voxels of {:.6g} x {:.6g} x {:.6g} mm with a volume of {:.6g} mm3)",
+                       spacing.x(), spacing.y(), spacing.z(), std::abs(axes.determinant()));
   }
   return {};
 }

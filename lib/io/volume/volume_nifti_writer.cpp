@@ -148,7 +148,7 @@ private:
 
   void require(bool good) const {
     if (!good) {
-      throw OutputError(fmt::format("{}: cannot be written: {}", name_.string(), std::strerror(errno)));
+      throw OutputError(fmt::format("{}: cannot be written: {}", name_.string(), file_error()));
     }
   }
 

@@ -3,21 +3,34 @@
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/core/threads.hpp"
+#include "tunica/surface/mesh/checks.hpp"
+
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cstring>
+#include <functional>
 
 namespace tunica {
 
 std::size_t BlockMatrix::find(Index row, Index wanted) const {
+  const auto missing = [&] {
+    return InputError(fmt::format("block ({}, {}) is not in the pattern of the matrix", row, wanted));
+  };
+  if (row >= node_count()) {
+    throw missing();
+  }
   const auto begin = column.begin() + row_start[row];
   const auto end = column.begin() + row_start[row + 1];
   const auto place = std::lower_bound(begin, end, wanted);
-  TUNICA_ASSERT(place != end && *place == wanted);
+  if (place == end || *place != wanted) {
+    throw missing();
+  }
   return place - column.begin();
 }
 
 BlockMatrix make_block_matrix(std::size_t nodes, const std::vector<std::array<Index, 3>>& triangles) {
+  require_corners(nodes, triangles);
   std::vector<std::uint64_t> pairs;
   pairs.reserve(nodes + 6 * triangles.size());
   const auto pair = [](Index row, Index column) { return (std::uint64_t{row} << 32) | column; };
@@ -44,6 +57,12 @@ BlockMatrix make_block_matrix(std::size_t nodes, const std::vector<std::array<In
 
 BlockMatrix make_block_matrix(const std::vector<std::vector<Index>>& neighbours) {
   const std::size_t nodes = neighbours.size();
+  for (std::size_t i = 0; i < nodes; ++i) {
+    if (!std::ranges::is_sorted(neighbours[i], std::less_equal<>{}) ||
+        (!neighbours[i].empty() && neighbours[i].back() >= nodes)) {
+      throw InputError(fmt::format("the neighbours of node {} are not in order, or beyond the {} nodes", i, nodes));
+    }
+  }
   BlockMatrix matrix;
   matrix.row_start.assign(nodes + 1, 0);
   for (std::size_t i = 0; i < nodes; ++i) {
@@ -106,7 +125,14 @@ void multiply_block(const double* block, const double* x, double* y) {
   sum.store(y);
 }
 
+void require_freedoms(std::size_t count, std::size_t nodes) {
+  if (count != freedom(nodes, 0)) {
+    throw InputError(fmt::format("{} numbers for the {} freedoms of a matrix", count, freedom(nodes, 0)));
+  }
+}
+
 void multiply(const BlockMatrix& matrix, const VectorX& x, VectorX& y) {
+  require_freedoms(narrow<std::size_t>(x.size()), matrix.node_count());
   y.resize(x.size());
   parallel_for_blocks(matrix.node_count(), 256, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
@@ -133,6 +159,9 @@ void symmetrise(BlockMatrix& matrix) {
 
 double dot(const VectorX& a, const VectorX& b) {
   constexpr Eigen::Index grain = 8192;
+  if (a.size() != b.size()) {
+    throw InputError(fmt::format("vectors of {} and {} numbers have no product", a.size(), b.size()));
+  }
   double sum = 0;
   for (Eigen::Index begin = 0; begin < a.size(); begin += grain) {
     const Eigen::Index size = std::min(grain, a.size() - begin);

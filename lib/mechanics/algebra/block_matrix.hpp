@@ -30,17 +30,22 @@ struct BlockMatrix {
   [[nodiscard]] Eigen::Map<const Matrix6> block(std::size_t k) const {
     return Eigen::Map<const Matrix6>(values.data() + 36 * k);
   }
-  /// Place of block (row, column), which must exist.
+  /// Place of block (row, column). Errors: InputError when there is none.
   [[nodiscard]] std::size_t find(Index row, Index column) const;
 };
 
 /// The pattern of a mesh: nodes that share a triangle, and every node with itself. Values are zero.
+/// Errors: InputError when a triangle names a node that does not exist.
 BlockMatrix make_block_matrix(std::size_t nodes, const std::vector<std::array<Index, 3>>& triangles);
 
-/// The pattern with these neighbours of every node, itself included, in order; both ways.
+/// The pattern with these neighbours of every node, itself included, in order; both ways. Errors: InputError when they
+/// are not so.
 BlockMatrix make_block_matrix(const std::vector<std::vector<Index>>& neighbours);
 
-/// y = A x, in parallel; the same to the bit whatever the number of threads.
+/// That a vector has a number for each of the six freedoms of every node. Errors: InputError.
+void require_freedoms(std::size_t count, std::size_t nodes);
+
+/// y = A x, in parallel; the same to the bit whatever the number of threads. Errors: InputError: x has another size.
 void multiply(const BlockMatrix& matrix, const VectorX& x, VectorX& y);
 
 /// y = B x for one 6x6 block stored by columns.
@@ -49,7 +54,7 @@ void multiply_block(const double* block, const double* x, double* y);
 /// A = (A + A') / 2.
 void symmetrise(BlockMatrix& matrix);
 
-/// Dot product in blocks: the same to the bit whatever the number of threads.
+/// Dot product in blocks: the same to the bit whatever the number of threads. Errors: InputError: different sizes.
 double dot(const VectorX& a, const VectorX& b);
 
 }  // namespace tunica

@@ -159,6 +159,8 @@ struct DirectSolver::Implementation {
   std::vector<int> negative;  ///< per front: negative pivots, or -1
   double factor_work = 0;
   double solve_work = 0;
+  std::size_t values = 0;  ///< of the matrix
+  FreeMask free;
 
   Panel panel(const Front& f) { return {factor.get() + f.panel, f.rows, f.columns, Eigen::OuterStride<>(f.rows)}; }
   [[nodiscard]] ConstantPanel panel(const Front& f) const {
@@ -178,6 +180,7 @@ struct DirectSolver::Implementation {
 };
 
 void DirectSolver::Implementation::analyse(const BlockMatrix& pattern, const FreeMask& free) {
+  values = pattern.values.size();
   components.resize(pattern.node_count());
   std::vector<Index> nodes;
   std::vector<int> number(pattern.node_count(), -1);
@@ -474,8 +477,10 @@ int DirectSolver::Implementation::eliminate(std::size_t index, const BlockMatrix
 
 DirectSolver::DirectSolver(const BlockMatrix& pattern, const FreeMask& free)
     : implementation_(std::make_unique<Implementation>()) {
-  TUNICA_ASSERT(pattern.column.size() < UINT32_MAX);
+  require_freedoms(free.size(), pattern.node_count());
+  TUNICA_ASSERT(pattern.column.size() < UINT32_MAX);  // its values alone would be a terabyte
   try {
+    implementation_->free = free;
     implementation_->analyse(pattern, free);
   } catch (const std::bad_alloc&) {
     throw MemoryError("the direct solver needs more memory than there is: use the cg solver or fewer shells");
@@ -487,9 +492,18 @@ DirectSolver::DirectSolver(DirectSolver&&) noexcept = default;
 
 DirectSolver::Factored DirectSolver::factor(const BlockMatrix& matrix) {
   Implementation& s = *implementation_;
+  if (matrix.values.size() != s.values || matrix.node_count() != s.components.size()) {
+    throw InputError("a matrix of another pattern cannot be factored");
+  }
   if (s.fronts.empty()) {
     return {};
   }
+  BlockMatrix turned;
+  if (!s.free.own_axes.empty()) {
+    turned = matrix;
+    to_own_axes(s.free, turned);
+  }
+  const BlockMatrix& values = s.free.own_axes.empty() ? matrix : turned;
   std::atomic<bool> regular{true};
   const auto eliminate = [&](const Arena& arena, bool in_slices) {
     for (const std::size_t front : arena.fronts) {
@@ -497,7 +511,7 @@ DirectSolver::Factored DirectSolver::factor(const BlockMatrix& matrix) {
         return;
       }
       check_interrupt();
-      s.negative[front] = s.eliminate(front, matrix, in_slices);
+      s.negative[front] = s.eliminate(front, values, in_slices);
       regular = regular && s.negative[front] >= 0;
     }
   };
@@ -513,9 +527,12 @@ DirectSolver::Factored DirectSolver::factor(const BlockMatrix& matrix) {
 
 void DirectSolver::solve(const VectorX& b, VectorX& x) const {
   const Implementation& s = *implementation_;
+  require_freedoms(narrow<std::size_t>(b.size()), s.components.size());
+  VectorX right = b;
+  to_own_axes(s.free, right);
   Eigen::VectorXd y(s.freedoms.size());
   for (std::size_t k = 0; k < s.freedoms.size(); ++k) {
-    y[k] = b[s.freedoms[k]];
+    y[k] = right[s.freedoms[k]];
   }
   Eigen::VectorXd others;
   for (const Front& f : s.fronts) {
@@ -542,6 +559,7 @@ void DirectSolver::solve(const VectorX& b, VectorX& x) const {
   for (std::size_t k = 0; k < s.freedoms.size(); ++k) {
     x[s.freedoms[k]] = y[k];
   }
+  to_world_axes(s.free, x);
 }
 
 double DirectSolver::factor_work() const { return implementation_->factor_work; }

@@ -1,13 +1,10 @@
 #pragma once
 
-#include "tunica/mechanics/algebra/block_matrix.hpp"
+#include "tunica/mechanics/algebra/free_mask.hpp"
 
 #include <memory>
 
 namespace tunica {
-
-/// One entry per freedom (6 per node): whether it is solved for. Held ones stay zero in every solution.
-using FreeMask = std::vector<bool>;
 
 /// Sparse direct factorisation P A P' = L S L' of the symmetric part of a block matrix on its free freedoms, S = +-1:
 /// multifrontal, without pivoting, so it counts the negative pivots of an indefinite matrix, and is stable enough where
@@ -16,7 +13,9 @@ using FreeMask = std::vector<bool>;
 /// Source: Duff, Reid 1983, "The multifrontal solution of indefinite sparse symmetric linear equations".
 class DirectSolver {
 public:
-  /// Errors: MemoryError when the factor does not fit into the memory.
+  /// @param pattern  as make_block_matrix() makes it
+  /// Errors: InputError when `free` has not 6 entries per node; MemoryError when the factor does not fit into the
+  /// memory.
   DirectSolver(const BlockMatrix& pattern, const FreeMask& free);
   ~DirectSolver();
   DirectSolver(DirectSolver&&) noexcept;
@@ -28,9 +27,10 @@ public:
     std::size_t negative_pivots = 0;
     bool regular = true;  ///< false: a pivot vanished, there is no factor to solve with
   };
+  /// Errors: InputError when the matrix has not the size of the pattern; Interrupted.
   Factored factor(const BlockMatrix& matrix);
 
-  /// x = A^-1 b on the free freedoms, with the last factor.
+  /// x = A^-1 b on the free freedoms, with the last factor. Errors: InputError when b has another size.
   void solve(const VectorX& b, VectorX& x) const;
 
   /// Multiplications of one factor() and of one solve().

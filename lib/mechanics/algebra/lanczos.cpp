@@ -1,7 +1,9 @@
 #include "tunica/mechanics/algebra/lanczos.hpp"
 
+#include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/core/progress.hpp"
+#include "tunica/core/require.hpp"
 
 #include <Eigen/Dense>
 
@@ -235,6 +237,14 @@ private:
 
 EigenPairs largest_eigenpairs(const SymmetricPencil& pencil, const std::vector<bool>& start,
                               const std::vector<VectorX>& deflated, const LanczosOptions& options) {
+  const auto other_size = [&](const VectorX& x) { return narrow<std::size_t>(x.size()) != start.size(); };
+  if (options.count == 0 || options.block == 0 || std::ranges::any_of(deflated, other_size)) {
+    throw InputError("eigenpairs: ask for one at least, in blocks of one at least, and give known ones of that size");
+  }
+  require_positive(options.tolerance, "the tolerance of eigenvalues");
+  if (!deflated.empty() && (options.deflated_value == 0 || !std::isfinite(options.deflated_value))) {
+    throw InputError("the eigenvalue of the known eigenvectors must be finite, and not zero");
+  }
   return BlockLanczos(pencil, start, deflated, options).run();
 }
 

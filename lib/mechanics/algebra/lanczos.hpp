@@ -38,6 +38,8 @@ struct EigenPairs {
 /// @param start     random vectors are drawn on the freedoms that are true in it
 /// @param deflated  known eigenvectors of one eigenvalue (`options.deflated_value`), which are left out; they need not
 ///                  be normalised
+/// Errors: InputError: a count or a block of none, a tolerance that is not above zero, known eigenvectors of
+/// another size than `start` or an eigenvalue of theirs that is zero or not finite.
 /// Cost: one solve with A per vector of the basis, count + 20 of them at least, and as many products with B; memory for
 /// twice 2 count + 8 block vectors.
 EigenPairs largest_eigenpairs(const SymmetricPencil& pencil, const std::vector<bool>& start,

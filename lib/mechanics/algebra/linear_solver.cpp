@@ -3,7 +3,10 @@
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/core/progress.hpp"
+#include "tunica/core/require.hpp"
 #include "tunica/core/threads.hpp"
+
+#include <fmt/format.h>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Dense>
@@ -11,14 +14,6 @@
 #include <cmath>
 
 namespace tunica {
-
-void mask(const FreeMask& free, VectorX& v) {
-  for (std::size_t i = 0; i < free.size(); ++i) {
-    if (!free[i]) {
-      v[i] = 0;
-    }
-  }
-}
 
 namespace {
 
@@ -29,9 +24,17 @@ struct BlockJacobi {
 
   BlockJacobi(const BlockMatrix& matrix, const FreeMask& free) : inverse(matrix.node_count()) {
     std::vector<char> good(matrix.node_count(), 1);
+    std::vector<Matrix6, Eigen::aligned_allocator<Matrix6>> own(matrix.node_count() * (free.own_axes.empty() ? 0 : 1),
+                                                                Matrix6::Identity());
+    for (const NodeAxes& of : free.own_axes) {
+      own[of.node].topLeftCorner<3, 3>() = own[of.node].bottomRightCorner<3, 3>() = of.axes;
+    }
     parallel_for_blocks(matrix.node_count(), 256, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
         Matrix6 block = matrix.block(matrix.find(narrow<Index>(i), narrow<Index>(i)));
+        if (!own.empty()) {
+          block = (own[i] * block * own[i].transpose()).eval();
+        }
         for (int c = 0; c < 6; ++c) {
           if (!free[freedom(i, narrow<std::size_t>(c))]) {
             block.row(c).setZero();
@@ -42,6 +45,9 @@ struct BlockJacobi {
         const Eigen::LLT<Matrix6> factor(block);
         good[i] = factor.info() == Eigen::Success ? 1 : 0;
         inverse[i] = good[i] != 0 ? Matrix6(factor.solve(Matrix6::Identity())) : Matrix6::Identity();
+        if (!own.empty()) {
+          inverse[i] = (own[i].transpose() * inverse[i] * own[i]).eval();
+        }
       }
     });
     positive = std::find(good.begin(), good.end(), 0) == good.end();
@@ -57,17 +63,20 @@ struct BlockJacobi {
   }
 };
 
+void require_solvable(const BlockMatrix& matrix, const FreeMask& free, const VectorX& b, const CgOptions& options) {
+  require_freedoms(free.size(), matrix.node_count());
+  require_freedoms(narrow<std::size_t>(b.size()), matrix.node_count());
+  if (!options.fixed_count) {
+    require_not_negative(options.tolerance, "the tolerance of conjugate gradients");
+  }
+}
+
 }  // namespace
 
 CgResult conjugate_gradients(const BlockMatrix& matrix, const FreeMask& free, const VectorX& b,
                              const CgOptions& options, VectorX& x) {
+  require_solvable(matrix, free, b, options);
   const BlockJacobi preconditioner(matrix, free);
-  std::vector<Eigen::Index> held;
-  for (std::size_t i = 0; i < free.size(); ++i) {
-    if (!free[i]) {
-      held.push_back(i);
-    }
-  }
   CgResult result;
   result.negative_curvature = !preconditioner.positive;
 
@@ -104,9 +113,7 @@ CgResult conjugate_gradients(const BlockMatrix& matrix, const FreeMask& free, co
       check_interrupt();
     }
     multiply(matrix, p, q);
-    for (const Eigen::Index i : held) {
-      q[i] = 0;
-    }
+    mask(free, q);
     const double curvature = dot(p, q);
     if (!(curvature > 0)) {
       if (!done) {
@@ -140,6 +147,7 @@ CgResult conjugate_gradients(const BlockMatrix& matrix, const FreeMask& free, co
 
 AlgebraicError error_by_factor(const BlockMatrix& matrix, const FreeMask& free, const DirectSolver& solver,
                                const VectorX& b, const VectorX& x) {
+  require_freedoms(narrow<std::size_t>(b.size()), matrix.node_count());
   VectorX product;
   multiply(matrix, x, product);
   VectorX r = b - product;
@@ -153,6 +161,7 @@ double gmres(const BlockMatrix& matrix, const FreeMask& free, const DirectSolver
              VectorX& x) {
   constexpr double tolerance = 1e-4;
   constexpr std::size_t most = 30;
+  require_freedoms(narrow<std::size_t>(b.size()), matrix.node_count());
   const double norm = std::sqrt(dot(b, b));
   VectorX product;
   const auto residual = [&] {

@@ -5,7 +5,8 @@
 
 #include <optional>
 
-/// Solving for the free freedoms. Held ones are marked in `free` (6 per node) and stay zero in every solution.
+/// Solving for the free freedoms. Held ones are marked in `free` (6 per node) and stay zero in every solution. Errors:
+/// InputError: marks or numbers that are not six per node.
 namespace tunica {
 
 struct CgOptions {
@@ -29,7 +30,8 @@ struct CgResult {
 /// After the last iteration the recursion goes on for the sake of the error alone: x and the counts do not change.
 /// Cost of that: a tenth of the iterations where they ended before the tolerance; else as many as it takes to have most
 /// of the error: a few where convergence is fast, up to four times as many again where it stagnates; where that is not
-/// enough, the error is told as a lower bound.
+/// enough, the error is told as a lower bound. Errors: InputError also where a tolerance is asked for that is not
+/// finite or below zero.
 CgResult conjugate_gradients(const BlockMatrix& matrix, const FreeMask& free, const VectorX& b,
                              const CgOptions& options, VectorX& x);
 
@@ -42,8 +44,5 @@ double gmres(const BlockMatrix& matrix, const FreeMask& free, const DirectSolver
 /// Error of x as a solution of the symmetric part of the matrix, by one more solve with `solver`'s factor of it.
 AlgebraicError error_by_factor(const BlockMatrix& matrix, const FreeMask& free, const DirectSolver& solver,
                                const VectorX& b, const VectorX& x);
-
-/// Sets the held entries to zero.
-void mask(const FreeMask& free, VectorX& v);
 
 }  // namespace tunica

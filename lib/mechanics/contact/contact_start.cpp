@@ -1,21 +1,36 @@
 #include "tunica/core/error.hpp"
 #include "tunica/mechanics/contact/detail/box_tree.hpp"
+#include "tunica/mechanics/contact/detail/own_surface.hpp"
 #include "tunica/surface/distance/signed_distance.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <numbers>
 
 namespace tunica {
 namespace {
 
 /// The surface of one body in the reference; of a solid it is closed.
-TriangleMesh surface_of(const Surfaces& surfaces, std::size_t body, const std::vector<Vec3>& reference) {
+/// @param left_out  a piece of it; SIZE_MAX: none
+TriangleMesh surface_of(const Surfaces& surfaces, std::size_t body, const std::vector<Vec3>& reference,
+                        std::size_t left_out) {
   TriangleMesh mesh{reference, {}};
   for (std::size_t f = surfaces.first[body]; f < surfaces.first[body + 1]; ++f) {
-    mesh.triangles.push_back(surfaces.faces[f].nodes);
+    if (surfaces.faces[f].part != left_out) {
+      mesh.triangles.push_back(surfaces.faces[f].nodes);
+    }
   }
   return mesh;
+}
+
+/// Of every body: whether it touches itself and is of several pieces.
+std::vector<bool> of_several_parts(const Surfaces& surfaces) {
+  std::vector<bool> several(surfaces.first.size() - 1);
+  for (const SurfaceFace& face : surfaces.faces) {
+    several[face.body] = several[face.body] || face.part != surfaces.faces[surfaces.first[face.body]].part;
+  }
+  return several;
 }
 
 struct Overlap {
@@ -133,15 +148,18 @@ private:
 
 /// Of solids the distance of every sample from the whole surface counts, so that a body wholly inside is found.
 void ContactSystem::require_apart(const Model& model) {
+  require_no_own_crossing(model);
   const FaceMaps& maps = *accepted_;
   const auto near = near_faces(maps, 0);
-  std::map<std::size_t, std::pair<SignedDistance, Bounds>> solids;
-  const auto solid = [&](std::size_t body) -> const std::pair<SignedDistance, Bounds>& {
-    const auto found = solids.find(body);
+  const std::vector<bool> several = of_several_parts(surfaces_);
+  std::map<std::array<std::size_t, 2>, std::pair<SignedDistance, Bounds>> solids;
+  const auto solid = [&](std::size_t body,
+                         std::size_t left_out = SIZE_MAX) -> const std::pair<SignedDistance, Bounds>& {
+    const auto found = solids.find({body, left_out});
     if (found != solids.end()) {
       return found->second;
     }
-    const TriangleMesh mesh = surface_of(surfaces_, body, reference_);
+    const TriangleMesh mesh = surface_of(surfaces_, body, reference_, left_out);
     Bounds box{Vec3::Constant(infinity), Vec3::Constant(-infinity)};
     for (const auto& triangle : mesh.triangles) {
       for (const Index i : triangle) {
@@ -149,7 +167,7 @@ void ContactSystem::require_apart(const Model& model) {
         box.upper = box.upper.cwiseMax(reference_[i]);
       }
     }
-    return solids.emplace(body, std::pair(SignedDistance(mesh), box)).first->second;
+    return solids.emplace(std::array{body, left_out}, std::pair(SignedDistance(mesh), box)).first->second;
   };
   Overlap deepest;
   for (std::size_t g = 0; g < groups_.size(); ++g) {
@@ -160,10 +178,11 @@ void ContactSystem::require_apart(const Model& model) {
       continue;
     }
     const SurfaceFace& face = surfaces_.faces[group.face];
+    const bool self = !group.point && !group.other.rigid && group.other.index == face.body;
     const bool in_solid = !group.point && !group.other.rigid && model.is_solid(group.other.index) &&
-                          group.other.index != face.body && !is_carried(face, group.other.index);
+                          (!self || several[face.body]) && !is_carried(face, group.other.index);
     if (in_solid) {
-      const auto& [distance, box] = solid(group.other.index);
+      const auto& [distance, box] = solid(group.other.index, self ? face.part : SIZE_MAX);
       if (!box.meets(maps.bounds(group.face), face.half_thickness)) {
         continue;
       }
@@ -191,7 +210,6 @@ void ContactSystem::require_apart(const Model& model) {
     }
   }
   if (deepest.contact == SIZE_MAX) {
-    require_no_own_crossing(model);
     return;
   }
   const Contact& contact = contacts_[deepest.contact];
@@ -204,8 +222,53 @@ void ContactSystem::require_apart(const Model& model) {
                   name(contact.between[1]), deepest.depth));
 }
 
+/// Contact leaves alone what is nearer than it can hold apart. Along a fold of the wall that is right: one whose faces
+/// touch is half a circle across, its middle as wide as the wall is thick. Paths along edges are longer than those
+/// across faces, by less than two times, and end at nodes.
+std::optional<Vec3> ContactSystem::first_fold(const Model& model, std::size_t contact) const {
+  const std::size_t body = contacts_[contact].between[0].index;
+  if (model.is_solid(body)) {
+    return std::nullopt;
+  }
+  const auto longest_side = [&](const SurfaceFace& face) {
+    double longest = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      longest = std::max(longest, (reference_[face.nodes[(k + 1) % 3]] - reference_[face.nodes[k]]).norm());
+    }
+    return longest;
+  };
+  std::vector<Bounds> boxes(surfaces_.faces.size());
+  std::vector<std::size_t> faces;
+  for (std::size_t f = surfaces_.first[body]; f < surfaces_.first[body + 1]; ++f) {
+    boxes[f] = accepted_->bounds(f);
+    faces.push_back(f);
+  }
+  const BoxTree tree(std::move(faces), boxes);
+  const SurfacePaths paths(model, body);
+  for (const Group& group : groups_) {
+    if (group.contact != contact) {
+      continue;
+    }
+    const SurfaceFace& own = surfaces_.faces[group.face];
+    std::vector<std::size_t> near;
+    tree.find(boxes[group.face], group.resolution / own_distance, near);
+    for (const std::size_t f : near) {
+      const SurfaceFace& other = surfaces_.faces[f];
+      if (share_a_node(own, other) || !hang_together(own, other) || offset(group, f) > 0) {
+        continue;
+      }
+      const double half_circle = std::numbers::pi / 2 * (own.half_thickness + other.half_thickness);
+      if (!paths.connect(own, other, 2 * half_circle + longest_side(own) + longest_side(other))) {
+        return (reference_[own.nodes[0]] + reference_[own.nodes[1]] + reference_[own.nodes[2]]) / 3;
+      }
+    }
+  }
+  return std::nullopt;
+}
+
 void ContactSystem::require_no_own_crossing(const Model& model) const {
-  for (const Contact& contact : contacts_) {
+  for (std::size_t c = 0; c < contacts_.size(); ++c) {
+    const Contact& contact = contacts_[c];
     const auto& [a, b] = contact.between;
     if (a.rigid || b.rigid || a.index != b.index) {
       continue;
@@ -214,6 +277,12 @@ void ContactSystem::require_no_own_crossing(const Model& model) const {
       throw InputError(fmt::format(
           "{}{} passes through itself in the reference at ({:.4g}, {:.4g}, {:.4g}) mm: move its parts "
           "apart, or mend the mesh",
+          contact.said_at.empty() ? "" : contact.said_at + ": ", model.name_of(a.index), at->x(), at->y(), at->z()));
+    }
+    if (const auto at = first_fold(model, c)) {
+      throw InputError(fmt::format(
+          "{}parts of {} lie in each other in the reference at ({:.4g}, {:.4g}, {:.4g}) mm, nearer than contact can "
+          "hold them apart: move them apart, or mend the mesh",
           contact.said_at.empty() ? "" : contact.said_at + ": ", model.name_of(a.index), at->x(), at->y(), at->z()));
     }
   }

@@ -1,6 +1,7 @@
 #include "tunica/core/error.hpp"
 #include "tunica/core/threads.hpp"
 #include "tunica/mechanics/contact/detail/box_tree.hpp"
+#include "tunica/mechanics/contact/detail/own_surface.hpp"
 
 #include <fmt/format.h>
 
@@ -28,9 +29,6 @@ constexpr double elastic_slip_of_wall = 1e-3;  // slip at which friction is full
 constexpr double sag_of_resolution = 0.05;     // what a surface may bend between samples
 constexpr double straight_above = 1e-3;        // sine between the way to a surface and its normal
 constexpr int least_level = 4, most_level = 32;
-
-/// Two surfaces of one body are as far apart as they were in the reference: this part of it counts as no contact.
-constexpr double own_distance = 0.9;
 
 }  // namespace
 
@@ -64,6 +62,9 @@ ContactSystem::ContactSystem(const Model& model, Surfaces surfaces, std::vector<
   };
   for (const auto& [one, other] : contacts_ | std::views::transform(&Contact::between)) {
     const bool self = !one.rigid && !other.rigid && one.index == other.index;
+    if (self) {
+      number_parts(model, one.index, surfaces_);
+    }
     meetings_.push_back(fmt::format("{} meets {}", name(one), self ? "itself" : name(other)));
   }
   make_groups();
@@ -109,6 +110,7 @@ void ContactSystem::make_groups() {
     young_.push_back(young);
     stiffness_.push_back(first_stiffness * young);
     largest_pressure_.push_back(0);
+    pressed_.push_back(0);
     for (std::size_t side = 0; side < (self ? 1 : 2); ++side) {
       const ContactParty& own = contact.between[side];
       const ContactParty& other = contact.between[1 - side];
@@ -291,7 +293,7 @@ double ContactSystem::offset(const Group& group, std::size_t other) const {
   }
   const SurfaceFace& face = surfaces_.faces[other];
   const double walls = own.half_thickness + face.half_thickness;
-  if (own.body != face.body) {
+  if (!hang_together(own, face)) {
     return walls;
   }
   // Parts of one body may lie nearer than their walls are thick: along a fold of a thick shell.
@@ -321,13 +323,9 @@ bool ContactSystem::excluded(const Group& group, std::size_t other) const {
   if (group.point) {
     return false;
   }
-  const auto& a = surfaces_.faces[group.face].nodes;
-  const auto& b = surfaces_.faces[other].nodes;
-  if (std::any_of(a.begin(), a.end(), [&](Index i) { return std::find(b.begin(), b.end(), i) != b.end(); })) {
-    return true;
-  }
   const SurfaceFace &own = surfaces_.faces[group.face], &its = surfaces_.faces[other];
-  return (own.body == its.body && offset(group, other) <= 0) || is_carried(own, its.body) || is_carried(its, own.body);
+  return share_a_node(own, its) || (hang_together(own, its) && offset(group, other) <= 0) ||
+         is_carried(own, its.body) || is_carried(its, own.body);
 }
 
 bool ContactSystem::is_carried(const SurfaceFace& face, std::size_t body) const {
@@ -519,6 +517,8 @@ void ContactSystem::accept(const Configuration& configuration) {
   accepted_ = maps_at(configuration);
   shapes_before_ = shapes_;
   accepted_stiffness_ = stiffness_;
+  std::ranges::transform(pressed_, largest_pressure_, pressed_.begin(),
+                         [](double a, double b) { return std::max(a, b); });
 }
 
 double ContactSystem::resolution() const {
@@ -584,6 +584,7 @@ void ContactSystem::keep_slip(const Configuration& configuration) {
 
 std::vector<double> ContactSystem::memory() const {
   std::vector<double> values = accepted_stiffness_;
+  values.insert(values.end(), pressed_.begin(), pressed_.end());
   values.push_back(real(pairs_.size()));
   for (const auto& [i, j] : pairs_) {
     values.insert(values.end(), {real(i), real(j)});
@@ -607,11 +608,14 @@ std::vector<double> ContactSystem::memory() const {
 void ContactSystem::recall(const std::vector<double>& memory, const Configuration& configuration, double time) {
   std::size_t read = 0;
   const auto next = [&] {
-    TUNICA_ASSERT(read < memory.size());
+    if (read == memory.size()) {
+      throw InputError("what contact remembers is of another model");
+    }
     return memory[read++];
   };
   std::ranges::generate(accepted_stiffness_, next);
   stiffness_ = accepted_stiffness_;
+  std::ranges::generate(pressed_, next);
   std::vector<std::array<Index, 2>> pairs(truncated<std::size_t>(next()));
   for (auto& [i, j] : pairs) {
     i = truncated<Index>(next());
@@ -644,7 +648,9 @@ void ContactSystem::recall(const std::vector<double>& memory, const Configuratio
       sample.before = place(group, sample, *accepted_);
     }
   }
-  TUNICA_ASSERT(read == memory.size());
+  if (read != memory.size()) {
+    throw InputError("what contact remembers is of another model");
+  }
 }
 
 }  // namespace tunica

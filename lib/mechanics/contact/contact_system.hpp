@@ -5,6 +5,7 @@
 #include "tunica/mechanics/contact/contact_state.hpp"
 #include "tunica/mechanics/contact/rigid_shape.hpp"
 #include "tunica/mechanics/contact/surface_faces.hpp"
+#include "tunica/mechanics/terms/changing_law.hpp"
 
 #include <algorithm>
 #include <map>
@@ -39,7 +40,7 @@ namespace tunica {
 
 class FaceMaps;
 
-class ContactSystem {
+class ContactSystem : public ChangingLaw {
 public:
   /// Part of the resolution below which the law goes on as a straight line, also where surfaces overlap on the way.
   static constexpr double straight_below = 0.05;
@@ -55,32 +56,34 @@ public:
 
   /// Makes the barrier harder where surfaces overlap.
   /// @return whether that changed anything
-  bool harden();
+  bool harden() override;
   /// Where Newton's method has come to rest: also makes the barrier softer where it is more than the pressures found
   /// ask for.
   /// @return whether that changed anything, so that Newton's method has to go on
-  bool sharpen();
+  bool sharpen() override;
   /// Of the rigid bodies' motion in the step, what is still to come.
-  [[nodiscard]] double left() const { return left_; }
-  void set_left(double left);
+  [[nodiscard]] double left() const override { return left_; }
+  void set_left(double left) override;
 
   /// Which nodes may come to act on each other, beyond those of one element.
   /// @return whether they are others than at the last call
   bool find_pairs(const Configuration& configuration);
   [[nodiscard]] const std::vector<std::array<Index, 2>>& pairs() const { return pairs_; }
 
+  [[nodiscard]] bool may_change() const override { return true; }
+
   /// Whether points may touch a body that deforms: its normals jump from one face to the next.
-  [[nodiscard]] bool has_kinks() const {
+  [[nodiscard]] bool has_kinks() const override {
     return !pairs_.empty() ||
            std::any_of(groups_.begin(), groups_.end(), [](const Group& group) { return group.point.has_value(); });
   }
 
   /// mm: the smallest over which pressure builds up.
-  [[nodiscard]] double resolution() const;
+  [[nodiscard]] double resolution() const override;
 
   /// Whether friction has given way somewhere, by the last forces: the tangent then is not symmetric, and its pivots
   /// say nothing about stability.
-  [[nodiscard]] bool slides() const { return slides_; }
+  [[nodiscard]] bool slides() const override { return slides_; }
 
   /// Adds forces; with a tangent their derivative, and to the forces what the rest of the rigid bodies' motion adds to
   /// first order.
@@ -89,7 +92,7 @@ public:
 
   /// The increment (6 per node) that was followed from where the last tangent was made: the next one takes the
   /// pressures that it expected.
-  void predict(const VectorX& increment);
+  void predict(const VectorX& increment) override;
 
   /// A state of rest, or the end of a time step: slip is kept, and where every point is.
   void accept(const Configuration& configuration);
@@ -112,20 +115,26 @@ public:
   /// Of the last results(): the sum over all bodies of forces and moments, relative to the sum of their magnitudes.
   [[nodiscard]] std::array<double, 2> imbalance() const { return imbalance_; }
 
+  /// Per contact the largest pressure of any accepted state so far, also of those within a step, MPa.
+  [[nodiscard]] const std::vector<double>& pressed() const { return pressed_; }
+
   struct Pressing {
     double pressure = 0;  ///< MPa
     double area = 0;      ///< mm^2
   };
 
   /// What is kept between steps, so that a run that goes on repeats the uninterrupted one: of the last accepted state
-  /// how stiff the barrier is, who may meet, how finely what is near is sampled, and with friction how far each sample
-  /// has slipped. Cost: two numbers per face, with friction five per sample.
+  /// how stiff the barrier is, what has pressed so far, who may meet, how finely what is near is sampled, and with
+  /// friction how far each sample has slipped. Cost: two numbers per face, with friction five per sample.
   [[nodiscard]] std::vector<double> memory() const;
   /// Puts the contact back to an accepted state.
   /// @param memory  of the same model; configuration, time  of that state
   void recall(const std::vector<double>& memory, const Configuration& configuration, double time);
 
 private:
+  /// Two surfaces of one body are as far apart as they were in the reference: this part of it counts as no contact.
+  static constexpr double own_distance = 0.9;
+
   struct Sample {
     Vec2 at;
     PatchWeights weights;
@@ -184,8 +193,12 @@ private:
   [[nodiscard]] bool is_close(const Group& group, const std::vector<std::size_t>& near, const FaceMaps& maps) const;
   /// Errors: InputError: bodies overlap in the reference.
   void require_apart(const Model& model);
-  /// Errors: InputError: a body that touches itself passes through itself at points that its parts share.
+  /// Errors: InputError: a body that touches itself passes through itself at points that its parts share, or lies in
+  /// itself.
   void require_no_own_crossing(const Model& model) const;
+  /// Where, if anywhere, faces of one piece of a body that touches itself are nearer than contact can hold them apart,
+  /// though it is far from one to the other along the surface. Of solids none is looked for.
+  [[nodiscard]] std::optional<Vec3> first_fold(const Model& model, std::size_t contact) const;
   /// Makes the samples of a group.
   void sample(Group& group, int level) const;
   /// Makes samples where there are none.
@@ -266,6 +279,7 @@ private:
   };
   Closest closest_;                       ///< at the last forces
   std::vector<double> largest_pressure_;  ///< MPa, per contact, of the last forces
+  std::vector<double> pressed_;           ///< MPa, per contact, of all accepted states
   std::vector<std::array<Index, 2>> pairs_;
   bool pairs_are_new_ = false;  ///< nobody has been told yet
   const Configuration rest_;

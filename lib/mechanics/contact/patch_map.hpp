@@ -21,6 +21,7 @@ namespace tunica {
 struct SurfaceFace {
   std::array<Index, 3> nodes{};  ///< global
   std::size_t body = 0;
+  std::size_t part = 0;  ///< of a body that touches itself: the piece that hangs together (own_surface.hpp)
   bool curved = false;
   double half_thickness = 0;  ///< mm
   double young = 0;           ///< MPa

@@ -413,6 +413,7 @@ void gather(const ElementGroup& elements, ElementLanes& lanes) {
   pack(&ShellElement::membrane, lanes.membrane);
   pack(&ShellElement::rotational, lanes.rotational);
   pack(&ShellElement::skewing, lanes.skewing);
+  pack(&ShellElement::prestrain, lanes.prestrain);
   for (std::size_t form = 0; form < 3; ++form) {
     set_lanes(
         lanes.bulging[form], [&](std::size_t k) -> const auto& { return elements[k]->bulging[form]; });
@@ -457,7 +458,7 @@ LaneVector18 linear_force(const ElementLanes& element, const LaneVector18& motio
   for (int k = 0; k < 3; ++k) {
     less.segment<3>(6 * k) -= motion.head<3>();
   }
-  const LaneState stress = element_force(element, linear_deformation(element, less));
+  const LaneState stress = element_force(element, linear_deformation(element, less) + element.prestrain);
   const Reference reference = find_reference(element);
   LaneVector18 local = reference.derivatives.strain.transpose().lazyProduct(stress.head<3>());
   LaneVec3 total = LaneVec3::Zero();
@@ -507,13 +508,13 @@ LaneMask corotational_response(const ElementLanes& element, const MotionLanes& m
   const LaneMask valid = find_kinematics(element, motion, now);
   response.deformation = now.state;
   const auto stress_of = [&](const LaneState& state) {
-    LaneState stress = element_force(element, state);
+    LaneState stress = element_force(element, state + element.prestrain);
     if (viscous.factor > 0) {
       stress += viscous.factor * element_force(element, state - viscous.previous);
     }
     return stress;
   };
-  response.energy = 0.5 * now.state.dot(element_force(element, now.state));
+  response.energy = now.state.dot(element_force(element, 0.5 * now.state + element.prestrain));
   Linearisation at;
   at.g = frame_spin(element, now.frame, at.current_gradients);
   for (int k = 0; k < 3; ++k) {

@@ -32,6 +32,7 @@ struct ElementLanes {
   LaneMat3 membrane;
   LaneMatrix9 rotational;
   LaneVec3 skewing;
+  LaneState prestrain;
 };
 
 /// All must be `curved`, or none; an element may stand in several lanes.

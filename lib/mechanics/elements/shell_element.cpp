@@ -92,10 +92,10 @@ ElementState linear_deformation(const ShellElement& element, const Vector18& mot
 }
 
 double strain_energy(const ShellElement& element, const ElementState& deformation) {
-  const Vec3 strain = deformation.head<3>();
-  const Vector9 rotations = deformation.segment<9>(3);
-  return 0.5 * (strain.dot(element.membrane * strain) + rotations.dot(element.rotational * rotations) +
-                deformation.tail<3>().dot(element.skewing.cwiseProduct(deformation.tail<3>())));
+  const ElementState mean = 0.5 * deformation + element.prestrain;
+  return deformation.head<3>().dot(element.membrane * mean.head<3>()) +
+         deformation.segment<9>(3).dot(element.rotational * mean.segment<9>(3)) +
+         deformation.tail<3>().dot(element.skewing.cwiseProduct(mean.tail<3>()));
 }
 
 Matrix18 linear_stiffness(const ShellElement& element) { return lane(linear_stiffness(same(element)), 0); }

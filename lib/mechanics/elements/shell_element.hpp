@@ -39,6 +39,9 @@
 /// under a point load that the mesh does not resolve it costs accuracy, so that only what needs it asks for it:
 /// stiffen_short_waves().
 ///
+/// A wall that is under stress in its reference (prestress.hpp) has the energy y'Ky/2 + y'K y0, with y0 the deformation
+/// whose stresses K y0 it bears there.
+///
 /// Forces are the gradient of the energy to the last term, and the tangent the gradient of the forces.
 /// Source: co-rotation: Nour-Omid, Rankin 1991; Felippa, Haugen 2005; Battini 2007. Strain of shallow shells: Marguerre
 /// 1938. The measure at the edges is tunica's own.
@@ -89,6 +92,7 @@ struct ShellElement {
   Vec3 short_waves = Vec3::Zero();  ///< what it has to be for waves as short as the elements
   double thinness = 0;              ///< x: h^2 times the largest curvature, over the thickness
   Matrix39 curvature;               ///< mean, from the rotation vectors
+  ElementState prestrain = ElementState::Zero();  ///< y0
 };
 
 /// What the three corners do: displacements (columns) and rotations from the reference.

@@ -2,13 +2,26 @@
 
 #include "tunica/core/error.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 namespace tunica {
+namespace {
+
+void require_body(const Model& model, std::size_t body) {
+  if (body >= model.body_count()) {
+    throw InputError(fmt::format("there is no body {}: the model has {}", body, model.body_count()));
+  }
+}
+
+}  // namespace
 
 template <typename Value>
 Value Table<Value>::at(double time) const {
-  TUNICA_ASSERT(!points.empty());
+  if (points.empty()) {
+    throw InputError("a table without points has no value");
+  }
   const auto next = std::upper_bound(points.begin(), points.end(), time,
                                      [](double t, const std::pair<double, Value>& point) { return t < point.first; });
   if (next == points.begin()) {
@@ -27,18 +40,42 @@ template struct Table<Vec3>;
 
 double Ramp::at(double time) const { return points.empty() ? 1 : Table<double>{points}.at(time); }
 
+std::vector<char> triangles_within(const ShellMesh& mesh, const std::vector<Index>& nodes) {
+  std::vector<char> chosen(mesh.vertices.size(), 0);
+  for (const Index node : nodes) {
+    if (node >= chosen.size()) {
+      throw InputError(fmt::format("there is no node {}: the mesh has {}", node, chosen.size()));
+    }
+    chosen[node] = 1;
+  }
+  std::vector<char> within;
+  within.reserve(mesh.triangles.size());
+  for (const auto& [a, b, c] : mesh.triangles) {
+    within.push_back(chosen[a] & chosen[b] & chosen[c]);
+  }
+  return within;
+}
+
+bool Model::is_imaged_under_pressure() const {
+  return std::any_of(loads.begin(), loads.end(), [](const Load& load) {
+    const auto* pressure = std::get_if<PressureLoad>(&load.kind);
+    return pressure != nullptr && pressure->imaged_at.value_or(0) != 0;
+  });
+}
+
 const std::string& Model::name_of(std::size_t body) const {
-  return is_solid(body) ? solids.at(body - shells.size()).name : shells.at(body).name;
+  require_body(*this, body);
+  return is_solid(body) ? solids[body - shells.size()].name : shells[body].name;
 }
 
 const std::vector<Vec3>& Model::vertices_of(std::size_t body) const {
-  return is_solid(body) ? solids.at(body - shells.size()).mesh.vertices : shells.at(body).mesh.vertices;
+  require_body(*this, body);
+  return is_solid(body) ? solids[body - shells.size()].mesh.vertices : shells[body].mesh.vertices;
 }
 
 std::size_t Model::node_count() const { return first_node(body_count()); }
 
 std::size_t Model::first_node(std::size_t body) const {
-  TUNICA_ASSERT(body <= body_count());
   std::size_t count = 0;
   for (std::size_t b = 0; b < body; ++b) {
     count += vertices_of(b).size();

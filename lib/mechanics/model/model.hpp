@@ -38,6 +38,7 @@ struct Material {
   double young = 0;               ///< MPa
   double poisson = 0;             ///< in (-1, 0.5)
   std::optional<double> density;  ///< tonne / mm^3; required by dynamics and gravity
+  bool young_stated = true;       ///< false: `young` is any number, and the stress does not depend on it
 };
 
 struct ShellBody {
@@ -73,6 +74,7 @@ template <typename Value>
 struct Table {
   std::vector<std::pair<double, Value>> points;  ///< (time s, value), times increasing, at least one
 
+  /// Errors: InputError: no point.
   [[nodiscard]] Value at(double time) const;
 };
 
@@ -158,7 +160,9 @@ struct Ramp {
   [[nodiscard]] double at(double time) const;
 };
 
-/// Held or prescribed components of some nodes, in world axes. Several on one node unite.
+/// Held or prescribed components of some nodes, in world axes. Several on one node unite. With `across` the nodes stay
+/// in the plane across it, and the wall as it stands to that plane, as in a plane of symmetry: the translation along it
+/// and the rotations about the axes in the plane are held, and nothing else of the fix counts.
 struct Fix {
   std::size_t body = 0;
   std::vector<Index> nodes;
@@ -167,18 +171,39 @@ struct Fix {
   Vec3 displacement = Vec3::Zero();  ///< mm; of the held translations; follows the load factor (static) or `ramp`
   Ramp ramp;
   std::string said_at{};
+  std::optional<Vec3> across{};  ///< unit
 };
 
-/// Holds the six rigid motions of every connected piece of a body without adding stress.
+/// Holds the rigid motions of every connected piece of a body that nothing else holds, without adding stress.
 struct RigidMotionsFix {
   std::size_t body = 0;
 };
 
-/// Pressure along the outward normals (positive: along them), on the whole body.
+/// An elastic bed of a shell: a force per area of -stiffness times the displacement from the reference.
+struct Support {
+  std::size_t body = 0;
+  std::vector<Index> nodes;  ///< on the triangles whose nodes are all among these
+  double stiffness = 0;      ///< MPa/mm
+  bool normal_only = false;  ///< of the displacement only the part along the reference normal
+  std::string said_at{};
+};
+
+/// Per triangle: whether all its nodes are among some. Errors: InputError: there is no such node.
+std::vector<char> triangles_within(const ShellMesh& mesh, const std::vector<Index>& nodes);
+
+/// Pressure along the outward normals (positive: along them).
 struct PressureLoad {
   double value = 0;                   ///< MPa
   bool follower = true;               ///< turns and grows with the surface
-  std::optional<double> imaged_at{};  ///< MPa, under which the shells were imaged
+  std::optional<double> imaged_at{};  ///< MPa, under which the shells were imaged: the load begins there
+  bool unload = false;                ///< the shape without that pressure is to be found, and the load begins at zero
+  std::vector<Index> nodes{};         ///< on the triangles (faces) whose nodes are all among these; empty: on all
+
+  /// MPa, at a factor of the load: from what it begins with to `value`.
+  [[nodiscard]] double at(double factor) const {
+    const double begin = imaged_at.value_or(0);
+    return begin + factor * (value - begin);
+  }
 };
 struct ForceLoad {
   std::vector<Index> nodes;
@@ -223,11 +248,15 @@ struct Model {
   std::vector<Contact> contacts;
   std::vector<Fix> fixes;
   std::vector<RigidMotionsFix> rigid_motions;
+  std::vector<Support> supports{};
   std::vector<Load> loads;
   std::vector<Probe> probes;
 
+  /// Whether some pressure, other than zero, says that the bodies were imaged under it.
+  [[nodiscard]] bool is_imaged_under_pressure() const;
   [[nodiscard]] std::size_t body_count() const { return shells.size() + solids.size(); }
   [[nodiscard]] bool is_solid(std::size_t body) const { return body >= shells.size(); }
+  // Errors: InputError: there is no such body.
   [[nodiscard]] const std::string& name_of(std::size_t body) const;
   /// Reference positions of a body's nodes.
   [[nodiscard]] const std::vector<Vec3>& vertices_of(std::size_t body) const;

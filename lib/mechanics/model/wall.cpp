@@ -1,6 +1,10 @@
 #include "tunica/mechanics/model/wall.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/core/require.hpp"
+#include "tunica/surface/mesh/checks.hpp"
+
+#include <fmt/format.h>
 
 #include <Eigen/Geometry>
 
@@ -14,6 +18,7 @@ template <typename Visit>
 void for_each_facet(const Model& model, const Visit& visit) {
   for (std::size_t b = 0; b < model.shells.size(); ++b) {
     const ShellMesh& mesh = model.shells[b].mesh;
+    require_corners(mesh.vertices.size(), mesh.triangles);
     const std::size_t first = model.first_node(b);
     for (const auto& [i, j, k] : mesh.triangles) {
       const Vec3& origin = mesh.vertices[i];
@@ -42,49 +47,46 @@ double part_above(std::array<double, 3> corners, double level) {
 double least_thickness(const Model& model) {
   double least = infinity;
   for (const ShellBody& body : model.shells) {
+    if (body.thickness.empty()) {
+      throw InputError(body.name + ": has no thickness");
+    }
     least = std::min(least, *std::min_element(body.thickness.begin(), body.thickness.end()));
   }
   return least;
 }
 
-std::vector<double> averaged_at_nodes(const Model& model, std::span<const double> of_triangles) {
-  std::vector<double> sum(model.node_count(), 0);
-  std::vector<double> weight(model.node_count(), 0);
-  std::size_t triangle = 0;
-  for_each_facet(model, [&](double area, const auto& nodes) {
-    for (const std::size_t node : nodes) {
-      sum[node] += area * of_triangles[triangle];
-      weight[node] += area;
-    }
-    ++triangle;
-  });
-  TUNICA_ASSERT(triangle == of_triangles.size());
-  for (std::size_t i = 0; i < sum.size(); ++i) {
-    sum[i] = weight[i] > 0 ? sum[i] / weight[i] : 0;
-  }
-  return sum;
-}
-
-double area_quantile(const Model& model, std::span<const double> of_nodes, double above) {
+double area_quantile(std::span<const Facet> facets, double above) {
+  require_not_negative(above, "the part of the area");
   constexpr int halvings = 40;
-  std::vector<std::pair<double, std::array<double, 3>>> facets;
+  double low = infinity;
+  double high = -infinity;
   double whole = 0;
-  for_each_facet(model, [&](double area, const auto& nodes) {
-    facets.push_back({area, {of_nodes[nodes[0]], of_nodes[nodes[1]], of_nodes[nodes[2]]}});
-    whole += area;
-  });
-  const auto [least, most] = std::minmax_element(of_nodes.begin(), of_nodes.end());
-  double low = *least;
-  double high = *most;
+  for (const Facet& facet : facets) {
+    const auto [least, most] = std::ranges::minmax(facet.values);
+    low = std::min(low, least);
+    high = std::max(high, most);
+    whole += facet.area;
+  }
   for (int i = 0; i < halvings && low < high; ++i) {
     const double middle = (low + high) / 2;
     double area_above = 0;
-    for (const auto& [area, corners] : facets) {
-      area_above += area * part_above(corners, middle);
+    for (const Facet& facet : facets) {
+      area_above += facet.area * part_above(facet.values, middle);
     }
     (area_above > above * whole ? low : high) = middle;
   }
   return high;
+}
+
+double area_quantile(const Model& model, std::span<const double> of_nodes, double above) {
+  if (of_nodes.size() != model.node_count()) {
+    throw InputError(fmt::format("{} values for {} nodes", of_nodes.size(), model.node_count()));
+  }
+  std::vector<Facet> facets;
+  for_each_facet(model, [&](double area, const auto& nodes) {
+    facets.push_back({area, {of_nodes[nodes[0]], of_nodes[nodes[1]], of_nodes[nodes[2]]}});
+  });
+  return area_quantile(facets, above);
 }
 
 }  // namespace tunica

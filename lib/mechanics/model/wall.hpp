@@ -2,21 +2,29 @@
 
 #include "tunica/mechanics/model/model.hpp"
 
+#include <array>
 #include <span>
+#include <vector>
 
-/// Fields that shells hold constant, made continuous: what their neighbours say at the nodes, and what of it is large.
+/// How large a field on the wall is.
+/// Errors: InputError: a corner that does not exist, no thickness, or not as many values as said.
 namespace tunica {
 
 /// The thinnest place of all bodies, mm.
 double least_thickness(const Model& model);
 
-/// Means at the nodes, within each body, of the triangles around, weighted by their area.
-/// @param of_triangles  of all bodies in order
-/// @return #nodes of all bodies; 0 at nodes without triangles
-std::vector<double> averaged_at_nodes(const Model& model, std::span<const double> of_triangles);
+/// A triangle of which a field is known at the corners.
+struct Facet {
+  double area = 0;
+  std::array<double, 3> values{};
+};
 
-/// The value that a field, linear between the nodes, passes on the part `above` of the area of all bodies' facets.
-/// Exact but for the halving of an interval, to 1e-12 of the field's range.
+/// The value that a field, linear within the facets, passes on the part `above` of their area. Exact but for the
+/// halving of an interval, to 1e-12 of the field's range.
+double area_quantile(std::span<const Facet> facets, double above);
+
+/// The same of a field that is linear between the nodes, over all bodies.
+/// @param of_nodes  #nodes of all bodies
 double area_quantile(const Model& model, std::span<const double> of_nodes, double above);
 
 }  // namespace tunica

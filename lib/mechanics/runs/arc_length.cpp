@@ -39,14 +39,14 @@ struct PathState {
 /// the nodes of displacements and (mean edge length x) rotations; the factor does not count.
 class PathSolver {
 public:
-  PathSolver(const ShellSystem& system, const Model& model, const RunSettings& settings)
+  PathSolver(const ShellSystem& system, const RunSettings& settings)
       : system_(system),
-        model_(model),
+        model_(*system.model),
         settings_(settings),
         free_(free_freedoms(system)),
         matrix_(system.pattern),
         solver_(system.pattern, free_),
-        prescribed_(prescribed_positions(system, model, 1)),
+        prescribed_(prescribed_positions(system, 1)),
         weights_(VectorX::Zero(first_freedom(system.node_count()))) {
     const double share = 1 / real(system.node_count());
     for (std::size_t i = 0; i < system.node_count(); ++i) {
@@ -126,7 +126,12 @@ public:
 
 private:
   Balance evaluate_at(const Configuration& configuration, double factor) {
-    return static_balance(system_, model_, configuration, factor, forces_, &matrix_);
+    return static_balance(system_, configuration, factor, forces_, &matrix_);
+  }
+
+  const VectorX& external(const Configuration& configuration, double factor) {
+    evaluate(system_, configuration, std::vector<double>(model_.loads.size(), factor), {}, forces_, nullptr);
+    return forces_.external;
   }
 
   bool factor_matrix(std::size_t& negative_pivots) {
@@ -146,10 +151,11 @@ private:
 
   /// How displacements and spins follow the factor.
   bool respond(const Configuration& configuration, VectorX& response) {
-    evaluate(system_, model_, configuration, std::vector<double>(model_.loads.size(), 1.0), {}, forces_, nullptr);
+    VectorX right = -external(configuration, 0);
+    right += external(configuration, 1);
     VectorX moved;
     multiply(matrix_, prescribed_, moved);
-    VectorX right = forces_.external - moved;
+    right -= moved;
     mask(free_, right);
     if (!solve(right, response)) {
       return false;
@@ -189,9 +195,9 @@ double limit_factor(const PathState& a, const PathState& b, double step) {
 
 class PathRun final : public SteppedRun {
 public:
-  PathRun(ShellSystem& system, const Model& model, const RunSettings& settings, const ArcLengthRun& run,
-          const StateCallback& on_state)
-      : SteppedRun(system, model, settings, on_state, run.max_steps), run_(run), path_(system, model, settings) {
+  PathRun(ShellSystem& system, const RunSettings& settings, const ArcLengthRun& run, const StateCallback& on_state)
+      : SteppedRun(system, settings, on_state, run.max_steps), run_(run), path_(system, settings) {
+    const Model& model = *system.model;
     // A body under follower pressure alone may be turned as it stands.
     only_follows_ = std::all_of(model.loads.begin(), model.loads.end(), [](const Load& load) {
       const auto* pressure = std::get_if<PressureLoad>(&load.kind);
@@ -273,7 +279,7 @@ private:
       return false;
     }
     for (const Piece& piece : system_.pieces) {
-      if (only_follows_ && held_by_rigid_motions(model_, piece.body)) {
+      if (only_follows_ && piece.balanced) {
         take_out_rigid_motion(system_, piece, state.configuration);
       }
     }
@@ -354,7 +360,7 @@ private:
   }
 
   [[nodiscard]] State state_now(std::size_t step) const {
-    State state = make_state(system_, model_, now_.configuration, real(step));
+    State state = make_state(system_, now_.configuration, real(step));
     state.load_factor = now_.factor;
     state.residual = now_.residual;
     state.newton_iterations = now_.iterations;
@@ -396,9 +402,9 @@ private:
 
 }  // namespace
 
-Summary run_arc_length(ShellSystem& system, const Model& model, const RunSettings& settings, const ArcLengthRun& run,
+Summary run_arc_length(ShellSystem& system, const RunSettings& settings, const ArcLengthRun& run,
                        const StateCallback& on_state, const Progress& progress) {
-  return PathRun(system, model, settings, run, on_state).run(progress);
+  return PathRun(system, settings, run, on_state).run(progress);
 }
 
 }  // namespace tunica

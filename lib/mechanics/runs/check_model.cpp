@@ -1,8 +1,13 @@
 #include "tunica/core/error.hpp"
+#include "tunica/core/require.hpp"
+#include "tunica/mechanics/contact/rigid_shape.hpp"
+#include "tunica/mechanics/runs/detail/prestress.hpp"
 #include "tunica/mechanics/runs/detail/run.hpp"
 #include "tunica/mechanics/runs/detail/supports.hpp"
 #include "tunica/mechanics/runs/doubts.hpp"
 #include "tunica/shell/patch/curved_surface.hpp"
+#include "tunica/surface/mesh/checks.hpp"
+#include "tunica/surface/mesh/tet_checks.hpp"
 
 #include <fmt/format.h>
 
@@ -16,8 +21,13 @@ namespace {
 
 std::string place(const Vec3& p) { return fmt::format("({:.6g}, {:.6g}, {:.6g}) mm", p.x(), p.y(), p.z()); }
 
+/// What a message begins with.
+std::string called(const std::string& said_at, const std::string& name) {
+  return said_at.empty() ? name : said_at + ": " + name;
+}
+
 [[noreturn]] void refuse(const std::string& said_at, const std::string& name, const std::string& what) {
-  throw InputError(fmt::format("{}{}: {}", said_at.empty() ? "" : said_at + ": ", name, what));
+  throw InputError(fmt::format("{}: {}", called(said_at, name), what));
 }
 
 [[noreturn]] void refuse(const ShellBody& body, const std::string& what) { refuse(body.said_at, body.name, what); }
@@ -31,25 +41,59 @@ const Material& material_of(const Model& model, std::size_t body) {
   return model.is_solid(body) ? model.solids[body - model.shells.size()].material : model.shells[body].material;
 }
 
+bool is_finite(double value) { return std::isfinite(value); }
+bool is_finite(const Vec3& value) { return value.allFinite(); }
+
+/// Times increase, and what is said of them is finite.
+template <typename Value>
+bool is_table(const std::vector<std::pair<double, Value>>& points) {
+  double before = -infinity;
+  for (const auto& [time, value] : points) {
+    if (!std::isfinite(time) || time <= before || !is_finite(value)) {
+      return false;
+    }
+    before = time;
+  }
+  return true;
+}
+
+void check_material(const Material& material, double largest_poisson, const std::string& of) {
+  if (!(material.young > 0) || !std::isfinite(material.young)) {
+    throw InputError(fmt::format("{}: Young's modulus is {:.6g} MPa: it must be positive", of, material.young));
+  }
+  if (!(material.poisson > -1 && material.poisson <= largest_poisson)) {
+    throw InputError(fmt::format("{}: Poisson's ratio is {:.6g}: it must be above -1 and at most {}", of,
+                                 material.poisson, largest_poisson));
+  }
+  if (material.density && (!(*material.density > 0) || !std::isfinite(*material.density))) {
+    throw InputError(of + ": the density must be positive");
+  }
+}
+
+/// Also of nodes that no element has: they are counted in the body's size.
+void check_places(const std::vector<Vec3>& nodes, const std::string& of) {
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    if (!std::isfinite(nodes[i].squaredNorm())) {
+      throw InputError(fmt::format("{}: the position of node {} is not finite, or too far out to reckon with", of, i));
+    }
+  }
+}
+
 void check_body(const ShellBody& body) {
   const ShellMesh& mesh = body.mesh;
   if (mesh.triangles.empty()) {
     refuse(body, "the shell has no triangles");
   }
-  for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
-    if (!mesh.vertices[i].allFinite()) {
-      refuse(body, fmt::format("the position of node {} is not finite", i));
+  const std::string name = called(body.said_at, body.name);
+  check_places(mesh.vertices, name);
+  naming(name, [&] {
+    if (body.curved) {
+      require_valid(mesh);
+    } else {
+      require_corners(mesh.vertices.size(), mesh.triangles);
     }
-  }
-  if (!(body.material.young > 0) || !std::isfinite(body.material.young)) {
-    refuse(body, fmt::format("Young's modulus is {:.6g} MPa: it must be positive", body.material.young));
-  }
-  if (!(body.material.poisson > -1 && body.material.poisson <= 0.5)) {
-    refuse(body, fmt::format("Poisson's ratio is {:.6g}: it must be above -1 and at most 0.5", body.material.poisson));
-  }
-  if (body.material.density && (!(*body.material.density > 0) || !std::isfinite(*body.material.density))) {
-    refuse(body, "the density must be positive");
-  }
+  });
+  check_material(body.material, 0.5, name);
   if (body.thickness.size() != 1 && body.thickness.size() != mesh.vertices.size()) {
     refuse(body, fmt::format("{} thicknesses for {} nodes: give one, or one per node", body.thickness.size(),
                              mesh.vertices.size()));
@@ -93,11 +137,6 @@ void check_triangles(const ShellBody& body) {
   std::string inconsistent;  // said only when no third triangle meets there
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     const auto& v = mesh.triangles[t];
-    for (const Index i : v) {
-      if (i >= mesh.vertices.size()) {
-        refuse(body, fmt::format("element {} names node {}, but there are {}", t, i, mesh.vertices.size()));
-      }
-    }
     const Vec3& a = mesh.vertices[v[0]];
     if (!has_area({a, mesh.vertices[v[1]], mesh.vertices[v[2]]})) {
       refuse(body, fmt::format("element {} (nodes {}, {}, {}) at {} is degenerate: it has no area; mend the mesh", t,
@@ -128,11 +167,8 @@ void check_triangles(const ShellBody& body) {
   if (!inconsistent.empty()) {
     refuse(body, inconsistent);
   }
-  if (body.curved && mesh.corner_normals.empty() && mesh.normals.size() != mesh.vertices.size()) {
-    refuse(body, fmt::format("{} normals for {} nodes", mesh.normals.size(), mesh.vertices.size()));
-  }
   if (body.curved && body.rest == Rest::curved) {
-    require_fit(mesh, body.said_at.empty() ? body.name : body.said_at + ": " + body.name);
+    require_fit(mesh, called(body.said_at, body.name));
   }
 }
 
@@ -144,6 +180,97 @@ void check_inner_face(const ShellBody& body) {
            fmt::format("its thickness, {:.6g} mm, is more than twice the radius of curvature over {:.0f} % of its "
                        "area, so that no inner face is left: is its unit right?",
                        *std::max_element(body.thickness.begin(), body.thickness.end()), 100 * share));
+  }
+}
+
+/// All numbers of a load.
+Vec3 numbers_of(const Load& load) {
+  if (const auto* pressure = std::get_if<PressureLoad>(&load.kind)) {
+    return {pressure->value, pressure->imaged_at.value_or(0), 0};
+  }
+  if (const auto* force = std::get_if<ForceLoad>(&load.kind)) {
+    return force->total;
+  }
+  if (const auto* moment = std::get_if<MomentLoad>(&load.kind)) {
+    return moment->total;
+  }
+  if (const auto* edge = std::get_if<EdgeLoad>(&load.kind)) {
+    return edge->per_length;
+  }
+  if (const auto* area = std::get_if<AreaLoad>(&load.kind)) {
+    return area->per_area;
+  }
+  return std::get<GravityLoad>(load.kind).acceleration;
+}
+
+void check_rigid(const RigidBody& body) {
+  constexpr double rounding = 1e-9;  // as where scenes are checked
+  for (const auto& table : tables_of(body)) {
+    if (table.points.empty() || !is_table(table.points)) {
+      refuse(body.said_at, body.name,
+             "a table of its shape or motion has no points, times that do not increase, or values that are not finite");
+    }
+  }
+  const auto check_axis = [&](const Vec3& point, const Vec3& direction) {
+    if (!point.allFinite() || !(std::abs(direction.norm() - 1) < rounding)) {
+      refuse(body.said_at, body.name, "an axis of its shape or motion has no unit vector, or no finite point");
+    }
+  };
+  if (const auto* plane = std::get_if<RigidPlane>(&body.shape)) {
+    check_axis(Vec3::Zero(), plane->normal);
+  } else if (const auto* mesh = std::get_if<RigidMesh>(&body.shape)) {
+    naming(called(body.said_at, body.name), [&] { require_surface(mesh->surface); });
+    if (mesh->turn) {
+      check_axis(mesh->turn->point, mesh->turn->axis);
+    }
+    if (mesh->expansion) {
+      check_axis(mesh->expansion->point, mesh->expansion->axis);
+    }
+  }
+}
+
+/// Contacts and attachments.
+void check_meetings(const Model& model) {
+  for (const Contact& contact : model.contacts) {
+    for (const ContactParty& party : contact.between) {
+      if (party.index >= (party.rigid ? model.rigids.size() : model.body_count())) {
+        refuse(contact.said_at, contact.name,
+               fmt::format("the contact names {}body {}, but there are {}", party.rigid ? "rigid " : "", party.index,
+                           party.rigid ? model.rigids.size() : model.body_count()));
+      }
+    }
+    if (contact.between[0].rigid && contact.between[1].rigid) {
+      refuse(contact.said_at, contact.name, "two rigid bodies cannot be in contact");
+    }
+    naming(called(contact.said_at, contact.name), [&] {
+      require_not_negative(contact.friction, "the friction");
+      require_positive(contact.resolution, "the resolution");
+    });
+  }
+  for (const Attachment& attachment : model.attachments) {
+    for (const std::size_t body : {attachment.body, attachment.to}) {
+      if (body >= model.body_count()) {
+        refuse(attachment.said_at, "an attachment",
+               fmt::format("it names body {}, but there are {}", body, model.body_count()));
+      }
+    }
+    for (const Index i : attachment.nodes) {
+      if (i >= model.vertices_of(attachment.body).size()) {
+        refuse(
+            model, attachment.body,
+            fmt::format("an attachment names node {}, but there are {}", i, model.vertices_of(attachment.body).size()));
+      }
+    }
+  }
+}
+
+/// Of a load or a fix.
+void check_numbers(const Vec3& numbers, const Ramp& ramp, const std::string& of) {
+  if (!numbers.allFinite()) {
+    throw InputError(of + ": is not finite");
+  }
+  if (!is_table(ramp.points)) {
+    throw InputError(of + ": the times of its ramp must increase, and its factors be finite");
   }
 }
 
@@ -164,16 +291,37 @@ void check_selections(const Model& model) {
   };
   for (const Fix& fix : model.fixes) {
     check(fix.body, fix.nodes, "fix");
+    check_numbers(fix.displacement, fix.ramp, called(fix.said_at, "this fix on " + model.name_of(fix.body)));
+    constexpr double rounding = 1e-9;
+    if (fix.across && !(std::abs(fix.across->norm() - 1) < rounding)) {
+      refuse(fix.said_at, "this fix on " + model.name_of(fix.body), "the plane of a slide has no unit normal");
+    }
+    if (fix.across && model.is_solid(fix.body)) {
+      refuse(model, fix.body, "a slide is of the rims of shells, and this is a solid");
+    }
+  }
+  for (const Support& support : model.supports) {
+    check(support.body, support.nodes, "support");
+    if (model.is_solid(support.body)) {
+      refuse(model, support.body, "a bed supports shells, and this is a solid: hold it by a fix");
+    }
+    naming(called(support.said_at, "this support of " + model.name_of(support.body)),
+           [&] { require_positive(support.stiffness, "the stiffness"); });
+    const std::vector<char> on = triangles_within(model.shells[support.body].mesh, support.nodes);
+    if (std::find(on.begin(), on.end(), 1) == on.end()) {
+      refuse(support.said_at, "this support of " + model.name_of(support.body),
+             "no triangle has all its nodes in the selection: select more");
+    }
   }
   for (const RigidMotionsFix& fix : model.rigid_motions) {
     check(fix.body, {0}, "fix of the rigid motions");
-    if (std::any_of(model.fixes.begin(), model.fixes.end(), [&](const Fix& other) { return other.body == fix.body; })) {
-      refuse(model, fix.body, "it is held by its rigid motions and by another fix: keep one of them");
-    }
   }
   for (const Load& load : model.loads) {
     check(load.body, {0}, "load");
-    if (const auto* force = std::get_if<ForceLoad>(&load.kind)) {
+    check_numbers(numbers_of(load), load.ramp, called(load.said_at, "this load on " + model.name_of(load.body)));
+    if (const auto* pressure = std::get_if<PressureLoad>(&load.kind); pressure != nullptr && !pressure->nodes.empty()) {
+      check(load.body, pressure->nodes, "pressure");
+    } else if (const auto* force = std::get_if<ForceLoad>(&load.kind)) {
       check(load.body, force->nodes, "force");
     } else if (const auto* moment = std::get_if<MomentLoad>(&load.kind)) {
       check(load.body, moment->nodes, "moment");
@@ -192,45 +340,48 @@ void check_selections(const Model& model) {
   }
 }
 
-double size_of(const PressureLoad& load) { return std::abs(load.value); }
-double size_of(const ForceLoad& load) { return load.total.cwiseAbs().maxCoeff(); }
-double size_of(const MomentLoad& load) { return load.total.cwiseAbs().maxCoeff(); }
-double size_of(const EdgeLoad& load) { return load.per_length.cwiseAbs().maxCoeff(); }
-double size_of(const AreaLoad& load) { return load.per_area.cwiseAbs().maxCoeff(); }
-double size_of(const GravityLoad& load) { return load.acceleration.cwiseAbs().maxCoeff(); }
-
 /// Norms take squares of loads, which have to be numbers.
-void check_sizes(const Model& model, const RunSettings& settings) {
+void check_load_sizes(const Model& model, const RunSettings& settings) {
   const auto* run = std::get_if<StaticRun>(&settings.kind);
   for (const Load& load : model.loads) {
     double factor = load.ramp.points.empty() && run != nullptr ? run->load_factors.back() : 1;
     for (const auto& point : load.ramp.points) {
       factor = std::max(factor, std::abs(point.second));
     }
-    const double most = factor * std::visit([](const auto& kind) { return size_of(kind); }, load.kind);
+    const double most = factor * numbers_of(load).cwiseAbs().maxCoeff();
     if (!std::isfinite(most * most)) {
-      throw InputError(fmt::format("{}this load on {}, with its ramp, is larger than any force: is its unit right?",
-                                   load.said_at.empty() ? "" : load.said_at + ": ", model.name_of(load.body)));
+      throw InputError(
+          called(load.said_at, fmt::format("this load on {}, with its ramp, is larger than any force: is its "
+                                           "unit right?",
+                                           model.name_of(load.body))));
     }
   }
 }
 
 constexpr double largest_solid_poisson = 0.4999;
 
-void check_solids(const Model& model, const RunSettings& settings) {
+void check_solid_bodies(const Model& model) {
   for (std::size_t b = model.shells.size(); b < model.body_count(); ++b) {
     const SolidBody& body = model.solids[b - model.shells.size()];
     if (body.mesh.tetrahedra.empty()) {
       refuse(model, b, "the solid has no tetrahedra");
     }
-    if (!(body.material.young > 0) || !std::isfinite(body.material.young)) {
-      refuse(model, b, fmt::format("Young's modulus is {:.6g} MPa: it must be positive", body.material.young));
+    const std::string name = called(body.said_at, body.name);
+    check_places(body.mesh.vertices, name);
+    naming(name, [&] { require_valid(body.mesh); });
+    for (std::size_t t = 0; t < body.mesh.tetrahedra.size(); ++t) {
+      const auto& [i, j, k, l] = body.mesh.tetrahedra[t];
+      const std::vector<Vec3>& x = body.mesh.vertices;
+      if (!(tet_volume(x[i], x[j], x[k], x[l]) > 0)) {
+        refuse(model, b, fmt::format("tetrahedron {} at {} is inside out or has no volume", t, place(x[i])));
+      }
     }
-    if (!(body.material.poisson > -1 && body.material.poisson <= largest_solid_poisson)) {
-      refuse(model, b,
-             fmt::format("Poisson's ratio is {:.6g}: it must be above -1 and at most {}", body.material.poisson,
-                         largest_solid_poisson));
-    }
+    check_material(body.material, largest_solid_poisson, name);
+  }
+}
+
+void check_solids(const Model& model, const RunSettings& settings) {
+  for (std::size_t b = model.shells.size(); b < model.body_count(); ++b) {
     if (settings.solver == Solver::cg) {
       refuse(model, b, "conjugate gradients cannot follow the pressure in a solid: use solver = \"direct\"");
     }
@@ -291,7 +442,8 @@ void check_path(const Model& model, const ArcLengthRun& run) {
       std::any_of(model.fixes.begin(), model.fixes.end(), ramped)) {
     throw InputError("arc length finds the load factor, so that no load can have a ramp over it: remove the ramps");
   }
-  if (run.max_steps == 0 || !(run.first_factor > 0) || (run.max_factor && !(*run.max_factor > 0))) {
+  if (run.max_steps == 0 || !(run.first_factor > 0) || !std::isfinite(run.first_factor) ||
+      (run.max_factor && (!(*run.max_factor > 0) || !std::isfinite(*run.max_factor)))) {
     throw InputError("arc length: max_steps must be at least 1, the first step and max_factor positive");
   }
   if (run.until && (run.until->probe >= model.probes.size() || run.until->axis < 0 || run.until->axis > 2 ||
@@ -301,13 +453,22 @@ void check_path(const Model& model, const ArcLengthRun& run) {
 }
 
 void check_run(const Model& model, const RunSettings& settings) {
+  constexpr double most_steps = 9e15;  // to 2^53 a double counts them
   const auto positive = [](double value) { return value > 0 && std::isfinite(value); };
   if (const auto* dynamic = std::get_if<DynamicRun>(&settings.kind)) {
     if (!positive(dynamic->duration) || !positive(dynamic->step)) {
       throw InputError("a dynamic run needs a positive duration and a positive step");
     }
-    if (!(dynamic->damping.mass >= 0) || !(dynamic->damping.stiffness >= 0)) {
-      throw InputError("damping must not be negative");
+    require_not_negative(dynamic->damping.mass, "damping by mass");
+    require_not_negative(dynamic->damping.stiffness, "damping by stiffness");
+    if (!(dynamic->spectral_radius >= 0 && dynamic->spectral_radius <= 1)) {
+      throw InputError(fmt::format("the spectral radius is {}: it must be from 0 to 1", dynamic->spectral_radius));
+    }
+    if (dynamic->adaptive) {
+      require_positive(dynamic->adaptive->value, "the error of a step");
+    }
+    if (!(dynamic->duration / dynamic->step < most_steps)) {
+      throw InputError("a dynamic run of more steps than can be counted: are the units of duration and step right?");
     }
     require_densities(model, "a dynamic run");
   } else if (const auto* frequencies = std::get_if<FrequencyRun>(&settings.kind)) {
@@ -332,6 +493,7 @@ void check_run(const Model& model, const RunSettings& settings) {
   if (settings.newton_max == 0 || settings.every == 0 || !positive(settings.converge)) {
     throw InputError("newton_max and every must be at least 1, and converge positive");
   }
+  require_not_negative(settings.settled, "the increment that ends Newton's method");
   if (settings.solver == Solver::cg && !settings.cg_fixed_count && !positive(settings.cg_tolerance)) {
     throw InputError("the tolerance of conjugate gradients must be positive");
   }
@@ -341,7 +503,8 @@ void check_run(const Model& model, const RunSettings& settings) {
 }
 
 /// Net load at the end of the ramps; follower pressure at the reference.
-void check_balance(const ShellSystem& system, const Model& model) {
+void check_balance(const ShellSystem& system) {
+  const Model& model = *system.model;
   if (model.rigid_motions.empty()) {
     return;
   }
@@ -350,9 +513,9 @@ void check_balance(const ShellSystem& system, const Model& model) {
     factors.push_back(load.ramp.points.empty() ? 1 : load.ramp.points.back().second);
   }
   Forces forces;
-  evaluate(system, model, reference_configuration(system), factors, {}, forces, nullptr);
+  evaluate(system, reference_configuration(system), factors, {}, forces, nullptr);
   for (const Piece& piece : system.pieces) {
-    if (!held_by_rigid_motions(model, piece.body)) {
+    if (!piece.balanced) {
       continue;
     }
     const double relative = imbalance(system, piece, forces.external);
@@ -367,7 +530,8 @@ void check_balance(const ShellSystem& system, const Model& model) {
 }
 
 /// Contact holds what it presses on, and attachments what they carry.
-bool may_be_held_by_others(const Model& model, const ShellSystem& system, const Piece& piece) {
+bool may_be_held_by_others(const ShellSystem& system, const Piece& piece) {
+  const Model& model = *system.model;
   const auto names = [&](const ContactParty& party) { return !party.rigid && party.index == piece.body; };
   if (std::any_of(model.contacts.begin(), model.contacts.end(),
                   [&](const Contact& c) { return names(c.between[0]) || names(c.between[1]); })) {
@@ -382,27 +546,48 @@ bool may_be_held_by_others(const Model& model, const ShellSystem& system, const 
 
 }  // namespace
 
-ShellSystem make_checked_system(const Model& model, const RunSettings& settings) {
+void require_valid(const ShellBody& body) { check_body(body); }
+
+void require_valid(const Model& model) {
   if (model.body_count() == 0) {
     throw InputError("the model has no shell and no solid");
   }
   for (const ShellBody& body : model.shells) {
     check_body(body);
+  }
+  check_solid_bodies(model);
+  check_selections(model);
+  for (const RigidBody& body : model.rigids) {
+    check_rigid(body);
+  }
+  check_meetings(model);
+}
+
+void require_valid(const Model& model, const State& state) {
+  const std::size_t nodes = model.node_count();
+  if (state.displacement.size() != nodes || state.rotation.size() != nodes) {
+    throw InputError(fmt::format("a state of {} displacements and {} rotations is not of a model of {} nodes",
+                                 state.displacement.size(), state.rotation.size(), nodes));
+  }
+}
+
+ShellSystem make_checked_system(const Model& model, const RunSettings& settings) {
+  require_valid(model);
+  for (const ShellBody& body : model.shells) {
     check_triangles(body);
     check_inner_face(body);
   }
   check_solids(model, settings);
-  check_selections(model);
   check_run(model, settings);
-  check_sizes(model, settings);
+  check_load_sizes(model, settings);
   ShellSystem system = make_system(model);
   if (std::holds_alternative<FrequencyRun>(settings.kind) || std::holds_alternative<BucklingRun>(settings.kind)) {
     stiffen_short_waves(system);
   }
-  check_balance(system, model);
+  check_balance(system);
   if (finds_rest(model, settings)) {
     for (const Piece& piece : system.pieces) {
-      if (may_be_held_by_others(model, system, piece)) {
+      if (may_be_held_by_others(system, piece)) {
         continue;
       }
       const int motions = free_rigid_motions(system, piece);
@@ -418,6 +603,28 @@ ShellSystem make_checked_system(const Model& model, const RunSettings& settings)
   }
   return system;
 }
+
+struct System::Implementation {
+  Implementation(Model of, const RunSettings& by)
+      : model(std::move(of)), settings(by), parts(make_checked_system(model, settings)) {}
+
+  Model model;
+  RunSettings settings;
+  ShellSystem parts;  // some of it refers to the model
+};
+
+System::System(Model model, const RunSettings& settings)
+    : implementation_(std::make_shared<Implementation>(std::move(model), settings)) {}
+
+const Model& System::model() const { return implementation_->model; }
+const RunSettings& System::settings() const { return implementation_->settings; }
+
+ShellSystem& System::parts() const {
+  add_prestress(implementation_->parts, implementation_->settings);
+  return implementation_->parts;
+}
+
+std::optional<double> System::prestress_residual() const { return parts().prestress_residual; }
 
 void check_model(const Model& model, const RunSettings& settings) { (void)make_checked_system(model, settings); }
 

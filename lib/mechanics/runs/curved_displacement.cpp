@@ -1,7 +1,11 @@
 #include "tunica/mechanics/runs/curved_displacement.hpp"
 
+#include "tunica/core/error.hpp"
 #include "tunica/core/threads.hpp"
 #include "tunica/mechanics/elements/rotation.hpp"
+#include "tunica/surface/mesh/checks.hpp"
+
+#include <fmt/format.h>
 
 #include <Eigen/SVD>
 
@@ -108,11 +112,22 @@ std::optional<ShellMesh> faceted(const ShellMesh& mesh) {
   return result;
 }
 
+/// The mesh of a body whose corners, and their motion, exist.
+const ShellMesh& checked(const Model& model, std::size_t body, const State& state) {
+  if (body >= model.shells.size()) {
+    throw InputError(fmt::format("there is no shell {}: the model has {}", body, model.shells.size()));
+  }
+  require_valid(model, state);
+  const ShellMesh& mesh = model.shells[body].mesh;
+  require_corners(mesh.vertices.size(), mesh.triangles);  // curved_patches() asks for the rest
+  return mesh;
+}
+
 /// The patches of a body in the reference and in a state.
 class MovedPatches {
 public:
   MovedPatches(const Model& model, std::size_t body, const State& state)
-      : faceted_(faceted(model.shells[body].mesh)),
+      : faceted_(faceted(checked(model, body, state))),
         mesh_(faceted_ ? *faceted_ : model.shells[body].mesh),
         displacement_(state.displacement.data() + model.first_node(body)),
         before_(curved_patches(mesh_)),
@@ -188,7 +203,13 @@ double climb(const MovedPatches& patches, Sample at) {
 
 std::vector<Vec3> curved_displacement(const Model& model, std::size_t body, const State& state,
                                       const Tessellation& surface) {
-  const MovedPatches patches(model, body, state);
+  const MovedPatches patches(model, body, state);  // a body that exists
+  const std::size_t count = model.shells[body].mesh.triangles.size();
+  if (surface.vertex_shell.size() != surface.mesh.vertices.size() ||
+      surface.barycentric.size() != surface.mesh.vertices.size() ||
+      std::ranges::any_of(surface.vertex_shell, [&](Index patch) { return patch >= count; })) {
+    throw InputError(model.name_of(body) + ": the tessellation is not of its shells");
+  }
   std::vector<Vec3> result(surface.mesh.vertices.size());
   parallel_for_blocks(result.size(), vertices_per_block, [&](std::size_t begin, std::size_t end) {
     for (std::size_t v = begin; v < end; ++v) {
@@ -200,6 +221,7 @@ std::vector<Vec3> curved_displacement(const Model& model, std::size_t body, cons
 
 double largest_displacement(const Model& model, const State& state) {
   constexpr std::size_t climbed = 16;  // patches around the largest may hold it
+  require_valid(model, state);
   double largest = 0;
   for (std::size_t i = model.first_node(model.shells.size()); i < state.displacement.size(); ++i) {
     largest = std::max(largest, state.displacement[i].norm());
@@ -225,7 +247,7 @@ double largest_displacement(const Model& model, const State& state) {
 std::size_t count_unresolved(const Model& model, const State& state, double angle) {
   std::size_t count = 0;
   for (std::size_t body = 0; body < model.shells.size() && !state.linear; ++body) {
-    const ShellMesh& mesh = model.shells[body].mesh;
+    const ShellMesh& mesh = checked(model, body, state);
     for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
       const auto motion = motion_of(mesh, t, model.first_node(body), state);
       const auto far = [&](const Vec3& bending) { return !(motion->normal.cross(bending).norm() <= angle); };

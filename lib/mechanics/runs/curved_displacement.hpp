@@ -12,6 +12,8 @@ namespace tunica {
 /// facet. Where a facet has collapsed, the nodes' displacements are interpolated linearly.
 /// @param state  global node order; `surface` is a tessellation of the body's own mesh
 /// @return #V displacements, mm
+/// Errors of all functions here: InputError: a body, a corner or a patch that does not exist, coordinates or normals
+/// that are not finite, a state of another model.
 std::vector<Vec3> curved_displacement(const Model& model, std::size_t body, const State& state,
                                       const Tessellation& surface);
 

@@ -1,8 +1,10 @@
 #include "tunica/mechanics/runs/doubts.hpp"
 
+#include "tunica/core/error.hpp"
 #include "tunica/mechanics/contact/rigid_shape.hpp"
-#include "tunica/mechanics/runs/unloaded.hpp"
+#include "tunica/mechanics/runs/solve.hpp"
 #include "tunica/shell/distance/target.hpp"
+#include "tunica/shell/patch/curved_surface.hpp"
 #include "tunica/surface/mesh/measure.hpp"
 
 #include <fmt/format.h>
@@ -51,11 +53,14 @@ double area_of(const ShellMesh& mesh, std::size_t triangle) {
 }
 
 /// The corners' own normals, or those of the vertices where a mesh has none (`curved` false: flat facets).
+/// Errors: InputError: as require_valid() of what it takes them from.
 class CornerNormals {
 public:
   CornerNormals(const ShellMesh& mesh, bool curved) : mesh_(mesh) {
     if (!curved || (mesh.corner_normals.empty() && mesh.normals.size() != mesh.vertices.size())) {
-      of_vertices_ = vertex_normals(flat_facets(mesh));
+      of_vertices_ = vertex_normals(flat_facets(mesh));  // which asks the same of its mesh
+    } else {
+      require_valid(mesh);
     }
   }
 
@@ -243,7 +248,7 @@ double waves_of(const ShellBody& body) {
 
 /// What long shells and what waves leave of an answer adds up, so both take from one allowance. Of five organs at about
 /// twice the allowance the stress at the faces was 11 to 31 % low, and displacements 3 % off.
-void doubt_coarseness(const ShellBody& body, bool may_be_chosen, std::vector<Warning>& found) {
+void doubt_coarseness(const ShellBody& body, std::vector<Warning>& found) {
   constexpr double of_bow = 0.4, of_waves = 10;  // of displacements
   constexpr double far_beyond = 3;               // of the allowance
   const double bow = median_bow_share(body);
@@ -252,11 +257,12 @@ void doubt_coarseness(const ShellBody& body, bool may_be_chosen, std::vector<War
   if (used > 1) {
     found.push_back(
         {Weight::minor, "coarse shells",
-         fmt::format("{}: its shells are coarse for so thin a curved wall: the stress at its faces may be {} too low, "
-                     "and displacements by up to {:.0f} %: take more shells, as far as the surface has them{}",
-                     at(body.said_at, body.name), used > far_beyond ? "more than 30 %" : "10 to 30 %",
-                     100 * std::min(1.0, of_bow * bow + of_waves * waves),
-                     may_be_chosen ? ", or let --accuracy 5% --of stress (ACCURACY=5% OF=stress) choose them" : "")});
+         fmt::format(
+             "{}: its shells are coarse for so thin a curved wall: the stress at its faces may be {} too low, "
+             "and displacements by up to {:.0f} %: take more shells, as far as the surface has them, or name the "
+             "surface that they were fitted to (--target), by which the error of each number is estimated",
+             at(body.said_at, body.name), used > far_beyond ? "more than 30 %" : "10 to 30 %",
+             100 * std::min(1.0, of_bow * bow + of_waves * waves))});
   }
 }
 
@@ -264,7 +270,7 @@ void doubt_coarseness(const ShellBody& body, bool may_be_chosen, std::vector<War
 std::vector<std::array<bool, 6>> held_freedoms(const Model& model, std::size_t body) {
   std::vector<std::array<bool, 6>> held(model.vertices_of(body).size());
   for (const Fix& fix : model.fixes) {
-    if (fix.body != body) {
+    if (fix.body != body || fix.across) {
       continue;
     }
     for (const Index node : fix.nodes) {
@@ -445,7 +451,8 @@ bool is_loaded(const Model& model) {
          std::any_of(model.rigids.begin(), model.rigids.end(), moves);
 }
 
-std::vector<Warning> doubts(const Model& model, const RunSettings& settings, bool are_shells_chosen) {
+std::vector<Warning> doubts(const Model& model, const RunSettings& settings, bool has_estimates) {
+  require_valid(model);
   std::vector<Warning> found;
   std::vector<std::vector<std::array<bool, 6>>> held;
   for (std::size_t b = 0; b < model.shells.size(); ++b) {
@@ -453,8 +460,8 @@ std::vector<Warning> doubts(const Model& model, const RunSettings& settings, boo
     doubt_thickness(body, found);
     doubt_material(at(body.said_at, body.name), body.material, is_pressed(model, b), found);
     doubt_voxels(body, found);
-    if (!are_shells_chosen) {
-      doubt_coarseness(body, !is_imaged_under_pressure(model), found);
+    if (!has_estimates) {
+      doubt_coarseness(body, found);
     }
     held.push_back(held_freedoms(model, b));
     if (cannot_move(model, b, held.back())) {
@@ -477,7 +484,7 @@ std::vector<Warning> doubts(const Model& model, const RunSettings& settings, boo
   }
   const bool needs_load =
       std::holds_alternative<StaticRun>(settings.kind) || std::holds_alternative<DynamicRun>(settings.kind);
-  if (needs_load && !is_loaded(model) && !is_imaged_under_pressure(model)) {
+  if (needs_load && !is_loaded(model) && !model.is_imaged_under_pressure()) {
     const std::string& place = model.shells.empty() ? model.solids.front().said_at : model.shells.front().said_at;
     found.push_back({Weight::minor, "no load", at(place, "nothing loads the model, so it stays as it is: add a load")});
   }
@@ -494,6 +501,10 @@ std::string pressure_text(double mpa) {
 }
 
 double share_without_inner_face(const ShellBody& body) {
+  if (body.thickness.size() != 1 && body.thickness.size() != body.mesh.vertices.size()) {
+    throw InputError(fmt::format("{}: {} thicknesses for {} nodes: give one, or one per node", body.name,
+                                 body.thickness.size(), body.mesh.vertices.size()));
+  }
   return share_thicker(body, curvatures_of(body.mesh, body.curved), 2);
 }
 

@@ -19,15 +19,16 @@ bool is_loaded(const Model& model);
 /// diagonal; stiffness and density that no material has; pressure on a cavity inside the body; images whose voxels are
 /// large for the wall; shells that are coarse for a curved wall so thin; bodies that cannot move; forces and moments
 /// that only held nodes bear; loads that are zero or stay so during the run, or jump within a step; nothing that loads
-/// at all (static and dynamic runs). The model must have passed check_model(). Cost: linear.
-/// @param are_shells_chosen  for an accuracy: its estimate says more of them than their shape
-std::vector<Warning> doubts(const Model& model, const RunSettings& settings, bool are_shells_chosen = false);
+/// at all (static and dynamic runs). The model must have passed check_model(). Errors: InputError as require_valid() of
+/// the model. Cost: linear.
+/// @param has_estimates  the errors of the answers are estimated: that says more of the shells than their shape
+std::vector<Warning> doubts(const Model& model, const RunSettings& settings, bool has_estimates = false);
 
 /// A pressure or a stiffness (MPa) with the unit that suits it, Pa to TPa: "16 kPa".
 std::string pressure_text(double mpa);
 
 /// The part of a body's area on which the wall is thicker than twice the radius of curvature, so that no inner face is
-/// left.
+/// left. Errors: InputError: as curvatures_of(), or not one thickness, nor one per node.
 double share_without_inner_face(const ShellBody& body);
 
 struct Curvature {
@@ -37,7 +38,8 @@ struct Curvature {
 
 /// Curvatures of the shells (#F): of each those of the symmetric shape operator that fits best how the
 /// normals turn along its edges; the corners' normals, or those of the vertices where `mesh` has none of its own
-/// (`curved` false: flat facets). Zero where a facet has no area.
+/// (`curved` false: flat facets). Zero where a facet has no area. Errors: InputError as
+/// require_valid() of the mesh, its normals included where they are looked at.
 /// Source: Rusinkiewicz, "Estimating curvatures and their derivatives on triangle meshes", 3DPVT 2004, section 3.
 std::vector<Curvature> curvatures_of(const ShellMesh& mesh, bool curved);
 

@@ -1,6 +1,7 @@
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/mechanics/elements/rotation.hpp"
+#include "tunica/mechanics/runs/detail/contact_steps.hpp"
 #include "tunica/mechanics/runs/detail/settle.hpp"
 #include "tunica/mechanics/runs/detail/stepped_run.hpp"
 #include "tunica/mechanics/runs/detail/supports.hpp"
@@ -70,7 +71,9 @@ RigidMotion rigid_motion(const ShellSystem& system, const Piece& piece, const Co
     inertia += system.mass[i] * (arm.squaredNorm() * Mat3::Identity() - arm * arm.transpose()) +
                system.inertia[i] * Mat3::Identity();
   }
-  return {momentum / mass, inertia.ldlt().solve(spin), centre};
+  const Vec3 turn =
+      (piece.turns * inertia * piece.turns + Mat3::Identity() - piece.turns).ldlt().solve(piece.turns * spin);
+  return {piece.shifts * momentum / mass, turn, centre};
 }
 
 /// Takes linear and angular momentum out of a piece. The loads are in balance, so there is only what the solver's
@@ -162,10 +165,10 @@ public:
     memory["length_before"] = {length_before_};
   }
 
-  void recall(const Memory& memory) {
-    rate_ = of_elements(memory.at("viscous_rate"));
-    before_ = of_elements(memory.at("deformation_before"));
-    length_before_ = memory.at("length_before").at(0);
+  void recall(const Checkpoint& from) {
+    rate_ = of_elements(from, "viscous_rate");
+    before_ = of_elements(from, "deformation_before");
+    length_before_ = remembered(from, "length_before", 1)[0];
   }
 
 private:
@@ -178,9 +181,11 @@ private:
   }
 
   /// Of the elements, or of none.
-  [[nodiscard]] std::vector<ElementState> of_elements(const std::vector<double>& numbers) const {
+  [[nodiscard]] std::vector<ElementState> of_elements(const Checkpoint& from, std::string_view name) const {
     constexpr std::size_t size = ElementState::SizeAtCompileTime;
-    TUNICA_ASSERT(numbers.empty() || numbers.size() == size * system_.elements.size());
+    const auto found = from.memory.find(name);
+    const bool none = found != from.memory.end() && found->second.empty();
+    const std::vector<double>& numbers = remembered(from, name, none ? 0 : size * system_.elements.size());
     std::vector<ElementState> result(numbers.size() / size);
     for (std::size_t e = 0; e < result.size(); ++e) {
       result[e] = Eigen::Map<const ElementState>(numbers.data() + size * e);
@@ -204,15 +209,16 @@ private:
 /// rate of its deformation: a rigid motion is not damped by beta.
 class TimeStepper {
 public:
-  TimeStepper(ShellSystem& system, const Model& model, const RunSettings& settings, const DynamicRun& run)
+  TimeStepper(ShellSystem& system, const RunSettings& settings, const DynamicRun& run)
       : system_(system),
-        model_(model),
+        model_(*system.model),
         settings_(settings),
         run_(run),
         scheme_(run),
         damping_(system, run.damping.stiffness, scheme_.second_order()),
         matrix_(system.pattern),
         mass_(lumped_masses(system)),
+        held_(along_world(system.held)),
         longest_side_(longest_side(system)),
         part_(run.step) {
     solver_.emplace(system, settings);
@@ -237,16 +243,16 @@ public:
 
   /// The forces that act at time 0, and the accelerations with which a second-order scheme begins.
   void start(Motion& motion) {
-    evaluate(system_, model_, motion.configuration, load_factors(model_, false, 0), {}, forces_, nullptr);
+    evaluate(system_, motion.configuration, load_factors(model_, false, 0), {}, forces_, nullptr);
     keep_acting(motion);
     braking_ = VectorX::Zero(mass_.size());
     if (!scheme_.second_order()) {
       return;
     }
     for (Eigen::Index i = 0; i < mass_.size(); ++i) {
-      const bool moves = !system_.held[i] && mass_[i] > 0;
-      motion.rates.acceleration[i] = moves ? (forces_.external[i] - forces_.internal[i]) / mass_[i] : 0;
+      motion.rates.acceleration[i] = mass_[i] > 0 ? (forces_.external[i] - forces_.internal[i]) / mass_[i] : 0;
     }
+    mask(solver_->free(), motion.rates.acceleration);
     motion.rates.auxiliary = motion.rates.acceleration;
   }
 
@@ -314,20 +320,19 @@ public:
     return result;
   }
 
-  void recall(const Memory& memory, Motion& motion) {
+  void recall(const Checkpoint& from, Motion& motion) {
     for (auto [name, vector] :
          {std::pair{"velocity", &motion.rates.velocity}, std::pair{"acceleration", &motion.rates.acceleration},
           std::pair{"auxiliary", &motion.rates.auxiliary}, std::pair{"acting", &acting_}}) {
-      const std::vector<double>& values = memory.at(name);
-      TUNICA_ASSERT(values.size() == narrow<std::size_t>(mass_.size()));
+      const std::vector<double>& values = remembered(from, name, narrow<std::size_t>(mass_.size()));
       vector->resize(mass_.size());
       std::copy(values.begin(), values.end(), vector->begin());
     }
     deformation_.clear();
     work_ = damped_ = 0;
-    part_ = memory.at("part").at(0);
-    at_rest_ = memory.at("at_rest").at(0) != 0;
-    damping_.recall(memory);
+    part_ = remembered(from, "part", 1)[0];
+    at_rest_ = remembered(from, "at_rest", 1)[0] != 0;
+    damping_.recall(from);
     braking_ = run_.damping.mass * mass_.cwiseProduct(motion.rates.velocity);
   }
 
@@ -383,7 +388,7 @@ private:
     // A load that is there from time 0 on comes onto a shell at rest without load.
     s.factors_before = time > 0 ? load_factors(model_, false, time) : std::vector<double>(model_.loads.size(), 0.0);
     if (deformation_.empty()) {
-      evaluate(system_, model_, s.start, s.factors_before, {}, forces_, nullptr);
+      evaluate(system_, s.start, s.factors_before, {}, forces_, nullptr);
       deformation_ = forces_.deformation;
     }
     damping_.begin(deformation_, length);
@@ -398,9 +403,9 @@ private:
       follow(s, result, motion.configuration);
     }
     find_change(s.start, motion.configuration, change_);
-    scheme_.end_rates(length, system_.held, s.rates_before, change_, motion.rates);
+    scheme_.end_rates(length, held_, s.rates_before, change_, motion.rates);
     for (const Piece& piece : system_.pieces) {
-      if (held_by_rigid_motions(model_, piece.body)) {
+      if (piece.balanced) {
         stop_rigid_motion(system_, piece, length, motion);
       }
     }
@@ -424,13 +429,11 @@ private:
   /// Loads, and on held freedoms what moves them.
   void keep_acting(const Motion& motion) {
     acting_ = forces_.external;
-    for (std::size_t i = 0; i < system_.held.size(); ++i) {
-      if (system_.held[i]) {
-        const Eigen::Index k = i;
-        acting_[k] = forces_.internal[k] +
-                     mass_[k] * (motion.rates.acceleration[k] + run_.damping.mass * motion.rates.velocity[k]);
-      }
-    }
+    mask(solver_->free(), acting_);
+    VectorX moving =
+        forces_.internal + mass_.cwiseProduct(motion.rates.acceleration + run_.damping.mass * motion.rates.velocity);
+    mask(system_.held, moving);
+    acting_ += moving;
   }
 
   /// Balance of the step with a part of its change; 1: the equation of the step itself.
@@ -440,9 +443,9 @@ private:
     for (std::size_t l = 0; part < 1 && l < factors.size(); ++l) {
       factors[l] = s.factors_before[l] + part * (s.factors[l] - s.factors_before[l]);
     }
-    evaluate(system_, model_, c, factors, damping_.state(), forces_, tangent, predicted);
+    evaluate(system_, c, factors, damping_.state(), forces_, tangent, predicted);
     find_change(s.start, c, s.change);
-    scheme_.end_rates(s.length, system_.held, s.rates_before, s.change, s.rates);
+    scheme_.end_rates(s.length, held_, s.rates_before, s.change, s.rates);
     const VectorX inertia = mass_.cwiseProduct(s.rates.acceleration + run_.damping.mass * s.rates.velocity);
     if (tangent != nullptr) {
       add_inertia(s.change, s.length, *tangent);
@@ -567,6 +570,7 @@ private:
   std::optional<TangentSolver> solver_;
   BlockMatrix matrix_;
   VectorX mass_;
+  const std::vector<bool> held_;  ///< along world axes
   Forces forces_;
   std::vector<ElementState> deformation_;  ///< at the start of the step
   VectorX change_;                         ///< displacements and rotations of the last part of a step
@@ -587,12 +591,11 @@ double first_load_factor(const Model& model, double time) {
 /// The steps of a run, what they hand over, and why one fails.
 class TimeLoop final : public SteppedRun {
 public:
-  TimeLoop(ShellSystem& system, const Model& model, const RunSettings& settings, const DynamicRun& run,
-           const StateCallback& on_state)
-      : SteppedRun(system, model, settings, on_state, step_count(run)),
+  TimeLoop(ShellSystem& system, const RunSettings& settings, const DynamicRun& run, const StateCallback& on_state)
+      : SteppedRun(system, settings, on_state, step_count(run)),
         run_(run),
-        stepper_(system, model, settings, run),
-        turns_(model),
+        stepper_(system, settings, run),
+        turns_(model_),
         motion_{reference_configuration(system), Rates::zero(first_freedom(system.node_count()))} {}
 
 private:
@@ -610,9 +613,10 @@ private:
   void resume(const Checkpoint& from) override {
     time_ = from.position;
     motion_.configuration = recall(from);
-    stepper_.recall(from.memory, motion_);
-    if (const auto found = from.memory.find("last_change"); found != from.memory.end()) {
-      last_change_ = Eigen::Map<const VectorX>(found->second.data(), narrow<Eigen::Index>(found->second.size()));
+    stepper_.recall(from, motion_);
+    if (from.memory.contains("last_change")) {
+      const Eigen::Index size = first_freedom(system_.node_count());
+      last_change_ = Eigen::Map<const VectorX>(remembered(from, "last_change", narrow<std::size_t>(size)).data(), size);
     }
   }
 
@@ -734,7 +738,7 @@ private:
   }
 
   [[nodiscard]] State state_now() const {
-    State state = make_state(system_, model_, motion_.configuration, time_);
+    State state = make_state(system_, motion_.configuration, time_);
     state.converged = true;
     state.load_factor = first_load_factor(model_, state.time);
     state.kinetic_energy = stepper_.kinetic_energy(motion_.rates.velocity);
@@ -758,10 +762,10 @@ private:
 
 }  // namespace
 
-Summary run_dynamic(ShellSystem& system, const Model& model, const RunSettings& settings, const DynamicRun& run,
+Summary run_dynamic(ShellSystem& system, const RunSettings& settings, const DynamicRun& run,
                     const StateCallback& on_state, const Progress& progress, const Resumption& resumption) {
-  release_rigid_motion_supports(system, model);
-  return TimeLoop(system, model, settings, run, on_state).follow(progress, resumption);
+  release_rigid_motion_supports(system);
+  return TimeLoop(system, settings, run, on_state).follow(progress, resumption);
 }
 
 }  // namespace tunica

@@ -6,6 +6,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 namespace tunica {
 namespace {
 
@@ -13,12 +15,34 @@ std::array<Vec3, 3> reference_corners(const ShellElement& e) {
   return {e.from_centroid.col(0), e.from_centroid.col(1), e.from_centroid.col(2)};
 }
 
-void add_dead_pressure(const ShellSystem& system, std::size_t element, double value, DeadLoad& load) {
+/// The elements of a shell, or faces of a solid, all of whose nodes are among some; empty where all are meant.
+std::vector<char> pressed_parts(const ShellSystem& system, std::size_t body, const std::vector<Index>& nodes) {
+  const Model& model = *system.model;
+  if (nodes.empty()) {
+    return {};
+  }
+  if (!model.is_solid(body)) {
+    return triangles_within(model.shells[body].mesh, nodes);
+  }
+  std::vector<char> chosen(system.node_count(), 0);
+  for (const Index node : nodes) {
+    chosen[model.first_node(body) + node] = 1;
+  }
+  std::vector<char> on;
+  for (std::size_t f = system.surfaces.first[body]; f < system.surfaces.first[body + 1]; ++f) {
+    const auto& v = system.surfaces.faces[f].nodes;
+    on.push_back(std::all_of(v.begin(), v.end(), [&](Index i) { return chosen[i] != 0; }) ? 1 : 0);
+  }
+  return on;
+}
+
+/// A pressure of 1 MPa.
+void add_dead_pressure(const ShellSystem& system, std::size_t element, DeadLoad& load) {
   const ShellElement& e = system.elements[element];
   Vector9 force;
   unit_pressure(reference_corners(e), system.heights[element], force, nullptr);
   for (int k = 0; k < 3; ++k) {
-    load.force.segment<3>(first_freedom(e.nodes[k])) += value * force.segment<3>(3 * k);
+    load.force.segment<3>(first_freedom(e.nodes[k])) += force.segment<3>(3 * k);
   }
 }
 
@@ -38,7 +62,8 @@ void add_area_load(const ShellSystem& system, std::size_t element, const Vec3& p
   }
 }
 
-Index used_node(const ShellSystem& system, const Model& model, std::size_t body, Index node) {
+Index used_node(const ShellSystem& system, std::size_t body, Index node) {
+  const Model& model = *system.model;
   const std::size_t global = model.first_node(body) + node;
   if (node >= model.vertices_of(body).size() || system.used[global] == 0) {
     throw InputError(fmt::format("{}: a load acts on node {}, which no element uses", model.name_of(body), node));
@@ -46,30 +71,34 @@ Index used_node(const ShellSystem& system, const Model& model, std::size_t body,
   return narrow<Index>(global);
 }
 
-void add_edge_load(const ShellSystem& system, const Model& model, std::size_t body, const EdgeLoad& edge_load,
-                   DeadLoad& load) {
+void add_edge_load(const ShellSystem& system, std::size_t body, const EdgeLoad& edge_load, DeadLoad& load) {
   for (const auto& edge : edge_load.edges) {
-    const Index a = used_node(system, model, body, edge[0]);
-    const Index b = used_node(system, model, body, edge[1]);
+    const Index a = used_node(system, body, edge[0]);
+    const Index b = used_node(system, body, edge[1]);
     const double length = (system.reference[a] - system.reference[b]).norm();
     load.force.segment<3>(first_freedom(a)) += edge_load.per_length * (length / 2);
     load.force.segment<3>(first_freedom(b)) += edge_load.per_length * (length / 2);
   }
 }
 
-/// Pressure that keeps its direction, or a force per area, on the surface of a solid.
+/// Pressure of 1 MPa that keeps its direction, or a force per area, on the surface of a solid.
 void add_solid_surface_load(const ShellSystem& system, const Load& load, DeadLoad& dead) {
   const auto* pressure = std::get_if<PressureLoad>(&load.kind);
   const auto* area = std::get_if<AreaLoad>(&load.kind);
   if (pressure == nullptr && area == nullptr) {
     return;
   }
-  for (std::size_t f = system.surfaces.first[load.body]; f < system.surfaces.first[load.body + 1]; ++f) {
+  const std::vector<char> on =
+      pressure == nullptr ? std::vector<char>() : pressed_parts(system, load.body, pressure->nodes);
+  const std::size_t first = system.surfaces.first[load.body];
+  for (std::size_t f = first; f < system.surfaces.first[load.body + 1]; ++f) {
+    if (!on.empty() && on[f - first] == 0) {
+      continue;
+    }
     const auto& v = system.surfaces.faces[f].nodes;
     const Vec3 twice =
         (system.reference[v[1]] - system.reference[v[0]]).cross(system.reference[v[2]] - system.reference[v[0]]);
-    const Vec3 force =
-        pressure != nullptr ? Vec3(pressure->value / 6 * twice) : Vec3(twice.norm() / 6 * area->per_area);
+    const Vec3 force = pressure != nullptr ? Vec3(twice / 6) : Vec3(twice.norm() / 6 * area->per_area);
     for (const Index node : v) {
       dead.force.segment<3>(first_freedom(node)) += force;
     }
@@ -78,7 +107,8 @@ void add_solid_surface_load(const ShellSystem& system, const Load& load, DeadLoa
 
 }  // namespace
 
-void make_loads(ShellSystem& system, const Model& model) {
+void make_loads(ShellSystem& system) {
+  const Model& model = *system.model;
   system.dead.resize(model.loads.size());
   for (std::size_t l = 0; l < model.loads.size(); ++l) {
     const Load& load = model.loads[l];
@@ -87,7 +117,7 @@ void make_loads(ShellSystem& system, const Model& model) {
     const std::size_t begin = solid ? 0 : system.first_element[load.body];
     const std::size_t end = solid ? 0 : system.first_element[load.body + 1];
     if (const auto* pressure = std::get_if<PressureLoad>(&load.kind); pressure != nullptr && pressure->follower) {
-      system.follower_pressures.emplace_back(l, load.body);
+      system.follower_pressures.push_back({l, load.body, pressed_parts(system, load.body, pressure->nodes)});
       continue;
     }
     dead.force = VectorX::Zero(first_freedom(system.node_count()));
@@ -98,8 +128,13 @@ void make_loads(ShellSystem& system, const Model& model) {
       dead.director.assign(system.node_count(), Mat3::Zero());
     }
     if (const auto* pressure = std::get_if<PressureLoad>(&load.kind)) {
+      dead.begin = pressure->at(0);
+      dead.end = pressure->at(1);
+      const std::vector<char> on = pressed_parts(system, load.body, pressure->nodes);
       for (std::size_t e = begin; e < end; ++e) {
-        add_dead_pressure(system, e, pressure->value, dead);
+        if (on.empty() || on[e - begin] != 0) {
+          add_dead_pressure(system, e, dead);
+        }
       }
     } else if (const auto* area = std::get_if<AreaLoad>(&load.kind)) {
       for (std::size_t e = begin; e < end; ++e) {
@@ -107,22 +142,55 @@ void make_loads(ShellSystem& system, const Model& model) {
       }
     } else if (const auto* force = std::get_if<ForceLoad>(&load.kind)) {
       for (const Index node : force->nodes) {
-        dead.force.segment<3>(first_freedom(used_node(system, model, load.body, node))) +=
+        dead.force.segment<3>(first_freedom(used_node(system, load.body, node))) +=
             force->total / real(force->nodes.size());
       }
     } else if (const auto* moment = std::get_if<MomentLoad>(&load.kind)) {
       for (const Index node : moment->nodes) {
-        dead.force.segment<3>(first_freedom(used_node(system, model, load.body, node)) + 3) +=
+        dead.force.segment<3>(first_freedom(used_node(system, load.body, node)) + 3) +=
             moment->total / real(moment->nodes.size());
       }
     } else if (const auto* edge = std::get_if<EdgeLoad>(&load.kind)) {
-      add_edge_load(system, model, load.body, *edge, dead);
+      add_edge_load(system, load.body, *edge, dead);
     } else if (const auto* gravity = std::get_if<GravityLoad>(&load.kind)) {
       for (std::size_t i = model.first_node(load.body); i < model.first_node(load.body + 1); ++i) {
         dead.force.segment<3>(first_freedom(i)) = system.mass[i] * gravity->acceleration;
       }
     }
   }
+}
+
+std::vector<double> follower_pressures(const ShellSystem& system, const std::vector<double>& factors, bool of_solids) {
+  const std::vector<std::size_t>& first = of_solids ? system.surfaces.first : system.first_element;
+  std::vector<double> pressures(of_solids ? system.surfaces.faces.size() : system.elements.size(), 0);
+  for (const FollowerPressure& follower : system.follower_pressures) {
+    if (system.model->is_solid(follower.body) != of_solids) {
+      continue;
+    }
+    const double value = std::get<PressureLoad>(system.model->loads[follower.load].kind).at(factors[follower.load]);
+    for (std::size_t k = first[follower.body]; k < first[follower.body + 1]; ++k) {
+      pressures[k] += follower.on.empty() || follower.on[k - first[follower.body]] != 0 ? value : 0;
+    }
+  }
+  return pressures;
+}
+
+std::vector<double> shell_pressures(const ShellSystem& system, const std::vector<double>& factors) {
+  const Model& model = *system.model;
+  std::vector<double> pressures(system.elements.size(), 0);
+  for (std::size_t l = 0; l < model.loads.size(); ++l) {
+    const auto* pressure = std::get_if<PressureLoad>(&model.loads[l].kind);
+    const std::size_t body = model.loads[l].body;
+    if (pressure == nullptr || model.is_solid(body)) {
+      continue;
+    }
+    const std::vector<char> on = pressed_parts(system, body, pressure->nodes);
+    const std::size_t first = system.first_element[body];
+    for (std::size_t e = first; e < system.first_element[body + 1]; ++e) {
+      pressures[e] += on.empty() || on[e - first] != 0 ? pressure->at(factors[l]) : 0;
+    }
+  }
+  return pressures;
 }
 
 }  // namespace tunica

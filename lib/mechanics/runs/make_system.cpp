@@ -3,6 +3,7 @@
 #include "tunica/mechanics/runs/detail/loads.hpp"
 #include "tunica/mechanics/runs/detail/shell_system.hpp"
 #include "tunica/mechanics/runs/detail/supports.hpp"
+#include "tunica/mechanics/runs/detail/terms.hpp"
 #include "tunica/shell/patch/curved_surface.hpp"
 
 #include <algorithm>
@@ -84,7 +85,8 @@ void colour_elements(ShellSystem& system) {
   }
 }
 
-void find_pieces(ShellSystem& system, const Model& model) {
+void find_pieces(ShellSystem& system) {
+  const Model& model = *system.model;
   DisjointSets joined(system.node_count());
   for (const ShellElement& e : system.elements) {
     joined.join(e.nodes[0], e.nodes[1]);
@@ -116,25 +118,17 @@ void find_pieces(ShellSystem& system, const Model& model) {
 void add_stiffness_norms(ShellSystem& system) {
   double translation = 0;
   double rotation = 0;
-  const auto add = [&](const auto& stiffness, Eigen::Index per_node) {
-    for (Eigen::Index row = 0; row < stiffness.rows(); ++row) {
-      for (Eigen::Index column = 0; column < stiffness.cols(); ++column) {
-        const double entry = stiffness(row, column) / (row % per_node < 3 ? 1 : system.length);
-        (column % per_node < 3 ? translation : rotation) += entry * entry;
-      }
-    }
-  };
-  for (const ShellElement& element : system.elements) {
-    add(linear_stiffness(element), 6);
-  }
-  for (const SolidElement& element : system.solids) {
-    add(linear_stiffness(element), 4);
+  for (const auto& term : system.terms) {
+    const auto [by_displacement, by_rotation] = term->squared_stiffness(system);
+    translation += by_displacement;
+    rotation += by_rotation;
   }
   system.translation_stiffness = std::sqrt(translation);
   system.rotation_stiffness = std::sqrt(rotation);
 }
 
-void add_solids(ShellSystem& system, const Model& model, double& edges) {
+void add_solids(ShellSystem& system, double& edges) {
+  const Model& model = *system.model;
   system.first_solid_node = system.reference.size();
   for (std::size_t s = 0; s < model.solids.size(); ++s) {
     const SolidBody& body = model.solids[s];
@@ -220,6 +214,7 @@ void make_pattern(ShellSystem& system, const std::vector<std::array<Index, 2>>& 
 
 ShellSystem make_system(const Model& model) {
   ShellSystem system;
+  system.model = &model;
   const std::size_t nodes = model.node_count();
   system.reference.reserve(nodes);
   system.used.assign(nodes, 0);
@@ -258,9 +253,8 @@ ShellSystem make_system(const Model& model) {
     }
     system.first_element.push_back(system.elements.size());
   }
-  add_solids(system, model, edges);
+  add_solids(system, edges);
   system.length = edges / real(std::max<std::size_t>(1, 3 * system.elements.size() + 6 * system.solids.size()));
-  add_stiffness_norms(system);
   if (!model.solids.empty() || !model.attachments.empty() || !model.contacts.empty()) {
     system.surfaces = surface_faces(model);
   }
@@ -268,10 +262,12 @@ ShellSystem make_system(const Model& model) {
   if (!model.contacts.empty()) {
     system.contact = std::make_shared<ContactSystem>(model, system.surfaces, system.reference, system.carried);
   }
+  make_terms(system);
+  add_stiffness_norms(system);
 
   make_pattern(system, {});
   colour_elements(system);
-  find_pieces(system, model);
+  find_pieces(system);
 
   system.area = VectorX::Zero(nodes);
   system.mass = system.area;
@@ -290,8 +286,8 @@ ShellSystem make_system(const Model& model) {
       system.mass[node] += density * e.volume / 4;
     }
   }
-  make_loads(system, model);
-  make_supports(system, model);
+  make_loads(system);
+  make_supports(system);
   return system;
 }
 

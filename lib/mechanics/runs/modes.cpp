@@ -3,6 +3,7 @@
 #include "tunica/core/narrow.hpp"
 #include "tunica/mechanics/algebra/lanczos.hpp"
 #include "tunica/mechanics/elements/rotation.hpp"
+#include "tunica/mechanics/runs/detail/linear_statics.hpp"
 #include "tunica/mechanics/runs/detail/run.hpp"
 #include "tunica/mechanics/runs/detail/supports.hpp"
 
@@ -31,22 +32,16 @@ constexpr double largest_linear_strain = 0.2;
 /// The shift of a free body, of its lowest eigenvalue.
 constexpr double near_part = 0.2;
 
-void require_freedoms(std::size_t wanted, std::size_t there) {
+void require_modes(std::size_t wanted, std::size_t there) {
   if (wanted > there) {
     throw InputError(fmt::format("count = {}, but the model has only {} modes: ask for fewer", wanted, there));
   }
 }
 
 /// The linear displacements and rotations (6 per node) under the loads and prescribed displacements at full value.
-VectorX linear_solution(ShellSystem& system, const Model& model, const RunSettings& settings) {
-  State last;
-  run_linear(system, model, settings, {true, {1}}, [&](const State& state) { last = state; }, {}, {});
-  VectorX solution(first_freedom(system.node_count()));
-  for (std::size_t i = 0; i < system.node_count(); ++i) {
-    solution.segment<3>(first_freedom(i)) = last.displacement[i];
-    solution.segment<3>(first_freedom(i) + 3) = last.rotation[i];
-  }
-  return solution;
+VectorX linear_solution(ShellSystem& system, const RunSettings& settings) {
+  const Model& model = *system.model;
+  return LinearSolver(system, settings).solve(load_factors(model, true, 1), prescribed_positions(system, 1)).moved;
 }
 
 /// Largest stretch of an edge in a linear solution.
@@ -65,7 +60,8 @@ double largest_strain(const ShellSystem& system, const VectorX& solution) {
 }
 
 /// How the tangent changes per unit of the factor along a linear solution, at the reference: central differences.
-BlockMatrix tangent_change(const ShellSystem& system, const Model& model, const VectorX& solution) {
+BlockMatrix tangent_change(const ShellSystem& system, const VectorX& solution) {
+  const Model& model = *system.model;
   const double part = difference_size / std::max(largest_strain(system, solution), largest_rotation(system, solution));
   std::vector<double> full = load_factors(model, true, 1);
   std::array<BlockMatrix, 2> tangent{system.pattern, system.pattern};
@@ -78,13 +74,25 @@ BlockMatrix tangent_change(const ShellSystem& system, const Model& model, const 
     for (double& factor : factors) {
       factor *= signed_part;
     }
-    evaluate(system, model, configuration, factors, {}, forces, &tangent[side]);
+    evaluate(system, configuration, factors, {}, forces, &tangent[side]);
   }
   for (std::size_t k = 0; k < tangent[0].values.size(); ++k) {
     tangent[0].values[k] = (tangent[0].values[k] - tangent[1].values[k]) / (2 * part);
   }
   symmetrise(tangent[0]);
   return std::move(tangent[0]);
+}
+
+/// The tangent at the reference, before the loads act: with what the wall bears there already.
+void reference_tangent(const ShellSystem& system, BlockMatrix& tangent) {
+  const Model& model = *system.model;
+  if (!system.prestress_residual) {
+    linear_stiffness(system, tangent);
+    return;
+  }
+  Forces forces;
+  evaluate(system, reference_configuration(system), std::vector<double>(model.loads.size(), 0.0), {}, forces, &tangent);
+  symmetrise(tangent);
 }
 
 void add(BlockMatrix& matrix, double factor, const VectorX& diagonal) {
@@ -94,8 +102,8 @@ void add(BlockMatrix& matrix, double factor, const VectorX& diagonal) {
   }
 }
 
-State reference_state(const ShellSystem& system, const Model& model, Summary& summary) {
-  State state = make_state(system, model, reference_configuration(system), 0);
+State reference_state(const ShellSystem& system, Summary& summary) {
+  State state = make_state(system, reference_configuration(system), 0);
   state.converged = true;
   state.linear = true;
   summary.volume_before = state.volume;
@@ -106,15 +114,15 @@ State reference_state(const ShellSystem& system, const Model& model, Summary& su
 }
 
 /// Hands the modes over, the first `values.size()` of `pairs`; each starts at a time after the one before.
-void hand_over(const ShellSystem& system, const Model& model, const RunSettings& settings,
-               const std::vector<double>& values, const EigenPairs& pairs, double load_factor, bool take_out_rigid,
-               Summary& summary, const StateCallback& on_state) {
+void hand_over(const ShellSystem& system, const RunSettings& settings, const std::vector<double>& values,
+               const EigenPairs& pairs, double load_factor, bool take_out_rigid, Summary& summary,
+               const StateCallback& on_state) {
   const double amplitude = shown_amplitude * longest_side(system);
   double before = 0;
   for (std::size_t k = 0; k < values.size(); ++k) {
     VectorX mode = pairs.vectors[k];
     if (take_out_rigid) {
-      take_out_linear_rigid_motion(system, model, mode);
+      take_out_linear_rigid_motion(system, mode);
     }
     Eigen::Index top = 0;
     double largest = 0;
@@ -182,7 +190,7 @@ public:
                                    multiply_b_(x, y);
                                    mask(free_, y);
                                  }};
-    return largest_eigenpairs(pencil, free_, deflated, options);
+    return largest_eigenpairs(pencil, along_world(free_), deflated, options);
   }
 
   /// The values found, checked by Sturm's count: none below the last that is less than `most` is missing.
@@ -240,7 +248,8 @@ LanczosOptions rough_options() {
 
 /// The square of a circular frequency that is low against the flexible ones, yet far above round-off: (t / L)^2 times
 /// that of a membrane wave along the model.
-double small_shift(const ShellSystem& system, const Model& model) {
+double small_shift(const ShellSystem& system) {
+  const Model& model = *system.model;
   const double size = longest_side(system);
   double shift = infinity;
   for (const ShellBody& body : model.shells) {
@@ -290,18 +299,19 @@ std::vector<VectorX> idle_rigid_modes(const ShellSystem& system, const Configura
 }
 
 /// The tangent about which a model vibrates; `configuration` becomes the state of rest.
-BlockMatrix stiffness_at_rest(ShellSystem& system, const Model& model, const RunSettings& settings,
-                              const FrequencyRun& run, Configuration& configuration) {
+BlockMatrix stiffness_at_rest(ShellSystem& system, const RunSettings& settings, const FrequencyRun& run,
+                              Configuration& configuration) {
+  const Model& model = *system.model;
   BlockMatrix stiffness = system.pattern;
   if (model.loads.empty() && system.prescribed.empty()) {
     linear_stiffness(system, stiffness);
     return stiffness;
   }
   if (run.preload.linear) {
-    linear_stiffness(system, stiffness);
-    const VectorX solution = linear_solution(system, model, settings);
+    reference_tangent(system, stiffness);
+    const VectorX solution = linear_solution(system, settings);
     if (solution.squaredNorm() > 0) {
-      const BlockMatrix change = tangent_change(system, model, solution);
+      const BlockMatrix change = tangent_change(system, solution);
       for (std::size_t k = 0; k < stiffness.values.size(); ++k) {
         stiffness.values[k] += change.values[k];
       }
@@ -309,33 +319,34 @@ BlockMatrix stiffness_at_rest(ShellSystem& system, const Model& model, const Run
     return stiffness;
   }
   State last;
-  run_static(system, model, settings, run.preload, [&](const State& state) { last = state; }, {}, {});
+  run_static(system, settings, run.preload, [&](const State& state) { last = state; }, {}, {});
   configuration.displacement = last.displacement;
   for (std::size_t i = 0; i < system.node_count(); ++i) {
     configuration.rotation[i] = exponential(last.rotation[i]);
   }
   Forces forces;
-  evaluate(system, model, configuration, load_factors(model, true, last.load_factor), {}, forces, &stiffness);
+  evaluate(system, configuration, load_factors(model, true, last.load_factor), {}, forces, &stiffness);
   symmetrise(stiffness);
   return stiffness;
 }
 
 }  // namespace
 
-Summary run_frequencies(ShellSystem& system, const Model& model, const RunSettings& settings, const FrequencyRun& run,
+Summary run_frequencies(ShellSystem& system, const RunSettings& settings, const FrequencyRun& run,
                         const StateCallback& on_state, const Progress& progress) {
+  const Model& model = *system.model;
   const auto start = Clock::now();
   Summary summary;
-  on_state(reference_state(system, model, summary));
+  on_state(reference_state(system, summary));
   Configuration configuration = reference_configuration(system);
-  BlockMatrix stiffness = stiffness_at_rest(system, model, settings, run, configuration);
+  BlockMatrix stiffness = stiffness_at_rest(system, settings, run, configuration);
   advance(progress, 0.3);
-  release_rigid_motion_supports(system, model);
+  release_rigid_motion_supports(system);
   const FreeMask free = free_freedoms(system);
   summary.dof = narrow<std::size_t>(std::count(free.begin(), free.end(), true));
 
   const std::vector<VectorX> rigid = idle_rigid_modes(system, configuration, stiffness);
-  require_freedoms(run.count, summary.dof - rigid.size());
+  require_modes(run.count, summary.dof - rigid.size());
   const VectorX mass = lumped_masses(system);
   // Where a body is free the first shift is only known to be small against the lowest value; one that is near it keeps
   // the rigid motions, which the inverse enlarges, from drowning the modes in round-off.
@@ -350,7 +361,7 @@ Summary run_frequencies(ShellSystem& system, const Model& model, const RunSettin
           "loads");
     }
   };
-  move_to(rigid.empty() ? 0 : -small_shift(system, model));
+  move_to(rigid.empty() ? 0 : -small_shift(system));
   advance(progress, 0.4);
   LanczosOptions options;
   options.count = run.count;
@@ -366,32 +377,32 @@ Summary run_frequencies(ShellSystem& system, const Model& model, const RunSettin
     summary.frequencies.push_back(std::sqrt(std::max(0.0, pencil.value(theta))) / (2 * std::numbers::pi));
   }
   const bool loaded = !model.loads.empty() || !system.prescribed.empty();
-  hand_over(system, model, settings, summary.frequencies, pairs, loaded ? 1 : 0, false, summary, on_state);
+  hand_over(system, settings, summary.frequencies, pairs, loaded ? 1 : 0, false, summary, on_state);
   summary.converged = true;
   summary.seconds_per_step.push_back(seconds_since(start));
   advance(progress, 1.0);
   return summary;
 }
 
-Summary run_buckling(ShellSystem& system, const Model& model, const RunSettings& settings, const BucklingRun& run,
+Summary run_buckling(ShellSystem& system, const RunSettings& settings, const BucklingRun& run,
                      const StateCallback& on_state, const Progress& progress) {
   const auto start = Clock::now();
   Summary summary;
-  on_state(reference_state(system, model, summary));
+  on_state(reference_state(system, summary));
   const FreeMask free = free_freedoms(system);
   summary.dof = narrow<std::size_t>(std::count(free.begin(), free.end(), true));
-  require_freedoms(run.count, summary.dof);
+  require_modes(run.count, summary.dof);
 
-  const VectorX solution = linear_solution(system, model, settings);
+  const VectorX solution = linear_solution(system, settings);
   const double strain = largest_strain(system, solution);
   const double largest_factor = strain > 0 ? largest_linear_strain / strain : infinity;
   if (!(std::max(strain, largest_rotation(system, solution)) > 0)) {
     throw InputError("the loads do not deform anything: buckling needs a load that does");
   }
-  const BlockMatrix change = tangent_change(system, model, solution);
+  const BlockMatrix change = tangent_change(system, solution);
   advance(progress, 0.3);
   BlockMatrix stiffness = system.pattern;
-  linear_stiffness(system, stiffness);
+  reference_tangent(system, stiffness);
   ShiftedPencil pencil(
       system, free, std::move(stiffness),
       [&](BlockMatrix& matrix, double by) {
@@ -437,7 +448,7 @@ Summary run_buckling(ShellSystem& system, const Model& model, const RunSettings&
         fmt::format("the loads buckle nothing: no factor up to {:.4g}, where they strain the shell by {:.0f} %",
                     largest_factor, 100 * largest_linear_strain));
   }
-  hand_over(system, model, settings, summary.buckling_factors, pairs, -1, true, summary, on_state);
+  hand_over(system, settings, summary.buckling_factors, pairs, -1, true, summary, on_state);
   summary.converged = true;
   summary.seconds_per_step.push_back(seconds_since(start));
   advance(progress, 1.0);

@@ -14,12 +14,13 @@ constexpr double largest_turn = 0.5;           // rad per iteration
 constexpr std::size_t free_iterations = 6;     // full steps before the line search sets in
 constexpr double round_off_of_length = 1e-11;  // of the model's longest side
 constexpr double round_off_of_nothing = 0.01;  // of the floor, where no load acts
-constexpr double near_balance = 0.1;           // residual from which the pressures of a contact mean something
+constexpr double near_balance = 0.1;           // residual from which forces that may jump mean something
 constexpr double largest_residual_at_kinks = 1e-4;
 constexpr double canceled = 0.3;        // by the mean of both sides of a kink, of the residual
-constexpr double largest_swing = 1e-3;  // of the contact's resolution, by the last two increments
+constexpr double largest_swing = 1e-3;  // of the law's resolution, by the last two increments
 constexpr std::size_t sides = 4;        // of a kink, or of several, that are looked at together
 constexpr int most_cuts = 6;            // of an increment
+constexpr int most_cuts_of_jumps = 20;  // likewise: surfaces come near each other from far away
 
 bool uses_cg(const RunSettings& settings) { return settings.solver == Solver::cg; }
 
@@ -31,9 +32,10 @@ double largest_shift(const VectorX& increment) {
   return std::sqrt(largest);
 }
 
-/// Where contact jumps from one face to the next, forces jump: a state of rest may lie on the kink, and Newton's method
-/// swings from one side to the other. There it is at rest where some mean of the sides' unbalanced forces vanishes.
-/// Source: Goldstein 1977, "Optimization of Lipschitz continuous functions" (the convex hull of nearby gradients).
+/// Where forces jump, as at the next face that something touches, a state of rest may lie on the kink, and Newton's
+/// method swings from one side to the other. There it is at rest where some mean of the sides' unbalanced forces
+/// vanishes. Source: Goldstein 1977, "Optimization of Lipschitz continuous functions" (the convex hull of nearby
+/// gradients).
 class Sides {
 public:
   void look(VectorX unbalanced) {
@@ -44,7 +46,7 @@ public:
     mean_ = least_mean();
   }
 
-  /// Contact follows another law from here.
+  /// The law is another from here.
   void forget() {
     seen_.clear();
     mean_.resize(0);
@@ -92,9 +94,6 @@ FreeMask free_freedoms(const ShellSystem& system) {
 
 TangentSolver::TangentSolver(const ShellSystem& system, const RunSettings& settings)
     : settings_(settings), free_(free_freedoms(system)) {
-  if (!uses_cg(settings)) {
-    direct_.emplace(system.pattern, free_);
-  }
   for (std::size_t i = system.first_solid_node; i < system.node_count(); ++i) {
     pressures_ += free_[freedom(i, 3)] ? 1 : 0;
   }
@@ -108,7 +107,7 @@ TangentSolver::Result TangentSolver::solve(BlockMatrix& matrix, const VectorX& b
     x.setZero(b.size());
     return {true, true, true, 0, 0, AlgebraicError{}};
   }
-  if (!direct_) {
+  if (uses_cg(settings_)) {
     symmetrise(matrix);
     const CgOptions options{settings_.cg_tolerance, settings_.cg_iterations, settings_.cg_fixed_count};
     const CgResult cg = conjugate_gradients(matrix, free_, b, options, x);
@@ -119,6 +118,9 @@ TangentSolver::Result TangentSolver::solve(BlockMatrix& matrix, const VectorX& b
     result.cg_iterations = cg.iterations;
     result.error = cg.error;
     return result;
+  }
+  if (!direct_) {
+    direct_.emplace(matrix, free_);
   }
   if (!same_matrix) {
     factored_ = direct_->factor(matrix);
@@ -140,27 +142,6 @@ TangentSolver::Result TangentSolver::solve(BlockMatrix& matrix, const VectorX& b
   return result;
 }
 
-void begin_contact(ShellSystem& system, const RunSettings& settings, double from, double to,
-                   const Configuration& configuration, std::optional<TangentSolver>& solver, BlockMatrix& matrix) {
-  if (!system.contact) {
-    return;
-  }
-  system.contact->set_step(from, to, configuration);
-  if (system.contact->find_pairs(configuration)) {
-    make_pattern(system, system.contact->pairs());
-    const bool tells = solver->tells_direct_error();
-    solver.emplace(system, settings);
-    solver->tell_direct_error(tells);
-    matrix = system.pattern;
-  }
-}
-
-void accept_contact(const ShellSystem& system, const Configuration& configuration) {
-  if (system.contact) {
-    system.contact->accept(configuration);
-  }
-}
-
 double increment_size(const ShellSystem& system, const VectorX& increment) {
   double sum = 0;
   for (Eigen::Index i = 0; i < increment.size(); i += 6) {
@@ -179,6 +160,7 @@ public:
                   const BalanceFunction& balance, const VectorX& held_increment, BlockMatrix& matrix,
                   Configuration& configuration)
       : system_(system),
+        law_(system.law()),
         settings_(settings),
         solver_(solver),
         balance_(balance),
@@ -189,7 +171,7 @@ public:
         whole_(VectorX::Zero(held_increment.size())) {}
 
   NewtonResult run(bool likely_at_rest) {
-    likely_at_rest = likely_at_rest || system_.contact;
+    likely_at_rest = likely_at_rest || law_.may_change();
     now_ = balance_(configuration_, likely_at_rest ? nullptr : &matrix_, {});
     tangent_is_current_ = !likely_at_rest;
     if (!now_.valid) {
@@ -216,9 +198,9 @@ public:
   }
 
 private:
-  /// Contact follows another barrier from here.
+  /// The law is another from here.
   bool sharpened() {
-    if (!system_.contact || !system_.contact->sharpen()) {
+    if (!law_.sharpen()) {
       return false;
     }
     sides_.forget();
@@ -229,7 +211,7 @@ private:
   }
 
   /// Prescribed displacements or rigid bodies have not come to the end of the step.
-  [[nodiscard]] bool is_moving() const { return left_ > 0 || (system_.contact && system_.contact->left() > 0); }
+  [[nodiscard]] bool is_moving() const { return left_ > 0 || law_.left() > 0; }
 
   [[nodiscard]] double residual_of(const Balance& balance) const {
     VectorX free = balance.unbalanced;
@@ -240,7 +222,7 @@ private:
 
   /// Nothing, or before a first touch nothing but round-off.
   [[nodiscard]] bool nothing_acts() const {
-    return now_.scale == 0 || (system_.contact && now_.scale <= round_off_of_nothing * now_.floor);
+    return now_.scale == 0 || (law_.may_change() && now_.scale <= round_off_of_nothing * now_.floor);
   }
 
   /// Increments that say nothing where the residual is round-off; also of a step in which nothing changes.
@@ -266,7 +248,6 @@ private:
   [[nodiscard]] double between_sides() const {
     return sides_.mean().size() > 0 && now_.scale > 0 ? force_norm(system_, sides_.mean()) / now_.scale : infinity;
   }
-  [[nodiscard]] bool has_kinks() const { return system_.contact && system_.contact->has_kinks(); }
 
   /// At rest on a kink: the last increments move next to nothing.
   [[nodiscard]] bool swings_at_kinks() {
@@ -278,7 +259,7 @@ private:
     return true;
   }
 
-  [[nodiscard]] bool is_small(double shift) const { return shift <= largest_swing * system_.contact->resolution(); }
+  [[nodiscard]] bool is_small(double shift) const { return shift <= largest_swing * law_.resolution(); }
 
   /// Whether an increment leads back to where the last one came from.
   [[nodiscard]] bool turns_back() const {
@@ -307,12 +288,10 @@ private:
     }
     VectorX all = last_;
     expand_carried(system_.carried, system_.surfaces, system_.reference, before_, all);
-    if (system_.contact) {
-      if (result_.residual < near_balance && system_.contact->harden()) {
-        sides_.forget();
-      }
-      system_.contact->predict(all);
+    if (result_.residual < near_balance && law_.harden()) {
+      sides_.forget();
     }
+    law_.predict(all);
     return balance_(configuration_, &matrix_, predicted_deformations(system_, before_, all));
   }
 
@@ -337,7 +316,7 @@ private:
     }
     const TangentSolver::Result solved = solver_.solve(matrix_, right, increment_);
     result_.cg_iterations += solved.cg_iterations;
-    result_.stable = solved.positive_definite || (system_.contact && system_.contact->slides());
+    result_.stable = solved.positive_definite || law_.slides();
     result_.linear_converged = solved.converged;
     result_.algebraic_error = solved.error;
     if (solved.error) {
@@ -345,7 +324,7 @@ private:
       result_.algebraic_error->solution = largest_solution_;
     }
     ++result_.iterations;
-    if (!solved.solved || (system_.contact && increment_size(system_, increment_) > longest_side(system_))) {
+    if (!solved.solved || (law_.may_change() && increment_size(system_, increment_) > longest_side(system_))) {
       return false;  // nothing holds some body
     }
     work_ = right.dot(increment_);
@@ -373,25 +352,23 @@ private:
     previous_residual_ = result_.residual;
     before_ = configuration_;
     double length = longest_;
-    const double bodies_left = system_.contact ? system_.contact->left() : 0;
-    const int most_trials = system_.contact ? most_cuts_in_contact : most_cuts;
+    const double bodies_left = law_.left();
+    const int most_trials = law_.may_change() ? most_cuts_of_jumps : most_cuts;
     for (int trial = 0;; ++trial) {
       configuration_ = before_;
       last_ = length * increment_;
       advance_configuration(system_, last_, configuration_);
-      if (system_.contact) {
-        system_.contact->set_left(bodies_left * (1 - length));
-      }
+      law_.set_left(bodies_left * (1 - length));
       tangent_is_current_ = more && trial == 0;
       now_ = tangent_is_current_ ? linearised() : balance_(configuration_, nullptr, {});
-      if ((left_ > 0 && !system_.contact) || trial == most_trials) {
+      if ((left_ > 0 && !law_.may_change()) || trial == most_trials) {
         break;
       }
       if (!now_.valid) {
         length /= 2;
         continue;
       }
-      if (result_.iterations <= free_iterations || system_.contact) {
+      if (result_.iterations <= free_iterations || law_.may_change()) {
         break;
       }
       VectorX free = now_.unbalanced;
@@ -412,7 +389,7 @@ private:
     if (now_.valid) {
       result_.residual = residual_of(now_);
     }
-    if (now_.valid && has_kinks()) {
+    if (now_.valid && law_.has_kinks()) {
       VectorX free = now_.unbalanced;
       mask(solver_.free(), free);
       sides_.look(std::move(free));
@@ -421,6 +398,7 @@ private:
   }
 
   const ShellSystem& system_;
+  ChangingLaw& law_;
   const RunSettings& settings_;
   TangentSolver& solver_;
   const BalanceFunction& balance_;

@@ -3,6 +3,7 @@
 #include "tunica/core/progress.hpp"
 #include "tunica/mechanics/contact/contact_state.hpp"
 #include "tunica/mechanics/model/model.hpp"
+#include "tunica/mechanics/runs/system.hpp"
 
 #include <Eigen/Geometry>
 
@@ -25,7 +26,8 @@ struct State {
   std::vector<Vec3> rotation;          ///< rotation vectors, rad, #nodes
   std::vector<Vec3> velocity;          ///< mm/s, dynamic only
   std::vector<Vec3> angular_velocity;  ///< rad/s, dynamic only
-  std::vector<double> pressure;  ///< of the nodes of solids, in units of their shear modulus; empty without solids
+  /// Of the nodes of solids, in units of their shear modulus, #nodes; empty without solids.
+  std::vector<double> pressure;
   std::optional<double> volume;  ///< mm^3 of the closed bodies' curved surfaces together; none when one is open
   double strain_energy = 0;      ///< N mm = mJ
   double kinetic_energy = 0;     ///< mJ
@@ -40,37 +42,6 @@ struct State {
   std::vector<RigidState> rigids;      ///< of the model's rigid bodies, in order; the same
   double force_imbalance = 0;          ///< sum of all contact and tie forces over all bodies, relative to the largest
   double moment_imbalance = 0;         ///< the same of their moments about the origin
-};
-
-/// What the wall bears, over all bodies: of von Mises stress and largest principal strain, each the larger of both
-/// faces after averaging at the nodes within a body. p99 is passed on 1 % of the area.
-struct Wall {
-  double stress_p99 = 0;  ///< MPa
-  double stress_max = 0;
-  Vec3 stress_max_at = Vec3::Zero();  ///< mm, the node, in the reference
-  double strain_p99 = 0;              ///< engineering strain of the co-rotated frame
-  double strain_max = 0;
-};
-
-/// Per-element results of one state (#elements of all shells in order; components in the element's own frame whose
-/// x axis is the projection of the first edge).
-struct ElementFields {
-  std::vector<Vec3> membrane_force;      ///< N/mm: xx, yy, xy
-  std::vector<Vec3> bending_moment;      ///< N: xx, yy, xy
-  std::vector<double> von_mises_top;     ///< MPa, at the face the normal points to
-  std::vector<double> von_mises_bottom;  ///< MPa
-  /// At the faces, largest first; engineering strains of the co-rotated frame.
-  std::vector<Vec2> principal_strain_top;
-  std::vector<Vec2> principal_strain_bottom;
-  std::vector<double> pressure;   ///< MPa, of this state
-  std::vector<double> von_mises;  ///< MPa, #nodes: the larger of both faces' averages at the nodes
-  Wall wall;
-  double largest_displacement = 0;  ///< mm, of the curved surfaces, also between the nodes
-  double displacement_p99 = 0;      ///< mm, passed on 1 % of the area of the shells
-  /// rad, by which 1 % of the shells' area or of the solids' volume turns at least; of a linear state, else 0.
-  double turn_p99 = 0;
-  std::vector<double> solid_von_mises;  ///< MPa, #tetrahedra of all solids in order; of the true (Cauchy) stress
-  std::vector<double> solid_pressure;   ///< MPa, the same; minus the mean stress: positive in compression
 };
 
 /// Where a static path broke off and the shell moved by itself to the next state of rest.
@@ -122,6 +93,8 @@ struct Summary {
   std::vector<Snap> snaps;             ///< under load control, in order
   std::vector<double> limit_factors;   ///< load factors at which a path by arc length turns, in its order
   std::vector<double> branch_factors;  ///< and near which other paths leave it
+  /// MPa, of the model's contacts, in order: the largest pressure of any accepted state, also of those within a step.
+  std::vector<double> contact_pressures;
 };
 
 /// Everything a run needs to go on after a step as if nothing had happened: the numbers as they stand in memory, so
@@ -156,38 +129,30 @@ struct Resumption {
   }
 };
 
-/// Finds what makes a model unsolvable before any time is spent, and names it: degenerate or non-manifold elements,
-/// inconsistent orientation, a normal nearly in its facet's plane, pieces that can move freely (static), a
-/// non-positive thickness, net force on a body held by its rigid motions only.
-/// Errors: InputError.
+/// What every function of a model relies on: shells and solids with meshes to compute with (as require_valid() of
+/// these, all nodes at finite places), material and thickness; nodes and bodies that fixes, loads, contacts,
+/// attachments and probes name; numbers that are finite, and tables whose times increase. check_model() begins with it.
+/// Errors: InputError. Cost: linear.
+void require_valid(const Model& model);
+void require_valid(const ShellBody& body);
+
+/// That a state has as many displacements and rotations as a model has nodes. Errors: InputError.
+void require_valid(const Model& model, const State& state);
+
+/// What makes a model unsolvable: as System. Errors: InputError.
 void check_model(const Model& model, const RunSettings& settings);
 
 /// Runs a model. Every `settings.every`-th state, the reference state (time 0) and the last one go to `on_state`. After
 /// the reference, a run for frequencies or buckling hands over its modes: linear states, their largest displacement 1 %
 /// of the model's longest side.
-/// Errors: InputError as check_model; RequirementError when a step does not converge, has no equilibrium, or becomes
-/// unstable (the last good state has been handed over). With `cg_fixed_count` a run ends normally, `converged` false.
-/// A run that goes on from a checkpoint must have the model and the settings of the run that made it.
+/// Errors: InputError as check_model, and where a checkpoint is not of so many nodes; RequirementError when a step does
+/// not converge, has no equilibrium, or becomes unstable (the last good state has been handed over). With
+/// `cg_fixed_count` a run ends normally, `converged` false. A run that goes on from a checkpoint must have the model
+/// and the settings of the run that made it.
+Summary solve(const System& system, const std::function<void(const State&)>& on_state, const Progress& progress = {},
+              const Resumption& resumption = {});
+/// Of a model from which nothing else is asked. Errors: InputError as System too.
 Summary solve(const Model& model, const RunSettings& settings, const std::function<void(const State&)>& on_state,
               const Progress& progress = {}, const Resumption& resumption = {});
-
-/// Forces, moments and stresses of every triangle in one state, and what is largest. For many states of one model: the
-/// elements are made ready once. The model must outlive it.
-class ElementFieldEvaluator {
-public:
-  explicit ElementFieldEvaluator(const Model& model);
-  ~ElementFieldEvaluator();
-  ElementFieldEvaluator(const ElementFieldEvaluator&) = delete;
-  ElementFieldEvaluator& operator=(const ElementFieldEvaluator&) = delete;
-
-  [[nodiscard]] ElementFields operator()(const State& state) const;
-
-private:
-  struct Implementation;
-  std::unique_ptr<Implementation> implementation_;
-};
-
-/// The same for one state.
-ElementFields element_fields(const Model& model, const State& state);
 
 }  // namespace tunica

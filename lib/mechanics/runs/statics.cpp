@@ -2,6 +2,7 @@
 #include "tunica/core/narrow.hpp"
 #include "tunica/mechanics/elements/rotation.hpp"
 #include "tunica/mechanics/model/wall.hpp"
+#include "tunica/mechanics/runs/detail/contact_steps.hpp"
 #include "tunica/mechanics/runs/detail/settle.hpp"
 #include "tunica/mechanics/runs/detail/stepped_run.hpp"
 #include "tunica/mechanics/runs/detail/supports.hpp"
@@ -14,7 +15,8 @@
 
 namespace tunica {
 
-VectorX prescribed_positions(const ShellSystem& system, const Model& model, double factor) {
+VectorX prescribed_positions(const ShellSystem& system, double factor) {
+  const Model& model = *system.model;
   VectorX positions = VectorX::Zero(first_freedom(system.node_count()));
   for (const PrescribedFreedom& p : system.prescribed) {
     positions[p.freedom] = p.value * factor_of(model.fixes[p.fix].ramp, true, factor);
@@ -22,9 +24,10 @@ VectorX prescribed_positions(const ShellSystem& system, const Model& model, doub
   return positions;
 }
 
-Balance static_balance(const ShellSystem& system, const Model& model, const Configuration& configuration, double factor,
-                       Forces& forces, BlockMatrix* tangent, const std::vector<ElementState>& predicted) {
-  evaluate(system, model, configuration, load_factors(model, true, factor), {}, forces, tangent, predicted);
+Balance static_balance(const ShellSystem& system, const Configuration& configuration, double factor, Forces& forces,
+                       BlockMatrix* tangent, const std::vector<ElementState>& predicted) {
+  const Model& model = *system.model;
+  evaluate(system, configuration, load_factors(model, true, factor), {}, forces, tangent, predicted);
   Balance balance;
   balance.valid = forces.valid;
   balance.unbalanced = forces.external - forces.internal;
@@ -61,24 +64,25 @@ constexpr double nudge = 0.01;
 /// taken out, and equilibrium found again, until both hold.
 class LoadStep {
 public:
-  LoadStep(ShellSystem& system, const Model& model, const RunSettings& settings)
-      : system_(system), model_(model), settings_(settings), matrix_(system.pattern) {
+  LoadStep(ShellSystem& system, const RunSettings& settings)
+      : system_(system), model_(*system.model), settings_(settings), matrix_(system.pattern) {
     solver_.emplace(system, settings);
   }
 
   NewtonResult run(double factor, double previous_factor, Configuration& configuration) {
     const auto balance = [&](const Configuration& c, BlockMatrix* tangent, const std::vector<ElementState>& predicted) {
-      return static_balance(system_, model_, c, factor, forces_, tangent, predicted);
+      return static_balance(system_, c, factor, forces_, tangent, predicted);
     };
-    const VectorX held =
-        prescribed_positions(system_, model_, factor) - prescribed_positions(system_, model_, previous_factor);
+    const VectorX held = prescribed_positions(system_, factor) - prescribed_positions(system_, previous_factor);
     begin_contact(system_, settings_, previous_factor, factor, configuration, solver_, matrix_);
-    NewtonResult result = newton(system_, settings_, *solver_, balance, held, matrix_, configuration);
+    // What was imaged under pressure may be there already.
+    NewtonResult result = newton(system_, settings_, *solver_, balance, held, matrix_, configuration,
+                                 system_.prestress_residual.has_value());
     const VectorX still = VectorX::Zero(held.size());
     for (int round = 0; round < 8 && result.converged; ++round) {
       bool changed = false;
       for (const Piece& piece : system_.pieces) {
-        if (held_by_rigid_motions(model_, piece.body)) {
+        if (piece.balanced) {
           take_out_rigid_motion(system_, piece, configuration);
           changed = true;
         }
@@ -86,7 +90,7 @@ public:
       if (!changed) {
         break;
       }
-      const NewtonResult again = newton(system_, settings_, *solver_, balance, still, matrix_, configuration);
+      const NewtonResult again = newton(system_, settings_, *solver_, balance, still, matrix_, configuration, true);
       result.converged = again.converged;
       result.valid = again.valid;
       result.residual = again.residual;
@@ -109,12 +113,11 @@ public:
   /// where it can rest.
   SettleResult let_go(double factor, double previous_factor, double thickness, Configuration& configuration) {
     const auto balance = [&](const Configuration& c, BlockMatrix* tangent, const std::vector<ElementState>& predicted) {
-      return static_balance(system_, model_, c, factor, forces_, tangent, predicted);
+      return static_balance(system_, c, factor, forces_, tangent, predicted);
     };
     begin_contact(system_, settings_, factor, factor, configuration, solver_, matrix_);
     advance_configuration(
-        system_, prescribed_positions(system_, model_, factor) - prescribed_positions(system_, model_, previous_factor),
-        configuration);
+        system_, prescribed_positions(system_, factor) - prescribed_positions(system_, previous_factor), configuration);
     advance_configuration(system_,
                           nudge * thickness * weakest_direction(system_, *solver_, balance, matrix_, configuration),
                           configuration);
@@ -126,9 +129,9 @@ public:
 
 private:
   void require_balance(const Configuration& configuration, double factor) {
-    static_balance(system_, model_, configuration, factor, forces_, nullptr);
+    static_balance(system_, configuration, factor, forces_, nullptr);
     for (const Piece& piece : system_.pieces) {
-      if (held_by_rigid_motions(model_, piece.body) && imbalance_of(piece, configuration) > largest_imbalance) {
+      if (piece.balanced && imbalance_of(piece, configuration) > largest_imbalance) {
         throw RequirementError(
             fmt::format("{}: at load factor {:.6g} the loads are no longer in balance on the deformed body, which only "
                         "its rigid motions hold: hold it by a [[fix]]",
@@ -208,14 +211,14 @@ Failure why(const NewtonResult& result, const SettleResult& let_go, bool prescri
 /// on from the state of rest that it then finds.
 class LoadControl final : public SteppedRun {
 public:
-  LoadControl(ShellSystem& system, const Model& model, const RunSettings& settings, const StaticRun& run,
-              const StateCallback& on_state, const std::optional<Checkpoint>& near)
-      : SteppedRun(system, model, settings, on_state, run.load_factors.size()),
+  LoadControl(ShellSystem& system, const RunSettings& settings, const StaticRun& run, const StateCallback& on_state,
+              const std::optional<Checkpoint>& near)
+      : SteppedRun(system, settings, on_state, run.load_factors.size()),
         run_(run),
         near_(near),
-        step_(system, model, settings),
-        thickness_(model.shells.empty() ? system.length : least_thickness(model)),
-        turns_(model),
+        step_(system, settings),
+        thickness_(model_.shells.empty() ? system.length : least_thickness(model_)),
+        turns_(model_),
         configuration_(reference_configuration(system)) {}
 
 private:
@@ -227,7 +230,7 @@ private:
   void resume(const Checkpoint& from) override {
     configuration_ = recall(from);
     factor_ = from.position;
-    increment_ = from.memory.at("increment").at(0);
+    increment_ = remembered(from, "increment", 1)[0];
   }
 
   State take_step() override {
@@ -248,22 +251,20 @@ private:
   /// Equilibrium from the configuration that is said to be near, supports and prescribed displacements put right.
   std::optional<NewtonResult> from_near(double target) {
     Configuration attempt{near_->displacement, near_->rotation};
-    VectorX positions = prescribed_positions(system_, model_, target);
+    VectorX moved(first_freedom(system_.node_count()));
     for (std::size_t i = 0; i < system_.node_count(); ++i) {
-      Vec3 turned = logarithm(attempt.rotation[i]);
-      for (int axis = 0; axis < 3; ++axis) {
-        if (system_.held[freedom(i, axis)]) {
-          attempt.displacement[i][axis] = positions[first_freedom(i) + axis];
-        }
-        if (system_.held[freedom(i, axis + 3)]) {
-          turned[axis] = 0;
-        }
-      }
-      attempt.rotation[i] = exponential(turned);
+      moved.segment<3>(first_freedom(i)) = attempt.displacement[i];
+      moved.segment<3>(first_freedom(i) + 3) = logarithm(attempt.rotation[i]);
+    }
+    mask(free_freedoms(system_), moved);
+    moved += prescribed_positions(system_, target);
+    for (std::size_t i = 0; i < system_.node_count(); ++i) {
+      attempt.displacement[i] = moved.segment<3>(first_freedom(i));
+      attempt.rotation[i] = exponential(moved.segment<3>(first_freedom(i) + 3));
     }
     RunSettings few = settings_;
     few.newton_max = std::min(settings_.newton_max, near_iterations);
-    LoadStep step(system_, model_, few);
+    LoadStep step(system_, few);
     step.tell_direct_error(true);
     NewtonResult result = step.run(target, target, attempt);
     if (!result.converged || !may_stand(result)) {
@@ -375,9 +376,7 @@ private:
     const auto node = narrow<Index>(farthest - u.begin());
     for (const Piece& piece : system_.pieces) {
       if (std::find(piece.nodes.begin(), piece.nodes.end(), node) != piece.nodes.end()) {
-        return !held_by_rigid_motions(model_, piece.body) && free_rigid_motions(system_, piece) > 0
-                   ? model_.name_of(piece.body)
-                   : "";
+        return !piece.balanced && free_rigid_motions(system_, piece) > 0 ? model_.name_of(piece.body) : "";
       }
     }
     return "";
@@ -418,7 +417,7 @@ private:
   }
 
   [[nodiscard]] State state_of(const NewtonResult& result) const {
-    State state = make_state(system_, model_, configuration_, factor_);
+    State state = make_state(system_, configuration_, factor_);
     state.load_factor = factor_;
     state.residual = result.residual;
     state.newton_iterations = result.iterations;
@@ -440,9 +439,9 @@ private:
 
 }  // namespace
 
-Summary run_static(ShellSystem& system, const Model& model, const RunSettings& settings, const StaticRun& run,
+Summary run_static(ShellSystem& system, const RunSettings& settings, const StaticRun& run,
                    const StateCallback& on_state, const Progress& progress, const Resumption& resumption) {
-  return LoadControl(system, model, settings, run, on_state, resumption.near).follow(progress, resumption);
+  return LoadControl(system, settings, run, on_state, resumption.near).follow(progress, resumption);
 }
 
 }  // namespace tunica

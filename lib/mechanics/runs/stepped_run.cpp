@@ -29,6 +29,9 @@ Summary SteppedRun::follow(const Progress& progress, const Resumption& resumptio
     const State state = take_step();
     const bool wanted = wants_state();
     record_step(state, seconds_since(start), summary_);
+    if (system_.contact) {
+      summary_.contact_pressures = system_.contact->pressed();
+    }
     if (wanted) {
       hand_over(state);
     }
@@ -45,7 +48,7 @@ Summary SteppedRun::follow(const Progress& progress, const Resumption& resumptio
 double SteppedRun::part_done() const { return real(summary_.steps) / real(most_steps_); }
 
 State SteppedRun::reference_state() const {
-  State state = make_state(system_, model_, reference_configuration(system_), 0);
+  State state = make_state(system_, reference_configuration(system_), 0);
   state.converged = true;
   return state;
 }
@@ -63,11 +66,11 @@ Checkpoint SteppedRun::keep(double position, const Configuration& configuration,
 
 Configuration SteppedRun::recall(const Checkpoint& from) {
   Configuration configuration{from.displacement, from.rotation};
-  if (const auto found = from.memory.find("solid_pressure"); found != from.memory.end()) {
-    configuration.pressure = found->second;
+  if (!system_.solids.empty()) {
+    configuration.pressure = remembered(from, "solid_pressure", system_.node_count());
   }
   if (system_.contact) {
-    system_.contact->recall(from.memory.at("contact"), configuration, from.position);
+    system_.contact->recall(remembered(from, "contact"), configuration, from.position);
   }
   return configuration;
 }

@@ -10,11 +10,13 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 
 namespace tunica {
 namespace {
 
 using Row6 = Eigen::Matrix<double, 1, 6>;
+using Mat6 = Eigen::Matrix<double, 6, 6>;
 
 Vec3 centre_of(const ShellSystem& system, const Piece& piece) {
   Vec3 centre = Vec3::Zero();
@@ -45,33 +47,144 @@ Row6 rigid_row(const Vec3& arm, double size, int component) {
   return row;
 }
 
-/// Six translations of three nodes far apart that stop every rigid motion and nothing else: their reactions vanish
-/// when the loads are in balance.
-std::vector<std::size_t> determinate_supports(const ShellSystem& system, const Piece& piece) {
+using Matrix36Row = Eigen::Matrix<double, 3, 6>;
+
+/// How a node's translations (part 0) or rotations (3) move in the six rigid motions, along its own axes if it has any.
+Matrix36Row rigid_rows(Index node, const Vec3& arm, double size, int part, const std::vector<const NodeAxes*>& own) {
+  Matrix36Row rows;
+  for (int c = 0; c < 3; ++c) {
+    rows.row(c) = rigid_row(arm, size, part + c);
+  }
+  return own[node] == nullptr ? rows : Matrix36Row(own[node]->axes * rows);
+}
+
+std::vector<const NodeAxes*> axes_of_nodes(const ShellSystem& system) {
+  std::vector<const NodeAxes*> own(system.node_count(), nullptr);
+  for (const NodeAxes& axes : system.held.own_axes) {
+    own[axes.node] = &axes;
+  }
+  return own;
+}
+
+/// A bed holds a rigid motion that it resists by more than this part of what it does to the one that it resists most.
+constexpr double least_part_of_bed = 1e-4;
+
+/// The rigid motions (columns: translation, rotation about `centre` times `size`) that held freedoms and beds leave.
+Eigen::Matrix<double, 6, Eigen::Dynamic> free_motions(const ShellSystem& system, const Piece& piece, const Vec3& centre,
+                                                      double size, const Configuration& configuration) {
+  const std::vector<const NodeAxes*> own = axes_of_nodes(system);
+  Mat6 normal = Mat6::Zero();
+  Mat6 of_bed = Mat6::Zero();
+  for (const Index i : piece.nodes) {
+    const Vec3 arm = system.reference[i] - centre + configuration.displacement[i];
+    for (const int part : {0, 3}) {
+      if (part == 3 && i >= system.first_solid_node) {
+        continue;
+      }
+      const Matrix36Row rows = rigid_rows(i, arm, size, part, own);
+      for (int c = 0; c < 3; ++c) {
+        if (system.held[freedom(i, narrow<std::size_t>(part + c))]) {
+          normal += rows.row(c).transpose() * rows.row(c);
+        }
+      }
+    }
+    if (system.bed) {
+      Matrix36Row rows;
+      for (int c = 0; c < 3; ++c) {
+        rows.row(c) = rigid_row(arm, size, c);
+      }
+      of_bed += rows.transpose() * system.bed->at(i) * rows;
+    }
+  }
+  const Eigen::SelfAdjointEigenSolver<Mat6> bed(of_bed);
+  for (int k = 0; k < 6; ++k) {
+    if (bed.eigenvalues()[k] > least_part_of_bed * bed.eigenvalues()[5]) {
+      normal += bed.eigenvectors().col(k) * bed.eigenvectors().col(k).transpose();
+    }
+  }
+  const Eigen::SelfAdjointEigenSolver<Mat6> eigen(normal);
+  const Eigen::Index count = (eigen.eigenvalues().array() < 1e-10).count();
+  return eigen.eigenvectors().leftCols(count);
+}
+
+/// Translations of three nodes far apart that stop these rigid motions and nothing else: their reactions vanish when
+/// the loads are in balance.
+std::vector<std::size_t> determinate_supports(const ShellSystem& system, const Piece& piece, const Vec3& centre,
+                                              double size, const Eigen::Matrix<double, 6, Eigen::Dynamic>& motions) {
+  if (motions.cols() == 0) {
+    return {};
+  }
   const auto farthest = [&](auto distance) {
     return *std::max_element(piece.nodes.begin(), piece.nodes.end(),
                              [&](Index a, Index b) { return distance(a) < distance(b); });
   };
-  const Vec3 centre = centre_of(system, piece);
-  const double size = size_of(system, piece, centre);
   const auto& x = system.reference;
   const Index a = farthest([&](Index i) { return (x[i] - centre).squaredNorm(); });
   const Index b = farthest([&](Index i) { return (x[i] - x[a]).squaredNorm(); });
   const Vec3 axis = (x[b] - x[a]).normalized();
   const Index c = farthest([&](Index i) { return (x[i] - x[a]).cross(axis).squaredNorm(); });
-  Eigen::Matrix<double, 6, 9> columns;
+  const std::vector<const NodeAxes*> own = axes_of_nodes(system);
+  Eigen::MatrixXd columns(motions.cols(), 9);
   const std::array<Index, 3> nodes{a, b, c};
-  for (int k = 0; k < 9; ++k) {
-    const Index node = nodes[k / 3];
-    columns.col(k) = rigid_row(x[node] - centre, size, k % 3).transpose();
+  for (int k = 0; k < 3; ++k) {
+    columns.middleCols<3>(3 * k) =
+        motions.transpose() * rigid_rows(nodes[k], x[nodes[k]] - centre, size, 0, own).transpose();
   }
-  const Eigen::ColPivHouseholderQR<Eigen::Matrix<double, 6, 9>> qr(columns);
+  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(columns);
   std::vector<std::size_t> freedoms;
-  for (int k = 0; k < 6; ++k) {
+  for (Eigen::Index k = 0; k < motions.cols(); ++k) {
     const int chosen = qr.colsPermutation().indices()[k];
     freedoms.push_back(freedom(nodes[chosen / 3], narrow<std::size_t>(chosen % 3)));
   }
   return freedoms;
+}
+
+/// Projectors on the translations among rigid motions and on the axes about which they turn: those of rotations about
+/// the centre. A motion that is neither, such as one about a node that is held, has no part in them.
+void set_projectors(const Eigen::Matrix<double, 6, Eigen::Dynamic>& motions, Piece& piece) {
+  constexpr double hardly = 1e-6;
+  const Mat6 onto = motions * motions.transpose();
+  const auto project = [&](Eigen::Index part) {
+    // Unit vectors that stay as they are.
+    const Eigen::SelfAdjointEigenSolver<Mat3> eigen(onto.block<3, 3>(part, part));
+    Mat3 projector = Mat3::Zero();
+    for (int k = 0; k < 3; ++k) {
+      if (eigen.eigenvalues()[k] > 1 - hardly) {
+        projector += eigen.eigenvectors().col(k) * eigen.eigenvectors().col(k).transpose();
+      }
+    }
+    return projector;
+  };
+  piece.shifts = project(0);
+  piece.turns = project(3);
+}
+
+void hold_slide(ShellSystem& system, const Fix& fix, std::set<std::size_t>& sliding) {
+  const Model& model = *system.model;
+  const Vec3 normal = *fix.across;
+  const Vec3 first = normal.unitOrthogonal();
+  Mat3 axes;
+  axes << normal.transpose(), first.transpose(), normal.cross(first).transpose();
+  for (const Index node : fix.nodes) {
+    const std::size_t global = model.first_node(fix.body) + node;
+    const auto held = system.held.begin() + first_freedom(global);
+    const auto count = std::count(held, held + 6, true);
+    if (count == 6) {
+      continue;
+    }
+    if (!sliding.insert(global).second) {
+      throw InputError(fmt::format("{}{}: two fixes let node {} slide, each in its plane: keep one",
+                                   fix.said_at.empty() ? "" : fix.said_at + ": ", model.name_of(fix.body), node));
+    }
+    if (count > 0) {
+      throw InputError(
+          fmt::format("{}{}: node {} slides in a plane, and another fix holds a part of its freedoms: hold "
+                      "it altogether, or let it slide",
+                      fix.said_at.empty() ? "" : fix.said_at + ": ", model.name_of(fix.body), node));
+    }
+    system.held.own_axes.push_back({narrow<Index>(global), axes});
+    held[0] = held[4] = held[5] = true;
+  }
 }
 
 }  // namespace
@@ -81,12 +194,40 @@ bool held_by_rigid_motions(const Model& model, std::size_t body) {
                      [&](const RigidMotionsFix& fix) { return fix.body == body; });
 }
 
-void make_supports(ShellSystem& system, const Model& model) {
+namespace {
+
+void hold_balanced_motions(ShellSystem& system) {
+  const Model& model = *system.model;
+  system.balancing.clear();
+  for (Piece& piece : system.pieces) {
+    piece.balanced = held_by_rigid_motions(model, piece.body);
+    if (!piece.balanced) {
+      continue;
+    }
+    const Vec3 centre = centre_of(system, piece);
+    const double size = size_of(system, piece, centre);
+    const auto motions = free_motions(system, piece, centre, size, reference_configuration(system));
+    set_projectors(motions, piece);
+    for (const std::size_t freedom : determinate_supports(system, piece, centre, size, motions)) {
+      system.held[freedom] = true;
+      system.balancing.push_back(freedom);
+    }
+  }
+}
+
+}  // namespace
+
+void make_supports(ShellSystem& system) {
+  const Model& model = *system.model;
   system.held.assign(freedom(system.node_count(), 0), false);
+  system.held.own_axes.clear();
   system.prescribed.clear();
   std::map<std::size_t, std::pair<double, std::size_t>> values;  // freedom -> (displacement, fix)
   for (std::size_t f = 0; f < model.fixes.size(); ++f) {
     const Fix& fix = model.fixes[f];
+    if (fix.across) {
+      continue;
+    }
     for (const Index node : fix.nodes) {
       for (std::size_t c = 0; c < 3; ++c) {
         const std::size_t moved = freedom(model.first_node(fix.body) + node, c);
@@ -113,11 +254,10 @@ void make_supports(ShellSystem& system, const Model& model) {
       system.prescribed.push_back({freedom, entry.first, entry.second});
     }
   }
-  for (const Piece& piece : system.pieces) {
-    if (held_by_rigid_motions(model, piece.body)) {
-      for (const std::size_t freedom : determinate_supports(system, piece)) {
-        system.held[freedom] = true;
-      }
+  std::set<std::size_t> sliding;
+  for (const Fix& fix : model.fixes) {
+    if (fix.across) {
+      hold_slide(system, fix, sliding);
     }
   }
   for (std::size_t i = 0; i < system.node_count(); ++i) {
@@ -127,19 +267,32 @@ void make_supports(ShellSystem& system, const Model& model) {
       std::fill_n(system.held.begin() + first_freedom(i) + 4, 2, true);
     }
   }
+  hold_balanced_motions(system);
   for (const Carried& c : system.carried) {
     std::fill_n(system.held.begin() + first_freedom(c.node), 3, true);
   }
 }
 
-void release_rigid_motion_supports(ShellSystem& system, const Model& model) {
-  for (const Piece& piece : system.pieces) {
-    if (held_by_rigid_motions(model, piece.body)) {
-      for (const Index i : piece.nodes) {
-        std::fill_n(system.held.begin() + first_freedom(i), 6, false);
-      }
-    }
+void set_free_motions(const ShellSystem& system, Piece& piece) {
+  const Vec3 centre = centre_of(system, piece);
+  set_projectors(free_motions(system, piece, centre, size_of(system, piece, centre), reference_configuration(system)),
+                 piece);
+}
+
+void hold_free_motions(ShellSystem& system, const Piece& piece) {
+  const Vec3 centre = centre_of(system, piece);
+  const double size = size_of(system, piece, centre);
+  const auto motions = free_motions(system, piece, centre, size, reference_configuration(system));
+  for (const std::size_t freedom : determinate_supports(system, piece, centre, size, motions)) {
+    system.held[freedom] = true;
   }
+}
+
+void release_rigid_motion_supports(ShellSystem& system) {
+  for (const std::size_t freedom : system.balancing) {
+    system.held[freedom] = false;
+  }
+  system.balancing.clear();
 }
 
 int free_rigid_motions(const ShellSystem& system, const Piece& piece) {
@@ -150,31 +303,18 @@ std::vector<VectorX> free_rigid_modes(const ShellSystem& system, const Piece& pi
                                       const Configuration& configuration) {
   const Vec3 centre = centre_of(system, piece);
   const double size = size_of(system, piece, centre);
-  const auto row_of = [&](Index node, int component) {
-    return rigid_row(system.reference[node] - centre + configuration.displacement[node], size, component);
-  };
-  Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
-  for (const Index i : piece.nodes) {
-    for (int c = 0; c < 6; ++c) {
-      if (system.held[freedom(i, narrow<std::size_t>(c))] && (c < 3 || i < system.first_solid_node)) {
-        const Row6 row = row_of(i, c);
-        normal += row.transpose() * row;
-      }
-    }
-  }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> eigen(normal);
+  const auto motions = free_motions(system, piece, centre, size, configuration);
   std::vector<VectorX> modes;
-  for (int k = 0; k < 6; ++k) {
-    if (eigen.eigenvalues()[k] < 1e-10) {
-      VectorX mode = VectorX::Zero(first_freedom(system.node_count()));
-      for (const Index i : piece.nodes) {
-        for (int c = 0; c < 6; ++c) {
-          const double motion = row_of(i, c) * eigen.eigenvectors().col(k);
-          mode[first_freedom(i) + c] = c < 3 ? motion : motion / size;
-        }
+  for (Eigen::Index k = 0; k < motions.cols(); ++k) {
+    VectorX mode = VectorX::Zero(first_freedom(system.node_count()));
+    for (const Index i : piece.nodes) {
+      const Vec3 arm = system.reference[i] - centre + configuration.displacement[i];
+      for (int c = 0; c < 6; ++c) {
+        const double motion = rigid_row(arm, size, c) * motions.col(k);
+        mode[first_freedom(i) + c] = c < 3 ? motion : motion / size;
       }
-      modes.push_back(mode);
     }
+    modes.push_back(mode);
   }
   return modes;
 }
@@ -192,7 +332,7 @@ double imbalance(const ShellSystem& system, const Piece& piece, const VectorX& e
     moment += (system.reference[i] - centre).cross(f) + m;
     magnitude += f.norm() + m.norm() / size;
   }
-  return magnitude > 0 ? std::max(force.norm(), moment.norm() / size) / magnitude : 0;
+  return magnitude > 0 ? std::max((piece.shifts * force).norm(), (piece.turns * moment).norm() / size) / magnitude : 0;
 }
 
 void take_out_rigid_motion(const ShellSystem& system, const Piece& piece, Configuration& configuration) {
@@ -216,7 +356,10 @@ void take_out_rigid_motion(const ShellSystem& system, const Piece& piece, Config
       moment += system.area[i] * arm.cross(configuration.displacement[i] - shift);
       inertia += system.area[i] * (arm.dot(now) * Mat3::Identity() - now * arm.transpose());
     }
-    const Vec3 turn = -inertia.partialPivLu().solve(moment);
+    shift = piece.shifts * shift;
+    const Vec3 turn = -(piece.turns * inertia * piece.turns + inertia.trace() * (Mat3::Identity() - piece.turns))
+                           .partialPivLu()
+                           .solve(piece.turns * moment);
     const Eigen::Quaterniond q = exponential(turn);
     // (q - 1) x, so that small displacements keep their digits.
     const auto change = [&](const Vec3& x) {
@@ -235,9 +378,9 @@ void take_out_rigid_motion(const ShellSystem& system, const Piece& piece, Config
   }
 }
 
-void take_out_linear_rigid_motion(const ShellSystem& system, const Model& model, VectorX& displacement) {
+void take_out_linear_rigid_motion(const ShellSystem& system, VectorX& displacement) {
   for (const Piece& piece : system.pieces) {
-    if (!held_by_rigid_motions(model, piece.body)) {
+    if (!piece.balanced) {
       continue;
     }
     double weight = 0;
@@ -257,7 +400,10 @@ void take_out_linear_rigid_motion(const ShellSystem& system, const Model& model,
       moment += system.area[i] * arm.cross(displacement.segment<3>(first_freedom(i)) - shift);
       inertia += system.area[i] * (arm.squaredNorm() * Mat3::Identity() - arm * arm.transpose());
     }
-    const Vec3 turn = inertia.ldlt().solve(moment);
+    const Vec3 turn = (piece.turns * inertia * piece.turns + inertia.trace() * (Mat3::Identity() - piece.turns))
+                          .ldlt()
+                          .solve(piece.turns * moment);
+    shift = piece.shifts * shift;
     for (const Index i : piece.nodes) {
       displacement.segment<3>(first_freedom(i)) -= shift + turn.cross(system.reference[i] - centre);
       displacement.segment<3>(first_freedom(i) + 3) -= turn;

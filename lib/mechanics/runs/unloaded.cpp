@@ -5,13 +5,16 @@
 #include "tunica/mechanics/elements/rotation.hpp"
 #include "tunica/mechanics/runs/detail/run.hpp"
 #include "tunica/mechanics/runs/detail/supports.hpp"
+#include "tunica/surface/mesh/measure.hpp"
 
 #include <fmt/format.h>
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 
 #include <algorithm>
 #include <deque>
+#include <utility>
 
 namespace tunica {
 namespace {
@@ -28,24 +31,6 @@ constexpr double mixed = 0.5;  // of the residual that they leave: waves as shor
 constexpr double smallest_part = 1.0 / 32;
 constexpr std::string_view key = "imaged_at";
 
-/// The imaged model under the pressures of the image alone, held where the image shows it.
-Model as_imaged(Model model) {
-  std::erase_if(model.loads, [](const Load& load) {
-    const auto* pressure = std::get_if<PressureLoad>(&load.kind);
-    return pressure == nullptr || !pressure->imaged_at;
-  });
-  for (Load& load : model.loads) {
-    auto& pressure = std::get<PressureLoad>(load.kind);
-    pressure.value = *pressure.imaged_at;
-    load.ramp = {};
-  }
-  for (Fix& fix : model.fixes) {
-    fix.displacement.setZero();
-    fix.ramp = {};
-  }
-  return model;
-}
-
 RunSettings for_statics(RunSettings settings) {
   settings.kind = StaticRun{false, {1}};
   settings.cg_fixed_count = false;
@@ -56,13 +41,31 @@ RunSettings for_statics(RunSettings settings) {
   return settings;
 }
 
+/// The imaged model under the pressures of the image alone, held where the image shows it.
+Model under_imaging_pressure(Model model) {
+  std::erase_if(model.loads, [](const Load& load) {
+    const auto* pressure = std::get_if<PressureLoad>(&load.kind);
+    return pressure == nullptr || !pressure->imaged_at;
+  });
+  for (Load& load : model.loads) {
+    auto& pressure = std::get<PressureLoad>(load.kind);
+    pressure.value = *std::exchange(pressure.imaged_at, std::nullopt);
+    load.ramp = {};
+  }
+  for (Fix& fix : model.fixes) {
+    fix.displacement.setZero();
+    fix.ramp = {};
+  }
+  return model;
+}
+
 /// The equilibrium on the image, solved for the motion that led there from the reference: displacements and rotation
 /// vectors (times a length) of all nodes, one after the other.
 class InverseStatics {
 public:
   InverseStatics(const Model& imaged, const RunSettings& settings)
       : imaged_(imaged),
-        pressed_(as_imaged(imaged)),
+        pressed_(under_imaging_pressure(imaged)),
         settings_(for_statics(settings)),
         image_(make_checked_system(pressed_, settings_)),
         solver_(image_, settings_),
@@ -91,7 +94,7 @@ public:
     }
     Configuration there = configuration(motion);
     Forces forces;
-    evaluate(*system, model, there, load_factors(model, true, 1), {}, forces, nullptr);
+    evaluate(*system, there, load_factors(model, true, 1), {}, forces, nullptr);
     VectorX left = forces.external - forces.internal;
     mask(solver_.free(), left);
     VectorX increment;
@@ -103,7 +106,7 @@ public:
     factored_ = true;
     advance_configuration(image_, increment, there);
     for (const Piece& piece : system->pieces) {
-      if (held_by_rigid_motions(model, piece.body)) {
+      if (piece.balanced) {
         take_out_rigid_motion(*system, piece, there);
       }
     }
@@ -139,7 +142,7 @@ public:
   [[nodiscard]] std::optional<double> volume(const VectorX& motion) const {
     const Model model = under(0, motion);
     const ShellSystem system = make_system(model);
-    return enclosed_volume(system, model, reference_configuration(system));
+    return enclosed_volume(system, reference_configuration(system));
   }
 
   /// Mean and largest length of the displacements.
@@ -208,8 +211,7 @@ private:
   [[nodiscard]] Model under(double part, const VectorX& motion) const {
     Model model = moved_back(pressed_, motion);
     for (Load& load : model.loads) {
-      auto& pressure = std::get<PressureLoad>(load.kind);
-      pressure.value = part * *pressure.imaged_at;
+      std::get<PressureLoad>(load.kind).value *= part;
     }
     return model;
   }
@@ -308,6 +310,41 @@ Approach approach(InverseStatics& inverse, VectorX motion, double enough,
   return best;
 }
 
+/// Of both shapes at planes across the longest axis of the imaged one, which the unloaded one keeps.
+std::optional<Unloaded::Roundness> least_roundness(const Model& imaged, const Model& unloaded) {
+  constexpr int planes = 15;
+  std::optional<Unloaded::Roundness> least;
+  for (std::size_t b = 0; b < imaged.shells.size(); ++b) {
+    const TriangleMesh image = flat_facets(imaged.shells[b].mesh);
+    const TriangleMesh without = flat_facets(unloaded.shells[b].mesh);
+    Vec3 centre = Vec3::Zero();
+    for (const Vec3& v : image.vertices) {
+      centre += v / real(image.vertices.size());
+    }
+    Mat3 spread = Mat3::Zero();
+    for (const Vec3& v : image.vertices) {
+      spread += (v - centre) * (v - centre).transpose();
+    }
+    const Vec3 axis = Eigen::SelfAdjointEigenSolver<Mat3>(spread).eigenvectors().col(2);
+    const auto roundness_at = [&](const TriangleMesh& mesh, double part) {
+      double low = infinity, high = -infinity;
+      for (const Vec3& v : mesh.vertices) {
+        low = std::min(low, axis.dot(v - centre));
+        high = std::max(high, axis.dot(v - centre));
+      }
+      return section_roundness(mesh, centre + (low + part * (high - low)) * axis, axis);
+    };
+    for (int i = 1; i <= planes; ++i) {  // near its ends a shape of facets has sections of few corners
+      const auto before = roundness_at(image, real(i + 1) / (planes + 3));
+      const auto after = roundness_at(without, real(i + 1) / (planes + 3));
+      if (before && after && (!least || *after * least->image < least->unloaded * *before)) {
+        least = {*before, *after};
+      }
+    }
+  }
+  return least;
+}
+
 [[noreturn]] void refuse(double part, const std::string& reason) {
   throw RequirementError(fmt::format(
       "no unloaded shape was found that lies where the image shows it under {:.4g} times the pressure {}: "
@@ -318,15 +355,9 @@ Approach approach(InverseStatics& inverse, VectorX motion, double enough,
 
 }  // namespace
 
-bool is_imaged_under_pressure(const Model& model) {
-  return std::any_of(model.loads.begin(), model.loads.end(), [](const Load& load) {
-    const auto* pressure = std::get_if<PressureLoad>(&load.kind);
-    return pressure != nullptr && pressure->imaged_at.has_value();
-  });
-}
-
 Unloaded find_unloaded(const Model& imaged, const RunSettings& settings,
                        const std::function<void(double, double)>& on_iteration) {
+  require_valid(imaged);
   require_shells_only(imaged);
   InverseStatics inverse(imaged, settings);
   VectorX found = inverse.no_motion();
@@ -357,11 +388,17 @@ Unloaded find_unloaded(const Model& imaged, const RunSettings& settings,
   if (!loaded.near) {
     refuse(1, inverse.reason);
   }
-  Unloaded unloaded{inverse.reference(loaded.motion), inverse.volume(loaded.motion), loaded.off[0], loaded.off[1],
-                    inverse.iterations};
+  Unloaded unloaded{inverse.reference(loaded.motion),
+                    inverse.volume(loaded.motion),
+                    loaded.off[0],
+                    loaded.off[1],
+                    inverse.iterations,
+                    {}};
+  unloaded.roundness = least_roundness(imaged, unloaded.model);
   for (Load& load : unloaded.model.loads) {
     if (auto* pressure = std::get_if<PressureLoad>(&load.kind)) {
       pressure->imaged_at.reset();
+      pressure->unload = false;
     }
   }
   return unloaded;

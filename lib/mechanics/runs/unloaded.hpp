@@ -12,6 +12,12 @@ struct Unloaded {
   double mean_distance = 0;      ///< mm: of the loaded shape's nodes from the image
   double largest_distance = 0;
   std::size_t iterations = 0;  ///< corrections of u
+  /// Roundness (section_roundness()) of the section that loses most of it, in the image and without the pressure: of 15
+  /// planes across the long axis. None where no section is closed.
+  struct Roundness {
+    double image = 0, unloaded = 0;
+  };
+  std::optional<Roundness> roundness;
 };
 
 /// Finds the reference X whose state of rest under the pressures `imaged_at` lies where the shells of `imaged` lie. The
@@ -28,8 +34,5 @@ struct Unloaded {
 /// @param on_iteration  part of the pressure, mean change by the iteration in mm
 Unloaded find_unloaded(const Model& imaged, const RunSettings& settings,
                        const std::function<void(double part, double mean_change)>& on_iteration = {});
-
-/// Whether some pressure says that the image was taken under it.
-bool is_imaged_under_pressure(const Model& model);
 
 }  // namespace tunica

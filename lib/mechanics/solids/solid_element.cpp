@@ -49,7 +49,8 @@ void add_cofactor_derivative(const Mat3& f, double factor, Matrix99& derivative)
   }
 }
 
-bool at_point(const SolidElement& e, const Mat3& gradient, double pressure, Point& at, bool with_derivative) {
+/// What the law makes of a deformation; the prestress is not in it.
+bool at_point_of_law(const SolidElement& e, const Mat3& gradient, double pressure, Point& at, bool with_derivative) {
   const Mat3 f = Mat3::Identity() + gradient;
   const double determinant = f.determinant();
   if (!(determinant > 0)) {
@@ -98,6 +99,20 @@ bool at_point(const SolidElement& e, const Mat3& gradient, double pressure, Poin
       }
     }
     add_cofactor_derivative(f, pressure, at.derivative);
+  }
+  return true;
+}
+
+bool at_point(const SolidElement& e, const Mat3& gradient, double pressure, Point& at, bool with_derivative) {
+  if (!at_point_of_law(e, gradient, pressure, at, with_derivative)) {
+    return false;
+  }
+  at.energy += e.prestress.cwiseProduct(gradient + 0.5 * gradient.transpose() * gradient).sum();
+  at.stress += (Mat3::Identity() + gradient) * e.prestress;
+  for (int l = 0; with_derivative && l < 3; ++l) {
+    for (int m = 0; m < 3; ++m) {
+      at.derivative.block<3, 3>(3 * l, 3 * m).diagonal().array() += e.prestress(l, m);
+    }
   }
   return true;
 }
@@ -174,10 +189,21 @@ bool solid_response(const SolidElement& e, const SolidMotion& motion, SolidRespo
 }
 
 Matrix16 linear_stiffness(const SolidElement& element) {
+  SolidElement bare = element;
+  bare.prestress.setZero();
   SolidResponse unused;
   Matrix16 tangent;
-  solid_response(element, {Corners4::Zero(), Eigen::Vector4d::Zero()}, unused, &tangent);
+  solid_response(bare, {Corners4::Zero(), Eigen::Vector4d::Zero()}, unused, &tangent);
   return tangent;
+}
+
+Vector16 linear_force(const SolidElement& element, const Vector16& motion) {
+  Vector16 force = linear_stiffness(element) * motion;
+  const Corners4 of_prestress = element.volume * element.prestress * element.gradients;
+  for (int k = 0; k < 4; ++k) {
+    force.segment<3>(4 * k) += of_prestress.col(k);
+  }
+  return force;
 }
 
 Mat3 solid_stress(const SolidElement& e, const SolidMotion& motion, bool linear) {
@@ -186,16 +212,14 @@ Mat3 solid_stress(const SolidElement& e, const SolidMotion& motion, bool linear)
   if (linear) {
     const Mat3 strain = 0.5 * (gradient + gradient.transpose());
     const double volume = strain.trace();
-    return 2 * e.shear * strain + ((e.bulk_of_displacement - 2 * e.shear / 3) * volume + p) * Mat3::Identity();
+    return 2 * e.shear * strain + ((e.bulk_of_displacement - 2 * e.shear / 3) * volume + p) * Mat3::Identity() +
+           e.prestress;
   }
   Point at;
   if (!at_point(e, gradient, p, at, false)) {
     return Mat3::Zero();
   }
   const Mat3 f = Mat3::Identity() + gradient;
-  if (e.law == SolidLaw::corotational) {  // a linear law: stress of the rotated frame, whatever the small strain
-    return at.stress * nearest_rotation(f).transpose() + p * Mat3::Identity();
-  }
   const Mat3 piola = at.stress + p * at.volume_derivative;
   return piola * f.transpose() / f.determinant();
 }

@@ -19,7 +19,8 @@
 ///   neo_hookean:  W = mu (|F|^2 - 3) / 2 - mu ln J + (K0 - 2 mu / 3) (ln J)^2 / 2, theta = ln J: no pressure crushes
 ///   it
 ///                 to nothing
-/// Both are linear elasticity for small strains.
+/// Both are linear elasticity for small strains. Where the reference bears a stress S0 (prestress.hpp), W has
+/// S0 : (F'F - 1) / 2 besides.
 /// Source: Dohrmann, Bochev 2004, "A stabilized finite element method for the Stokes problem based on polynomial
 /// pressure projections"; Bonet, Wood 2008, "Nonlinear continuum mechanics for
 /// finite element analysis", section 6.4.3; the derivative of R: McAdams
@@ -40,6 +41,7 @@ struct SolidElement {
   double shear = 0;    ///< MPa
   double bulk_of_displacement = 0;
   double bulk_of_pressure = 0;
+  Mat3 prestress = Mat3::Zero();  ///< S0, MPa
 };
 
 /// @param corners  columns, mm, in the order of TetMesh
@@ -60,8 +62,12 @@ struct SolidResponse {
 /// @return false where the tetrahedron has turned inside out
 bool solid_response(const SolidElement& element, const SolidMotion& motion, SolidResponse& response, Matrix16* tangent);
 
-/// The tangent at the reference.
+/// The tangent at the reference, without what prestress adds.
 Matrix16 linear_stiffness(const SolidElement& element);
+
+/// The forces of the linear theory: that stiffness times the motion (displacement and pressure per corner), and those
+/// of the prestress.
+Vector16 linear_force(const SolidElement& element, const Vector16& motion);
 
 /// Cauchy stress, MPa. Of the linear theory where `linear`.
 Mat3 solid_stress(const SolidElement& element, const SolidMotion& motion, bool linear);

@@ -15,7 +15,7 @@ namespace tunica::report {
 /// A surface as it is drawn: the loaded organ, or what there is of it.
 struct SeenSurface {
   TriangleMesh mesh;           ///< mm; without triangles where nothing can be drawn
-  std::vector<double> stress;  ///< #V, MPa; empty: not loaded
+  std::vector<double> stress;  ///< #V, MPa, membrane; empty: not loaded
   std::array<Vec3, 3> axes;    ///< as of picture_axes()
 };
 

@@ -33,6 +33,39 @@ Box bounding_box(const TriangleMesh& mesh) {
 
 double diagonal(const TriangleMesh& mesh) { return bounding_box(mesh).diagonal(); }
 
+std::optional<double> section_roundness(const TriangleMesh& mesh, const Vec3& point, const Vec3& normal) {
+  require_valid(mesh);
+  const auto height = [&](Index vertex) { return normal.dot(mesh.vertices[vertex] - point); };
+  double perimeter = 0;
+  Vec3 twice_area = Vec3::Zero();
+  Vec3 closure = Vec3::Zero();  // the segments go round: they add up to nothing
+  for (const auto& triangle : mesh.triangles) {
+    std::array<Vec3, 2> ends;  // where the boundary of the triangle goes up through the plane, and down
+    std::size_t crossings = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Index a = triangle[k];
+      const Index b = triangle[(k + 1) % 3];
+      const double from = height(a);
+      const double to = height(b);
+      if ((from < 0) != (to < 0)) {
+        ends[from < 0 ? 0 : 1] = mesh.vertices[a] + from / (from - to) * (mesh.vertices[b] - mesh.vertices[a]);
+        ++crossings;
+      }
+    }
+    if (crossings == 2) {
+      const Vec3 along = ends[1] - ends[0];
+      perimeter += along.norm();
+      closure += along;
+      twice_area += (ends[0] - point).cross(along);
+    }
+  }
+  constexpr double round_off = 1e-9;
+  if (!(perimeter > 0) || closure.norm() > round_off * perimeter) {
+    return std::nullopt;
+  }
+  return 2 * std::numbers::pi * std::abs(twice_area.dot(normal.normalized())) / (perimeter * perimeter);
+}
+
 double triangle_area(const Vec3& a, const Vec3& b, const Vec3& c) { return 0.5 * (b - a).cross(c - a).norm(); }
 
 double area(const TriangleMesh& mesh) {

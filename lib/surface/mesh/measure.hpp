@@ -2,6 +2,8 @@
 
 #include "tunica/surface/mesh/triangle_mesh.hpp"
 
+#include <optional>
+
 namespace tunica {
 
 /// An axis-aligned box. Of nothing: lower = upper = 0.
@@ -23,6 +25,10 @@ double area(const TriangleMesh& mesh);
 /// Volume enclosed by a closed mesh, mm^3; positive when the triangles face outward.
 /// Limits: of an open mesh it is the volume of the cone from the centre of the bounding box.
 double signed_volume(const TriangleMesh& mesh);
+
+/// How round a plane section is: 4 pi area / perimeter^2, 1 for a circle, less for several loops together. None where
+/// the plane misses the surface or the section is not closed. The mesh is oriented.
+std::optional<double> section_roundness(const TriangleMesh& mesh, const Vec3& point, const Vec3& normal);
 
 /// Area of a triangle, mm^2.
 double triangle_area(const Vec3& a, const Vec3& b, const Vec3& c);

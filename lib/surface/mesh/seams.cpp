@@ -16,8 +16,6 @@
 namespace tunica {
 namespace {
 
-// Two texts of six digits differ by up to 1e-5 of a coordinate along each axis.
-constexpr double six_digits = 2e-5;
 constexpr double share_of_edge = 0.01;  // vertices farther apart than that are none in one place
 
 /// A boundary edge, as its triangle runs along it.
@@ -164,11 +162,7 @@ private:
     }
     std::ranges::sort(vertices_);
     vertices_.erase(std::unique(vertices_.begin(), vertices_.end()), vertices_.end());
-    double largest = 0;
-    for (const Index v : vertices_) {
-      largest = std::max(largest, mesh_.vertices[v].cwiseAbs().maxCoeff());
-    }
-    reach_.assign(vertices_.size(), six_digits * largest);
+    reach_.assign(vertices_.size(), infinity);
     for (const Rim& rim : rims_) {
       for (const Index v : {rim.from, rim.to}) {
         double& reach = reach_[local(v)];

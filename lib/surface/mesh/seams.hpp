@@ -15,8 +15,8 @@ struct Seams {
 };
 
 /// Finds the boundary edges that coincide: along seams of texture, where parts were glued or mirrored, at T-junctions.
-/// Ends coincide that are no farther apart than two roundings to six digits of the mesh's largest coordinate, and than
-/// a hundredth of the edges there. An edge coincides with others in parts where these do and lie along it.
+/// Ends coincide that are no farther apart than a hundredth of the boundary edges there. An edge coincides with others
+/// in parts where these do and lie along it.
 /// @param mesh  any triangles with three corners and finite vertices
 /// Cost: linear for a closed mesh; n log n in the boundary edges. Errors: Interrupted.
 Seams find_seams(const TriangleMesh& mesh);

@@ -1,6 +1,7 @@
 #include "tunica/volume/cubes/doubts.hpp"
 
 #include "tunica/core/narrow.hpp"
+#include "tunica/volume/labels/shelter.hpp"
 
 #include <fmt/format.h>
 
@@ -22,8 +23,9 @@ constexpr double share_of_wall = 0.1;
 constexpr double notable_share = 0.01;
 // Of a volume: not worth a word.
 constexpr double least_share = 0.001;
-// Of what the sections of an open wall enclose, as of a tube whose wall is as thick as its lumen's radius. A vertebra
-// around its canal, or an organ around a vessel, has less than half of that.
+// Of what an open wall and the hollow that it stands around fill together: as of a tube whose wall is as thick as its
+// lumen's radius. A kidney around its hilum, a vertebra around its canal or an aorta in its bends has half of that at
+// most.
 constexpr double share_of_open_wall = 0.25;
 constexpr double notable_few = 0.05;       // of the volume of the voxels
 constexpr double notable_smoothing = 0.1;  // of the voxels
@@ -106,15 +108,15 @@ std::vector<Warning> doubt_hollows(const Subject& subject, const Mask& mask, con
                  "directions; --face inner or --face outer takes one of them",
                  subject.name, percent, subject.at(hollows.middle))}};
   }
-  if (hollows.ring_share >= share_of_open_wall) {
-    return {
-        {Weight::major, "wall with two faces",
-         fmt::format("{}: it may be a wall with two faces, with an open end or a hole within the image: its sections "
-                     "are rings around "
-                     "{:.3g} % of what they enclose; both faces become one surface, and one pressure presses them in "
-                     "opposite directions; close the hole, or crop the image so that its border cuts the open end, "
-                     "and pass --face inner or --face outer",
-                     subject.name, 1e2 * hollows.ring_share)}};
+  if (const Shelter shelter = find_shelter(mask); shelter.share >= share_of_open_wall) {
+    return {{Weight::major, "wall with two faces",
+             fmt::format(
+                 "{}: it may be a wall with two faces that is open along a slit, at an end or by a hole within the "
+                 "image: it stands on most sides around a hollow, {:.3g} % of what both fill, around {}: both faces of "
+                 "a wall become one surface, and one pressure presses them in opposite directions; close the slit or "
+                 "hole in the segmentation, or crop the image so that its border cuts the open end, and pass --face "
+                 "inner or --face outer; nothing is off where it is a solid that bends around something",
+                 subject.name, 1e2 * shelter.share, subject.at(shelter.middle))}};
   }
   if (real(cavities.voxels) < least_share * real(count_voxels(mask))) {
     return {};
@@ -167,6 +169,13 @@ std::vector<Warning> doubt_bridge(const Subject& subject, const std::optional<Br
 }
 
 std::vector<Warning> doubt_openings(const Subject& subject, const Openings& openings, double area) {
+  if (openings.openings.empty()) {
+    return {{Weight::minor, "no opening",
+             fmt::format("{}: 0 openings found: the image's border does not cut it, so that it stays closed as without "
+                         "--open-border (OPEN=1); open a vessel that ends within the image by --cut 'above z=40mm' "
+                         "(CUT='above z=40mm')",
+                         subject.name)}};
+  }
   std::vector<Vec3> places;
   double lids = 0;
   for (const Opening& opening : openings.openings) {

@@ -79,6 +79,7 @@ const Meaning* labels_of(const T* values, std::size_t count, const Volume& slab,
 LabelIndex::LabelIndex(const std::array<std::size_t, 3>& dims, const Eigen::Matrix<double, 3, 4>& affine,
                        std::size_t limit)
     : dims_(dims), affine_(affine), limit_(limit) {
+  require_affine(affine);
   if (voxel_count(dims) > std::size_t{1} << 38 ||
       (dims[0] + 63) / 64 * dims[1] * dims[2] > std::numeric_limits<std::uint32_t>::max()) {
     throw InputError("the volume has more than 2^38 voxels, too many for all labels at once: name one label");
@@ -141,8 +142,10 @@ void LabelIndex::add_pieces(const std::vector<Piece<Meaning>>& pieces) {
         throw InputError(fmt::format(
             "its label {} is above 2^53, where labels cannot be told apart: give the labels smaller numbers", value));
       }
+      // Above 2^53 floating-point numbers are whole whatever they measure, and stand for their neighbours too.
+      const bool measured = std::is_floating_point_v<Meaning> && std::abs(label) > 0x1p53;
       found->second = &entries_[label];
-      if (entries_.size() > limit_) {
+      if (measured || entries_.size() > limit_) {
         image_ = true;
         entries_.clear();
         return;
@@ -185,7 +188,7 @@ std::optional<std::vector<Label>> LabelIndex::labels(const std::vector<std::pair
 
 Mask LabelIndex::mask(double label) const {
   Mask mask(dims_, affine_);
-  const Entry& entry = entries_.at(label);
+  const Entry& entry = entry_of(label);
   std::uint64_t* const words = mask.row(0, 0);
   for (std::size_t i = 0; i < entry.at.size(); ++i) {
     words[entry.at[i]] |= entry.bits[i];
@@ -193,10 +196,18 @@ Mask LabelIndex::mask(double label) const {
   return mask;
 }
 
-MaskBounds LabelIndex::bounds(double label) const { return entries_.at(label).bounds; }
+MaskBounds LabelIndex::bounds(double label) const { return entry_of(label).bounds; }
+
+const LabelIndex::Entry& LabelIndex::entry_of(double label) const {
+  const auto found = entries_.find(label);
+  if (found == entries_.end()) {
+    throw InputError(fmt::format("no voxel has the label {}", label));
+  }
+  return found->second;
+}
 
 std::size_t LabelIndex::surface_vertices(double label) const {
-  const Entry& entry = entries_.at(label);
+  const Entry& entry = entry_of(label);
   const std::size_t words = (dims_[0] + 63) / 64;
   const std::size_t rows = dims_[1];
   std::size_t pairs = 0;  // neighbours that both have the label

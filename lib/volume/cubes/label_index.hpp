@@ -35,12 +35,12 @@ public:
   [[nodiscard]] std::optional<std::vector<Label>> labels(
       const std::vector<std::pair<double, std::string>>& names = {}) const;
 
-  /// The voxels with a label that labels() lists, and where they are.
+  /// The voxels with a label that labels() lists, and where they are. Errors: InputError: it lists no such label.
   [[nodiscard]] Mask mask(double label) const;
   [[nodiscard]] MaskBounds bounds(double label) const;
 
   /// Vertices of the closed surface of a label that labels() lists: edges between a voxel with it and one without.
-  /// Its surface has about twice as many triangles. Cost: one pass over the label's words.
+  /// Its surface has about twice as many triangles. Errors: as mask(). Cost: one pass over the label's words.
   [[nodiscard]] std::size_t surface_vertices(double label) const;
 
 private:
@@ -54,6 +54,7 @@ private:
   struct Piece;
   template <typename Meaning, typename T>
   void add_values(const Volume& slab, const std::vector<T>& values, std::size_t first_slice);
+  [[nodiscard]] const Entry& entry_of(double label) const;
   template <typename Meaning>
   void add_pieces(const std::vector<Piece<Meaning>>& pieces);
 

@@ -68,6 +68,23 @@ private:
   double value_;
 };
 
+void require_lids(const BorderLids* lids, const std::array<std::size_t, 3>& dims) {
+  for (std::size_t axis = 0; lids != nullptr && axis < 3; ++axis) {
+    const std::size_t voxels = dims[0] * dims[1] * dims[2] / dims[axis];
+    for (const std::vector<bool>& side : lids->closed[axis]) {
+      if (!side.empty() && side.size() != voxels) {
+        throw InputError(fmt::format("lids of {} voxels are not of a side of {}", side.size(), voxels));
+      }
+    }
+  }
+}
+
+void require_range(const std::array<std::size_t, 2>& range, std::size_t count) {
+  if (range[0] > range[1] || range[1] > count) {
+    throw InputError(fmt::format("bounds from {} to {} are not within {} rows or slices", range[0], range[1], count));
+  }
+}
+
 }  // namespace
 
 /// The mesh of a selection, counted and laid out at the start, and then written in any parts.
@@ -75,7 +92,10 @@ class SlabMarchingCubes::Writer {
 public:
   Writer(const Mask& mask, const MarchingCubesOptions& options) : mask_(mask), options_(options) {
     window_.size = mask.dims();
+    require_lids(options.lids, mask.dims());
     if (const auto& bounds = options.bounds) {
+      require_range(bounds->rows, mask.dims()[1]);
+      require_range(bounds->slices, mask.dims()[2]);
       window_.first = {0, bounds->rows[0], bounds->slices[0]};
       window_.size = {mask.dims()[0], bounds->rows[1] - bounds->rows[0], bounds->slices[1] - bounds->slices[0]};
     }

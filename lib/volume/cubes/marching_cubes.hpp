@@ -42,7 +42,8 @@ struct MarchingCubesOptions {
 /// The mesh is the same to the bit whatever the number of threads.
 /// @param mask  the selection by `rule`, of which whole pieces and cavities may have been edited out
 /// @return no triangles when nothing is inside
-/// Errors: InputError when the mesh would exceed 2^31 - 1 vertices or triangles.
+/// Errors: InputError: require_volume(); dimensions of volume, mask, bounds or lids that do not suit each other; an
+/// isovalue that is not-a-number; when the mesh would exceed 2^31 - 1 vertices or triangles.
 /// Source: Lorensen and Cline 1987; rows and partitioned output as in flying edges (Schroeder, Maynard, Geveci 2015),
 /// on bits.
 /// Cost: two passes over one bit per voxel; memory: the mask, the mesh, a few slices of bits per thread, and for above

@@ -1,8 +1,8 @@
 #include "tunica/volume/cubes/openings.hpp"
 
-#include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/core/progress.hpp"
+#include "tunica/surface/mesh/checks.hpp"
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
@@ -233,11 +233,7 @@ bool turns_about(const Mat3& squares, const Vec3& normal) {
 }  // namespace
 
 Openings find_openings(const Mask& mask, const TriangleMesh& surface) {
-  for (const auto& triangle : surface.triangles) {
-    if (*std::ranges::max_element(triangle) >= surface.vertices.size()) {
-      throw InputError("a triangle of the surface has a vertex that is not there");
-    }
-  }
+  require_valid(surface);
   Openings found;
   std::vector<ImageFace> faces;
   for (int axis = 0; axis < 3; ++axis) {
@@ -278,7 +274,18 @@ Openings find_openings(const Mask& mask, const TriangleMesh& surface) {
   return found;
 }
 
+std::size_t count_border_cuts(const Mask& mask) {
+  std::vector<Opening> openings;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const bool upper : {false, true}) {
+      ImageFace(mask, axis, upper).find(openings);
+    }
+  }
+  return openings.size();
+}
+
 TriangleMesh without_border(const TriangleMesh& surface, const Mask& mask) {
+  require_valid(surface);
   const Mat3 to_index = mask.affine().leftCols<3>().inverse();
   std::vector<unsigned> faces(surface.vertices.size(), 0);  // a bit for each face of the image that a vertex is near
   for (std::size_t v = 0; v < faces.size(); ++v) {

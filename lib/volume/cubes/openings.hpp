@@ -33,11 +33,15 @@ struct Openings {
 /// Where no rim is, the border cuts no wall: no end. In an image of two slices all are ends, for nothing shows where
 /// the wall goes.
 /// @param surface  of the selection, by marching_cubes() with an open border and no lids, not smoothed
-/// Cost: linear in the surface and in the image's border. Errors: InputError: a vertex that is not there. Interrupted.
+/// Cost: linear in the surface and in the image's border. Errors: InputError as require_valid() of it. Interrupted.
 Openings find_openings(const Mask& mask, const TriangleMesh& surface);
 
+/// Connected parts of the image's faces where its border cuts a selection, ends or not. Cost: linear in the border.
+std::size_t count_border_cuts(const Mask& mask);
+
 /// A surface without the lids on the image's border: triangles that lie within half a voxel of a face of the image, as
-/// both faces of a wall do there. The whole surface where nothing else is left.
+/// both faces of a wall do there. The whole surface where nothing else is left. Errors: InputError as
+/// require_valid() of the surface.
 TriangleMesh without_border(const TriangleMesh& surface, const Mask& mask);
 
 }  // namespace tunica

@@ -2,6 +2,7 @@
 
 #include "tunica/core/disjoint_sets.hpp"
 #include "tunica/core/narrow.hpp"
+#include "tunica/surface/mesh/checks.hpp"
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
@@ -47,6 +48,7 @@ Vec3 outward_step(const Mask& mask, bool open_border, const Vec3& point) {
 }  // namespace
 
 bool faces_outward(const TriangleMesh& mesh, const Mask& mask, bool open_border) {
+  require_valid(mesh);
   const Mat3 axes = mask.affine().leftCols<3>();
   const Mat3 to_index = axes.inverse();
   const double side = axes.determinant() < 0 ? -1 : 1;  // a mirroring affine turns normals round
@@ -66,6 +68,9 @@ bool faces_outward(const TriangleMesh& mesh, const Mask& mask, bool open_border)
   }
   std::vector<double> votes(points.size(), 0.0);
   for (Index vertex = 0; vertex < points.size(); ++vertex) {
+    if (normals[vertex].isZero(0)) {
+      continue;  // of no triangle: it may be anywhere
+    }
     votes[pieces.root(vertex)] += normals[vertex].dot(outward_step(mask, open_border, points[vertex]));
   }
   return std::all_of(mesh.triangles.begin(), mesh.triangles.end(),

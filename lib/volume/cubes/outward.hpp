@@ -10,6 +10,7 @@ namespace tunica {
 /// inside to outside there, and the sum over a component has to be positive.
 /// @param mesh  as marching_cubes() made it, not smoothed
 /// @param open_border  as given to marching_cubes()
+/// Errors: InputError as require_valid() of the mesh.
 /// Cost: linear in the size of the mesh.
 bool faces_outward(const TriangleMesh& mesh, const Mask& mask, bool open_border);
 

@@ -94,50 +94,6 @@ std::size_t outside_of(const std::vector<Component>& components) {
   return outside;
 }
 
-/// Voxels that are outside and cannot leave their slice across its border: rings of the selection enclose them.
-/// @param across  1 or 2: the axis that the slices are across
-std::size_t count_in_rings(const Mask& mask, int across) {
-  VoxelRuns runs(mask, false);
-  runs.connect_slices(across);
-  const std::size_t last = mask.dims()[across == 1 ? 2 : 1] - 1;
-  std::vector<bool> leaves(runs.size(), false);
-  runs.for_each([&](std::size_t run, std::size_t j, std::size_t k) {
-    const std::size_t at = across == 1 ? k : j;
-    if (at == 0 || at == last || runs[run].begin == 0 || runs[run].end == mask.dims()[0]) {
-      leaves[runs.root(run)] = true;
-    }
-  });
-  const std::vector<std::size_t> sizes = runs.component_sizes();
-  std::size_t enclosed = 0;
-  for (std::size_t run = 0; run < sizes.size(); ++run) {
-    enclosed += leaves[run] ? 0 : sizes[run];
-  }
-  return enclosed;
-}
-
-/// The same bits with the axes i and k exchanged. The affine is not.
-Mask exchanged(const Mask& mask) {
-  const auto [columns, rows, slices] = mask.dims();
-  Mask other({slices, rows, columns}, mask.affine());
-  for (std::size_t k = 0; k < slices; ++k) {
-    check_interrupt();
-    for (std::size_t j = 0; j < rows; ++j) {
-      for (std::size_t w = 0; w < mask.words_per_row(); ++w) {
-        for (std::uint64_t word = mask.row(j, k)[w]; word != 0; word &= word - 1) {
-          other.set(k, j, 64 * w + narrow<std::size_t>(std::countr_zero(word)), true);
-        }
-      }
-    }
-  }
-  return other;
-}
-
-double ring_share(const Mask& mask) {
-  const std::size_t enclosed =
-      std::max({count_in_rings(mask, 1), count_in_rings(mask, 2), count_in_rings(exchanged(mask), 2)});
-  return enclosed > 0 ? real(enclosed) / real(enclosed + count_voxels(mask)) : 0;
-}
-
 /// The selection without its outermost voxels: those with a neighbour, across a face, that is outside. Beyond the image
 /// everything is as it is at the border.
 Mask eroded(const Mask& mask) {
@@ -309,7 +265,6 @@ Hollows find_hollows(const Mask& mask) {
     }
   }
   Hollows found{Mask(mask.dims(), mask.affine()), Mask(mask.dims(), mask.affine()), {}};
-  found.ring_share = ring_share(mask);
   if (largest == components.size()) {
     return found;
   }

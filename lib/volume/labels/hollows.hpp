@@ -24,12 +24,9 @@ struct Hollows {
   double share = 0;                ///< theirs, of what they and the selection fill together
   Vec3 middle = Vec3::Zero();      ///< centroid of the largest, mm
   bool closed = true;              ///< none that counts is at the image's border
-  /// Of sections across one axis of the image, that where it is largest: what rings of the selection enclose within
-  /// their section, of that and the selection together. Shows a wall whose open end lies within the image.
-  double ring_share = 0;
 };
 
-/// Cost: four passes over the bits, some 100 bytes per run of outside voxels. Errors: Interrupted.
+/// Cost: a pass over the bits, some 100 bytes per run of outside voxels. Errors: Interrupted.
 Hollows find_hollows(const Mask& mask);
 
 /// The solid whose surface is the inner face of a wall: its hollows, with whatever lies within them.

@@ -227,6 +227,9 @@ std::size_t count_at_border(const Mask& mask) {
 }
 
 std::size_t count_differing(const Mask& a, const Mask& b) {
+  if (a.dims() != b.dims()) {
+    throw InputError("selections of different dimensions cannot be compared");
+  }
   return std::transform_reduce(a.row(0, 0), a.row(0, 0) + word_count(a), b.row(0, 0), std::size_t{0}, std::plus{},
                                [](std::uint64_t l, std::uint64_t r) { return std::popcount(l ^ r); });
 }

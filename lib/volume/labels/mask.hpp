@@ -75,7 +75,7 @@ std::size_t count_voxels(const Mask& mask);
 /// Number of voxels inside that the image's border cuts: the first and last along an axis of more than one.
 std::size_t count_at_border(const Mask& mask);
 
-/// Number of voxels that are inside in one mask and outside in the other, of the same dimensions.
+/// Number of voxels that are inside in one mask and outside in the other. Errors: InputError: different dimensions.
 std::size_t count_differing(const Mask& a, const Mask& b);
 
 }  // namespace tunica

@@ -53,6 +53,7 @@ struct StaircaseResult {
 /// The result is the same to the bit whatever the number of threads.
 /// @param mesh  the marching-cubes surface of a selection, in world mm; changed in place
 /// @param grid  the selection (its dims and affine are used)
+/// Errors: InputError as require_valid() of the mesh.
 /// Source: Gibson, Constrained elastic surface nets, MICCAI 1998, with a thin plate's energy in place of springs;
 /// Nesterov's accelerated projected gradient with restarts (O'Donoghue and Candes 2015); moving least squares.
 /// Cost: some 60 passes over the mesh and 8 microseconds per vertex.

@@ -4,6 +4,7 @@
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/core/threads.hpp"
+#include "tunica/surface/mesh/checks.hpp"
 #include "tunica/volume/cubes/cell_crossings.hpp"
 #include "tunica/volume/smoothing/detail/local_quadrics.hpp"
 #include "tunica/volume/smoothing/detail/vertex_neighbours.hpp"
@@ -452,6 +453,7 @@ private:
 }  // namespace
 
 StaircaseResult smooth_staircase(TriangleMesh& mesh, const Mask& grid, const StaircaseOptions& options) {
+  require_valid(mesh);
   Smoother smoother(mesh, grid, options.open_border);
   const StaircaseResult result = smoother.run(options.progress);
   mesh.vertices = smoother.places();

@@ -13,6 +13,8 @@ public:
 
   [[nodiscard]] bool solid() const { return solid_; }
   [[nodiscard]] const std::vector<Vec3>& vertices() const { return vertices_; }
+  /// Of its surface.
+  [[nodiscard]] const std::vector<std::array<Index, 3>>& triangles() const { return triangles_; }
   [[nodiscard]] bool used(std::size_t vertex) const { return used_[vertex] != 0; }
   [[nodiscard]] double tolerance() const { return tolerance_; }
 
@@ -32,6 +34,7 @@ private:
 
   const std::vector<Vec3>& vertices_;
   bool solid_;
+  std::vector<std::array<Index, 3>> triangles_;
   std::vector<std::array<Index, 2>> edges_;
   std::vector<Index> boundary_;
   std::vector<char> used_;  // by an element: loose vertices carry nothing
@@ -46,6 +49,18 @@ std::vector<Index> nodes_of(const SelectableBody& body, const Selection& where, 
 /// The boundary edges of a shell with both ends among the nodes, at least one. Errors: InputError.
 std::vector<std::array<Index, 2>> edges_of(const SelectableBody& body, const std::vector<Index>& nodes,
                                            const Places& places);
+
+/// Errors: InputError with the place of "where": no triangle of the body's surface has all its nodes among these.
+void require_triangle(const SelectableBody& body, const std::vector<Index>& nodes, const Places& places);
+
+/// A loop of boundary edges of a shell.
+struct Rim {
+  std::vector<Index> nodes;  ///< in increasing order
+  Vec3 normal;               ///< unit, of the plane nearest to them
+};
+
+/// The rims all of whose nodes are among these, at least one, in the order of their first nodes. Errors: InputError.
+std::vector<Rim> rims_within(const SelectableBody& body, const std::vector<Index>& nodes, const Places& places);
 
 /// The nodes of a body within a distance of another body's surface: of a shell, of that face of its wall.
 /// @param side  of a shell; the others are the shell's or the solid's that is to carry the nodes

@@ -11,13 +11,11 @@ namespace tunica {
 /// Round-off may leave this part of a solution open, well below what any mesh does; more and there is no answer.
 inline constexpr double largest_round_off = 1e-3;
 
-/// An increment is halved this often where surfaces would overlap: they come near each other from far away.
-inline constexpr int most_cuts_in_contact = 20;
-
 /// Which freedoms no support holds.
 FreeMask free_freedoms(const ShellSystem& system);
 
-/// One linear system after another with the same pattern, by the solver that the settings ask for.
+/// One linear system after another with the same pattern, by the solver that the settings ask for. What only depends on
+/// the pattern is made ready by the first.
 class TangentSolver {
 public:
   TangentSolver(const ShellSystem& system, const RunSettings& settings);
@@ -51,14 +49,6 @@ private:
   bool tell_direct_error_ = false;
 };
 
-/// Makes contact ready for a step of the rigid bodies: samples, pairs of nodes that may meet, and what follows from
-/// them. Nothing where nothing touches.
-void begin_contact(ShellSystem& system, const RunSettings& settings, double from, double to,
-                   const Configuration& configuration, std::optional<TangentSolver>& solver, BlockMatrix& matrix);
-
-/// A state that is kept.
-void accept_contact(const ShellSystem& system, const Configuration& configuration);
-
 /// What keeps a configuration from equilibrium.
 struct Balance {
   VectorX unbalanced;  ///< external - internal (- inertia), 6 per node, also at held freedoms
@@ -71,7 +61,7 @@ using BalanceFunction =
     std::function<Balance(const Configuration&, BlockMatrix* tangent, const std::vector<ElementState>& predicted)>;
 
 struct NewtonResult {
-  bool apart = true;  ///< contact is certain that nothing passed through anything
+  bool apart = true;  ///< it is certain that nothing passed through anything
   /// Residual below the tolerance, or at the floor of round-off with increments below largest_round_off of the change.
   bool converged = false;
   bool linear_converged = false;  ///< the last linear system was solved to its own tolerance

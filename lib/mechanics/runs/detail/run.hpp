@@ -16,7 +16,7 @@ using StateCallback = std::function<void(const State&)>;
 ShellSystem make_checked_system(const Model& model, const RunSettings& settings);
 
 /// Everything of a state that follows from the configuration.
-State make_state(const ShellSystem& system, const Model& model, const Configuration& configuration, double time);
+State make_state(const ShellSystem& system, const Configuration& configuration, double time);
 
 /// What the loads amount to, for a message: the pressures reached of those wanted with the thinnest wall they act on,
 /// or the factor of the loads where there is none.
@@ -30,23 +30,27 @@ std::string doubt_of_stiffness(const Model& model, const std::vector<double>& re
 /// Tells a state the error of its linear solve.
 void set_algebraic_error(const std::optional<AlgebraicError>& error, State& state);
 
+/// What a checkpoint remembers under a name. Errors: InputError: nothing, or not as many numbers.
+const std::vector<double>& remembered(const Checkpoint& from, std::string_view name,
+                                      std::optional<std::size_t> count = {});
+
 /// Collects what solve() returns from the steps of a run; a state without displacements (not handed over, and not the
 /// last) adds its counts only.
 void record_step(const State& state, double seconds, Summary& summary);
 
 /// Prescribed displacements at a load factor (6 per node).
-VectorX prescribed_positions(const ShellSystem& system, const Model& model, double factor);
+VectorX prescribed_positions(const ShellSystem& system, double factor);
 
 /// What keeps a configuration from static equilibrium at a load factor.
-Balance static_balance(const ShellSystem& system, const Model& model, const Configuration& configuration, double factor,
-                       Forces& forces, BlockMatrix* tangent, const std::vector<ElementState>& predicted = {});
+Balance static_balance(const ShellSystem& system, const Configuration& configuration, double factor, Forces& forces,
+                       BlockMatrix* tangent, const std::vector<ElementState>& predicted = {});
 
 /// Load steps, each with Newton's method until it converges. Errors: RequirementError.
-Summary run_static(ShellSystem& system, const Model& model, const RunSettings& settings, const StaticRun& run,
+Summary run_static(ShellSystem& system, const RunSettings& settings, const StaticRun& run,
                    const StateCallback& on_state, const Progress& progress, const Resumption& resumption);
 
 /// One linear solve about the reference configuration. Errors: RequirementError.
-Summary run_linear(ShellSystem& system, const Model& model, const RunSettings& settings, const StaticRun& run,
+Summary run_linear(ShellSystem& system, const RunSettings& settings, const StaticRun& run,
                    const StateCallback& on_state, const Progress& progress, const Resumption& resumption);
 
 /// The path of equilibria by arc length: a tangent predictor and Newton's method in the plane across it, on the factor
@@ -56,24 +60,24 @@ Summary run_linear(ShellSystem& system, const Model& model, const RunSettings& s
 /// Source: Riks 1979, "An incremental approach to the solution of snapping and buckling problems"; Keller 1977.
 /// Errors: RequirementError: the path does not go on, or ends before what it should reach.
 /// Cost: three to six factorisations per step.
-Summary run_arc_length(ShellSystem& system, const Model& model, const RunSettings& settings, const ArcLengthRun& run,
+Summary run_arc_length(ShellSystem& system, const RunSettings& settings, const ArcLengthRun& run,
                        const StateCallback& on_state, const Progress& progress);
 
 /// Natural frequencies and modes. Masses are lumped as in a dynamic run; bodies held by their rigid motions are free,
 /// and free rigid motions are left out. Errors: RequirementError: no stable state under the loads; the eigenvalues do
 /// not converge.
-Summary run_frequencies(ShellSystem& system, const Model& model, const RunSettings& settings, const FrequencyRun& run,
+Summary run_frequencies(ShellSystem& system, const RunSettings& settings, const FrequencyRun& run,
                         const StateCallback& on_state, const Progress& progress);
 
 /// The smallest positive factors of the loads at which K0 + factor K1 is singular: K0 the linear stiffness, K1 the
 /// derivative of the whole tangent (stress, change of shape, follower pressure) along the linear solution. Its
 /// unsymmetric part (applied moments, pressure at free edges) is left out.
 /// Errors: RequirementError: the loads buckle nothing before they strain it by 20 %; the eigenvalues do not converge.
-Summary run_buckling(ShellSystem& system, const Model& model, const RunSettings& settings, const BucklingRun& run,
+Summary run_buckling(ShellSystem& system, const RunSettings& settings, const BucklingRun& run,
                      const StateCallback& on_state, const Progress& progress);
 
 /// Time steps. Errors: RequirementError.
-Summary run_dynamic(ShellSystem& system, const Model& model, const RunSettings& settings, const DynamicRun& run,
+Summary run_dynamic(ShellSystem& system, const RunSettings& settings, const DynamicRun& run,
                     const StateCallback& on_state, const Progress& progress, const Resumption& resumption);
 
 }  // namespace tunica

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "tunica/core/lane_count.hpp"
-#include "tunica/mechanics/algebra/block_matrix.hpp"
+#include "tunica/mechanics/algebra/free_mask.hpp"
 #include "tunica/mechanics/contact/carried.hpp"
 #include "tunica/mechanics/contact/contact_system.hpp"
 #include "tunica/mechanics/elements/pressure.hpp"
@@ -9,6 +9,7 @@
 #include "tunica/mechanics/model/configuration.hpp"
 #include "tunica/mechanics/model/model.hpp"
 #include "tunica/mechanics/solids/solid_element.hpp"
+#include "tunica/mechanics/terms/support.hpp"
 
 #include <memory>
 #include <optional>
@@ -16,11 +17,14 @@
 /// A model made ready for solving: elements, loads, masses and supports by global node, and the sums over them.
 namespace tunica {
 
-/// A load that keeps its direction, for a factor of 1. `director` of a node is the sum over the triangles around it of
-/// n g', for normals n that turn with the node and vectors g fixed in space: its energy is -trace(R n g').
+/// A load that keeps its direction, times a number that goes from `begin` to `end` with the load factor. `director` of
+/// a node is the sum over the triangles around it of n g', for normals n that turn with the node and vectors g fixed in
+/// space: its energy is -trace(R n g').
 struct DeadLoad {
   VectorX force;               ///< 6 per node: force, moment about fixed axes
   std::vector<Mat3> director;  ///< empty, or #nodes
+  double begin = 0;
+  double end = 1;
 };
 
 struct PrescribedFreedom {
@@ -33,6 +37,18 @@ struct PrescribedFreedom {
 struct Piece {
   std::size_t body = 0;
   std::vector<Index> nodes;  ///< global
+  /// Held by its rigid motions; those that nothing else holds are the translations and the rotations onto which these
+  /// project.
+  bool balanced = false;
+  Mat3 shifts = Mat3::Identity();
+  Mat3 turns = Mat3::Identity();
+};
+
+/// A pressure that follows the surface.
+struct FollowerPressure {
+  std::size_t load = 0;
+  std::size_t body = 0;
+  std::vector<char> on;  ///< per element, or face of a solid, of the body; empty: on all
 };
 
 /// Elements that are computed at once; those beyond `count` repeat another.
@@ -42,7 +58,8 @@ struct Batch {
 };
 
 struct ShellSystem {
-  std::vector<Vec3> reference;  ///< #nodes
+  const Model* model = nullptr;  ///< what it is made of, and what must outlive it
+  std::vector<Vec3> reference;   ///< #nodes
   std::vector<ShellElement> elements;
   /// Reference normals at the corners of each element: of the curved surface, or the facet's.
   std::vector<std::array<Vec3, 3>> normals;
@@ -63,19 +80,25 @@ struct ShellSystem {
   std::shared_ptr<ContactSystem> contact;  ///< none where nothing touches
 
   std::vector<DeadLoad> dead;  ///< per load; empty vectors for follower pressure
-  std::vector<std::pair<std::size_t, std::size_t>> follower_pressures;  ///< (load, body)
+  std::vector<FollowerPressure> follower_pressures;
+  std::shared_ptr<const SupportTerm> bed;          ///< none where nothing is supported
+  std::vector<std::shared_ptr<const Term>> terms;  ///< all that acts, as make_terms() says
 
-  VectorX area;            ///< per node: a third of the triangles around it
-  VectorX mass;            ///< tonne per node
-  VectorX inertia;         ///< tonne mm^2 per node, about every axis: rho t^3 / 12 times the area
-  std::vector<bool> held;  ///< 6 per node
+  VectorX area;                        ///< per node: a third of the triangles around it
+  VectorX mass;                        ///< tonne per node
+  VectorX inertia;                     ///< tonne mm^2 per node, about every axis: rho t^3 / 12 times the area
+  FreeMask held;                       ///< 6 per node; what is not free
+  std::vector<std::size_t> balancing;  ///< of those, what holds only rigid motions of bodies whose loads are in balance
   std::vector<PrescribedFreedom> prescribed;
-  double length = 0;  ///< mean edge, mm: what makes moments comparable with forces
+  std::optional<double> prestress_residual;  ///< of the balance of the stress that the reference bears, relative
+  double length = 0;                         ///< mean edge, mm: what makes moments comparable with forces
   /// Norms of the elements' stiffness, moments divided by `length`: forces by displacements (N/mm), by rotations (N).
   double translation_stiffness = 0;
   double rotation_stiffness = 0;
 
   [[nodiscard]] std::size_t node_count() const { return reference.size(); }
+  /// What changes while a state is sought.
+  [[nodiscard]] ChangingLaw& law() const;
 };
 
 /// Errors: InputError for what only shows when loads and supports are put on the nodes (a load on a node without
@@ -110,19 +133,6 @@ SolidMotion corner_motion(const SolidElement& element, const Configuration& conf
 std::vector<double> load_factors(const Model& model, bool is_static, double time);
 double factor_of(const Ramp& ramp, bool is_static, double time);
 
-struct ViscousState {
-  double factor = 0;                                    ///< beta / dt
-  const std::vector<ElementState>* previous = nullptr;  ///< deformations at the start of the step
-};
-
-struct Forces {
-  VectorX internal;  ///< 6 per node: force, moment
-  VectorX external;
-  double energy = 0;
-  std::vector<ElementState> deformation;  ///< per shell element
-  bool valid = false;                     ///< false: an element has collapsed or folded by more than the normals allow
-};
-
 /// What the linearised elements deform to by an increment (6 per node) from a configuration.
 std::vector<ElementState> predicted_deformations(const ShellSystem& system, const Configuration& configuration,
                                                  const VectorX& increment);
@@ -130,8 +140,8 @@ std::vector<ElementState> predicted_deformations(const ShellSystem& system, cons
 /// Internal and external forces, and d(internal - external)/d(displacement, spin) where `tangent` is given (its
 /// pattern is system.pattern). In parallel; the same to the bit whatever the number of threads.
 /// @param predicted  as in corotational_response(), per element; empty: none
-void evaluate(const ShellSystem& system, const Model& model, const Configuration& configuration,
-              const std::vector<double>& factors, const ViscousState& viscous, Forces& forces, BlockMatrix* tangent,
+void evaluate(const ShellSystem& system, const Configuration& configuration, const std::vector<double>& factors,
+              const ViscousState& viscous, Forces& forces, BlockMatrix* tangent,
               const std::vector<ElementState>& predicted = {});
 
 /// Stiffness of the linear theory at the reference, without any load.
@@ -158,11 +168,9 @@ double force_norm(const ShellSystem& system, const VectorX& force);
 double round_off(const ShellSystem& system, const Configuration& configuration);
 
 /// Deformed geometry of one body, with its normals at the corners.
-ShellMesh deformed_mesh(const ShellSystem& system, const Model& model, const Configuration& configuration,
-                        std::size_t body);
+ShellMesh deformed_mesh(const ShellSystem& system, const Configuration& configuration, std::size_t body);
 
 /// Volume of the closed bodies together; none when a body is open.
-std::optional<double> enclosed_volume(const ShellSystem& system, const Model& model,
-                                      const Configuration& configuration);
+std::optional<double> enclosed_volume(const ShellSystem& system, const Configuration& configuration);
 
 }  // namespace tunica

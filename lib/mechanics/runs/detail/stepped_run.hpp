@@ -13,9 +13,8 @@ public:
 
 protected:
   /// @param most_steps  after which the run ends
-  SteppedRun(ShellSystem& system, const Model& model, const RunSettings& settings, const StateCallback& on_state,
-             std::size_t most_steps)
-      : system_(system), model_(model), settings_(settings), most_steps_(most_steps), on_state_(on_state) {}
+  SteppedRun(ShellSystem& system, const RunSettings& settings, const StateCallback& on_state, std::size_t most_steps)
+      : system_(system), model_(*system.model), settings_(settings), most_steps_(most_steps), on_state_(on_state) {}
   ~SteppedRun() = default;
 
   /// Makes ready for the first step. @return the reference state

@@ -62,23 +62,6 @@ public:
     }
   }
 
-  /// Joins runs of neighbouring rows of one slice, across axis 1 or 2, that share a face.
-  void connect_slices(int across) {
-    const auto [columns, rows, slices] = mask_.dims();
-    for (std::size_t k = 0; k < slices; ++k) {
-      check_interrupt();
-      for (std::size_t j = 0; j < rows; ++j) {
-        const std::size_t row = j + rows * k;
-        if (across == 2 && j > 0) {
-          connect_rows(row, row - 1, 0);
-        }
-        if (across == 1 && k > 0) {
-          connect_rows(row, row - rows, 0);
-        }
-      }
-    }
-  }
-
   [[nodiscard]] std::size_t size() const { return runs_.size(); }
   [[nodiscard]] const Run& operator[](std::size_t run) const { return runs_[run]; }
 

@@ -1,0 +1,103 @@
+#include "tunica/accuracy/estimates.hpp"
+
+#include "tunica/accuracy/detail/levels.hpp"
+#include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace tunica {
+namespace {
+
+constexpr double left_by_second_order = 0.25;  // of the change before
+constexpr double slowest_fall = 1.0 / 3;       // of changes, minus 1: slower is counted as this
+constexpr double error_of_coarse = 4.0 / 3;    // of the change to a mesh of half the size: second order
+constexpr double largest_credible = 0.25;      // a larger change is none of an asymptotic range
+
+double relative(double change, double of) { return change == 0 ? 0 : std::abs(change / of); }
+
+}  // namespace
+
+Answers answers_of(const State& state, const ElementFields& fields) {
+  constexpr double percent = 100;
+  const Wall& wall = fields.wall;
+  Answers answers{{"membrane_p99_mpa", wall.membrane_p99},
+                  {"membrane_max_mpa", wall.membrane_max},
+                  {"tension_p99_n_per_mm", wall.tension_p99},
+                  {"stress_p99_mpa", wall.stress_p99},
+                  {"stress_max_mpa", wall.stress_max},
+                  {"strain_p99_percent", percent * wall.strain_p99},
+                  {"strain_max_percent", percent * wall.strain_max},
+                  {"max_displacement_mm", fields.largest_displacement},
+                  {"strain_energy_mj", state.strain_energy}};
+  if (state.volume) {
+    answers.emplace_back("volume_after_mm3", *state.volume);
+  }
+  return answers;
+}
+
+double error_of_last(std::span<const double> values) {
+  if (values.size() < 2) {
+    throw InputError("an estimate takes two values or more");
+  }
+  const auto change = [&](std::size_t k) { return relative(values[k] - values[k - 1], values.back()); };
+  const std::size_t last = values.size() - 1;
+  if (last == 1 || change(last) == 0) {
+    return change(last);
+  }
+  const double fall = change(last - 1) / change(last);
+  const double to_come = fall < 2 ? change(last) / std::max(fall - 1, slowest_fall) : change(last);
+  return std::max(to_come, left_by_second_order * change(last - 1));
+}
+
+Estimates estimates_of(const std::vector<Answers>& levels, double besides, bool doubtful) {
+  Estimates estimates;
+  if (levels.size() < 2) {
+    return estimates;
+  }
+  for (std::size_t i = 0; i < levels.back().size(); ++i) {
+    std::vector<double> values;
+    for (const Answers& level : levels) {
+      values.push_back(level[i].second);
+    }
+    const double error = error_of_last(values) + (values.back() == 0 ? 0 : besides);
+    estimates[levels.back()[i].first] = {error, !doubtful && levels.size() > 2 && error < largest_credible,
+                                         fmt::format("{} levels", levels.size())};
+  }
+  return estimates;
+}
+
+RefinedAnswers estimate_by_refinement(const Model& model, const State& state, const Answers& answers,
+                                      const std::vector<const Target*>& targets, const RunSettings& settings,
+                                      const ModelOf& model_of) {
+  const Level level = finer_level(model.shells, targets);
+  Model fine = model_of(level.bodies);
+  carry_selections(model, level, fine);
+  RunSettings run = settings;
+  run.kind = StaticRun{std::get<StaticRun>(settings.kind).linear, {state.load_factor}};
+  Resumption near;
+  if (!state.linear) {
+    near.near = interpolated(state, model.shells, level);
+  }
+  try {
+    const System system(std::move(fine), run);
+    State last;
+    (void)solve(
+        system, [&](const State& handed) { last = handed; }, {}, near);
+    const Answers finer = answers_of(last, ElementFieldEvaluator(system)(last));
+    RefinedAnswers refined;
+    for (std::size_t i = 0; i < answers.size(); ++i) {
+      const double error = error_of_coarse * relative(finer[i].second - answers[i].second, finer[i].second);
+      refined.estimates[answers[i].first] = {error, error < largest_credible,
+                                             fmt::format("one refinement to {} shells", level.shell_count())};
+    }
+    return refined;
+  } catch (const RequirementError& error) {
+    return {{}, error.what()};
+  }
+}
+
+}  // namespace tunica

@@ -1,0 +1,379 @@
+#include "tunica/mechanics/runs/fields.hpp"
+
+#include "tunica/core/error.hpp"
+#include "tunica/mechanics/elements/rotation.hpp"
+#include "tunica/mechanics/model/wall.hpp"
+#include "tunica/mechanics/runs/curved_displacement.hpp"
+#include "tunica/mechanics/runs/detail/loads.hpp"
+#include "tunica/mechanics/runs/detail/prestress.hpp"
+#include "tunica/mechanics/runs/detail/recovery.hpp"
+#include "tunica/mechanics/runs/detail/shell_system.hpp"
+#include "tunica/mechanics/runs/disturbed.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+
+#include <algorithm>
+#include <cmath>
+
+namespace tunica {
+namespace {
+
+constexpr double rare = 0.01;       // of the area, on which a 99th percentile is passed
+constexpr double even_wall = 1.25;  // most by least thickness in a shell: to there its corners have their own
+
+std::vector<double> lengths(const std::vector<Vec3>& vectors) {
+  std::vector<double> result;
+  for (const Vec3& v : vectors) {
+    result.push_back(v.norm());
+  }
+  return result;
+}
+
+/// By which angle the shells' nodes or the tetrahedra of a linear state turn at least where they turn most.
+double turn_of(const ShellSystem& system, const State& state) {
+  const Model& model = *system.model;
+  double turn = system.elements.empty() ? 0 : area_quantile(model, lengths(state.rotation), rare);
+  std::vector<std::pair<double, double>> turns;  // with the volumes
+  double left = 0;
+  for (const SolidElement& element : system.solids) {
+    Mat3 displacement;
+    for (int k = 0; k < 3; ++k) {
+      displacement.col(k) = state.displacement[element.nodes[k + 1]] - state.displacement[element.nodes[0]];
+    }
+    Mat3 edges;
+    for (int k = 0; k < 3; ++k) {
+      edges.col(k) = system.reference[element.nodes[k + 1]] - system.reference[element.nodes[0]];
+    }
+    const Mat3 gradient = displacement * edges.inverse();
+    const double volume = std::abs(edges.determinant()) / 6;
+    turns.emplace_back((gradient - gradient.transpose()).norm() / std::sqrt(8.0), volume);
+    left += rare * volume;
+  }
+  std::ranges::sort(turns, std::greater());
+  for (const auto& [of_element, volume] : turns) {
+    left -= volume;
+    if (left <= 0) {
+      return std::max(turn, of_element);
+    }
+  }
+  return turn;
+}
+
+const Model& checked(const Model& model) {
+  require_valid(model);
+  return model;
+}
+
+ElementState state_of(const ShellElement& element, const State& state) {
+  if (state.linear) {
+    Vector18 moved;
+    for (int k = 0; k < 3; ++k) {
+      moved.segment<3>(6 * k) = state.displacement[element.nodes[k]];
+      moved.segment<3>(6 * k + 3) = state.rotation[element.nodes[k]];
+    }
+    return linear_deformation(element, moved);
+  }
+  ElementState d = ElementState::Zero();
+  CornerMotion motion;
+  for (int k = 0; k < 3; ++k) {
+    const Index node = element.nodes[k];
+    motion.displacement.col(k) = state.displacement[node];
+    motion.rotation[k] = exponential(state.rotation[node]).toRotationMatrix();
+  }
+  deformation(element, motion, d);
+  return d;
+}
+
+double von_mises(const Vec3& s) {
+  return std::sqrt(std::max(0.0, s[0] * s[0] - s[0] * s[1] + s[1] * s[1] + 3 * s[2] * s[2]));
+}
+
+/// Largest first, of a tensor's xx, yy and xy.
+Vec2 principal(const Vec3& tensor) {
+  const double mean = (tensor[0] + tensor[1]) / 2;
+  const double radius = std::hypot((tensor[0] - tensor[1]) / 2, tensor[2]);
+  return {mean + radius, mean - radius};
+}
+
+/// The symmetric part of F N for stretches F = 1 + strain.
+Vec3 stretched(const Vec3& strain, const Vec3& tensor) {
+  const double x = 1 + strain[0], y = 1 + strain[1], xy = strain[2] / 2;
+  return {x * tensor[0] + xy * tensor[2], y * tensor[1] + xy * tensor[2],
+          ((x + y) * tensor[2] + xy * (tensor[0] + tensor[1])) / 2};
+}
+
+/// What a place of the wall bears.
+struct Bearing {
+  Vec3 force, moment;  ///< per current length
+  double top = 0, bottom = 0, membrane = 0, tension = 0;
+  Vec2 strain_top, strain_bottom;
+};
+
+/// By the laws of a linear wall in its co-rotated frame.
+/// @param stressed  force and moment per reference length, energy-conjugate to the strains: of Biot's stress
+/// @param strained  those that the deformation alone makes
+/// With F = R (1 + e), its in-plane part, Biot's stress T is pushed forward to F T sym / det F, and moments by what the
+/// lever, the thickness, became.
+Bearing bearing_of(const TensorPair& stressed, const TensorPair& strained, double thickness, const Material& material,
+                   bool linear) {
+  Bearing b;
+  const Mat3 compliance = plane_stress(material).inverse();
+  const Vec3 strain = compliance * strained.force / thickness;
+  const Vec3 bend = compliance * strained.moment * 6 / (thickness * thickness);  // strain at the face by bending
+  double now = thickness;
+  b.force = stressed.force;
+  b.moment = stressed.moment;
+  if (!linear) {
+    const double area = (1 + strain[0]) * (1 + strain[1]) - strain[2] * strain[2] / 4;
+    now *= std::pow(area, -material.poisson / (1 - material.poisson));
+    b.force = stretched(strain, stressed.force) / area;
+    b.moment = stretched(strain, stressed.moment) / area * (now / thickness);
+  }
+  const Vec3 mean = b.force / now, side = 6 / (now * now) * b.moment;
+  b.top = von_mises(mean + side);
+  b.bottom = von_mises(mean - side);
+  b.membrane = von_mises(mean);
+  b.tension = principal(b.force)[0];
+  const auto face = [](const Vec3& e) { return principal(Vec3(e[0], e[1], e[2] / 2)); };
+  b.strain_top = face(strain + bend);
+  b.strain_bottom = face(strain - bend);
+  return b;
+}
+
+/// Recovered numbers at the corners of the shells.
+struct CornerFields {
+  std::vector<Facet> stress, membrane, tension, strain;
+};
+
+/// Of the shells that count.
+WallNumbers numbers_of(const Model& model, const CornerFields& all, const std::vector<std::uint8_t>& is_out) {
+  const auto counted = [&](const std::vector<Facet>& facets) {
+    std::vector<Facet> left;
+    for (std::size_t t = 0; t < facets.size(); ++t) {
+      if (is_out[t] == 0) {
+        left.push_back(facets[t]);
+      }
+    }
+    return left;
+  };
+  const auto largest = [](const std::vector<Facet>& facets) {
+    double most = -infinity;
+    for (const Facet& facet : facets) {
+      most = std::max(most, *std::ranges::max_element(facet.values));
+    }
+    return most;
+  };
+  WallNumbers w;
+  const std::vector<Facet> stress = counted(all.stress), membrane = counted(all.membrane);
+  const std::vector<Facet> strain = counted(all.strain);
+  w.stress_p99 = area_quantile(stress, rare);
+  w.stress_max = largest(stress);
+  w.membrane_p99 = area_quantile(membrane, rare);
+  w.membrane_max = largest(membrane);
+  w.tension_p99 = area_quantile(counted(all.tension), rare);
+  w.strain_p99 = area_quantile(strain, rare);
+  w.strain_max = largest(strain);
+  double of_faces = 0, of_middle = 0;
+  for (std::size_t t = 0; t < stress.size(); ++t) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (stress[t].values[k] >= w.stress_p99) {
+        of_faces += stress[t].area * stress[t].values[k];
+        of_middle += stress[t].area * membrane[t].values[k];
+      }
+    }
+  }
+  w.bending_share = of_faces > 0 ? 1 - of_middle / of_faces : 0;
+  // The first of equal ones, so that on a symmetric body it is not round-off that chooses.
+  constexpr double equal_stress = 1e-6;
+  std::size_t first = 0;
+  for (const ShellBody& body : model.shells) {
+    for (std::size_t v = 0, t = first; const auto& triangle : body.mesh.triangles) {
+      for (v = 0; v < 3; ++v) {
+        if (is_out[t] == 0 && all.stress[t].values[v] >= (1 - equal_stress) * w.stress_max) {
+          w.stress_max_at = body.mesh.vertices[triangle[v]];
+          return w;
+        }
+      }
+      ++t;
+    }
+    first += body.mesh.triangles.size();
+  }
+  return w;
+}
+
+}  // namespace
+
+struct ElementFieldEvaluator::Implementation {
+  explicit Implementation(const System& of)
+      : whole(of), model(whole->model()), system(whole->parts()), recovery(system), near(near_disturbances(model)) {}
+  explicit Implementation(const Model& of)
+      : alone(make_system(checked(of))), model(of), system(*alone), recovery(*alone), near(near_disturbances(of)) {
+    add_prestress(*alone, RunSettings());
+  }
+
+  std::optional<System> whole;       ///< what `system` is part of
+  std::optional<ShellSystem> alone;  ///< or not
+  const Model& model;
+  const ShellSystem& system;
+  Recovery recovery;
+  std::vector<std::uint8_t> near;  ///< near_disturbances()
+
+  void add_shells(const State& state, ElementFields& fields) const;
+  void add_solids(const State& state, ElementFields& fields) const;
+  /// Thickness at a corner of a shell.
+  [[nodiscard]] double thickness_at(std::size_t t, int corner) const;
+  [[nodiscard]] bool is_held(const Vec3& place) const;
+};
+
+ElementFieldEvaluator::ElementFieldEvaluator(const System& system) : implementation_(new Implementation(system)) {}
+ElementFieldEvaluator::ElementFieldEvaluator(const Model& model) : implementation_(new Implementation(model)) {}
+ElementFieldEvaluator::~ElementFieldEvaluator() = default;
+
+ElementFields element_fields(const Model& model, const State& state) { return ElementFieldEvaluator(model)(state); }
+
+double ElementFieldEvaluator::Implementation::thickness_at(std::size_t t, int corner) const {
+  const ShellElement& element = system.elements[t];
+  const auto& of_nodes = model.shells[element.body].thickness;
+  if (of_nodes.size() == 1) {
+    return element.thickness;
+  }
+  const std::size_t first = model.first_node(element.body);
+  const std::array<double, 3> own{of_nodes[element.nodes[0] - first], of_nodes[element.nodes[1] - first],
+                                  of_nodes[element.nodes[2] - first]};
+  const auto [least, most] = std::ranges::minmax(own);
+  return most > even_wall * least ? element.thickness : own[corner];
+}
+
+bool ElementFieldEvaluator::Implementation::is_held(const Vec3& place) const {
+  return std::ranges::any_of(model.fixes, [&](const Fix& fix) {
+    return !model.is_solid(fix.body) && std::ranges::any_of(fix.nodes, [&](Index node) {
+      return model.shells[fix.body].mesh.vertices[node] == place;
+    });
+  });
+}
+
+void ElementFieldEvaluator::Implementation::add_shells(const State& state, ElementFields& fields) const {
+  std::vector<TensorPair> stressed, strained;
+  for (const ShellElement& element : system.elements) {
+    const Material& material = model.shells[element.body].material;
+    const ElementState d = state_of(element, state);
+    const double t = element.thickness;
+    const Mat3 elasticity = plane_stress(material);
+    const auto pair_of = [&](const ElementState& y) {
+      return TensorPair{t * elasticity * y.head<3>(),
+                        t * t * t / 12 * elasticity * (element.curvature * y.segment<9>(3))};
+    };
+    strained.push_back(pair_of(d));
+    stressed.push_back(pair_of(d + element.prestrain));
+    const Bearing b = bearing_of(stressed.back(), strained.back(), t, material, state.linear);
+    fields.membrane_force.push_back(b.force);
+    fields.bending_moment.push_back(b.moment);
+    fields.von_mises_top.push_back(b.top);
+    fields.von_mises_bottom.push_back(b.bottom);
+    fields.membrane_von_mises.push_back(b.membrane);
+    fields.tension.push_back(b.tension);
+    fields.principal_strain_top.push_back(b.strain_top);
+    fields.principal_strain_bottom.push_back(b.strain_bottom);
+  }
+  const auto strained_corners = recovery.at_corners(strained);
+  const auto stressed_corners = system.prestress_residual ? recovery.at_corners(stressed) : strained_corners;
+  CornerFields corners;
+  std::vector<double> weight(model.node_count(), 0);
+  double whole = 0, near_area = 0;
+  for (std::size_t t = 0; t < system.elements.size(); ++t) {
+    const ShellElement& element = system.elements[t];
+    const double area = recovery.area(t);
+    whole += area;
+    near_area += near[t] != 0 ? area : 0;
+    for (auto* list : {&corners.stress, &corners.membrane, &corners.tension, &corners.strain}) {
+      list->push_back({area, {}});
+    }
+    for (int k = 0; k < 3; ++k) {
+      const Bearing b = bearing_of(stressed_corners[t][k], strained_corners[t][k], thickness_at(t, k),
+                                   model.shells[element.body].material, state.linear);
+      const Index node = element.nodes[k];
+      const double stress = std::max(b.top, b.bottom), strain = std::max(b.strain_top[0], b.strain_bottom[0]);
+      corners.stress[t].values[k] = stress;
+      corners.membrane[t].values[k] = b.membrane;
+      corners.tension[t].values[k] = b.tension;
+      corners.strain[t].values[k] = strain;
+      weight[node] += area;
+      fields.von_mises[node] += area * stress;
+      fields.membrane_stress[node] += area * b.membrane;
+      fields.strain[node] += area * strain;
+    }
+  }
+  for (std::size_t i = 0; i < weight.size(); ++i) {
+    fields.von_mises[i] /= weight[i] > 0 ? weight[i] : 1;
+    fields.membrane_stress[i] /= weight[i] > 0 ? weight[i] : 1;
+    fields.strain[i] /= weight[i] > 0 ? weight[i] : 1;
+  }
+  constexpr double all = 1 - 1e-9;
+  const std::vector<std::uint8_t> none(near.size(), 0);
+  Wall& wall = fields.wall;
+  wall.whole = numbers_of(model, corners, none);
+  wall.is_all_near = near_area > all * whole;
+  wall.left_out = wall.is_all_near ? 0 : near_area / whole;
+  static_cast<WallNumbers&>(wall) = wall.left_out > 0 ? numbers_of(model, corners, near) : wall.whole;
+  wall.is_max_on_held = is_held(wall.whole.stress_max_at);
+}
+
+void ElementFieldEvaluator::Implementation::add_solids(const State& state, ElementFields& fields) const {
+  std::vector<double> sums(model.node_count(), 0);
+  std::vector<double> volumes(model.node_count(), 0);
+  for (const SolidElement& element : system.solids) {
+    SolidMotion motion;
+    for (int k = 0; k < 4; ++k) {
+      motion.displacement.col(k) = state.displacement[element.nodes[k]];
+      motion.pressure[k] = state.pressure[element.nodes[k]];
+    }
+    const Mat3 stress = solid_stress(element, motion, state.linear);
+    const double mean = stress.trace() / 3;
+    fields.solid_von_mises.push_back(std::sqrt(1.5) * (stress - mean * Mat3::Identity()).norm());
+    fields.solid_pressure.push_back(-mean);
+    const double volume = element.volume;
+    for (const Index node : element.nodes) {
+      sums[node] += volume * fields.solid_von_mises.back();
+      volumes[node] += volume;
+    }
+  }
+  for (std::size_t i = 0; i < volumes.size(); ++i) {
+    if (volumes[i] > 0) {
+      fields.von_mises[i] = fields.membrane_stress[i] = sums[i] / volumes[i];
+    }
+  }
+}
+
+ElementFields ElementFieldEvaluator::operator()(const State& state) const {
+  const Model& model = implementation_->model;
+  const ShellSystem& system = implementation_->system;
+  const std::size_t nodes = model.node_count();
+  require_valid(model, state);
+  if (!system.solids.empty() && state.pressure.size() != nodes) {
+    throw InputError(fmt::format("a state with {} pressures for {} nodes", state.pressure.size(), nodes));
+  }
+  std::vector<double> factors;
+  for (const Load& load : model.loads) {
+    factors.push_back(
+        factor_of(load.ramp, state.velocity.empty(), state.velocity.empty() ? state.load_factor : state.time));
+  }
+  ElementFields fields;
+  for (auto* of_nodes : {&fields.von_mises, &fields.membrane_stress, &fields.strain}) {
+    of_nodes->assign(nodes, 0);
+  }
+  fields.pressure = shell_pressures(system, factors);
+  if (!system.elements.empty()) {
+    implementation_->add_shells(state, fields);
+    fields.displacement_p99 = area_quantile(model, lengths(state.displacement), rare);
+  }
+  implementation_->add_solids(state, fields);
+  if (state.linear) {
+    fields.turn_p99 = turn_of(system, state);
+  }
+  fields.largest_displacement = largest_displacement(model, state);
+  return fields;
+}
+
+}  // namespace tunica

@@ -1,0 +1,350 @@
+#include "tunica/mechanics/runs/hold_doubts.hpp"
+
+#include "tunica/core/disjoint_sets.hpp"
+#include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
+#include "tunica/mechanics/elements/rotation.hpp"
+#include "tunica/mechanics/runs/doubts.hpp"
+#include "tunica/shell/distance/shell_crossings.hpp"
+#include "tunica/surface/mesh/incidence.hpp"
+#include "tunica/surface/mesh/self_intersections.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <map>
+#include <numbers>
+
+namespace tunica {
+namespace {
+
+std::string named(const std::string& said_at, const std::string& name) {
+  return said_at.empty() ? name : said_at + ": " + name;
+}
+
+std::string where(const Vec3& p) { return fmt::format("({:.4g}, {:.4g}, {:.4g}) mm", p.x(), p.y(), p.z()); }
+
+/// The largest pressure on a shell at the end of the load, with its sign, MPa.
+double pressure_on(const Model& model, std::size_t body) {
+  double sum = 0;
+  for (const Load& load : model.loads) {
+    const auto* pressure = std::get_if<PressureLoad>(&load.kind);
+    sum += pressure != nullptr && load.body == body ? pressure->value : 0;
+  }
+  return sum;
+}
+
+/// Per node of a body: whether a fix, a load at nodes or edges, or another body takes hold of it.
+std::vector<char> touched_nodes(const Model& model, std::size_t body) {
+  std::vector<char> touched(model.vertices_of(body).size(), 0);
+  const auto mark = [&](const std::vector<Index>& nodes) {
+    for (const Index node : nodes) {
+      touched[node] = 1;
+    }
+  };
+  for (const Fix& fix : model.fixes) {
+    if (fix.body == body) {
+      mark(fix.nodes);
+    }
+  }
+  for (const Attachment& attachment : model.attachments) {
+    if (attachment.body == body) {
+      mark(attachment.nodes);
+    }
+  }
+  for (const Load& load : model.loads) {
+    if (load.body != body) {
+      continue;
+    }
+    if (const auto* force = std::get_if<ForceLoad>(&load.kind)) {
+      mark(force->nodes);
+    } else if (const auto* edge = std::get_if<EdgeLoad>(&load.kind)) {
+      for (const auto& ends : edge->edges) {
+        mark({ends[0], ends[1]});
+      }
+    }
+  }
+  return touched;
+}
+
+/// A rim: what its edges, in the direction of their triangles, enclose.
+struct Lumen {
+  Vec3 area = Vec3::Zero();  ///< mm^2, normal of the plane that sees most of it, as long as what it sees
+  Vec3 centre = Vec3::Zero();
+  double length = 0;  ///< mm
+  bool touched = false;
+};
+
+std::vector<Lumen> lumens_of(const ShellMesh& mesh, const std::vector<char>& touched) {
+  const TriangleMesh facets = flat_facets(mesh);
+  const auto edges = boundary_edges(neighbours(facets, incidence(facets)));
+  DisjointSets joined(mesh.vertices.size());
+  for (const auto& [t, k] : edges) {
+    joined.join(mesh.triangles[t][k], mesh.triangles[t][(k + 1) % 3]);
+  }
+  std::map<Index, Lumen> lumens;  // by root
+  for (const auto& [t, k] : edges) {
+    const Index a = mesh.triangles[t][k];
+    const Index b = mesh.triangles[t][(k + 1) % 3];
+    Lumen& lumen = lumens[joined.root(a)];
+    const double length = (mesh.vertices[b] - mesh.vertices[a]).norm();
+    lumen.area += mesh.vertices[a].cross(mesh.vertices[b]) / 2;
+    lumen.centre += length * (mesh.vertices[a] + mesh.vertices[b]) / 2;
+    lumen.length += length;
+    lumen.touched = lumen.touched || touched[a] != 0 || touched[b] != 0;
+  }
+  std::vector<Lumen> found;
+  for (auto& [root, lumen] : lumens) {
+    lumen.centre /= lumen.length;
+    found.push_back(lumen);
+  }
+  return found;
+}
+
+/// The connected pieces of a shell, by their nodes; without those that no triangle has.
+std::vector<std::vector<Index>> pieces_of(const ShellMesh& mesh) {
+  DisjointSets joined(mesh.vertices.size());
+  std::vector<char> used(mesh.vertices.size(), 0);
+  for (const auto& [a, b, c] : mesh.triangles) {
+    joined.join(a, b);
+    joined.join(a, c);
+    used[a] = used[b] = used[c] = 1;
+  }
+  std::map<Index, std::vector<Index>> pieces;
+  for (std::size_t i = 0; i < used.size(); ++i) {
+    if (used[i] != 0) {
+      pieces[joined.root(narrow<Index>(i))].push_back(narrow<Index>(i));
+    }
+  }
+  std::vector<std::vector<Index>> found;
+  for (auto& [root, nodes] : pieces) {
+    found.push_back(std::move(nodes));
+  }
+  return found;
+}
+
+struct Swing {
+  double largest = 0;  ///< mm, of the whole displacement
+  double rigid = 0;    ///< mm, the largest displacement by the rigid motion
+  double turn = 0;     ///< rad
+  Vec3 centre = Vec3::Zero();
+};
+
+/// @param displacement  of node i of the mesh at `first` + i
+Swing swing_of(const ShellMesh& mesh, const std::vector<Index>& nodes, const std::vector<Vec3>& displacement,
+               std::size_t first) {
+  Swing swing;
+  Vec3 shift = Vec3::Zero();
+  for (const Index i : nodes) {
+    swing.centre += mesh.vertices[i] / real(nodes.size());
+    shift += displacement[first + i] / real(nodes.size());
+    swing.largest = std::max(swing.largest, displacement[first + i].norm());
+  }
+  Mat3 spread = Mat3::Zero();
+  for (const Index i : nodes) {
+    const Vec3 arm = mesh.vertices[i] - swing.centre;
+    spread += (arm + displacement[first + i] - shift) * arm.transpose();
+  }
+  // Source: Kabsch 1976, "A solution for the best rotation to relate two sets of vectors".
+  const Eigen::JacobiSVD<Mat3> svd(spread, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const double sign = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
+  const Mat3 turn = svd.matrixU() * Vec3(1, 1, sign).asDiagonal() * svd.matrixV().transpose();
+  swing.turn = Eigen::AngleAxisd(turn).angle();
+  for (const Index i : nodes) {
+    const Vec3 arm = mesh.vertices[i] - swing.centre;
+    swing.rigid = std::max(swing.rigid, (turn * arm - arm + shift).norm());
+  }
+  return swing;
+}
+
+/// All shells as one mesh, displaced by a state; where there is none, as they are.
+/// @return empty corner normals where some body has none
+ShellMesh joined_shells(const Model& model, const State* state) {
+  ShellMesh all;
+  const bool curved = std::ranges::all_of(model.shells, [](const ShellBody& body) { return body.curved; });
+  for (std::size_t b = 0; b < model.shells.size(); ++b) {
+    const ShellMesh& mesh = model.shells[b].mesh;
+    const std::size_t first = model.first_node(b);
+    for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
+      all.vertices.push_back(mesh.vertices[i] +
+                             (state == nullptr ? Vec3(Vec3::Zero()) : state->displacement[first + i]));
+    }
+    for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+      std::array<Index, 3> corners{};
+      std::array<Vec3, 3> normals;
+      for (std::size_t k = 0; k < 3; ++k) {
+        const Index node = mesh.triangles[t][k];
+        corners[k] = narrow<Index>(first + node);
+        normals[k] = curved ? mesh.normal(t, k) : Vec3(Vec3::Zero());
+        if (curved && state != nullptr) {
+          normals[k] = exponential(state->rotation[first + node]) * normals[k];
+        }
+      }
+      all.triangles.push_back(corners);
+      if (curved) {
+        all.corner_normals.push_back(normals);
+      }
+    }
+  }
+  return all;
+}
+
+std::vector<std::array<Index, 2>> crossings_of(const ShellMesh& shells) {
+  if (!shells.corner_normals.empty()) {
+    try {
+      return crossing_patches(shells);
+    } catch (const InputError&) {  // folded over: there is no patch
+    }
+  }
+  return find_self_intersections(flat_facets(shells));
+}
+
+}  // namespace
+
+std::vector<Warning> doubts_of_ends(const Model& model) {
+  require_valid(model);
+  constexpr double least_roundness = 0.05;  // of the area that a circle as long as the rim encloses
+  std::vector<Warning> found;
+  for (std::size_t b = 0; b < model.shells.size(); ++b) {
+    const ShellBody& body = model.shells[b];
+    const double pressure = pressure_on(model, b);
+    if (pressure == 0) {
+      continue;
+    }
+    std::size_t count = 0;
+    const Lumen* widest = nullptr;
+    const std::vector<Lumen> lumens = lumens_of(body.mesh, touched_nodes(model, b));
+    for (const Lumen& lumen : lumens) {
+      const double roundness = lumen.area.norm() * 4 * std::numbers::pi / (lumen.length * lumen.length);
+      if (lumen.touched || roundness < least_roundness) {
+        continue;
+      }
+      ++count;
+      widest = widest == nullptr || lumen.area.norm() > widest->area.norm() ? &lumen : widest;
+    }
+    if (count > 0) {
+      found.push_back(
+          {Weight::minor, "free end",
+           fmt::format(
+               "{}: {} free, {}at {}: what continues it there would pull with the pressure times the lumen, "
+               "{:.3g} N, and nothing does: let rims slide in their planes (--fix rims:slide, FIX=rims:slide)",
+               named(body.said_at, body.name), count == 1 ? "an open end is" : fmt::format("{} open ends are", count),
+               count == 1 ? "" : "the widest ", where(widest->centre), std::abs(pressure) * widest->area.norm())});
+    }
+  }
+  return found;
+}
+
+std::vector<Warning> swings_of(const Model& model, const State& state) {
+  require_valid(model);
+  require_valid(model, state);
+  std::vector<Warning> found;
+  constexpr double most_of_it = 0.5;
+  for (std::size_t b = 0; b < model.shells.size(); ++b) {
+    const ShellBody& body = model.shells[b];
+    const bool pushed =
+        std::ranges::any_of(model.fixes, [&](const Fix& fix) { return fix.body == b && prescribes(fix); });
+    if (pushed || pressure_on(model, b) == 0) {
+      continue;
+    }
+    const double thickness = *std::ranges::max_element(body.thickness);
+    const auto pieces = pieces_of(body.mesh);
+    for (const std::vector<Index>& nodes : pieces) {
+      const Swing swing = swing_of(body.mesh, nodes, state.displacement, model.first_node(b));
+      if (swing.rigid <= most_of_it * swing.largest || swing.rigid <= most_of_it * thickness) {
+        continue;
+      }
+      found.push_back(
+          {Weight::major, "swing",
+           fmt::format("{}{} swings: of the {:.3g} mm that it moves at most, {:.3g} mm are a motion as one, by {:.2g} "
+                       "degrees: what holds it in the body is missing: let its rims slide (--fix rims:slide, "
+                       "FIX=rims:slide), or put it into a bed (--support 1e5N/m3, SUPPORT=1e5N/m3)",
+                       named(body.said_at, body.name),
+                       pieces.size() > 1 ? fmt::format(", the piece at {},", where(swing.centre)) : "", swing.largest,
+                       swing.rigid, swing.turn * 180 / std::numbers::pi)});
+    }
+  }
+  return found;
+}
+
+CrossingWatch::CrossingWatch(const Model& model) : model_(model) { require_valid(model); }
+
+void CrossingWatch::see(const State& state) {
+  require_valid(model_, state);
+  if (found_ || model_.shells.empty()) {
+    return;
+  }
+  const ShellMesh now = joined_shells(model_, &state);
+  const std::vector<std::array<Index, 2>> crossings = crossings_of(now);
+  if (crossings.empty()) {
+    return;
+  }
+  if (!before_) {
+    before_ = crossings_of(joined_shells(model_, nullptr));
+  }
+  std::vector<std::array<Index, 2>> made;
+  std::ranges::set_difference(crossings, *before_, std::back_inserter(made));
+  // Neighbours that fold over each other are an element's failure, which the run itself tells.
+  std::erase_if(made, [&](const auto& pair) {
+    const auto& a = now.triangles[pair[0]];
+    const auto& b = now.triangles[pair[1]];
+    return std::ranges::any_of(a, [&](Index node) { return std::ranges::find(b, node) != b.end(); });
+  });
+  if (made.empty()) {
+    return;
+  }
+  Vec3 middle = Vec3::Zero();
+  for (const Index node : now.triangles[made.front()[0]]) {
+    middle += now.vertices[node] / 3;
+  }
+  const std::string when = state.velocity.empty() ? fmt::format("at load factor {:.3g}", state.load_factor)
+                                                  : fmt::format("at {:.3g} s", state.time);
+  found_ = {
+      Weight::major, "walls through each other",
+      fmt::format("{}: {} the wall passes through itself or another in {} pairs of shells, the first at {}: what "
+                  "is said from there on holds for no body: add a [[contact]] between what meets, the same body "
+                  "twice where it is itself, or lower the load",
+                  named(model_.shells.front().said_at, model_.shells.front().name), when, made.size(), where(middle))};
+}
+
+std::vector<Warning> doubts_of_suction(const Model& model, const RunSettings& settings) {
+  constexpr double sensitive = 0.2;
+  require_valid(model);
+  const bool alone =
+      model.solids.empty() && model.rigids.empty() && model.contacts.empty() && model.attachments.empty();
+  if (!alone || !std::holds_alternative<StaticRun>(settings.kind) || settings.solver == Solver::cg) {
+    return {};
+  }
+  const auto sucked = std::ranges::find_if(model.loads, [](const Load& load) {
+    const auto* pressure = std::get_if<PressureLoad>(&load.kind);
+    return pressure != nullptr && pressure->value < 0;
+  });
+  if (sucked == model.loads.end()) {
+    return {};
+  }
+  RunSettings buckling = settings;
+  buckling.kind = BucklingRun{1};
+  double factor = 0;
+  try {
+    factor = solve(model, buckling, [](const State&) {}).buckling_factors.front();
+  } catch (const RequirementError&) {  // it does not buckle, or the run itself fails
+    return {};
+  } catch (const InputError&) {  // nothing of the kind can be asked of it
+    return {};
+  }
+  if (factor * sensitive >= 1) {
+    return {};
+  }
+  const double value = std::get<PressureLoad>(sucked->kind).value;
+  return {{Weight::major, "near buckling",
+           fmt::format("{}: the suction of {} is {:.0f} % of the load at which the perfect shell buckles: dents of a "
+                       "wall's thickness let it yield at a third of that, so that this state may not be reached: ask "
+                       "for less, or follow the path (control = \"arc-length\") of a shell with its dents",
+                       named(sucked->said_at, model.name_of(sucked->body)), pressure_text(-value), 100 / factor)}};
+}
+
+}  // namespace tunica

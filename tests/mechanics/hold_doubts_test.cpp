@@ -1,0 +1,149 @@
+// What hints that an organ is not held as it is in the body.
+
+#include "tunica/mechanics/runs/hold_doubts.hpp"
+
+#include "benchmarks.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace tunica::hold_doubts {
+namespace {
+
+using namespace benchmarks;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+/// A tube along z, rings 0 to `along`, with free rims.
+Model tube(double radius, double length, double thickness, double pressure) {
+  constexpr std::size_t around = 24, along = 16;
+  ShellMesh mesh;
+  for (std::size_t j = 0; j <= along; ++j) {
+    for (std::size_t i = 0; i < around; ++i) {
+      const double u = 2 * pi * (static_cast<double>(i) + (j % 2 == 1 ? 0.5 : 0)) / static_cast<double>(around);
+      mesh.normals.emplace_back(std::cos(u), std::sin(u), 0);
+      mesh.vertices.emplace_back(radius * mesh.normals.back() +
+                                 length * static_cast<double>(j) / static_cast<double>(along) * Vec3::UnitZ());
+    }
+  }
+  add_tube_triangles(around, along, mesh);
+  Model model;
+  ShellBody body = flat_body(std::move(mesh), 2, 0.45, thickness);
+  body.curved = true;
+  body.rest = Rest::curved;
+  model.shells.push_back(body);
+  model.loads.push_back({0, PressureLoad{pressure, true}, {}});
+  return model;
+}
+
+State at_rest(const Model& model) {
+  State state;
+  state.displacement.assign(model.node_count(), Vec3::Zero());
+  state.rotation.assign(model.node_count(), Vec3::Zero());
+  return state;
+}
+
+std::vector<std::string> kinds(const std::vector<Warning>& warnings) {
+  std::vector<std::string> found;
+  for (const Warning& warning : warnings) {
+    found.push_back(warning.kind);
+  }
+  return found;
+}
+
+TEST(HoldDoubts, FreeEndsLackTheirThrust) {
+  Model model = tube(10, 40, 1, 0.01);
+  std::vector<Warning> found = doubts_of_ends(model);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_THAT(found[0].text, HasSubstr("2 open ends are free"));
+  EXPECT_THAT(found[0].text, HasSubstr("3.11 N"));  // the polygon's area
+  EXPECT_THAT(found[0].text, HasSubstr("rims:slide"));
+  hold(
+      model, [](const Vec3& p) { return p.z() < eps; }, "xyz", "xyz");
+  found = doubts_of_ends(model);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_THAT(found[0].text, HasSubstr("an open end is free, at"));
+  Fix slide;
+  slide.nodes = nodes_where(model.shells[0].mesh, [](const Vec3& p) { return p.z() > 40 - eps; });
+  slide.across = Vec3::UnitZ();
+  model.fixes.push_back(slide);
+  EXPECT_THAT(doubts_of_ends(model), IsEmpty());
+  model.fixes.clear();
+  model.loads.clear();
+  EXPECT_THAT(doubts_of_ends(model), IsEmpty());
+}
+
+TEST(HoldDoubts, SwingsAreSaidAndWideningIsNot) {
+  const Model model = tube(10, 40, 1, 0.01);
+  State state = at_rest(model);
+  const ShellMesh& mesh = model.shells[0].mesh;
+  for (std::size_t i = 0; i < model.node_count(); ++i) {
+    state.displacement[i] = 3 * mesh.normals[i];
+  }
+  EXPECT_THAT(swings_of(model, state), IsEmpty());
+  const Eigen::AngleAxisd turn(0.2, Vec3::UnitX());
+  for (std::size_t i = 0; i < model.node_count(); ++i) {
+    state.displacement[i] = turn * (mesh.vertices[i] + mesh.normals[i]) - mesh.vertices[i];
+    state.rotation[i] = Vec3(0.2, 0, 0);
+  }
+  const std::vector<Warning> found = swings_of(model, state);
+  ASSERT_THAT(kinds(found), testing::ElementsAre("swing"));
+  EXPECT_THAT(found[0].text, HasSubstr("by 11 degrees"));
+  for (Vec3& u : state.displacement) {
+    u *= 0.02;  // less than half a wall
+  }
+  for (Vec3& r : state.rotation) {
+    r *= 0.02;
+  }
+  EXPECT_THAT(swings_of(model, state), IsEmpty());
+}
+
+TEST(HoldDoubts, WallsThroughEachOtherAreSaidWithThePlace) {
+  const Model model = tube(10, 40, 1, 0.01);
+  const ShellMesh& mesh = model.shells[0].mesh;
+  State state = at_rest(model);
+  for (std::size_t i = 0; i < model.node_count(); ++i) {
+    const double middle = std::exp(-std::pow((mesh.vertices[i].z() - 20) / 6, 2));
+    state.displacement[i] = Vec3(0, -1.2 * middle * mesh.vertices[i].y(), 0);
+  }
+  state.load_factor = 0.5;
+  CrossingWatch watch(model);
+  watch.see(at_rest(model));
+  EXPECT_FALSE(watch.found());
+  watch.see(state);
+  ASSERT_TRUE(watch.found());
+  EXPECT_EQ(watch.found()->kind, "walls through each other");
+  EXPECT_THAT(watch.found()->text, HasSubstr("at load factor 0.5"));
+  EXPECT_THAT(watch.found()->text, HasSubstr("pairs of shells, the first at ("));
+  EXPECT_THAT(watch.found()->text, HasSubstr("[[contact]]"));
+  watch.see(at_rest(model));
+  EXPECT_TRUE(watch.found());
+}
+
+TEST(HoldDoubts, WhatCrossesInTheImageIsNotTheRunsDoing) {
+  Model model = tube(10, 40, 1, 0.01);
+  model.shells.push_back(model.shells[0]);
+  for (Vec3& v : model.shells[1].mesh.vertices) {
+    v = Vec3(v.z() - 20, v.y(), v.x() + 20);
+  }
+  for (Vec3& n : model.shells[1].mesh.normals) {
+    n = Vec3(n.z(), n.y(), n.x());
+  }
+  CrossingWatch watch(model);
+  watch.see(at_rest(model));
+  EXPECT_FALSE(watch.found());
+}
+
+/// A sphere at .95 of 2 E t^2 / (R^2 sqrt(3 (1 - nu^2))).
+TEST(HoldDoubts, SuctionNearBucklingIsSaid) {
+  const double critical = 2 * 1000 * 0.2 * 0.2 / (100 * std::sqrt(3 * (1 - 0.09)));
+  const Model near = pressurised_sphere(3, 0.2, -0.95 * critical);
+  const std::vector<Warning> found = doubts_of_suction(near, nonlinear_run({1}));
+  ASSERT_THAT(kinds(found), testing::ElementsAre("near buckling"));
+  EXPECT_THAT(found[0].text, HasSubstr(" % of the load at which the perfect shell buckles"));
+  EXPECT_THAT(doubts_of_suction(pressurised_sphere(3, 0.2, -0.1 * critical), nonlinear_run({1})), IsEmpty());
+  EXPECT_THAT(doubts_of_suction(pressurised_sphere(3, 0.2, critical), nonlinear_run({1})), IsEmpty());
+}
+
+}  // namespace
+}  // namespace tunica::hold_doubts

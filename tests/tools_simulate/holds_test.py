@@ -1,0 +1,83 @@
+"""What holds an organ: rims that slide, elastic beds; and what is said where something is missing."""
+import unittest
+
+import numpy as np
+
+from support import SimulateTest, sphere, write_ply
+
+WALL = ["--young", "2MPa", "--poisson", "0.45", "--thickness", "0.5mm", "--static", "--force"]
+
+
+def tube(radius, length, around, along):
+    """A tube along an axis that is none of the world's, open at both ends."""
+    u = 2 * np.pi * (np.arange(around)[None] + 0.5 * (np.arange(along + 1) % 2)[:, None]) / around
+    out = np.stack([np.cos(u), np.sin(u), 0 * u], axis=2).reshape(-1, 3)
+    z = np.repeat(np.linspace(0, length, along + 1), around)
+    turn, _ = np.linalg.qr(np.array([[1, 2, 0.5], [-1, 0.3, 1], [0.2, -1, 2]]))
+    turn *= np.sign(np.linalg.det(turn))
+    triangles = []
+    for j in range(along):
+        for i in range(around):
+            a, b = j * around + i, j * around + (i + 1) % around
+            c, d = a + around, b + around
+            triangles += [(a, b, c), (b, d, c)] if j % 2 == 0 else [(a, b, d), (a, d, c)]
+    return (radius * out + z[:, None] * np.array([0, 0, 1])) @ turn.T, np.array(triangles), out @ turn.T
+
+
+class Holds(SimulateTest):
+    def setUp(self):
+        super().setUp()
+        self.tube = tube(10, 40, 32, 24)
+        write_ply(self.path("tube.ply"), *self.tube)
+        write_ply(self.path("ball.ply"), *sphere(3, 10))
+
+    def warnings(self, report):
+        return " ".join(report["warnings"])
+
+    def test_rims_slide_in_their_planes(self):
+        report = self.run_tool("tube.ply", "out.hdf", *WALL, "--pressure", "1kPa", "--fix", "rims:slide")
+        self.assertNotIn("free", self.warnings(report))
+        self.assertEqual(report["stated"]["fix"], ["rims:slide"])
+        wall = report["result"]["wall"]
+        hoop = 1e-3 * 10 / 0.5 * (1 - 0.45 + 0.45**2)**0.5
+        self.assertLess(abs(wall["stress_p99_mpa"] / hoop - 1), 0.05)
+        self.assertLess(wall["stress_max_mpa"] / wall["stress_p99_mpa"], 1.02)
+
+    def test_imaged_under_pressure_with_sliding_rims(self):
+        report = self.run_tool("tube.ply", "out.hdf", "--poisson", "0.45", "--thickness", "0.5mm", "--static", "--imaged-at",
+                               "80mmHg", "--fix", "rims:slide", "--support", "1e5N/m3")
+        self.assertLess(report["result"]["max_displacement_mm"], 1e-6)
+        self.assertEqual(report["stated"]["support"], {"stiffness_n_per_m3": 1e5, "direction": "all"})
+
+    def test_free_ends_and_swings_are_said(self):
+        report = self.run_tool("tube.ply", "out.hdf", *WALL, "--pressure", "1kPa", "--support", "1e7N/m3")
+        self.assertIn("2 open ends are free", self.warnings(report))
+        report = self.run_tool("tube.ply", "out.hdf", *WALL, "--pressure", "3kPa", "--support", "1e7N/m3", "--fix", "rims:slide")
+        self.assertNotIn("swings", self.warnings(report))
+
+    def test_a_bed_holds_a_ball(self):
+        for stiffness in ("1e6N/m3", "1kPa/mm"):
+            report = self.run_tool("ball.ply", "out.hdf", *WALL, "--pressure", "1kPa", "--support", stiffness)
+            wanted = 1e-3 / (1e-3 + 2 * 2 * 0.5 / (0.55 * 100))
+            self.assertLess(abs(report["result"]["max_displacement_mm"] / wanted - 1), 0.06)
+
+    def test_slips_of_the_pen(self):
+        self.run_tool("tube.ply", "out.hdf", *WALL, "--pressure", "1kPa", "--support", "1kPa", "--fix", "boundary", expect=2)
+        self.assertIn("not a stiffness per area", self.done.stderr)
+        self.run_tool("ball.ply", "out.hdf", *WALL, "--pressure", "1kPa", "--fix", "rims:slide", expect=3)
+        self.assertIn("closed", self.done.stderr)
+        self.run_tool("tube.ply", "out.hdf", *WALL, "--pressure", "1kPa", "--fix", "rims:slip", expect=2)
+        self.assertIn("rims:slide", self.done.stderr)
+        self.run_tool("tube.ply", "out.hdf", *WALL, "--pressure", "1kPa", "--support", "1e5N/m3", "--imaged-at", "1kPa",
+                      "--unloaded", "u.ply", "--fix", "boundary", expect=2)
+        self.assertIn("bed", self.done.stderr)
+
+    def test_suction_near_buckling_is_said(self):
+        report = self.run_tool("ball.ply", "out.hdf", *WALL, "--pressure=-1kPa", "--fix", "rigid-motions")
+        self.assertNotIn("perfect shell", self.warnings(report))
+        report = self.run_tool("ball.ply", "out.hdf", *WALL, "--pressure=-3.5kPa", "--fix", "rigid-motions")
+        self.assertIn("% of the load at which the perfect shell buckles", self.warnings(report))
+
+
+if __name__ == "__main__":
+    unittest.main()
