@@ -740,8 +740,9 @@ Json run_label(cli::Tool& tool, const Arguments& arguments, const cli::LabelTabl
   const VolumeFile file = read_slabs(
       tool, arguments, "extract", [&](const VolumeFile& header, const Volume& slab, std::size_t first_slice) {
         if (first_slice == 0) {
-          auto [choice, missing] =
-              naming(arguments.volume.string(), [&] { return cli::choose_labels(names.of(header), *arguments.label); });
+          auto [choice, missing] = naming(arguments.volume.string(), [&] {
+            return cli::choose_labels(names.of(header), names.unfolded(*arguments.label));
+          });
           absent = missing;
           if (choice) {
             target = {{Inside::Rule::label, choice->values[0]}, choice->name, choice->in_file_name};

@@ -299,13 +299,18 @@ std::unique_ptr<Target> target_like(const cli::Tool& tool, const ShellMesh& shel
 }
 
 /// A target that cannot be what the shells were fitted to: no finer than they are, or somewhere else.
-void require_own_target(const ShellMesh& shell, const Target& target, const fs::path& path) {
+/// @param needed  else, where it is hardly finer, it is left out with a warning
+/// @return whether it can be used
+bool require_own_target(const cli::Tool& tool, const ShellMesh& shell, const Target& target, const fs::path& path,
+                        bool needed) {
   constexpr std::size_t facets_per_shell = 2;
   constexpr double farthest_mean = 0.02;  // of the diagonal
-  if (target.mesh().triangles.size() < facets_per_shell * shell.triangles.size()) {
+  const std::size_t facets = target.mesh().triangles.size();
+  const bool is_finer = facets >= facets_per_shell * shell.triangles.size();
+  if (!is_finer && needed) {
     throw InputError(
         fmt::format("{}: has {} triangles, and the shells are {}: name the fine surface that they were fitted to",
-                    path.string(), target.mesh().triangles.size(), shell.triangles.size()));
+                    path.string(), facets, shell.triangles.size()));
   }
   if (const double mean = mean_distance(shell, target).first; mean > farthest_mean * target.diagonal()) {
     throw InputError(
@@ -313,6 +318,14 @@ void require_own_target(const ShellMesh& shell, const Target& target, const fs::
                     "surface that they were fitted to",
                     path.string(), mean, 100 * mean / target.diagonal()));
   }
+  if (!is_finer) {
+    tool.warn({Weight::minor, "error of the mesh",
+               fmt::format("{}: has {} triangles, too few to fit four times the {} shells to it: how far the answers "
+                           "may be off by the mesh is not estimated; up to {} shells it can be (SHELLS={})",
+                           path.string(), facets, shell.triangles.size(), facets / facets_per_shell,
+                           facets / facets_per_shell)});
+  }
+  return is_finer;
 }
 
 /// Asks the scene for the unloaded shells, and names them as an output.
@@ -371,7 +384,8 @@ struct ReadTarget {
   std::optional<double> voxel;  ///< mm, longest edge, of the image behind it
 };
 
-ReadTarget read_target(const cli::Tool& tool, const SceneShell& shell, const ShellMesh& mesh, const fs::path& path) {
+ReadTarget read_target(const cli::Tool& tool, const SceneShell& shell, const ShellMesh& mesh, const fs::path& path,
+                       bool needed) {
   MeshFile file = read_mesh(path, shell.unit_mm, true);
   require_surface(file, path);
   const MeshFile own = read_mesh(shell.mesh, shell.unit_mm);
@@ -386,7 +400,9 @@ ReadTarget read_target(const cli::Tool& tool, const SceneShell& shell, const She
     vertex *= shell.scale;
   }
   read.target = target_like(tool, mesh, std::move(file.mesh), path);
-  require_own_target(mesh, *read.target, path);
+  if (!require_own_target(tool, mesh, *read.target, path, needed)) {
+    read.target.reset();
+  }
   return read;
 }
 
@@ -491,7 +507,8 @@ public:
     if (given_.accuracy.shell_out) {
       certify(model().shells.front().mesh, targets_.front().get(), tool_.progress("certify"),
               tool_.result()["accuracy"]);
-      write_shells(tool_, *given_.accuracy.shell_out, model().shells.front().mesh, space_, !accuracy_->reasons.empty());
+      write_shells(tool_, *given_.accuracy.shell_out, model().shells.front().mesh, space_,
+                   !accuracy_->reasons.empty() && !accuracy_->request.max_seconds);
     }
     // A fixed count of iterations asks for no convergence, so none is claimed.
     const bool converged = summary.converged && !scene_.run.cg_fixed_count;
@@ -623,7 +640,7 @@ private:
       const auto found = std::ranges::find(scene_.shells, name, &SceneShell::name);
       const std::size_t b = found - scene_.shells.begin();
       inputs_.push_back(tool_.input(path));
-      ReadTarget read = read_target(tool_, *found, model().shells[b].mesh, path);
+      ReadTarget read = read_target(tool_, *found, model().shells[b].mesh, path, scene_.accuracy.has_value());
       space_ = read.space;
       if (read.voxel) {
         voxel_ = std::max(voxel_.value_or(0), *read.voxel);
@@ -729,8 +746,8 @@ private:
     }
     if (!accuracy_->reasons.empty() && accuracy_->request.max_seconds) {
       tool_.warn({Weight::minor, "accuracy not reached",
-                  fmt::format("{}: {}; a longer --max-seconds, or more --max-shells, may reach it", subject().string(),
-                              missed_accuracy(*accuracy_))});
+                  fmt::format("{}: {}; more shells to begin with (SHELLS=800), or a longer --max-seconds, may reach it",
+                              subject().string(), missed_accuracy(*accuracy_))});
     } else if (!accuracy_->reasons.empty()) {
       journal_->remove();
       throw RequirementError(fmt::format("{}: {}; what there is stays in {}.part", subject().string(),

@@ -74,22 +74,22 @@ public:
         if (judged() || model_error_ >= request_.within) {
           break;
         }
+      } else if (last_) {
+        break;
       }
       if (const std::string bound = passes_a_bound(seconds_since(begin)); !bound.empty()) {
         give_up(bound);
         break;
       }
       start = Clock::now();
-      Level fine = finer_level(level_.bodies, targets_);
-      near_.reset();
-      if (last_ && near_serves_) {
-        near_ = interpolated(last_->at, level_.bodies, fine);
+      try {
+        refine();
+      } catch (const InputError& error) {  // shells that fold
+        if (!ends_with_what_there_is(4 * level_.shell_count(), error.what())) {
+          throw;
+        }
+        break;
       }
-      const Model coarse = std::move(model_);
-      level_ = std::move(fine);
-      is_finer_ = true;
-      model_ = model_of_(level_.bodies);
-      carry_selections(coarse, level_, model_);
     }
     tell_choices();
     std::vector<Answers> answers;
@@ -105,6 +105,19 @@ public:
   }
 
 private:
+  void refine() {
+    Level fine = finer_level(level_.bodies, targets_);
+    near_.reset();
+    if (last_ && near_serves_) {
+      near_ = interpolated(last_->at, level_.bodies, fine);
+    }
+    Model model = model_of_(fine.bodies);
+    carry_selections(model_, fine, model);
+    level_ = std::move(fine);
+    model_ = std::move(model);
+    is_finer_ = true;
+  }
+
   [[nodiscard]] const StaticRun* statics() const { return std::get_if<StaticRun>(&settings_.kind); }
 
   [[nodiscard]] Answer solved(const RunSettings& settings) const {
@@ -125,7 +138,15 @@ private:
         choose_run();
       }
       return solved(settings_);
+    } catch (const InputError& error) {  // shells that make no elements
+      if (!ends_with_what_there_is(level_.shell_count(), error.what())) {
+        throw;
+      }
+      return std::nullopt;
     } catch (const RequirementError& error) {
+      if (ends_with_what_there_is(level_.shell_count(), error.what())) {
+        return std::nullopt;
+      }
       if (is_finer_ || 4 * level_.shell_count() > request_.max_shells) {
         throw;
       }
@@ -137,6 +158,16 @@ private:
       }
       return std::nullopt;
     }
+  }
+
+  /// Whether a level that has no answer ends the run with that of the level before: where the accuracy is an aim within
+  /// a bound of time.
+  bool ends_with_what_there_is(std::size_t shells, const std::string& why) {
+    if (!last_ || !request_.max_seconds) {
+      return false;
+    }
+    give_up(fmt::format("on {} shells there is no answer: {}", shells, why));
+    return true;
   }
 
   void choose_run() {

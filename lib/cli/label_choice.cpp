@@ -74,7 +74,7 @@ std::string no_label_in(const LabelNames& names, const std::string& text) {
 void LabelTables::read(Tool& tool, const std::filesystem::path& volume,
                        const std::optional<std::filesystem::path>& named) {
   if (named) {
-    given_ = read_label_names(tool.input(*named));
+    given_ = read_label_names(tool.input(*named), &unions_);
     if (const auto several = several_names(*named, given_)) {
       tool.warn(*several);
     }

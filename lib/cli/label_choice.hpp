@@ -26,9 +26,16 @@ public:
     return !given_.empty() ? given_ : !file.volume.label_names.empty() ? file.volume.label_names : beside_;
   }
 
+  /// The labels behind a name of several, such as "1+2"; what is none as it is.
+  [[nodiscard]] std::string unfolded(const std::string& text) const {
+    const auto found = unions_.find(text);
+    return found == unions_.end() ? text : found->second;
+  }
+
 private:
   LabelNames given_;
   LabelNames beside_;
+  LabelUnions unions_;  ///< of the table that was named
 };
 
 /// Labels that are one organ.

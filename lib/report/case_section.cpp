@@ -76,11 +76,6 @@ std::string plus_minus(const CaseReport& one, const char* key, const std::string
   return percent ? "estimated error " + figure_above(*percent) + (doubtful ? " %, not credible; " : " %; ") : "";
 }
 
-// Where the wall rests as imaged: that nothing moves is no finding.
-bool rests_as_imaged(const CaseReport& one) {
-  return is_prestressed(one) && measure("max_displacement_mm").value(one.source) == 0;
-}
-
 std::string share_of_bending(const CaseReport& one) {
   const auto share = measure("bending_share_percent").value(one.source);
   return share ? figure(*share) + " % of it bending; " : "";
@@ -108,7 +103,7 @@ Markup three_numbers(const CaseReport& one) {
   list +=
       big_number("max_displacement_mm", "Largest displacement", one,
                  !measure("max_displacement_mm").value(one.source) ? "not computed"
-                 : rests_as_imaged(one)
+                 : rests_as_imaged(one.source)
                      ? "by construction: under " + one.redacted(pressure) + " the wall rests where the image shows it"
                      : plus_minus(one, "displacement_error_percent", "max_displacement_mm") +
                            (pressure.empty() ? "of the curved surface" : "under " + one.redacted(pressure) + whence));

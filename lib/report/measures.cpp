@@ -340,4 +340,8 @@ std::string status_of(const CaseReport& one) {
   return !one.source.done() ? "failed" : one.warnings.empty() ? "done" : "warned";
 }
 
+bool rests_as_imaged(const PipelineCase& one) {
+  return one.at("simulate", "result.prestress").is_object() && measure("max_displacement_mm").value(one) == 0;
+}
+
 }  // namespace tunica::report

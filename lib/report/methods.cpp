@@ -194,12 +194,22 @@ std::string load_sentence(const CaseReport& one) {
               ? "The image was taken under a pressure of " + imaged + "; the shape without it was found first. "
               : "The image was taken under a pressure of " + imaged +
                     ", with which the wall was in equilibrium as imaged (prestress by one linear solution). ";
-  text += pressure.empty() ? "It was loaded" : "A pressure of " + pressure;
-  text += pressure.empty()                      ? ""
-          : setting(one, "follower") == "false" ? " was put on it"
-                                                : " that follows the surface was put on it";
-  text += support_words(one) + solution_words(one) + ". ";
-  text += "Stresses are von Mises stresses at either face of the wall, as the 99th percentile by area.";
+  if (rests_as_imaged(one.source)) {
+    text += "No other load was put on it, so that nothing moves" + support_words(one) + ". ";
+  } else {
+    text += pressure.empty() ? "It was loaded" : "A pressure of " + pressure;
+    text += pressure.empty()                      ? ""
+            : setting(one, "follower") == "false" ? " was put on it"
+                                                  : " that follows the surface was put on it";
+    text += support_words(one) + solution_words(one) + ". ";
+  }
+  text +=
+      "Stresses are von Mises values of Cauchy stresses, of their mean over the wall (membrane stress) and at either "
+      "face of the wall, as the 99th percentile by area";
+  const Json left_out = one.source.at("simulate", "result.wall.left_out_percent");
+  text += left_out.is_number() && left_out.get<double>() > 0
+              ? ", without the " + figure(left_out.get<double>()) + " % of it near rims, supports and loads."
+              : ".";
   const auto reached = accuracy_reached(one.source);
   if (reached && reached->percent) {
     text += fmt::format(" The error of the {} by number of shells and model is estimated at {} %.", reached->of,

@@ -151,6 +151,24 @@ TEST(Accuracy, ABendingLayerThatNoLevelResolvesDoesNotCount) {
   EXPECT_EQ(edges_per_layer(benchmarks::pressurised_sphere(1, 0.5, 1)), infinity);
 }
 
+/// A bound of time makes the accuracy an aim: where finer shells have no answer, the run ends with the one before.
+TEST(Accuracy, WithinABoundOfTimeARunEndsWithWhatThereIs) {
+  const ModelOf few_only = [](std::vector<ShellBody> bodies) {
+    if (bodies.front().mesh.triangles.size() > 5000) {
+      throw InputError("they fold");
+    }
+    return clamped_tube(std::move(bodies));
+  };
+  AccuracyRequest request{0.001, Quantity::displacement, 50'000};
+  EXPECT_THROW(solve_within({tube_body()}, {nullptr}, request, at_rest(), few_only), InputError);
+  request.max_seconds = 1000;
+  const Accuracy found = solve_within({tube_body()}, {nullptr}, request, at_rest(), few_only);
+  EXPECT_EQ(found.levels.size(), 2U);
+  ASSERT_EQ(found.reasons.size(), 1U);
+  EXPECT_THAT(found.reasons.front(), ::testing::HasSubstr("no answer: they fold"));
+  EXPECT_EQ(found.system->model().shells[0].mesh.triangles.size(), 3072U);
+}
+
 TEST(Accuracy, TooFewShellsForAnEstimateAreSaid) {
   const Accuracy found = Sphere().solved({0.02, Quantity::displacement, 500});
   EXPECT_FALSE(found.estimate);

@@ -303,15 +303,19 @@ TEST(MechanicsArguments, CheckpointsAreOfTheModel) {
   Resumption resumption;
   resumption.from = first;
   EXPECT_NO_THROW(go_on(resumption));
-  for (const auto& [name, numbers] : first->memory) {
+  for (Eigen::VectorXd MotionMemory::*list :
+       {&MotionMemory::velocity, &MotionMemory::acceleration, &MotionMemory::auxiliary, &MotionMemory::acting,
+        &MotionMemory::last_change}) {
     resumption.from = first;
-    resumption.from->memory[name].push_back(0);
-    expect_refused("more " + name, [&] { go_on(resumption); });
-    resumption.from->memory.erase(name);
-    if (name != "last_change") {  // which a first step does not know
-      expect_refused("no " + name, [&] { go_on(resumption); });
-    }
+    (*resumption.from->motion.*list).setZero(7);
+    expect_refused("as many numbers of a motion", [&] { go_on(resumption); });
   }
+  resumption.from = first;
+  resumption.from->motion->viscous_rate = {1, 2};
+  expect_refused("as many rates", [&] { go_on(resumption); });
+  resumption.from = first;
+  resumption.from->motion.reset();
+  expect_refused("no motion", [&] { go_on(resumption); });
 }
 
 TEST(MechanicsArguments, MatricesAreChecked) {

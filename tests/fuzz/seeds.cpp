@@ -238,7 +238,7 @@ void journals(const Seeds& seeds) {
     checkpoint.displacement.assign(model.node_count(), Vec3::Zero());
     checkpoint.summary.steps = 1;
     checkpoint.summary.seconds_per_step = {0.5};
-    checkpoint.memory["newmark"] = {1, 2, 3};
+    checkpoint.motion.emplace().velocity = Eigen::Vector3d(1, 2, 3);
     return checkpoint;
   });
   const std::string states = read_file(fs::path(part) += ".states");

@@ -135,6 +135,12 @@ TEST_F(LabelTables, may_be_json) {
   EXPECT_THAT(read(R"({"name": "set", "labels": {"aorta": 1, "left atrium": 2, "both": [1, 2]}, "numTraining": 7})"),
               two);
   EXPECT_THAT(read(R"({"labels": {"1": "aorta", "2": "left atrium"}})"), two);
+  EXPECT_THAT(read(R"({"labels": {"aorta": [1], "left atrium": 2}})"), two);
+  LabelUnions unions;
+  const auto regions = folder.file("dataset.json", R"({"labels": {"background": 0, "whole": [1, 2, 3], "core": [3]}})");
+  EXPECT_THAT(read_label_names(regions, &unions), ElementsAre(Pair(0, "background"), Pair(3, "core")));
+  EXPECT_THAT(unions, ElementsAre(Pair("whole", "1+2+3")));
+  EXPECT_THAT(error_in(R"({"labels": {"aorta": 1, "both": [1, "x"]}})"), HasSubstr("'both' lists"));
   EXPECT_THAT(read(R"({"segmentAttributes": [[{"labelID": 1, "SegmentLabel": "aorta"}],)"
                    R"([{"labelID": 2, "SegmentLabel": "left atrium"}]]})"),
               two);

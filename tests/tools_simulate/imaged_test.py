@@ -1,6 +1,7 @@
 #!/usr/bin/python3
 """`--imaged-at`: an organ imaged under pressure is at rest as the image shows it, and bears that pressure already."""
 import math
+import os
 import unittest
 
 import h5py
@@ -147,6 +148,12 @@ class Imaged(SimulateTest):
             self.assertIn("one refinement to 320 shells", estimate["from"])
         self.assertEqual(few["estimates"]["max_displacement_mm"]["percent"], 0)
 
+    def test_a_surface_no_finer_than_the_shells_gives_no_estimate(self):
+        write_ply(self.path("same.ply"), *oval(2)[:2])
+        report = self.run_tool("oval.ply", "out.hdf", *THIN, "--imaged-at", "120mmHg", "--static", "--target", "same.ply")
+        self.assertEqual(report["result"]["estimates"], {})
+        self.assertIn("too few to fit", " ".join(report["warnings"]))
+
     def test_a_bound_of_time_ends_with_what_there_is(self):
         write_ply(self.path("few.ply"), *oval(1))
         write_ply(self.path("target.ply"), *oval(5)[:2])
@@ -154,6 +161,9 @@ class Imaged(SimulateTest):
                                "stress", "--target", "target.ply", "--max-seconds", "1ms")
         self.assertFalse(report["result"]["accuracy"]["credible"])
         self.assertIn("past the 0.001 s allowed", " ".join(report["warnings"]))
+        self.run_tool("few.ply", "out.hdf", *THIN, "--imaged-at", "120mmHg", "--static", "--accuracy", "0.001%", "--of", "stress",
+                      "--target", "target.ply", "--max-seconds", "1ms", "--shell-out", "fine.ply", "--force")
+        self.assertTrue(os.path.exists(self.path("fine.ply")))
         self.run_tool("few.ply", "out.hdf", *THIN, "--imaged-at", "120mmHg", "--static", "--max-seconds", "1s", "--force", expect=2)
         self.assertIn("--max-seconds belongs to --accuracy", self.done.stderr)
 

@@ -26,7 +26,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::string_view states_magic = "TUNICA STATES 2\n";
-constexpr std::string_view checkpoint_magic = "TUNICA CHECKPOINT 4\n";
+constexpr std::string_view checkpoint_magic = "TUNICA CHECKPOINT 5\n";
 /// Time between checkpoints, as a multiple of what the last one took.
 constexpr int spacing = 20;
 constexpr std::uint64_t largest_record = std::uint64_t{1} << 40;
@@ -74,7 +74,8 @@ private:
     (*this)(pair.second);
   }
   void put(const std::vector<std::pair<std::string, std::string>>& pairs) { each(pairs); }
-  void put(const std::map<std::string, std::vector<double>, std::less<>>& named) { each(named); }
+  void put(const Eigen::VectorXd& values) { list(values.data(), narrow<std::size_t>(values.size())); }
+  void put(const MotionMemory& value);
   template <typename Items>
   void each(const Items& items) {
     (*this)(narrow<std::uint64_t>(items.size()));
@@ -159,14 +160,11 @@ private:
       get(second);
     }
   }
-  void get(std::map<std::string, std::vector<double>, std::less<>>& named) {
-    const std::size_t entries = count(2 * sizeof(std::uint64_t));
-    for (std::size_t i = 0; i < entries; ++i) {
-      std::string name;
-      get(name);
-      get(named[name]);
-    }
+  void get(Eigen::VectorXd& values) {
+    values.resize(narrow<Eigen::Index>(count(sizeof(double))));
+    raw(values.data(), narrow<std::size_t>(values.size()) * sizeof(double));
   }
+  void get(MotionMemory& value);
 
   std::string_view bytes_;
 };
@@ -194,16 +192,27 @@ void state_members(Archive& archive, AnyState& state) {
        force_imbalance, moment_imbalance);
 }
 
+template <typename Archive, typename AnyMemory>
+void motion_members(Archive& archive, AnyMemory& memory) {
+  auto& [velocity, acceleration, auxiliary, acting, last_change, part, at_rest, viscous_rate, deformation_before,
+         length_before] = memory;
+  each(archive, velocity, acceleration, auxiliary, acting, last_change, part, at_rest, viscous_rate, deformation_before,
+       length_before);
+}
+
+void Packer::put(const MotionMemory& value) { motion_members(*this, value); }
+void Unpacker::get(MotionMemory& value) { motion_members(*this, value); }
+
 template <typename Archive, typename AnyCheckpoint>
 void checkpoint_members(Archive& archive, AnyCheckpoint& checkpoint) {
-  auto& [summary, position, displacement, rotation, memory] = checkpoint;
+  auto& [summary, position, displacement, rotation, solid_pressure, contact, increment, rates] = checkpoint;
   auto& [dof, steps, parts, converged, residual, newton_iterations, cg_iterations, error, error_is_bound, volume_before,
          volume_after, strain, largest, seconds_per_step, frequencies, factors, stiffened, energy, bend, motion, snaps,
          limits, branches, contact_pressures] = summary;
   each(archive, dof, steps, parts, converged, residual, newton_iterations, cg_iterations, error, error_is_bound,
        volume_before, volume_after, strain, largest, seconds_per_step, frequencies, factors, stiffened, energy, bend,
        motion, snaps, limits, branches, contact_pressures);
-  each(archive, position, displacement, rotation, memory);
+  each(archive, position, displacement, rotation, solid_pressure, contact, increment, rates);
 }
 
 std::uint32_t checksum(std::string_view bytes) {

@@ -98,14 +98,16 @@ public:
     }
   }
 
-  // Value and name, or name and value. nnU-Net's regions, several values of a name, are no labels.
+  // Value and name, or name and value, or name and values: nnU-Net's regions.
   void object(const Json& labels) {
     for (const auto& [key, entry] : labels.items()) {
       const Json* name = entry.is_object() ? name_in(entry) : &entry;
       if (name != nullptr && name->is_string() && !label_in(*name)) {
         add(Json(key), *name);
+      } else if (entry.is_array() && entry.size() == 1 && label_in(entry[0])) {
+        add(entry[0], Json(key));
       } else if (entry.is_array()) {
-        continue;
+        add_union(key, entry);
       } else if (label_in(entry)) {
         add(entry, Json(key));
       } else {
@@ -115,8 +117,27 @@ public:
   }
 
   LabelNames names;
+  LabelUnions unions;
 
 private:
+  void add_union(const std::string& name, const Json& values) {
+    std::string text;
+    for (const Json& value : values) {
+      const auto label = label_in(value);
+      if (!label) {
+        refuse(path_, fmt::format("its entry '{}' lists {}, which is no label", shown(name),
+                                  shown(value.dump().substr(0, 80))));
+      }
+      text += fmt::format("{}{:.0f}", text.empty() ? "" : "+", *label);
+    }
+    if (const auto why = label_error(names, name)) {
+      throw InputError(fmt::format("{}: {}", path_.string(), *why));
+    }
+    if (!text.empty()) {
+      unions[name] = text;
+    }
+  }
+
   void add(const Json& value, const Json& name) {
     const auto label = label_in(value);
     if (!label || !name.is_string()) {
@@ -137,7 +158,7 @@ private:
 
 }  // namespace
 
-LabelNames parse_label_json(const fs::path& path, std::string_view text) {
+LabelNames parse_label_json(const fs::path& path, std::string_view text, LabelUnions* unions) {
   const Json whole = parse(path, text);
   const Json* labels = &whole;
   if (whole.is_object()) {
@@ -151,6 +172,9 @@ LabelNames parse_label_json(const fs::path& path, std::string_view text) {
     reading.object(*labels);
   } else {
     refuse(path, "is no list of labels");
+  }
+  if (unions != nullptr) {
+    *unions = std::move(reading.unions);
   }
   return std::move(reading.names);
 }

@@ -278,12 +278,12 @@ std::optional<std::string> volume_format::label_error(const LabelNames& names, s
   return {};
 }
 
-LabelNames read_label_names(const fs::path& path) {
+LabelNames read_label_names(const fs::path& path, LabelUnions* unions) {
   const std::string text = read_text(path);
   const std::string_view content = trimmed(text);
   std::optional<LabelNames> names;
   if (content.starts_with('{') || content.starts_with('[')) {
-    names = volume_format::parse_label_json(path, text);
+    names = volume_format::parse_label_json(path, text, unions);
   } else {
     names = parse_columns(path, text);
   }

@@ -106,8 +106,6 @@ void find_change(const Configuration& start, const Configuration& end, VectorX& 
 
 bool acceptable(const NewtonResult& result) { return result.converged && result.valid && result.stable; }
 
-using Memory = std::map<std::string, std::vector<double>, std::less<>>;
-
 /// Damping by beta K: forces beta K times the rate of deformation, in each element's own frame. The rate at the end of
 /// a step is viscosity (deformation - zero): the backward difference, or that of second order through the step before.
 class StiffnessDamping {
@@ -159,16 +157,16 @@ public:
     return work;
   }
 
-  void remember(Memory& memory) const {
-    memory["viscous_rate"] = numbers_of(rate_);
-    memory["deformation_before"] = numbers_of(before_);
-    memory["length_before"] = {length_before_};
+  void remember(MotionMemory& memory) const {
+    memory.viscous_rate = numbers_of(rate_);
+    memory.deformation_before = numbers_of(before_);
+    memory.length_before = length_before_;
   }
 
-  void recall(const Checkpoint& from) {
-    rate_ = of_elements(from, "viscous_rate");
-    before_ = of_elements(from, "deformation_before");
-    length_before_ = remembered(from, "length_before", 1)[0];
+  void recall(const MotionMemory& memory) {
+    rate_ = of_elements(memory.viscous_rate, "the viscous rate");
+    before_ = of_elements(memory.deformation_before, "the deformation before");
+    length_before_ = memory.length_before;
   }
 
 private:
@@ -181,11 +179,11 @@ private:
   }
 
   /// Of the elements, or of none.
-  [[nodiscard]] std::vector<ElementState> of_elements(const Checkpoint& from, std::string_view name) const {
+  [[nodiscard]] std::vector<ElementState> of_elements(const std::vector<double>& numbers, std::string_view name) const {
     constexpr std::size_t size = ElementState::SizeAtCompileTime;
-    const auto found = from.memory.find(name);
-    const bool none = found != from.memory.end() && found->second.empty();
-    const std::vector<double>& numbers = remembered(from, name, none ? 0 : size * system_.elements.size());
+    if (!numbers.empty()) {
+      require_count(numbers.size(), size * system_.elements.size(), name);
+    }
     std::vector<ElementState> result(numbers.size() / size);
     for (std::size_t e = 0; e < result.size(); ++e) {
       result[e] = Eigen::Map<const ElementState>(numbers.data() + size * e);
@@ -308,31 +306,32 @@ public:
   }
 
   /// What a run must keep between its steps to go on as if nothing had happened, beyond the configuration.
-  [[nodiscard]] Memory memory(const Motion& motion) const {
-    const auto values = [](const VectorX& v) { return std::vector<double>(v.begin(), v.end()); };
-    Memory result{{"velocity", values(motion.rates.velocity)},
-                  {"acceleration", values(motion.rates.acceleration)},
-                  {"auxiliary", values(motion.rates.auxiliary)},
-                  {"acting", values(acting_)},
-                  {"part", {part_}},
-                  {"at_rest", {at_rest_ ? 1.0 : 0.0}}};
+  [[nodiscard]] MotionMemory memory(const Motion& motion) const {
+    MotionMemory result;
+    result.velocity = motion.rates.velocity;
+    result.acceleration = motion.rates.acceleration;
+    result.auxiliary = motion.rates.auxiliary;
+    result.acting = acting_;
+    result.part = part_;
+    result.at_rest = at_rest_;
     damping_.remember(result);
     return result;
   }
 
-  void recall(const Checkpoint& from, Motion& motion) {
-    for (auto [name, vector] :
-         {std::pair{"velocity", &motion.rates.velocity}, std::pair{"acceleration", &motion.rates.acceleration},
-          std::pair{"auxiliary", &motion.rates.auxiliary}, std::pair{"acting", &acting_}}) {
-      const std::vector<double>& values = remembered(from, name, narrow<std::size_t>(mass_.size()));
-      vector->resize(mass_.size());
-      std::copy(values.begin(), values.end(), vector->begin());
-    }
+  void recall(const MotionMemory& memory, Motion& motion) {
+    const auto take = [&](const VectorX& from, const char* name, VectorX& to) {
+      require_count(narrow<std::size_t>(from.size()), narrow<std::size_t>(mass_.size()), name);
+      to = from;
+    };
+    take(memory.velocity, "the velocity", motion.rates.velocity);
+    take(memory.acceleration, "the acceleration", motion.rates.acceleration);
+    take(memory.auxiliary, "the integrator", motion.rates.auxiliary);
+    take(memory.acting, "the acting forces", acting_);
     deformation_.clear();
     work_ = damped_ = 0;
-    part_ = remembered(from, "part", 1)[0];
-    at_rest_ = remembered(from, "at_rest", 1)[0] != 0;
-    damping_.recall(from);
+    part_ = memory.part;
+    at_rest_ = memory.at_rest;
+    damping_.recall(memory);
     braking_ = run_.damping.mass * mass_.cwiseProduct(motion.rates.velocity);
   }
 
@@ -613,19 +612,19 @@ private:
   void resume(const Checkpoint& from) override {
     time_ = from.position;
     motion_.configuration = recall(from);
-    stepper_.recall(from, motion_);
-    if (from.memory.contains("last_change")) {
-      const Eigen::Index size = first_freedom(system_.node_count());
-      last_change_ = Eigen::Map<const VectorX>(remembered(from, "last_change", narrow<std::size_t>(size)).data(), size);
+    require_count(from.motion ? 1 : 0, 1, "a motion");
+    stepper_.recall(*from.motion, motion_);
+    last_change_ = from.motion->last_change;
+    if (last_change_.size() > 0) {
+      require_count(narrow<std::size_t>(last_change_.size()), 6 * system_.node_count(), "the last change");
     }
   }
 
   [[nodiscard]] Checkpoint checkpoint() const override {
-    auto memory = stepper_.memory(motion_);
-    if (last_change_.size() > 0) {
-      memory["last_change"].assign(last_change_.begin(), last_change_.end());
-    }
-    return keep(time_, motion_.configuration, std::move(memory));
+    Checkpoint now = keep(time_, motion_.configuration);
+    now.motion = stepper_.memory(motion_);
+    now.motion->last_change = last_change_;
+    return now;
   }
 
   State take_step() override {

@@ -231,7 +231,9 @@ std::vector<Warning> doubts_of_ends(const Model& model) {
           {Weight::minor, "free end",
            fmt::format(
                "{}: {} free, {}at {}: what continues it there would pull with the pressure times the lumen, "
-               "{:.3g} N, and nothing does: let rims slide in their planes (--fix rims:slide, FIX=rims:slide)",
+               "{:.3g} N, and nothing does: hold the ends (--fix boundary, FIX=boundary), or let those of a straight "
+               "vessel slide in "
+               "their planes (--fix rims:slide, FIX=rims:slide)",
                named(body.said_at, body.name), count == 1 ? "an open end is" : fmt::format("{} open ends are", count),
                count == 1 ? "" : "the widest ", where(widest->centre), std::abs(pressure) * widest->area.norm())});
     }

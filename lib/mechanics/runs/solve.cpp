@@ -74,8 +74,8 @@ std::string doubt_of_stiffness(const Model& model, const std::vector<double>& re
     for (const auto& [time, factor] : load.ramp.points) {
       most = std::max(most, std::abs(factor));
     }
-    const auto* pressure = std::get_if<PressureLoad>(&load.kind);
-    if (pressure == nullptr || std::abs(pressure->at(reached[l])) >= far_below * std::abs(pressure->at(most))) {
+    // Of a wall imaged under pressure: of what is put on it besides.
+    if (!std::holds_alternative<PressureLoad>(load.kind) || std::abs(reached[l]) >= far_below * most) {
       continue;
     }
     const double young = model.is_solid(load.body) ? model.solids[load.body - model.shells.size()].material.young
@@ -117,12 +117,10 @@ void record_step(const State& state, double seconds, Summary& summary) {
   }
 }
 
-const std::vector<double>& remembered(const Checkpoint& from, std::string_view name, std::optional<std::size_t> count) {
-  const auto found = from.memory.find(name);
-  if (found == from.memory.end() || found->second.size() != count.value_or(found->second.size())) {
-    throw InputError(fmt::format("a checkpoint without \"{}\", or with that of another model", name));
+void require_count(std::size_t found, std::size_t count, std::string_view name) {
+  if (found != count) {
+    throw InputError(fmt::format("a checkpoint with {} numbers of {}, and the model has {}", found, name, count));
   }
-  return found->second;
 }
 
 Summary solve(const Model& model, const RunSettings& settings, const std::function<void(const State&)>& on_state,

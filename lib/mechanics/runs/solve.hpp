@@ -9,7 +9,6 @@
 
 #include <functional>
 #include <limits>
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -97,6 +96,20 @@ struct Summary {
   std::vector<double> contact_pressures;
 };
 
+/// What a dynamic run remembers between its steps beyond the configuration; vectors of 6 per node.
+struct MotionMemory {
+  Eigen::VectorXd velocity;      ///< mm/s, rad/s
+  Eigen::VectorXd acceleration;  ///< mm/s^2, rad/s^2
+  Eigen::VectorXd auxiliary;     ///< of the integrator (time_scheme.hpp)
+  Eigen::VectorXd acting;        ///< N, N mm: forces at the end of the last step
+  Eigen::VectorXd last_change;   ///< mm, rad; none before two steps
+  double part = 0;               ///< s: the next part of a step
+  bool at_rest = false;
+  std::vector<double> viscous_rate;        ///< 1/s, 15 per shell, or none
+  std::vector<double> deformation_before;  ///< likewise, at the start of the last step
+  double length_before = 0;                ///< s, of that step
+};
+
 /// Everything a run needs to go on after a step as if nothing had happened: the numbers as they stand in memory, so
 /// that a run that goes on from here repeats the uninterrupted one (to the bit with the direct solver; what a solver
 /// keeps only to be faster, such as a factor of an earlier matrix, is not here, so with others to their tolerance).
@@ -105,8 +118,10 @@ struct Checkpoint {
   double position = 0;                       ///< s; static: the load factor
   std::vector<Vec3> displacement;            ///< mm, #nodes
   std::vector<Eigen::Quaterniond> rotation;  ///< #nodes
-  /// What the kind of run remembers between its steps beyond the configuration, by name: velocities, step sizes.
-  std::map<std::string, std::vector<double>, std::less<>> memory;
+  std::vector<double> solid_pressure;        ///< #nodes, where there are solids
+  std::vector<double> contact;               ///< ContactSystem::memory(), where there is contact
+  double increment = 0;                      ///< of a static run: the load factor's next
+  std::optional<MotionMemory> motion;        ///< of a dynamic run
 };
 
 /// How a run is made to outlive its process, and what it says on the way.

@@ -230,7 +230,7 @@ private:
   void resume(const Checkpoint& from) override {
     configuration_ = recall(from);
     factor_ = from.position;
-    increment_ = remembered(from, "increment", 1)[0];
+    increment_ = from.increment;
   }
 
   State take_step() override {
@@ -245,7 +245,9 @@ private:
   }
 
   [[nodiscard]] Checkpoint checkpoint() const override {
-    return keep(factor_, configuration_, {{"increment", {increment_}}});
+    Checkpoint now = keep(factor_, configuration_);
+    now.increment = increment_;
+    return now;
   }
 
   /// Equilibrium from the configuration that is said to be near, supports and prescribed displacements put right.

@@ -53,24 +53,26 @@ State SteppedRun::reference_state() const {
   return state;
 }
 
-Checkpoint SteppedRun::keep(double position, const Configuration& configuration,
-                            std::map<std::string, std::vector<double>, std::less<>> memory) const {
-  if (!configuration.pressure.empty()) {
-    memory["solid_pressure"] = configuration.pressure;
-  }
+Checkpoint SteppedRun::keep(double position, const Configuration& configuration) const {
+  Checkpoint now;
+  now.position = position;
+  now.displacement = configuration.displacement;
+  now.rotation = configuration.rotation;
+  now.solid_pressure = configuration.pressure;
   if (system_.contact) {
-    memory["contact"] = system_.contact->memory();
+    now.contact = system_.contact->memory();
   }
-  return {{}, position, configuration.displacement, configuration.rotation, std::move(memory)};
+  return now;
 }
 
 Configuration SteppedRun::recall(const Checkpoint& from) {
   Configuration configuration{from.displacement, from.rotation};
   if (!system_.solids.empty()) {
-    configuration.pressure = remembered(from, "solid_pressure", system_.node_count());
+    require_count(from.solid_pressure.size(), system_.node_count(), "pressures");
+    configuration.pressure = from.solid_pressure;
   }
   if (system_.contact) {
-    system_.contact->recall(remembered(from, "contact"), configuration, from.position);
+    system_.contact->recall(from.contact, configuration, from.position);
   }
   return configuration;
 }

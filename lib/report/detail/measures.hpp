@@ -87,4 +87,7 @@ std::vector<Outlier> outliers(std::span<const std::optional<double>> values);
 /// The middle value, or the mean of the two in the middle. @param values  at least one
 double median(std::vector<double> values);
 
+/// Whether the wall rests under the pressure of the image where that shows it: that nothing moves is no finding.
+bool rests_as_imaged(const PipelineCase& one);
+
 }  // namespace tunica::report

@@ -20,7 +20,7 @@ std::string to_utf8(const std::filesystem::path& path, std::string bytes);
 /// The names in a JSON text: {"1": "aorta"}, {"aorta": 1}, [{"value": 1, "name": "aorta"}], by themselves or under
 /// "labels" (nnU-Net's dataset.json) or "segmentAttributes" (dcmqi). Names of several labels are left out.
 /// Errors: InputError naming the file: no JSON, another shape, a key twice, nested deeper than 16.
-LabelNames parse_label_json(const std::filesystem::path& path, std::string_view text);
+LabelNames parse_label_json(const std::filesystem::path& path, std::string_view text, LabelUnions* unions);
 
 /// The names in the text of a NIfTI header extension, `<Label Key="1">aorta</Label>` in a `<LabelTable>`, as
 /// TotalSegmentator and Connectome Workbench write it; none where the text is another one.

@@ -30,9 +30,8 @@ std::string doubt_of_stiffness(const Model& model, const std::vector<double>& re
 /// Tells a state the error of its linear solve.
 void set_algebraic_error(const std::optional<AlgebraicError>& error, State& state);
 
-/// What a checkpoint remembers under a name. Errors: InputError: nothing, or not as many numbers.
-const std::vector<double>& remembered(const Checkpoint& from, std::string_view name,
-                                      std::optional<std::size_t> count = {});
+/// Errors: InputError: a checkpoint has not as many numbers of what is named.
+void require_count(std::size_t found, std::size_t count, std::string_view name);
 
 /// Collects what solve() returns from the steps of a run; a state without displacements (not handed over, and not the
 /// last) adds its counts only.

@@ -29,8 +29,7 @@ protected:
 
   [[nodiscard]] State reference_state() const;
   /// A checkpoint with what every kind of run keeps: the configuration, what contact remembers.
-  [[nodiscard]] Checkpoint keep(double position, const Configuration& configuration,
-                                std::map<std::string, std::vector<double>, std::less<>> memory) const;
+  [[nodiscard]] Checkpoint keep(double position, const Configuration& configuration) const;
   /// The configuration of a checkpoint; contact remembers.
   [[nodiscard]] Configuration recall(const Checkpoint& from);
   [[nodiscard]] bool is_last() const { return ended_ || summary_.steps + 1 == most_steps_; }
