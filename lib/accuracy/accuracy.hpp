@@ -41,7 +41,8 @@ struct AccuracyRequest {
   std::string probe{};            ///< the name of a probe of the model
   int axis = 0;                   ///< of its displacement
   std::optional<double> voxel{};  ///< mm, longest edge, of the image that the targets come from
-  /// s, of all levels together: no level is begun that would pass it.
+  /// s, of all levels together: no level is begun that would pass it. The accuracy then is an aim: where finer shells
+  /// have no answer, the run ends with the level before, and the reason.
   std::optional<double> max_seconds{};
 };
 

@@ -107,6 +107,19 @@ inline ShellMesh make_geodesic(double radius, std::size_t frequency) {
   return mesh;
 }
 
+/// Mean over an ellipse's length of the square of the distance from its centre.
+inline double mean_square_of_ellipse(double a, double b) {
+  constexpr int steps = 10000;
+  double whole = 0, sum = 0;
+  for (int i = 0; i < steps; ++i) {
+    const double u = 2 * pi * (i + 0.5) / steps;
+    const double ds = std::hypot(a * std::sin(u), b * std::cos(u));
+    whole += ds;
+    sum += ds * (std::pow(a * std::cos(u), 2) + std::pow(b * std::sin(u), 2));
+  }
+  return sum / whole;
+}
+
 /// Icosahedron split `levels` times onto the sphere: 20 x 4^levels triangles, with the sphere's normals.
 inline ShellMesh make_sphere(double radius, int levels) {
   const double g = (1 + std::sqrt(5.0)) / 2;
@@ -155,6 +168,21 @@ inline void add_tube_triangles(std::size_t around, std::size_t along, ShellMesh&
       }
     }
   }
+}
+
+/// A tube along z from 0, with semi-axes a and b of its section along x and y: along + 1 rings of `around` vertices.
+inline ShellMesh tube_mesh(double a, double b, double length, std::size_t around, std::size_t along) {
+  ShellMesh mesh;
+  for (std::size_t j = 0; j <= along; ++j) {
+    for (std::size_t i = 0; i < around; ++i) {
+      const double u = 2 * pi * (static_cast<double>(i) + (j % 2 == 1 ? 0.5 : 0)) / static_cast<double>(around);
+      const double z = length * static_cast<double>(j) / static_cast<double>(along);
+      mesh.vertices.emplace_back(a * std::cos(u), b * std::sin(u), z);
+      mesh.normals.push_back(Vec3(std::cos(u) / a, std::sin(u) / b, 0).normalized());
+    }
+  }
+  add_tube_triangles(around, along, mesh);
+  return mesh;
 }
 
 /// An open vessel with an aneurysm: radius 10 + 10 exp(-((z - 30) / 10)^2) ((1 + cos angle) / 2)^2 mm, z in [0, 60] mm,

@@ -15,16 +15,7 @@ using namespace benchmarks;
 
 /// A tube along z; x and y axes of its section.
 Model tube(double a, double b, double length, std::size_t around, std::size_t along, double thickness) {
-  ShellMesh mesh;
-  for (std::size_t j = 0; j <= along; ++j) {
-    for (std::size_t i = 0; i < around; ++i) {
-      const double u = 2 * pi * (static_cast<double>(i) + (j % 2 == 1 ? 0.5 : 0)) / static_cast<double>(around);
-      const double z = length * static_cast<double>(j) / static_cast<double>(along);
-      mesh.vertices.emplace_back(a * std::cos(u), b * std::sin(u), z);
-      mesh.normals.push_back(Vec3(std::cos(u) / a, std::sin(u) / b, 0).normalized());
-    }
-  }
-  add_tube_triangles(around, along, mesh);
+  ShellMesh mesh = tube_mesh(a, b, length, around, along);
   Model model;
   ShellBody body = flat_body(std::move(mesh), 2, 0.45, thickness);
   body.curved = true;
@@ -134,15 +125,7 @@ TEST(Fields, OfACorotationalSolidAreCauchyStresses) {
 /// distance of the tangent from the centre.
 TEST(Fields, RecoveredAreNearerToEquilibriumThanMeansAtTheNodes) {
   constexpr double a = 12, b = 10, thickness = 1.5, length = 12, pressure = 16e-3, poisson = 0.45;
-  double whole = 0, mean_square = 0;
-  constexpr int steps = 10000;
-  for (int i = 0; i < steps; ++i) {
-    const double u = 2 * pi * (i + 0.5) / steps;
-    const double ds = std::hypot(a * std::sin(u), b * std::cos(u));
-    whole += ds;
-    mean_square += ds * (std::pow(a * std::cos(u), 2) + std::pow(b * std::sin(u), 2));
-  }
-  mean_square /= whole;
+  const double mean_square = mean_square_of_ellipse(a, b);
   std::array<std::array<double, 2>, 2> errors{};  // of the size: recovered, means
   for (std::size_t n = 0; n < 2; ++n) {
     const std::size_t around = n == 0 ? 24 : 48;

@@ -3,6 +3,7 @@
 #include "tunica/mechanics/runs/hold_doubts.hpp"
 
 #include "benchmarks.hpp"
+#include "tunica/mechanics/runs/doubts.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -17,16 +18,7 @@ using ::testing::IsEmpty;
 /// A tube along z, rings 0 to `along`, with free rims.
 Model tube(double radius, double length, double thickness, double pressure) {
   constexpr std::size_t around = 24, along = 16;
-  ShellMesh mesh;
-  for (std::size_t j = 0; j <= along; ++j) {
-    for (std::size_t i = 0; i < around; ++i) {
-      const double u = 2 * pi * (static_cast<double>(i) + (j % 2 == 1 ? 0.5 : 0)) / static_cast<double>(around);
-      mesh.normals.emplace_back(std::cos(u), std::sin(u), 0);
-      mesh.vertices.emplace_back(radius * mesh.normals.back() +
-                                 length * static_cast<double>(j) / static_cast<double>(along) * Vec3::UnitZ());
-    }
-  }
-  add_tube_triangles(around, along, mesh);
+  ShellMesh mesh = tube_mesh(radius, radius, length, around, along);
   Model model;
   ShellBody body = flat_body(std::move(mesh), 2, 0.45, thickness);
   body.curved = true;
@@ -132,6 +124,31 @@ TEST(HoldDoubts, WhatCrossesInTheImageIsNotTheRunsDoing) {
   CrossingWatch watch(model);
   watch.see(at_rest(model));
   EXPECT_FALSE(watch.found());
+}
+
+TEST(HoldDoubts, BedsAndSuctionInTheImageAreQuestioned) {
+  Model model = pressurised_sphere(2, 0.2, 0.016);
+  const auto said = [&] {
+    std::string all;
+    for (const Warning& warning : doubts(model, nonlinear_run({1}), true)) {
+      all += warning.text;
+    }
+    return all;
+  };
+  for (const auto& [stiffness, what] :
+       {std::pair(1e-4, ""), {1e5, "stiffer than that of any tissue"}, {1e-9, "softer than that of any tissue"}}) {
+    model.supports = {{0, {}, stiffness}};
+    for (Index i = 0; i < model.node_count(); ++i) {
+      model.supports[0].nodes.push_back(i);
+    }
+    EXPECT_THAT(said(), HasSubstr(what));
+    EXPECT_EQ(said().find("any tissue around") != std::string::npos, *what != 0);
+  }
+  auto& pressure = std::get<PressureLoad>(model.loads[0].kind);
+  for (const double imaged : {0.016, -0.016}) {
+    pressure.value = pressure.imaged_at.emplace(imaged);
+    EXPECT_EQ(said().find("is a suction") != std::string::npos, imaged < 0);
+  }
 }
 
 /// A sphere at .95 of 2 E t^2 / (R^2 sqrt(3 (1 - nu^2))).

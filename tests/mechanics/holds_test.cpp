@@ -21,17 +21,11 @@ Vec3 tilted_axis() { return tilted(Vec3::UnitZ()) - tilted(Vec3::Zero()); }
 
 /// A tube along a tilted axis, its rims free.
 Model tube(double length, std::size_t around, std::size_t along) {
-  ShellMesh mesh;
-  for (std::size_t j = 0; j <= along; ++j) {
-    for (std::size_t i = 0; i < around; ++i) {
-      const double u = 2 * pi * (static_cast<double>(i) + (j % 2 == 1 ? 0.5 : 0)) / static_cast<double>(around);
-      const Vec3 out(std::cos(u), std::sin(u), 0);
-      const double z = length * static_cast<double>(j) / static_cast<double>(along);
-      mesh.vertices.push_back(tilted(radius * out + z * Vec3::UnitZ()));
-      mesh.normals.push_back(tilted(out) - tilted(Vec3::Zero()));
-    }
+  ShellMesh mesh = tube_mesh(radius, radius, length, around, along);
+  for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
+    mesh.vertices[i] = tilted(mesh.vertices[i]);
+    mesh.normals[i] = tilted(mesh.normals[i]) - tilted(Vec3::Zero());
   }
-  add_tube_triangles(around, along, mesh);
   Model model;
   ShellBody body = flat_body(std::move(mesh), young, poisson, thickness);
   body.curved = true;

@@ -82,17 +82,7 @@ Model free_sphere(std::size_t frequency, double radius, double thickness) {
 
 /// A cylinder along z with the surface's normals; odd rows shifted by half a cell.
 Model cylinder(double radius, double length, double thickness, std::size_t around, std::size_t along) {
-  ShellMesh mesh;
-  for (std::size_t j = 0; j <= along; ++j) {
-    for (std::size_t i = 0; i < around; ++i) {
-      const double angle = 2 * pi * (static_cast<double>(i) + (j % 2 == 1 ? 0.5 : 0)) / static_cast<double>(around);
-      const Vec3 normal(std::cos(angle), std::sin(angle), 0);
-      mesh.vertices.push_back(radius * normal +
-                              Vec3(0, 0, length * static_cast<double>(j) / static_cast<double>(along)));
-      mesh.normals.push_back(normal);
-    }
-  }
-  add_tube_triangles(around, along, mesh);
+  ShellMesh mesh = tube_mesh(radius, radius, length, around, along);
   Model model;
   ShellBody body = flat_body(mesh, 1000, 0.3, thickness);
   body.curved = true;

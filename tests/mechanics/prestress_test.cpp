@@ -176,15 +176,7 @@ TEST(Prestress, OfATorusIsThatOfEquilibriumAwayFromItsTops) {
 /// M(s) = p (mean r^2 - r^2) / 2, N = p times the distance of the tangent from the centre.
 TEST(Prestress, OfAnEllipticTubeBendsAsEquilibriumSays) {
   constexpr double a = 12, b = 10, poisson = 0.45;
-  double whole = 0, mean_square = 0;
-  constexpr int steps = 10000;
-  for (int i = 0; i < steps; ++i) {
-    const double u = 2 * pi * (i + 0.5) / steps;
-    const double ds = std::hypot(a * std::sin(u), b * std::cos(u));
-    whole += ds;
-    mean_square += ds * (a * a * std::cos(u) * std::cos(u) + b * b * std::sin(u) * std::sin(u));
-  }
-  mean_square /= whole;
+  const double mean_square = mean_square_of_ellipse(a, b);
   const auto error = [&](std::size_t around, double thickness) {
     const Model model = long_tube([](double u) { return ellipse(a, b, u); }, 12, around, around / 4, thickness);
     const ElementFields fields = fields_of(model);

@@ -1,5 +1,6 @@
 #include "tunica/surface/mesh/cut_open.hpp"
 
+#include "surface/shapes.hpp"
 #include "tunica/core/error.hpp"
 #include "tunica/surface/mesh/checks.hpp"
 #include "tunica/surface/mesh/incidence.hpp"
@@ -18,29 +19,7 @@ constexpr double pi = std::numbers::pi;
 
 /// A tube along z from 0 to `length`, its ends closed by fans, normals outward.
 TriangleMesh closed_tube(double radius, double length, std::size_t around, std::size_t along) {
-  TriangleMesh mesh;
-  for (std::size_t j = 0; j <= along; ++j) {
-    for (std::size_t i = 0; i < around; ++i) {
-      const double u = 2 * pi * (static_cast<double>(i) + (j % 2 == 1 ? 0.5 : 0)) / static_cast<double>(around);
-      mesh.vertices.emplace_back(radius * std::cos(u), radius * std::sin(u),
-                                 length * static_cast<double>(j) / static_cast<double>(along));
-    }
-  }
-  for (std::size_t j = 0; j < along; ++j) {
-    for (std::size_t i = 0; i < around; ++i) {
-      const auto a = static_cast<Index>(j * around + i);
-      const auto b = static_cast<Index>(j * around + (i + 1) % around);
-      const auto c = static_cast<Index>(a + around);
-      const auto d = static_cast<Index>(b + around);
-      if (j % 2 == 0) {
-        mesh.triangles.push_back({a, b, c});
-        mesh.triangles.push_back({b, d, c});
-      } else {
-        mesh.triangles.push_back({a, b, d});
-        mesh.triangles.push_back({a, d, c});
-      }
-    }
-  }
+  TriangleMesh mesh = shapes::tube(around, along, radius, length);
   const auto bottom = static_cast<Index>(mesh.vertices.size());
   mesh.vertices.emplace_back(0, 0, 0);
   mesh.vertices.emplace_back(0, 0, length);

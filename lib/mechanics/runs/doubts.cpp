@@ -157,6 +157,19 @@ void doubt_material(const std::string& where, const Material& material, bool pre
   }
 }
 
+void doubt_bed(const std::string& where, const Support& bed, std::vector<Warning>& found) {
+  // MPa/mm. What is used for the tissue around vessels goes from 1e4 to 1e7 N/m3.
+  constexpr double softest = 1e-7, stiffest = 1;
+  constexpr double newtons_per_cubic_metre = 1e9;
+  if (bed.stiffness < softest || bed.stiffness > stiffest) {
+    found.push_back(
+        {Weight::major, "stiffness",
+         fmt::format("{}: its bed of {:.3g} N/m3 is {} than that of any tissue around, 1e4 to 1e7 N/m3: is "
+                     "its unit right?",
+                     where, bed.stiffness * newtons_per_cubic_metre, bed.stiffness < softest ? "softer" : "stiffer")});
+  }
+}
+
 bool is_pressed(const Model& model, std::size_t body) {
   return std::ranges::any_of(model.loads, [&](const Load& load) {
     return load.body == body && std::holds_alternative<PressureLoad>(load.kind);
@@ -414,6 +427,9 @@ void doubt_loads(const Model& model, const RunSettings& settings,
         pressure != nullptr && pressure->imaged_at && pressure->value * *pressure->imaged_at < 0) {
       found.push_back({Weight::major, "imaging pressure",
                        where + ": imaged_at presses on the other face of the wall than the load: is its sign right?"});
+    } else if (pressure != nullptr && pressure->imaged_at.value_or(0) < 0 && !model.is_solid(load.body)) {
+      found.push_back({Weight::minor, "imaging pressure",
+                       where + ": imaged_at is a suction, by which the wall is pressed together: is its sign right?"});
     }
   }
   for (const Fix& fix : model.fixes) {
@@ -475,6 +491,9 @@ std::vector<Warning> doubts(const Model& model, const RunSettings& settings, boo
     held.push_back(held_freedoms(model, b));
   }
   doubt_loads(model, settings, held, found);
+  for (const Support& bed : model.supports) {
+    doubt_bed(at(bed.said_at, model.name_of(bed.body)), bed, found);
+  }
   for (const Contact& contact : model.contacts) {
     if (!contact.consistent) {
       found.push_back({Weight::minor, "the paper's transfer",

@@ -71,7 +71,7 @@ std::vector<char> touched_nodes(const Model& model, std::size_t body) {
   return touched;
 }
 
-/// A rim: what its edges, in the direction of their triangles, enclose.
+/// What a rim encloses.
 struct Lumen {
   Vec3 area = Vec3::Zero();  ///< mm^2, normal of the plane that sees most of it, as long as what it sees
   Vec3 centre = Vec3::Zero();
@@ -80,29 +80,21 @@ struct Lumen {
 };
 
 std::vector<Lumen> lumens_of(const ShellMesh& mesh, const std::vector<char>& touched) {
-  const TriangleMesh facets = flat_facets(mesh);
-  const auto edges = boundary_edges(neighbours(facets, incidence(facets)));
-  DisjointSets joined(mesh.vertices.size());
-  for (const auto& [t, k] : edges) {
-    joined.join(mesh.triangles[t][k], mesh.triangles[t][(k + 1) % 3]);
-  }
-  std::map<Index, Lumen> lumens;  // by root
-  for (const auto& [t, k] : edges) {
-    const Index a = mesh.triangles[t][k];
-    const Index b = mesh.triangles[t][(k + 1) % 3];
-    Lumen& lumen = lumens[joined.root(a)];
-    const double length = (mesh.vertices[b] - mesh.vertices[a]).norm();
-    lumen.area += mesh.vertices[a].cross(mesh.vertices[b]) / 2;
-    lumen.centre += length * (mesh.vertices[a] + mesh.vertices[b]) / 2;
-    lumen.length += length;
-    lumen.touched = lumen.touched || touched[a] != 0 || touched[b] != 0;
-  }
-  std::vector<Lumen> found;
-  for (auto& [root, lumen] : lumens) {
+  std::vector<Lumen> lumens;
+  for (const std::vector<Index>& rim : boundary_loops(flat_facets(mesh))) {
+    Lumen& lumen = lumens.emplace_back();
+    for (std::size_t i = 0; i < rim.size(); ++i) {
+      const Vec3& a = mesh.vertices[rim[i]];
+      const Vec3& b = mesh.vertices[rim[(i + 1) % rim.size()]];
+      const double length = (b - a).norm();
+      lumen.area += a.cross(b) / 2;
+      lumen.centre += length * (a + b) / 2;
+      lumen.length += length;
+      lumen.touched = lumen.touched || touched[rim[i]] != 0;
+    }
     lumen.centre /= lumen.length;
-    found.push_back(lumen);
   }
-  return found;
+  return lumens;
 }
 
 /// The connected pieces of a shell, by their nodes; without those that no triangle has.
@@ -263,8 +255,8 @@ std::vector<Warning> swings_of(const Model& model, const State& state) {
       found.push_back(
           {Weight::major, "swing",
            fmt::format("{}{} swings: of the {:.3g} mm that it moves at most, {:.3g} mm are a motion as one, by {:.2g} "
-                       "degrees: what holds it in the body is missing: let its rims slide (--fix rims:slide, "
-                       "FIX=rims:slide), or put it into a bed (--support 1e5N/m3, SUPPORT=1e5N/m3)",
+                       "degrees: what holds it in the body is missing: put it into a bed (--support 1e5N/m3, "
+                       "SUPPORT=1e5N/m3), or hold its other end, too (--fix, FIX)",
                        named(body.said_at, body.name),
                        pieces.size() > 1 ? fmt::format(", the piece at {},", where(swing.centre)) : "", swing.largest,
                        swing.rigid, swing.turn * 180 / std::numbers::pi)});

@@ -82,14 +82,13 @@ void add_edge_load(const ShellSystem& system, std::size_t body, const EdgeLoad& 
 }
 
 /// Pressure of 1 MPa that keeps its direction, or a force per area, on the surface of a solid.
-void add_solid_surface_load(const ShellSystem& system, const Load& load, DeadLoad& dead) {
+/// @param on  as PressedParts::on
+void add_solid_surface_load(const ShellSystem& system, const Load& load, const std::vector<char>& on, DeadLoad& dead) {
   const auto* pressure = std::get_if<PressureLoad>(&load.kind);
   const auto* area = std::get_if<AreaLoad>(&load.kind);
   if (pressure == nullptr && area == nullptr) {
     return;
   }
-  const std::vector<char> on =
-      pressure == nullptr ? std::vector<char>() : pressed_parts(system, load.body, pressure->nodes);
   const std::size_t first = system.surfaces.first[load.body];
   for (std::size_t f = first; f < system.surfaces.first[load.body + 1]; ++f) {
     if (!on.empty() && on[f - first] == 0) {
@@ -105,6 +104,25 @@ void add_solid_surface_load(const ShellSystem& system, const Load& load, DeadLoa
   }
 }
 
+/// MPa, of the pressures that count, per shell element, or per face of the surfaces of solids.
+template <typename Counts>
+std::vector<double> summed(const ShellSystem& system, const std::vector<double>& factors, bool of_solids,
+                           const Counts& counts) {
+  const std::vector<std::size_t>& first = of_solids ? system.surfaces.first : system.first_element;
+  std::vector<double> pressures(of_solids ? system.surfaces.faces.size() : system.elements.size(), 0);
+  for (const PressedParts& parts : system.pressed) {
+    const auto& pressure = std::get<PressureLoad>(system.model->loads[parts.load].kind);
+    if (system.model->is_solid(parts.body) != of_solids || !counts(pressure)) {
+      continue;
+    }
+    const double value = pressure.at(factors[parts.load]);
+    for (std::size_t k = first[parts.body]; k < first[parts.body + 1]; ++k) {
+      pressures[k] += parts.on.empty() || parts.on[k - first[parts.body]] != 0 ? value : 0;
+    }
+  }
+  return pressures;
+}
+
 }  // namespace
 
 void make_loads(ShellSystem& system) {
@@ -116,21 +134,24 @@ void make_loads(ShellSystem& system) {
     const bool solid = model.is_solid(load.body);
     const std::size_t begin = solid ? 0 : system.first_element[load.body];
     const std::size_t end = solid ? 0 : system.first_element[load.body + 1];
-    if (const auto* pressure = std::get_if<PressureLoad>(&load.kind); pressure != nullptr && pressure->follower) {
-      system.follower_pressures.push_back({l, load.body, pressed_parts(system, load.body, pressure->nodes)});
-      continue;
+    const auto* pressure = std::get_if<PressureLoad>(&load.kind);
+    if (pressure != nullptr) {
+      system.pressed.push_back({l, load.body, pressed_parts(system, load.body, pressure->nodes)});
+      if (pressure->follower) {
+        continue;
+      }
     }
     dead.force = VectorX::Zero(first_freedom(system.node_count()));
     if (solid) {
-      add_solid_surface_load(system, load, dead);
+      add_solid_surface_load(system, load, pressure == nullptr ? std::vector<char>() : system.pressed.back().on, dead);
     }
     if (std::holds_alternative<AreaLoad>(load.kind) && !solid) {
       dead.director.assign(system.node_count(), Mat3::Zero());
     }
-    if (const auto* pressure = std::get_if<PressureLoad>(&load.kind)) {
+    if (pressure != nullptr) {
       dead.begin = pressure->at(0);
       dead.end = pressure->at(1);
-      const std::vector<char> on = pressed_parts(system, load.body, pressure->nodes);
+      const std::vector<char>& on = system.pressed.back().on;
       for (std::size_t e = begin; e < end; ++e) {
         if (on.empty() || on[e - begin] != 0) {
           add_dead_pressure(system, e, dead);
@@ -161,36 +182,11 @@ void make_loads(ShellSystem& system) {
 }
 
 std::vector<double> follower_pressures(const ShellSystem& system, const std::vector<double>& factors, bool of_solids) {
-  const std::vector<std::size_t>& first = of_solids ? system.surfaces.first : system.first_element;
-  std::vector<double> pressures(of_solids ? system.surfaces.faces.size() : system.elements.size(), 0);
-  for (const FollowerPressure& follower : system.follower_pressures) {
-    if (system.model->is_solid(follower.body) != of_solids) {
-      continue;
-    }
-    const double value = std::get<PressureLoad>(system.model->loads[follower.load].kind).at(factors[follower.load]);
-    for (std::size_t k = first[follower.body]; k < first[follower.body + 1]; ++k) {
-      pressures[k] += follower.on.empty() || follower.on[k - first[follower.body]] != 0 ? value : 0;
-    }
-  }
-  return pressures;
+  return summed(system, factors, of_solids, [](const PressureLoad& pressure) { return pressure.follower; });
 }
 
 std::vector<double> shell_pressures(const ShellSystem& system, const std::vector<double>& factors) {
-  const Model& model = *system.model;
-  std::vector<double> pressures(system.elements.size(), 0);
-  for (std::size_t l = 0; l < model.loads.size(); ++l) {
-    const auto* pressure = std::get_if<PressureLoad>(&model.loads[l].kind);
-    const std::size_t body = model.loads[l].body;
-    if (pressure == nullptr || model.is_solid(body)) {
-      continue;
-    }
-    const std::vector<char> on = pressed_parts(system, body, pressure->nodes);
-    const std::size_t first = system.first_element[body];
-    for (std::size_t e = first; e < system.first_element[body + 1]; ++e) {
-      pressures[e] += on.empty() || on[e - first] != 0 ? pressure->at(factors[l]) : 0;
-    }
-  }
-  return pressures;
+  return summed(system, factors, false, [](const PressureLoad&) { return true; });
 }
 
 }  // namespace tunica

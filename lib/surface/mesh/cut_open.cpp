@@ -33,8 +33,7 @@ public:
     }
     mesh_.triangles = std::move(kept);
     part_at_points();
-    drop_unused();
-    return std::move(mesh_);
+    return without_unused(std::move(mesh_));
   }
 
 private:
@@ -144,28 +143,6 @@ private:
         triangles[t][k] = place->second;
       }
     }
-  }
-
-  void drop_unused() {
-    std::vector<Index> number(mesh_.vertices.size(), 0);
-    for (const auto& t : mesh_.triangles) {
-      for (const Index v : t) {
-        number[v] = 1;
-      }
-    }
-    std::vector<Vec3> used;
-    for (std::size_t v = 0; v < number.size(); ++v) {
-      if (number[v] != 0) {
-        number[v] = narrow<Index>(used.size());
-        used.push_back(mesh_.vertices[v]);
-      }
-    }
-    for (auto& t : mesh_.triangles) {
-      for (Index& v : t) {
-        v = number[v];
-      }
-    }
-    mesh_.vertices = std::move(used);
   }
 
   TriangleMesh mesh_;

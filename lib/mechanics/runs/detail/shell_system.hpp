@@ -44,8 +44,8 @@ struct Piece {
   Mat3 turns = Mat3::Identity();
 };
 
-/// A pressure that follows the surface.
-struct FollowerPressure {
+/// What a pressure acts on.
+struct PressedParts {
   std::size_t load = 0;
   std::size_t body = 0;
   std::vector<char> on;  ///< per element, or face of a solid, of the body; empty: on all
@@ -79,8 +79,8 @@ struct ShellSystem {
   std::vector<Carried> carried;
   std::shared_ptr<ContactSystem> contact;  ///< none where nothing touches
 
-  std::vector<DeadLoad> dead;  ///< per load; empty vectors for follower pressure
-  std::vector<FollowerPressure> follower_pressures;
+  std::vector<DeadLoad> dead;                      ///< per load; empty vectors for follower pressure
+  std::vector<PressedParts> pressed;               ///< per pressure, also those that keep their direction
   std::shared_ptr<const SupportTerm> bed;          ///< none where nothing is supported
   std::vector<std::shared_ptr<const Term>> terms;  ///< all that acts, as make_terms() says
 
