@@ -461,8 +461,9 @@ std::function<TriangleMesh(const MarchingCubesOptions&)> smoothed_surface(cli::T
   };
 }
 
-// Along planes in the axes of the output.
-void cut_open(TriangleMesh& mesh, const Subject& subject, const Arguments& arguments) {
+// Along planes in the axes of the output. What is said of the image's border afterwards concerns what is left.
+void cut_open(Surface& surface, const Subject& subject, const Arguments& arguments) {
+  TriangleMesh& mesh = surface.mesh;
   for (const std::string& text : arguments.cuts) {
     const HalfSpaceNodes half = parse_cut(text);
     const double turned = subject.ras && half.axis < 2 ? -1 : 1;
@@ -478,7 +479,12 @@ void cut_open(TriangleMesh& mesh, const Subject& subject, const Arguments& argum
                       arguments.volume.string(), text, subject.name, range.lower, range.upper, "xyz"[half.axis]));
     }
     const double kept = half.below ? -1 : 1;  // what lies beyond is above the plane along this normal
-    mesh = tunica::cut_open(mesh, kept * turned * Vec3::Unit(half.axis), kept * half.at);
+    const Vec3 normal = kept * turned * Vec3::Unit(half.axis);
+    const double offset = kept * half.at;
+    mesh = tunica::cut_open(mesh, normal, offset);
+    drop_beyond(surface.mask, normal, offset);
+    std::erase_if(surface.openings.openings,
+                  [&](const Opening& opening) { return !opening.is_end && normal.dot(opening.middle) > offset; });
   }
 }
 
@@ -523,7 +529,7 @@ Surface extract(cli::Tool& tool, const Subject& subject, Selection selection, co
     const StaircaseOptions staircase{arguments.open_border, tool.progress("smooth")};
     surface.staircase = smooth_staircase(surface.mesh, surface.mask, staircase);
   }
-  cut_open(surface.mesh, subject, arguments);
+  cut_open(surface, subject, arguments);
   return surface;
 }
 
@@ -546,12 +552,14 @@ void note_file(cli::Tool& tool, const VolumeFile& file) {
 }
 
 void doubt(cli::Tool& tool, const Subject& subject, const Surface& surface, const Target& target, const Json& result,
-           bool open_border) {
+           const Arguments& arguments) {
   if (!result["volume_mm3"].is_null()) {
     warn_all(tool, doubt_volume(subject, surface.mask, result["volume_mm3"].get<double>()));
   }
-  if (open_border) {
-    warn_all(tool, doubt_openings(subject, surface.openings, result["area_mm2"].get<double>()));
+  if (arguments.open_border) {
+    if (arguments.cuts.empty() || !surface.openings.openings.empty()) {
+      warn_all(tool, doubt_openings(subject, surface.openings, result["area_mm2"].get<double>()));
+    }
     warn_all(tool, doubt_rims(subject, surface.mask, surface.mesh, boundary_loops(surface.mesh)));
   } else {
     warn_all(tool, doubt_closed_border(subject, surface.mask, target.inside));
@@ -622,7 +630,7 @@ Json extract_to_file(cli::Tool& tool, Selection selection, const Arguments& argu
                            {"volume_change", surface.staircase->volume_change},
                            {"held_back", surface.staircase->held_back}};
   }
-  doubt(tool, subject, surface, target, result, arguments.open_border);
+  doubt(tool, subject, surface, target, result, arguments);
   tool.require_unchanged_inputs();
   write(tool, output_path(arguments.out, target), surface.mesh, name, voxel, arguments);
   if (other) {

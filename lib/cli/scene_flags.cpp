@@ -34,6 +34,9 @@ std::optional<HalfSpaceNodes> parse_half_space(const std::string& text, const ch
       text.find_first_not_of(' ', axis + 1) != equals) {
     return std::nullopt;
   }
+  if (text.find(';') != std::string::npos) {
+    throw UsageError(fmt::format("{} '{}': holds several: repeat {} for each", flag, text, flag));
+  }
   half.axis = text[axis] - 'x';
   try {
     half.at = parse_quantity(text.substr(equals + 1), dimension::length);
@@ -202,6 +205,11 @@ Scene SceneFlags::scene(const std::filesystem::path& mesh) const {
   shell.mesh = mesh;
   if (mesh_unit) {
     shell.unit_mm = parse_length_unit(*mesh_unit);
+  }
+  if (!pressure && imaged_at == 0.0) {
+    throw UsageError(
+        "--pressure is missing: --imaged-at 0 is an image without pressure, so give the one that loads the wall, for "
+        "example --pressure 100mmHg");
   }
   shell.material.young_stated = young || !pressure_is_imaged();
   shell.material.young = shell.material.young_stated ? required(young, "--young", "1MPa") : any_young;

@@ -26,9 +26,9 @@ class WholeTools(unittest.TestCase):
         cls.folder = tempfile.mkdtemp(prefix="tunica-tools-")
         cls.addClassCleanup(shutil.rmtree, cls.folder, ignore_errors=True)
         # One step of the chain each: what is read stays, what is written is new for every test.
-        for command in (["phantom", "sphere", "ball.nii.gz", "--size", "24"],
+        for command in (["phantom", "sphere", "ball.nii.gz", "--size", "16"],
                         ["extract", "ball.nii.gz", "surface.ply", "--label", "1", "--smooth", "staircase"],
-                        ["decimate", "surface.ply", "coarse.ply", "--triangles", "200"],
+                        ["decimate", "surface.ply", "coarse.ply", "--triangles", "100"],
                         ["relax", "coarse.ply", "surface.ply", "shell.ply", "--report", "relax.json",
                          "--tolerance", "2%", "--refine"]):
             subprocess.run([tool(command[0]), *command[1:]], cwd=cls.folder, check=True, capture_output=True)

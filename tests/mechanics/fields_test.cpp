@@ -258,5 +258,36 @@ TEST(Fields, OfAWallOfSmoothThicknessHaveThatOfThePlace) {
   EXPECT_NEAR(fields.wall.whole.stress_max, 1, 0.015);
 }
 
+/// A plate that is pulled, twice as thick from its middle on: equilibrium hands the force on, and the stress is that
+/// over the thickness of the place, without waves of the step.
+TEST(Fields, AreNotDisturbedByAStepOfTheThickness) {
+  const Grid grid = make_grid(16, 4, [](double u, double v) { return Vec3(4 * u, v, 0); });
+  constexpr double force = 2;
+  Model model;
+  model.shells.push_back(flat_body(grid.mesh, 1000, 0, 1));
+  auto& thickness = model.shells[0].thickness;
+  thickness.clear();
+  EdgeLoad edge;
+  edge.per_length = Vec3(force, 0, 0);
+  for (std::size_t j = 0; j < 4; ++j) {
+    edge.edges.push_back({grid.node(16, j), grid.node(16, j + 1)});
+  }
+  for (const Vec3& p : grid.mesh.vertices) {
+    thickness.push_back(p.x() < 2 - eps ? 1 : 2);
+  }
+  model.loads.push_back({0, edge, {}});
+  hold(
+      model, [](const Vec3& p) { return p.x() < eps; }, "xyz", "xyz");
+  hold(
+      model, [](const Vec3&) { return true; }, "yz", "xyz");
+  const ElementFields fields = element_fields(model, last_state(model, linear_run()));
+  for (std::size_t i = 0; i < thickness.size(); ++i) {
+    if (std::abs(grid.mesh.vertices[i].x() - 1.875) > 0.2) {  // of no shell that stands for the step
+      const double exact = force / thickness[i];
+      EXPECT_NEAR(fields.von_mises[i], exact, 0.015 * exact);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace tunica

@@ -1,6 +1,8 @@
 // Bodies of tetrahedra against analytic and published solutions.
 
 #include "tets.hpp"
+#include "tunica/mechanics/runs/fields.hpp"
+#include "tunica/mechanics/solids/solid_element.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -182,6 +184,100 @@ TEST(SolidPressure, PushesOnEverySideOfABody) {
   for (const SolidLaw law : {SolidLaw::corotational, SolidLaw::neo_hookean}) {
     EXPECT_NEAR(shrinks(true, law), 1, 1e-10);
     EXPECT_NEAR(shrinks(false, law), 1, 1e-4);
+  }
+}
+
+/// A quarter of a tube between planes of symmetry.
+Model quarter_of_tube(double inner, double thickness, double young, double poisson, SolidLaw law) {
+  const Grid grid = make_grid(
+      16, 1, [](double u, double v) { return Vec3(pi / 2 * u, v, 0); }, Diagonals::alternating);
+  Model model = one_solid(extrude(grid.mesh.triangles, grid.mesh.vertices.size(), 6,
+                                  [&](Index v, double w) {
+                                    const Vec3& at = grid.mesh.vertices[v];
+                                    const double r = inner + w * thickness;
+                                    return Vec3(r * std::cos(at.x()), r * std::sin(at.x()), at.y());
+                                  }),
+                          young, poisson, law);
+  for (int c = 0; c < 3; ++c) {
+    hold_nodes(
+        model, 0, [&](const Vec3& x) { return x[c] < eps || (c == 2 && x[c] > 1 - eps); }, std::string(1, "xyz"[c]));
+  }
+  return model;
+}
+
+struct TubeOfTetrahedra {
+  double hoop = 0;  ///< MPa, mean over the wall
+  double inner = 0, outer = 0;
+};
+
+/// Of the blown tube.
+TubeOfTetrahedra blown(const Model& model, const State& state, double inner, double thickness) {
+  const SolidBody& body = model.solids[0];
+  TubeOfTetrahedra tube;
+  double volume = 0;
+  for (const auto& nodes : body.mesh.tetrahedra) {
+    Corners4 corners;
+    SolidMotion motion;
+    for (int k = 0; k < 4; ++k) {
+      corners.col(k) = body.mesh.vertices[nodes[k]];
+      motion.displacement.col(k) = state.displacement[nodes[k]];
+      motion.pressure[k] = state.pressure[nodes[k]];
+    }
+    const Mat3 stress = solid_stress(make_solid_element(corners, body.material, body.law), motion, false);
+    const Corners4 now = corners + motion.displacement;
+    const double part =
+        std::abs((now.col(1) - now.col(0)).dot((now.col(2) - now.col(0)).cross(now.col(3) - now.col(0)))) / 6;
+    const Vec3 out = Vec3(now.row(0).mean(), now.row(1).mean(), 0).normalized();
+    const Vec3 around(-out.y(), out.x(), 0);
+    const double r = std::hypot(now.row(0).mean(), now.row(1).mean());
+    tube.hoop += part / r * around.dot(stress * around);  // per angle
+    volume += part / r;
+  }
+  tube.hoop /= volume;
+  const auto radius = [&](double r) {
+    const Index node = nodes_of(model, 0, [&](const Vec3& x) {
+                         return std::abs(x.x() - r) < eps && x.y() < eps && x.z() < eps;
+                       }).front();
+    return r + state.displacement[node].x();
+  };
+  tube.inner = radius(inner);
+  tube.outer = radius(inner + thickness);
+  return tube;
+}
+
+/// Whatever the law, p r / t with the inner radius and the thickness of the blown tube. Shells under the same force per
+/// angle bear the same, and are as wide but for what the pressure does through the thickness: nu / (1 - nu) t / (2 r).
+TEST(SolidPressure, AThickTubeOfTetrahedraBearsWhatOneOfShellsBears) {
+  constexpr double inner = 9, thickness = 2, young = 2, poisson = 0.45, middle = 10, length = 10;
+  for (const auto& [law, pressure] :
+       {std::pair{SolidLaw::corotational, 0.02}, std::pair{SolidLaw::neo_hookean, 0.02},
+        std::pair{SolidLaw::corotational, 0.07}, std::pair{SolidLaw::neo_hookean, 0.05}}) {
+    Model solid = quarter_of_tube(inner, thickness, young, poisson, law);
+    const std::vector<Index> inside =
+        nodes_of(solid, 0, [](const Vec3& x) { return x.head<2>().norm() < inner + eps; });
+    Load load{0, PressureLoad{-pressure, true}, {}};
+    std::get<PressureLoad>(load.kind).nodes = inside;
+    solid.loads.push_back(load);
+    const TubeOfTetrahedra tube = blown(solid, last_state(solid, nonlinear_run({0.5, 1})), inner, thickness);
+    EXPECT_NEAR(tube.hoop, pressure * tube.inner / (tube.outer - tube.inner), 0.005 * tube.hoop);
+
+    Model shells;
+    ShellBody body = flat_body(tube_mesh(middle, middle, length, 48, 10), young, poisson, thickness);
+    body.curved = true;
+    body.rest = Rest::curved;
+    shells.shells.push_back(body);
+    hold(
+        shells, [](const Vec3& p) { return p.z() < eps || p.z() > length - eps; }, "z", "xy");
+    shells.rigid_motions.push_back({0});
+    const double now = (tube.inner + tube.outer) / 2;
+    shells.loads.push_back({0, PressureLoad{pressure * tube.inner / now, true}, {}});
+    const State state = last_state(shells, nonlinear_run({0.5, 1}));
+    const double wide = (shells.shells[0].mesh.vertices[240] + state.displacement[240]).head<2>().norm();
+    const Wall wall = element_fields(shells, state).wall;
+    const double strain = now / middle - 1;
+    EXPECT_NEAR(wide / now, 1, 0.1 * strain + strain * strain);
+    EXPECT_NEAR(wall.whole.tension_p99, tube.hoop * (tube.outer - tube.inner) * wide / now,
+                0.005 * tube.hoop * thickness);
   }
 }
 

@@ -73,9 +73,10 @@ class Table(WithStubs):
     def test_encodings_and_separators_of_spreadsheets(self):
         (self.table.parent / "gro\u00df.nii").write_text("a volume")
         lines = ["case;volume;label;fix;;", 'p1;gro\u00df.nii;1;"below z=1mm; above z=9mm"', "p2;a.nii.gz;Gef\u00e4\u00df;"]
-        for separator in ";,\t":
+        encodings = ("utf-8", "utf-16", "utf-16-le", "cp1252")
+        for separator, of_it in ((";", encodings), (",", encodings[:1]), ("\t", encodings[:1])):
             text = f"sep={separator}\r\n" + "\r\n".join(line.replace(";", separator).replace(f"mm{separator} above", "mm; above") for line in lines)
-            for encoding in ("utf-8", "utf-16", "utf-16-le", "cp1252"):
+            for encoding in of_it:
                 self.table.write_bytes(text.encode(encoding))
                 done = self.run_table("-n", "-k", **LOAD)
                 self.assertEqual(done.returncode, 0, done.stderr)
@@ -251,7 +252,8 @@ class WholeCohort(Pipeline):
     """The real tools on phantoms, with broken cases among them."""
 
     def run_cohort(self):
-        self.done = self.make("-j2", "-k", CASES=self.folder / "cases.tsv", SHELLS=60, THREADS=1, RELAX="--max-iterations 1", **cohort.WALL)
+        self.done = self.make("-j2", "-k", CASES=self.folder / "cases.tsv", SHELLS=60, THREADS=1, METHOD="barycentre",
+                              RELAX="--max-iterations 1", **cohort.WALL)
         self.assertNotIn("Traceback", self.done.stderr)
         with open(self.out / "summary.tsv", newline="") as file:
             return list(csv.DictReader(file, delimiter="\t", quoting=csv.QUOTE_NONE))

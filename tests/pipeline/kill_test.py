@@ -21,7 +21,7 @@ import unittest
 
 from pipeline_test import LOAD, STAGES, TOOLS, Pipeline
 
-KILLS = 8
+KILLS = 5
 SEED = 1
 TIMES = ("seconds", "peak_mib", "ms_per_step", "real_time_factor")
 

@@ -9,6 +9,9 @@
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
 
+#include <array>
+#include <cmath>
+#include <limits>
 #include <numbers>
 
 namespace tunica {
@@ -266,6 +269,20 @@ TEST(Watertight, NormalsPerCornerKeepTheRimsOfAClosedCylinder) {
     const double exact = 2 * std::numbers::pi;
     EXPECT_NEAR(curved_volume(shell), exact, 6e-3 * std::pow(8.0 / around, 4) * exact);
   }
+}
+
+/// Leaves numbers that are none where the next function has its variables.
+[[gnu::noinline]] void spoil_the_stack() {
+  std::array<volatile double, 4096> numbers;
+  for (volatile double& number : numbers) {
+    number = std::numeric_limits<double>::quiet_NaN();
+  }
+}
+
+TEST(Watertight, VolumeDoesNotDependOnWhatWasInMemory) {
+  const ShellMesh shell = watertight(sphere_shell(1));
+  spoil_the_stack();
+  EXPECT_TRUE(std::isfinite(curved_volume(shell)));
 }
 
 TEST(Watertight, VolumeIsThatOfAFineTessellationAndDoesNotDependOnTheOrigin) {

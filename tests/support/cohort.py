@@ -8,7 +8,7 @@ import subprocess
 
 SHAPES = ("sphere", "tube", "aneurysm", "capsule", "bladder", "colon")
 WALL = {"IMAGED_AT": "0kPa", "YOUNG": "1MPa", "POISSON": "0.45"}
-COLUMNS = ("case", "volume", "label", "pressure", "thickness", "open", "fix", "tolerance")
+COLUMNS = ("case", "volume", "label", "pressure", "thickness", "open", "fix", "tolerance", "method")
 
 # Per broken case the stage that ends it, its exit code, and words of the message.
 BROKEN = {
@@ -77,7 +77,7 @@ def make_cohort(folder, tools, count, sizes, seed=1):
     (scans / "no-slices.nii.gz").unlink()
     (scans / "no-slices.nii.gz").mkdir()
     cells = {"absent-label": {"label": "9"}, "misspelt-label": {"label": "vesel"}, "no-unit": {"pressure": "1"},
-             "held-wrongly": {"open": "0", "fix": "boundary"}, "too-close": {"tolerance": "1e-7%"}}
+             "held-wrongly": {"open": "0", "fix": "boundary"}, "too-close": {"tolerance": "1e-7%", "method": "fit"}}
     for name in BROKEN:
         line(name, f"scans/{name}.nii.gz", **cells.get(name, {}))
     choice.shuffle(lines)

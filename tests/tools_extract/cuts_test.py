@@ -62,9 +62,21 @@ class Cuts(unittest.TestCase):
             self.extract("o.ply", "--label", "1", "--space", space, "--cut", words)
             self.assertTrue(kept(Ply(self.folder / "o.ply").vertices[:, 0]))
 
+    def test_of_the_border_that_is_said_which_planes_leave(self):
+        """Of a ball that the border cuts through, and of one that it shaves."""
+        i, j, k = numpy.mgrid[:40, :30, :50]
+        data = ((i - 38) ** 2 + (j - 15) ** 2 + (k - 25) ** 2 <= 25).astype(numpy.uint8)
+        data[(i - 8) ** 2 + (j - 14) ** 2 + (k - 25) ** 2 <= 81] = 2
+        nibabel.save(nibabel.Nifti1Image(data, numpy.eye(4)), self.folder / "v.nii.gz")
+        for label, words, cut in (("1", (), "below x=-36mm"), ("2", (), "above x=-4mm"), ("2", ("--open-border",), "above x=-4mm")):
+            for more, said in (((), True), (("--cut", "above z=30mm"), True), (("--cut", cut), False)):
+                warnings = " ".join(self.extract("o.ply", "--label", label, *words, *more)["warnings"])
+                self.assertEqual("border cuts" in warnings, said, (label, words, more, warnings))
+
     def test_what_cannot_be_cut_is_said(self):
         self.assertIn("reaches from", self.extract("o.ply", "--label", "1", "--cut", "above z=90mm", code=3))
         self.assertIn("write 'above z=40mm'", self.extract("o.ply", "--label", "1", "--cut", "z=40mm", code=2))
+        self.assertIn("repeat --cut", self.extract("o.ply", "--label", "1", "--cut", "above z=40mm; below z=10mm", code=2))
         self.assertIn("no unit", self.extract("o.ply", "--label", "1", "--cut", "above z=40", code=2))
         self.assertFalse((self.folder / "o.ply").exists())
 

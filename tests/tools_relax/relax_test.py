@@ -343,9 +343,9 @@ class Contract(Case):
             self.assertNotIn("SPACE=LPS", comments)
 
     def test_normals_that_point_inward_are_turned_outward(self):
-        ball, faces = sphere(2)
-        hollow, inner = sphere(2, 14.0)
-        tube, sides = cylinder(16, 10)
+        ball, faces = sphere(1)
+        hollow, inner = sphere(1, 14.0)
+        tube, sides = cylinder(10, 6)
         wall = np.vstack([faces, inner[:, ::-1] + len(ball)])
         for vertices, triangles in [(ball, faces), (tube, sides), (np.vstack([ball, hollow]), wall)]:
             write_ply(self.path("outward.ply"), vertices, triangles)
@@ -472,6 +472,11 @@ class Fit(Case):
             measured = json.load(file)["result"]["boundary_percent"]
         self.assertLessEqual(measured["lower"], boundary["upper"])
         self.assertGreaterEqual(measured["upper"], boundary["lower"])
+        # A limit of shells that only a search for the fewest keeps is kept.
+        fewest = result["shells"]
+        record, _ = self.relax(self.target, self.target, self.out, "--tolerance", "0.3%", "--max-shells", fewest, "--force")
+        self.assertTrue(record["result"]["reached"])
+        self.assertLessEqual(record["result"]["shells"], fewest)
 
     def test_count_is_kept_and_threads_do_not_matter(self):
         record, _ = self.relax(self.target, self.target, self.out, "--shells", 60, "--max-iterations", 1, "--threads", 1)
@@ -575,7 +580,7 @@ class Fit(Case):
         self.assertLess(record["result"]["hausdorff_percent"]["upper"], 0.1)
 
     def test_pieces_sheets_and_crumbs_are_kept(self):
-        ball, faces = sphere(3)
+        ball, faces = sphere(2)
         crumb = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]]) + [30, 0, 0]
         sheet = np.array([[30, 10, 0], [34, 10, 0], [30, 14, 1], [34, 14, 0.0]])
         write_ply(self.path("pieces.ply"), np.vstack([ball, crumb, sheet]),
@@ -596,7 +601,7 @@ class Fit(Case):
 
     def test_tolerance_that_the_count_does_not_allow_is_4(self):
         for most in ("--shells", "--max-shells"):
-            record, _ = self.relax(self.target, self.target, self.out, "--tolerance", "0.05%", most, 20,
+            record, _ = self.relax(self.target, self.target, self.out, "--tolerance", "0.3%", most, 20,
                                    "--max-iterations", 1, expect=4)
             self.assertIs(record["result"]["reached"], False)
             self.assertLessEqual(record["result"]["shells"], 20)
@@ -646,17 +651,17 @@ class Fit(Case):
         bumpy = self.path("bumpy.ply")
         vertices, triangles = sphere(3)
         write_ply(bumpy, vertices * (1 + 0.05 * np.sin(vertices[:, :1] / 4) * np.cos(vertices[:, 1:2] / 5)), triangles)
+        coarse = self.path("coarse.ply")
+        write_ply(coarse, *sphere(1))
         counts = {}
-        for thickness in ("4mm", "16mm"):
-            record, _ = self.relax(bumpy, bumpy, self.out, "--tolerance", "2%t", "--thickness", thickness, "--force")
+        for thickness, words in (("4mm", (coarse, bumpy, self.out, "--refine")), ("16mm", (bumpy, bumpy, self.out))):
+            record, _ = self.relax(*words, "--tolerance", "2%t", "--thickness", thickness, "--force")
             result, wanted = record["result"], 0.02 * float(thickness[:-2])
             self.assertTrue(result["reached"])
             self.assertLessEqual(result["mean_distance_bound_mm"], wanted)
             self.assertLessEqual(result["mean_distance_mm"], result["mean_distance_bound_mm"])
             counts[thickness] = result["shells"]
         self.assertLess(counts["16mm"], counts["4mm"])
-        coarse = self.path("coarse.ply")
-        write_ply(coarse, *sphere(1))
         record, error = self.relax(coarse, bumpy, self.out, "--refine", "--tolerance", "1%t", "--thickness", "1mm",
                                    "--max-shells", 90, "--force", expect=4)
         self.assertIs(record["result"]["reached"], False)
@@ -676,25 +681,18 @@ class Fit(Case):
         self.assertLess(record["result"]["min_angle_deg"], 20)
         self.assertIn("the smallest angle of the shells is", err)
 
-    def test_a_limit_of_shells_that_only_a_search_for_the_fewest_keeps_is_kept(self):
-        record, _ = self.relax(self.target, self.target, self.out, "--tolerance", "0.6%")
-        fewest = record["result"]["shells"]
-        record, _ = self.relax(self.target, self.target, self.out, "--tolerance", "0.6%", "--max-shells",
-                               fewest, "--force")
-        self.assertTrue(record["result"]["reached"])
-        self.assertLessEqual(record["result"]["shells"], fewest)
-
 
 class MidSurface(Case):
     def setUp(self):
         super().setUp()
         self.ball, self.out = self.path("ball.ply"), self.path("out.ply")
-        write_ply(self.ball, *sphere(4, 10.0))
+        write_ply(self.ball, *sphere(3, 10.0))
 
     def points(self):
         return columns(read_ply(self.out)[0], "xyz")
 
     def test_of_a_sphere_is_a_sphere_half_a_wall_away(self):
+        write_ply(self.ball, *sphere(4, 10.0))
         for face, radius in (("outer", 9.0), ("inner", 11.0)):
             with self.subTest(face):
                 record, _ = self.relax(self.ball, self.ball, self.out, "--shells", 300, "--mid-surface", face, "--thickness",
@@ -740,12 +738,12 @@ class MidSurface(Case):
             self.assertLess(record["result"]["mid_surface"]["error_mm"]["mean"], 0.05)
 
     def test_a_face_turned_inward_is_turned_around(self):
-        points, triangles = sphere(4, 10.0)
+        points, triangles = sphere(3, 10.0)
         write_ply(self.ball, points, triangles[:, ::-1])
         _, error = self.relax(self.ball, self.ball, self.out, "--shells", 300, "--mid-surface", "inner", "--thickness", "2mm",
                               "--max-iterations", 1)
         self.assertIn("its normals point inward", error)
-        np.testing.assert_allclose(np.linalg.norm(self.points(), axis=1), 11, atol=0.02)
+        np.testing.assert_allclose(np.linalg.norm(self.points(), axis=1), 11, atol=0.05)
 
     def narrow_torus(self):
         """Its hole is narrower than half of a wall of 3 mm."""
@@ -775,7 +773,7 @@ class MidSurface(Case):
 
     def test_between_two_faces_measures_the_thickness(self):
         inner = self.path("inner.ply")
-        points, triangles = sphere(4, 8.0)
+        points, triangles = sphere(3, 8.0)
         write_ply(inner, points + [0.5, 0, 0], triangles)
         record, _ = self.relax(self.ball, self.ball, self.out, "--shells", 300, "--mid-surface", "outer", "--other-face", inner,
                                "--max-iterations", 1)

@@ -1,6 +1,8 @@
 #!/usr/bin/python3
 """The pages of tunica-report in a browser, and the script they carry: built anew from web/ it has the same bytes."""
 
+import atexit
+import functools
 import json
 import os
 import pathlib
@@ -15,24 +17,30 @@ SOURCE = pathlib.Path(os.environ["TUNICA_SOURCE"])
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 
 
-class WithPackages(unittest.TestCase):
-    """A copy of web/ with the packages that its lock file names."""
+@functools.cache
+def with_packages():
+    """A copy of web/ with the packages that its lock file names, once for all tests. @return its folder, and why there is none"""
+    if not shutil.which("npm"):
+        return None, "npm is not installed"
+    folder = pathlib.Path(tempfile.mkdtemp(prefix="tunica-web-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    shutil.copytree(SOURCE / "web", folder / "web", ignore=shutil.ignore_patterns("node_modules", "dist"))
+    done = subprocess.run(["npm", "ci", "--ignore-scripts", "--no-audit", "--no-fund"], cwd=folder / "web",
+                          capture_output=True, text=True)
+    if done.returncode != 0:
+        if "E40" in done.stderr or "ENOTFOUND" in done.stderr or "EAI_AGAIN" in done.stderr or "ECONN" in done.stderr:
+            return None, "npm reaches no registry"
+        raise AssertionError(done.stderr)
+    return folder, ""
 
+
+class WithPackages(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        if not shutil.which("npm"):
-            raise unittest.SkipTest("npm is not installed")
-        folder = tempfile.TemporaryDirectory(prefix="tunica-web-")
-        cls.addClassCleanup(folder.cleanup)
-        cls.folder = pathlib.Path(folder.name)
+        cls.folder, missing = with_packages()
+        if missing:
+            raise unittest.SkipTest(missing)
         cls.web = cls.folder / "web"
-        shutil.copytree(SOURCE / "web", cls.web, ignore=shutil.ignore_patterns("node_modules", "dist"))
-        done = subprocess.run(["npm", "ci", "--ignore-scripts", "--no-audit", "--no-fund"], cwd=cls.web,
-                              capture_output=True, text=True)
-        if done.returncode != 0:
-            if "E40" in done.stderr or "ENOTFOUND" in done.stderr or "EAI_AGAIN" in done.stderr or "ECONN" in done.stderr:
-                raise unittest.SkipTest("npm reaches no registry")
-            raise AssertionError(done.stderr)
 
 
 class Bundle(WithPackages):

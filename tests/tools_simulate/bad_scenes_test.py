@@ -134,6 +134,10 @@ class BadScenes(SimulateTest):
                 else:
                     self.noted(scene)
 
+    def test_a_solid_of_one_piece_against_itself(self):
+        write_vtk(self.path("one.vtk"), *block(3, np.array([4.0, 4.0, 4.0]), np.array([3.0, 3.0, -2.0])))
+        self.named(RUN + solid("one.vtk") + contact("cube", "cube"), "solid of one piece", place="[[contact]]")
+
     def test_a_body_that_crosses_itself(self):
         points, triangles, normals = sphere(1, 2)
         write_ply(self.path("twins.ply"), np.concatenate([points, points + [1, 0.1, 0.2]]),

@@ -68,6 +68,8 @@ class Holds(SimulateTest):
         self.assertIn("closed", self.done.stderr)
         self.run_tool("tube.ply", "out.hdf", *WALL, "--pressure", "1kPa", "--fix", "rims:slip", expect=2)
         self.assertIn("rims:slide", self.done.stderr)
+        self.run_tool("tube.ply", "out.hdf", *WALL, "--pressure", "1kPa", "--fix", "boundary", "--fix", "rims:slide", expect=3)
+        self.assertIn("no rim is left to slide", self.done.stderr)
         self.run_tool("tube.ply", "out.hdf", *WALL, "--pressure", "1kPa", "--support", "1e5N/m3", "--imaged-at", "1kPa",
                       "--unloaded", "u.ply", "--fix", "boundary", expect=2)
         self.assertIn("bed", self.done.stderr)

@@ -56,6 +56,8 @@ class Imaged(SimulateTest):
         np.testing.assert_allclose(self.faces("linear.hdf"), found, rtol=1e-6)
 
     def test_another_pressure_needs_a_stiffness(self):
+        self.run_tool("oval.ply", "out.hdf", *THIN, "--imaged-at", "0mmHg", "--static", expect=2)
+        self.assertIn("--pressure is missing", self.done.stderr)
         self.run_tool("oval.ply", "out.hdf", *THIN, "--imaged-at", "80mmHg", "--pressure", "120mmHg", "--static", expect=2)
         self.assertIn("--young is missing", self.done.stderr)
         self.run_tool("oval.ply", "out.hdf", *THIN, "--pressure", "120mmHg", "--static", expect=2)

@@ -91,10 +91,10 @@ class Resume(SimulateTest):
         self.assertEqual([name for name in os.listdir(self.folder) if name.startswith("out.hdf.")], [])
 
     def test_static_run_killed_many_times(self):
-        self.killed_many_times("plate.ply", STATIC, 10, 1)
+        self.killed_many_times("plate.ply", STATIC, 6, 1)
 
     def test_dynamic_run_killed_many_times(self):
-        self.killed_many_times("ball.ply", DYNAMIC, 10, 2)
+        self.killed_many_times("ball.ply", DYNAMIC, 6, 2)
 
     def test_linear_run_killed(self):
         self.write("scene.toml", """

@@ -56,31 +56,24 @@ void BoxTree::build(std::size_t begin, std::size_t end) {
   build(middle, end);
 }
 
-void BoxTree::find(const Bounds& box, double reach, std::vector<std::size_t>& found) const {
-  const auto before = narrow<std::ptrdiff_t>(found.size());
-  std::vector<std::size_t> open;
-  if (!nodes_.empty()) {
-    open.push_back(0);
+void BoxTree::refit(const std::vector<Bounds>& boxes) {
+  for (std::size_t i = 0; i < faces_.size(); ++i) {
+    boxes_[i] = boxes[faces_[i]];
   }
-  while (!open.empty()) {
-    const std::size_t number = open.back();
-    open.pop_back();
-    const Node& node = nodes_[number];
-    if (!box.meets(node.box, reach)) {
-      continue;
-    }
+  for (std::size_t number = nodes_.size(); number-- > 0;) {  // children come after their parents
+    Node& node = nodes_[number];
+    const auto add = [&](const Bounds& box) {
+      node.box.lower = node.box.lower.cwiseMin(box.lower);
+      node.box.upper = node.box.upper.cwiseMax(box.upper);
+    };
+    node.box = node.second == 0 ? boxes_[node.begin] : nodes_[number + 1].box;
     if (node.second != 0) {
-      open.push_back(node.second);
-      open.push_back(number + 1);
-      continue;
+      add(nodes_[node.second].box);
     }
-    for (std::size_t i = node.begin; i < node.end; ++i) {
-      if (box.meets(boxes_[i], reach)) {
-        found.push_back(faces_[i]);
-      }
+    for (std::size_t i = node.begin; node.second == 0 && i < node.end; ++i) {
+      add(boxes_[i]);
     }
   }
-  std::sort(found.begin() + before, found.end());
 }
 
 }  // namespace tunica

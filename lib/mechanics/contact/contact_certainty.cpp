@@ -131,14 +131,24 @@ bool ContactSystem::is_certain(const Configuration& configuration) {
     farthest = std::max(farthest, (configuration.displacement[i] - before.configuration().displacement[i]).norm());
   }
   const auto near = near_faces(now, 2 * farthest);
+  for (std::size_t number = 0; number < sides_.size(); ++number) {
+    const Side& side = sides_[number];
+    if (side.points || !side.other.rigid) {
+      continue;  // whether a mesh passes the other body is told by that one's faces
+    }
+    for (std::size_t f = surfaces_.first[side.body]; f < surfaces_.first[side.body + 1]; ++f) {
+      Group group = group_of(number, f);
+      refine(group);
+      if (!passes_rigid(group, before[f], now[f])) {
+        return false;
+      }
+    }
+  }
   for (std::size_t g = 0; g < groups_.size(); ++g) {
     if (groups_[g].point) {
-      continue;  // whether the mesh passes the other body is told by that one's faces
+      continue;
     }
     const std::size_t f = groups_[g].face;
-    if (groups_[g].other.rigid && !passes_rigid(groups_[g], before[f], now[f])) {
-      return false;
-    }
     for (const std::size_t other : near[g]) {
       if (!stay_apart(surfaces_.faces[f], before[f], now[f], surfaces_.faces[other], before[other], now[other],
                       same_distance * groups_[g].wall)) {

@@ -267,11 +267,18 @@ std::optional<Vec3> ContactSystem::first_fold(const Model& model, std::size_t co
 }
 
 void ContactSystem::require_no_own_crossing(const Model& model) const {
+  const std::vector<bool> several = of_several_parts(surfaces_);
   for (std::size_t c = 0; c < contacts_.size(); ++c) {
     const Contact& contact = contacts_[c];
     const auto& [a, b] = contact.between;
     if (a.rigid || b.rigid || a.index != b.index) {
       continue;
+    }
+    if (model.is_solid(a.index) && !several[a.index]) {
+      throw InputError(fmt::format(
+          "{}{} is a solid of one piece, whose parts contact does not hold apart: leave this contact out, or give what "
+          "may meet as pieces that do not hang together",
+          contact.said_at.empty() ? "" : contact.said_at + ": ", model.name_of(a.index)));
     }
     if (const auto at = OwnCrossing(surfaces_, a.index, reference_).find()) {
       throw InputError(fmt::format(

@@ -30,6 +30,9 @@ constexpr double sag_of_resolution = 0.05;     // what a surface may bend betwee
 constexpr double straight_above = 1e-3;        // sine between the way to a surface and its normal
 constexpr int least_level = 4, most_level = 32;
 
+/// However small a rigid body is, between samples it moves away by no more than they are apart.
+double bend_of_rigid(double curvature, double longest) { return std::min(longest * longest / 6 * curvature, longest); }
+
 }  // namespace
 
 ContactSystem::ContactSystem(const Model& model, Surfaces surfaces, std::vector<Vec3> reference,
@@ -67,10 +70,9 @@ ContactSystem::ContactSystem(const Model& model, Surfaces surfaces, std::vector<
     }
     meetings_.push_back(fmt::format("{} meets {}", name(one), self ? "itself" : name(other)));
   }
-  make_groups();
   accepted_ = maps_at(rest_);
-  const FaceMaps& maps = *accepted_;
-  refine(maps);
+  make_sides();
+  refine(*accepted_);
   require_apart(model);
   accept(rest_);
 }
@@ -86,7 +88,7 @@ std::shared_ptr<const FaceMaps> ContactSystem::maps_at(const Configuration& conf
   return last_;
 }
 
-void ContactSystem::make_groups() {
+void ContactSystem::make_sides() {
   const auto wall_of = [&](std::size_t body) {
     double wall = 0;
     std::size_t count = 0;
@@ -99,72 +101,153 @@ void ContactSystem::make_groups() {
     return wall / real(std::max<std::size_t>(1, count));
   };
   const auto young_of = [&](std::size_t body) { return surfaces_.faces[surfaces_.first[body]].young; };
+  std::map<std::size_t, double> walls;  // of the bodies that deform
+  for (const Contact& contact : contacts_) {
+    for (const ContactParty& party : contact.between) {
+      if (!party.rigid && walls.emplace(party.index, 0).second) {
+        walls[party.index] = wall_of(party.index);
+        std::vector<std::size_t> faces(surfaces_.first[party.index + 1] - surfaces_.first[party.index]);
+        std::iota(faces.begin(), faces.end(), surfaces_.first[party.index]);
+        std::vector<Bounds> boxes(surfaces_.faces.size());
+        for (const std::size_t f : faces) {
+          boxes[f] = accepted_->bounds(f);
+          thickest_[party.index] = std::max(thickest_[party.index], surfaces_.faces[f].half_thickness);
+        }
+        trees_.emplace(party.index, std::make_shared<BoxTree>(std::move(faces), boxes));
+      }
+    }
+  }
   for (std::size_t c = 0; c < contacts_.size(); ++c) {
     const Contact& contact = contacts_[c];
     const bool both = !contact.between[0].rigid && !contact.between[1].rigid;
     const bool self = both && contact.between[0].index == contact.between[1].index;
-    double young = infinity;
+    double young = infinity, wall = infinity;
     for (const ContactParty& party : contact.between) {
       young = party.rigid ? young : std::min(young, young_of(party.index));
+      wall = party.rigid ? wall : std::min(wall, walls[party.index]);
     }
     young_.push_back(young);
     stiffness_.push_back(first_stiffness * young);
     largest_pressure_.push_back(0);
     pressed_.push_back(0);
-    for (std::size_t side = 0; side < (self ? 1 : 2); ++side) {
-      const ContactParty& own = contact.between[side];
-      const ContactParty& other = contact.between[1 - side];
-      if (own.rigid) {
-        if (!shapes_[own.index].convex()) {
-          add_points(contact, c, side, wall_of(other.index));
-        }
+    for (std::size_t k = 0; k < (self ? 1 : 2); ++k) {
+      const ContactParty &own = contact.between[k], &other = contact.between[1 - k];
+      if (own.rigid && shapes_[own.index].convex()) {
         continue;
       }
-      const double wall = both ? std::min(wall_of(own.index), wall_of(other.index)) : wall_of(own.index);
-      for (std::size_t f = surfaces_.first[own.index]; f < surfaces_.first[own.index + 1]; ++f) {
-        const SurfaceFace& face = surfaces_.faces[f];
-        Group group;
-        group.face = f;
-        group.contact = c;
-        group.other = other;
-        group.weight = both || !shapes_[other.index].convex() ? 0.5 : 1;
-        group.wall = face.half_thickness > 0 ? std::min(wall, 2 * face.half_thickness) : wall;
-        group.resolution = contact.resolution * group.wall;
-        group.elastic_slip = elastic_slip_of_wall * wall;
-        groups_.push_back(std::move(group));
+      const bool one = !own.rigid && other.rigid && shapes_[other.index].convex();
+      sides_.push_back({c, own.index, other, own.rigid, one ? 1 : 0.5, wall});
+      if (own.rigid) {
+        add_points(sides_.size() - 1);
+        continue;
       }
+      std::vector<Group> groups;
+      for (std::size_t f = surfaces_.first[own.index]; f < surfaces_.first[own.index + 1]; ++f) {
+        Group group = group_of(sides_.size() - 1, f);
+        resolution_ = std::min(resolution_, group.resolution);
+        if (!other.rigid) {
+          groups.push_back(std::move(group));
+        }
+      }
+      add_groups(std::move(groups));
     }
   }
 }
 
-void ContactSystem::add_points(const Contact& contact, std::size_t number, std::size_t side, double wall) {
+ContactSystem::Group ContactSystem::group_of(std::size_t number, std::size_t f) const {
+  const Side& side = sides_[number];
+  const SurfaceFace& face = surfaces_.faces[f];
+  Group group;
+  group.side = number;
+  group.face = f;
+  group.contact = side.contact;
+  group.other = side.other;
+  group.weight = side.weight;
+  group.wall = face.half_thickness > 0 ? std::min(side.wall, 2 * face.half_thickness) : side.wall;
+  group.resolution = contacts_[side.contact].resolution * group.wall;
+  group.elastic_slip = elastic_slip_of_wall * side.wall;
+  return group;
+}
+
+void ContactSystem::add_points(std::size_t number) {
   constexpr double spacing_of_edge = 0.25;
-  const ContactParty& other = contact.between[1 - side];
-  const std::size_t rigid = contact.between[side].index;
+  const Side& side = sides_[number];
   double edges = 0;
-  for (std::size_t f = surfaces_.first[other.index]; f < surfaces_.first[other.index + 1]; ++f) {
+  for (std::size_t f = surfaces_.first[side.other.index]; f < surfaces_.first[side.other.index + 1]; ++f) {
     edges += (reference_[surfaces_.faces[f].nodes[1]] - reference_[surfaces_.faces[f].nodes[0]]).norm();
   }
   const double mean =
-      edges / real(std::max<std::size_t>(1, surfaces_.first[other.index + 1] - surfaces_.first[other.index]));
+      edges / real(std::max<std::size_t>(1, surfaces_.first[side.other.index + 1] - surfaces_.first[side.other.index]));
   const double spacing = spacing_of_edge * mean;
-  for (const Vec3& point : shapes_[rigid].corners_and_edges(spacing)) {
+  for (const Vec3& point : shapes_[side.body].corners_and_edges(spacing)) {
     Group group;
+    group.side = number;
     group.point = point;
-    group.rigid = rigid;
-    group.contact = number;
-    group.other = other;
-    group.weight = 0.5;
-    group.wall = wall;
-    group.resolution = contact.resolution * wall;
-    group.elastic_slip = elastic_slip_of_wall * wall;
+    group.rigid = side.body;
+    group.contact = side.contact;
+    group.other = side.other;
+    group.weight = side.weight;
+    group.wall = side.wall;
+    group.resolution = contacts_[side.contact].resolution * side.wall;
+    group.elastic_slip = elastic_slip_of_wall * side.wall;
     group.level = 1;
     group.samples.emplace_back();
     group.samples.back().weights.setZero();
     group.samples.back().at.setZero();
     group.samples.back().area = spacing * spacing;
+    resolution_ = std::min(resolution_, group.resolution);
     groups_.push_back(std::move(group));
   }
+}
+
+void ContactSystem::add_groups(std::vector<Group> more) {
+  if (more.empty()) {
+    return;
+  }
+  const auto before = [](const Group& a, const Group& b) {
+    return std::pair(a.side, a.face) < std::pair(b.side, b.face);
+  };
+  const auto middle = narrow<std::ptrdiff_t>(groups_.size());
+  std::ranges::move(more, std::back_inserter(groups_));
+  std::inplace_merge(groups_.begin(), groups_.begin() + middle, groups_.end(), before);
+}
+
+void ContactSystem::gather(const FaceMaps& maps) {
+  std::vector<Group> more;
+  auto known = groups_.begin();
+  for (std::size_t number = 0; number < sides_.size(); ++number) {
+    const Side& side = sides_[number];
+    if (side.points || !side.other.rigid) {
+      continue;
+    }
+    known = std::find_if(known, groups_.end(), [&](const Group& group) { return group.side >= number; });
+    const RigidShape& shape = shapes_[side.other.index];
+    const double resolution = contacts_[side.contact].resolution * side.wall;
+    // Of any of its groups, by refine().
+    const double sag = std::max(sag_of_resolution * resolution, side.largest_bend / (most_level * most_level));
+    const double reach = resolution + sag + thickest_.at(side.body);
+    std::vector<std::size_t> faces;
+    trees_.at(side.body)->find_if(
+        [&](const Bounds& box) {
+          const Vec3 centre = (box.lower + box.upper) / 2;
+          return shape.at(centre).distance - (box.upper - centre).norm() < reach;
+        },
+        faces);
+    for (const std::size_t f : faces) {
+      while (known != groups_.end() && known->side == number && known->face < f) {
+        ++known;
+      }
+      if (known != groups_.end() && known->side == number && known->face == f) {
+        continue;
+      }
+      Group group = group_of(number, f);
+      refine(group);
+      if (is_near(group, maps)) {
+        more.push_back(std::move(group));
+      }
+    }
+  }
+  add_groups(std::move(more));
 }
 
 Vec3 ContactSystem::place(const Group& group, const Sample& sample, const FaceMaps& maps) const {
@@ -230,34 +313,47 @@ ContactSystem::Sample ContactSystem::sample_at(const Group& group, const PatchMa
 }
 
 void ContactSystem::refine(const FaceMaps& maps) {
-  for (Group& group : groups_) {
-    if (group.point) {
-      continue;
-    }
-    const SurfaceFace& face = surfaces_.faces[group.face];
-    const PatchMap& map = maps[group.face];
-    double longest = 0;
-    for (int k = 0; k < 3; ++k) {
-      longest = std::max(longest, (map.points().col((k + 1) % 3) - map.points().col(k)).norm());
-    }
-    // What the farthest point of a part bends away from the plane at its middle, with one piece per edge.
-    double bend = face.curved ? flatness(patch_of(face, map), 1) : 0;
-    if (group.other.rigid) {
-      // However small a body is, between samples it moves away by no more than they are apart.
-      bend += std::min(longest * longest / 6 * shapes_[group.other.index].largest_curvature(), longest);
-    } else {
-      bend *= 2;
-    }
-    const double wanted = std::sqrt(bend / (sag_of_resolution * group.resolution));
-    const auto level = narrow<int>(std::lround(std::clamp(std::ceil(wanted), real(least_level), real(most_level))));
-    if (level > group.level) {
-      group.level = level;
-      if (!group.samples.empty()) {
-        sample(group, level);
+  bends_.assign(surfaces_.faces.size(), {0, 0});
+  std::map<std::size_t, std::array<double, 2>> largest;
+  for (const auto& [body, tree] : trees_) {
+    for (std::size_t f = surfaces_.first[body]; f < surfaces_.first[body + 1]; ++f) {
+      const PatchMap& map = maps[f];
+      auto& [bend, longest] = bends_[f];
+      // What the farthest point of a part bends away from the plane at its middle, with one piece per edge.
+      bend = surfaces_.faces[f].curved ? flatness(patch_of(surfaces_.faces[f], map), 1) : 0;
+      for (int k = 0; k < 3; ++k) {
+        longest = std::max(longest, (map.points().col((k + 1) % 3) - map.points().col(k)).norm());
       }
+      largest[body] = {std::max(largest[body][0], bend), std::max(largest[body][1], longest)};
     }
-    group.sag = bend / (group.level * group.level);
   }
+  for (Side& side : sides_) {
+    if (!side.points && side.other.rigid) {
+      side.other_bend = shapes_[side.other.index].largest_curvature();
+      const auto [bend, longest] = largest[side.body];
+      side.largest_bend = bend + bend_of_rigid(side.other_bend, longest);
+    }
+  }
+  for (Group& group : groups_) {
+    refine(group);
+  }
+}
+
+void ContactSystem::refine(Group& group) const {
+  if (group.point) {
+    return;
+  }
+  const auto [own, longest] = bends_[group.face];
+  const double bend = group.other.rigid ? own + bend_of_rigid(sides_[group.side].other_bend, longest) : 2 * own;
+  const double wanted = std::sqrt(bend / (sag_of_resolution * group.resolution));
+  const auto level = narrow<int>(std::lround(std::clamp(std::ceil(wanted), real(least_level), real(most_level))));
+  if (level > group.level) {
+    group.level = level;
+    if (!group.samples.empty()) {
+      sample(group, level);
+    }
+  }
+  group.sag = bend / (group.level * group.level);
 }
 
 bool ContactSystem::harden() {
@@ -335,46 +431,29 @@ bool ContactSystem::is_carried(const SurfaceFace& face, std::size_t body) const 
   });
 }
 
-std::vector<std::vector<std::size_t>> ContactSystem::near_faces(const FaceMaps& maps, double more) const {
+std::vector<std::vector<std::size_t>> ContactSystem::near_faces(const FaceMaps& maps, double more) {
   constexpr std::size_t groups_per_task = 256;
-  std::vector<std::vector<std::size_t>> near(groups_.size());
-  std::map<std::size_t, BoxTree> trees;  // of a body
   std::vector<Bounds> bounds(surfaces_.faces.size());
-  std::map<std::size_t, double> thickest;  // half walls
-  std::set<std::size_t> prepared;
-  const auto prepare = [&](std::size_t body) {
-    for (std::size_t f = surfaces_.first[body]; prepared.count(body) == 0 && f < surfaces_.first[body + 1]; ++f) {
+  for (auto& [body, tree] : trees_) {
+    for (std::size_t f = surfaces_.first[body]; f < surfaces_.first[body + 1]; ++f) {
       bounds[f] = maps.bounds(f);
-      thickest[body] = std::max(thickest[body], surfaces_.faces[f].half_thickness);
     }
-    prepared.insert(body);
-  };
-  for (const Group& group : groups_) {
-    if (group.other.rigid) {
-      continue;
-    }
-    prepare(group.other.index);
-    if (!group.point) {
-      prepare(surfaces_.faces[group.face].body);
-    }
-    if (trees.count(group.other.index) == 0) {
-      std::vector<std::size_t> faces(surfaces_.first[group.other.index + 1] - surfaces_.first[group.other.index]);
-      std::iota(faces.begin(), faces.end(), surfaces_.first[group.other.index]);
-      trees.emplace(group.other.index, BoxTree(std::move(faces), bounds));
-    }
+    tree->refit(bounds);
   }
+  gather(maps);
+  std::vector<std::vector<std::size_t>> near(groups_.size());
   parallel_for_blocks(groups_.size(), groups_per_task, [&](std::size_t begin, std::size_t end) {
     for (std::size_t g = begin; g < end; ++g) {
       const Group& group = groups_[g];
       if (group.other.rigid) {
         continue;
       }
-      const double thick = thickest.at(group.other.index);
+      const double thick = thickest_.at(group.other.index);
       const Vec3 point = group.point ? shapes_[group.rigid].of_mesh(*group.point) : Vec3(Vec3::Zero());
       const Bounds own = group.point ? Bounds{point, point} : bounds[group.face];
       const double walls = (group.point ? 0 : surfaces_.faces[group.face].half_thickness) + thick;
       const double reach = std::max(group.resolution, thick == 0 ? group.wall / 4 : 0) + group.sag + walls + more;
-      trees.at(group.other.index).find(own, reach, near[g]);
+      trees_.at(group.other.index)->find(own, reach, near[g]);
       std::erase_if(near[g], [&](std::size_t f) { return excluded(group, f); });
     }
   });
@@ -455,6 +534,7 @@ ContactSystem::Touch ContactSystem::touch(const Group& group, const Vec3& x, con
 void ContactSystem::set_step(double from, double to, const Configuration& configuration) {
   stiffness_ = accepted_stiffness_;
   std::ranges::for_each(groups_, let_sleep);
+  std::erase_if(groups_, [](const Group& group) { return group.other.rigid && group.samples.empty(); });
   refine(*maps_at(configuration));
   begin_ = from;
   end_ = to;
@@ -483,8 +563,7 @@ void ContactSystem::set_left(double left) {
 }
 
 bool ContactSystem::find_pairs(const Configuration& configuration) {
-  if (std::all_of(groups_.begin(), groups_.end(),
-                  [](const Group& group) { return group.other.rigid || group.point; })) {
+  if (std::ranges::all_of(sides_, [](const Side& side) { return side.other.rigid || side.points; })) {
     return false;
   }
   double edges = 0;
@@ -519,14 +598,6 @@ void ContactSystem::accept(const Configuration& configuration) {
   accepted_stiffness_ = stiffness_;
   std::ranges::transform(pressed_, largest_pressure_, pressed_.begin(),
                          [](double a, double b) { return std::max(a, b); });
-}
-
-double ContactSystem::resolution() const {
-  double smallest = infinity;
-  for (const Group& group : groups_) {
-    smallest = std::min(smallest, group.resolution);
-  }
-  return smallest;
 }
 
 void ContactSystem::go_back() {
@@ -589,6 +660,11 @@ std::vector<double> ContactSystem::memory() const {
   for (const auto& [i, j] : pairs_) {
     values.insert(values.end(), {real(i), real(j)});
   }
+  const auto comes_and_goes = [](const Group& group) { return group.other.rigid; };
+  values.push_back(real(narrow<std::size_t>(std::ranges::count_if(groups_, comes_and_goes))));
+  for (const Group& group : groups_ | std::views::filter(comes_and_goes)) {
+    values.insert(values.end(), {real(group.side), real(group.face)});
+  }
   for (const Group& group : groups_) {
     values.insert(values.end(), {real(group.level), group.sag});
     const bool rubs = contacts_[group.contact].friction > 0;
@@ -631,6 +707,19 @@ void ContactSystem::recall(const std::vector<double>& memory, const Configuratio
   }
   shapes_before_ = shapes_;
   accepted_ = maps_at(configuration);
+  std::erase_if(groups_, [](const Group& group) { return group.other.rigid; });
+  std::vector<Group> near(truncated<std::size_t>(next()));
+  for (Group& group : near) {
+    const auto side = truncated<std::size_t>(next());
+    const auto face = truncated<std::size_t>(next());
+    if (side >= sides_.size() || sides_[side].points || face >= surfaces_.faces.size() ||
+        surfaces_.faces[face].body != sides_[side].body) {
+      throw InputError("what contact remembers is of another model");
+    }
+    group = group_of(side, face);
+  }
+  add_groups(std::move(near));
+  refine(*accepted_);
   for (Group& group : groups_) {
     group.level = truncated<int>(next());
     group.sag = next();

@@ -8,6 +8,7 @@
 #include "tunica/mechanics/terms/changing_law.hpp"
 
 #include <algorithm>
+#include <array>
 #include <map>
 #include <memory>
 #include <optional>
@@ -38,6 +39,7 @@
 /// A rigid mesh also touches with its own corners, and with points along its sharp edges.
 namespace tunica {
 
+class BoxTree;
 class FaceMaps;
 
 class ContactSystem : public ChangingLaw {
@@ -79,7 +81,7 @@ public:
   }
 
   /// mm: the smallest over which pressure builds up.
-  [[nodiscard]] double resolution() const override;
+  [[nodiscard]] double resolution() const override { return resolution_; }
 
   /// Whether friction has given way somewhere, by the last forces: the tangent then is not symmetric, and its pivots
   /// say nothing about stability.
@@ -152,10 +154,22 @@ private:
     std::size_t other = SIZE_MAX;
     PatchWeights other_weights;
   };
+  /// The faces of one body towards the other party of a contact; or a rigid mesh's points.
+  struct Side {
+    std::size_t contact = 0;
+    std::size_t body = 0;  ///< number of the rigid one where `points` is set
+    ContactParty other;
+    bool points = false;
+    double weight = 1;        ///< one half where both sides are sampled
+    double wall = 0;          ///< mm, mean
+    double other_bend = 0;    ///< 1/mm, of a rigid body at the last refine()
+    double largest_bend = 0;  ///< mm, of all its faces then
+  };
   /// One face towards one other party of a contact; or one point of a rigid mesh, whose corners and edges may lie
-  /// between the samples of what it meets. There is one for each face in each contact, so that it holds samples only
-  /// while something is near.
+  /// between the samples of what it meets. Towards a body that deforms there is one for each face, which holds samples
+  /// only while something is near; towards a rigid one there are those only that were near in the step.
   struct Group {
+    std::size_t side = 0;
     std::size_t face = 0;
     std::optional<Vec3> point;  ///< of the rigid mesh, as it is given
     std::size_t rigid = 0;      ///< whose point that is
@@ -186,8 +200,13 @@ private:
 
   [[nodiscard]] std::shared_ptr<const FaceMaps> maps_at(const Configuration& configuration);
 
-  void make_groups();
-  void add_points(const Contact& contact, std::size_t number, std::size_t side, double wall);
+  void make_sides();
+  [[nodiscard]] Group group_of(std::size_t side, std::size_t face) const;
+  void add_points(std::size_t side);
+  /// Adds groups that are not there yet. They stand by their sides and faces.
+  void add_groups(std::vector<Group> more);
+  /// Adds groups for the faces that rigid bodies are near.
+  void gather(const FaceMaps& maps);
   [[nodiscard]] Vec3 place(const Group& group, const Sample& sample, const FaceMaps& maps) const;
   /// Whether a group may touch what it looks at.
   [[nodiscard]] bool is_close(const Group& group, const std::vector<std::size_t>& near, const FaceMaps& maps) const;
@@ -207,15 +226,17 @@ private:
   static void let_sleep(Group& group);
   [[nodiscard]] Sample sample_at(const Group& group, const PatchMap& map, int i, int j) const;
   void keep_slip(const Configuration& configuration);
-  /// Levels and sags for a configuration.
+  /// Levels and sags for a configuration, also of groups that come later.
   void refine(const FaceMaps& maps);
+  void refine(Group& group) const;
   [[nodiscard]] double offset(const Group& group, std::size_t other) const;
   /// How far surfaces may overlap on the way to a state, mm.
   [[nodiscard]] double deepest(const Group& group, std::size_t other) const;
   [[nodiscard]] bool excluded(const Group& group, std::size_t other) const;
   [[nodiscard]] bool is_carried(const SurfaceFace& face, std::size_t body) const;
-  /// For every group towards a body that deforms: the faces that come within its reach and `more` (mm).
-  [[nodiscard]] std::vector<std::vector<std::size_t>> near_faces(const FaceMaps& maps, double more) const;
+  /// Gathers what is near, and finds for every group towards a body that deforms the faces that come within its reach
+  /// and `more` (mm).
+  [[nodiscard]] std::vector<std::vector<std::size_t>> near_faces(const FaceMaps& maps, double more);
   [[nodiscard]] bool is_near(const Group& group, const FaceMaps& maps) const;
   [[nodiscard]] Touch touch(const Group& group, const Vec3& x, const std::vector<std::size_t>& near,
                             const FaceMaps& maps) const;
@@ -267,11 +288,16 @@ private:
   std::vector<RigidShape> shapes_at_tangent_;
   double begin_ = 0, end_ = 0, left_ = 0;
   bool slides_ = false;
-  std::vector<Group> groups_;
-  std::vector<double> young_;               ///< MPa, per contact, of the softer body
-  std::vector<double> stiffness_;           ///< MPa, per contact, of the barrier
-  std::vector<double> accepted_stiffness_;  ///< of the last accepted state
-  std::vector<double> smallest_gap_;        ///< mm, per contact, of the samples at the last forces
+  std::vector<Side> sides_;
+  std::vector<Group> groups_;                              ///< by side and face
+  std::map<std::size_t, std::shared_ptr<BoxTree>> trees_;  ///< of the bodies that deform, with the boxes last asked for
+  std::map<std::size_t, double> thickest_;                 ///< mm, half walls, of these
+  std::vector<std::array<double, 2>> bends_;  ///< mm, per face at the last refine(): its bend, its longest side
+  double resolution_ = infinity;              ///< mm, the smallest
+  std::vector<double> young_;                 ///< MPa, per contact, of the softer body
+  std::vector<double> stiffness_;             ///< MPa, per contact, of the barrier
+  std::vector<double> accepted_stiffness_;    ///< of the last accepted state
+  std::vector<double> smallest_gap_;          ///< mm, per contact, of the samples at the last forces
   struct Closest {
     double gap = infinity;
     std::size_t contact = 0;

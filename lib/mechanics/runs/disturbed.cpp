@@ -3,6 +3,7 @@
 #include "tunica/core/disjoint_sets.hpp"
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
+#include "tunica/mechanics/runs/detail/corner_normals.hpp"
 #include "tunica/mechanics/runs/doubts.hpp"
 #include "tunica/mechanics/runs/solve.hpp"
 #include "tunica/surface/mesh/incidence.hpp"
@@ -15,11 +16,12 @@
 #include <algorithm>
 #include <cmath>
 #include <queue>
+#include <set>
 
 namespace tunica {
 namespace {
 
-constexpr double jump = 1.25;      // of the thickness within a shell, from which on it bends the wall
+constexpr double step = 1.25;      // of the thickness within a shell, from which on it bends the wall
 constexpr double layers = 2;       // bending lengths, within which stress is that of what disturbs it
 constexpr double flattest = 1e-6;  // curvature times the body's diagonal, below which it is round-off
 
@@ -103,6 +105,33 @@ std::vector<double> scaled_distances(const ShellMesh& mesh, std::vector<double> 
 
 }  // namespace
 
+double slant_of_rim(const ShellBody& body, const Fix& fix) {
+  const std::set<Index> nodes(fix.nodes.begin(), fix.nodes.end());
+  const CornerNormals normal(body.mesh, body.curved);
+  double length = 0, squares = 0;
+  const TriangleMesh facets = flat_facets(body.mesh);
+  for (const auto& [t, k] : boundary_edges(neighbours(facets, incidence(facets)))) {
+    const std::array<Index, 3>& v = facets.triangles[t];
+    const std::size_t next = (k + 1) % 3;
+    if (nodes.contains(v[k]) && nodes.contains(v[next])) {
+      const double part = (facets.vertices[v[next]] - facets.vertices[v[k]]).norm();
+      const double sine = (normal(t, k) + normal(t, next)).normalized().dot(*fix.across);
+      length += part;
+      squares += part * sine * sine;
+    }
+  }
+  return length > 0 ? std::sqrt(2 * squares / length) : 0;
+}
+
+bool is_step(const ShellBody& body, std::size_t triangle) {
+  if (body.thickness.size() == 1) {
+    return false;
+  }
+  const auto& t = body.mesh.triangles[triangle];
+  const auto [least, most] = std::minmax({body.thickness[t[0]], body.thickness[t[1]], body.thickness[t[2]]});
+  return most > step * least;
+}
+
 std::vector<std::uint8_t> disturbed_nodes(const Model& model, std::size_t b) {
   require_valid(model);
   if (b >= model.shells.size()) {
@@ -117,7 +146,7 @@ std::vector<std::uint8_t> disturbed_nodes(const Model& model, std::size_t b) {
   };
   std::vector<std::uint8_t> slides(disturbed.size(), 0);  // as in a plane of symmetry: nothing bends there
   for (const Fix& fix : model.fixes) {
-    if (fix.body == b && fix.across) {
+    if (fix.body == b && fix.across && slant_of_rim(body, fix) <= upright) {
       for (const Index node : fix.nodes) {
         slides[node] = 1;
       }
@@ -142,10 +171,10 @@ std::vector<std::uint8_t> disturbed_nodes(const Model& model, std::size_t b) {
       mark({v[k], v[(k + 1) % 3]});
     }
   }
-  for (const auto& t : body.thickness.size() > 1 ? body.mesh.triangles : decltype(body.mesh.triangles){}) {
-    const auto [least, most] = std::minmax({body.thickness[t[0]], body.thickness[t[1]], body.thickness[t[2]]});
-    if (most > jump * least) {
-      mark({t[0], t[1], t[2]});
+  for (std::size_t t = 0; t < body.mesh.triangles.size(); ++t) {
+    if (is_step(body, t)) {
+      const auto& [i, j, k] = body.mesh.triangles[t];
+      mark({i, j, k});
     }
   }
   return disturbed;

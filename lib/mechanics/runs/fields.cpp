@@ -20,8 +20,7 @@
 namespace tunica {
 namespace {
 
-constexpr double rare = 0.01;       // of the area, on which a 99th percentile is passed
-constexpr double even_wall = 1.25;  // most by least thickness in a shell: to there its corners have their own
+constexpr double rare = 0.01;  // of the area, on which a 99th percentile is passed
 
 std::vector<double> lengths(const std::vector<Vec3>& vectors) {
   std::vector<double> result;
@@ -235,15 +234,11 @@ ElementFields element_fields(const Model& model, const State& state) { return El
 
 double ElementFieldEvaluator::Implementation::thickness_at(std::size_t t, int corner) const {
   const ShellElement& element = system.elements[t];
-  const auto& of_nodes = model.shells[element.body].thickness;
-  if (of_nodes.size() == 1) {
+  const ShellBody& body = model.shells[element.body];
+  if (body.thickness.size() == 1 || is_step(body, t - system.first_element[element.body])) {
     return element.thickness;
   }
-  const std::size_t first = model.first_node(element.body);
-  const std::array<double, 3> own{of_nodes[element.nodes[0] - first], of_nodes[element.nodes[1] - first],
-                                  of_nodes[element.nodes[2] - first]};
-  const auto [least, most] = std::ranges::minmax(own);
-  return most > even_wall * least ? element.thickness : own[corner];
+  return body.thickness[element.nodes[corner] - model.first_node(element.body)];
 }
 
 bool ElementFieldEvaluator::Implementation::is_held(const Vec3& place) const {

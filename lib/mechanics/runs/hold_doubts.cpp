@@ -4,6 +4,7 @@
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/mechanics/elements/rotation.hpp"
+#include "tunica/mechanics/runs/disturbed.hpp"
 #include "tunica/mechanics/runs/doubts.hpp"
 #include "tunica/shell/distance/shell_crossings.hpp"
 #include "tunica/surface/mesh/incidence.hpp"
@@ -95,6 +96,35 @@ std::vector<Lumen> lumens_of(const ShellMesh& mesh, const std::vector<char>& tou
     lumen.centre /= lumen.length;
   }
   return lumens;
+}
+
+/// The rim that slides least upright, of a body under pressure.
+void doubt_slides(const Model& model, std::size_t b, std::vector<Warning>& found) {
+  constexpr double far_off = 0.2;
+  const ShellBody& body = model.shells[b];
+  const Fix* worst = nullptr;
+  double slant = upright;
+  for (const Fix& fix : model.fixes) {
+    if (const double here = fix.body == b && fix.across ? slant_of_rim(body, fix) : 0; here > slant) {
+      worst = &fix;
+      slant = here;
+    }
+  }
+  if (worst == nullptr) {
+    return;
+  }
+  Vec3 middle = Vec3::Zero();
+  for (const Index node : worst->nodes) {
+    middle += body.mesh.vertices[node] / real(worst->nodes.size());
+  }
+  found.push_back(
+      {slant > far_off ? Weight::major : Weight::minor, "slanting rim",
+       fmt::format("{}: the rim at {} slides in its plane, which the wall meets some {:.0f} degrees off a right angle: "
+                   "stress around it may be off by {:.0f} to {:.0f} %, for nothing pulls there as the vessel that goes "
+                   "on would: "
+                   "hold it instead (--fix boundary, FIX=boundary), or cut the vessel straight across",
+                   named(body.said_at, body.name), where(middle),
+                   std::asin(std::min(1.0, slant)) * 180 / std::numbers::pi, 1e2 * slant, 2e2 * slant)});
 }
 
 /// The connected pieces of a shell, by their nodes; without those that no triangle has.
@@ -207,6 +237,7 @@ std::vector<Warning> doubts_of_ends(const Model& model) {
     if (pressure == 0) {
       continue;
     }
+    doubt_slides(model, b, found);
     std::size_t count = 0;
     const Lumen* widest = nullptr;
     const std::vector<Lumen> lumens = lumens_of(body.mesh, touched_nodes(model, b));
@@ -223,9 +254,8 @@ std::vector<Warning> doubts_of_ends(const Model& model) {
           {Weight::minor, "free end",
            fmt::format(
                "{}: {} free, {}at {}: what continues it there would pull with the pressure times the lumen, "
-               "{:.3g} N, and nothing does: hold the ends (--fix boundary, FIX=boundary), or let those of a straight "
-               "vessel slide in "
-               "their planes (--fix rims:slide, FIX=rims:slide)",
+               "{:.3g} N, and nothing does: hold the ends (--fix boundary, FIX=boundary), or let those "
+               "that are cut straight across slide in their planes (--fix rims:slide, FIX=rims:slide)",
                named(body.said_at, body.name), count == 1 ? "an open end is" : fmt::format("{} open ends are", count),
                count == 1 ? "" : "the widest ", where(widest->centre), std::abs(pressure) * widest->area.norm())});
     }

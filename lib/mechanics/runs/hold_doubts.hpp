@@ -12,7 +12,8 @@
 namespace tunica {
 
 /// Open ends of a shell under pressure that nothing holds and no force pulls: what continues the vessel there would
-/// pull with the pressure times the lumen. Cost: linear.
+/// pull with the pressure times the lumen. And rims that slide in planes that the wall meets at a slant, where it would
+/// pull in the plane as well (slant_of_rim()). Cost: linear.
 std::vector<Warning> doubts_of_ends(const Model& model);
 
 /// Swings of a state: the rigid motion nearest to what a connected piece under pressure does makes more than half of

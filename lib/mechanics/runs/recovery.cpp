@@ -2,6 +2,7 @@
 
 #include "tunica/core/disjoint_sets.hpp"
 #include "tunica/core/narrow.hpp"
+#include "tunica/mechanics/runs/disturbed.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -46,7 +47,8 @@ void Recovery::add_body(const ShellBody& body, std::span<const ShellElement> ele
       }
       const auto [other, is_first] = sides.emplace(std::pair{ends[0], ends[1]}, here);
       for (std::size_t end = 0; end < 2 && !is_first; ++end) {
-        if (is_smooth(body, normal_at(here[end]), normal_at(other->second[end]))) {
+        if (is_step(body, t) == is_step(body, other->second[end] / 3) &&
+            is_smooth(body, normal_at(here[end]), normal_at(other->second[end]))) {
           smooth.join(here[end], other->second[end]);
         }
       }

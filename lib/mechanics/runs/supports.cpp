@@ -255,10 +255,18 @@ void make_supports(ShellSystem& system) {
     }
   }
   std::set<std::size_t> sliding;
+  const Fix* slide = nullptr;
   for (const Fix& fix : model.fixes) {
     if (fix.across) {
+      slide = &fix;
       hold_slide(system, fix, sliding);
     }
+  }
+  if (slide != nullptr && sliding.empty()) {
+    throw InputError(
+        fmt::format("{}{}: no rim is left to slide, for other fixes hold all of them altogether: keep one "
+                    "of them",
+                    slide->said_at.empty() ? "" : slide->said_at + ": ", model.name_of(slide->body)));
   }
   for (std::size_t i = 0; i < system.node_count(); ++i) {
     if (system.used[i] == 0) {

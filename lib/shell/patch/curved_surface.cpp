@@ -478,7 +478,7 @@ double curved_volume(const ShellMesh& shell) {
   double volume = 0;
   const auto key = [](Index from, Index to) { return (std::uint64_t{from} << 32) | to; };
   for (std::size_t t = 0; t < shell.triangles.size(); ++t) {
-    Deflection w{};  // between watertight patches there is no gap
+    Deflection w{{}, Vec3::Zero()};  // between watertight patches there is no gap
     if (!watertight.empty()) {
       volume += flux_volume(watertight[t], origin);
     } else {

@@ -1,6 +1,7 @@
 #include "tunica/volume/labels/mask.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/progress.hpp"
 #include "tunica/core/threads.hpp"
 #include "tunica/volume/labels/pack_bits.hpp"
@@ -224,6 +225,21 @@ std::size_t count_at_border(const Mask& mask) {
     }
   }
   return count;
+}
+
+void drop_beyond(Mask& mask, const Vec3& normal, double offset) {
+  const auto [width, height, depth] = mask.dims();
+  const double step = normal.dot(mask.affine().col(0));
+  for (std::size_t k = 0; k < depth; ++k) {
+    for (std::size_t j = 0; j < height; ++j) {
+      const double first = normal.dot(mask.affine() * Eigen::Vector4d(0, real(j), real(k), 1));
+      for (std::size_t i = 0; i < width; ++i) {
+        if (first + step * real(i) > offset && mask(i, j, k)) {
+          mask.set(i, j, k, false);
+        }
+      }
+    }
+  }
 }
 
 std::size_t count_differing(const Mask& a, const Mask& b) {

@@ -2,6 +2,8 @@
 
 #include "tunica/mechanics/contact/detail/contact_parts.hpp"
 
+#include <algorithm>
+#include <cstddef>
 #include <vector>
 
 namespace tunica {
@@ -14,8 +16,43 @@ public:
   /// @param faces  numbers; boxes  by number, copied
   BoxTree(std::vector<std::size_t> faces, const std::vector<Bounds>& boxes);
 
-  /// Adds the faces whose boxes come within `reach` (mm, along each axis) of `box`, in increasing order.
-  void find(const Bounds& box, double reach, std::vector<std::size_t>& found) const;
+  /// Takes the boxes anew, where faces have moved; the halves stay. Cost: linear.
+  void refit(const std::vector<Bounds>& boxes);
+
+  /// Adds the faces for whose boxes `is_near` holds, in increasing order. Where it holds for a box it holds for all
+  /// that contain it.
+  template <typename IsNear>
+  void find_if(IsNear&& is_near, std::vector<std::size_t>& found) const {
+    const auto before = static_cast<std::ptrdiff_t>(found.size());
+    std::vector<std::size_t> open;
+    if (!nodes_.empty()) {
+      open.push_back(0);
+    }
+    while (!open.empty()) {
+      const std::size_t number = open.back();
+      open.pop_back();
+      const Node& node = nodes_[number];
+      if (!is_near(node.box)) {
+        continue;
+      }
+      if (node.second != 0) {
+        open.push_back(node.second);
+        open.push_back(number + 1);
+        continue;
+      }
+      for (std::size_t i = node.begin; i < node.end; ++i) {
+        if (is_near(boxes_[i])) {
+          found.push_back(faces_[i]);
+        }
+      }
+    }
+    std::sort(found.begin() + before, found.end());
+  }
+
+  /// The same of the faces whose boxes come within `reach` (mm, along each axis) of `box`.
+  void find(const Bounds& box, double reach, std::vector<std::size_t>& found) const {
+    find_if([&](const Bounds& other) { return box.meets(other, reach); }, found);
+  }
 
 private:
   struct Node {

@@ -14,14 +14,13 @@ struct TensorPair {
 
 /// Continuous fields from what shells hold constant: linear within each shell, of least square difference over the area
 /// from the shells' values. Continuous at every node among the shells that go on smoothly in each other: not across
-/// creases, nor between bodies. A tensor is carried from a shell to a node by the smallest rotation of its normal.
-/// Means at the nodes of the shells' values lose what a field curves within a star of shells, 5/48 of h^2 times its
-/// Laplacian; this undoes it but for 1/48 of the other sign on a regular mesh (in one dimension, for all of it).
-/// At a rim, where shells are on one side only, both are of first order: h times the slope by .29 here, by .5 there.
-/// Source: Hinton, Campbell 1974, "Local and global smoothing of discontinuous finite element functions using a least
-/// squares method"; Oden, Brauchli 1971.
-/// Cost: linear; the mass matrix has a condition of 4 over its lumped one, so some fifteen iterations of conjugate
-/// gradients.
+/// creases and steps of the thickness, nor between bodies. A tensor is carried from a shell to a node by the smallest
+/// rotation of its normal. Means at the nodes of the shells' values lose what a field curves within a star of shells,
+/// 5/48 of h^2 times its Laplacian; this undoes it but for 1/48 of the other sign on a regular mesh (in one dimension,
+/// for all of it). At a rim, where shells are on one side only, both are of first order: h times the slope by .29 here,
+/// by .5 there. Source: Hinton, Campbell 1974, "Local and global smoothing of discontinuous finite element functions
+/// using a least squares method"; Oden, Brauchli 1971. Cost: linear; the mass matrix has a condition of 4 over its
+/// lumped one, so some fifteen iterations of conjugate gradients.
 class Recovery {
 public:
   Recovery(const ShellSystem& system);
