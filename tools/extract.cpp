@@ -567,12 +567,15 @@ void doubt(cli::Tool& tool, const Subject& subject, const Surface& surface, cons
 }
 
 void write(cli::Tool& tool, const fs::path& out, TriangleMesh mesh, const std::string& name, const Vec3& voxel,
-           const Arguments& arguments) {
+           const std::optional<std::string>& face, const Arguments& arguments) {
   const auto stage = tool.stage("write");
   PlyOptions options;
   options.comments = {fmt::format("tunica-extract {}", version), printable("made by " + tool.made_by()),
                       printable("source " + tool.provenance().name_of(arguments.volume)), printable(name),
                       fmt::format("voxel {:.6g} {:.6g} {:.6g} mm", voxel.x(), voxel.y(), voxel.z())};
+  if (face) {
+    options.comments.push_back("face " + *face);
+  }
   options.space = arguments.space == "ras" ? "RAS" : "LPS";
   options.overwrite = tool.force();
   to_space(mesh, arguments.space);
@@ -632,7 +635,7 @@ Json extract_to_file(cli::Tool& tool, Selection selection, const Arguments& argu
   }
   doubt(tool, subject, surface, target, result, arguments);
   tool.require_unchanged_inputs();
-  write(tool, output_path(arguments.out, target), surface.mesh, name, voxel, arguments);
+  write(tool, output_path(arguments.out, target), surface.mesh, name, voxel, arguments.face, arguments);
   if (other) {
     const FaceDistance thickness =
         distance_of_faces(without_border(surface.mesh, surface.mask), without_border(other->mesh, other->mask));
@@ -643,7 +646,7 @@ Json extract_to_file(cli::Tool& tool, Selection selection, const Arguments& argu
     if (arguments.other_face) {
       const std::string& behind = *arguments.face == "inner" ? "outer" : "inner";
       write(tool, output_path(*arguments.other_face, target), other->mesh, target.name + ", " + behind + " face", voxel,
-            arguments);
+            behind, arguments);
     }
   }
   return result;

@@ -89,7 +89,7 @@ def stage_flags(case):
         decimate += ["--min-angle", "20", "--soft-angle"]  # needles would bend too stiffly
     relax = flag("--tolerance", setting("TOLERANCE")) + ["--refine"] if setting("TOLERANCE") else []
     if accuracy:
-        relax = ["--shells", shells, "--max-iterations", "1"]  # the coarsest of the levels, near enough to be refitted
+        relax = ["--shells", shells, "--max-iterations", "4"]  # the coarsest of the levels, near enough to be refitted
     relax += flag_if("--method", "METHOD")
     if setting("MID_SURFACE"):
         relax += flag("--mid-surface", setting("MID_SURFACE")) + flag_if("--thickness", "THICKNESS")

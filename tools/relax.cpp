@@ -326,14 +326,15 @@ void warn_of_crossings(const cli::Tool& tool, const ShellMesh& shell,
 /// @param coarse  triangles of COARSE
 void warn_if_few(const cli::Tool& tool, const Arguments& given, std::size_t coarse, const ShellMesh& made,
                  const Target& target) {
-  constexpr double about = 0.95;
+  constexpr double about = 0.95, few = 0.5;
   const std::size_t wanted = given.shells.value_or(coarse);
   const bool is_to_count = given.method == "fit" && !given.tolerance && !given.refine;
   if (is_to_count && real(made.triangles.size()) < about * real(wanted)) {
-    tool.warn({Weight::minor, "fewer than asked for",
-               fmt::format("{}: {} shells instead of {}: TARGET has {} triangles, and what they allow is all there is; "
-                           "for more, extract TARGET from a finer image, or split these shells by --refine",
-                           given.target.string(), made.triangles.size(), wanted, target.mesh().triangles.size())});
+    tool.warn(
+        {real(made.triangles.size()) < few * real(wanted) ? Weight::minor : Weight::note, "fewer than asked for",
+         fmt::format("{}: {} shells instead of {}: TARGET has {} triangles, and what they allow is all there is; "
+                     "for more, extract TARGET from a finer image, or split these shells by --refine (RELAX=--refine)",
+                     given.target.string(), made.triangles.size(), wanted, target.mesh().triangles.size())});
   }
 }
 
@@ -354,6 +355,33 @@ void warn_of_middle(const cli::Tool& tool, const HalfWaySurface& middle) {
                fmt::format("the middle of the wall crosses itself at {} pair(s) of its triangles: a thinner wall or a "
                            "smoother TARGET parts them",
                            middle.crossing)});
+  }
+}
+
+/// TARGET may say which face of a wall it is.
+void require_that_face(const Arguments& given, const MeshFile& target) {
+  for (const std::string face : {"inner", "outer"}) {
+    if (given.mid_surface && *given.mid_surface != face &&
+        std::ranges::find(target.comments, "face " + face) != target.comments.end()) {
+      throw InputError(
+          fmt::format("{} is the {} face of a wall, as it says, and --mid-surface (MID_SURFACE) the {}: "
+                      "name the same",
+                      given.target.string(), face, *given.mid_surface));
+    }
+  }
+}
+
+/// Areas, mm^2, of TARGET and of the middle: between both faces, as it lies half way.
+void warn_of_pressure(const cli::Tool& tool, WallFace which, double face, double middle) {
+  constexpr double notable = 1.05;
+  const double inner = which == WallFace::inner ? face : 2 * middle - face;
+  if (inner > 0 && middle > notable * inner) {
+    tool.warn(
+        {Weight::minor, "pressure on the middle",
+         fmt::format("the middle of the wall has {:.2g} times the area of its inner face, and a pressure on these "
+                     "shells acts on the middle: stress is larger by as much than by a pressure inside; divide "
+                     "the pressure (--pressure, --imaged-at; PRESSURE, IMAGED_AT) by {:.4g}",
+                     middle / inner, middle / inner)});
   }
 }
 
@@ -398,6 +426,7 @@ private:
     ply_ = ply_options(tool_, common_space(start.file, given_.coarse, surface.file, given_.target));
     const auto kept = voxel_comments(voxel_comments(surface.file).empty() ? start.file : surface.file);
     ply_.comments.insert(ply_.comments.begin(), kept.begin(), kept.end());
+    require_that_face(given_, surface.file);
     if (given_.other_face) {
       tool_.input(*given_.other_face);
       Surface other = read_surface(tool_, *given_.other_face, unit_mm);
@@ -486,6 +515,7 @@ private:
                        "wall closes a gap, or a branch is too narrow for it; a thinner wall leaves them",
                        after.boundary_loops, handles(after), before.boundary_loops, handles(before))});
     }
+    warn_of_pressure(tool_, which_face(), area(face_->mesh()), area(middle.mesh));
     Json& said = tool_.result()["mid_surface"];
     said["grid_mm"] = middle.cell;
     said["left_out"] = {{"pieces", middle.left_out}, {"area_mm2", middle.left_out_area}};

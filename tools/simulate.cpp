@@ -746,8 +746,8 @@ private:
     }
     if (!accuracy_->reasons.empty() && accuracy_->request.max_seconds) {
       tool_.warn({Weight::minor, "accuracy not reached",
-                  fmt::format("{}: {}; more shells to begin with (SHELLS=800), or a longer --max-seconds, may reach it",
-                              subject().string(), missed_accuracy(*accuracy_))});
+                  fmt::format("{}: {}; shells made anew of this surface, four times as many (SHELLS={}), may do better",
+                              subject().string(), missed_accuracy(*accuracy_), 4 * accuracy_->levels.back().shells)});
     } else if (!accuracy_->reasons.empty()) {
       journal_->remove();
       throw RequirementError(fmt::format("{}: {}; what there is stays in {}.part", subject().string(),

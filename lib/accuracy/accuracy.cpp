@@ -23,7 +23,7 @@ namespace {
 constexpr std::size_t fewest_levels = 3;               // two changes: one may be small by chance
 constexpr double model_share = 0.25;                   // of the request: what a cheaper model may be off by
 constexpr std::size_t most_from_near = 5;              // iterations; more, and the start was none
-constexpr double largest_distance = 1;                 // of the wall, of any place: above, it is another shape there
+constexpr double largest_distance = 0.5;               // of the wall, of any place: the middle lies in the wall
 constexpr double cost_of_next = 5;                     // a level's time, of the one before
 constexpr double settled_share = 0.1;                  // of the request: the last increment of Newton's method
 constexpr double residual_share = 0.01;                // of the request: where a looser one was asked for

@@ -18,6 +18,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <ranges>
 
 namespace tunica::report {
 namespace {
@@ -37,23 +38,35 @@ std::optional<std::size_t> count_in(const std::vector<std::string>& words, const
   return value && *value >= 0 && *value < 1e9 ? std::optional(truncated<std::size_t>(*value)) : std::nullopt;
 }
 
-// The rule by which the extraction chose, as its command says.
-std::optional<Inside> rule_of(const std::vector<std::string>& words, const Volume& volume) {
-  if (const auto label = flag_value(words, "--label")) {
-    if (const auto value = parse_number(*label)) {
-      return Inside{Inside::Rule::label, *value};
-    }
-    for (const auto& [value, name] : volume.label_names) {
-      if (name == *label) {
-        return Inside{Inside::Rule::label, value};
+// The rules by which the extraction chose, as its command says: that of one of them is enough.
+std::vector<Inside> rules_of(const std::vector<std::string>& words, const Volume& volume) {
+  if (const auto text = flag_value(words, "--label")) {
+    const auto label_of = [&](const std::string& label) -> std::optional<Inside> {
+      for (const auto& [value, name] : volume.label_names) {
+        if (name == label) {
+          return Inside{Inside::Rule::label, value};
+        }
       }
+      const auto value = parse_number(label);
+      return value ? std::optional(Inside{Inside::Rule::label, *value}) : std::nullopt;
+    };
+    if (const auto whole = label_of(*text)) {
+      return {*whole};
     }
-    return std::nullopt;
+    std::vector<Inside> rules;
+    for (const auto part : *text | std::views::split('+')) {
+      const auto rule = label_of(std::string(part.begin(), part.end()));
+      if (!rule) {
+        return {};
+      }
+      rules.push_back(*rule);
+    }
+    return rules;
   }
   const auto level = flag_value(words, "--isovalue");
   const auto value = level ? parse_number(*level) : std::nullopt;
   const bool below = flag_value(words, "--inside") == "below";
-  return value ? std::optional(Inside{below ? Inside::Rule::below : Inside::Rule::above, *value}) : std::nullopt;
+  return value ? std::vector{Inside{below ? Inside::Rule::below : Inside::Rule::above, *value}} : std::vector<Inside>{};
 }
 
 // Errors: InputError that says why the volume cannot be shown.
@@ -73,12 +86,15 @@ Image read_image(const PipelineCase& one) {
   options.prefer_qform = std::ranges::find(words, "--prefer-qform") != words.end();
   options.segment = flag_value(words, "--names") ? std::nullopt : flag_value(words, "--label");
   Volume volume = read_volume(path, options).volume;
-  const auto rule = rule_of(words, volume);
-  if (!rule) {
-    throw InputError("no slices: the command of the extraction names neither a label nor an isovalue");
+  const std::vector<Inside> rules = rules_of(words, volume);
+  if (rules.empty()) {
+    throw InputError("no slices: what the command of the extraction names is no label of the volume, nor an isovalue");
   }
-  Mask organ = select(volume, *rule);
-  return {std::move(volume), std::move(organ), rule->rule != Inside::Rule::label};
+  Mask organ = select(volume, rules.front());
+  for (const Inside& rule : rules | std::views::drop(1)) {
+    unite(organ, select(volume, rule));
+  }
+  return {std::move(volume), std::move(organ), rules.front().rule != Inside::Rule::label};
 }
 
 // The shells in voxel coordinates.

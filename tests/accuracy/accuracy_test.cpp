@@ -27,7 +27,7 @@ RunSettings at_rest() {
 struct Sphere {
   Target target{flat_facets(benchmarks::make_sphere(radius, 5))};
   Model model = benchmarks::pressurised_sphere(1, thickness, 0.01);
-  std::map<std::size_t, double> factors;  // of the pressure, by shells
+  std::map<std::size_t, double> factors{};  // of the pressure, by shells
   RunSettings settings = at_rest();
 
   [[nodiscard]] double exact(Quantity of) const {
@@ -64,6 +64,13 @@ TEST(Accuracy, ASphereUnderPressureIsWithinWhatIsClaimed) {
     EXPECT_EQ(found.states.size(), 2U);
     EXPECT_TRUE(found.summary.converged);
   }
+}
+
+TEST(Accuracy, APlaceThatTheMiddleOfTheWallDoesNotReachIsDoubtful) {
+  TriangleMesh surface = flat_facets(benchmarks::make_sphere(radius, 6));
+  surface.vertices[700] *= 1 + 0.95 * thickness / radius;
+  const Sphere sphere{.target = Target{surface}};
+  EXPECT_THAT(sphere.solved({0.05}).reasons, testing::Contains(testing::HasSubstr("a place of the surface lies")));
 }
 
 TEST(Accuracy, WhereDisplacementsAreSmallTheLinearModelIsTaken) {

@@ -62,7 +62,7 @@ class Organ:
         run("decimate", body.surface, start, "--triangles", 190, "--min-angle", 20)
         run("decimate", body.surface, other, "--triangles", 800, "--min-angle", 20)
         self.coarsest = body.folder / "coarsest.ply"
-        report, self.start = run("relax", start, body.surface, self.coarsest, "--shells", 190, "--max-iterations", 1)
+        report, self.start = run("relax", start, body.surface, self.coarsest, "--shells", 190, "--max-iterations", 4)
         self.fix = "boundary" if report["result"]["boundary_percent"] is not None else "rigid-motions"
         self.fine, self.seconds = [], {}
         for count in sorted({CAREFUL, finest // 4, finest}):

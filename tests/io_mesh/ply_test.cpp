@@ -219,6 +219,8 @@ TEST(PlyReader, OwnUnitWinsOverTheFlagAndNoneIsMillimetres) {
   const TemporaryFolder folder;
   const auto with_unit = folder.file("cm.ply", tetrahedron_ascii);
   EXPECT_EQ(read_mesh(with_unit, 1000.0).mesh.vertices[1].x(), 10);
+  EXPECT_THAT(refusal(folder, with(tetrahedron_ascii, "units cm", "units cm\ncomment units mm")),
+              HasSubstr("contradict"));
   const auto without = folder.file("none.ply", with(tetrahedron_ascii, "comment units cm\n", ""));
   EXPECT_EQ(read_mesh(without, 1000.0).mesh.vertices[1].x(), 1000);
   EXPECT_EQ(read_mesh(without, {}, true).mesh.vertices[1].x(), 1);

@@ -65,6 +65,26 @@ TEST(HoldDoubts, FreeEndsLackTheirThrust) {
   EXPECT_THAT(doubts_of_ends(model), IsEmpty());
 }
 
+TEST(HoldDoubts, EdgesThatRunBesideEachOtherAreSaid) {
+  for (const double gap : {0.05, 0.4, 0.7}) {
+    Model model = tube(10, 20, 1, 0.01);
+    ShellMesh& mesh = model.shells[0].mesh;
+    const ShellMesh other = mesh;
+    for (std::size_t i = 0; i < other.vertices.size(); ++i) {  // continues it behind a gap, its nodes elsewhere
+      mesh.vertices.push_back(Eigen::AngleAxisd(0.1, Vec3::UnitZ()) * (other.vertices[i] + Vec3(0, 0, 20 + gap)));
+      mesh.normals.push_back(Eigen::AngleAxisd(0.1, Vec3::UnitZ()) * other.normals[i]);
+    }
+    for (const auto& [a, b, c] : other.triangles) {
+      const auto first = static_cast<Index>(other.vertices.size());
+      mesh.triangles.push_back({first + a, first + b, first + c});
+    }
+    hold(
+        model, [](const Vec3&) { return true; }, "xyz", "xyz");
+    const std::vector<Warning> found = doubts_of_ends(model);
+    EXPECT_EQ(kinds(found), gap < 0.5 ? std::vector<std::string>{"open seam"} : std::vector<std::string>{});
+  }
+}
+
 TEST(HoldDoubts, SwingsAreSaidAndWideningIsNot) {
   const Model model = tube(10, 40, 1, 0.01);
   State state = at_rest(model);
@@ -124,6 +144,10 @@ TEST(HoldDoubts, WhatCrossesInTheImageIsNotTheRunsDoing) {
   CrossingWatch watch(model);
   watch.see(at_rest(model));
   EXPECT_FALSE(watch.found());
+  model.loads.clear();
+  const std::vector<Warning> found = doubts_of_ends(model);
+  ASSERT_THAT(kinds(found), testing::ElementsAre("walls through each other"));
+  EXPECT_THAT(found[0].text, HasSubstr("nothing holds them apart"));
 }
 
 TEST(HoldDoubts, BedsAndSuctionInTheImageAreQuestioned) {

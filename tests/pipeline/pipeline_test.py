@@ -145,7 +145,7 @@ class Rules(WithStubs):
         self.make(VOLUMES="a.nii.gz", LABEL=3, ACCURACY="2%", OF="energy", **LOAD)
         _, decimate, relax, simulate = self.calls()
         self.assertIn("--triangles 190 --min-angle 20 --soft-angle", decimate)
-        self.assertIn("--shells 190 --max-iterations 1", relax)
+        self.assertIn("--shells 190 --max-iterations 4", relax)
         self.assertIn("--accuracy 2% --of energy", simulate)
         folder = self.out / "a" / "3"
         self.assertIn(f"--target {folder / 'surface.ply'} --shell-out {folder / 'refined.ply'}", simulate)

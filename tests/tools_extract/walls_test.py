@@ -65,6 +65,7 @@ class Walls(Warnings):
                                  face, "--other-face", other)
             result = report["result"]
             self.assertEqual(result["face"], face)
+            self.assertIn(f"comment face {face}\n".encode(), self.out.read_bytes())
             self.assertAlmostEqual(result["wall_thickness_mm"]["mean"], 1.6, delta=0.1)
             self.assertEqual((result["components"], result["oriented_outward"]), (1, True))
             self.assertEqual([pathlib.Path(entry["path"]).name for entry in report["outputs"]], ["out.ply", "other.ply"])

@@ -2,6 +2,7 @@
 """tunica-relax from outside: the contract's keys and exit codes, the patch in the file, the paper's own targets."""
 import json
 import os
+import re
 import signal
 import subprocess
 import tempfile
@@ -727,6 +728,30 @@ class MidSurface(Case):
                 points = self.points()
                 np.testing.assert_allclose(np.linalg.norm(points[:, :2], axis=1), radius, atol=0.03)
                 np.testing.assert_allclose([points[:, 2].min(), points[:, 2].max()], [0, 30], atol=0.03)
+
+    def test_what_a_pressure_on_the_middle_is_off_by_is_told(self):
+        """A tube's middle is wider than its inner face, of radius 10 here or 8, by the ratio of the radii."""
+        tube = self.path("tube.ply")
+        write_ply(tube, *cylinder(32, 12))
+        for face, thickness, ratio in (("inner", 2, 11 / 10), ("outer", 2, 9 / 8), ("inner", 0.5, None)):
+            _, error = self.relax(tube, tube, self.out, "--shells", 200, "--mid-surface", face, "--thickness", f"{thickness}mm",
+                                  "--max-iterations", 1, "--force")
+            said = re.search(r"IMAGED_AT\) by ([0-9.]+)", error)
+            self.assertEqual(said is None, ratio is None, error)
+            if said:
+                self.assertAlmostEqual(float(said.group(1)), ratio, delta=0.01)
+
+    def test_a_face_that_says_to_be_the_other_one_is_refused(self):
+        tube = self.path("tube.ply")
+        write_ply(tube, *cylinder(16, 6))
+        with open(tube, "rb") as file:
+            said = file.read().replace(b"\nelement vertex", b"\ncomment face inner\nelement vertex", 1)
+        with open(tube, "wb") as file:
+            file.write(said)
+        done = subprocess.run([os.path.join(BIN, "tunica-relax"), tube, tube, self.out, "--mid-surface", "outer", "--thickness", "1mm"],
+                              capture_output=True, text=True)
+        self.assertEqual(done.returncode, 3)
+        self.assertIn("is the inner face of a wall", done.stderr)
 
     def test_by_the_papers_rule_and_with_coarse_triangles_kept(self):
         coarse = self.path("coarse.ply")

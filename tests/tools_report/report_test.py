@@ -296,6 +296,15 @@ class CasePage(ReportTest):
         self.assertEqual(len(pictures), 2, "the organ, and the slices")
         self.assertTrue(all(base64.b64decode(src.split(",")[1]).startswith(b"\x89PNG") for src in pictures))
 
+    def test_slices_of_several_labels(self):
+        self.copy("aneurysm")
+        path = self.case / "extract.json"
+        said = path.read_text()
+        self.assertIn("--label 1 ", said)
+        path.write_text(said.replace("--label 1 ", "--label 1+2 "))
+        _, _, page = self.report()
+        self.assertEqual(len(page.of("img")), 2)
+
     def test_every_state_of_a_static_path_is_drawn(self):
         # Small loads: the states of a path are the last one times their load.
         with tempfile.TemporaryDirectory() as folder:

@@ -426,6 +426,10 @@ void understand_comments(MeshFile& file, const std::string& name) {
     } else if (first == "units") {
       const std::string_view unit = words.token();
       if (words.at_line_end() && !unit.empty()) {
+        if (file.units && *file.units != unit) {
+          throw InputError(fmt::format("{}: its comments \"units {}\" and \"units {}\" contradict each other: keep one",
+                                       name, *file.units, unit.substr(0, 20)));
+        }
         file.units = unit;
       }
     }

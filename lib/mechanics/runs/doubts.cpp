@@ -32,6 +32,10 @@ constexpr double thickest = 0.05;
 constexpr double thickest_curved = 0.25;
 // Of the wall, in the mean: where they are no features of the surface a displacement may be off by ten times that.
 constexpr double highest_waves = 0.003;
+// MPa. Blood and bladders reach some 300 mmHg.
+constexpr double mmhg = 133.322387415e-6, most_in_image = 450 * mmhg;
+// mm, as thick as a cell. The thinnest walls of organs, such as Glisson's capsule or an alveolus' septum, have several.
+constexpr double thinnest = 0.005;
 // Of bow_share(), from where bending is some 20 % too stiff.
 constexpr double largest_bow = 0.5;
 
@@ -64,8 +68,26 @@ double share_thicker(const ShellBody& body, const std::vector<Curvature>& curvat
   return whole > 0 ? thicker / whole : 0;
 }
 
+/// "; was 1 kPa or 1 MPa meant?": the values with another prefix that are plausible.
+std::string meant(double value, std::initializer_list<double> factors, const std::array<double, 2>& plausible,
+                  const std::function<std::string(double)>& text) {
+  std::string list;
+  for (const double factor : factors) {
+    if (value * factor >= plausible[0] && value * factor <= plausible[1]) {
+      list += (list.empty() ? "" : " or ") + text(value * factor);
+    }
+  }
+  return list.empty() ? ": is its unit right?" : fmt::format(": was {} meant?", list);
+}
+
 void doubt_thickness(const ShellBody& body, std::vector<Warning>& found) {
   const double most = *std::max_element(body.thickness.begin(), body.thickness.end());
+  if (most < thinnest) {
+    found.push_back(
+        {Weight::major, "thin wall",
+         fmt::format("{}: its thickness, {:.4g} mm, is less than that of a cell{}", at(body.said_at, body.name), most,
+                     meant(most, {1e3}, {0.05, 20}, [](double mm) { return fmt::format("{:.4g} mm", mm); }))});
+  }
   const std::vector<Curvature> curvatures = curvatures_of(body.mesh, body.curved);
   if (const double share = share_thicker(body, curvatures, 1); share > most_of_it) {
     found.push_back(
@@ -97,18 +119,6 @@ void doubt_thickness(const ShellBody& body, std::vector<Warning>& found) {
                      "some 10 % less than this thin one",
                      at(body.said_at, body.name), most, 100 * thick / whole)});
   }
-}
-
-/// "; was 1 kPa or 1 MPa meant?": the values with another prefix that are plausible.
-std::string meant(double value, std::initializer_list<double> factors, const std::array<double, 2>& plausible,
-                  const std::function<std::string(double)>& text) {
-  std::string list;
-  for (const double factor : factors) {
-    if (value * factor >= plausible[0] && value * factor <= plausible[1]) {
-      list += (list.empty() ? "" : " or ") + text(value * factor);
-    }
-  }
-  return list.empty() ? ": is its unit right?" : fmt::format(": was {} meant?", list);
 }
 
 void doubt_material(const std::string& where, const Material& material, bool pressed, std::vector<Warning>& found) {
@@ -410,6 +420,12 @@ void doubt_loads(const Model& model, const RunSettings& settings,
     } else if (pressure != nullptr && pressure->imaged_at.value_or(0) < 0 && !model.is_solid(load.body)) {
       found.push_back({Weight::minor, "imaging pressure",
                        where + ": imaged_at is a suction, by which the wall is pressed together: is its sign right?"});
+    } else if (pressure != nullptr && pressure->imaged_at.value_or(0) > most_in_image) {
+      found.push_back({Weight::major, "imaging pressure",
+                       fmt::format("{}: no organ is imaged under {}, {:.3g} mmHg{}", where,
+                                   pressure_text(*pressure->imaged_at), *pressure->imaged_at / mmhg,
+                                   meant(*pressure->imaged_at, {1e-3, mmhg / 1e-3}, {7e-4, most_in_image},
+                                         [](double mpa) { return fmt::format("{:.4g} mmHg", mpa / mmhg); }))});
     }
   }
   for (const Fix& fix : model.fixes) {

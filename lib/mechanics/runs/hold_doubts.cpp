@@ -127,6 +127,67 @@ void doubt_slides(const Model& model, std::size_t b, std::vector<Warning>& found
                    std::asin(std::min(1.0, slant)) * 180 / std::numbers::pi, 1e2 * slant, 2e2 * slant)});
 }
 
+/// Where two rims, or two sides of one, run beside each other nearer than half of the wall, over more than half of one.
+void doubt_gaps(const Model& model, std::size_t b, std::vector<Warning>& found) {
+  constexpr double most_of_it = 0.5, apart = 4;  // apart: along a rim, of what is beside each other
+  const ShellBody& body = model.shells[b];
+  const std::vector<Vec3>& x = body.mesh.vertices;
+  const double reach = *std::ranges::min_element(body.thickness) / 2;
+  struct Edge {
+    std::size_t rim = 0;
+    double at = 0;  // along it, mm
+    Vec3 from, to;
+  };
+  std::vector<Edge> edges;
+  std::vector<double> lengths;
+  for (const std::vector<Index>& rim : boundary_loops(flat_facets(body.mesh))) {
+    double along = 0;
+    for (std::size_t i = 0; i < rim.size(); ++i) {
+      edges.push_back({lengths.size(), along, x[rim[i]], x[rim[(i + 1) % rim.size()]]});
+      along += (edges.back().to - edges.back().from).norm();
+    }
+    lengths.push_back(along);
+  }
+  std::ranges::sort(edges, {}, [](const Edge& edge) { return std::min(edge.from.x(), edge.to.x()); });
+  double longest = 0;
+  for (const Edge& edge : edges) {
+    longest = std::max(longest, (edge.to - edge.from).norm());
+  }
+  std::vector<double> beside(lengths.size(), 0), gap(lengths.size(), 0);
+  std::vector<Vec3> place(lengths.size());
+  for (const Edge& own : edges) {
+    const Vec3 middle = (own.from + own.to) / 2;
+    double nearest = infinity;
+    const auto first = std::ranges::lower_bound(edges, middle.x() - reach - longest, {},
+                                                [](const Edge& edge) { return std::min(edge.from.x(), edge.to.x()); });
+    for (auto other = first; other != edges.end() && std::min(other->from.x(), other->to.x()) <= middle.x() + reach;
+         ++other) {
+      const Vec3 along = other->to - other->from;
+      const double part = std::clamp((middle - other->from).dot(along) / along.squaredNorm(), 0.0, 1.0);
+      const double distance = (other->from + part * along - middle).norm();
+      const double between = std::abs(other->at - own.at);
+      const bool same_side =
+          other->rim == own.rim && std::min(between, lengths[own.rim] - between) <= longest + apart * distance;
+      nearest = same_side ? nearest : std::min(nearest, distance);
+    }
+    if (nearest < reach) {
+      beside[own.rim] += (own.to - own.from).norm();
+      gap[own.rim] = std::max(gap[own.rim], nearest);
+      place[own.rim] = middle;
+    }
+  }
+  for (std::size_t rim = 0; rim < lengths.size(); ++rim) {
+    if (beside[rim] > most_of_it * lengths[rim]) {
+      found.push_back(
+          {Weight::major, "open seam",
+           fmt::format("{}: its edge at {} runs beside another one within {:.2g} mm, less than half of the wall: parts "
+                       "that should join are held and pressed there like ends of a vessel: close the gap in the mesh",
+                       named(body.said_at, body.name), where(place[rim]), gap[rim])});
+      return;
+    }
+  }
+}
+
 /// The connected pieces of a shell, by their nodes; without those that no triangle has.
 std::vector<std::vector<Index>> pieces_of(const ShellMesh& mesh) {
   DisjointSets joined(mesh.vertices.size());
@@ -225,14 +286,50 @@ std::vector<std::array<Index, 2>> crossings_of(const ShellMesh& shells) {
   return find_self_intersections(flat_facets(shells));
 }
 
+/// Bodies that pass through each other before anything moves. Contact refuses those that it holds apart.
+void doubt_bodies(const Model& model, std::vector<Warning>& found) {
+  if (model.shells.size() < 2) {
+    return;
+  }
+  const ShellMesh all = joined_shells(model, nullptr);
+  const auto body_of = [&](Index triangle) {
+    const auto node = static_cast<std::size_t>(all.triangles[triangle][0]);
+    std::size_t body = 0;
+    while (body + 1 < model.shells.size() && model.first_node(body + 1) <= node) {
+      ++body;
+    }
+    return body;
+  };
+  std::map<std::array<std::size_t, 2>, std::pair<std::size_t, Vec3>> pairs;  // of bodies: how many shells, and where
+  for (const auto& [one, other] : crossings_of(all)) {
+    const auto [a, b] = std::minmax({body_of(one), body_of(other)});
+    const bool tied = std::ranges::any_of(model.attachments, [&, a = a, b = b](const Attachment& tie) {
+      return std::minmax({tie.body, tie.to}) == std::pair(a, b);
+    });
+    if (a != b && !tied) {
+      ++pairs.try_emplace({a, b}, 0, all.vertices[all.triangles[one][0]]).first->second.first;
+    }
+  }
+  for (const auto& [bodies, what] : pairs) {
+    found.push_back(
+        {Weight::major, "walls through each other",
+         fmt::format("{} and {} pass through each other in {} pairs of shells, the first at {}, and nothing "
+                     "holds them apart: move them apart and add a [[contact]] between them",
+                     named(model.shells[bodies[0]].said_at, model.shells[bodies[0]].name), model.shells[bodies[1]].name,
+                     what.first, where(what.second))});
+  }
+}
+
 }  // namespace
 
 std::vector<Warning> doubts_of_ends(const Model& model) {
   require_valid(model);
   constexpr double least_roundness = 0.05;  // of the area that a circle as long as the rim encloses
   std::vector<Warning> found;
+  doubt_bodies(model, found);
   for (std::size_t b = 0; b < model.shells.size(); ++b) {
     const ShellBody& body = model.shells[b];
+    doubt_gaps(model, b, found);
     const double pressure = pressure_on(model, b);
     if (pressure == 0) {
       continue;

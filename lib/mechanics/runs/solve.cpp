@@ -78,12 +78,15 @@ std::string doubt_of_stiffness(const Model& model, const std::vector<double>& re
     if (!std::holds_alternative<PressureLoad>(load.kind) || std::abs(reached[l]) >= far_below * most) {
       continue;
     }
-    const double young = model.is_solid(load.body) ? model.solids[load.body - model.shells.size()].material.young
-                                                   : model.shells[load.body].material.young;
+    const Material& material = model.is_solid(load.body) ? model.solids[load.body - model.shells.size()].material
+                                                         : model.shells[load.body].material;
+    if (!material.young_stated) {
+      continue;
+    }
     return fmt::format(
         "; the pressure that {} bears grows with its Young's modulus, {}: is the unit of one of them "
         "wrong?",
-        model.name_of(load.body), pressure_text(young));
+        model.name_of(load.body), pressure_text(material.young));
   }
   return {};
 }

@@ -227,6 +227,13 @@ std::size_t count_at_border(const Mask& mask) {
   return count;
 }
 
+void unite(Mask& mask, const Mask& other) {
+  if (mask.dims() != other.dims()) {
+    throw InputError("selections of different dimensions cannot be united");
+  }
+  std::transform(mask.row(0, 0), mask.row(0, 0) + word_count(mask), other.row(0, 0), mask.row(0, 0), std::bit_or{});
+}
+
 void drop_beyond(Mask& mask, const Vec3& normal, double offset) {
   const auto [width, height, depth] = mask.dims();
   const double step = normal.dot(mask.affine().col(0));

@@ -75,6 +75,9 @@ std::size_t count_voxels(const Mask& mask);
 /// Number of voxels inside that the image's border cuts: the first and last along an axis of more than one.
 std::size_t count_at_border(const Mask& mask);
 
+/// What is inside in the other one comes in, too. Errors: InputError: different dimensions.
+void unite(Mask& mask, const Mask& other);
+
 /// Voxels whose middles lie beyond a plane, where normal . x > offset (mm), become outside. Cost: one pass.
 void drop_beyond(Mask& mask, const Vec3& normal, double offset);
 
