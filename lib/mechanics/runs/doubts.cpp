@@ -34,8 +34,6 @@ constexpr double thickest_curved = 0.25;
 constexpr double highest_waves = 0.003;
 // MPa. Blood and bladders reach some 300 mmHg.
 constexpr double mmhg = 133.322387415e-6, most_in_image = 450 * mmhg;
-// mm, as thick as a cell. The thinnest walls of organs, such as Glisson's capsule or an alveolus' septum, have several.
-constexpr double thinnest = 0.005;
 // Of bow_share(), from where bending is some 20 % too stiff.
 constexpr double largest_bow = 0.5;
 
@@ -82,12 +80,6 @@ std::string meant(double value, std::initializer_list<double> factors, const std
 
 void doubt_thickness(const ShellBody& body, std::vector<Warning>& found) {
   const double most = *std::max_element(body.thickness.begin(), body.thickness.end());
-  if (most < thinnest) {
-    found.push_back(
-        {Weight::major, "thin wall",
-         fmt::format("{}: its thickness, {:.4g} mm, is less than that of a cell{}", at(body.said_at, body.name), most,
-                     meant(most, {1e3}, {0.05, 20}, [](double mm) { return fmt::format("{:.4g} mm", mm); }))});
-  }
   const std::vector<Curvature> curvatures = curvatures_of(body.mesh, body.curved);
   if (const double share = share_thicker(body, curvatures, 1); share > most_of_it) {
     found.push_back(
