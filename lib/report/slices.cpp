@@ -6,6 +6,7 @@
 #include "tunica/draw/slice_sheet.hpp"
 #include "tunica/io/file/output_file.hpp"
 #include "tunica/io/mesh/mesh_file.hpp"
+#include "tunica/io/volume/label_names.hpp"
 #include "tunica/io/volume/volume_file.hpp"
 #include "tunica/report/detail/command_words.hpp"
 #include "tunica/report/detail/measures.hpp"
@@ -41,25 +42,16 @@ std::optional<std::size_t> count_in(const std::vector<std::string>& words, const
 // The rules by which the extraction chose, as its command says: that of one of them is enough.
 std::vector<Inside> rules_of(const std::vector<std::string>& words, const Volume& volume) {
   if (const auto text = flag_value(words, "--label")) {
-    const auto label_of = [&](const std::string& label) -> std::optional<Inside> {
-      for (const auto& [value, name] : volume.label_names) {
-        if (name == label) {
-          return Inside{Inside::Rule::label, value};
-        }
-      }
-      const auto value = parse_number(label);
-      return value ? std::optional(Inside{Inside::Rule::label, *value}) : std::nullopt;
-    };
-    if (const auto whole = label_of(*text)) {
-      return {*whole};
-    }
     std::vector<Inside> rules;
+    if (const auto whole = find_label(volume.label_names, *text)) {
+      return {Inside{Inside::Rule::label, *whole}};
+    }
     for (const auto part : *text | std::views::split('+')) {
-      const auto rule = label_of(std::string(part.begin(), part.end()));
-      if (!rule) {
+      const auto value = find_label(volume.label_names, std::string(part.begin(), part.end()));
+      if (!value) {
         return {};
       }
-      rules.push_back(*rule);
+      rules.push_back({Inside::Rule::label, *value});
     }
     return rules;
   }

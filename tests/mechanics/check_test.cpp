@@ -263,21 +263,6 @@ TEST(Doubts, ImagedUnderAPressureOfTheOtherSign) {
               ElementsAre("scene:9:1: shell: this load is zero", HasSubstr("imaged_at is a suction")));
 }
 
-TEST(Doubts, ImagedUnderAPressureOfAnotherUnit) {
-  Model model = pressurised_sphere(2, 0.2, 0.016);
-  const auto said = [&] {
-    std::string all;
-    for (const Warning& warning : doubts(model, nonlinear_run({1}), true)) {
-      all += warning.text;
-    }
-    return all;
-  };
-  auto& pressure = std::get<PressureLoad>(model.loads[0].kind);
-  pressure.value = 0.12;
-  pressure.imaged_at = 0.12;
-  EXPECT_THAT(said(), testing::HasSubstr("900 mmHg: was 120 mmHg meant?"));
-}
-
 TEST(Doubts, NormalsThatDoNotFitTheNodes) {
   const auto ball = [](int level, double lean) {
     Model model = pressurised_sphere(level, 0.05, 1e-3);

@@ -150,7 +150,7 @@ TEST(HoldDoubts, WhatCrossesInTheImageIsNotTheRunsDoing) {
   EXPECT_THAT(found[0].text, HasSubstr("nothing holds them apart"));
 }
 
-TEST(HoldDoubts, BedsAndSuctionInTheImageAreQuestioned) {
+TEST(HoldDoubts, BedsAndPressuresInTheImageAreQuestioned) {
   Model model = pressurised_sphere(2, 0.2, 0.016);
   const auto said = [&] {
     std::string all;
@@ -173,6 +173,9 @@ TEST(HoldDoubts, BedsAndSuctionInTheImageAreQuestioned) {
     pressure.value = pressure.imaged_at.emplace(imaged);
     EXPECT_EQ(said().find("is a suction") != std::string::npos, imaged < 0);
   }
+  std::get<PressureLoad>(model.loads[0].kind).value = 0.12;
+  std::get<PressureLoad>(model.loads[0].kind).imaged_at = 0.12;
+  EXPECT_THAT(said(), HasSubstr("900 mmHg: was 120 mmHg meant?"));
 }
 
 /// A sphere at .95 of 2 E t^2 / (R^2 sqrt(3 (1 - nu^2))).

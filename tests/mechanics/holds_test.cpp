@@ -96,9 +96,11 @@ TEST(Slide, TubeIsStressedEvenlyUpToItsRims) {
 // Cut at an angle, the tube lacks what would pull in the rims' planes: membrane stress is too large by once to twice
 // that angle.
 TEST(Slide, SlantingRimsAreOffByOnceToTwiceTheirSlant) {
-  const double exact = pressure * radius / thickness * std::sqrt(0.75);
-  for (const double slope : {0.09, 0.18}) {
+  for (const auto& [slope, wall_thickness, least, most] :
+       {std::array{0.09, 0.5, 1.0, 2.0}, {0.18, 0.5, 1.0, 2.0}, {0.09, 3.0, 0.7, 1.0}, {0.09, 0.1, 1.5, 2.2}}) {
+    const double exact = pressure * radius / wall_thickness * std::sqrt(0.75);
     Model model = sliding_tube(60, 32, 48);
+    model.shells[0].thickness = {wall_thickness};
     const Vec3 sideways = tilted(Vec3::UnitX()) - tilted(Vec3::Zero());
     for (Vec3& x : model.shells[0].mesh.vertices) {
       x += slope * (x - tilted(Vec3::Zero())).dot(sideways) * tilted_axis();
@@ -112,8 +114,8 @@ TEST(Slide, SlantingRimsAreOffByOnceToTwiceTheirSlant) {
     State state;
     solve(system, [&](const State& now) { state = now; });
     const Wall wall = ElementFieldEvaluator(system)(state).wall;
-    EXPECT_GT(wall.whole.membrane_p99 / exact - 1, slope);
-    EXPECT_LT(wall.whole.membrane_p99 / exact - 1, 2 * slope);
+    EXPECT_GT(wall.whole.membrane_p99 / exact - 1, least * slope);
+    EXPECT_LT(wall.whole.membrane_p99 / exact - 1, most * slope);
     EXPECT_GT(wall.left_out, 0);
     const std::vector<Warning> found = doubts_of_ends(model);
     ASSERT_EQ(found.size(), 1U);

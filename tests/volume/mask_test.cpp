@@ -119,5 +119,22 @@ TEST(Mask, CountsWhatTheBorderCutsAndWhatDiffers) {
   EXPECT_EQ(count_at_border(slice), 1U);
 }
 
+TEST(Mask, IsUnitedAndLosesWhatLiesBeyondAPlane) {
+  Volume volume;
+  volume.affine << -2, 0, 0, 10, 0, 1, 0, 0, 0, 0, 1, 0;
+  Mask mask({70, 2, 2}, volume.affine);
+  Mask other = mask;
+  mask.set(3, 0, 1, true);    // x = 4
+  other.set(69, 1, 0, true);  // x = -128
+  unite(mask, other);
+  EXPECT_EQ(count_voxels(mask), 2U);
+  drop_beyond(mask, Vec3::UnitX(), 4);
+  EXPECT_EQ(count_voxels(mask), 2U);
+  drop_beyond(mask, -Vec3::UnitX(), 127.5);
+  EXPECT_TRUE(mask(3, 0, 1));
+  EXPECT_FALSE(mask(69, 1, 0));
+  EXPECT_THROW(unite(mask, Mask({3, 3, 1}, volume.affine)), InputError);
+}
+
 }  // namespace
 }  // namespace tunica

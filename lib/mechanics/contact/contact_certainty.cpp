@@ -137,7 +137,7 @@ bool ContactSystem::is_certain(const Configuration& configuration) {
       continue;  // whether a mesh passes the other body is told by that one's faces
     }
     for (std::size_t f = surfaces_.first[side.body]; f < surfaces_.first[side.body + 1]; ++f) {
-      Group group = group_of(number, f);
+      Group group = group_of_face(number, f);
       refine(group);
       if (!passes_rigid(group, before[f], now[f])) {
         return false;

@@ -143,7 +143,7 @@ void ContactSystem::make_sides() {
       }
       std::vector<Group> groups;
       for (std::size_t f = surfaces_.first[own.index]; f < surfaces_.first[own.index + 1]; ++f) {
-        Group group = group_of(sides_.size() - 1, f);
+        Group group = group_of_face(sides_.size() - 1, f);
         resolution_ = std::min(resolution_, group.resolution);
         if (!other.rigid) {
           groups.push_back(std::move(group));
@@ -154,18 +154,23 @@ void ContactSystem::make_sides() {
   }
 }
 
-ContactSystem::Group ContactSystem::group_of(std::size_t number, std::size_t f) const {
+ContactSystem::Group ContactSystem::group_of(std::size_t number, double wall) const {
   const Side& side = sides_[number];
-  const SurfaceFace& face = surfaces_.faces[f];
   Group group;
   group.side = number;
-  group.face = f;
   group.contact = side.contact;
   group.other = side.other;
   group.weight = side.weight;
-  group.wall = face.half_thickness > 0 ? std::min(side.wall, 2 * face.half_thickness) : side.wall;
-  group.resolution = contacts_[side.contact].resolution * group.wall;
+  group.wall = wall;
+  group.resolution = contacts_[side.contact].resolution * wall;
   group.elastic_slip = elastic_slip_of_wall * side.wall;
+  return group;
+}
+
+ContactSystem::Group ContactSystem::group_of_face(std::size_t side, std::size_t f) const {
+  const double mean = sides_[side].wall, own = 2 * surfaces_.faces[f].half_thickness;
+  Group group = group_of(side, own > 0 ? std::min(mean, own) : mean);
+  group.face = f;
   return group;
 }
 
@@ -180,16 +185,9 @@ void ContactSystem::add_points(std::size_t number) {
       edges / real(std::max<std::size_t>(1, surfaces_.first[side.other.index + 1] - surfaces_.first[side.other.index]));
   const double spacing = spacing_of_edge * mean;
   for (const Vec3& point : shapes_[side.body].corners_and_edges(spacing)) {
-    Group group;
-    group.side = number;
+    Group group = group_of(number, side.wall);
     group.point = point;
     group.rigid = side.body;
-    group.contact = side.contact;
-    group.other = side.other;
-    group.weight = side.weight;
-    group.wall = side.wall;
-    group.resolution = contacts_[side.contact].resolution * side.wall;
-    group.elastic_slip = elastic_slip_of_wall * side.wall;
     group.level = 1;
     group.samples.emplace_back();
     group.samples.back().weights.setZero();
@@ -240,7 +238,7 @@ void ContactSystem::gather(const FaceMaps& maps) {
       if (known != groups_.end() && known->side == number && known->face == f) {
         continue;
       }
-      Group group = group_of(number, f);
+      Group group = group_of_face(number, f);
       refine(group);
       if (is_near(group, maps)) {
         more.push_back(std::move(group));
@@ -329,9 +327,9 @@ void ContactSystem::refine(const FaceMaps& maps) {
   }
   for (Side& side : sides_) {
     if (!side.points && side.other.rigid) {
-      side.other_bend = shapes_[side.other.index].largest_curvature();
+      side.curvature = shapes_[side.other.index].largest_curvature();
       const auto [bend, longest] = largest[side.body];
-      side.largest_bend = bend + bend_of_rigid(side.other_bend, longest);
+      side.largest_bend = bend + bend_of_rigid(side.curvature, longest);
     }
   }
   for (Group& group : groups_) {
@@ -344,7 +342,7 @@ void ContactSystem::refine(Group& group) const {
     return;
   }
   const auto [own, longest] = bends_[group.face];
-  const double bend = group.other.rigid ? own + bend_of_rigid(sides_[group.side].other_bend, longest) : 2 * own;
+  const double bend = group.other.rigid ? own + bend_of_rigid(sides_[group.side].curvature, longest) : 2 * own;
   const double wanted = std::sqrt(bend / (sag_of_resolution * group.resolution));
   const auto level = narrow<int>(std::lround(std::clamp(std::ceil(wanted), real(least_level), real(most_level))));
   if (level > group.level) {
@@ -716,7 +714,7 @@ void ContactSystem::recall(const std::vector<double>& memory, const Configuratio
         surfaces_.faces[face].body != sides_[side].body) {
       throw InputError("what contact remembers is of another model");
     }
-    group = group_of(side, face);
+    group = group_of_face(side, face);
   }
   add_groups(std::move(near));
   refine(*accepted_);

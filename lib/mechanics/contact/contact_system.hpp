@@ -162,7 +162,7 @@ private:
     bool points = false;
     double weight = 1;        ///< one half where both sides are sampled
     double wall = 0;          ///< mm, mean
-    double other_bend = 0;    ///< 1/mm, of a rigid body at the last refine()
+    double curvature = 0;     ///< 1/mm, largest of a rigid other body at the last refine()
     double largest_bend = 0;  ///< mm, of all its faces then
   };
   /// One face towards one other party of a contact; or one point of a rigid mesh, whose corners and edges may lie
@@ -201,7 +201,9 @@ private:
   [[nodiscard]] std::shared_ptr<const FaceMaps> maps_at(const Configuration& configuration);
 
   void make_sides();
-  [[nodiscard]] Group group_of(std::size_t side, std::size_t face) const;
+  /// A group of a side where its wall is so thick, mm, of no face yet.
+  [[nodiscard]] Group group_of(std::size_t side, double wall) const;
+  [[nodiscard]] Group group_of_face(std::size_t side, std::size_t face) const;
   void add_points(std::size_t side);
   /// Adds groups that are not there yet. They stand by their sides and faces.
   void add_groups(std::vector<Group> more);

@@ -106,6 +106,9 @@ std::vector<double> scaled_distances(const ShellMesh& mesh, std::vector<double> 
 }  // namespace
 
 double slant_of_rim(const ShellBody& body, const Fix& fix) {
+  if (!fix.across) {
+    return 0;
+  }
   const std::set<Index> nodes(fix.nodes.begin(), fix.nodes.end());
   const CornerNormals normal(body.mesh, body.curved);
   double length = 0, squares = 0;
@@ -126,6 +129,9 @@ double slant_of_rim(const ShellBody& body, const Fix& fix) {
 bool is_step(const ShellBody& body, std::size_t triangle) {
   if (body.thickness.size() == 1) {
     return false;
+  }
+  if (triangle >= body.mesh.triangles.size() || body.thickness.size() != body.mesh.vertices.size()) {
+    throw InputError(fmt::format("{}: there is no triangle {}, or not one thickness per node", body.name, triangle));
   }
   const auto& t = body.mesh.triangles[triangle];
   const auto [least, most] = std::minmax({body.thickness[t[0]], body.thickness[t[1]], body.thickness[t[2]]});

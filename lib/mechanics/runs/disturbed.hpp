@@ -12,14 +12,15 @@ namespace tunica {
 /// along the rim of the sine of that angle, times sqrt(2): the angle at which a straight tube is cut. A vessel that
 /// goes on pulls at its rim in that plane as well. Where nothing does, what 1 % of the membrane stress of a straight
 /// tube under pressure exceeds is too large by .8 to 2.1 times that angle, at radii of 3 to 100 walls, however fine the
-/// mesh. 0: a rim as in a plane of symmetry, or none. Cost: linear in the body.
+/// mesh. 0: a rim as in a plane of symmetry, or none that slides. Errors: InputError: as require_valid() of the mesh.
+/// Cost: linear in the body.
 double slant_of_rim(const ShellBody& body, const Fix& fix);
 
 /// The slant up to which a rim that slides disturbs nothing.
 constexpr double upright = 0.05;
 
 /// Whether the thickness at the corners of a triangle differs by more than a quarter: the shell stands for a step, not
-/// for a place of the wall.
+/// for a place of the wall. Errors: InputError: no such triangle, not as many thicknesses as nodes.
 bool is_step(const ShellBody& body, std::size_t triangle);
 
 /// Nodes of a body at which its wall bends over a short length: those that are held or bear point loads, rims, where

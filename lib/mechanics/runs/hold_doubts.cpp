@@ -121,8 +121,7 @@ void doubt_slides(const Model& model, std::size_t b, std::vector<Warning>& found
       {slant > far_off ? Weight::major : Weight::minor, "slanting rim",
        fmt::format("{}: the rim at {} slides in its plane, which the wall meets some {:.0f} degrees off a right angle: "
                    "stress around it may be off by {:.0f} to {:.0f} %, for nothing pulls there as the vessel that goes "
-                   "on would: "
-                   "hold it instead (--fix boundary, FIX=boundary), or cut the vessel straight across",
+                   "on would: hold it instead (--fix boundary, FIX=boundary), or cut the vessel straight across",
                    named(body.said_at, body.name), where(middle),
                    std::asin(std::min(1.0, slant)) * 180 / std::numbers::pi, 1e2 * slant, 2e2 * slant)});
 }
