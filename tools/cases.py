@@ -20,6 +20,7 @@ MOTION = ("DENSITY", "DURATION", "STEP")
 WITH_UNIT = {"PRESSURE": "80mmHg", "YOUNG": "1MPa", "THICKNESS": "1.5mm", "DENSITY": "1100kg/m3", "IMAGED_AT": "80mmHg",
              "DURATION": "1s", "STEP": "10ms", "SUPPORT": "1e5N/m3"}
 NUMBERS = (*WITH_UNIT, "POISSON", "TOLERANCE", "ACCURACY", "ISOVALUE", "SMOOTH", "SHELLS", "LOAD_STEPS")
+WHOLE = ("SHELLS", "LOAD_STEPS")
 FURTHER = ("EXTRACT", "DECIMATE", "RELAX", "SIMULATE")
 SWITCHES = ("LARGEST", "FILL", "OPEN")
 ON, OFF = ("1", "yes", "on", "true"), ("", "0", "no", "off", "false")
@@ -191,7 +192,7 @@ def text_of(path):
     except OSError as error:
         raise Refused(f"{path}: {error.strerror}") from None
     encodings = ["utf-16"] if data[:2] in (b"\xff\xfe", b"\xfe\xff") else ["utf-16-le"] if data[1:2] == b"\0" else \
-        ["utf-8-sig", "cp1252"]
+        ["utf-16-be"] if data[:1] == b"\0" else ["utf-8-sig", "cp1252"]
     for encoding in encodings:
         try:
             text = data.decode(encoding)
@@ -273,8 +274,10 @@ def misspelt(value_of, called):
     """What no tool could mean, of make or of a line of a table, by words. What a spreadsheet writes, FALSE, is off."""
     wrong = [f"{called(name)}: '{shown(value_of(name))}' is not understood: 1 or 0" for name in SWITCHES
              if value_of(name).lower() not in ON + OFF]
-    wrong += [f"{called(name)}: '{shown(value_of(name))}' has a comma: write {shown(value_of(name)).replace(',', '.', 1)}, and "
-              "thousands without a sign" for name in NUMBERS if re.match(r"[-+]?[0-9]+,[0-9]", value_of(name))]
+    for name in NUMBERS:
+        if re.match(r"[-+]?[0-9]+,[0-9]", value_of(name)):
+            right = value_of(name).replace(",", "" if name in WHOLE else ".", 1)
+            wrong.append(f"{called(name)}: '{shown(value_of(name))}' has a comma: write {shown(right)}, and thousands without a sign")
     if not re.fullmatch(r"[0-9]{0,10}", value_of("MEM"), re.ASCII):
         wrong.append(f"{called('MEM')}: '{shown(value_of('MEM'))}' is no number of megabytes")
     for name in FURTHER:
@@ -307,6 +310,17 @@ def rests_as_imaged(setting_of):
 def is_zero(quantity):
     """Whether a quantity is nothing, in whatever unit."""
     return re.match(r"[-+]?(0+\.?0*|\.0+)(e[-+]?\d+)?\s*[^\d.]", quantity + " ", re.I) is not None
+
+
+def without_effect(stated, setting_of):
+    """What is stated and would change nothing, by words: variables of another kind of run."""
+    idle = {"KIND=dynamic": ("DURATION", "STEP")} if setting_of("KIND") == "static" else {"KIND=static": ("LOAD_STEPS",)}
+    chosen = [name for name in ("SHELLS", "TOLERANCE", "MID_SURFACE", "LOAD_STEPS") if setting_of(name)]
+    chosen += ["KIND=dynamic"] if setting_of("KIND") == "dynamic" else []
+    chosen += [f"SIMULATE={word}" for word in ("--accuracy", "--target", "--unloaded") if word in setting_of("SIMULATE")]
+    if chosen and not setting_of("ACCURACY"):
+        idle[f"ACCURACY, and {chosen[0]} is given"] = ("OF",)
+    return [f"{name} is of {of}: leave it out" for of, names in idle.items() for name in names if stated(name)]
 
 
 def missing_of(case):
@@ -357,7 +371,8 @@ def cases_of_table(path, out):
             if other is not row and not wrong:
                 wrong.append(f"{case.name} is there already, at {other.place}: give one another name")
             cases.append(case)
-        wrong += missing_of(Case(out, volume, name, "", own))
+        whole = Case(out, volume, name, "", own)
+        wrong += missing_of(whole) + without_effect(lambda name: row.cells.get(name, ""), whole.setting)
         problems += [f"{row.place}: {shown(name)}: {words}" if name else f"{row.place}: {words}" for words in wrong]
     if problems:
         more = [f"{path}: and {len(problems) - 20} problems more"] if len(problems) > 20 else []
@@ -375,6 +390,8 @@ def find_cases(out):
     volumes = {os.path.abspath(path): path for path in reversed(find_volumes(os.environ.get("VOLUMES", "")))}
     if not volumes:
         raise Refused("VOLUMES is empty: name segmented volumes, or leave it out to see a shipped sample")
+    if wrong := without_effect(setting, setting):
+        raise Refused(*wrong)
     volumes = list(reversed(volumes.values()))
     if is_zero(setting("IMAGED_AT")) and not setting("PRESSURE"):
         raise Refused("IMAGED_AT is zero and PRESSURE is not given, so that nothing loads the wall: give PRESSURE and YOUNG")

@@ -333,6 +333,13 @@ void run(cli::Tool& tool, const Arguments& given) {
     in = read_surface(tool, tool.input(given.in), unit_mm, in_millimetres, coarse.repairs);
     tool.require_unchanged_inputs();
   }
+  if (in.unit_unknown) {
+    tool.warn(
+        {Weight::minor, "unit of length",
+         fmt::format("{}: says no unit of length, so {} says none either, and the other tools take its numbers for "
+                     "mm: give --mesh-unit mm|cm|m|um",
+                     given.in.string(), given.out.string())});
+  }
   coarse.diagonal = diagonal(in.mesh);
   coarse.made = decimated(tool, given, in.mesh, coarse.diagonal);
   coarse.angle = min_angle_degrees(coarse.made.mesh);

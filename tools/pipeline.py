@@ -64,7 +64,8 @@ def accuracy_flags(case):
     is_stated = any(setting(name) for name in ("SHELLS", "TOLERANCE", "MID_SURFACE", "LOAD_STEPS"))
     if is_stated or setting("KIND") != "static" or re.search(r"--(unloaded|load-steps|accuracy|target)\b", setting("SIMULATE")):
         return []
-    return ["--accuracy", "5%", *of, "--max-seconds", "60s"]
+    bound = [] if re.search(r"--max-seconds\b", setting("SIMULATE")) else ["--max-seconds", "60s"]
+    return ["--accuracy", "5%", *of, *bound]
 
 
 def stage_flags(case):
@@ -89,7 +90,8 @@ def stage_flags(case):
         decimate += ["--min-angle", "20", "--soft-angle"]  # needles would bend too stiffly
     relax = flag("--tolerance", setting("TOLERANCE")) + ["--refine"] if setting("TOLERANCE") else []
     if accuracy:
-        relax = ["--shells", shells, "--max-iterations", "4"]  # the coarsest of the levels, near enough to be refitted
+        # The coarsest of the levels, near enough to be refitted.
+        relax = ([] if setting("METHOD") == "barycentre" else ["--shells", shells]) + ["--max-iterations", "4"]
     relax += flag_if("--method", "METHOD")
     if setting("MID_SURFACE"):
         relax += flag("--mid-surface", setting("MID_SURFACE")) + flag_if("--thickness", "THICKNESS")

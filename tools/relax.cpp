@@ -28,6 +28,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <numeric>
 #include <utility>
 
@@ -318,7 +319,8 @@ void warn_of_crossings(const cli::Tool& tool, const ShellMesh& shell,
   const Vec3& place = shell.vertices[shell.triangles[crossings.front()[0]][0]];
   tool.warn({Weight::minor, "shells cross",
              fmt::format("{} pair(s) of curved shells cross, the first near ({:.4g}, {:.4g}, {:.4g}): the wall passes "
-                         "through itself there; more shells part them, or a TARGET that does not cross itself",
+                         "through itself there; more shells part them (of the pipeline SHELLS), or a TARGET that does "
+                         "not cross itself",
                          crossings.size(), place.x(), place.y(), place.z())});
 }
 
@@ -371,17 +373,21 @@ void require_that_face(const Arguments& given, const MeshFile& target) {
   }
 }
 
-/// Areas, mm^2, of TARGET and of the middle: between both faces, as it lies half way.
-void warn_of_pressure(const cli::Tool& tool, WallFace which, double face, double middle) {
+/// Areas of parallel surfaces are A + M x + 2 pi chi x^2, x from the middle (Steiner; rims that are cut straight).
+/// @param face, middle  areas of TARGET and of the middle, mm^2
+/// @param euler  chi, of the middle
+void warn_of_pressure(const cli::Tool& tool, WallFace which, double face, double middle, long euler, double thickness) {
   constexpr double notable = 1.05;
-  const double inner = which == WallFace::inner ? face : 2 * middle - face;
+  const double curved = std::numbers::pi * real(euler) * thickness * thickness;
+  const double inner = which == WallFace::inner ? face : 2 * middle - face + curved;
   if (inner > 0 && middle > notable * inner) {
     tool.warn(
         {Weight::minor, "pressure on the middle",
-         fmt::format("the middle of the wall has {:.2g} times the area of its inner face, and a pressure on these "
-                     "shells acts on the middle: stress is larger by as much than by a pressure inside; divide "
-                     "the pressure (--pressure, --imaged-at; PRESSURE, IMAGED_AT) by {:.4g}",
-                     middle / inner, middle / inner)});
+         fmt::format(
+             "the middle of the wall has {:.2g} times the area of its inner face, and a pressure on these "
+             "shells acts on the middle: stress is larger by as much than by a pressure inside; divide "
+             "the pressure (--pressure, --imaged-at; PRESSURE, IMAGED_AT) by {:.4g}, unless it is divided already",
+             middle / inner, middle / inner)});
   }
 }
 
@@ -515,7 +521,7 @@ private:
                        "wall closes a gap, or a branch is too narrow for it; a thinner wall leaves them",
                        after.boundary_loops, handles(after), before.boundary_loops, handles(before))});
     }
-    warn_of_pressure(tool_, which_face(), area(face_->mesh()), area(middle.mesh));
+    warn_of_pressure(tool_, which_face(), area(face_->mesh()), area(middle.mesh), after.euler, *given_.thickness);
     Json& said = tool_.result()["mid_surface"];
     said["grid_mm"] = middle.cell;
     said["left_out"] = {{"pieces", middle.left_out}, {"area_mm2", middle.left_out_area}};
@@ -631,11 +637,10 @@ private:
     const double angle = min_angle_degrees(flat_facets(relaxed_.shell));
     result["min_angle_deg"] = angle;
     if (const double wanted = min_angle_.value_or(usual_angle); fits_ && angle < rounded_up * wanted) {
-      tool_.warn(
-          {Weight::minor, "narrow angles",
-           fmt::format("the smallest angle of the shells is {:.3g} degrees, below {:.3g}: boundaries, creases or the "
-                       "tolerance allow no more, and stresses there are less certain; allow more shells",
-                       angle, wanted)});
+      tool_.note(
+          fmt::format("the smallest angle of the shells is {:.3g} degrees, below {:.3g}: boundaries, creases, the "
+                      "tolerance or the number of shells allow no more",
+                      angle, wanted));
     }
     const auto crossings = crossing_patches(relaxed_.shell);
     result["self_intersections"] = crossings.size();

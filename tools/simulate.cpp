@@ -745,9 +745,11 @@ private:
       tool_.note(line);
     }
     if (!accuracy_->reasons.empty() && accuracy_->request.max_seconds) {
-      tool_.warn({Weight::minor, "accuracy not reached",
-                  fmt::format("{}: {}; shells made anew of this surface, four times as many (SHELLS={}), may do better",
-                              subject().string(), missed_accuracy(*accuracy_), 4 * accuracy_->levels.back().shells)});
+      tool_.warn(
+          {Weight::minor, "accuracy not reached",
+           fmt::format("{}: {}; shells made anew of this surface, four times as many (of the pipeline SHELLS={} in "
+                       "place of ACCURACY, OF and --max-seconds), may do better, as far as the surface has them",
+                       subject().string(), missed_accuracy(*accuracy_), 4 * accuracy_->levels.back().shells)});
     } else if (!accuracy_->reasons.empty()) {
       journal_->remove();
       throw RequirementError(fmt::format("{}: {}; what there is stays in {}.part", subject().string(),

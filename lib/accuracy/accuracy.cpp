@@ -10,6 +10,7 @@
 #include "tunica/mechanics/runs/curved_displacement.hpp"
 #include "tunica/mechanics/runs/disturbed.hpp"
 #include "tunica/shell/distance/shell_distance.hpp"
+#include "tunica/shell/distance/shell_quality.hpp"
 
 #include <fmt/format.h>
 
@@ -287,14 +288,9 @@ private:
       }
     }
     const double thinnest = least_thickness(last_->system.model());
-    const double off = out_.levels.back().mean_distance.value_or(0) / thinnest;
-    if (off >= request_.within) {  // the error of an answer is one to three times that
-      out_.reasons.push_back(fmt::format(
-          "the shells are {:.2g} % of the wall from the surface in the mean, which costs as much of the answer",
-          100 * off));
-    }
+    doubt_distance(out_.levels.back().mean_distance.value_or(0), thinnest);
     if (out_.reasons.empty() && *out_.estimate < request_.within) {
-      doubt_far_places(thinnest);
+      doubt_parts_left_out(thinnest);
     }
     if (other_state_ >= model_share * request_.within) {
       out_.reasons.push_back(
@@ -314,10 +310,24 @@ private:
     is_doubtful_ = !out_.reasons.empty();
   }
 
-  /// A place that no level comes close to shows in no difference of levels.
-  void doubt_far_places(double thinnest) {
+  /// @param mean  of the shells' distances, mm
+  void doubt_distance(double mean, double thinnest) {
+    if (mean >= request_.within * thinnest) {  // the error of an answer is one to three times that
+      out_.reasons.push_back(fmt::format(
+          "the shells are {:.2g} % of the wall from the surface in the mean, which costs as much of the answer",
+          100 * mean / thinnest));
+    }
+  }
+
+  /// Parts of the surface that no level comes close to show in no difference of levels. They cost an answer as much as
+  /// they raise the mean distance; the stress at the faces, which follows the curvature, wherever there is one.
+  void doubt_parts_left_out(double thinnest) {
     for (std::size_t b = 0; b < level_.bodies.size(); ++b) {
       if (targets_[b] == nullptr) {
+        continue;
+      }
+      doubt_distance(shell_quality(level_.bodies[b].mesh, *targets_[b]).mean_distance, thinnest);
+      if (request_.of != Quantity::stress) {
         continue;
       }
       ShellDistanceOptions measuring;

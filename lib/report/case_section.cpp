@@ -265,9 +265,10 @@ Markup mechanics(const CaseReport& one) {
   if (one.source.at("simulate", "ok") != true) {
     return {};
   }
-  std::vector<Line> lines = lines_of(
-      one, {"membrane_p99_kpa", "tension_p99_n_per_mm", "stress_p99_kpa", "bending_share_percent", "stress_max_kpa",
-            "left_out_percent", "strain_p99_percent", "max_displacement_mm", "volume_change_percent"});
+  std::vector<Line> lines =
+      lines_of(one, {"membrane_p99_kpa", "membrane_mean_kpa", "tension_p99_n_per_mm", "stress_p99_kpa",
+                     "bending_share_percent", "stress_max_kpa", "left_out_percent", "strain_p99_percent",
+                     "max_displacement_mm", "volume_change_percent"});
   if (const Json volume = one.source.at("simulate", "result.unloaded.volume_mm3"); volume.is_number()) {
     lines.push_back({"Volume within the shells, without load", figure(1e-3 * volume.get<double>()) + " ml"});
   }

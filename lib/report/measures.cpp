@@ -40,7 +40,7 @@ Value answered(const char* key, double scale = 1) {
 Value estimated(const char* of, const char* key) {
   return [of = std::string(of), place = fmt::format("result.estimates.{}.percent", key)](const PipelineCase& one) {
     const auto reached = is_answered(one) ? accuracy_reached(one) : std::nullopt;
-    if (reached && reached->of == of) {
+    if (reached && reached->of == of && reached->percent) {
       return reached->percent;
     }
     return is_answered(one) ? number(one.at("simulate", place)) : std::nullopt;
@@ -49,7 +49,12 @@ Value estimated(const char* of, const char* key) {
 
 // An input as it was written, where that is known; of tools that told no `stated` the command says it.
 std::optional<std::string> written(const PipelineCase& one, const StatedInput& input) {
-  const Json typed = one.at("simulate", "stated.typed." + input.key);
+  Json typed = one.at("simulate", "stated.typed." + input.key);
+  // A pressure left out is that of the image.
+  if (input.key == "pressure" && typed.is_null() &&
+      one.at("simulate", "stated.pressure_mpa") == one.at("simulate", "stated.imaged_at_mpa")) {
+    typed = one.at("simulate", "stated.typed.imaged_at");
+  }
   if (typed.is_string()) {
     return typed.get<std::string>();
   }
@@ -170,6 +175,9 @@ std::vector<Measure> make_mechanics() {
        "Estimated error of the 99th percentile of membrane stress by number of shells and model.",
        "simulate: result.estimates.membrane_p99_mpa.percent, or result.accuracy.estimate_percent of an accuracy of it",
        false, estimated("membrane", "membrane_p99_mpa"), true},
+      {"membrane_mean_kpa", "Membrane stress mean", "kPa",
+       "Mean, by area, of the von Mises value of the mean stress over the wall.",
+       "simulate: result.wall.membrane_mean_mpa × 1000", false, answered("result.wall.membrane_mean_mpa", 1e3)},
       {"tension_p99_n_per_mm", "Tension p99", "N/mm",
        "99th percentile, by area, of the largest principal tension of the wall, per current length.",
        "simulate: result.wall.tension_p99_n_per_mm", false, answered("result.wall.tension_p99_n_per_mm")},

@@ -4,6 +4,7 @@
 #include "mechanics/benchmarks.hpp"
 #include "tunica/accuracy/detail/levels.hpp"
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/mechanics/elements/rotation.hpp"
 
 #include <gmock/gmock.h>
@@ -66,11 +67,28 @@ TEST(Accuracy, ASphereUnderPressureIsWithinWhatIsClaimed) {
   }
 }
 
-TEST(Accuracy, APlaceThatTheMiddleOfTheWallDoesNotReachIsDoubtful) {
+TEST(Accuracy, APlaceThatTheMiddleOfTheWallDoesNotReachMakesTheStressOfFacesDoubtful) {
   TriangleMesh surface = flat_facets(benchmarks::make_sphere(radius, 6));
   surface.vertices[700] *= 1 + 0.95 * thickness / radius;
   const Sphere sphere{.target = Target{surface}};
-  EXPECT_THAT(sphere.solved({0.05}).reasons, testing::Contains(testing::HasSubstr("a place of the surface lies")));
+  EXPECT_THAT(sphere.solved({0.05, Quantity::stress, 5120}).reasons,
+              testing::Contains(testing::HasSubstr("a place of the surface lies")));
+  const Accuracy volume = sphere.solved({0.05, Quantity::volume});
+  EXPECT_THAT(volume.reasons, testing::IsEmpty());
+  EXPECT_NEAR(volume.levels.back().value / sphere.exact(Quantity::volume), 1, 0.02);
+}
+
+TEST(Accuracy, APartThatNoShellsComeToIsDoubtful) {
+  TriangleMesh surface = flat_facets(benchmarks::make_sphere(radius, 6));
+  const auto count = narrow<Index>(surface.vertices.size());
+  TriangleMesh part = flat_facets(benchmarks::make_sphere(0.15 * radius, 3));
+  surface.vertices.insert(surface.vertices.end(), part.vertices.begin(), part.vertices.end());
+  for (const auto& [a, b, c] : part.triangles) {
+    surface.triangles.push_back({a + count, b + count, c + count});
+  }
+  const Sphere sphere{.target = Target{surface}};
+  EXPECT_THAT(sphere.solved({0.05, Quantity::displacement, 5120}).reasons,
+              testing::Contains(testing::HasSubstr("of the wall from the surface in the mean")));
 }
 
 TEST(Accuracy, WhereDisplacementsAreSmallTheLinearModelIsTaken) {

@@ -161,6 +161,10 @@ TEST_F(LabelTables, with_several_names_of_a_label_are_told) {
   const auto warning = several_names("t.tsv", {{1, "aorta"}, {2, "vein"}, {1, "trachea"}});
   ASSERT_TRUE(warning);
   EXPECT_THAT(warning->text, HasSubstr("t.tsv: the label 1 is called 'aorta' and 'trachea'"));
+  const auto number = several_names("t.tsv", {{1, "2"}, {2, "vein"}});
+  ASSERT_TRUE(number);
+  EXPECT_THAT(number->text, HasSubstr("t.tsv: the label 1 is called '2', which is another label's number"));
+  EXPECT_FALSE(several_names("t.tsv", {{1, "1"}, {2, "7"}}));
 }
 
 TEST_F(LabelTables, that_are_none_are_refused_with_their_line) {

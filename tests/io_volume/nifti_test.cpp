@@ -190,6 +190,17 @@ TEST(NiftiTransform, BothAndDifferent) {
   EXPECT_THAT(texts_of(file.warnings), testing::ElementsAre(HasSubstr("the qform is used")));
 }
 
+TEST(NiftiTransform, AnSformOfOtherVoxelsThanStatedIsSaid) {
+  const TemporaryFolder folder;
+  NiftiOptions options;
+  options.pixdim = {1, 4, 3, 4};
+  folder.file("v.nii", nifti_file(options));
+  const VolumeFile file = read_both_ways(folder / "v.nii");
+  EXPECT_EQ(file.volume.affine(0, 0), -2);
+  EXPECT_THAT(texts_of(file.warnings),
+              testing::ElementsAre(HasSubstr("its sform has voxels of 2 x 3 x 4, its pixdim of 4 x 3 x 4")));
+}
+
 TEST(NiftiTransform, NeitherIsASpacingWithAWarning) {
   const TemporaryFolder folder;
   NiftiOptions options;

@@ -283,6 +283,22 @@ TEST(Prestress, IsAtRestInEveryKindOfRun) {
   }
 }
 
+/// What long steps take of a motion does not look smaller because the wall was under pressure before.
+TEST(Prestress, EnergiesOfAMotionAreThoseSinceTheImage) {
+  Model model = closed(make_geodesic(20, 4), 0.5, 200);
+  model.shells[0].material.density = 1.1e-9;
+  RunSettings settings;
+  settings.kind = DynamicRun{0.05, 0.01, {}, Integrator::backward_euler};
+  const auto lost = [&](double added_to, double imaged_at) {
+    model.loads[0].kind = PressureLoad{imaged_at + added_to, true, imaged_at};
+    const EnergyBalance energy = solve(model, settings, [](const State&) {}).energy.value();
+    return energy.lost / energy.largest;
+  };
+  const double at_rest = lost(0.1 * pressure, 0);
+  EXPECT_GT(at_rest, 0.3);
+  EXPECT_NEAR(lost(0.1 * pressure, pressure), at_rest, 0.05 * at_rest);
+}
+
 /// A sphere in tension rings higher than one at rest: w^2 of every mode grows.
 TEST(Prestress, RaisesFrequencies) {
   Model model = closed(make_geodesic(20, 6), 0.5);

@@ -73,7 +73,7 @@ class Table(WithStubs):
     def test_encodings_and_separators_of_spreadsheets(self):
         (self.table.parent / "gro\u00df.nii").write_text("a volume")
         lines = ["case;volume;label;fix;;", 'p1;gro\u00df.nii;1;"below z=1mm; above z=9mm"', "p2;a.nii.gz;Gef\u00e4\u00df;"]
-        encodings = ("utf-8", "utf-16", "utf-16-le", "cp1252")
+        encodings = ("utf-8", "utf-16", "utf-16-le", "utf-16-be", "cp1252")
         for separator, of_it in ((";", encodings), (",", encodings[:1]), ("\t", encodings[:1])):
             text = f"sep={separator}\r\n" + "\r\n".join(line.replace(";", separator).replace(f"mm{separator} above", "mm; above") for line in lines)
             for encoding in of_it:

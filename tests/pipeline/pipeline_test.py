@@ -184,6 +184,8 @@ class Rules(WithStubs):
         self.assertNotIn("--tolerance", relax)
         self.assertIn("--accuracy 5% --of membrane --max-seconds 60s", simulate)
         self.assertTrue((self.out / "a" / "iso-0.5" / "refined.ply").exists())
+        self.make(VOLUMES="a.nii.gz", ISOVALUE=-0.5, SIMULATE="--max-seconds 2min", **LOAD)
+        self.assertIn("--accuracy 5% --of membrane --max-seconds 2min", self.calls()[-1])
         for own in ({"SHELLS": "800"}, {"TOLERANCE": "1%"}, {"LOAD_STEPS": "3"}, {"SIMULATE": "--unloaded u.ply"}):
             self.make(VOLUMES="a.nii.gz", ISOVALUE=-0.5, **own, **LOAD)
             self.assertNotIn("--accuracy", " ".join(self.calls()))
@@ -365,6 +367,12 @@ class Rules(WithStubs):
         self.assertIn("VOLUMES is empty", self.refusal(VOLUMES="", LABEL=1, **LOAD))
         self.assertIn("OUT: has no name", self.refusal(VOLUMES="a.nii.gz", LABEL=1, **{**LOAD, "OUT": ""}))
         self.assertIn("folder", self.refusal(VOLUMES="a.nii.gz", LABELS="../1", **LOAD))
+        for given, words in (({"DURATION": "1s"}, "DURATION is of KIND=dynamic: leave it out"),
+                             ({"SHELLS": "800", "OF": "stress"}, "OF is of ACCURACY, and SHELLS is given: leave it out"),
+                             ({"SIMULATE": "--accuracy 2%", "OF": "stress"}, "OF is of ACCURACY, and SIMULATE=--accuracy is given"),
+                             ({"KIND": "dynamic", "DENSITY": "1g/cm3", "DURATION": "1s", "STEP": "1ms", "LOAD_STEPS": "3"},
+                              "LOAD_STEPS is of KIND=static: leave it out")):
+            self.assertIn(words, self.refusal(VOLUMES="a.nii.gz", LABEL=1, **given, **LOAD))
         (self.bin / "tunica-relax").unlink()
         self.assertIn("no tunica-relax", self.refusal(VOLUMES="a.nii.gz", LABEL=1, **LOAD))
 
@@ -440,7 +448,8 @@ class Rules(WithStubs):
         self.assertIn("EXTRACT: a quotation mark is not closed", self.make(EXTRACT="'", **arguments).stderr)
 
     def test_a_comma_is_no_decimal_point(self):
-        for name, value, right in (("THICKNESS", "1,5mm", "1.5mm"), ("POISSON", "0,45", "0.45"), ("TOLERANCE", "0,5%", "0.5%")):
+        for name, value, right in (("THICKNESS", "1,5mm", "1.5mm"), ("POISSON", "0,45", "0.45"), ("TOLERANCE", "0,5%", "0.5%"),
+                                   ("SHELLS", "1,000", "1000")):
             said = self.refusal(VOLUMES="a.nii.gz", LABEL=1, **{**LOAD, name: value})
             self.assertIn(f"{name}: '{value}' has a comma: write {right}", said)
 

@@ -87,6 +87,16 @@ TEST(Summary, RoundsBoundsUp) {
   EXPECT_THAT(summary_tsv({one}), testing::HasSubstr("\t0.1147\t"));
 }
 
+TEST(Measures, AnAccuracyWithoutAnEstimateOfItsOwnShowsThatOfAllAnswers) {
+  PipelineCase one{"a/1", "out/a/1", "simulate", "0", "done", {}, {}};
+  one.reports["simulate"] = {
+      {"ok", true},
+      {"result",
+       {{"accuracy", {{"of", "membrane"}, {"value", 0.1}, {"estimate_percent", {}}, {"requested_percent", 5}}},
+        {"estimates", {{"membrane_p99_mpa", {{"percent", 3}, {"credible", false}}}}}}}};
+  EXPECT_EQ(shown(one, "membrane_error_percent"), "3%");
+}
+
 TEST(Measures, InputsAreShownAsTheyWereStated) {
   PipelineCase one{"a/1", "out/a/1", "simulate", "0", "done", {}, {}};
   const auto pressure = [&](double megapascals, const char* typed) {
@@ -100,6 +110,11 @@ TEST(Measures, InputsAreShownAsTheyWereStated) {
   one.reports["simulate"] = {{"command", "tunica-simulate s.ply r.hdf --pressure 120mmHg"}};
   EXPECT_EQ(shown(one, "pressure_kpa"), "120 mmHg (16.0 kPa)") << "a report of an older tool";
   EXPECT_EQ(shown(one, "imaged_at_kpa"), "");
+  one.reports["simulate"] = {{"stated",
+                              {{"pressure_mpa", 0.0159986865},
+                               {"imaged_at_mpa", 0.0159986865},
+                               {"typed", {{"pressure", {}}, {"imaged_at", "120mmHg"}}}}}};
+  EXPECT_EQ(shown(one, "pressure_kpa"), "120 mmHg (16.0 kPa)") << "left out: that of the image";
 }
 
 TEST(CommandWords, AreThoseTheShellSees) {

@@ -233,7 +233,9 @@ class Decimate(WholeTool):
     def test_units(self):
         vertices, triangles = meshes.sphere(3)
         meshes.write_obj(self.path("in.obj"), vertices, triangles)
-        self.assertAlmostEqual(self.run_tool("in.obj", "a.ply", "--triangles", 100)["result"]["diagonal_mm"], 12 ** 0.5)
+        report = self.run_tool("in.obj", "a.ply", "--triangles", 100)
+        self.assertAlmostEqual(report["result"]["diagonal_mm"], 12 ** 0.5)
+        self.assertIn("says no unit of length", " ".join(report["warnings"]))
         with open(self.path("a.ply"), "rb") as made:  # millimetres would be a claim that nobody made
             self.assertNotIn(b"comment units", made.read(400))
         self.run_tool("in.obj", "c.ply", "--max-error", "0.2mm", code=2, says="--mesh-unit")

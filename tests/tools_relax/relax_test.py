@@ -696,8 +696,11 @@ class MidSurface(Case):
         write_ply(self.ball, *sphere(4, 10.0))
         for face, radius in (("outer", 9.0), ("inner", 11.0)):
             with self.subTest(face):
-                record, _ = self.relax(self.ball, self.ball, self.out, "--shells", 300, "--mid-surface", face, "--thickness",
-                                       "2mm", "--max-iterations", 1, "--force")
+                record, said = self.relax(self.ball, self.ball, self.out, "--shells", 300, "--mid-surface", face, "--thickness",
+                                          "2mm", "--max-iterations", 1, "--force")
+                # A pressure inside acts on the inner face.
+                ratio = float(re.search(r"IMAGED_AT\) by ([0-9.]+), unless", said)[1])
+                self.assertAlmostEqual(ratio, (radius / (radius - 1)) ** 2, delta=0.005)
                 result = record["result"]["mid_surface"]
                 self.assertEqual(result["thickness_mm"], {"min": 2, "max": 2})
                 self.assertLess(result["error_mm"]["max"], 0.02)

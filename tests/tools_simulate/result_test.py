@@ -142,6 +142,8 @@ class Result(SimulateTest):
                 self.assertAlmostEqual(of_nodes.mean() / stress, 1, delta=0.05)
             self.assertAlmostEqual(faces.max() / wall["stress_max_mpa"], 1, delta=1e-3)
             self.assertAlmostEqual(membrane.max() / wall["membrane_max_mpa"], 1, delta=1e-3)
+            self.assertAlmostEqual(wall["membrane_mean_mpa"] / stress, 1, delta=0.02)
+            self.assertEqual(history["membrane_mean"][-1], wall["membrane_mean_mpa"])
 
     def test_static_result_is_one_loaded_state_that_vtk_reads(self):
         result = self.run_tool("ball.ply", "out.hdf", *STATIC)["result"]
@@ -268,8 +270,8 @@ nearest = ["0mm", "0mm", "{RADIUS}mm"]
             self.assertEqual(history["load_factor"][:].tolist(), [0, 0.25, 0.5, 1])
             self.assertEqual(set(history), {"time", "load_factor", "volume", "strain_energy", "kinetic_energy",
                                             "residual", "newton_iterations", "cg_iterations", "max_displacement",
-                                            "displacement_p99", "membrane_p99", "membrane_max", "tension_p99",
-                                            "stress_p99", "stress_max", "stress_max_at", "strain_p99", "strain_max"})
+                                            "displacement_p99", "membrane_p99", "membrane_max", "membrane_mean",
+                                            "tension_p99", "stress_p99", "stress_max", "stress_max_at", "strain_p99", "strain_max"})
             self.assertTrue(all(len(history[name]) == 4 for name in history))
             self.assertTrue((np.diff(history["volume"]) > 0).all())
             self.assertTrue((np.diff(history["strain_energy"]) > 0).all())

@@ -123,6 +123,24 @@ TEST(Staircase, TheErrorOfAVesselOf256VoxelsIsMoreThanHalved) {
   EXPECT_LT(mean_distance(mesh, tree), 0.00008 * diagonal(truth));
 }
 
+TEST(Staircase, ABallInThickSlicesHasNoPlateaus) {
+  // 12 slices of 5 mm: the last one is a plateau 11 voxels wide, 2 mm above the pole.
+  PhantomOptions options;
+  options.shape = PhantomShape::sphere;
+  options.size = 60;
+  options.spacing = Vec3(1, 1, 5);
+  const Mask mask = select(make_phantom(options).volume, label_one);
+  TriangleMesh mesh = marching_cubes(mask, {});
+  smooth_staircase(mesh, mask);
+  const TriangleMesh truth = phantom_surface(options);
+  const ClosestPoint tree(truth);
+  double farthest = 0;
+  for (const Vec3& p : mesh.vertices) {
+    farthest = std::max(farthest, std::sqrt(tree.closest(p).squared_distance));
+  }
+  EXPECT_LT(farthest, 0.7);
+}
+
 TEST(Staircase, ThickSlicesMoveAlongTheirOwnAxisOnly) {
   // Slices of 5 mm: up to 2.5 mm across the slices, and no more than 0.4 mm within.
   PhantomOptions options;

@@ -184,6 +184,7 @@ constexpr std::array about{
     About{"tunica/history/membrane_p99", "MPa",
           "von Mises stress of the mean over the wall, passed on 1 % of the area"},
     About{"tunica/history/membrane_max", "MPa", "largest von Mises stress of the mean over the wall"},
+    About{"tunica/history/membrane_mean", "MPa", "von Mises stress of the mean over the wall, mean over the area"},
     About{"tunica/history/tension_p99", "N/mm", "largest principal membrane force, passed on 1 % of the area"},
     About{"tunica/history/stress_p99", "MPa", "von Mises stress of either face, passed on 1 % of the area"},
     About{"tunica/history/stress_max", "MPa", "largest von Mises stress of either face"},
@@ -251,7 +252,7 @@ std::string ascii_of(std::string text) {
 }
 
 // In the order of make_history().
-std::array<double, 15> history_of(const State& state, const ElementFields& of_elements) {
+std::array<double, 16> history_of(const State& state, const ElementFields& of_elements) {
   const Wall& wall = of_elements.wall;
   return {state.time,
           state.load_factor,
@@ -263,6 +264,7 @@ std::array<double, 15> history_of(const State& state, const ElementFields& of_el
           of_elements.displacement_p99,
           wall.membrane_p99,
           wall.membrane_max,
+          wall.membrane_mean,
           wall.tension_p99,
           wall.stress_p99,
           wall.stress_max,
@@ -449,8 +451,8 @@ struct ResultFile::Implementation {
 
     const Handle history = writer.group(tunica_group.get(), "history");
     for (const char* name : {"time", "load_factor", "volume", "strain_energy", "kinetic_energy", "residual",
-                             "max_displacement", "displacement_p99", "membrane_p99", "membrane_max", "tension_p99",
-                             "stress_p99", "stress_max", "strain_p99", "strain_max"}) {
+                             "max_displacement", "displacement_p99", "membrane_p99", "membrane_max", "membrane_mean",
+                             "tension_p99", "stress_p99", "stress_max", "strain_p99", "strain_max"}) {
       numbers.emplace_back(writer, history.get(), name, H5T_NATIVE_DOUBLE, std::vector<Size>{}, history_chunk, false);
     }
     for (const char* name : {"newton_iterations", "cg_iterations"}) {
@@ -571,7 +573,7 @@ struct ResultFile::Implementation {
     node_rotation.append(writer, 1, flattened(state.rotation).data());
     node_membrane.append(writer, 1, of_elements.membrane_stress.data());
     node_stress.append(writer, 1, of_elements.von_mises.data());
-    const std::array<double, 15> history = history_of(state, of_elements);
+    const std::array<double, 16> history = history_of(state, of_elements);
     stress_max_at.append(writer, 1, of_elements.wall.stress_max_at.data());
     for (std::size_t i = 0; i < numbers.size(); ++i) {
       numbers[i].append(writer, 1, &history[i]);

@@ -137,6 +137,7 @@ namespace {
 Json wall_report(const WallNumbers& wall) {
   return {{"membrane_p99_mpa", wall.membrane_p99},
           {"membrane_max_mpa", wall.membrane_max},
+          {"membrane_mean_mpa", wall.membrane_mean},
           {"tension_p99_n_per_mm", wall.tension_p99},
           {"stress_p99_mpa", wall.stress_p99},
           {"stress_max_mpa", wall.stress_max},

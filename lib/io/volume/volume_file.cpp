@@ -128,7 +128,7 @@ VolumeFile read_any(const fs::path& path, const VolumeOptions& options, const Sl
         {Weight::minor, "anisotropic voxels",
          fmt::format("{}: its voxels are {:.3g} x {:.3g} x {:.3g} mm: where the organ's surface lies along the slices, "
                      "it is known to half a slice, {:.3g} mm; displacements and stresses of single places are as "
-                     "uncertain there: trust means and percentiles, or take thinner slices",
+                     "uncertain there: trust means over the organ, or take thinner slices",
                      path.string(), edges[0], edges[1], edges[2], edges.maxCoeff() / 2)});
   }
   const auto& dims = file.volume.dims;

@@ -336,6 +336,18 @@ void set_transform(VolumeFile& file, const fs::path& path, const Header& header,
                        use_qform ? "" : " (--prefer-qform takes the other)")});
     }
   }
+  if (has_sform && !has_qform) {
+    const Vec3 edges = sform(header).leftCols<3>().colwise().norm().transpose();
+    const Vec3 stated = spacing_of(header);
+    constexpr double notable = 0.01;
+    if (stated.minCoeff() > 0 && ((edges - stated).cwiseAbs().array() > notable * stated.array()).any()) {
+      file.warnings.push_back(
+          {Weight::major, "world transform",
+           fmt::format("{}: its sform has voxels of {:.4g} x {:.4g} x {:.4g}, its pixdim of {:.4g} x {:.4g} x {:.4g}: "
+                       "the sform is used; compare with the image that was segmented, and correct the header",
+                       path.string(), edges[0], edges[1], edges[2], stated[0], stated[1], stated[2])});
+    }
+  }
   if (!has_sform && !has_qform) {
     file.warnings.push_back(
         {Weight::major, "world transform",

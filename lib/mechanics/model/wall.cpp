@@ -78,6 +78,15 @@ double area_quantile(std::span<const Facet> facets, double above) {
   return high;
 }
 
+double area_mean(std::span<const Facet> facets) {
+  double sum = 0, area = 0;
+  for (const Facet& facet : facets) {
+    sum += facet.area * (facet.values[0] + facet.values[1] + facet.values[2]) / 3;
+    area += facet.area;
+  }
+  return area > 0 ? sum / area : 0;
+}
+
 double area_quantile(const Model& model, std::span<const double> of_nodes, double above) {
   if (of_nodes.size() != model.node_count()) {
     throw InputError(fmt::format("{} values for {} nodes", of_nodes.size(), model.node_count()));

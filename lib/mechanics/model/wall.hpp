@@ -27,4 +27,7 @@ double area_quantile(std::span<const Facet> facets, double above);
 /// @param of_nodes  #nodes of all bodies
 double area_quantile(const Model& model, std::span<const double> of_nodes, double above);
 
+/// The mean of a field, linear within the facets, over their area; 0 without area.
+double area_mean(std::span<const Facet> facets);
+
 }  // namespace tunica

@@ -171,6 +171,7 @@ WallNumbers numbers_of(const Model& model, const CornerFields& all, const std::v
   w.stress_max = largest(stress);
   w.membrane_p99 = area_quantile(membrane, rare);
   w.membrane_max = largest(membrane);
+  w.membrane_mean = area_mean(membrane);
   w.tension_p99 = area_quantile(counted(all.tension), rare);
   w.strain_p99 = area_quantile(strain, rare);
   w.strain_max = largest(strain);

@@ -17,8 +17,9 @@ struct WallNumbers {
   Vec3 stress_max_at = Vec3::Zero();  ///< mm, the node, in the reference
   double membrane_p99 = 0;            ///< MPa
   double membrane_max = 0;
-  double tension_p99 = 0;  ///< N/mm, the largest principal membrane force, per current length
-  double strain_p99 = 0;   ///< engineering strain of the co-rotated frame
+  double membrane_mean = 0;  ///< over the area: of a closed organ its volume and area all but decide it
+  double tension_p99 = 0;    ///< N/mm, the largest principal membrane force, per current length
+  double strain_p99 = 0;     ///< engineering strain of the co-rotated frame
   double strain_max = 0;
   /// Where the faces' stress passes its p99, the part of it that the membrane stress there is not.
   double bending_share = 0;

@@ -191,7 +191,7 @@ std::vector<Warning> doubt_openings(const Subject& subject, const Openings& open
            fmt::format(
                "{}: the image's border cuts off a side of it at {}: that is no end of a vessel, so a flat lid closes "
                "it there, {:.2g} % of the surface; shape and stress are wrong on the lid and around it; take an "
-               "image that holds its whole width",
+               "image that holds its whole width, or cut the part beside the border off (--cut, of the pipeline CUT)",
                subject.name, list_places(subject, places), 1e2 * lids / area)}};
 }
 

@@ -163,7 +163,7 @@ private:
     return any;
   }
 
-  static constexpr int most_iterations = 60;
+  static constexpr int most_iterations = 240;
   static constexpr int most_last_iterations = 3;
   static constexpr int most_corrections = 8;
 
@@ -174,9 +174,10 @@ private:
   void relax(const VertexNeighbours& neighbours, const std::vector<bool>& active, int iterations,
              const Progress& progress) {
     constexpr double step = 0.25;
-    constexpr double enough = 2e-4;
+    constexpr double enough = 1e-4;
     const std::size_t size = now_.size();
-    if (std::ranges::find(active, true) == active.end()) {
+    const auto moving = std::ranges::count(active, true);
+    if (moving == 0) {
       return;
     }
     std::vector<Vec3> ahead = now_;
@@ -198,7 +199,7 @@ private:
       const double uphill =
           sum_blocks(size, [&](std::size_t v) { return (ahead[v] - next[v]).dot(next[v] - now_[v]); });
       const double moved =
-          std::sqrt(sum_blocks(size, [&](std::size_t v) { return (next[v] - now_[v]).squaredNorm(); }) / real(size));
+          std::sqrt(sum_blocks(size, [&](std::size_t v) { return (next[v] - now_[v]).squaredNorm(); }) / real(moving));
       const double faster = uphill > 0 ? 1 : 0.5 * (1 + std::sqrt(1 + 4 * momentum * momentum));
       const double carry = uphill > 0 ? 0 : (momentum - 1) / faster;
       for_all(size, [&](std::size_t v) {
@@ -262,9 +263,9 @@ private:
   /// steps are as long as the root of the radius: the mean is taken over a square of a width in proportion, and so does
   /// not mix a small part with what it joins.
   void remove_local_drift(const VertexNeighbours& neighbours) {
-    constexpr int steps = 24;
-    constexpr double radius_of_all_steps = 20;
-    constexpr double least_share = 0.1;
+    constexpr int steps = 240;
+    constexpr double radius_of_all_steps = 200;
+    constexpr double least_share = 0.01;
     const std::vector<Vec3> normal = normals(now_);
     const std::vector<double> radius = radii(neighbours, normal);
     std::vector<double> drift(now_.size(), 0.0);
