@@ -312,14 +312,22 @@ def is_zero(quantity):
     return re.match(r"[-+]?(0+\.?0*|\.0+)(e[-+]?\d+)?\s*[^\d.]", quantity + " ", re.I) is not None
 
 
+def shells_stated_by(setting_of):
+    """Which variable says how many shells there are to be, or leaves no choice of them, as it is written; none: the accuracy
+    chooses them, as it does with ACCURACY."""
+    if setting_of("ACCURACY"):
+        return None
+    stated = [name for name in ("SHELLS", "TOLERANCE", "MID_SURFACE", "LOAD_STEPS") if setting_of(name)]
+    stated += ["KIND=dynamic"] if setting_of("KIND") == "dynamic" else []
+    stated += [f"SIMULATE={word}" for word in re.findall(r"--(?:unloaded|load-steps|accuracy|target)\b", setting_of("SIMULATE"))]
+    return next(iter(stated), None)
+
+
 def without_effect(stated, setting_of):
     """What is stated and would change nothing, by words: variables of another kind of run."""
     idle = {"KIND=dynamic": ("DURATION", "STEP")} if setting_of("KIND") == "static" else {"KIND=static": ("LOAD_STEPS",)}
-    chosen = [name for name in ("SHELLS", "TOLERANCE", "MID_SURFACE", "LOAD_STEPS") if setting_of(name)]
-    chosen += ["KIND=dynamic"] if setting_of("KIND") == "dynamic" else []
-    chosen += [f"SIMULATE={word}" for word in ("--accuracy", "--target", "--unloaded") if word in setting_of("SIMULATE")]
-    if chosen and not setting_of("ACCURACY"):
-        idle[f"ACCURACY, and {chosen[0]} is given"] = ("OF",)
+    if by := shells_stated_by(setting_of):
+        idle[f"ACCURACY, and {by} is given"] = ("OF",)
     return [f"{name} is of {of}: leave it out" for of, names in idle.items() for name in names if stated(name)]
 
 

@@ -33,7 +33,7 @@ import subprocess
 import sys
 import tempfile
 
-from cases import CONTROL, SWITCHES, Refused, find_cases, say, stem_of
+from cases import CONTROL, SWITCHES, Refused, find_cases, say, shells_stated_by, stem_of
 
 STAGES = ("extract", "decimate", "relax", "simulate")
 PRODUCTS = {"extract": ["surface.ply"], "decimate": ["coarse.ply"], "relax": ["shell.ply", "map.png"],
@@ -61,8 +61,7 @@ def accuracy_flags(case):
     of = flag("--of", setting("OF") or "membrane")
     if setting("ACCURACY"):
         return [*flag("--accuracy", setting("ACCURACY")), *of]
-    is_stated = any(setting(name) for name in ("SHELLS", "TOLERANCE", "MID_SURFACE", "LOAD_STEPS"))
-    if is_stated or setting("KIND") != "static" or re.search(r"--(unloaded|load-steps|accuracy|target)\b", setting("SIMULATE")):
+    if shells_stated_by(setting):
         return []
     bound = [] if re.search(r"--max-seconds\b", setting("SIMULATE")) else ["--max-seconds", "60s"]
     return ["--accuracy", "5%", *of, *bound]

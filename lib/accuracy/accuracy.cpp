@@ -310,7 +310,7 @@ private:
     is_doubtful_ = !out_.reasons.empty();
   }
 
-  /// @param mean  of the shells' distances, mm
+  /// @param mean  of the distances from shells to surface, or of those back, mm
   void doubt_distance(double mean, double thinnest) {
     if (mean >= request_.within * thinnest) {  // the error of an answer is one to three times that
       out_.reasons.push_back(fmt::format(
@@ -326,7 +326,7 @@ private:
       if (targets_[b] == nullptr) {
         continue;
       }
-      doubt_distance(shell_quality(level_.bodies[b].mesh, *targets_[b]).mean_distance, thinnest);
+      doubt_distance(mean_distance_from_target(level_.bodies[b].mesh, *targets_[b]), thinnest);
       if (request_.of != Quantity::stress) {
         continue;
       }

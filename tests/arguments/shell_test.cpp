@@ -69,6 +69,7 @@ const std::vector<Call<ShellMesh>> of_shells{
     {"mean_distance_bound", [](const ShellMesh& s) { mean_distance_bound(s, ball(), 0.1); }},
     {"shell_errors", [](const ShellMesh& s) { shell_errors(s, ball(), 0.1); }},
     {"shell_quality", [](const ShellMesh& s) { shell_quality(s, ball()); }},
+    {"mean_distance_from_target", [](const ShellMesh& s) { mean_distance_from_target(s, ball()); }},
     {"refit", [](const ShellMesh& s) { refit(s, ball()); }},
     {"fit_normals", [](ShellMesh s) { fit_normals(ball(), s); }},
     {"half_wall_error", [](const ShellMesh& s) { half_wall_error(s, ball(), 0.1); }},

@@ -1,5 +1,6 @@
 #!/usr/bin/python3
-"""Mean distance of the extracted surface to the true one, in voxels, by voxels' faces and smoothed, as a table.
+"""Mean distance of the extracted surface to the true one, in voxels, by voxels' faces and smoothed, and what the steps that
+are left cost the stress, as tables.
 
     TUNICA_BIN=build/release/bin tests/bench/staircase_bench.py [--out docs/tables/staircase.md]
 
@@ -16,10 +17,19 @@ from pathlib import Path
 BIN = os.path.abspath(os.environ.get("TUNICA_BIN", "build/release/bin"))
 CASES = (("aneurysm", 256, "1"), ("tube", 256, "1"), ("bladder", 128, "1"), ("capsule", 128, "1"), ("colon", 128, "1"),
          ("bladder", 96, "0.78,0.78,5"), ("colon", 48, "1"), ("colon", 48, "0.78,0.78,5"))
+# Phantoms without ends, with the share of flipped border voxels.
+CLOSED = (("sphere", 60, "1", 0), ("sphere", 60, "1,1,3", 0), ("sphere", 60, "1,1,5", 0), ("sphere", 60, "1,1,5", 0.02),
+          ("bladder", 60, "1", 0), ("bladder", 60, "1,1,3", 0), ("bladder", 60, "1,1,5", 0), ("capsule", 80, "1,1,4", 0))
 INTRODUCTION = """Mean distance of the surface to the true one, in voxels (the cube root of a voxel's volume).
 
 | phantom | voxels | spacing, mm | without smoothing | `--smooth staircase` | ratio |
 |---|---|---|---|---|---|"""
+STRESS = """
+Stress under 16 kPa, wall 1.5 mm, 3,000 shells of the smoothed surface against 3,000 of the true one, error in %: what the steps that are
+left cost. Border voxels are flipped with the probability `noise`.
+
+| phantom | voxels | spacing, mm | noise | mean membrane stress | its 99th percentile | 99th percentile at the faces |
+|---|---|---|---|---|---|---|"""
 
 
 def run(tool, *arguments):
@@ -46,6 +56,21 @@ def row(folder, name, size, spacing):
     return f"| {name} | {size} | {spacing} | {before:.3f} | {after:.3f} | {after / before:.2f} |"
 
 
+def wall(folder, surface):
+    run("relax", surface, surface, folder / "shell.ply", "--shells", 3000, "--min-angle", 20)
+    return run("simulate", folder / "shell.ply", folder / "result.hdf", "--static", "--imaged-at", "16kPa", "--poisson", 0.45,
+               "--thickness", "1.5mm", "--fix", "rigid-motions")["wall"]
+
+
+def stress_row(folder, name, size, spacing, noise):
+    run("phantom", name, folder / "volume.nii", "--size", size, "--spacing", spacing, "--noise", noise, "--truth",
+        folder / "truth.ply")
+    run("extract", folder / "volume.nii", folder / "surface.ply", "--label", 1, "--smooth", "staircase", "--largest")
+    found, truth = wall(folder, folder / "surface.ply"), wall(folder, folder / "truth.ply")
+    errors = (f"{100 * (found[key] / truth[key] - 1):+.1f}" for key in ("membrane_mean_mpa", "membrane_p99_mpa", "stress_p99_mpa"))
+    return f"| {name} | {size} | {spacing} | {noise:g} | {' | '.join(errors)} |"
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out")
@@ -54,6 +79,10 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         for case in CASES:
             lines.append(row(Path(folder), *case))
+            print(lines[-1], flush=True)
+        lines.append(STRESS)
+        for case in CLOSED:
+            lines.append(stress_row(Path(folder), *case))
             print(lines[-1], flush=True)
     if options.out:
         Path(options.out).write_text("\n".join(lines) + "\n", encoding="utf-8")

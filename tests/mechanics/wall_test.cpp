@@ -18,6 +18,12 @@ Model square(std::size_t n) {
   return model;
 }
 
+TEST(Wall, MeanOfALinearFieldIsByArea) {
+  const std::vector<Facet> facets{{3, {1, 2, 6}}, {1, {0, 0, 3}}};
+  EXPECT_DOUBLE_EQ(area_mean(facets), 2.5);
+  EXPECT_EQ(area_mean({}), 0);
+}
+
 TEST(Wall, QuantileOfALinearFieldIsExact) {
   for (const std::size_t n : {1, 2, 5}) {
     const Model model = square(n);

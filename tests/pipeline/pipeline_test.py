@@ -184,6 +184,8 @@ class Rules(WithStubs):
         self.assertNotIn("--tolerance", relax)
         self.assertIn("--accuracy 5% --of membrane --max-seconds 60s", simulate)
         self.assertTrue((self.out / "a" / "iso-0.5" / "refined.ply").exists())
+        self.make(VOLUMES="a.nii.gz", ISOVALUE=-0.5, METHOD="barycentre", **LOAD)
+        self.assertNotIn("--shells", next(line for line in self.calls() if line.startswith("relax")))  # of the fit alone
         self.make(VOLUMES="a.nii.gz", ISOVALUE=-0.5, SIMULATE="--max-seconds 2min", **LOAD)
         self.assertIn("--accuracy 5% --of membrane --max-seconds 2min", self.calls()[-1])
         for own in ({"SHELLS": "800"}, {"TOLERANCE": "1%"}, {"LOAD_STEPS": "3"}, {"SIMULATE": "--unloaded u.ply"}):

@@ -50,6 +50,14 @@ double mean_distance(const TriangleMesh& mesh, const ClosestPoint& truth) {
   return sum / weights;
 }
 
+PhantomOptions phantom(PhantomShape shape, std::size_t size, const Vec3& spacing = Vec3::Ones()) {
+  PhantomOptions options;
+  options.shape = shape;
+  options.size = size;
+  options.spacing = spacing;
+  return options;
+}
+
 struct Smoothed {
   std::string shape;
   std::size_t size;
@@ -79,10 +87,7 @@ INSTANTIATE_TEST_SUITE_P(
                     Smoothed{"colon", 128, Vec3(0.8, 0.8, 3), 0.5}));
 
 TEST_P(StaircaseOf, StaysWithinHalfAVoxelKeepsTheVolumeAndComesCloserToTheTruth) {
-  PhantomOptions options;
-  options.shape = *phantom_shape(GetParam().shape);
-  options.size = GetParam().size;
-  options.spacing = GetParam().spacing;
+  const PhantomOptions options = phantom(*phantom_shape(GetParam().shape), GetParam().size, GetParam().spacing);
   const Mask mask = select(make_phantom(options).volume, label_one);
   MarchingCubesOptions extraction;
   extraction.open_border = GetParam().shape == "tube" || GetParam().shape == "aneurysm";
@@ -107,9 +112,7 @@ TEST_P(StaircaseOf, StaysWithinHalfAVoxelKeepsTheVolumeAndComesCloserToTheTruth)
 }
 
 TEST(Staircase, TheErrorOfAVesselOf256VoxelsIsMoreThanHalved) {
-  PhantomOptions options;
-  options.shape = PhantomShape::aneurysm;
-  options.size = 256;
+  const PhantomOptions options = phantom(PhantomShape::aneurysm, 256);
   const Mask mask = select(make_phantom(options).volume, label_one);
   MarchingCubesOptions open;
   open.open_border = true;
@@ -125,10 +128,7 @@ TEST(Staircase, TheErrorOfAVesselOf256VoxelsIsMoreThanHalved) {
 
 TEST(Staircase, ABallInThickSlicesHasNoPlateaus) {
   // 12 slices of 5 mm: the last one is a plateau 11 voxels wide, 2 mm above the pole.
-  PhantomOptions options;
-  options.shape = PhantomShape::sphere;
-  options.size = 60;
-  options.spacing = Vec3(1, 1, 5);
+  const PhantomOptions options = phantom(PhantomShape::sphere, 60, Vec3(1, 1, 5));
   const Mask mask = select(make_phantom(options).volume, label_one);
   TriangleMesh mesh = marching_cubes(mask, {});
   smooth_staircase(mesh, mask);
@@ -143,11 +143,7 @@ TEST(Staircase, ABallInThickSlicesHasNoPlateaus) {
 
 TEST(Staircase, ThickSlicesMoveAlongTheirOwnAxisOnly) {
   // Slices of 5 mm: up to 2.5 mm across the slices, and no more than 0.4 mm within.
-  PhantomOptions options;
-  options.shape = PhantomShape::bladder;
-  options.size = 96;
-  options.spacing = Vec3(0.8, 0.8, 5);
-  const Mask mask = select(make_phantom(options).volume, label_one);
+  const Mask mask = select(make_phantom(phantom(PhantomShape::bladder, 96, Vec3(0.8, 0.8, 5))).volume, label_one);
   const TriangleMesh before = marching_cubes(mask);
   TriangleMesh after = before;
   smooth_staircase(after, mask);

@@ -573,7 +573,7 @@ struct ResultFile::Implementation {
     node_rotation.append(writer, 1, flattened(state.rotation).data());
     node_membrane.append(writer, 1, of_elements.membrane_stress.data());
     node_stress.append(writer, 1, of_elements.von_mises.data());
-    const std::array<double, 16> history = history_of(state, of_elements);
+    const auto history = history_of(state, of_elements);
     stress_max_at.append(writer, 1, of_elements.wall.stress_max_at.data());
     for (std::size_t i = 0; i < numbers.size(); ++i) {
       numbers[i].append(writer, 1, &history[i]);

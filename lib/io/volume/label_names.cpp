@@ -337,15 +337,15 @@ std::optional<double> find_label(const LabelNames& names, const std::string& tex
 std::optional<Warning> several_names(const fs::path& path, const LabelNames& names) {
   std::map<double, std::set<std::string>> names_of;
   for (const auto& [value, name] : names) {
-    const auto number = parse_number(name);
-    if (number && *number != value &&
-        std::ranges::any_of(names, [&](const auto& other) { return other.first == *number; })) {
+    names_of[value].insert(name);
+  }
+  for (const auto& [value, name] : names) {
+    if (const auto number = parse_number(name); number && *number != value && names_of.contains(*number)) {
       return Warning{Weight::minor, "several names",
                      fmt::format("{}: the label {} is called '{}', which is another label's number: that one is taken "
                                  "where it is asked for; give the label a name in letters",
                                  path.string(), value, shown(name))};
     }
-    names_of[value].insert(name);
   }
   constexpr std::size_t most = 3;
   std::string labels;

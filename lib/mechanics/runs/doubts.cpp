@@ -172,8 +172,8 @@ void doubt_voxels(const ShellBody& body, std::vector<Warning>& found) {
     found.push_back(
         {Weight::minor, "large voxels",
          fmt::format("{}: the {} of its image, {:.3g} mm, leave the surface uncertain by up to {:.3g} mm, "
-                     "{:.2g} times the wall: what is left of its steps bends the wall; 99th percentiles are "
-                     "too high by some 10 % (membrane) and 30 % (faces) on smooth organs, and by much more "
+                     "{:.2g} times the wall: what is left of its steps bends the wall; 99th percentiles may be "
+                     "too high by up to 10 % (membrane) and 30 % (faces) on smooth organs, and by much more "
                      "on ragged ones; go by the mean membrane stress, or take a finer image",
                      at(body.said_at, body.name), slices ? "slices" : "voxels", longest, longest / 2,
                      longest / 2 / wall)});

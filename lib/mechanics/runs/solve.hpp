@@ -55,7 +55,7 @@ struct EnergyBalance {
   double damped = 0;             ///< by physical damping
   double lost = 0;               ///< to time integration; below zero: gained from it
   double most_lost = 0;          ///< so far
-  double largest = 0;            ///< energy so far, stored or brought in
+  double largest = 0;            ///< energy so far, stored or brought in, without that of a prestress's forces
   double gained = 0;             ///< the most that time integration has given back or added, relative to `largest`
   std::size_t gaining_step = 0;  ///< in which that passed a tenth; 0: in none
   double gaining_time = 0;       ///< s, the end of that step

@@ -92,8 +92,10 @@ void add_neighbours(const ShellMesh& shell, const std::vector<CubicPatch>& patch
   }
 }
 
-/// Mean distance from the target's facets, by their centroids, to the curved surface, mm.
-double mean_from_target(const ShellMesh& shell, const Target& target) {
+}  // namespace
+
+double mean_distance_from_target(const ShellMesh& shell, const Target& target) {
+  require_shells(shell);
   const int level = std::clamp(truncated<int>(std::sqrt(10.0 * real(samples) / real(shell.triangles.size()))), 4, 24);
   const ClosestPoint tree(tessellate_uniformly(shell, level).mesh);
   const TriangleMesh& mesh = target.mesh();
@@ -119,13 +121,11 @@ double mean_from_target(const ShellMesh& shell, const Target& target) {
   return sum / std::max(area, 1e-300);
 }
 
-}  // namespace
-
 ShellQuality shell_quality(const ShellMesh& shell, const Target& target) {
   require_shells(shell);
   ShellQuality quality;
   const auto patches = curved_patches(shell);
-  quality.mean_distance = std::max(mean_distance(shell, target).first, mean_from_target(shell, target));
+  quality.mean_distance = std::max(mean_distance(shell, target).first, mean_distance_from_target(shell, target));
   add_normal_errors(patches, target, quality);
   add_neighbours(shell, patches, quality);
   return quality;

@@ -14,6 +14,10 @@ struct ShellQuality {
   double size_ratio = 1;  ///< largest ratio of the longest edges of two neighbouring facets
 };
 
+/// Mean distance, mm, from the target to the curved surface over the target's area, by the centroids of some 100,000 of
+/// its triangles at most. Errors: InputError as require_shells(). Cost: about 0.1 s. Parallel.
+double mean_distance_from_target(const ShellMesh& shell, const Target& target);
+
 /// Sampled: some 20,000 points of the curved surface, and the target's centroids. A crease is an edge of the target
 /// with a dihedral above 40 degrees; points whose closest triangle has one are left out of the normals' errors.
 /// Cost: about 0.1 s. Parallel.

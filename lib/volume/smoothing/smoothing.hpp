@@ -56,7 +56,7 @@ struct StaircaseResult {
 /// Errors: InputError as require_valid() of the mesh.
 /// Source: Gibson, Constrained elastic surface nets, MICCAI 1998, with a thin plate's energy in place of springs;
 /// Nesterov's accelerated projected gradient with restarts (O'Donoghue and Candes 2015); moving least squares.
-/// Cost: up to 240 passes over the mesh and 10 microseconds per vertex.
+/// Cost: up to 500 passes over the mesh and 10 microseconds per vertex.
 /// Limits: the mean error to the true surface falls to a seventh where the organ's features are ten voxels across or
 /// more, to 0.3 to 0.6 of the staircase's below, and hardly where they are thinner than a slice: there marching cubes
 /// itself lies some 0.05 voxels too far inside, which keeping its volume keeps.
