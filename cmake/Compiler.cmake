@@ -112,7 +112,7 @@ function(tunica_test name)
   set_target_properties(test_${name} PROPERTIES UNITY_BUILD ${TUNICA_UNITY} UNITY_BUILD_BATCH_SIZE 8)
   target_link_libraries(test_${name} PRIVATE tunica_flags ${arg_LINKS} GTest::gtest_main GTest::gmock)
   target_compile_options(test_${name} PRIVATE ${TUNICA_RECIPE})
-  target_include_directories(test_${name} PRIVATE ${PROJECT_SOURCE_DIR}/tests)
+  target_include_directories(test_${name} PRIVATE ${PROJECT_SOURCE_DIR}/tests ${PROJECT_SOURCE_DIR}/tests/lib)
   gtest_discover_tests(test_${name} TEST_PREFIX ${name}. DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 600)
 endfunction()
 

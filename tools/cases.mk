@@ -37,7 +37,8 @@ define stage
     echo 'tunica-$(2): ended with exit code 0, but without $(files_$(2)) and a good report: look at RUN and at its flags' \
       >> $(1)/out/$(2).log; fi; \
   echo $$code > $(1)/$(2).exit; [ $$code = 0 ] || \
-    { cat $(1)/out/$(2).log >&2; rm -f $(addprefix $(1)/out/,$(files_$(2))); exit $$code; }
+    { cat $(1)/out/$(2).log >&2; rm -f $(addprefix $(1)/out/,$(files_$(2))); exit $$code; }; \
+  printf '\n%s' "$$(sha256sum < $(1)/out/$(2).json | cut -c1-64)" >> $(1)/out/.$(2).flags
 	@: > $(1)/$(2).done
 endef
 

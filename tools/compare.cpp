@@ -310,6 +310,11 @@ void run(cli::Tool& tool, const Arguments& given) {
         given.map || in_millimetres(given.max) || in_millimetres(given.width) || in_millimetres(given.picture_range);
     MeshFile file_a = read_mesh(given.a, unit_mm, require_unit);
     MeshFile file_b = read_mesh(given.b, unit_mm, require_unit);
+    for (const auto& note : {unit_note(file_a, given.a), unit_note(file_b, given.b)}) {
+      if (note) {
+        tool.warn(*note);
+      }
+    }
     const std::string space = common_space(file_a, given.a, file_b, given.b);
     require_same_scale(file_a, given.a, file_b, given.b, unit_mm);
     warn_of_surfaces(tool, given, file_a, file_b);

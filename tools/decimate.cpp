@@ -106,6 +106,9 @@ MeshFile read_surface(const cli::Tool& tool, const fs::path& path, const std::op
                       bool require_unit, std::optional<Repairs>& repairs) {
   MeshFile file = read_mesh(path, unit_mm, require_unit);
   require_no_other_unit(file, unit_mm, path);
+  if (const auto note = unit_note(file, path)) {
+    tool.warn(*note);
+  }
   if (repairs) {
     try {
       Repaired result = repaired(file.mesh);

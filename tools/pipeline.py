@@ -111,8 +111,10 @@ def stage_commands(case, binaries, flags):
     surface, coarse, shell, error_map, result, picture, refined, facts = (
         os.path.join(case.folder, name) for name in ("surface.ply", "coarse.ply", "shell.ply", "map.png", "result.hdf",
                                                      "picture.png", REFINED, "extract.json"))
-    # What the shells were fitted to tells the error of the mesh; with MID_SURFACE they lie half a wall from it.
-    refinement = ["--target", surface] if not case.setting("MID_SURFACE") and case.setting("KIND") == "static" else []
+    # What the shells were fitted to tells the error of the mesh, in a motion where levels are solved; with MID_SURFACE they
+    # lie half a wall from it.
+    takes_target = case.setting("KIND") == "static" or accuracy_flags(case)
+    refinement = ["--target", surface] if takes_target and not case.setting("MID_SURFACE") else []
     refinement += ["--shell-out", refined] if accuracy_flags(case) else []
     words = {"extract": [path_word(case.volume), surface], "decimate": [surface, coarse],
              "relax": [coarse, surface, shell, "--picture", error_map],
@@ -226,9 +228,11 @@ def around(volume):
 def is_up_to_date(case, stage, remembered):
     """Whether a stage had these flags and left a good report, whose files, written and read, data beside a header and slices
     of a folder too, are still the same."""
-    if read_text(os.path.join(case.folder, f".{stage}.flags")) != remembered:
+    path = os.path.join(case.folder, f"{stage}.json")
+    # The hash of the report makes it this case's own.
+    if not os.path.isfile(path) or read_text(os.path.join(case.folder, f".{stage}.flags")) != f"{remembered}\n{sha256(path)}":
         return False
-    report = read_report(os.path.join(case.folder, f"{stage}.json"))
+    report = read_report(path)
     own = {name: os.path.join(case.folder, name) for names in (*PRODUCTS.values(), [REFINED]) for name in names}
     # A name that is no UTF-8 stands in a report with U+FFFD for its bytes.
     own[os.fsencode(os.path.basename(case.volume)).decode("utf-8", "replace")] = case.volume

@@ -239,14 +239,26 @@ void turn_outward(const cli::Tool& tool, const fs::path& path, TriangleMesh& mes
     return;
   }
   mesh = turned_outward(std::move(mesh), facing);
-  tool.warn({Weight::minor, "faces inward",
-             fmt::format("{}: {}: they are turned around, so that a positive pressure pushes outward; give a negative "
-                         "one to push inward",
-                         path.string(), facing_phrase(facing))});
+  if (facing.outermost_inward == 0) {
+    tool.warn(
+        {Weight::minor, "faces inward",
+         fmt::format("{}: {} of its {} pieces lie within others: they are taken for the walls of hollows, and are "
+                     "turned around to face into them; a surface of its own is to be a mesh of its own",
+                     path.string(), facing.inward, facing.pieces)});
+  } else {
+    tool.warn(
+        {Weight::minor, "faces inward",
+         fmt::format("{}: {}: they are turned around, so that a positive pressure pushes outward; give a negative "
+                     "one to push inward",
+                     path.string(), facing_phrase(facing))});
+  }
 }
 
 Surface read_surface(const cli::Tool& tool, const fs::path& path, const std::optional<double>& unit_mm) {
   Surface surface{read_mesh(path, unit_mm, true), {}, {}, 0};
+  if (const auto note = unit_note(surface.file, path)) {
+    tool.warn(*note);
+  }
   surface.facts = require_surface(surface.file, path);
   for (const Warning& warning : seam_warnings(surface.file.mesh, surface.facts, path, Weight::major)) {
     tool.warn(warning);

@@ -387,6 +387,9 @@ struct ReadTarget {
 ReadTarget read_target(const cli::Tool& tool, const SceneShell& shell, const ShellMesh& mesh, const fs::path& path,
                        bool needed) {
   MeshFile file = read_mesh(path, shell.unit_mm, true);
+  if (const auto note = unit_note(file, path)) {
+    tool.warn(*note);
+  }
   require_surface(file, path);
   const MeshFile own = read_mesh(shell.mesh, shell.unit_mm);
   require_same_scale(own, shell.mesh, file, path, shell.unit_mm);
@@ -427,7 +430,7 @@ Estimates refined_estimates(const cli::Tool& tool, const System& system, const S
                             const std::pair<State, ElementFields>& last, const fs::path& subject) {
   RefinedAnswers refined = naming(subject.string(), [&] {
     return estimate_by_refinement(
-        system.model(), last.first, answers_of(last.first, last.second), {&target}, system.settings(),
+        system.model(), last.first, last.second, {&target}, system.settings(),
         [&](std::vector<ShellBody> bodies) { return resolve_scene(scene, std::move(bodies)); });
   });
   if (!refined.reason.empty()) {

@@ -71,7 +71,21 @@ Estimates estimates_of(const std::vector<Answers>& levels, double besides, bool 
   return estimates;
 }
 
-RefinedAnswers estimate_by_refinement(const Model& model, const State& state, const Answers& answers,
+namespace {
+
+/// The quantiles beside an answer that is a 99th percentile; none of any other.
+std::array<double, 2> beside(const std::string& answer, const Wall& wall, double otherwise) {
+  const WallNumbers::Beside& quantiles = wall.beside;
+  return answer == "membrane_p99_mpa"       ? quantiles.membrane
+         : answer == "stress_p99_mpa"       ? quantiles.stress
+         : answer == "tension_p99_n_per_mm" ? quantiles.tension
+         : answer == "strain_p99_percent"   ? quantiles.strain
+                                            : std::array{otherwise, otherwise};
+}
+
+}  // namespace
+
+RefinedAnswers estimate_by_refinement(const Model& model, const State& state, const ElementFields& fields,
                                       const std::vector<const Target*>& targets, const RunSettings& settings,
                                       const ModelOf& model_of) {
   const Level level = finer_level(model.shells, targets);
@@ -88,12 +102,21 @@ RefinedAnswers estimate_by_refinement(const Model& model, const State& state, co
     State last;
     (void)solve(
         system, [&](const State& handed) { last = handed; }, {}, near);
-    const Answers finer = answers_of(last, ElementFieldEvaluator(system)(last));
+    const ElementFields finer_fields = ElementFieldEvaluator(system)(last);
+    const Answers finer = answers_of(last, finer_fields);
+    const Answers coarse = answers_of(state, fields);
     RefinedAnswers refined;
-    for (std::size_t i = 0; i < answers.size(); ++i) {
-      const double error = error_of_coarse * relative(finer[i].second - answers[i].second, finer[i].second);
-      refined.estimates[answers[i].first] = {error, error < largest_credible,
-                                             fmt::format("one refinement to {} shells", level.shell_count())};
+    for (std::size_t i = 0; i < coarse.size(); ++i) {
+      const auto& [name, before] = coarse[i];
+      const double after = finer[i].second;
+      double change = relative(after - before, after);
+      const std::array<double, 2> near_before = beside(name, fields.wall, before);
+      const std::array<double, 2> near_after = beside(name, finer_fields.wall, after);
+      for (std::size_t k = 0; k < near_after.size(); ++k) {
+        change = std::max(change, relative(near_after[k] - near_before[k], near_after[k]));
+      }
+      refined.estimates[name] = {error_of_coarse * change, error_of_coarse * change < largest_credible,
+                                 fmt::format("one refinement to {} shells", level.shell_count())};
     }
     return refined;
   } catch (const RequirementError& error) {

@@ -22,7 +22,7 @@ struct CaseMemory {
 /// @param voxels       of the volume
 /// @param voxel_bytes  of one voxel as it is stored
 /// Source: lines fitted to `peak_mib` of the reports of phantoms of 16 to 400 voxels and of 200 to 12,800 shells;
-/// tests/tools_extract/memory_test.py holds them to a factor of 1.5.
+/// tests/tools/extract/memory_test.py holds them to a factor of 1.5.
 /// Limits: extract of a label, without `--smooth SIGMA`; simulate of statics, without accuracy, contact or solids.
 CaseMemory estimate_memory(std::size_t vertices, std::size_t shells, std::size_t voxels, std::size_t voxel_bytes);
 

@@ -52,10 +52,9 @@ std::string_view example_unit(const Usage& usage) { return usage.units.substr(0,
     for (std::size_t at = names.find(' '); at != std::string::npos; at = names.find(' ', at + 2)) {
       names.replace(at, 1, ", ");
     }
-    way = usage.units.empty()
-              ? fmt::format("write {} alone", number)
-              : fmt::format("units of {} are {}, for example {}{}", usage.name.substr(usage.name.find(' ') + 1), names,
-                            number, example_unit(usage));
+    way = usage.units.empty() ? fmt::format("write {} alone", number)
+                              : fmt::format("units of {} are {}, for example 2.5{}",
+                                            usage.name.substr(usage.name.find(' ') + 1), names, example_unit(usage));
   }
   throw UsageError(fmt::format("'{}' {}: {}", text, why, way));
 }

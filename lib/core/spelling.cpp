@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <numeric>
 #include <utility>
 
@@ -174,6 +175,39 @@ struct Twin {
 constexpr std::array twins{Twin{"mPa", "millipascal", "Pa", 1e-3, "megapascal"},
                            Twin{"MN", "meganewton", "kN", 1e3, "millinewton"}};
 
+/// A unit that tunica does not read, in one that it does: exact, so that no other one is taken for it.
+struct Foreign {
+  std::string_view written;
+  std::string_view instead;
+  double scale;
+};
+constexpr std::array foreign_units{
+    Foreign{"Ba", "Pa", 0.1},
+    Foreign{"daPa", "Pa", 10},
+    Foreign{"atm", "kPa", 101.325},
+    Foreign{"mHg", "mmHg", 1e3},
+    Foreign{"cmHg", "mmHg", 10},
+    Foreign{"inHg", "mmHg", 25.4},
+    Foreign{"mmH2O", "cmH2O", 0.1},
+    Foreign{"mH2O", "cmH2O", 100},
+    Foreign{"ksi", "psi", 1e3},
+    Foreign{"daN", "N", 10},
+    Foreign{"kgf", "N", 9.80665},
+    Foreign{"gf", "mN", 9.80665},
+    Foreign{"lbf", "N", 4.4482216152605},
+    Foreign{"nN", "uN", 1e-3},
+    Foreign{"dm", "mm", 100},
+    Foreign{"nm", "um", 1e-3},
+    Foreign{"km", "m", 1e3},
+    Foreign{"in", "mm", 25.4},
+    Foreign{"ft", "mm", 304.8},
+    Foreign{"Mg", "t", 1},
+    Foreign{"mg", "g", 1e-3},
+    Foreign{"lb", "kg", 0.45359237},
+    Foreign{"ns", "us", 1e-3},
+    Foreign{"h", "min", 60},
+};
+
 // The sign of a unit that is written as a word, such as "kilopascals"; else what was written.
 std::string abbreviated(const std::string& written) {
   constexpr std::array<std::pair<std::string_view, std::string_view>, 8> prefixes{{{"micro", "u"},
@@ -213,6 +247,10 @@ std::string abbreviated(const std::string& written) {
 
 // The units whose names differ from what is written by their case at most.
 std::vector<UnitReading> units_like(const std::string& written) {
+  const auto* const foreign = std::ranges::find(foreign_units, written, &Foreign::written);
+  if (foreign != foreign_units.end() && !parse_unit(written)) {
+    return {{std::string(foreign->instead), foreign->scale, ""}};
+  }
   const std::string small = lower(written);
   std::vector<UnitReading> found;
   for (const Unit& unit : units) {
@@ -246,10 +284,12 @@ std::vector<UnitReading> readings_of_parts(const std::string& unit) {
       parts = units_like(abbreviated(name));
     }
     std::vector<UnitReading> longer;
+    const std::size_t digit = power.find_first_of("123456789");
+    const double exponent = (divides ? -1 : 1) * (power.find('-') == std::string::npos ? 1 : -1) *
+                            (digit == std::string::npos ? 1 : power[digit] - '0');
     for (const UnitReading& before : made) {
       for (const UnitReading& part : parts) {
-        longer.push_back({before.text + mark + part.text + power,
-                          divides ? before.scale / part.scale : before.scale * part.scale,
+        longer.push_back({before.text + mark + part.text + power, before.scale * std::pow(part.scale, exponent),
                           before.meaning + part.meaning});
       }
     }

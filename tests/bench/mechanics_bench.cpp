@@ -1,6 +1,6 @@
 // How long steps and static solves take, against one CHOLMOD factorisation of the same static matrix in the same run:
 // seconds depend on the machine and on what else runs there, the ratio much less. The vessel is that of
-// tests/mechanics: 1 kPa ramped over 1 s, both ends held, E 1 MPa, nu 0.45, t 1 mm, 1100 kg/m^3, steps of 40 ms.
+// tests/lib/mechanics: 1 kPa ramped over 1 s, both ends held, E 1 MPa, nu 0.45, t 1 mm, 1100 kg/m^3, steps of 40 ms.
 // Processor time on one thread, but for `real-time`: wall time on all threads that are allowed.
 // Prints tab-separated lines; a ratio has its bar beside it.
 

@@ -5,13 +5,12 @@
     ... stability.py --redraw
     ... stability.py --cell shrunken-sphere-default/2-3 --seed 1 --keep FOLDER
 
-The first writes for each map NAME.svg, NAME.csv (a line per cell) and NAME.md (scene and report of each cell's worst
-seed); the second draws the SVG again from the CSV; the third runs one cell and keeps its files.
+The first writes for each map NAME.svg and NAME.csv (a line per cell); the second draws the SVG again from the CSV; the
+third runs one cell and keeps its mesh, scene, report and result.
 """
 import argparse
 import concurrent.futures
 import csv
-import json
 import math
 import os
 import sys
@@ -24,7 +23,6 @@ from atlas.judge import ORDER, Runner, Verdict, badness, judged
 MAPS = statics.MAPS + dynamics.MAPS + surfaces.MAPS
 SEEDS = (1, 2, 3)
 COLUMNS = ("column", "row", "x", "y", "class", "classes_of_seeds", "error_percent", "seed", "exit_code", "message")
-UNTOLD = ("ms_per_step", "real_time_factor", "tetrahedra", "nodes", "wall")
 PAGES = Path(__file__).resolve().parents[2] / "docs" / "stability"
 
 
@@ -42,56 +40,18 @@ def run_cell(chart, method, place, seed, folder):
     return verdict, runner
 
 
-def shortened(value):
-    """Of a report: no long lists, no times, nothing empty."""
-    if isinstance(value, dict):
-        return {key: shortened(part) for key, part in value.items() if part not in (None, [], {}) and key not in UNTOLD}
-    if isinstance(value, list) and len(value) > 4:
-        return [shortened(part) for part in value[:4]] + [f"… {len(value)} in all"]
-    return [shortened(part) for part in value] if isinstance(value, list) else value
-
-
-def by_lines(report):
-    """JSON with a line for every key of the report and of its result, and for every part of a long list."""
-    def listed(values, indent, deeper):
-        lines = [f'{indent} {json.dumps(key)}: ' +
-                 (listed(value, indent + " ", False) if deeper and isinstance(value, dict) else text(value, indent + " "))
-                 for key, value in values.items()]
-        return "{\n" + ",\n".join(lines) + "\n" + indent + "}"
-
-    def text(value, indent):
-        whole = json.dumps(value, ensure_ascii=False)
-        if not isinstance(value, list) or len(whole) < 160:
-            return whole
-        return "[\n" + ",\n".join(f"{indent} {json.dumps(part, ensure_ascii=False)}" for part in value) + "\n" + indent + "]"
-    return listed(report, "", True)
-
-
-def record(runner):
-    """Scene, commands and reports of a cell as text."""
-    parts = []
-    scene = Path(runner.path("scene.toml"))
-    if scene.exists():
-        lines = [line if len(line) < 160 else line[:150] + " …" for line in scene.read_text("utf-8").splitlines()]
-        parts.append("```toml\n" + "\n".join(lines[:60] + (["…"] if len(lines) > 60 else [])) + "\n```")
-    for _, command, report in runner.reports:
-        kept = {key: shortened(report[key]) for key in ("ok", "error", "warnings", "result") if report.get(key)}
-        parts.append("```\ntunica-" + " ".join(command) + "\n" + by_lines(kept).replace(runner.folder + "/", "") + "\n```")
-    return "\n".join(parts)
-
-
 def worst_of(chart, method, place, seeds=SEEDS):
-    """@return the row of the CSV, the worst verdict, its record"""
+    """@return the row of the CSV, the worst verdict"""
     found = []
     for seed in seeds:
         with tempfile.TemporaryDirectory(prefix="tunica-atlas-") as folder:
-            verdict, runner = run_cell(chart, method, place, seed, folder)
-            found.append((badness(verdict), seed, verdict, record(runner)))
-    _, seed, verdict, text = max(found, key=lambda one: one[0])
+            verdict, _ = run_cell(chart, method, place, seed, folder)
+            found.append((badness(verdict), seed, verdict))
+    _, seed, verdict = max(found, key=lambda one: one[0])
     letters = "".join(one[2].letter for one in found)
     return (*place, chart.x.name(place[0]), chart.y.name(place[1]), verdict.letter, letters,
             "" if math.isnan(verdict.error) else f"{100 * verdict.error:.4g}", seed, verdict.code,
-            verdict.message), verdict, text
+            verdict.message), verdict
 
 
 def write_map(name, chart, method, out, jobs):
@@ -101,19 +61,9 @@ def write_map(name, chart, method, out, jobs):
     with open(out / f"{name}.csv", "w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(COLUMNS)
-        writer.writerows(row for row, _, _ in found.values())
-    verdicts = {place: verdict for place, (_, verdict, _) in found.items()}
-    (out / f"{name}.svg").write_text(draw.svg(chart, method, verdicts, f"{name}.md"), encoding="utf-8")
-    page = [f"# {chart.title}: {method.title}", "",
-            f"The worst of {len(SEEDS)} seeds in every cell of [the map]({name}.svg), also as [CSV]({name}.csv).",
-            chart.truth, "",
-            f"Again, with all its files: `make -f Makefile.pipeline stability CELL={name}/COLUMN-ROW`."]
-    for (i, j), (row, verdict, text) in found.items():
-        error = f", error {row[6]} %" if row[6] else ""
-        page += ["", f"## cell-{i}-{j}", "",
-                 f"{chart.x.label} = {row[2]}, {chart.y.label} = {row[3]}: {draw.WORDS[verdict.letter]} "
-                 f"(the seeds: {', '.join(row[5])}), seed {row[7]}{error}.", "", text]
-    (out / f"{name}.md").write_text("\n".join(line.rstrip() for line in "\n".join(page).split("\n")) + "\n", "utf-8")
+        writer.writerows(row for row, _ in found.values())
+    verdicts = {place: verdict for place, (_, verdict) in found.items()}
+    (out / f"{name}.svg").write_text(draw.svg(chart, method, verdicts, name), encoding="utf-8")
     return verdicts
 
 
@@ -158,7 +108,7 @@ def main():
     for name, (chart, method) in all_charts.items():
         if name.startswith(wanted) and given.redraw:
             verdicts = {place: verdict for place, (verdict, _) in stored(name, given.out).items()}
-            (given.out / f"{name}.svg").write_text(draw.svg(chart, method, verdicts, f"{name}.md"), encoding="utf-8")
+            (given.out / f"{name}.svg").write_text(draw.svg(chart, method, verdicts, name), encoding="utf-8")
         elif name.startswith(wanted):
             verdicts = write_map(name, chart, method, given.out, given.jobs)
             wrong += method.name == "default" and any(verdict.letter == "W" for verdict in verdicts.values())

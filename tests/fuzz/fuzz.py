@@ -17,7 +17,7 @@ from pathlib import Path
 SOURCE = Path(__file__).resolve().parent
 SECONDS_EACH = 10  # for one input
 MEGABYTES = 2048
-READERS_TESTS = ("io_volume", "io_mesh", "io_scene")
+READERS_TESTS = ("volume", "mesh", "scene")
 ENDINGS = {"nifti": ("nii", "gz", "hdr"), "nrrd": ("nrrd", "nhdr"), "metaimage": ("mha", "mhd"),
            "slices": ("tif", "tiff", "png"), "label_table": ("txt", "tsv", "csv", "ctbl"), "scene": ("toml",)}
 UNLIMITED = {"result": 1 << 20, "pipeline": 1 << 20}  # megabytes that HDF5 may ask for, and does not get: see result.cpp
@@ -32,7 +32,7 @@ def in_memory():
 def files_of_tests(build):
     """What the readers' tests write for the readers, a folder per ending; made anew where a test is newer."""
     folder = build / "fuzz" / "tests"
-    programs = [build / "tests" / test / f"test_{test}" for test in READERS_TESTS]
+    programs = [build / "tests" / "lib" / "io" / test / f"test_io_{test}" for test in READERS_TESTS]
     if not folder.is_dir() or any(program.stat().st_mtime > folder.stat().st_mtime for program in programs):
         shutil.rmtree(folder, ignore_errors=True)
         with tempfile.TemporaryDirectory(dir=folder.parent) as made:

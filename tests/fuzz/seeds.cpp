@@ -1,9 +1,9 @@
 // Writes the files that fuzzing starts from, a folder per harness: by tunica's own writers, and by hand as the readers'
 // tests make them. What is text lies in tests/fuzz/seeds.
 #include "fuzz/journal_model.hpp"
-#include "io_mesh/tet_files.hpp"
-#include "io_scene/scene_fixture.hpp"
-#include "io_volume/builders.hpp"
+#include "io/mesh/tet_files.hpp"
+#include "io/scene/scene_fixture.hpp"
+#include "io/volume/builders.hpp"
 #include "tunica/core/version.hpp"
 #include "tunica/io/file/output_file.hpp"
 #include "tunica/io/mesh/surface_file.hpp"

@@ -1,19 +1,28 @@
 """Small meshes, written and read by hand, for the whole-tool tests."""
+import functools
 import math
 import struct
 
+import numpy as np
 
-def write_ply(path, vertices, triangles, normals=None, comments=()):
+
+def write_ply(path, vertices, triangles, normals=None, comments=(), **properties):
+    """Binary, doubles and 32-bit indices. `properties`: further numbers per vertex."""
+    rows, names = np.asarray(vertices, float), ["x", "y", "z"]
+    if normals is not None:
+        rows, names = np.hstack([rows, normals]), [*names, "nx", "ny", "nz"]
+    for name, values in properties.items():
+        rows, names = np.column_stack([rows, values]), [*names, name]
+    faces = np.zeros(len(triangles), dtype=[("count", "u1"), ("corners", "<i4", 3)])
+    faces["count"], faces["corners"] = 3, np.reshape(triangles, (-1, 3))
+    header = ["ply", "format binary_little_endian 1.0", *("comment " + comment for comment in comments),
+              f"element vertex {len(rows)}", *(f"property double {name}" for name in names),
+              f"element face {len(triangles)}", "property list uchar int vertex_indices", "end_header\n"]
     with open(path, "wb") as file:
-        lines = ["ply", "format binary_little_endian 1.0", *("comment " + c for c in comments),
-                 "element vertex %d" % len(vertices)]
-        lines += ["property double " + name for name in (["x", "y", "z"] + (["nx", "ny", "nz"] if normals else []))]
-        lines += ["element face %d" % len(triangles), "property list uchar int vertex_indices", "end_header", ""]
-        file.write("\n".join(lines).encode())
-        for i, v in enumerate(vertices):
-            file.write(struct.pack("<3d", *v) + (struct.pack("<3d", *normals[i]) if normals else b""))
-        for t in triangles:
-            file.write(struct.pack("<B3i", 3, *t))
+        file.write("\n".join(header).encode() + np.ascontiguousarray(rows, "<f8").tobytes() + faces.tobytes())
+
+
+write_ply_mm = functools.partial(write_ply, comments=["units mm"])
 
 
 def write_obj(path, vertices, triangles):
@@ -62,6 +71,34 @@ def sphere(level, radius=1.0, centre=(0.0, 0.0, 0.0)):
             fine += [(i, a, c), (a, j, b), (c, b, k), (a, b, c)]
         triangles = fine
     return [tuple(radius * x + c for x, c in zip(v, centre)) for v in vertices], triangles
+
+
+def geodesic_sphere(splits, radius):
+    """An icosahedron split `splits` times: 20 x 4^splits triangles. @return arrays: vertices, triangles, unit normals"""
+    p = (1 + 5**0.5) / 2
+    corners = [(-1, p, 0), (1, p, 0), (-1, -p, 0), (1, -p, 0), (0, -1, p), (0, 1, p),
+               (0, -1, -p), (0, 1, -p), (p, 0, -1), (p, 0, 1), (-p, 0, -1), (-p, 0, 1)]
+    triangles = [(0, 11, 5), (0, 5, 1), (0, 1, 7), (0, 7, 10), (0, 10, 11), (1, 5, 9), (5, 11, 4), (11, 10, 2),
+                 (10, 7, 6), (7, 1, 8), (3, 9, 4), (3, 4, 2), (3, 2, 6), (3, 6, 8), (3, 8, 9), (4, 9, 5),
+                 (2, 4, 11), (6, 2, 10), (8, 6, 7), (9, 8, 1)]
+    normals = [np.array(c) / np.linalg.norm(c) for c in corners]
+    for _ in range(splits):
+        middle_of, finer = {}, []
+
+        def middle(a, b):
+            key = (min(a, b), max(a, b))
+            if key not in middle_of:
+                between = normals[a] + normals[b]
+                normals.append(between / np.linalg.norm(between))
+                middle_of[key] = len(normals) - 1
+            return middle_of[key]
+
+        for a, b, c in triangles:
+            ab, bc, ca = middle(a, b), middle(b, c), middle(c, a)
+            finer += [(a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca)]
+        triangles = finer
+    normals = np.array(normals)
+    return radius * normals, np.array(triangles), normals
 
 
 def tube(n, m, radius=1.0, length=4.0):

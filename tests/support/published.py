@@ -7,22 +7,11 @@ import subprocess
 import h5py
 import numpy as np
 
+from meshes import write_ply_mm as write_ply
+
 SIMULATE = os.path.join(os.environ["TUNICA_BIN"], "tunica-simulate")
 MEMBRANES = ("cst", "opt", "adapt")
 BENDINGS = ("comas", "comas-consistent", "dkt", "dkt-comas")
-
-
-def write_ply(path, vertices, triangles, normals=None):
-    """A mesh for tunica: binary PLY in millimetres, with unit normals where the shell is curved."""
-    names = ["x", "y", "z"] + (["nx", "ny", "nz"] if normals is not None else [])
-    rows = np.asarray(vertices, float) if normals is None else np.hstack([vertices, normals])
-    header = ["ply", "format binary_little_endian 1.0", "comment units mm", f"element vertex {len(rows)}"]
-    header += [f"property double {name}" for name in names]
-    header += [f"element face {len(triangles)}", "property list uchar int vertex_indices", "end_header\n"]
-    faces = np.zeros(len(triangles), dtype=[("count", "u1"), ("corners", "<i4", 3)])
-    faces["count"], faces["corners"] = 3, triangles
-    with open(path, "wb") as file:
-        file.write("\n".join(header).encode() + np.ascontiguousarray(rows, "<f8").tobytes() + faces.tobytes())
 
 
 def grid(nx, ny, surface, normal=None, first=0):

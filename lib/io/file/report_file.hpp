@@ -56,8 +56,13 @@ struct ReferenceError {
 
 /// Compares two runs of one case: by the probes that both have (largest distance between their displacements over the
 /// times that both cover, against the largest displacement of the reference's probes), else by the largest
-/// displacement, else by the upper bound of the distance (in percent of the diagonal).
+/// displacement, where neither moves by the membrane stress of the wall, else by the upper bound of the distance (in
+/// percent of the diagonal).
 /// Errors: InputError when the reports have none of these in common, or damaged probes.
 ReferenceError error_against(const Report& run, const Report& reference);
+
+/// What two simulations state otherwise of wall, load and supports: their difference is then no error. Each as
+/// "young_mpa 2.0, 3.0 in the reference". Empty where one of them states nothing, as other tools.
+std::vector<std::string> stated_otherwise(const Report& run, const Report& reference);
 
 }  // namespace tunica

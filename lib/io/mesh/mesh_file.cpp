@@ -131,6 +131,7 @@ MeshFile read_mesh(const std::filesystem::path& path, std::optional<double> unit
     throw UsageError(fmt::format("{}: its format carries no unit of length, pass --mesh-unit mm|cm|m|um", name));
   } else {
     file.unit_unknown = format != Format::ply && format != Format::glb;
+    file.unit_assumed = format == Format::ply;
   }
   require_valid(file, name);
   return file;
@@ -141,6 +142,16 @@ void require_no_other_unit(const MeshFile& file, std::optional<double> unit_mm, 
     throw InputError(fmt::format("{}: the file itself says that its unit is {}: do not state another one",
                                  path.string(), *file.units));
   }
+}
+
+std::optional<Warning> unit_note(const MeshFile& file, const std::filesystem::path& path) {
+  if (!file.unit_assumed) {
+    return std::nullopt;
+  }
+  return Warning{Weight::note, "unit of length",
+                 fmt::format("{}: has no comment \"units mm\": its numbers are taken for mm; where they are not, state "
+                             "their unit (--mesh-unit, or unit in a scene)",
+                             path.string())};
 }
 
 ShellMesh shell_of(const MeshFile& file, const std::filesystem::path& path) {

@@ -1,6 +1,7 @@
 // io/mesh: formats of meshes, a file each.
 #pragma once
 
+#include "tunica/core/warning.hpp"
 #include "tunica/shell/patch/shell_mesh.hpp"
 
 #include <filesystem>
@@ -18,6 +19,7 @@ struct MeshFile {
   std::optional<Patch> patch;                       ///< `surface=` comment
   std::optional<std::string> units;                 ///< what holds by the file: "mm", …; none for OBJ, STL, OFF
   bool unit_unknown = false;                        ///< no unit in the file's format, and none was given
+  bool unit_assumed = false;                        ///< a PLY that says none: its numbers are taken for mm
   std::optional<double> voxel;                      ///< mm, longest edge: `voxel` comment, of the image behind it
   std::optional<double> shortest_voxel;             ///< mm, its shortest edge
   std::optional<std::string> space;   ///< world axes, "LPS" or "RAS": `SPACE=` in a comment, header or name
@@ -40,6 +42,9 @@ MeshFile read_mesh(const std::filesystem::path& path, std::optional<double> unit
 
 /// For a unit that is meant for this file alone. Errors: InputError when the file's own `units` say another one.
 void require_no_other_unit(const MeshFile& file, std::optional<double> unit_mm, const std::filesystem::path& path);
+
+/// A note where a unit is assumed.
+std::optional<Warning> unit_note(const MeshFile& file, const std::filesystem::path& path);
 
 /// The curved shell mesh in a file: positions, unit normals, patch. Errors: InputError when it has no normals.
 ShellMesh shell_of(const MeshFile& file, const std::filesystem::path& path);

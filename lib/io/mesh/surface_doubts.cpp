@@ -1,6 +1,8 @@
 #include "tunica/io/mesh/surface_doubts.hpp"
 
+#include "tunica/core/error.hpp"
 #include "tunica/surface/mesh/seams.hpp"
+#include "tunica/surface/repair/repair.hpp"
 
 #include <fmt/format.h>
 
@@ -8,6 +10,25 @@ namespace tunica {
 namespace {
 
 std::string near(const Vec3& p) { return fmt::format("near ({:.4g}, {:.4g}, {:.4g})", p.x(), p.y(), p.z()); }
+
+std::size_t seams_after_repair(const TriangleMesh& mesh) {
+  try {
+    return find_seams(repaired(mesh).mesh).edges;
+  } catch (const InputError&) {  // nothing would be left
+    return mesh.triangles.size();
+  }
+}
+
+// What helps against seams: what was tried here.
+std::string remedy_of_seams(const TriangleMesh& mesh, const Seams& seams, const std::filesystem::path& path) {
+  const std::size_t left = seams_after_repair(mesh);
+  if (left >= seams.edges) {
+    return "these cannot be joined (three triangles would meet in an edge, or the surface would have one side only): "
+           "mend them in the program that made the mesh, or leave them out of account";
+  }
+  return fmt::format("tunica-decimate {} OUT.ply --repair --triangles {} joins {} and keeps all else", path.string(),
+                     2 * mesh.triangles.size(), left == 0 ? "them" : fmt::format("{} of them", seams.edges - left));
+}
 
 }  // namespace
 
@@ -18,9 +39,10 @@ std::vector<Warning> seam_warnings(const TriangleMesh& mesh, const MeshFacts& fa
     return warnings;
   }
   const Seams seams = find_seams(mesh);
-  const std::string advice =
-      fmt::format("tunica-decimate {} OUT.ply --repair --triangles {} joins them and keeps all else", path.string(),
-                  2 * mesh.triangles.size());
+  if (seams.edges == 0) {
+    return warnings;
+  }
+  const std::string advice = remedy_of_seams(mesh, seams, path);
   if (seams.whole_edges > 0) {
     warnings.push_back(
         {weight, "open seam",

@@ -10,6 +10,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <utility>
 
 namespace tunica {
 namespace {
@@ -126,6 +127,23 @@ Coordinate key_against_reference(const std::vector<Report>& reports, const std::
     }
   }
   return error;
+}
+
+void warn_of_other_inputs(const std::vector<Report>& reports, const Report& reference, std::vector<Warning>& warnings) {
+  std::string first;
+  std::size_t count = 0;
+  for (const Report& report : reports) {
+    if (const std::vector<std::string> other = stated_otherwise(report, reference); !other.empty() && count++ == 0) {
+      first = fmt::format("{} ({})", report.path.string(), fmt::join(other, "; "));
+    }
+  }
+  if (count > 0) {
+    warnings.push_back({Weight::major, "other inputs",
+                        fmt::format("{} of {} runs state another wall, load or support than the reference, the first "
+                                    "{}: how far they differ is no error of theirs; give a reference of the same "
+                                    "inputs",
+                                    count, reports.size(), first)});
+  }
 }
 
 std::string shown(const Json& value) {
@@ -277,6 +295,7 @@ std::string csv_of(const std::vector<std::pair<Row, bool>>& rows, const std::vec
   std::string csv = fmt::format("report,tool,index,{},{},{},pareto_front,failed,command,made_by\n",
                                 csv_field(options.series ? "series " + *options.series : "series"), csv_field(x.key),
                                 csv_field(y.key));
+  std::string made_by = csv_field(options.made_by);
   const auto command = [](const Report& report) {
     const auto found = report.json.find("command");
     return csv_field(found != report.json.end() ? shown(*found) : "");
@@ -284,13 +303,13 @@ std::string csv_of(const std::vector<std::pair<Row, bool>>& rows, const std::vec
   for (const auto& [row, front] : rows) {
     csv += fmt::format("{},{},{},{},{},{},{},,{},{}\n", csv_field(row.report->path.string()),
                        csv_field(row.report->tool()), row.index, csv_field(row.series), row.mark.x, row.mark.y,
-                       front ? 1 : 0, command(*row.report), csv_field(options.made_by));
+                       front ? 1 : 0, command(*row.report), std::exchange(made_by, ""));
   }
   for (const Failure& failure : failures) {
     csv += fmt::format("{},{},0,{},{},,0,{},{},{}\n", csv_field(failure.report->path.string()),
                        csv_field(failure.report->tool()), csv_field(failure.series),
                        failure.mark.x ? fmt::format("{}", *failure.mark.x) : "", csv_field(failure.mark.label),
-                       command(*failure.report), csv_field(options.made_by));
+                       command(*failure.report), std::exchange(made_by, ""));
   }
   return csv;
 }
@@ -308,6 +327,9 @@ ReportChart chart_of_reports(const std::vector<Report>& reports, const std::vect
   ReportChart made;
   made.x_key = x.key;
   made.y_key = y.key;
+  if (options.reference) {
+    warn_of_other_inputs(reports, *options.reference, made.warnings);
+  }
   std::vector<Row> rows = rows_of(reports, x, y, options, made.warnings);
   drop_negative(rows, options, made.warnings);
   if (rows.empty()) {

@@ -20,7 +20,7 @@ struct ReportChartOptions {
   std::optional<std::string> y_label;
   Scale x_scale = Scale::automatic;
   Scale y_scale = Scale::automatic;
-  std::string made_by;  ///< stands in each line of the table
+  std::string made_by;  ///< stands in the first line of the table
   bool joined = false;  ///< join the marks of a series in the order of x; those of a list are always joined
 };
 

@@ -83,6 +83,9 @@ BodyMesh read_body_mesh(const SceneShell& shell, BodyFindings& found) {
     const MeshFile& file = mesh.file;
     join_space(file, shell.mesh, found);
     require_no_other_unit(file, shell.unit_mm, shell.mesh);
+    if (const auto note = unit_note(file, shell.mesh)) {
+      found.warnings.push_back(*note);
+    }
     mesh.curved = shell.rest == Rest::curved && !(file.normals.empty() && file.corner_normals.empty());
     mesh.shell = mesh.curved
                      ? shell_of(file, shell.mesh)
@@ -119,6 +122,9 @@ TriangleMesh read_closed_surface(const std::filesystem::path& path, std::optiona
   MeshFile file = read_mesh(path, unit_mm, true);
   join_space(file, path, found);
   require_no_other_unit(file, unit_mm, path);
+  if (const auto note = unit_note(file, path)) {
+    found.warnings.push_back(*note);
+  }
   const MeshFacts facts = require_surface(file, path);
   if (const auto why = why_unfit(facts, Boundary::forbidden)) {
     throw InputError(fmt::format("{}: {}; it must be closed, to have an inside", path.string(), *why));

@@ -237,6 +237,53 @@ void settle_until(Scene& scene) {
   path->until->probe = narrow<std::size_t>(found - scene.probes.begin());
 }
 
+namespace {
+
+/// A point that is meant to name a node and lies far from all: its unit, its axes or its sign may be another one.
+void warn_of_far_point(const Vec3& point, std::size_t body, const Place& place, const Model& model,
+                       std::vector<Warning>& warnings) {
+  constexpr double far_from_all = 0.1;  // of the diagonal of the body's box
+  const std::vector<Vec3>& vertices = model.vertices_of(body);
+  Vec3 low = Vec3::Constant(infinity);
+  Vec3 high = -low;
+  double squared = infinity;
+  for (const Vec3& p : vertices) {
+    low = low.cwiseMin(p);
+    high = high.cwiseMax(p);
+    squared = std::min(squared, (p - point).squaredNorm());
+  }
+  if (std::sqrt(squared) > far_from_all * (high - low).norm()) {
+    warnings.push_back(
+        {Weight::minor, "far point",
+         fmt::format("{}: the nearest node lies {:.4g} mm from this point, and the body reaches from "
+                     "({:.4g}, {:.4g}, {:.4g}) to ({:.4g}, {:.4g}, {:.4g}) mm: check the point's unit and "
+                     "axes",
+                     place.text, std::sqrt(squared), low.x(), low.y(), low.z(), high.x(), high.y(), high.z())});
+  }
+}
+
+void warn_of_far_points(const Scene& scene, const Model& model, std::vector<Warning>& warnings) {
+  const auto look = [&](const std::string& body, const Selection& where, const Places& places) {
+    if (const auto* nearest = std::get_if<NearestNode>(&where)) {
+      warn_of_far_point(nearest->point, body_index(scene, body, places), places.item, model, warnings);
+    }
+  };
+  for (const SceneFix& fix : scene.fixes) {
+    look(fix.body, fix.where, fix.places);
+  }
+  for (const SceneLoad& load : scene.loads) {
+    look(load.body, load.where.value_or(AllNodes{}), load.places);
+  }
+  for (const SceneAttach& attach : scene.attachments) {
+    look(attach.body, attach.where, attach.places);
+  }
+  for (const SceneProbe& probe : scene.probes) {
+    look(probe.body, NearestNode{probe.nearest}, probe.places);
+  }
+}
+
+}  // namespace
+
 LoadedScene load_scene(const Scene& scene) {
   require_load(scene);
   BodyFindings found;
@@ -252,6 +299,7 @@ LoadedScene load_scene(const Scene& scene) {
     bodies.rigids.push_back(load_rigid(rigid, found));
   }
   LoadedScene loaded{resolve_scene(scene, std::move(bodies)), std::move(found.notes), std::move(found.warnings)};
+  warn_of_far_points(scene, loaded.model, loaded.warnings);
   std::vector<bool> is_looked_at(loaded.model.shells.size(), false);
   for (const Load& load : loaded.model.loads) {
     const auto* const pressure = std::get_if<PressureLoad>(&load.kind);

@@ -115,6 +115,7 @@ struct Columns {
   std::size_t count = 0;
   std::size_t index = 0;
   std::size_t name = 0;
+  std::optional<std::size_t> other;  // a column beside "index" that may hold the labels' values as well
 };
 
 // The columns of a table's heading; none where the line is no heading.
@@ -129,7 +130,10 @@ std::optional<Columns> columns_of(std::string_view heading) {
     const auto index = column(heads, {"index", "labelvalue", "label_value", "voxel_value", "value", "id", "labelid",
                                       "label_id", "label id", "label"});
     if (index && name && index != name) {
-      return Columns{separator, heads.size(), *index, *name};
+      const auto other = lower_case(heads[*index]) == "index"
+                             ? column(heads, {"labelvalue", "label_value", "voxel_value", "value", "label"})
+                             : std::nullopt;
+      return Columns{separator, heads.size(), *index, *name, other == name ? std::nullopt : other};
     }
   }
   return {};
@@ -166,6 +170,20 @@ std::pair<std::string, std::string> index_and_name(const fs::path& path, std::si
           surplus > 0 ? std::string(trimmed(line.substr(begin, last.end - begin))) : row[columns.name].text};
 }
 
+// A column "index" may count the rows, as spreadsheets and data frames do.
+void require_agreement(const fs::path& path, std::size_t number, const std::vector<Cell>& row, const Columns& columns) {
+  if (!columns.other || row.size() <= std::max(columns.index, *columns.other)) {
+    return;
+  }
+  const auto index = whole_number(row[columns.index].text);
+  const auto other = whole_number(row[*columns.other].text);
+  if (index && other && *index != *other) {
+    throw_line(path, number,
+               fmt::format("the column \"index\" says {}, another one {}: leave one column with the labels' values",
+                           *index, *other));
+  }
+}
+
 // A table with a heading, or none where the first line is no heading.
 std::optional<LabelNames> parse_columns(const fs::path& path, std::string_view text) {
   TextScanner scanner(text);
@@ -180,6 +198,7 @@ std::optional<LabelNames> parse_columns(const fs::path& path, std::string_view t
     if (!label) {
       throw_line(path, scanner.line(), fmt::format("'{}' is no label value, a whole number", shown(index)));
     }
+    require_agreement(path, scanner.line(), cells(scanner.rest(), columns->separator), *columns);
     add(names, path, scanner.line(), *label, name);
   }
   return names;

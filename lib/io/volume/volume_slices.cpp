@@ -6,6 +6,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
+#include <map>
 
 namespace tunica::volume_format {
 namespace fs = std::filesystem;
@@ -74,6 +76,48 @@ void warn_of_gaps(const fs::path& folder, const std::vector<fs::path>& slices, s
   }
 }
 
+// What a name looks like, its numbers aside: "slice#" for slice007.
+std::string pattern_of(const fs::path& slice) {
+  std::string pattern;
+  for (const char sign : slice.stem().string()) {
+    const bool is_digit = sign >= '0' && sign <= '9';
+    if (!is_digit) {
+      pattern += sign;
+    } else if (!pattern.ends_with('#')) {
+      pattern += '#';
+    }
+  }
+  return pattern;
+}
+
+std::string without_signs(std::string pattern) {
+  std::erase_if(pattern, [](char sign) { return sign == '-' || sign == '+'; });
+  return pattern;
+}
+
+// Names that differ in more than their numbers are of several series. Errors: InputError: something stands beside a
+// series, which would be taken for slices of it, or numbers have signs, and no order that is certain.
+void require_one_series(const fs::path& folder, const std::vector<fs::path>& slices) {
+  std::map<std::string, std::vector<std::string>> series;
+  for (const fs::path& slice : slices) {
+    series[pattern_of(slice)].push_back(slice.filename().string());
+  }
+  const auto longest = std::ranges::max_element(series, {}, [](const auto& one) { return one.second.size(); });
+  if (series.size() < 2 || longest->second.size() < 2) {
+    return;
+  }
+  const auto other = longest == series.begin() ? std::next(series.begin()) : series.begin();
+  const bool are_signed = std::ranges::all_of(
+      series, [&](const auto& one) { return without_signs(one.first) == without_signs(longest->first); });
+  throw InputError(fmt::format(
+      "{}: {}, {} like {}, {} like {}: {}", folder.string(),
+      are_signed ? "its slices have numbers with and without a sign in their names, so that their order is not certain"
+                 : fmt::format("its slices are of {} series, as their names say", series.size()),
+      longest->second.size(), longest->second.front(), other->second.size(), other->second.front(),
+      are_signed ? "number them from 0 on"
+                 : "leave one series in the folder, and call its slices alike but for a number"));
+}
+
 // The slices of a folder in the natural order of their names.
 std::vector<fs::path> slices_in(const fs::path& folder, std::vector<Warning>& warnings) {
   std::vector<fs::path> slices;
@@ -104,6 +148,7 @@ std::vector<fs::path> slices_in(const fs::path& folder, std::vector<Warning>& wa
         {Weight::note, "files ignored",
          fmt::format("{}: {} files that are no slices (.png, .tif, .tiff) are ignored", folder.string(), others)});
   }
+  require_one_series(folder, slices);
   warn_of_gaps(folder, slices, warnings);
   return slices;
 }

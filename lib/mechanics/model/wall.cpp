@@ -67,13 +67,25 @@ double area_quantile(std::span<const Facet> facets, double above) {
     high = std::max(high, most);
     whole += facet.area;
   }
+  std::vector<Facet> open(facets.begin(), facets.end());  // of which a part may be above
+  double wholly_above = 0;
   for (int i = 0; i < halvings && low < high; ++i) {
     const double middle = (low + high) / 2;
-    double area_above = 0;
-    for (const Facet& facet : facets) {
+    double area_above = wholly_above;
+    for (const Facet& facet : open) {
       area_above += facet.area * part_above(facet.values, middle);
     }
-    (area_above > above * whole ? low : high) = middle;
+    if (area_above > above * whole) {
+      low = middle;
+      std::erase_if(open, [&](const Facet& facet) { return *std::ranges::max_element(facet.values) <= low; });
+    } else {
+      high = middle;
+      std::erase_if(open, [&](const Facet& facet) {
+        const bool is_above = *std::ranges::min_element(facet.values) >= high;
+        wholly_above += is_above ? facet.area : 0;
+        return is_above;
+      });
+    }
   }
   return high;
 }

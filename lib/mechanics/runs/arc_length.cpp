@@ -130,7 +130,7 @@ private:
   }
 
   const VectorX& external(const Configuration& configuration, double factor) {
-    evaluate(system_, configuration, std::vector<double>(model_.loads.size(), factor), {}, forces_, nullptr);
+    evaluate(system_, {configuration, std::vector<double>(model_.loads.size(), factor)}, forces_, nullptr);
     return forces_.external;
   }
 

@@ -513,7 +513,7 @@ void check_balance(const ShellSystem& system) {
     factors.push_back(load.ramp.points.empty() ? 1 : load.ramp.points.back().second);
   }
   Forces forces;
-  evaluate(system, reference_configuration(system), factors, {}, forces, nullptr);
+  evaluate(system, {reference_configuration(system), factors}, forces, nullptr);
   for (const Piece& piece : system.pieces) {
     if (!piece.balanced) {
       continue;

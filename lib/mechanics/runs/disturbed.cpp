@@ -3,15 +3,15 @@
 #include "tunica/core/disjoint_sets.hpp"
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
-#include "tunica/mechanics/runs/detail/corner_normals.hpp"
-#include "tunica/mechanics/runs/doubts.hpp"
+#include "tunica/mechanics/model/corner_normals.hpp"
+#include "tunica/mechanics/model/curvature.hpp"
 #include "tunica/mechanics/runs/solve.hpp"
 #include "tunica/surface/mesh/incidence.hpp"
 #include "tunica/surface/mesh/measure.hpp"
 
 #include <fmt/format.h>
 
-#include <Eigen/Geometry>
+#include <Eigen/Dense>
 
 #include <algorithm>
 #include <cmath>
@@ -111,19 +111,28 @@ double slant_of_rim(const ShellBody& body, const Fix& fix) {
   }
   const std::set<Index> nodes(fix.nodes.begin(), fix.nodes.end());
   const CornerNormals normal(body.mesh, body.curved);
-  double length = 0, squares = 0;
+  const Vec3 aside = fix.across->unitOrthogonal(), across = fix.across->cross(aside);
+  double length = 0;
+  Mat3 left = Mat3::Zero();
+  Vec3 right = Vec3::Zero();
   const TriangleMesh facets = flat_facets(body.mesh);
   for (const auto& [t, k] : boundary_edges(neighbours(facets, incidence(facets)))) {
     const std::array<Index, 3>& v = facets.triangles[t];
     const std::size_t next = (k + 1) % 3;
     if (nodes.contains(v[k]) && nodes.contains(v[next])) {
       const double part = (facets.vertices[v[next]] - facets.vertices[v[k]]).norm();
-      const double sine = (normal(t, k) + normal(t, next)).normalized().dot(*fix.across);
+      const Vec3 n = (normal(t, k) + normal(t, next)).normalized();
+      const Vec3 terms(1, n.dot(aside), n.dot(across));
       length += part;
-      squares += part * sine * sine;
+      left += part * terms * terms.transpose();
+      right += part * n.dot(*fix.across) * terms;
     }
   }
-  return length > 0 ? std::sqrt(2 * squares / length) : 0;
+  if (!(length > 0)) {
+    return 0;
+  }
+  const Vec3 fitted = left.completeOrthogonalDecomposition().solve(right);
+  return std::sqrt(2 * fitted.dot(left * fitted) / length);
 }
 
 bool is_step(const ShellBody& body, std::size_t triangle) {

@@ -1,11 +1,14 @@
 #include "tunica/mechanics/runs/doubts.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/mechanics/contact/rigid_shape.hpp"
-#include "tunica/mechanics/runs/detail/corner_normals.hpp"
+#include "tunica/mechanics/model/corner_normals.hpp"
+#include "tunica/mechanics/model/curvature.hpp"
 #include "tunica/mechanics/runs/solve.hpp"
 #include "tunica/shell/distance/target.hpp"
 #include "tunica/shell/patch/curved_surface.hpp"
+#include "tunica/surface/distance/closest_point.hpp"
 #include "tunica/surface/mesh/measure.hpp"
 
 #include <fmt/format.h>
@@ -113,6 +116,41 @@ void doubt_thickness(const ShellBody& body, std::vector<Warning>& found) {
   }
 }
 
+/// Of the area, where a face of the wall, half of it away from the middle, lies nearer to the middle of another part of
+/// the same wall than to its own: walls that overlap, and leave no lumen between them.
+double share_overlapping(const ShellBody& body) {
+  constexpr double nearer = 0.8;  // what noise and curvature take of the own distance
+  const TriangleMesh mesh{body.mesh.vertices, body.mesh.triangles};
+  const ClosestPoint middle(mesh);
+  double whole = 0, overlapping = 0;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const auto& v = mesh.triangles[t];
+    const Vec3 &a = mesh.vertices[v[0]], &b = mesh.vertices[v[1]], &c = mesh.vertices[v[2]];
+    const Vec3 normal = (b - a).cross(c - a).normalized();
+    const double half = thickness_of(body, t) / 2;
+    const double area = area_of(body.mesh, t);
+    whole += area;
+    const bool overlaps = std::ranges::any_of(std::array{-half, half}, [&](double away) {
+      return middle.closest((a + b + c) / 3 + away * normal, narrow<Index>(t)).squared_distance <
+             nearer * nearer * half * half;
+    });
+    overlapping += overlaps ? area : 0;
+  }
+  return whole > 0 ? overlapping / whole : 0;
+}
+
+void doubt_overlaps(const ShellBody& body, std::vector<Warning>& found) {
+  constexpr double notable = 0.1;
+  if (const double share = share_overlapping(body); share > notable) {
+    found.push_back(
+        {share > most_of_it ? Weight::major : Weight::minor, "thick wall",
+         fmt::format("{}: over {:.0f} % of its area its walls, {:.4g} mm thick, are nearer to each other than "
+                     "that and overlap, so that no lumen is left there: is the unit right?",
+                     at(body.said_at, body.name), 100 * share,
+                     *std::max_element(body.thickness.begin(), body.thickness.end()))});
+  }
+}
+
 void doubt_material(const std::string& where, const Material& material, bool pressed, std::vector<Warning>& found) {
   // MPa. Fat and brain reach down to a few hundred Pa; tungsten, the stiffest metal, has 410 GPa; the walls of
   // balloons, the stiffest that pressure is put on from inside, some GPa.
@@ -177,6 +215,13 @@ void doubt_voxels(const ShellBody& body, std::vector<Warning>& found) {
                      "on ragged ones; go by the mean membrane stress, or take a finer image",
                      at(body.said_at, body.name), slices ? "slices" : "voxels", longest, longest / 2,
                      longest / 2 / wall)});
+  } else if (longest > wall / 2) {
+    found.push_back(
+        {Weight::note, "large voxels",
+         fmt::format("{}: the voxels of its image, {:.3g} mm, are {:.2g} times the wall: what is left of their "
+                     "steps may add a quarter to the 99th percentile at the faces, and on vessels a few voxels "
+                     "wide as much again; the membrane stress holds to some per cent",
+                     at(body.said_at, body.name), longest, longest / wall)});
   }
 }
 
@@ -463,7 +508,11 @@ std::vector<Warning> doubts(const Model& model, const RunSettings& settings, boo
   std::vector<std::vector<std::array<bool, 6>>> held;
   for (std::size_t b = 0; b < model.shells.size(); ++b) {
     const ShellBody& body = model.shells[b];
+    const std::size_t before = found.size();
     doubt_thickness(body, found);
+    if (found.size() == before) {
+      doubt_overlaps(body, found);
+    }
     doubt_material(at(body.said_at, body.name), body.material, is_pressed(model, b), found);
     doubt_voxels(body, found);
     if (!has_estimates) {
@@ -515,39 +564,6 @@ double share_without_inner_face(const ShellBody& body) {
                                  body.thickness.size(), body.mesh.vertices.size()));
   }
   return share_thicker(body, curvatures_of(body.mesh, body.curved), 2);
-}
-
-std::vector<Curvature> curvatures_of(const ShellMesh& mesh, bool curved) {
-  const CornerNormals normal(mesh, curved);
-  std::vector<Curvature> curvatures;
-  curvatures.reserve(mesh.triangles.size());
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    const auto& v = mesh.triangles[t];
-    const Vec3 along = mesh.vertices[v[1]] - mesh.vertices[v[0]];
-    const Vec3 across = along.cross(mesh.vertices[v[2]] - mesh.vertices[v[0]]);
-    if (!(across.norm() > 0)) {
-      curvatures.emplace_back();
-      continue;
-    }
-    const Vec3 x = along.normalized();
-    const Vec3 y = across.cross(along).normalized();
-    Eigen::Matrix3d left = Eigen::Matrix3d::Zero();
-    Vec3 right = Vec3::Zero();
-    for (std::size_t k = 0; k < 3; ++k) {
-      const Vec3 edge = mesh.vertices[v[(k + 1) % 3]] - mesh.vertices[v[k]];
-      const Vec3 turn = normal(t, (k + 1) % 3) - normal(t, k);
-      const double u = edge.dot(x);
-      const double w = edge.dot(y);
-      Eigen::Matrix<double, 2, 3> rows;
-      rows << u, w, 0, 0, u, w;
-      left += rows.transpose() * rows;
-      right += rows.transpose() * Vec2(turn.dot(x), turn.dot(y));
-    }
-    const Vec3 shape = left.ldlt().solve(right);  // xx, xy, yy
-    const double sum = std::abs(shape[0] + shape[2]);
-    curvatures.push_back({sum / 2 + std::hypot((shape[0] - shape[2]) / 2, shape[1]), sum});
-  }
-  return curvatures;
 }
 
 }  // namespace tunica

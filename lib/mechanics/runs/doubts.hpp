@@ -31,16 +31,4 @@ std::string pressure_text(double mpa);
 /// left. Errors: InputError: as curvatures_of(), or not one thickness, nor one per node.
 double share_without_inner_face(const ShellBody& body);
 
-struct Curvature {
-  double largest = 0;  ///< 1/mm, of the principal ones
-  double sum = 0;      ///< of both, without its sign
-};
-
-/// Curvatures of the shells (#F): of each those of the symmetric shape operator that fits best how the
-/// normals turn along its edges; the corners' normals, or those of the vertices where `mesh` has none of its own
-/// (`curved` false: flat facets). Zero where a facet has no area. Errors: InputError as
-/// require_valid() of the mesh, its normals included where they are looked at.
-/// Source: Rusinkiewicz, "Estimating curvatures and their derivatives on triangle meshes", 3DPVT 2004, section 3.
-std::vector<Curvature> curvatures_of(const ShellMesh& mesh, bool curved);
-
 }  // namespace tunica

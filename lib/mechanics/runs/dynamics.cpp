@@ -202,9 +202,8 @@ private:
 };
 
 /// M a1 + alpha M v1 + f_int(x1) = f_ext(x1, t1), with velocity and acceleration at the end of a step as the scheme
-/// says. Masses are lumped; rotary inertia is rho t^3 / 12 per area about every axis (that of a plate about the axes in
-/// its plane), so it needs no gyroscopic term. Damping is alpha M and, in each element's own frame, beta K times the
-/// rate of its deformation: a rigid motion is not damped by beta.
+/// says. Damping is alpha M and, in each element's own frame, beta K times the rate of its deformation: a rigid motion
+/// is not damped by beta.
 class TimeStepper {
 public:
   TimeStepper(ShellSystem& system, const RunSettings& settings, const DynamicRun& run)
@@ -217,11 +216,10 @@ public:
         matrix_(system.pattern),
         mass_(lumped_masses(system)),
         held_(along_world(system.held)),
-        longest_side_(longest_side(system)),
         part_(run.step) {
     solver_.emplace(system, settings);
     if (system.prestress_residual) {
-      evaluate(system, reference_configuration(system), load_factors(model_, false, 0), {}, forces_, nullptr);
+      evaluate(system, {reference_configuration(system), load_factors(model_, false, 0)}, forces_, nullptr);
       borne_ = forces_.internal;
       mask(solver_->free(), borne_);
     }
@@ -246,7 +244,7 @@ public:
 
   /// The forces that act at time 0, and the accelerations with which a second-order scheme begins.
   void start(Motion& motion) {
-    evaluate(system_, motion.configuration, load_factors(model_, false, 0), {}, forces_, nullptr);
+    evaluate(system_, {motion.configuration, load_factors(model_, false, 0)}, forces_, nullptr);
     keep_acting(motion);
     braking_ = VectorX::Zero(mass_.size());
     if (!scheme_.second_order()) {
@@ -399,7 +397,7 @@ private:
     // A load that is there from time 0 on comes onto a shell at rest without load.
     s.factors_before = time > 0 ? load_factors(model_, false, time) : std::vector<double>(model_.loads.size(), 0.0);
     if (deformation_.empty()) {
-      evaluate(system_, s.start, s.factors_before, {}, forces_, nullptr);
+      evaluate(system_, {s.start, s.factors_before}, forces_, nullptr);
       deformation_ = forces_.deformation;
     }
     damping_.begin(deformation_, length);
@@ -454,35 +452,20 @@ private:
     for (std::size_t l = 0; part < 1 && l < factors.size(); ++l) {
       factors[l] = s.factors_before[l] + part * (s.factors[l] - s.factors_before[l]);
     }
-    evaluate(system_, c, factors, damping_.state(), forces_, tangent, predicted);
     find_change(s.start, c, s.change);
     scheme_.end_rates(s.length, held_, s.rates_before, s.change, s.rates);
-    const VectorX inertia = mass_.cwiseProduct(s.rates.acceleration + run_.damping.mass * s.rates.velocity);
-    if (tangent != nullptr) {
-      add_inertia(s.change, s.length, *tangent);
-    }
-    Balance result;
-    result.valid = forces_.valid;
-    result.unbalanced = forces_.external - forces_.internal - inertia;
+    const Movement movement{s.change,
+                            s.rates.velocity,
+                            s.rates.acceleration,
+                            scheme_.velocity_factor(s.length),
+                            scheme_.acceleration_factor(s.length),
+                            run_.damping.mass,
+                            damping_.state()};
+    Balance result = balance_at(system_, {c, factors, &predicted, &movement}, forces_, tangent);
     if (part < 1 && s.left_at_start.size() > 0) {
       result.unbalanced -= (1 - part) * s.left_at_start;
     }
-    VectorX reactions = forces_.internal + inertia;
-    mask(system_.held, reactions);
-    result.scale =
-        std::max({force_norm(system_, forces_.external), force_norm(system_, inertia), force_norm(system_, reactions)});
-    result.floor = round_off(system_, c) + round_off_of_inertia(s.length);
-    condense(system_, c, result.unbalanced, tangent);
     return result;
-  }
-
-  /// Of a short step: what the digits of places leave of accelerations.
-  [[nodiscard]] double round_off_of_inertia(double length) const {
-    VectorX noise = mass_;
-    for (std::size_t i = 0; i < system_.node_count(); ++i) {
-      noise.segment<3>(first_freedom(i)) *= longest_side_;
-    }
-    return std::numeric_limits<double>::epsilon() * scheme_.acceleration_factor(length) * force_norm(system_, noise);
   }
 
   NewtonResult run(Step& s, double from, double to, Configuration& configuration) {
@@ -561,17 +544,6 @@ private:
     result.newton.cg_iterations += settled.cg_iterations;
   }
 
-  void add_inertia(const VectorX& change, double length, BlockMatrix& tangent) const {
-    const double factor = scheme_.acceleration_factor(length) + run_.damping.mass * scheme_.velocity_factor(length);
-    for (std::size_t i = 0; i < system_.node_count(); ++i) {
-      auto block = tangent.block(tangent.find(narrow<Index>(i), narrow<Index>(i)));
-      block.diagonal().head<3>() += factor * mass_.segment<3>(first_freedom(i));
-      const Vec3 turn = change.segment<3>(first_freedom(i) + 3);
-      block.block<3, 3>(3, 3) +=
-          factor * mass_[first_freedom(i) + 3] * spin_to_rate(turn, spin_coefficients(turn.squaredNorm()).eta);
-    }
-  }
-
   ShellSystem& system_;
   const Model& model_;
   const RunSettings& settings_;
@@ -590,10 +562,9 @@ private:
   VectorX braking_;                        ///< forces of damping by mass, likewise
   double work_ = 0;                        ///< mJ, since energies were last balanced
   double damped_ = 0;
-  double longest_side_ = 0;  ///< mm
-  double tolerance_ = 0;     ///< mm, of error control; 0: none
-  double part_ = 0;          ///< s: length of the next part under error control
-  bool at_rest_ = false;     ///< the last step changed nothing
+  double tolerance_ = 0;  ///< mm, of error control; 0: none
+  double part_ = 0;       ///< s: length of the next part under error control
+  bool at_rest_ = false;  ///< the last step changed nothing
 };
 
 double first_load_factor(const Model& model, double time) {
@@ -737,7 +708,7 @@ private:
           "{:.3g} of its change of load ({}); beyond it {}{}; the last good state is at {:.6g} s{}",
           time_, end, step.reached, describe_loads(model_, carried, wanted),
           step.ran_away ? "the shell yields without bound" : "no state was found that the shell could rest in", place,
-          time_, doubt_of_stiffness(model_, carried)));
+          time_, remedy_of_failure(model_, carried)));
     }
     throw RequirementError(
         fmt::format("the step from {:.6g} s to {:.6g} s {} (relative residual {:.3g} after {} "

@@ -21,6 +21,7 @@ namespace tunica {
 namespace {
 
 constexpr double rare = 0.01;  // of the area, on which a 99th percentile is passed
+constexpr std::array<double, 2> about_as_rare{0.02, 0.005};
 
 std::vector<double> lengths(const std::vector<Vec3>& vectors) {
   std::vector<double> result;
@@ -164,16 +165,20 @@ WallNumbers numbers_of(const Model& model, const CornerFields& all, const std::v
     }
     return most;
   };
+  const auto set_quantiles = [](const std::vector<Facet>& facets, double& p99, std::array<double, 2>& beside) {
+    p99 = area_quantile(facets, rare);
+    std::ranges::transform(about_as_rare, beside.begin(), [&](double part) { return area_quantile(facets, part); });
+  };
   WallNumbers w;
   const std::vector<Facet> stress = counted(all.stress), membrane = counted(all.membrane);
   const std::vector<Facet> strain = counted(all.strain);
-  w.stress_p99 = area_quantile(stress, rare);
+  set_quantiles(stress, w.stress_p99, w.beside.stress);
   w.stress_max = largest(stress);
-  w.membrane_p99 = area_quantile(membrane, rare);
+  set_quantiles(membrane, w.membrane_p99, w.beside.membrane);
   w.membrane_max = largest(membrane);
   w.membrane_mean = area_mean(membrane);
-  w.tension_p99 = area_quantile(counted(all.tension), rare);
-  w.strain_p99 = area_quantile(strain, rare);
+  set_quantiles(counted(all.tension), w.tension_p99, w.beside.tension);
+  set_quantiles(strain, w.strain_p99, w.beside.strain);
   w.strain_max = largest(strain);
   double of_faces = 0, of_middle = 0;
   for (std::size_t t = 0; t < stress.size(); ++t) {

@@ -212,13 +212,15 @@ std::vector<std::vector<Index>> pieces_of(const ShellMesh& mesh) {
 struct Swing {
   double largest = 0;  ///< mm, of the whole displacement
   double rigid = 0;    ///< mm, the largest displacement by the rigid motion
+  double at_held = 0;  ///< mm, the mean displacement by it of what is held
   double turn = 0;     ///< rad
   Vec3 centre = Vec3::Zero();
 };
 
 /// @param displacement  of node i of the mesh at `first` + i
+/// @param held  nodes of the mesh
 Swing swing_of(const ShellMesh& mesh, const std::vector<Index>& nodes, const std::vector<Vec3>& displacement,
-               std::size_t first) {
+               std::size_t first, const std::vector<char>& held) {
   Swing swing;
   Vec3 shift = Vec3::Zero();
   for (const Index i : nodes) {
@@ -236,10 +238,15 @@ Swing swing_of(const ShellMesh& mesh, const std::vector<Index>& nodes, const std
   const double sign = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
   const Mat3 turn = svd.matrixU() * Vec3(1, 1, sign).asDiagonal() * svd.matrixV().transpose();
   swing.turn = Eigen::AngleAxisd(turn).angle();
+  double count = 0;
   for (const Index i : nodes) {
     const Vec3 arm = mesh.vertices[i] - swing.centre;
-    swing.rigid = std::max(swing.rigid, (turn * arm - arm + shift).norm());
+    const double moved = (turn * arm - arm + shift).norm();
+    swing.rigid = std::max(swing.rigid, moved);
+    swing.at_held += held[i] != 0 ? moved : 0;
+    count += held[i] != 0 ? 1 : 0;
   }
+  swing.at_held /= std::max(1.0, count);
   return swing;
 }
 
@@ -285,11 +292,8 @@ std::vector<std::array<Index, 2>> crossings_of(const ShellMesh& shells) {
   return find_self_intersections(flat_facets(shells));
 }
 
-/// Bodies that pass through each other before anything moves. Contact refuses those that it holds apart.
+/// Bodies that pass through each other or themselves before anything moves. Contact refuses those that it holds apart.
 void doubt_bodies(const Model& model, std::vector<Warning>& found) {
-  if (model.shells.size() < 2) {
-    return;
-  }
   const ShellMesh all = joined_shells(model, nullptr);
   const auto body_of = [&](Index triangle) {
     const auto node = static_cast<std::size_t>(all.triangles[triangle][0]);
@@ -305,11 +309,23 @@ void doubt_bodies(const Model& model, std::vector<Warning>& found) {
     const bool tied = std::ranges::any_of(model.attachments, [&, a = a, b = b](const Attachment& tie) {
       return std::minmax({tie.body, tie.to}) == std::pair(a, b);
     });
-    if (a != b && !tied) {
+    const bool meet = std::ranges::any_of(all.triangles[one], [&, &other = other](Index node) {
+      return std::ranges::find(all.triangles[other], node) != all.triangles[other].end();
+    });
+    if (!tied && !meet) {
       ++pairs.try_emplace({a, b}, 0, all.vertices[all.triangles[one][0]]).first->second.first;
     }
   }
   for (const auto& [bodies, what] : pairs) {
+    if (bodies[0] == bodies[1]) {
+      found.push_back(
+          {Weight::major, "surface crosses itself",
+           fmt::format(
+               "{}: passes through itself in {} pairs of shells, the first at {}: what is said of the wall around "
+               "holds for no body: mend the surface, or take more shells",
+               named(model.shells[bodies[0]].said_at, model.shells[bodies[0]].name), what.first, where(what.second))});
+      continue;
+    }
     found.push_back(
         {Weight::major, "walls through each other",
          fmt::format("{} and {} pass through each other in {} pairs of shells, the first at {}, and nothing "
@@ -359,6 +375,17 @@ std::vector<Warning> doubts_of_ends(const Model& model) {
   return found;
 }
 
+namespace {
+
+std::string_view remedy_of_swings(const Model& model, std::size_t body) {
+  const auto bed = std::ranges::find(model.supports, body, &Support::body);
+  return bed == model.supports.end() ? "put it into a bed (--support 1e5N/m3, SUPPORT=1e5N/m3)"
+         : bed->normal_only          ? "let its bed hold it in all directions (direction = \"all\" of the [[support]])"
+                                     : "make its bed stiffer";
+}
+
+}  // namespace
+
 std::vector<Warning> swings_of(const Model& model, const State& state) {
   require_valid(model);
   require_valid(model, state);
@@ -372,20 +399,28 @@ std::vector<Warning> swings_of(const Model& model, const State& state) {
       continue;
     }
     const double thickness = *std::ranges::max_element(body.thickness);
+    std::vector<char> held(body.mesh.vertices.size(), 0);
+    for (const Fix& fix : model.fixes) {
+      for (const Index node :
+           fix.body == b && !fix.across ? fix.nodes : std::vector<Index>()) {  // what slides may turn
+        held[node] = 1;
+      }
+    }
     const auto pieces = pieces_of(body.mesh);
     for (const std::vector<Index>& nodes : pieces) {
-      const Swing swing = swing_of(body.mesh, nodes, state.displacement, model.first_node(b));
-      if (swing.rigid <= most_of_it * swing.largest || swing.rigid <= most_of_it * thickness) {
+      const Swing swing = swing_of(body.mesh, nodes, state.displacement, model.first_node(b), held);
+      // A plate that is held all around and pressed flat moves as one, too; what is held turns about its hold.
+      if (swing.rigid <= most_of_it * swing.largest || swing.rigid <= most_of_it * thickness ||
+          swing.at_held > most_of_it * swing.rigid) {
         continue;
       }
       found.push_back(
           {Weight::major, "swing",
            fmt::format("{}{} swings: of the {:.3g} mm that it moves at most, {:.3g} mm are a motion as one, by {:.2g} "
-                       "degrees: what holds it in the body is missing: put it into a bed (--support 1e5N/m3, "
-                       "SUPPORT=1e5N/m3), or hold its other end, too (--fix, FIX)",
+                       "degrees: what holds it in the body is missing: {}, or hold its other end, too (--fix, FIX)",
                        named(body.said_at, body.name),
                        pieces.size() > 1 ? fmt::format(", the piece at {},", where(swing.centre)) : "", swing.largest,
-                       swing.rigid, swing.turn * 180 / std::numbers::pi)});
+                       swing.rigid, swing.turn * 180 / std::numbers::pi, remedy_of_swings(model, b))});
     }
   }
   return found;
@@ -425,10 +460,11 @@ void CrossingWatch::see(const State& state) {
                                                   : fmt::format("at {:.3g} s", state.time);
   found_ = {
       Weight::major, "walls through each other",
-      fmt::format("{}: {} the wall passes through itself or another in {} pairs of shells, the first at {}: what "
+      fmt::format("{}: {} the wall passes through itself or another in {} pairs of shells{}, the first at {}: what "
                   "is said from there on holds for no body: add a [[contact]] between what meets, the same body "
                   "twice where it is itself, or lower the load",
-                  named(model_.shells.front().said_at, model_.shells.front().name), when, made.size(), where(middle))};
+                  named(model_.shells.front().said_at, model_.shells.front().name), when, made.size(),
+                  before_->empty() ? "" : " more than without load", where(middle))};
 }
 
 std::vector<Warning> doubts_of_suction(const Model& model, const RunSettings& settings) {

@@ -80,7 +80,7 @@ LinearSolver::LinearSolver(const ShellSystem& system, const RunSettings& setting
 
 LinearSolution LinearSolver::solve(const std::vector<double>& factors, const VectorX& prescribed) {
   Forces forces;
-  evaluate(system_, reference_configuration(system_), factors, {}, forces, nullptr);
+  evaluate(system_, {reference_configuration(system_), factors}, forces, nullptr);
   LinearSolution solution{prescribed, std::move(forces.external), {}, 0, false};
   expand(system_, solution.moved);
   const VectorX right = unbalanced_by(system_, solver_.free(), solution.external, solution.moved);

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
 
 namespace tunica {
 namespace {
@@ -71,13 +72,40 @@ Index used_node(const ShellSystem& system, std::size_t body, Index node) {
   return narrow<Index>(global);
 }
 
+/// Half at each end; across the edge it also works on the bow that rotations of its ends make (MembraneStiffness::bow),
+/// by which a membrane under constant stress is in balance with its edge load.
 void add_edge_load(const ShellSystem& system, std::size_t body, const EdgeLoad& edge_load, DeadLoad& load) {
+  std::map<std::pair<Index, Index>, std::vector<std::pair<std::size_t, std::size_t>>> sides;  // of elements, by ends
   for (const auto& edge : edge_load.edges) {
     const Index a = used_node(system, body, edge[0]);
     const Index b = used_node(system, body, edge[1]);
     const double length = (system.reference[a] - system.reference[b]).norm();
     load.force.segment<3>(first_freedom(a)) += edge_load.per_length * (length / 2);
     load.force.segment<3>(first_freedom(b)) += edge_load.per_length * (length / 2);
+    sides[std::minmax(a, b)];
+  }
+  for (std::size_t e = system.first_element[body]; e < system.first_element[body + 1]; ++e) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto& nodes = system.elements[e].nodes;
+      if (const auto side = sides.find(std::minmax(nodes[k], nodes[(k + 1) % 3])); side != sides.end()) {
+        side->second.emplace_back(e, k);
+      }
+    }
+  }
+  for (const auto& [ends, elements] : sides) {
+    for (const auto& [e, k] : elements) {
+      const ShellElement& element = system.elements[e];
+      const auto corners = reference_corners(element);
+      const Vec3 along = element.axes * (corners[(k + 1) % 3] - corners[k]).normalized();
+      const Vec2 out(along.y(), -along.x());
+      const double pull = (element.axes * edge_load.per_length).head<2>().dot(out);
+      const double facet = (corners[1] - corners[0]).cross(corners[2] - corners[0]).norm() / 2;
+      const Vec3 force(out.x() * out.x(), out.y() * out.y(), out.x() * out.y());  // the membrane force of a unit pull
+      const Vec3 moment = facet * pull * element.bow.col(narrow<Eigen::Index>(k)).dot(force) / real(elements.size()) *
+                          element.axes.row(2).transpose();
+      load.force.segment<3>(first_freedom(element.nodes[(k + 1) % 3]) + 3) += moment;
+      load.force.segment<3>(first_freedom(element.nodes[k]) + 3) -= moment;
+    }
   }
 }
 

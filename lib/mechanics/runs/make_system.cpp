@@ -262,13 +262,6 @@ ShellSystem make_system(const Model& model) {
   if (!model.contacts.empty()) {
     system.contact = std::make_shared<ContactSystem>(model, system.surfaces, system.reference, system.carried);
   }
-  make_terms(system);
-  add_stiffness_norms(system);
-
-  make_pattern(system, {});
-  colour_elements(system);
-  find_pieces(system);
-
   system.area = VectorX::Zero(nodes);
   system.mass = system.area;
   system.inertia = system.area;
@@ -286,6 +279,13 @@ ShellSystem make_system(const Model& model) {
       system.mass[node] += density * e.volume / 4;
     }
   }
+  make_terms(system);
+  add_stiffness_norms(system);
+
+  make_pattern(system, {});
+  colour_elements(system);
+  find_pieces(system);
+
   make_loads(system);
   make_supports(system);
   return system;

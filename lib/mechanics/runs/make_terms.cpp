@@ -1,8 +1,10 @@
 #include "tunica/core/narrow.hpp"
+#include "tunica/mechanics/elements/rotation.hpp"
 #include "tunica/mechanics/runs/detail/terms.hpp"
 
 #include <Eigen/Dense>
 
+#include <limits>
 #include <utility>
 
 namespace tunica {
@@ -47,6 +49,36 @@ bool DeadLoadTerm::add(const ShellSystem& system, const Instant& at, Forces& for
   return true;
 }
 
+InertiaTerm::InertiaTerm(const ShellSystem& system) : masses_(lumped_masses(system)) {
+  VectorX of_places = masses_;
+  const double longest = longest_side(system);
+  for (std::size_t i = 0; i < system.node_count(); ++i) {
+    of_places.segment<3>(first_freedom(i)) *= longest;
+  }
+  noise_ = std::numeric_limits<double>::epsilon() * force_norm(system, of_places);
+}
+
+bool InertiaTerm::add(const ShellSystem& system, const Instant& at, Forces& forces, BlockMatrix* tangent) const {
+  if (at.movement == nullptr) {
+    return true;
+  }
+  const Movement& movement = *at.movement;
+  forces.inertia += masses_.cwiseProduct(movement.acceleration + movement.mass_damping * movement.velocity);
+  forces.noise += movement.acceleration_factor * noise_;
+  if (tangent == nullptr) {
+    return true;
+  }
+  const double factor = movement.acceleration_factor + movement.mass_damping * movement.velocity_factor;
+  for (std::size_t i = 0; i < system.node_count(); ++i) {
+    auto block = tangent->block(tangent->find(narrow<Index>(i), narrow<Index>(i)));
+    block.diagonal().head<3>() += factor * masses_.segment<3>(first_freedom(i));
+    const Vec3 turn = movement.change.segment<3>(first_freedom(i) + 3);
+    block.block<3, 3>(3, 3) +=
+        factor * masses_[first_freedom(i) + 3] * spin_to_rate(turn, spin_coefficients(turn.squaredNorm()).eta);
+  }
+  return true;
+}
+
 void make_terms(ShellSystem& system) {
   system.terms.push_back(std::make_shared<ShellTerm>());
   if (!system.solids.empty()) {
@@ -61,6 +93,7 @@ void make_terms(ShellSystem& system) {
   if (system.contact) {
     system.terms.push_back(std::make_shared<ContactTerm>(system.contact));
   }
+  system.terms.push_back(std::make_shared<InertiaTerm>(system));
 }
 
 }  // namespace tunica

@@ -4,6 +4,7 @@
 #include "tunica/mechanics/algebra/lanczos.hpp"
 #include "tunica/mechanics/elements/rotation.hpp"
 #include "tunica/mechanics/runs/detail/linear_statics.hpp"
+#include "tunica/mechanics/runs/detail/prestress.hpp"
 #include "tunica/mechanics/runs/detail/run.hpp"
 #include "tunica/mechanics/runs/detail/supports.hpp"
 
@@ -22,13 +23,10 @@ namespace {
 
 /// Largest displacement of a mode that is handed over, as part of the model's longest side.
 constexpr double shown_amplitude = 0.01;
-/// Strain or rotation (rad) at which the tangent is differenced: central differences leave its square, round-off 1e-16
-/// over it.
-constexpr double difference_size = 1e-4;
 /// Work of a rigid motion below this part of the terms it is summed from is zero.
 constexpr double no_work = 1e-10;
-/// Beyond this strain a linear solution means nothing, nor does a factor of it.
-constexpr double largest_linear_strain = 0.2;
+/// Beyond this strain or rotation (rad) a linear solution means nothing, nor does a factor of it.
+constexpr double largest_linear_strain = 0.2, largest_linear_rotation = 1;
 /// The shift of a free body, of its lowest eigenvalue.
 constexpr double near_part = 0.2;
 
@@ -59,28 +57,27 @@ double largest_strain(const ShellSystem& system, const VectorX& solution) {
   return largest;
 }
 
-/// How the tangent changes per unit of the factor along a linear solution, at the reference: central differences.
-BlockMatrix tangent_change(const ShellSystem& system, const VectorX& solution) {
+/// How the tangent changes per unit of the factor: by the stress of a linear solution, and by the loads that follow the
+/// surface. That the solution moves the shell is left out, as in all linear buckling: to first order it is no
+/// stiffness, and where a flat plate is pressed aside it would make up modes that its stretching forbids.
+BlockMatrix tangent_change(ShellSystem& system, const VectorX& solution) {
   const Model& model = *system.model;
-  const double part = difference_size / std::max(largest_strain(system, solution), largest_rotation(system, solution));
-  std::vector<double> full = load_factors(model, true, 1);
-  std::array<BlockMatrix, 2> tangent{system.pattern, system.pattern};
+  const Configuration reference = reference_configuration(system);
   Forces forces;
-  for (std::size_t side = 0; side < 2; ++side) {
-    const double signed_part = side == 0 ? part : -part;
-    Configuration configuration = reference_configuration(system);
-    advance_configuration(system, signed_part * solution, configuration);
-    std::vector<double> factors = full;
-    for (double& factor : factors) {
-      factor *= signed_part;
-    }
-    evaluate(system, configuration, factors, {}, forces, &tangent[side]);
+  BlockMatrix change = system.pattern;
+  BlockMatrix before = system.pattern;
+  evaluate(system, {reference, std::vector<double>(model.loads.size(), 0.0)}, forces, &before);
+  const auto elements = system.elements;
+  const auto solids = system.solids;
+  add_stress(system, solution);
+  evaluate(system, {reference, load_factors(model, true, 1)}, forces, &change);
+  system.elements = elements;
+  system.solids = solids;
+  for (std::size_t k = 0; k < change.values.size(); ++k) {
+    change.values[k] -= before.values[k];
   }
-  for (std::size_t k = 0; k < tangent[0].values.size(); ++k) {
-    tangent[0].values[k] = (tangent[0].values[k] - tangent[1].values[k]) / (2 * part);
-  }
-  symmetrise(tangent[0]);
-  return std::move(tangent[0]);
+  symmetrise(change);
+  return change;
 }
 
 /// The tangent at the reference, before the loads act: with what the wall bears there already.
@@ -91,7 +88,7 @@ void reference_tangent(const ShellSystem& system, BlockMatrix& tangent) {
     return;
   }
   Forces forces;
-  evaluate(system, reference_configuration(system), std::vector<double>(model.loads.size(), 0.0), {}, forces, &tangent);
+  evaluate(system, {reference_configuration(system), std::vector<double>(model.loads.size(), 0.0)}, forces, &tangent);
   symmetrise(tangent);
 }
 
@@ -325,7 +322,7 @@ BlockMatrix stiffness_at_rest(ShellSystem& system, const RunSettings& settings, 
     configuration.rotation[i] = exponential(last.rotation[i]);
   }
   Forces forces;
-  evaluate(system, configuration, load_factors(model, true, last.load_factor), {}, forces, &stiffness);
+  evaluate(system, {configuration, load_factors(model, true, last.load_factor)}, forces, &stiffness);
   symmetrise(stiffness);
   return stiffness;
 }
@@ -395,8 +392,10 @@ Summary run_buckling(ShellSystem& system, const RunSettings& settings, const Buc
 
   const VectorX solution = linear_solution(system, settings);
   const double strain = largest_strain(system, solution);
-  const double largest_factor = strain > 0 ? largest_linear_strain / strain : infinity;
-  if (!(std::max(strain, largest_rotation(system, solution)) > 0)) {
+  const double rotation = largest_rotation(system, solution);
+  const double largest_factor = std::min(strain > 0 ? largest_linear_strain / strain : infinity,
+                                         rotation > 0 ? largest_linear_rotation / rotation : infinity);
+  if (!(std::max(strain, rotation) > 0)) {
     throw InputError("the loads do not deform anything: buckling needs a load that does");
   }
   const BlockMatrix change = tangent_change(system, solution);
@@ -444,9 +443,10 @@ Summary run_buckling(ShellSystem& system, const RunSettings& settings, const Buc
     }
   }
   if (summary.buckling_factors.empty()) {
-    throw RequirementError(
-        fmt::format("the loads buckle nothing: no factor up to {:.4g}, where they strain the shell by {:.0f} %",
-                    largest_factor, 100 * largest_linear_strain));
+    throw RequirementError(fmt::format(
+        "the loads buckle nothing: no factor up to {:.4g}, where they strain the shell by {:.0f} % or turn it "
+        "by a radian",
+        largest_factor, 100 * largest_linear_strain));
   }
   hand_over(system, settings, summary.buckling_factors, pairs, -1, true, summary, on_state);
   summary.converged = true;

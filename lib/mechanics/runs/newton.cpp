@@ -142,6 +142,20 @@ TangentSolver::Result TangentSolver::solve(BlockMatrix& matrix, const VectorX& b
   return result;
 }
 
+Balance balance_at(const ShellSystem& system, const Instant& at, Forces& forces, BlockMatrix* tangent) {
+  evaluate(system, at, forces, tangent);
+  Balance balance;
+  balance.valid = forces.valid;
+  balance.unbalanced = forces.external - forces.internal - forces.inertia;
+  VectorX reactions = forces.internal + forces.inertia;
+  mask(system.held, reactions);
+  balance.scale = std::max(
+      {force_norm(system, forces.external), force_norm(system, forces.inertia), force_norm(system, reactions)});
+  balance.floor = round_off(system, at.configuration) + forces.noise;
+  condense(system, at.configuration, balance.unbalanced, tangent);
+  return balance;
+}
+
 double increment_size(const ShellSystem& system, const VectorX& increment) {
   double sum = 0;
   for (Eigen::Index i = 0; i < increment.size(); i += 6) {

@@ -24,7 +24,7 @@ bool is_attached(const ShellSystem& system, const Piece& piece) {
 void hold_loose_pieces(ShellSystem& system, const std::vector<double>& factors) {
   const Model& model = *system.model;
   Forces forces;
-  evaluate(system, reference_configuration(system), factors, {}, forces, nullptr);
+  evaluate(system, {reference_configuration(system), factors}, forces, nullptr);
   for (const Piece& piece : system.pieces) {
     if (is_attached(system, piece) || free_rigid_motions(system, piece) == 0) {
       continue;
@@ -43,6 +43,27 @@ void hold_loose_pieces(ShellSystem& system, const std::vector<double>& factors) 
 }
 
 }  // namespace
+
+void add_stress(ShellSystem& system, const VectorX& moved) {
+  for (ShellElement& element : system.elements) {
+    Vector18 of_corners;
+    for (int k = 0; k < 3; ++k) {
+      of_corners.segment<6>(6 * k) = moved.segment<6>(first_freedom(element.nodes[k]));
+    }
+    ElementState strain = linear_deformation(element, of_corners);
+    strain.tail<3>() = strain.tail<3>().cwiseProduct(
+        element.skewing.unaryExpr([](double stiffness) { return stiffness > 0 ? 1.0 : 0.0; }));
+    element.prestrain += strain;
+  }
+  for (SolidElement& element : system.solids) {
+    SolidMotion motion;
+    for (int k = 0; k < 4; ++k) {
+      motion.displacement.col(k) = moved.segment<3>(first_freedom(element.nodes[k]));
+      motion.pressure[k] = moved[first_freedom(element.nodes[k]) + 3];
+    }
+    element.prestress += solid_stress(element, motion, true);
+  }
+}
 
 void add_prestress(ShellSystem& system, const RunSettings& settings) {
   const Model& model = *system.model;
@@ -63,23 +84,7 @@ void add_prestress(ShellSystem& system, const RunSettings& settings) {
   LinearSolver solver(system, exact);
   const LinearSolution solution = solver.solve(factors, VectorX::Zero(first_freedom(system.node_count())));
   const double residual = solver.residual(solution);
-  for (ShellElement& element : system.elements) {
-    Vector18 moved;
-    for (int k = 0; k < 3; ++k) {
-      moved.segment<6>(6 * k) = solution.moved.segment<6>(first_freedom(element.nodes[k]));
-    }
-    element.prestrain = linear_deformation(element, moved);
-    element.prestrain.tail<3>() = element.prestrain.tail<3>().cwiseProduct(
-        element.skewing.unaryExpr([](double stiffness) { return stiffness > 0 ? 1.0 : 0.0; }));
-  }
-  for (SolidElement& element : system.solids) {
-    SolidMotion motion;
-    for (int k = 0; k < 4; ++k) {
-      motion.displacement.col(k) = solution.moved.segment<3>(first_freedom(element.nodes[k]));
-      motion.pressure[k] = solution.moved[first_freedom(element.nodes[k]) + 3];
-    }
-    element.prestress = solid_stress(element, motion, true);
-  }
+  add_stress(system, solution.moved);
   system.prestress_residual = residual;
   system.held = held;
   system.terms = terms;

@@ -60,19 +60,18 @@ std::vector<double> load_factors(const Model& model, bool is_static, double time
   return factors;
 }
 
-void evaluate(const ShellSystem& system, const Configuration& configuration, const std::vector<double>& factors,
-              const ViscousState& viscous, Forces& forces, BlockMatrix* tangent,
-              const std::vector<ElementState>& predicted) {
+void evaluate(const ShellSystem& system, const Instant& at, Forces& forces, BlockMatrix* tangent) {
   const Eigen::Index size = first_freedom(system.node_count());
-  forces.internal.setZero(size);
-  forces.external.setZero(size);
-  forces.energy = 0;
+  for (VectorX* sum : {&forces.internal, &forces.external, &forces.inertia}) {
+    sum->setZero(size);
+  }
+  forces.energy = forces.noise = 0;
   if (tangent != nullptr) {
     std::fill(tangent->values.begin(), tangent->values.end(), 0.0);
   }
   bool valid = true;
   for (const auto& term : system.terms) {
-    valid = term->add(system, {configuration, factors, viscous, predicted}, forces, tangent) && valid;
+    valid = term->add(system, at, forces, tangent) && valid;
   }
   forces.valid = valid && forces.internal.allFinite() && forces.external.allFinite();
 }

@@ -109,8 +109,8 @@ void scatter(const ShellSystem& system, const Batch& batch, const LaneMatrix18& 
 bool ShellTerm::add(const ShellSystem& system, const Instant& at, Forces& forces, BlockMatrix* tangent) const {
   const std::vector<double> pressure = follower_pressures(system, at.factors, false);
   const Configuration& configuration = at.configuration;
-  const ViscousState& viscous = at.viscous;
-  const std::vector<ElementState>& predicted = at.predicted;
+  const ViscousState viscous = at.movement == nullptr ? ViscousState() : at.movement->viscous;
+  const bool is_predicted = at.predicted != nullptr && !at.predicted->empty();
   std::atomic<bool> valid{true};
   forces.deformation.resize(system.elements.size());
   std::vector<double> energies(system.elements.size());
@@ -132,13 +132,13 @@ bool ShellTerm::add(const ShellSystem& system, const Instant& at, Forces& forces
               damping.previous, [&](std::size_t l) -> const auto& { return (*viscous.previous)[batch.elements[l]]; });
         }
         LaneState expected;
-        if (!predicted.empty()) {
+        if (is_predicted) {
           set_lanes(
-              expected, [&](std::size_t l) -> const auto& { return predicted[batch.elements[l]]; });
+              expected, [&](std::size_t l) -> const auto& { return (*at.predicted)[batch.elements[l]]; });
         }
         const LaneMask whole =
             corotational_response(elements, motion, damping, response, tangent == nullptr ? nullptr : &stiffness,
-                                  predicted.empty() ? nullptr : &expected);
+                                  is_predicted ? &expected : nullptr);
         if (!all_of(whole)) {
           valid = false;
           continue;

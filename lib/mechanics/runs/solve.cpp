@@ -66,7 +66,12 @@ std::string describe_loads(const Model& model, const std::vector<double>& reache
   return text.empty() ? fmt::format("{:.4g} of {:.4g} times the loads", reached.front(), wanted.front()) : text;
 }
 
-std::string doubt_of_stiffness(const Model& model, const std::vector<double>& reached) {
+std::string remedy_of_failure(const Model& model, const std::vector<double>& reached) {
+  const bool slides = std::ranges::any_of(model.fixes, [](const Fix& fix) { return fix.across.has_value(); });
+  if (slides && model.supports.empty()) {
+    return "; between ends that slide a vessel under pressure gives way sideways, as a column does: put it into a bed "
+           "(--support 1e5N/m3, SUPPORT=1e5N/m3), or hold its ends (--fix boundary, FIX=boundary)";
+  }
   constexpr double far_below = 0.05;
   for (std::size_t l = 0; l < model.loads.size(); ++l) {
     const Load& load = model.loads[l];

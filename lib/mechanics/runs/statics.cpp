@@ -27,16 +27,7 @@ VectorX prescribed_positions(const ShellSystem& system, double factor) {
 Balance static_balance(const ShellSystem& system, const Configuration& configuration, double factor, Forces& forces,
                        BlockMatrix* tangent, const std::vector<ElementState>& predicted) {
   const Model& model = *system.model;
-  evaluate(system, configuration, load_factors(model, true, factor), {}, forces, tangent, predicted);
-  Balance balance;
-  balance.valid = forces.valid;
-  balance.unbalanced = forces.external - forces.internal;
-  VectorX reactions = forces.internal;
-  mask(system.held, reactions);
-  balance.scale = std::max(force_norm(system, forces.external), force_norm(system, reactions));
-  balance.floor = round_off(system, configuration);
-  condense(system, configuration, balance.unbalanced, tangent);
-  return balance;
+  return balance_at(system, {configuration, load_factors(model, true, factor), &predicted}, forces, tangent);
 }
 
 namespace {
@@ -415,7 +406,7 @@ private:
     throw RequirementError(fmt::format(
         "{} beyond load factor {:.6g} of {:.6g} ({}): {}{}; the last good state is at {:.6g}{}", found, factor_, last,
         describe_loads(model_, load_factors(model_, true, factor_), load_factors(model_, true, last)), reason, place,
-        factor_, loose.empty() ? doubt_of_stiffness(model_, load_factors(model_, true, factor_)) : ""));
+        factor_, loose.empty() ? remedy_of_failure(model_, load_factors(model_, true, factor_)) : ""));
   }
 
   [[nodiscard]] State state_of(const NewtonResult& result) const {

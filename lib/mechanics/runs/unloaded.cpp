@@ -94,7 +94,7 @@ public:
     }
     Configuration there = configuration(motion);
     Forces forces;
-    evaluate(*system, there, load_factors(model, true, 1), {}, forces, nullptr);
+    evaluate(*system, {there, load_factors(model, true, 1)}, forces, nullptr);
     VectorX left = forces.external - forces.internal;
     mask(solver_.free(), left);
     VectorX increment;

@@ -7,9 +7,12 @@
 
 namespace tunica {
 
-/// The elastic beds of a model, each a force per area -k u on its triangles, u the displacement from the reference, or
-/// its part along the reference normal. The area of a curved triangle stands at its corners, a third at each, so that
-/// a stiffness is a matrix per node, and constant. Energy u'Ku / 2.
+/// The elastic beds of a model, each a force per area on its triangles. In all directions it is -k u, u the
+/// displacement from the reference. A bed along the normal lets the wall slide: its energy is k d^2 / 2 per area, d the
+/// distance of the moved point from the reference surface, to second order n.u + u'Su / 2 with the normal n and the
+/// shape operator S there. Without the second term a round tube that is pressed into its bed would gain by turning
+/// about its axis. The area of a curved triangle stands at its corners, a third at each. Limits: d is the distance as
+/// long as u is short beside the radii of curvature.
 class SupportTerm : public Term {
 public:
   /// @param elements  of the model's shells, with the areas of their curved patches
@@ -26,7 +29,18 @@ public:
   [[nodiscard]] Mat3 at(std::size_t node) const;
 
 private:
-  std::vector<Mat3> stiffness_;  ///< #nodes
+  /// A corner of a triangle on a bed along the normal.
+  struct Sliding {
+    Index node;
+    double stiffness;  ///< N/mm
+    Vec3 normal;
+    Mat3 shape;  ///< 1/mm
+  };
+  [[nodiscard]] static double distance(const Sliding& at, const Vec3& displacement);
+
+  std::vector<double> sticking_;  ///< #nodes, N/mm: of beds in all directions
+  std::vector<Sliding> sliding_;
+  std::vector<Mat3> stiffness_;  ///< #nodes, of both at the reference
 };
 
 }  // namespace tunica

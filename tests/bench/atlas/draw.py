@@ -35,8 +35,8 @@ def text(x, y, size, words, anchor="middle", more=""):
             f"{escape(words)}</text>")
 
 
-def svg(chart, method, verdicts, page):
-    """@param verdicts {(column, row): Verdict}; @param page what the cells link to, its heads are cell-COLUMN-ROW"""
+def svg(chart, method, verdicts, name):
+    """@param verdicts {(column, row): Verdict}; @param name of the map, as CELL takes it"""
     columns, rows = len(chart.x.values), len(chart.y.values)
     width = LEFT + columns * CELL + RIGHT_MARGIN
     title = wrapped(f"{chart.title}: {method.title}", int(width / 9.6))
@@ -53,9 +53,10 @@ def svg(chart, method, verdicts, page):
     letters = []  # over the borders
     for (i, j), verdict in sorted(verdicts.items()):
         x, y, colour = LEFT + i * CELL, top + (rows - 1 - j) * CELL, COLOURS[verdict.letter]
-        tip = f"{WORDS[verdict.letter]}; exit code {verdict.code}" + (f"; {verdict.message}" if verdict.message else "")
-        out.append(f"<a href=\"{page}#cell-{i}-{j}\"><title>{escape(tip)}</title><rect x=\"{x + 1}\" y=\"{y + 1}\" "
-                   f"width=\"{CELL - 2}\" height=\"{CELL - 2}\" fill=\"{colour}\"/></a>")
+        tip = f"CELL={name}/{i}-{j}: {WORDS[verdict.letter]}; exit code {verdict.code}" + \
+            (f"; {verdict.message}" if verdict.message else "")
+        out.append(f"<g><title>{escape(tip)}</title><rect x=\"{x + 1}\" y=\"{y + 1}\" "
+                   f"width=\"{CELL - 2}\" height=\"{CELL - 2}\" fill=\"{colour}\"/></g>")
         halo = f" stroke=\"{colour}\" stroke-width=\"5\" paint-order=\"stroke\" pointer-events=\"none\""
         letters += [text(x + CELL / 2, y + 34, 24, verdict.letter, more=halo + " font-weight=\"bold\""),
                     text(x + CELL / 2, y + 58, 14.5, error_text(verdict.error), more=halo)]

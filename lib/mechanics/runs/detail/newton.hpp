@@ -56,7 +56,10 @@ struct Balance {
   double floor = 0;    ///< round-off of the norm of `unbalanced`
   bool valid = false;
 };
-/// `predicted` as in evaluate().
+/// At an instant: by the sum of all terms, with what is carried condensed.
+Balance balance_at(const ShellSystem& system, const Instant& at, Forces& forces, BlockMatrix* tangent);
+
+/// `predicted` as in Instant; empty: none.
 using BalanceFunction =
     std::function<Balance(const Configuration&, BlockMatrix* tangent, const std::vector<ElementState>& predicted)>;
 

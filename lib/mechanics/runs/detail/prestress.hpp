@@ -16,4 +16,7 @@ namespace tunica {
 /// Errors: InputError: nothing bears the pressure; RequirementError: as LinearSolver. Cost: one linear solve.
 void add_prestress(ShellSystem& system, const RunSettings& settings);
 
+/// Adds the stress of linear displacements (6 per node) to what the reference bears.
+void add_stress(ShellSystem& system, const VectorX& moved);
+
 }  // namespace tunica

@@ -23,9 +23,9 @@ State make_state(const ShellSystem& system, const Configuration& configuration, 
 std::string describe_loads(const Model& model, const std::vector<double>& reached, const std::vector<double>& wanted);
 
 /// For the message of a run that found no equilibrium: where that is at a small part of a pressure, that Young's
-/// modulus may have another unit; else nothing.
+/// modulus may have another unit; where ends slide and nothing beds the wall, that a bed helps; else nothing.
 /// @param reached  factors of the loads
-std::string doubt_of_stiffness(const Model& model, const std::vector<double>& reached);
+std::string remedy_of_failure(const Model& model, const std::vector<double>& reached);
 
 /// Tells a state the error of its linear solve.
 void set_algebraic_error(const std::optional<AlgebraicError>& error, State& state);

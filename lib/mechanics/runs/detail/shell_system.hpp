@@ -137,12 +137,8 @@ double factor_of(const Ramp& ramp, bool is_static, double time);
 std::vector<ElementState> predicted_deformations(const ShellSystem& system, const Configuration& configuration,
                                                  const VectorX& increment);
 
-/// Internal and external forces, and d(internal - external)/d(displacement, spin) where `tangent` is given (its
-/// pattern is system.pattern). In parallel; the same to the bit whatever the number of threads.
-/// @param predicted  as in corotational_response(), per element; empty: none
-void evaluate(const ShellSystem& system, const Configuration& configuration, const std::vector<double>& factors,
-              const ViscousState& viscous, Forces& forces, BlockMatrix* tangent,
-              const std::vector<ElementState>& predicted = {});
+/// The sum of all terms, as Term::add(), from zero on. `tangent`, where it is given, has the pattern system.pattern.
+void evaluate(const ShellSystem& system, const Instant& at, Forces& forces, BlockMatrix* tangent);
 
 /// Stiffness of the linear theory at the reference, without any load.
 void linear_stiffness(const ShellSystem& system, BlockMatrix& matrix);

@@ -36,6 +36,18 @@ public:
   bool add(const ShellSystem& system, const Instant& at, Forces& forces, BlockMatrix* tangent) const override;
 };
 
+/// Masses that are accelerated, and damping in proportion to them. Masses are lumped; rotary inertia is rho t^3 / 12
+/// per area about every axis (that of a plate about the axes in its plane), so it needs no gyroscopic term.
+class InertiaTerm : public Term {
+public:
+  explicit InertiaTerm(const ShellSystem& system);
+  bool add(const ShellSystem& system, const Instant& at, Forces& forces, BlockMatrix* tangent) const override;
+
+private:
+  VectorX masses_;
+  double noise_;  ///< N s^2, per derivative of the acceleration: what the digits of places leave of it
+};
+
 /// Fills `terms`, in the order in which they are summed, and makes the bed. All that they act on is there.
 void make_terms(ShellSystem& system);
 

@@ -1,0 +1,302 @@
+// Nodes that another body carries.
+
+#include "random.hpp"
+#include "tets.hpp"
+#include "tunica/mechanics/elements/rotation.hpp"
+#include "tunica/mechanics/runs/detail/shell_system.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace tunica {
+namespace {
+
+using namespace benchmarks;
+
+TetMesh box(std::size_t nx, std::size_t ny, std::size_t nz, const Vec3& low, const Vec3& high) {
+  return make_block(nx, ny, nz, [&](const Vec3& u) { return Vec3(low + u.cwiseProduct(high - low)); });
+}
+
+/// A part of a cylinder of radius 5 about the y axis, its crown at z = 0, with its normals.
+ShellBody panel(std::size_t n) {
+  ShellBody body = flat_body({}, 10, 0.3, 0.2);
+  const Grid grid = make_grid(n, n, [](double u, double v) {
+    const double angle = 0.8 * (u - 0.5);
+    return Vec3(5 * std::sin(angle), 4 * v - 2, 5 * std::cos(angle) - 5);
+  });
+  body.mesh = grid.mesh;
+  body.curved = true;
+  body.rest = Rest::curved;
+  for (const Vec3& x : body.mesh.vertices) {
+    body.mesh.normals.push_back(Vec3(x.x(), 0, x.z() + 5).normalized());
+  }
+  return body;
+}
+
+/// A solid of 2 mm on the panel, its lower nodes 0.1 mm above it, carried.
+Model solid_on_shell() {
+  Model model;
+  model.shells.push_back(panel(4));
+  const double radius = 5.1;
+  model.solids.push_back({"solid",
+                          make_block(3, 3, 2,
+                                     [&](const Vec3& u) {
+                                       const double angle = 0.6 * (u.x() - 0.5), r = radius + 2 * u.z();
+                                       return Vec3(r * std::sin(angle), 3 * u.y() - 1.5, r * std::cos(angle) - 5);
+                                     }),
+                          {1, 0.4, std::nullopt},
+                          SolidLaw::neo_hookean});
+  Attachment attachment;
+  attachment.body = 1;
+  attachment.to = 0;
+  attachment.nodes = nodes_of(model, 1, [&](const Vec3& x) { return std::hypot(x.x(), x.z() + 5) < radius + eps; });
+  model.attachments.push_back(attachment);
+  return model;
+}
+
+/// A flat shell on the upper face of a block, its nodes not the block's.
+Model shell_on_solid() {
+  Model model;
+  const Grid grid = make_grid(5, 4, [](double u, double v) { return Vec3(4 * u - 2, 4 * v - 2, 1); });
+  model.shells.push_back(flat_body(grid.mesh, 100, 0.3, 0.1));
+  model.solids.push_back(
+      {"solid", box(3, 3, 2, Vec3(-2, -2, -1), Vec3(2, 2, 1)), {1, 0.4, std::nullopt}, SolidLaw::neo_hookean});
+  Attachment attachment;
+  attachment.body = 0;
+  attachment.to = 1;
+  for (Index i = 0; i < grid.mesh.vertices.size(); ++i) {
+    attachment.nodes.push_back(i);
+  }
+  model.attachments.push_back(attachment);
+  return model;
+}
+
+/// Moves some nodes of the carrier rigidly; how far all others are from following.
+double rigid_error(Model model, std::size_t body, const std::function<bool(const Vec3&)>& moved, double angle) {
+  const Eigen::Quaterniond turn = exponential(angle * Vec3(1, 2, -1).normalized());
+  const auto motion = [&](const Vec3& x) { return Vec3(turn * x - x + Vec3(0.5, -1, 0.2)); };
+  move_nodes(model, body, moved, motion);
+  RunSettings settings = nonlinear_run({0.25, 0.5, 0.75, 1});
+  settings.converge = 1e-11;
+  settings.newton_max = 60;
+  const State state = last_state(model, settings);
+  double error = 0;
+  std::size_t node = 0;
+  for (std::size_t b = 0; b < model.body_count(); ++b) {
+    for (const Vec3& x : model.vertices_of(b)) {
+      error = std::max(error, (state.displacement[node++] - motion(x)).norm());
+    }
+  }
+  EXPECT_LT(state.strain_energy, 1e-14);
+  return error;
+}
+
+TEST(Carried, AShellOnASolidFollowsItsRigidMotion) {
+  EXPECT_LT(rigid_error(
+                shell_on_solid(), 1, [](const Vec3& x) { return x.z() < -1 + eps; }, 0.6),
+            1e-8);
+}
+
+TEST(Carried, ASolidOnAShellFollowsItsRigidMotion) {
+  EXPECT_LT(rigid_error(
+                solid_on_shell(), 0, [](const Vec3&) { return true; }, 0.6),
+            1e-8);
+}
+
+/// A rotated configuration, put there by hand: carried nodes are exactly in their places, and nothing pulls.
+TEST(Carried, RigidMotionsGiveNoForce) {
+  for (const Model& model : {shell_on_solid(), solid_on_shell()}) {
+    const ShellSystem system = make_system(model);
+    const Eigen::Quaterniond turn = exponential(Vec3(0.7, -1.1, 0.4));
+    Configuration moved = reference_configuration(system);
+    for (std::size_t i = 0; i < system.node_count(); ++i) {
+      moved.displacement[i] = turn * system.reference[i] - system.reference[i] + Vec3(3, -2, 1);
+      if (i < system.first_solid_node) {
+        moved.rotation[i] = turn;
+      }
+    }
+    const Configuration exact = moved;
+    for (const Carried& c : system.carried) {
+      moved.displacement[c.node] = Vec3(7, 7, 7);
+    }
+    place_carried(system.carried, system.surfaces, system.reference, moved);
+    for (std::size_t i = 0; i < system.node_count(); ++i) {
+      ASSERT_LT((moved.displacement[i] - exact.displacement[i]).norm(), 1e-13) << i;
+    }
+    Forces forces;
+    evaluate(system, {moved, load_factors(model, true, 1)}, forces, nullptr);
+    VectorX unbalanced = forces.external - forces.internal;
+    condense(system, moved, unbalanced, nullptr);
+    EXPECT_LT(force_norm(system, unbalanced), 1e-11);
+  }
+}
+
+/// What acts on the nodes that are left does the same work, and has the same sum and moment, as before.
+TEST(Carried, CondensedForcesKeepTheirSumAndMoment) {
+  for (const Model& model : {shell_on_solid(), solid_on_shell()}) {
+    const ShellSystem system = make_system(model);
+    Random random(13);
+    Configuration moved = reference_configuration(system);
+    VectorX step = VectorX::NullaryExpr(first_freedom(system.node_count()), [&](Eigen::Index) { return random(0.02); });
+    advance_configuration(system, step, moved);
+    VectorX forces = VectorX::Zero(step.size());
+    for (const Carried& c : system.carried) {
+      forces.segment<3>(first_freedom(c.node)) = random.vector(1);
+    }
+    const auto sums = [&](const VectorX& all) {
+      Vector6 sum = Vector6::Zero();
+      for (std::size_t i = 0; i < system.node_count(); ++i) {
+        const Vec3 f = all.segment<3>(first_freedom(i));
+        sum.head<3>() += f;
+        sum.tail<3>() += (system.reference[i] + moved.displacement[i]).cross(f);
+        if (i < system.first_solid_node) {
+          sum.tail<3>() += all.segment<3>(first_freedom(i) + 3);
+        }
+      }
+      return sum;
+    };
+    VectorX condensed = forces;
+    condense(system, moved, condensed, nullptr);
+    for (const Carried& c : system.carried) {
+      EXPECT_EQ(condensed.segment<3>(first_freedom(c.node)).norm(), 0);
+    }
+    EXPECT_LT((sums(condensed) - sums(forces)).norm(), 1e-12 * forces.norm() * 10);
+    // And by virtual work.
+    expand_carried(system.carried, system.surfaces, system.reference, moved, step);
+    EXPECT_NEAR(condensed.dot(step), forces.dot(step), 1e-12 * forces.norm());
+  }
+}
+
+/// The tangent of what is left, with the curvature of the map under the carried forces.
+TEST(Carried, TheCondensedTangentIsTheDerivativeOfTheCondensedForces) {
+  for (const Model& model : {shell_on_solid(), solid_on_shell()}) {
+    const ShellSystem system = make_system(model);
+    Random random(13);
+    const Eigen::Index size = first_freedom(system.node_count());
+    Configuration at = reference_configuration(system);
+    VectorX away = VectorX::NullaryExpr(size, [&](Eigen::Index) { return random(0.02); });
+    for (std::size_t i = system.first_solid_node; i < system.node_count(); ++i) {
+      away.segment<2>(first_freedom(i) + 4).setZero();
+    }
+    advance_configuration(system, away, at);
+    std::vector<char> is_carried(system.node_count(), 0);
+    for (const Carried& c : system.carried) {
+      is_carried[c.node] = 1;
+    }
+    const auto left = [&](const Configuration& where, BlockMatrix* tangent) {
+      Forces forces;
+      evaluate(system, {where, load_factors(model, true, 1)}, forces, tangent);
+      EXPECT_TRUE(forces.valid);
+      VectorX unbalanced = forces.external - forces.internal;
+      condense(system, where, unbalanced, tangent);
+      return VectorX(-unbalanced);
+    };
+    BlockMatrix tangent = system.pattern;
+    left(at, &tangent);
+    constexpr double step = 1e-6;
+    for (std::size_t i = 0; i < system.node_count(); ++i) {
+      for (std::size_t c = is_carried[i] != 0 ? 3 : 0; c < (i < system.first_solid_node ? 6 : 4); ++c) {
+        VectorX one = VectorX::Zero(size), column;
+        one[first_freedom(i) + static_cast<Eigen::Index>(c)] = 1;
+        multiply(tangent, one, column);
+        Configuration after = at, before = at;
+        advance_configuration(system, step * one, after);
+        advance_configuration(system, -step * one, before);
+        const VectorX difference = (left(after, nullptr) - left(before, nullptr)) / (2 * step);
+        ASSERT_LT((difference - column).norm(), 2e-7 * column.norm() + 1e-9) << "node " << i << ", component " << c;
+      }
+    }
+  }
+}
+
+/// A block on another; the faces between them meet, their nodes do not. `fine` cells of the upper against `coarse` of
+/// the lower; the outside moves linearly. How far the nodes are from it.
+double stacked_error(std::size_t coarse, std::size_t fine, SolidLaw law, bool linear) {
+  Model model;
+  model.solids.push_back({"lower", box(coarse, coarse, 2, Vec3(0, 0, 0), Vec3(2, 2, 1)), {1, 0.3, std::nullopt}, law});
+  model.solids.push_back({"upper", box(fine, fine, 2, Vec3(0, 0, 1), Vec3(2, 2, 2)), {1, 0.3, std::nullopt}, law});
+  Random random(13);
+  for (SolidBody& body : model.solids) {  // distorted inside
+    for (Vec3& x : body.mesh.vertices) {
+      const bool inside = x.x() > eps && x.x() < 2 - eps && x.y() > eps && x.y() < 2 - eps && x.z() > eps &&
+                          x.z() < 2 - eps && std::abs(x.z() - 1) > eps;
+      x += inside ? random.vector(0.08) : Vec3(Vec3::Zero());
+    }
+  }
+  Attachment attachment;
+  attachment.body = 1;
+  attachment.to = 0;
+  attachment.nodes = nodes_of(model, 1, [](const Vec3& x) { return std::abs(x.z() - 1) < eps; });
+  model.attachments.push_back(attachment);
+  Mat3 gradient;
+  gradient << random.vector(0.01), random.vector(0.01), random.vector(0.01);
+  const auto exact = [&](const Vec3& x) { return Vec3(gradient * x + Vec3(0.1, 0, -0.1)); };
+  const auto outside = [](const Vec3& x) { return (x - Vec3(1, 1, 1)).cwiseAbs().maxCoeff() > 1 - eps; };
+  move_nodes(model, 0, outside, exact);
+  move_nodes(
+      model, 1, [&](const Vec3& x) { return outside(x) && x.z() > 1 + eps; }, exact);
+  RunSettings settings = linear ? linear_run() : nonlinear_run({1});
+  settings.converge = 1e-12;
+  const State state = last_state(model, settings);
+  double error = 0;
+  std::size_t node = 0;
+  for (const SolidBody& body : model.solids) {
+    for (const Vec3& x : body.mesh.vertices) {
+      error = std::max(error, (state.displacement[node++] - exact(x)).norm());
+    }
+  }
+  return error;
+}
+
+TEST(Carried, AFinerFaceOnACoarserOnePassesThePatchTest) {
+  for (const SolidLaw law : {SolidLaw::corotational, SolidLaw::neo_hookean}) {
+    EXPECT_LT(stacked_error(2, 4, law, false), 1e-10);
+    EXPECT_LT(stacked_error(3, 3, law, false), 1e-10);
+  }
+}
+
+TEST(Carried, LinearRunsKnowAttachments) { EXPECT_LT(stacked_error(2, 4, SolidLaw::corotational, true), 1e-10); }
+
+/// Where the carried triangles cross the edges of those that carry them, forces are shared as by a rule of quadrature,
+/// and a tenth of the strain is lost about the face; where they are coarser than those, nodes between them lie free.
+TEST(Carried, OfFacesThatCrossTheFinerOneShouldBeCarried) {
+  for (const auto& [coarse, fine] : {std::pair<std::size_t, std::size_t>{2, 3}, {3, 4}, {3, 5}}) {
+    EXPECT_LT(stacked_error(coarse, fine, SolidLaw::corotational, false), 1e-3);
+    EXPECT_GT(stacked_error(fine, coarse, SolidLaw::corotational, false),
+              3 * stacked_error(coarse, fine, SolidLaw::corotational, false));
+  }
+}
+
+TEST(Carried, ANodeCarriedTwiceIsNamed) {
+  Model model = shell_on_solid();
+  model.attachments.push_back(model.attachments.front());
+  EXPECT_THAT(error_of(model, nonlinear_run({1})), testing::HasSubstr("node 0 is carried twice"));
+}
+
+TEST(Carried, ACircleIsRefused) {
+  Model model = shell_on_solid();
+  Attachment back;
+  back.body = 1;
+  back.to = 0;
+  back.nodes = nodes_of(model, 1, [](const Vec3& x) { return x.z() > 1 - eps; });
+  model.attachments.push_back(back);
+  EXPECT_THAT(error_of(model, nonlinear_run({1})), testing::HasSubstr("carry each other in a circle"));
+}
+
+/// A solid on a shell on a solid: forces go all the way down.
+TEST(Carried, WhatIsCarriedMayCarry) {
+  Model model = shell_on_solid();
+  model.solids.push_back(
+      {"top", box(2, 2, 1, Vec3(-1, -1, 1.05), Vec3(1, 1, 2)), {1, 0.4, std::nullopt}, SolidLaw::neo_hookean});
+  Attachment attachment;
+  attachment.body = 2;
+  attachment.to = 0;
+  attachment.nodes = nodes_of(model, 2, [](const Vec3& x) { return x.z() < 1.05 + eps; });
+  model.attachments.push_back(attachment);
+  EXPECT_LT(rigid_error(
+                model, 1, [](const Vec3& x) { return x.z() < -1 + eps; }, 0.4),
+            1e-8);
+}
+
+}  // namespace
+}  // namespace tunica

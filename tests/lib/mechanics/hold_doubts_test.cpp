@@ -1,0 +1,225 @@
+// What hints that an organ is not held as it is in the body.
+
+#include "tunica/mechanics/runs/hold_doubts.hpp"
+
+#include "benchmarks.hpp"
+#include "tunica/mechanics/runs/doubts.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace tunica::hold_doubts {
+namespace {
+
+using namespace benchmarks;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+/// A tube along z, rings 0 to `along`, with free rims.
+Model tube(double radius, double length, double thickness, double pressure) {
+  constexpr std::size_t around = 24, along = 16;
+  ShellMesh mesh = tube_mesh(radius, radius, length, around, along);
+  Model model;
+  ShellBody body = flat_body(std::move(mesh), 2, 0.45, thickness);
+  body.curved = true;
+  body.rest = Rest::curved;
+  model.shells.push_back(body);
+  model.loads.push_back({0, PressureLoad{pressure, true}, {}});
+  return model;
+}
+
+State at_rest(const Model& model) {
+  State state;
+  state.displacement.assign(model.node_count(), Vec3::Zero());
+  state.rotation.assign(model.node_count(), Vec3::Zero());
+  return state;
+}
+
+std::vector<std::string> kinds(const std::vector<Warning>& warnings) {
+  std::vector<std::string> found;
+  for (const Warning& warning : warnings) {
+    found.push_back(warning.kind);
+  }
+  return found;
+}
+
+TEST(HoldDoubts, FreeEndsLackTheirThrust) {
+  Model model = tube(10, 40, 1, 0.01);
+  std::vector<Warning> found = doubts_of_ends(model);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_THAT(found[0].text, HasSubstr("2 open ends are free"));
+  EXPECT_THAT(found[0].text, HasSubstr("3.11 N"));  // the polygon's area
+  EXPECT_THAT(found[0].text, HasSubstr("rims:slide"));
+  hold(
+      model, [](const Vec3& p) { return p.z() < eps; }, "xyz", "xyz");
+  found = doubts_of_ends(model);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_THAT(found[0].text, HasSubstr("an open end is free, at"));
+  Fix slide;
+  slide.nodes = nodes_where(model.shells[0].mesh, [](const Vec3& p) { return p.z() > 40 - eps; });
+  slide.across = Vec3::UnitZ();
+  model.fixes.push_back(slide);
+  EXPECT_THAT(doubts_of_ends(model), IsEmpty());
+  model.fixes.clear();
+  model.loads.clear();
+  EXPECT_THAT(doubts_of_ends(model), IsEmpty());
+}
+
+TEST(HoldDoubts, EdgesThatRunBesideEachOtherAreSaid) {
+  for (const double gap : {0.05, 0.4, 0.7}) {
+    Model model = tube(10, 20, 1, 0.01);
+    ShellMesh& mesh = model.shells[0].mesh;
+    const ShellMesh other = mesh;
+    for (std::size_t i = 0; i < other.vertices.size(); ++i) {  // continues it behind a gap, its nodes elsewhere
+      mesh.vertices.push_back(Eigen::AngleAxisd(0.1, Vec3::UnitZ()) * (other.vertices[i] + Vec3(0, 0, 20 + gap)));
+      mesh.normals.push_back(Eigen::AngleAxisd(0.1, Vec3::UnitZ()) * other.normals[i]);
+    }
+    for (const auto& [a, b, c] : other.triangles) {
+      const auto first = static_cast<Index>(other.vertices.size());
+      mesh.triangles.push_back({first + a, first + b, first + c});
+    }
+    hold(
+        model, [](const Vec3&) { return true; }, "xyz", "xyz");
+    const std::vector<Warning> found = doubts_of_ends(model);
+    EXPECT_EQ(kinds(found), gap < 0.5 ? std::vector<std::string>{"open seam"} : std::vector<std::string>{});
+  }
+}
+
+TEST(HoldDoubts, SwingsAreSaidAndWideningIsNot) {
+  const Model model = tube(10, 40, 1, 0.01);
+  State state = at_rest(model);
+  const ShellMesh& mesh = model.shells[0].mesh;
+  for (std::size_t i = 0; i < model.node_count(); ++i) {
+    state.displacement[i] = 3 * mesh.normals[i];
+  }
+  EXPECT_THAT(swings_of(model, state), IsEmpty());
+  const Eigen::AngleAxisd turn(0.2, Vec3::UnitX());
+  for (std::size_t i = 0; i < model.node_count(); ++i) {
+    state.displacement[i] = turn * (mesh.vertices[i] + mesh.normals[i]) - mesh.vertices[i];
+    state.rotation[i] = Vec3(0.2, 0, 0);
+  }
+  const std::vector<Warning> found = swings_of(model, state);
+  ASSERT_THAT(kinds(found), testing::ElementsAre("swing"));
+  Model sliding = model;  // rims that slide go along
+  Fix slide;
+  slide.nodes = nodes_where(mesh, [](const Vec3& p) { return p.z() < eps || p.z() > 40 - eps; });
+  slide.across = Vec3::UnitZ();
+  sliding.fixes.push_back(slide);
+  EXPECT_THAT(kinds(swings_of(sliding, state)), testing::ElementsAre("swing"));
+  EXPECT_THAT(found[0].text, HasSubstr("by 11 degrees"));
+  for (Vec3& u : state.displacement) {
+    u *= 0.02;  // less than half a wall
+  }
+  for (Vec3& r : state.rotation) {
+    r *= 0.02;
+  }
+  EXPECT_THAT(swings_of(model, state), IsEmpty());
+}
+
+TEST(HoldDoubts, WhatIsHeldAllAroundDoesNotSwing) {
+  const Grid grid = make_grid(12, 12, [](double u, double v) { return Vec3(20 * u, 20 * v, 0); });
+  Model model;
+  model.shells.push_back(flat_body(grid.mesh, 2, 0.45, 0.5));
+  const auto inside = [](const Vec3& p) { return std::min({p.x(), p.y(), 20 - p.x(), 20 - p.y()}) > eps; };
+  hold(
+      model, [&](const Vec3& p) { return !inside(p); }, "xyz", "xyz");
+  model.loads.push_back({0, PressureLoad{1e-3, true}, {}});
+  State pressed_flat = at_rest(model);
+  for (std::size_t i = 0; i < model.node_count(); ++i) {
+    pressed_flat.displacement[i] = inside(grid.mesh.vertices[i]) ? Vec3(0, 0, 1) : Vec3(0, 0, 0);
+  }
+  EXPECT_THAT(swings_of(model, pressed_flat), IsEmpty());
+}
+
+TEST(HoldDoubts, ABodyThatCrossesItselfIsSaid) {
+  Model model = tube(10, 40, 1, 0.01);
+  model.loads.clear();
+  EXPECT_THAT(doubts_of_ends(model), IsEmpty());
+  for (Vec3& v : model.shells[0].mesh.vertices) {  // one side through the other
+    v.y() -= v.y() > 0 ? 25 * std::exp(-std::pow((v.z() - 20) / 6, 2)) : 0;
+  }
+  const std::vector<Warning> found = doubts_of_ends(model);
+  ASSERT_THAT(kinds(found), testing::Contains("surface crosses itself"));
+}
+
+TEST(HoldDoubts, WallsThroughEachOtherAreSaidWithThePlace) {
+  const Model model = tube(10, 40, 1, 0.01);
+  const ShellMesh& mesh = model.shells[0].mesh;
+  State state = at_rest(model);
+  for (std::size_t i = 0; i < model.node_count(); ++i) {
+    const double middle = std::exp(-std::pow((mesh.vertices[i].z() - 20) / 6, 2));
+    state.displacement[i] = Vec3(0, -1.2 * middle * mesh.vertices[i].y(), 0);
+  }
+  state.load_factor = 0.5;
+  CrossingWatch watch(model);
+  watch.see(at_rest(model));
+  EXPECT_FALSE(watch.found());
+  watch.see(state);
+  ASSERT_TRUE(watch.found());
+  EXPECT_EQ(watch.found()->kind, "walls through each other");
+  EXPECT_THAT(watch.found()->text, HasSubstr("at load factor 0.5"));
+  EXPECT_THAT(watch.found()->text, HasSubstr("pairs of shells, the first at ("));
+  EXPECT_THAT(watch.found()->text, HasSubstr("[[contact]]"));
+  watch.see(at_rest(model));
+  EXPECT_TRUE(watch.found());
+}
+
+TEST(HoldDoubts, WhatCrossesInTheImageIsNotTheRunsDoing) {
+  Model model = tube(10, 40, 1, 0.01);
+  model.shells.push_back(model.shells[0]);
+  for (Vec3& v : model.shells[1].mesh.vertices) {
+    v = Vec3(v.z() - 20, v.y(), v.x() + 20);
+  }
+  for (Vec3& n : model.shells[1].mesh.normals) {
+    n = Vec3(n.z(), n.y(), n.x());
+  }
+  CrossingWatch watch(model);
+  watch.see(at_rest(model));
+  EXPECT_FALSE(watch.found());
+  model.loads.clear();
+  const std::vector<Warning> found = doubts_of_ends(model);
+  ASSERT_THAT(kinds(found), testing::ElementsAre("walls through each other"));
+  EXPECT_THAT(found[0].text, HasSubstr("nothing holds them apart"));
+}
+
+TEST(HoldDoubts, BedsAndPressuresInTheImageAreQuestioned) {
+  Model model = pressurised_sphere(2, 0.2, 0.016);
+  const auto said = [&] {
+    std::string all;
+    for (const Warning& warning : doubts(model, nonlinear_run({1}), true)) {
+      all += warning.text;
+    }
+    return all;
+  };
+  for (const auto& [stiffness, what] :
+       {std::pair(1e-4, ""), {1e5, "stiffer than that of any tissue"}, {1e-9, "softer than that of any tissue"}}) {
+    model.supports = {{0, {}, stiffness}};
+    for (Index i = 0; i < model.node_count(); ++i) {
+      model.supports[0].nodes.push_back(i);
+    }
+    EXPECT_THAT(said(), HasSubstr(what));
+    EXPECT_EQ(said().find("any tissue around") != std::string::npos, *what != 0);
+  }
+  auto& pressure = std::get<PressureLoad>(model.loads[0].kind);
+  for (const double imaged : {0.016, -0.016}) {
+    pressure.value = pressure.imaged_at.emplace(imaged);
+    EXPECT_EQ(said().find("is a suction") != std::string::npos, imaged < 0);
+  }
+  std::get<PressureLoad>(model.loads[0].kind).value = 0.12;
+  std::get<PressureLoad>(model.loads[0].kind).imaged_at = 0.12;
+  EXPECT_THAT(said(), HasSubstr("900 mmHg: was 120 mmHg meant?"));
+}
+
+/// A sphere at .95 of 2 E t^2 / (R^2 sqrt(3 (1 - nu^2))).
+TEST(HoldDoubts, SuctionNearBucklingIsSaid) {
+  const double critical = 2 * 1000 * 0.2 * 0.2 / (100 * std::sqrt(3 * (1 - 0.09)));
+  const Model near = pressurised_sphere(3, 0.2, -0.95 * critical);
+  const std::vector<Warning> found = doubts_of_suction(near, nonlinear_run({1}));
+  ASSERT_THAT(kinds(found), testing::ElementsAre("near buckling"));
+  EXPECT_THAT(found[0].text, HasSubstr(" % of the load at which the perfect shell buckles"));
+  EXPECT_THAT(doubts_of_suction(pressurised_sphere(3, 0.2, -0.1 * critical), nonlinear_run({1})), IsEmpty());
+  EXPECT_THAT(doubts_of_suction(pressurised_sphere(3, 0.2, critical), nonlinear_run({1})), IsEmpty());
+}
+
+}  // namespace
+}  // namespace tunica::hold_doubts
