@@ -11,6 +11,7 @@
 #include "tunica/mechanics/runs/disturbed.hpp"
 #include "tunica/shell/distance/shell_distance.hpp"
 #include "tunica/shell/distance/shell_quality.hpp"
+#include "tunica/surface/mesh/measure.hpp"
 
 #include <fmt/format.h>
 
@@ -41,6 +42,42 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 7> names{{{"
                                                                               {"membrane", "MPa"},
                                                                               {"tension", "N/mm"},
                                                                               {"probe", "mm"}}};
+
+/// What a load presses or a fix holds. It ends where triangles do, on every level within its border: what its part of
+/// the area changed by is left, to first order, and costs an answer about as much.
+struct Region {
+  double part = 0;    ///< of the body's area
+  double acting = 0;  ///< of the area, what acts: of a load that part, of a fix the rest
+};
+
+/// Those of loads and fixes that name nodes, in their order.
+std::vector<Region> regions_of(const Model& model) {
+  std::vector<Region> regions;
+  const auto look = [&](std::size_t body, const std::vector<Index>& nodes, bool is_load) {
+    if (body >= model.shells.size() || nodes.empty()) {
+      return;
+    }
+    const ShellMesh& mesh = model.shells[body].mesh;
+    const std::vector<char> within = triangles_within(mesh, nodes);
+    double inside = 0, whole = 0;
+    for (std::size_t t = 0; t < within.size(); ++t) {
+      const auto& [a, b, c] = mesh.triangles[t];
+      const double area = triangle_area(mesh.vertices[a], mesh.vertices[b], mesh.vertices[c]);
+      whole += area;
+      inside += within[t] != 0 ? area : 0;
+    }
+    regions.push_back({inside / whole, is_load ? inside / whole : 1 - inside / whole});
+  };
+  for (const Load& load : model.loads) {
+    if (const auto* pressure = std::get_if<PressureLoad>(&load.kind)) {
+      look(load.body, pressure->nodes, true);
+    }
+  }
+  for (const Fix& fix : model.fixes) {
+    look(fix.body, fix.nodes, false);
+  }
+  return regions;
+}
 
 class Ladder {
 public:
@@ -196,6 +233,7 @@ private:
       }
     }
     out_.levels.push_back(level);
+    measure_borders();
     near_serves_ = near_serves_ && (!near_ || answer.summary.newton_iterations <= most_from_near);
     field_change_ = last_ ? field_change(last_->at, answer.at, level_) : infinity;
     last_ = std::move(answer);
@@ -206,6 +244,16 @@ private:
     if (on_level_) {
       on_level_(out_.levels.back());
     }
+  }
+
+  void measure_borders() {
+    std::vector<Region> regions = regions_of(model_);
+    border_error_ = 0;
+    for (std::size_t i = 0; i < std::min(regions.size(), regions_.size()); ++i) {
+      const double change = std::abs(regions[i].part - regions_[i].part);
+      border_error_ = std::max(border_error_, regions[i].acting > 0 ? change / regions[i].acting : 0.0);
+    }
+    regions_ = std::move(regions);
   }
 
   /// Whether the whole load, put on this mesh at once, leads where the coarser level led.
@@ -240,6 +288,7 @@ private:
         return;
       }
     } catch (const RequirementError&) {  // no linear answer
+    } catch (const InputError&) {        // or zero, as the membrane stress of a flat plate
     }
     choices_.push_back({"model", "nonlinear", 0, "linear",
                         std::isfinite(error) ? fmt::format("an error of {:.2g} %", 100 * error) : "no answer"});
@@ -265,8 +314,10 @@ private:
     return *out_.estimate < request_.within && out_.reasons.empty();
   }
 
-  /// Of the model and the solver.
-  [[nodiscard]] double error_besides() const { return model_error_ + last_->summary.algebraic_error.value_or(0); }
+  /// Of the model, the solver, and the borders of what is pressed and held.
+  [[nodiscard]] double error_besides() const {
+    return model_error_ + last_->summary.algebraic_error.value_or(0) + border_error_;
+  }
 
   void doubt() {
     out_.reasons.clear();
@@ -286,6 +337,12 @@ private:
                         "edges wide at its coarsest place, {:g} are needed",
                         edges, fewest_edges_per_layer));
       }
+    }
+    if (border_error_ >= request_.within) {
+      out_.reasons.push_back(
+          fmt::format("what is pressed or held ends where triangles do, and its area still changes by "
+                      "{:.2g} %: let its border lie on edges of the mesh",
+                      100 * border_error_));
     }
     const double thinnest = least_thickness(last_->system.model());
     doubt_distance(out_.levels.back().mean_distance.value_or(0), thinnest);
@@ -394,6 +451,8 @@ private:
   double field_change_ = infinity;
   bool is_doubtful_ = false;  // the last level, for other reasons than its cost
   double other_state_ = 0;    // relative distance of another answer of the second level
+  std::vector<Region> regions_;
+  double border_error_ = 0;  // by which these changed from the level before, relative
 };
 
 }  // namespace

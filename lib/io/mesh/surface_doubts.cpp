@@ -96,10 +96,12 @@ std::vector<Warning> pressed_side_warnings(const TriangleMesh& mesh, double pres
   if (facing.hollows > 0) {
     warnings.push_back(
         {Weight::major, "nested surfaces",
-         fmt::format("{}: {} of its {} pieces lie within others and face the other way, as hollows do, the largest {}: "
-                     "positive pressure pushes them into the hollow; fill it (--fill-cavities of tunica-extract, "
-                     "FILL=1), or take each surface as a body of its own",
-                     path.string(), facing.hollows, facing.pieces, near(facing.hollow_place))});
+         fmt::format(
+             "{}: {} of its {} pieces lie within others and face the other way, as hollows do, the largest {}: "
+             "positive pressure pushes them into the hollow; fill it (--fill-cavities of tunica-extract, "
+             "FILL=1); of a wall that is open at its ends take one face (--face inner); or take each surface as "
+             "a body of its own",
+             path.string(), facing.hollows, facing.pieces, near(facing.hollow_place))});
   }
   return warnings;
 }

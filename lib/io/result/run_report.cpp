@@ -310,7 +310,8 @@ template <typename Tell>
 void for_each_notable(const Estimates& estimates, const Tell& tell) {
   for (const TellingAnswer& answer : telling_answers) {
     const auto found = estimates.find(answer.key);
-    if (found != estimates.end() && !(found->second.error < answer.notable)) {
+    // An answer of zero has no relative error.
+    if (found != estimates.end() && std::isfinite(found->second.error) && found->second.error >= answer.notable) {
       tell(answer, found->second);
     }
   }

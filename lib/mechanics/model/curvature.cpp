@@ -56,7 +56,7 @@ std::vector<Curvature> curvatures_of(const ShellMesh& mesh, bool curved) {
     // Of the two principal curvatures, by their sum and the sum of their squares; the third eigenvalue is zero.
     const double sum = shape.trace();
     const double difference = std::sqrt(std::max(0.0, 2 * shape.squaredNorm() - sum * sum));
-    curvatures.push_back({(std::abs(sum) + difference) / 2, std::abs(sum)});
+    curvatures.push_back({(std::abs(sum) + difference) / 2, sum});
   }
   return curvatures;
 }

@@ -16,7 +16,7 @@ std::vector<Mat3> shape_operators_of(const ShellMesh& mesh, bool curved);
 
 struct Curvature {
   double largest = 0;  ///< 1/mm, of the principal ones
-  double sum = 0;      ///< of both, without its sign
+  double sum = 0;      ///< of both, positive where the surface bulges along its normals
 };
 
 /// Curvatures of those shape operators (#F). Errors: as there.

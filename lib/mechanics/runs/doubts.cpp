@@ -100,19 +100,20 @@ void doubt_thickness(const ShellBody& body, std::vector<Warning>& found) {
                      at(body.said_at, body.name), most, diagonal_mm)});
     return;
   }
-  double whole = 0, thick = 0;
+  // With its sign, in the mean over the area: what the steps of an image leave bulges both ways.
+  double whole = 0, thickness_by_radius = 0;
   for (std::size_t t = 0; t < curvatures.size(); ++t) {
     const double area = area_of(body.mesh, t);
     whole += area;
-    thick += thickness_of(body, t) * curvatures[t].sum > thickest_curved ? area : 0;
+    thickness_by_radius += area * thickness_of(body, t) * curvatures[t].sum;
   }
-  if (thick > most_of_it * whole) {
+  if (std::abs(thickness_by_radius) > thickest_curved * whole) {
     found.push_back(
         {Weight::minor, "thick wall",
          fmt::format("{}: its thickness, {:.4g} mm, is more than a quarter of a vessel's radius, or an eighth of a "
-                     "ball's, over {:.0f} % of its area: pressure on the inner face moves so thick a wall at least "
+                     "ball's, in the mean over its area: pressure on the inner face moves so thick a wall at least "
                      "some 10 % less than this thin one",
-                     at(body.said_at, body.name), most, 100 * thick / whole)});
+                     at(body.said_at, body.name), most)});
   }
 }
 

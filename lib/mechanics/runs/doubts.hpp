@@ -15,7 +15,7 @@ bool prescribes(const Fix& fix);
 bool is_loaded(const Model& model);
 
 /// What of a model can be solved but hardly be meant, a sentence each that begins with where it was said: walls thicker
-/// than a quarter of a vessel's radius or an eighth of a ball's over most of a body, or than a twentieth of its
+/// than a quarter of a vessel's radius or an eighth of a ball's in the mean over a body, or than a twentieth of its
 /// diagonal; stiffness and density that no material has; pressure on a cavity inside the body; images whose voxels are
 /// large for the wall; shells that are coarse for a curved wall so thin; bodies that cannot move; forces and moments
 /// that only held nodes bear; loads that are zero or stay so during the run, or jump within a step; nothing that loads

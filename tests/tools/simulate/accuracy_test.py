@@ -50,6 +50,44 @@ class AccuracyTest(SimulateTest):
         self.assertEqual([entry["path"] for entry in report["outputs"]], ["out.hdf", "fine.ply"])
         self.assertEqual([entry["path"] for entry in report["inputs"]], ["ball.ply", "target.ply"])
 
+    def test_the_border_of_a_load_is_part_of_the_claim(self):
+        self.write("scene.toml", """
+[run]
+kind = "static"
+[accuracy]
+within = "5%"
+target = {ball = "target.ply"}
+[[shell]]
+name = "ball"
+mesh = "ball.ply"
+young = "1MPa"
+poisson = 0.45
+thickness = "0.5mm"
+[[fix]]
+body = "ball"
+where = {below = {axis = "z", at = "-5mm"}}
+translation = "xyz"
+rotation = "xyz"
+[[load]]
+body = "ball"
+kind = "pressure"
+value = "1kPa"
+where = {above = {axis = "z", at = "2mm"}}
+""")
+        exact = 0.2294  # by meshes with rings of nodes at both borders
+        self.run_tool("--scene", "scene.toml", "out.hdf", "--max-shells", "6000", expect=4)
+        self.assertIn("accuracy not reached", self.done.stderr)
+        with open(self.path("report.json"), encoding="utf-8") as file:
+            claim = json.load(file)["result"]["accuracy"]
+        self.assertLess(abs(claim["value"] / exact - 1), claim["estimate_percent"] / 100)
+
+    def test_membrane_stress_that_the_linear_model_has_not(self):
+        vertices, triangles = grid(12, 12, 20, 20)
+        write_ply(self.path("plate.ply"), vertices, triangles)
+        words = [*WALL[:-1], "1kPa", "--fix", "boundary", "--static", "--accuracy", "10%", "--of", "membrane"]
+        claim = self.run_tool("plate.ply", "out.hdf", *words)["result"]["accuracy"]
+        self.assertEqual([choice["chosen"] for choice in claim["choices"] if choice["part"] == "model"], ["nonlinear"])
+
     def test_a_loose_solver_is_part_of_the_claim(self):
         claim = self.run_tool("ball.ply", "out.hdf", *HELD, "--accuracy", "2%", "--target", "target.ply", "--solver", "cg",
                               "--cg-tolerance", "5%", "--converge", "0.5")["result"]["accuracy"]
