@@ -169,13 +169,23 @@ private:
     return answer_of(std::move(model), run, request_, is_static ? near_ : std::nullopt);
   }
 
+  /// One of which a part can be asked for. Errors: InputError: it is zero.
+  [[nodiscard]] Answer answered(const RunSettings& settings) const {
+    Answer answer = solved(settings);
+    if (!(std::abs(answer.value) > 0)) {
+      throw InputError(fmt::format("{}: the quantity asked for is zero: no part of it can be kept within",
+                                   model_.shells.front().name));
+    }
+    return answer;
+  }
+
   /// The coarsest mesh may be too coarse for any state; of a finer one the model is to blame.
   std::optional<Answer> tried() {
     try {
       if (std::holds_alternative<DynamicRun>(settings_.kind) && !motion_) {
         choose_run();
       }
-      return solved(settings_);
+      return answered(settings_);
     } catch (const InputError& error) {  // shells that make no elements
       if (!ends_with_what_there_is(level_.shell_count(), error.what())) {
         throw;
@@ -213,7 +223,7 @@ private:
     try {
       MotionChoice choice =
           choose_motion(settings_, model_share * request_.within, at_its_end(model_, motion_->duration).has_value(),
-                        [&](const RunSettings& settings) { return solved(settings); });
+                        [&](const RunSettings& settings) { return answered(settings); });
       settings_ = choice.settings;
       model_error_ = choice.error;
       choices_ = std::move(choice.choices);
@@ -288,7 +298,6 @@ private:
         return;
       }
     } catch (const RequirementError&) {  // no linear answer
-    } catch (const InputError&) {        // or zero, as the membrane stress of a flat plate
     }
     choices_.push_back({"model", "nonlinear", 0, "linear",
                         std::isfinite(error) ? fmt::format("an error of {:.2g} %", 100 * error) : "no answer"});

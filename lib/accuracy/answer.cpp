@@ -112,10 +112,6 @@ Answer answer_of(Model model, const RunSettings& settings, const AccuracyRequest
     answer.states.push_back(std::move(last));
   }
   answer.seconds = seconds_since(start);
-  if (!(std::abs(answer.value) > 0)) {
-    throw InputError(fmt::format("{}: the quantity asked for is zero: no part of it can be kept within",
-                                 answer.system.model().shells.front().name));
-  }
   return answer;
 }
 

@@ -7,7 +7,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <map>
 
 namespace tunica {
 namespace {
@@ -19,21 +21,34 @@ constexpr double largest_credible = 0.25;      // a larger change is none of an 
 
 double relative(double change, double of) { return change == 0 ? 0 : std::abs(change / of); }
 
+/// An answer that is a 99th percentile, and the quantiles beside it.
+struct Percentile {
+  const char* key;
+  double WallNumbers::*p99;
+  std::array<double, 2> WallNumbers::Beside::*beside;
+  double unit;  ///< of the key, per that of the wall's numbers
+};
+constexpr std::array percentiles{
+    Percentile{"membrane_p99_mpa", &WallNumbers::membrane_p99, &WallNumbers::Beside::membrane, 1},
+    Percentile{"tension_p99_n_per_mm", &WallNumbers::tension_p99, &WallNumbers::Beside::tension, 1},
+    Percentile{"stress_p99_mpa", &WallNumbers::stress_p99, &WallNumbers::Beside::stress, 1},
+    Percentile{"strain_p99_percent", &WallNumbers::strain_p99, &WallNumbers::Beside::strain, 100},
+};
+
 }  // namespace
 
 Answers answers_of(const State& state, const ElementFields& fields) {
   constexpr double percent = 100;
   const Wall& wall = fields.wall;
-  Answers answers{{"membrane_p99_mpa", wall.membrane_p99},
-                  {"membrane_max_mpa", wall.membrane_max},
+  Answers answers{{"membrane_max_mpa", wall.membrane_max},
                   {"membrane_mean_mpa", wall.membrane_mean},
-                  {"tension_p99_n_per_mm", wall.tension_p99},
-                  {"stress_p99_mpa", wall.stress_p99},
                   {"stress_max_mpa", wall.stress_max},
-                  {"strain_p99_percent", percent * wall.strain_p99},
                   {"strain_max_percent", percent * wall.strain_max},
                   {"max_displacement_mm", fields.largest_displacement},
                   {"strain_energy_mj", state.strain_energy}};
+  for (const Percentile& one : percentiles) {
+    answers.emplace_back(one.key, one.unit * wall.*one.p99);
+  }
   if (state.volume) {
     answers.emplace_back("volume_after_mm3", *state.volume);
   }
@@ -71,20 +86,6 @@ Estimates estimates_of(const std::vector<Answers>& levels, double besides, bool 
   return estimates;
 }
 
-namespace {
-
-/// The quantiles beside an answer that is a 99th percentile; none of any other.
-std::array<double, 2> beside(const std::string& answer, const Wall& wall, double otherwise) {
-  const WallNumbers::Beside& quantiles = wall.beside;
-  return answer == "membrane_p99_mpa"       ? quantiles.membrane
-         : answer == "stress_p99_mpa"       ? quantiles.stress
-         : answer == "tension_p99_n_per_mm" ? quantiles.tension
-         : answer == "strain_p99_percent"   ? quantiles.strain
-                                            : std::array{otherwise, otherwise};
-}
-
-}  // namespace
-
 RefinedAnswers estimate_by_refinement(const Model& model, const State& state, const ElementFields& fields,
                                       const std::vector<const Target*>& targets, const RunSettings& settings,
                                       const ModelOf& model_of) {
@@ -105,17 +106,21 @@ RefinedAnswers estimate_by_refinement(const Model& model, const State& state, co
     const ElementFields finer_fields = ElementFieldEvaluator(system)(last);
     const Answers finer = answers_of(last, finer_fields);
     const Answers coarse = answers_of(state, fields);
-    RefinedAnswers refined;
+    std::map<std::string, double> changes;
     for (std::size_t i = 0; i < coarse.size(); ++i) {
-      const auto& [name, before] = coarse[i];
-      const double after = finer[i].second;
-      double change = relative(after - before, after);
-      const std::array<double, 2> near_before = beside(name, fields.wall, before);
-      const std::array<double, 2> near_after = beside(name, finer_fields.wall, after);
-      for (std::size_t k = 0; k < near_after.size(); ++k) {
-        change = std::max(change, relative(near_after[k] - near_before[k], near_after[k]));
+      changes[coarse[i].first] = relative(finer[i].second - coarse[i].second, finer[i].second);
+    }
+    for (const Percentile& one : percentiles) {
+      const std::array<double, 2>&before = fields.wall.beside.*one.beside,
+                               &after = finer_fields.wall.beside.*one.beside;
+      for (std::size_t k = 0; k < after.size(); ++k) {
+        changes[one.key] = std::max(changes[one.key], relative(after[k] - before[k], after[k]));
       }
-      refined.estimates[name] = {error_of_coarse * change, error_of_coarse * change < largest_credible,
+    }
+    RefinedAnswers refined;
+    for (const auto& [name, change] : changes) {
+      const double error = error_of_coarse * change;
+      refined.estimates[name] = {error, error < largest_credible,
                                  fmt::format("one refinement to {} shells", level.shell_count())};
     }
     return refined;

@@ -9,6 +9,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <Eigen/Geometry>
+
 #include <algorithm>
 #include <iterator>
 #include <map>
@@ -243,22 +245,20 @@ namespace {
 void warn_of_far_point(const Vec3& point, std::size_t body, const Place& place, const Model& model,
                        std::vector<Warning>& warnings) {
   constexpr double far_from_all = 0.1;  // of the diagonal of the body's box
-  const std::vector<Vec3>& vertices = model.vertices_of(body);
-  Vec3 low = Vec3::Constant(infinity);
-  Vec3 high = -low;
-  double squared = infinity;
-  for (const Vec3& p : vertices) {
-    low = low.cwiseMin(p);
-    high = high.cwiseMax(p);
-    squared = std::min(squared, (p - point).squaredNorm());
+  Eigen::AlignedBox3d box;
+  double distance = infinity;
+  for (const Vec3& p : model.vertices_of(body)) {
+    box.extend(p);
+    distance = std::min(distance, (p - point).norm());
   }
-  if (std::sqrt(squared) > far_from_all * (high - low).norm()) {
+  if (distance > far_from_all * box.diagonal().norm()) {
+    const Vec3 low = box.min(), high = box.max();
     warnings.push_back(
         {Weight::minor, "far point",
          fmt::format("{}: the nearest node lies {:.4g} mm from this point, and the body reaches from "
                      "({:.4g}, {:.4g}, {:.4g}) to ({:.4g}, {:.4g}, {:.4g}) mm: check the point's unit and "
                      "axes",
-                     place.text, std::sqrt(squared), low.x(), low.y(), low.z(), high.x(), high.y(), high.z())});
+                     place.text, distance, low.x(), low.y(), low.z(), high.x(), high.y(), high.z())});
   }
 }
 

@@ -14,7 +14,7 @@ namespace tunica {
 /// Open ends of a shell under pressure that nothing holds and no force pulls: what continues the vessel there would
 /// pull with the pressure times the lumen. And rims that slide in planes that the wall meets at a slant, where it would
 /// pull in the plane as well (slant_of_rim()). And edges that run beside each other within half of the wall, where
-/// parts should join; and bodies in each other. Cost: n log n, of several bodies that of crossing_patches().
+/// parts should join; and bodies that pass through each other or themselves. Cost: that of crossing_patches().
 std::vector<Warning> doubts_of_ends(const Model& model);
 
 /// Swings of a state: the rigid motion nearest to what a connected piece under pressure does makes more than half of

@@ -67,12 +67,12 @@ BlockMatrix tangent_change(ShellSystem& system, const VectorX& solution) {
   BlockMatrix change = system.pattern;
   BlockMatrix before = system.pattern;
   evaluate(system, {reference, std::vector<double>(model.loads.size(), 0.0)}, forces, &before);
-  const auto elements = system.elements;
-  const auto solids = system.solids;
+  auto elements = system.elements;
+  auto solids = system.solids;
   add_stress(system, solution);
   evaluate(system, {reference, load_factors(model, true, 1)}, forces, &change);
-  system.elements = elements;
-  system.solids = solids;
+  system.elements = std::move(elements);
+  system.solids = std::move(solids);
   for (std::size_t k = 0; k < change.values.size(); ++k) {
     change.values[k] -= before.values[k];
   }

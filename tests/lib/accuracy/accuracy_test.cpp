@@ -3,6 +3,7 @@
 
 #include "mechanics/benchmarks.hpp"
 #include "tunica/accuracy/detail/levels.hpp"
+#include "tunica/accuracy/estimates.hpp"
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/mechanics/elements/rotation.hpp"
@@ -206,6 +207,32 @@ TEST(Accuracy, WhatHasNoAnswerIsRefused) {
   Sphere sphere;
   std::get<PressureLoad>(sphere.model.loads.front().kind).value = 0;
   EXPECT_THROW(sphere.solved({0.02}), InputError);
+}
+
+// A 99th percentile that a finer mesh gives again is believed no more than what its neighbours do.
+TEST(Estimates, APercentileThatAgreesByChanceIsNotBelieved) {
+  Sphere sphere;
+  const System system(sphere.model, sphere.settings);
+  State last;
+  (void)solve(system, [&](const State& state) { last = state; });
+  ElementFields fields = ElementFieldEvaluator(system)(last);
+  const auto estimate = [&] {
+    return estimate_by_refinement(sphere.model, last, fields, {&sphere.target}, sphere.settings,
+                                  [&](std::vector<ShellBody> bodies) {
+                                    Model finer = sphere.model;
+                                    finer.shells = std::move(bodies);
+                                    return finer;
+                                  })
+        .estimates;
+  };
+  Estimates found = estimate();
+  const double membrane = found["membrane_p99_mpa"].error, mean = found["membrane_mean_mpa"].error;
+  EXPECT_LT(membrane, 0.2);
+  fields.wall.beside.membrane[1] *= 1.5;
+  found = estimate();
+  EXPECT_GT(found["membrane_p99_mpa"].error, membrane + 0.3);
+  EXPECT_FALSE(found["membrane_p99_mpa"].credible);
+  EXPECT_EQ(found["membrane_mean_mpa"].error, mean);
 }
 
 TEST(Levels, ARigidMotionStaysOne) {
