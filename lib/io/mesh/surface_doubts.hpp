@@ -12,8 +12,8 @@
 /// What a user has to know of a surface that was read, in the same words wherever it enters.
 namespace tunica {
 
-/// Of boundary edges that coincide: seams and T-junctions, with their number, the place, and what to do, which is tried.
-/// Cost: where there are any, that of repaired().
+/// Of boundary edges that coincide: seams and T-junctions, with their number, the place, and what to do, which is
+/// tried. Cost: where there are any, that of repaired().
 /// @param facts  of the mesh: a closed one costs nothing
 /// @param weight  how far the answer may be off
 std::vector<Warning> seam_warnings(const TriangleMesh& mesh, const MeshFacts& facts, const std::filesystem::path& path,
