@@ -32,7 +32,7 @@ OF_A_RUN = ("VOLUMES", "LABELS", "CASES", "OUT", "THREADS", "RUN", "BIN")
 NAME_HEADS = {"name", "labelname", "label_name", "structure", "structure_name", "region", "organ"}
 VALUE_HEADS = {"index", "labelvalue", "label_value", "voxel_value", "value", "id", "labelid", "label_id"}
 # What a case says of the one side takes the place of what make says of the other.
-INSTEAD = ((("LABEL",), ("ISOVALUE",)), (("ACCURACY",), ("SHELLS", "TOLERANCE")))
+INSTEAD = ((("LABEL", "LABELS"), ("ISOVALUE",)), (("ACCURACY",), ("SHELLS", "TOLERANCE")))
 
 
 class Refused(Exception):
@@ -165,7 +165,7 @@ def find_labels():
     if setting("ISOVALUE"):
         return ["iso" + setting("ISOVALUE")]
     try:
-        labels = shlex.split(setting("LABELS"))
+        labels = shlex.split(setting("LABELS") or setting("LABEL"))
     except ValueError:
         raise Refused("LABELS: a quotation mark is not closed") from None
     for label in labels:
@@ -258,16 +258,20 @@ def own_settings(row, folder):
     own = {name: cell for name, cell in row.cells.items() if name in OF_A_CASE and name != "LABEL"}
     problems = [f"{name.lower()}: '{shown(cell)}' has a control character" for name, cell in row.cells.items()
                 if CONTROL.search(cell)]
+    problems += excluding(row.cells.get, str.lower)
     for sides in INSTEAD:
-        given = [[name for name in side if name in row.cells] for side in sides]
-        if all(given):
-            problems.append(f"{given[0][0].lower()} and {given[1][0].lower()} exclude each other")
         for side, other in (sides, sides[::-1]):
             if any(name in row.cells for name in side):
                 own.update({name: "" for name in other if name != "LABEL"})
     if "NAMES" in own:
         own["NAMES"] = os.path.join(folder, os.path.expanduser(own["NAMES"]))
     return own, problems + misspelt(lambda name: own.get(name, ""), str.lower)
+
+
+def excluding(value_of, called):
+    """What cannot be given together, by words."""
+    given = [[next((name for name in side if value_of(name)), None) for side in sides] for sides in INSTEAD]
+    return [f"{called(one)} and {called(other)} exclude each other: leave one out" for one, other in given if one and other]
 
 
 def misspelt(value_of, called):
@@ -296,6 +300,8 @@ def misstated():
     wrong += misspelt(setting, str)
     if not re.fullmatch(r"([1-9][0-9]{0,4})?", setting("THREADS"), re.ASCII):
         wrong.append(f"THREADS: '{shown(setting('THREADS'))}' is no number of threads")
+    if setting("LABEL") and setting("LABELS"):
+        wrong.append("LABEL and LABELS are the same: give one")
     if setting("MID_SURFACE") not in ("", "outer", "inner"):
         wrong.append(f"MID_SURFACE: '{shown(setting('MID_SURFACE'))}' is not understood: outer or inner")
     return wrong
@@ -331,22 +337,24 @@ def without_effect(stated, setting_of):
     return [f"{name} is of {of}: leave it out" for of, names in idle.items() for name in names if stated(name)]
 
 
-def missing_of(case):
-    """What a case still needs, by words."""
+def not_understood(setting_of, called):
+    """What no run could be made of, of make or of a case, by words."""
+    if (kind := setting_of("KIND")) not in ("static", "dynamic"):
+        return [f"{called('KIND')}: '{shown(kind)}' is not understood: static or dynamic"]
+    if setting_of("ACCURACY") and setting_of("MID_SURFACE"):
+        return [f"{called('ACCURACY')} refits the shells to the face that {called('MID_SURFACE')} leaves: give "
+                f"{called('SHELLS')} or {called('TOLERANCE')} instead"]
+    return []
+
+
+def missing_in(setting_of):
+    """The variables that a run still needs."""
     needed = ["IMAGED_AT", "POISSON", "THICKNESS"]
-    kind = case.setting("KIND")
-    if kind not in ("static", "dynamic"):
-        return [f"kind: '{shown(kind)}' is not understood: static or dynamic"]
-    if case.setting("ACCURACY") and case.setting("MID_SURFACE"):
-        return ["accuracy refits the shells to the face that mid_surface leaves: give shells or tolerance instead"]
-    if kind == "dynamic":
-        needed += ["YOUNG", *MOTION, *(["PRESSURE"] if is_zero(case.setting("IMAGED_AT")) else [])]
-    elif not rests_as_imaged(case.setting):
+    if setting_of("KIND") == "dynamic":
+        needed += ["YOUNG", *MOTION, *(["PRESSURE"] if is_zero(setting_of("IMAGED_AT")) else [])]
+    elif not rests_as_imaged(setting_of):
         needed += ["PRESSURE", "YOUNG"]
-    missing = [name for name in dict.fromkeys(needed) if not case.setting(name)]
-    if not missing:
-        return []
-    return [f"{', '.join(missing).lower()} not given: fill the cell, or give {missing[0]} to make for all such cases"]
+    return [name for name in dict.fromkeys(needed) if not setting_of(name)]
 
 
 def cases_of_table(path, out):
@@ -379,8 +387,10 @@ def cases_of_table(path, out):
             if other is not row and not wrong:
                 wrong.append(f"{case.name} is there already, at {other.place}: give one another name")
             cases.append(case)
-        whole = Case(out, volume, name, "", own)
-        wrong += missing_of(whole) + without_effect(lambda name: row.cells.get(name, ""), whole.setting)
+        whole = Case(out, volume, name, "", own).setting
+        wrong += not_understood(whole, str.lower) + without_effect(lambda name: row.cells.get(name, ""), whole)
+        if missing := whole("KIND") in ("static", "dynamic") and missing_in(whole):
+            wrong.append(f"{', '.join(missing).lower()} not given: fill the cell, or give {missing[0]} to make for all such cases")
         problems += [f"{row.place}: {shown(name)}: {words}" if name else f"{row.place}: {words}" for words in wrong]
     if problems:
         more = [f"{path}: and {len(problems) - 20} problems more"] if len(problems) > 20 else []
@@ -393,14 +403,19 @@ def find_cases(out):
     if wrong := misstated():
         raise Refused(*wrong)
     if setting("CASES"):
+        if setting("VOLUMES"):
+            raise Refused("CASES names the volumes itself: leave out VOLUMES")
         return cases_of_table(os.path.expanduser(os.environ["CASES"].strip()), out)
-    labels = find_labels()
-    volumes = {os.path.abspath(path): path for path in reversed(find_volumes(os.environ.get("VOLUMES", "")))}
-    if not volumes:
-        raise Refused("VOLUMES is empty: name segmented volumes, or leave it out to see a shipped sample")
-    if wrong := without_effect(setting, setting):
+    if wrong := excluding(setting, str) + not_understood(setting, str) + without_effect(setting, setting):
         raise Refused(*wrong)
+    labels = find_labels()
+    unnamed = [name for name, given in (("VOLUMES", setting("VOLUMES")), ("LABELS", labels)) if not given]
+    if missing := unnamed + missing_in(setting):
+        idle = "IMAGED_AT is zero, so that nothing loads the wall: " if "PRESSURE" in missing and is_zero(setting("IMAGED_AT")) else ""
+        raise Refused(f"{idle}{' '.join(missing)} not given: a volume comes with its labels (LABELS=1 or ISOVALUE=0) and physical "
+                      "properties, each with its unit, such as IMAGED_AT=80mmHg POISSON=0.45 THICKNESS=1.5mm, with another "
+                      "PRESSURE than in the image also YOUNG=3MPa, and for KIND=dynamic YOUNG=3MPa DENSITY=1100kg/m3 "
+                      "DURATION=1s STEP=10ms")
+    volumes = {os.path.abspath(path): path for path in reversed(find_volumes(os.environ["VOLUMES"]))}
     volumes = list(reversed(volumes.values()))
-    if is_zero(setting("IMAGED_AT")) and not setting("PRESSURE"):
-        raise Refused("IMAGED_AT is zero and PRESSURE is not given, so that nothing loads the wall: give PRESSURE and YOUNG")
     return [Case(out, volume, name, label) for volume, name in zip(volumes, name_volumes(volumes)) for label in labels]

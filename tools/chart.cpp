@@ -1,7 +1,7 @@
 #include "tunica/cli/tool.hpp"
 #include "tunica/io/file/output_file.hpp"
 #include "tunica/io/file/signed_file.hpp"
-#include "tunica/io/result/report_chart.hpp"
+#include "tunica/report/report_chart.hpp"
 
 #include <charconv>
 #include <cmath>

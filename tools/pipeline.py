@@ -7,10 +7,12 @@ called by a harmless name, with
   mem              its MEM, or what stands for it in RUN
   STAGE.command    the command of the stage, its words quoted for the shell
   STAGE.flags      what its result depends on besides the files that its report names
+  STAGE.leaves     the files it has to leave
+  STAGE.stale      what is removed before: all that this stage and the later ones may have left
   STAGE.exit       the exit code of the stage in this run; empty while it runs
-  STAGE.done       there when the stage is up to date
-and cases.mk, run in OUT/.run, knows the rest. What is up to date is decided by content: times lie, those of packages, copies
-and other machines. Settings are environment variables, set by Makefile.pipeline.
+  surface.ply ...  each there once the case's own is up to date
+and the chain of Makefile.pipeline, run in OUT/.run, knows the rest. What is up to date is decided by content: times lie, those
+of packages, copies and other machines. Settings are environment variables, set by tools/settings.mk.
 
 OUT/.lock is held, by a descriptor that every process of the run inherits, from the planning until the last of them has
 ended: runs on one OUT come one after the other, also after a kill that left some of their processes.
@@ -35,9 +37,11 @@ import tempfile
 
 from cases import CONTROL, SWITCHES, Refused, find_cases, say, shells_stated_by, stem_of
 
-STAGES = ("extract", "decimate", "relax", "simulate")
+# What each stage leaves beside its report, the file of the chain first.
 PRODUCTS = {"extract": ["surface.ply"], "decimate": ["coarse.ply"], "relax": ["shell.ply", "map.png"],
             "simulate": ["result.hdf", "picture.png"]}
+STAGES = tuple(PRODUCTS)
+MAKEFILE = os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "Makefile.pipeline")
 TABLES = (".tsv", ".csv", ".txt", ".json", ".xml", ".ctbl", ".label", ".lut")  # of label names, beside a volume
 REFINED = "refined.ply"  # of an accuracy: the shells that carried the load
 
@@ -245,8 +249,8 @@ def is_up_to_date(case, stage, remembered):
         return False
 
 
-def plan_case(case, binaries, dry):
-    """Writes the case's folder for cases.mk. Errors: OSError when a folder cannot be made."""
+def plan_case(case, run, binaries, dry):
+    """Writes the case's folder for the chain. Errors: OSError when a folder cannot be made."""
     if not dry:
         os.makedirs(case.folder, exist_ok=True)
     os.makedirs(os.path.dirname(case.plan), exist_ok=True)
@@ -256,7 +260,8 @@ def plan_case(case, binaries, dry):
     flags = stage_flags(case)
     commands = stage_commands(case, binaries, flags)
     done = True
-    for stage in STAGES:
+    out = os.path.join(os.path.relpath(case.plan, run), "out")
+    for number, stage in enumerate(STAGES):
         tool = os.path.join(binaries, f"tunica-{stage}")
         # The volume itself, which may be a folder of slices, stands here: a report names the files.
         read = f"{os.path.abspath(case.volume)} {around(case.volume)} " if stage == "extract" else ""
@@ -264,9 +269,13 @@ def plan_case(case, binaries, dry):
         path = os.path.join(case.plan, stage)
         write_text(path + ".flags", remembered)
         write_text(path + ".command", commands[stage])
+        write_text(path + ".leaves", " ".join(os.path.join(out, name) for name in PRODUCTS[stage]))
+        stale = [os.path.join(out, name) for later in STAGES[number:]
+                 for name in (*PRODUCTS[later], f"{later}.json", f"{later}.log", f".{later}.flags")]
+        write_text(path + ".stale", " ".join([*stale, os.path.join(out, REFINED)]))
         done = done and is_up_to_date(case, stage, remembered)
         if done:
-            write_text(path + ".done", "")
+            write_text(os.path.join(case.plan, PRODUCTS[stage][0]), "")
 
 
 def plan_cases(cases, run, binaries, dry):
@@ -287,7 +296,7 @@ def plan_cases(cases, run, binaries, dry):
         used.add(name)
         case.plan = os.path.join(run, name)
         try:
-            plan_case(case, binaries, dry)
+            plan_case(case, run, binaries, dry)
         except OSError as error:
             shutil.rmtree(case.plan, ignore_errors=True)
             case.refused = f"{case.folder}: cannot be written: {error.strerror}"
@@ -321,11 +330,10 @@ def run_make(make, run):
     This make has its job slots for itself: one that outlives a killed process, and the make that called it, could wait
     for each other's without end (GNU make 4.3, of which the latter takes back all slots as it ends).
     @return make's exit code, and the signal that stopped this process, if any"""
-    rules = os.path.join(os.path.dirname(os.path.abspath(__file__)), "cases.mk")
     flags, separator, variables = os.environ.get("MAKEFLAGS", "").partition(" -- ")
     flags = re.sub(r"--jobserver-[a-z]+=\S+", "", flags)
     environment = dict(os.environ, TUNICA_FROM=os.getcwd(), MAKEFLAGS=flags + separator + variables)
-    child = subprocess.Popen([*shlex.split(make), "--no-print-directory", "-f", rules], cwd=run, env=environment,
+    child = subprocess.Popen([*shlex.split(make), "--no-print-directory", "-f", MAKEFILE, "chain"], cwd=run, env=environment,
                              close_fds=False, stdin=subprocess.DEVNULL, preexec_fn=os.setpgrp)
     stopped = []
 
@@ -355,7 +363,7 @@ def how_it_ended(case):
     stage itself, which its report tells."""
     if case.refused:
         return "none", "2", case.refused
-    if os.path.exists(os.path.join(case.plan, STAGES[-1] + ".done")):
+    if os.path.exists(os.path.join(case.plan, PRODUCTS[STAGES[-1]][0])):
         return STAGES[-1], "0", "done"
     last = ("none", "", "not run")
     for stage in STAGES:

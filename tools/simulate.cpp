@@ -263,7 +263,7 @@ RunIdentity identity_of_run(const cli::Tool& tool, const Scene& scene, const std
 std::vector<std::pair<std::string, std::string>> shown_inputs(const cli::Tool& tool, const RunIdentity& origin) {
   std::vector<std::pair<std::string, std::string>> inputs = origin.inputs;
   for (auto& [path, hash] : inputs) {
-    path = tool.provenance().told(path);
+    path = tool.provenance().redact(path);
   }
   return inputs;
 }
@@ -483,6 +483,21 @@ void tell_modes(cli::Tool& tool, const Summary& summary, const RunSettings& run,
   }
 }
 
+/// The answer in a line.
+std::string answer_text(const LastState& last, bool with_wall) {
+  std::string text = fmt::format("largest displacement {:.4g} mm", last.largest_displacement);
+  if (last.peak) {
+    text += fmt::format(" at the end of the motion ({:.4g} mm at most in the states written, at {:.4g} s)",
+                        last.peak->displacement, last.peak->time);
+  }
+  if (with_wall) {
+    text += fmt::format(
+        " (99 % of the wall below {:.4g} mm), membrane stress of the wall {} (99th percentile), at its faces {}",
+        last.displacement_p99, pressure_text(last.wall.membrane_p99), pressure_text(last.wall.stress_p99));
+  }
+  return text;
+}
+
 class Simulation {
 public:
   Simulation(cli::Tool& tool, const Arguments& given) : tool_(tool), given_(given) {}
@@ -567,7 +582,7 @@ private:
         .surfaces = drawing_.surface_endings(),
         .run = scene_.run,
         .made_by = fmt::format("tunica {}: {}", version,
-                               journal_ ? told(journal_->identity().command) : tool_.provenance().lasting_command()),
+                               journal_ ? redact(journal_->identity().command) : tool_.provenance().lasting_command()),
         .series = is_series(),
         .tessellation = drawing_.level(),
         .overwrite = tool_.force() || !given_.resume.empty(),
@@ -772,8 +787,8 @@ private:
     stage("write");
     const char* const time_units = kind<DynamicRun>() != nullptr ? "s" : kind<FrequencyRun>() != nullptr ? "Hz" : "1";
     file_.emplace(out_, model(),
-                  ResultOptions{is_series(), time_units, told(origin.command), told(origin.scene),
-                                accuracy_ ? told(without_times(tool_.result()["accuracy"]).dump(1)) : "",
+                  ResultOptions{is_series(), time_units, redact(origin.command), redact(origin.scene),
+                                accuracy_ ? redact(without_times(tool_.result()["accuracy"]).dump(1)) : "",
                                 shown_inputs(tool_, origin), drawing_.level(), tool_.force()});
     if (drawing_.any()) {
       exported_.emplace(out_, model(), exports());
@@ -782,7 +797,7 @@ private:
     crossings_.emplace(model());
   }
 
-  [[nodiscard]] std::string told(const std::string& text) const { return tool_.provenance().told(text); }
+  [[nodiscard]] std::string redact(const std::string& text) const { return tool_.provenance().redact(text); }
 
   void record(const State& state) {
     constexpr double most_bending = std::numbers::pi / 6;
@@ -799,7 +814,14 @@ private:
     if (!is_modes()) {
       crossings_->see(state);
     }
-    last_ = {of_state.wall, count_unresolved(model(), state, most_bending), of_state.turn_p99};
+    last_ = {of_state.wall, of_state.largest_displacement, of_state.displacement_p99,
+             count_unresolved(model(), state, most_bending), last_.peak};
+    if (kind<DynamicRun>() != nullptr) {
+      if (!last_.peak || last_.peak->displacement < last_.largest_displacement) {
+        last_.peak = {last_.largest_displacement, state.time};
+      }
+      tool_.result()["peak"] = peak_report(*last_.peak);
+    }
   }
 
   Summary solved() {
@@ -835,20 +857,14 @@ private:
   }
 
   void tell(const Summary& summary, bool converged) {
-    const Json& result = tool_.result();
-    std::string found = fmt::format("largest displacement {:.4g} mm", result["max_displacement_mm"].get<double>());
-    if (!model().shells.empty()) {
-      found += fmt::format(
-          " (99 % of the wall below {:.4g} mm), membrane stress of the wall {} (99th percentile), at its faces {}",
-          result["displacement_p99_mm"].get<double>(), pressure_text(last_.wall.membrane_p99),
-          pressure_text(last_.wall.stress_p99));
-    }
     tool_.note(fmt::format("{} nodes in {} steps, {}: {}", model().node_count(), summary.steps,
-                           converged ? "converged" : "not asked to converge", found));
+                           converged ? "converged" : "not asked to converge",
+                           answer_text(last_, !model().shells.empty())));
+    Summary without = summary;
     if (accuracy_) {
-      last_.turn_p99 = 0;  // a linear model was held against a nonlinear one
+      without.linear_departure.reset();  // a linear model was held against a nonlinear one
     }
-    warn_of(tool_, subject(), run_warnings(scene_.run, summary, last_));
+    warn_of(tool_, subject(), run_warnings(scene_.run, without, last_));
     warn_of(tool_, subject(), contact_warnings(model(), summary, tool_.result()));
     if (crossings_->found()) {
       tool_.warn(*crossings_->found());

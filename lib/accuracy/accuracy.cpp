@@ -106,10 +106,10 @@ public:
     const auto begin = Clock::now();
     auto start = begin;
     for (;;) {
-      std::optional<Answer> answer = tried();
+      std::optional<Answer> answer = try_level();
       if (answer) {
         take(*std::move(answer), seconds_since(start));
-        if (judged() || model_error_ >= request_.within) {
+        if (judge() || model_error_ >= request_.within) {
           break;
         }
       } else if (last_) {
@@ -170,7 +170,7 @@ private:
   }
 
   /// One of which a part can be asked for. Errors: InputError: it is zero.
-  [[nodiscard]] Answer answered(const RunSettings& settings) const {
+  [[nodiscard]] Answer solve_for_answer(const RunSettings& settings) const {
     Answer answer = solved(settings);
     if (!(std::abs(answer.value) > 0)) {
       throw InputError(fmt::format("{}: the quantity asked for is zero: no part of it can be kept within",
@@ -180,12 +180,12 @@ private:
   }
 
   /// The coarsest mesh may be too coarse for any state; of a finer one the model is to blame.
-  std::optional<Answer> tried() {
+  std::optional<Answer> try_level() {
     try {
       if (std::holds_alternative<DynamicRun>(settings_.kind) && !motion_) {
         choose_run();
       }
-      return answered(settings_);
+      return solve_for_answer(settings_);
     } catch (const InputError& error) {  // shells that make no elements
       if (!ends_with_what_there_is(level_.shell_count(), error.what())) {
         throw;
@@ -223,7 +223,7 @@ private:
     try {
       MotionChoice choice =
           choose_motion(settings_, model_share * request_.within, at_its_end(model_, motion_->duration).has_value(),
-                        [&](const RunSettings& settings) { return answered(settings); });
+                        [&](const RunSettings& settings) { return solve_for_answer(settings); });
       settings_ = choice.settings;
       model_error_ = choice.error;
       choices_ = std::move(choice.choices);
@@ -304,7 +304,7 @@ private:
   }
 
   /// Whether the last level is accepted.
-  bool judged() {
+  bool judge() {
     const std::size_t n = out_.levels.size();
     if (model_error_ >= request_.within) {
       out_.reasons = {fmt::format("the shortest time step tried, {:.4g} ms, still changes the answer by {:.2g} %",

@@ -11,7 +11,8 @@
 #include <string_view>
 #include <vector>
 
-/// lib/accuracy: the cheapest model whose error in one quantity is credibly below what is asked.
+/// lib/accuracy: the cheapest model whose error in one quantity is, by an estimate that holds (see Accuracy::reasons),
+/// below what is asked.
 namespace tunica {
 
 /// Of the state of rest; of a motion the largest that it comes to.
@@ -64,7 +65,7 @@ struct AccuracyLevel {
   double seconds = 0;                   ///< of splits, fit and solve
   std::optional<double> mean_distance;  ///< mm, to the targets, the largest of all bodies
   std::size_t newton_iterations = 0;
-  std::string failure{};  ///< of the coarsest, which on_level is told of: why it has no value
+  std::string failure{};  ///< of the coarsest, which on_level gets: why it has no value
   Answers answers{};      ///< all that the level says
 };
 

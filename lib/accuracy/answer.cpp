@@ -136,7 +136,7 @@ std::optional<Model> at_its_end(const Model& model, double duration) {
 }
 
 MotionChoice choose_motion(const RunSettings& settings, double share, bool may_rest,
-                           const std::function<Answer(const RunSettings&)>& answered) {
+                           const std::function<Answer(const RunSettings&)>& solve_for_answer) {
   const auto& given = std::get<DynamicRun>(settings.kind);
   const double left_by_order = given.integrator == Integrator::backward_euler ? 0.5 : 0.25;
   std::vector<RunSettings> tried;
@@ -148,7 +148,7 @@ MotionChoice choose_motion(const RunSettings& settings, double share, bool may_r
   for (;;) {
     RunSettings finer = settings;
     std::get<DynamicRun>(finer.kind).step = std::ldexp(given.step, -narrow<int>(tried.size()));
-    const Answer answer = answered(finer);
+    const Answer answer = solve_for_answer(finer);
     tried.push_back(finer);
     values.push_back(answer.value);
     seconds.push_back(answer.seconds);
@@ -178,7 +178,7 @@ MotionChoice choose_motion(const RunSettings& settings, double share, bool may_r
   RunSettings rest = settings;
   rest.kind = StaticRun{false, {1}};
   try {
-    const Answer answer = answered(rest);
+    const Answer answer = solve_for_answer(rest);
     const double error = off(answer.value) + left;
     if (error < share) {
       const std::string cost = fmt::format("{:.2g} times the time", seconds[chosen] / answer.seconds);

@@ -142,7 +142,7 @@ std::string Provenance::label_of(const std::string& word) const {
 std::string Provenance::command() const {
   std::string text;
   for (const std::string& word : words_) {
-    text += (text.empty() ? "" : " ") + shell_quoted(told(word));  // quoting may change a name
+    text += (text.empty() ? "" : " ") + shell_quoted(redact(word));  // quoting may change a name
   }
   return text;
 }
@@ -162,7 +162,7 @@ std::string Provenance::lasting_command() const {
       continue;
     }
     const std::string label = i > 0 ? label_of(value) : "";
-    text += (text.empty() ? "" : " ") + shell_quoted(label.empty() ? told(words_[i]) : flag + label);
+    text += (text.empty() ? "" : " ") + shell_quoted(label.empty() ? redact(words_[i]) : flag + label);
   }
   return text;
 }
@@ -175,10 +175,10 @@ std::string Provenance::name_of(const fs::path& path) const {
       return known.label;
     }
   }
-  return told(path.filename().string());
+  return redact(path.filename().string());
 }
 
-std::string Provenance::told(std::string text) const {
+std::string Provenance::redact(std::string text) const {
   for (const auto& [what, by] : hidden_) {
     replace_words(text, what, by);
   }

@@ -9,7 +9,7 @@
 namespace tunica::cli {
 
 /// What a run says of itself in what it writes: its command, and the names of its files, or, with --no-paths, words in
-/// their place (input1.nii.gz, OUT.ply), so that no folder and no file's name, which may be a patient's, is passed on.
+/// their place (input1.nii.gz, OUT.ply), so that no folder and no file's name, which may be a patient's, is written.
 class Provenance {
 public:
   /// @param words  of the command line, the first already the tool's name
@@ -36,7 +36,7 @@ public:
   [[nodiscard]] std::string name_of(const std::filesystem::path& path) const;
 
   /// The text, with words in place of the names and folders of all files that the run knows of, where they are hidden.
-  [[nodiscard]] std::string told(std::string text) const;
+  [[nodiscard]] std::string redact(std::string text) const;
 
 private:
   struct Known {

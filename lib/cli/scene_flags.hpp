@@ -8,7 +8,7 @@
 
 namespace tunica::cli {
 
-/// What tunica-simulate can be told of a scene without a file: one shell under pressure.
+/// What flags say of a scene without a file: one shell under pressure.
 struct SceneFlags {
   std::optional<double> young, thickness, density, pressure, imaged_at, support, duration, step, ramp;
   std::optional<std::string> poisson, mesh_unit, membrane, bending, solver, cg_tolerance, converge;

@@ -462,7 +462,8 @@ std::string Tool::stopped_by(int signal) const {
   return fmt::format("stopped by signal {}{}", signal,
                      kept == outputs_.end()
                          ? ""
-                         : fmt::format(": go on by tunica-{} {} {}", verb_, resume_flag, part_of(*kept).string()));
+                         : fmt::format(": go on by tunica-{} {} {}{}", verb_, resume_flag, part_of(*kept).string(),
+                                       std::filesystem::exists(*kept) ? " --force" : ""));
 }
 
 // In the thread that watches, while the work goes on: of what that changes only what is guarded is read, so the report
@@ -519,14 +520,14 @@ int Tool::finish(ExitCode code, const std::string& error) {
   return static_cast<int>(code);
 }
 
-Json Tool::told(const Json& json) const {
+Json Tool::redact(const Json& json) const {
   if (json.is_string() && provenance_.hides_paths()) {
-    return provenance_.told(json.get<std::string>());
+    return provenance_.redact(json.get<std::string>());
   }
   Json copy = json;
   if (json.is_structured() && provenance_.hides_paths()) {
     for (Json& part : copy) {
-      part = told(part);
+      part = redact(part);
     }
   }
   return copy;
@@ -581,7 +582,7 @@ void Tool::write_report(bool ok, const std::string& error, const Json& result) {
     report["stated"] = stated_;
   }
   // A file name need not be UTF-8; the report has to be.
-  const std::string text = told(report).dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  const std::string text = redact(report).dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
   if (report_ == standard_output) {
     tunica::print(text);
     return;

@@ -118,7 +118,7 @@ public:
   /// The `result` object of the report. A value that is undefined is set to null (`Json()`).
   [[nodiscard]] Json& result() { return result_; }
 
-  /// The `stated` object of the report: what the user said of the organ, as numbers. Null: the tool is told nothing.
+  /// The `stated` object of the report: what the user said of the organ, as numbers. Null: nothing was stated.
   [[nodiscard]] Json& stated() { return stated_; }
 
   /// Whether standard output belongs to the report (`--report -`).
@@ -146,7 +146,7 @@ private:
   [[nodiscard]] Json describe_outputs(bool ok) const;
   void write_report(bool ok, const std::string& error, const Json& result);
   void parse_common();
-  [[nodiscard]] Json told(const Json& json) const;
+  [[nodiscard]] Json redact(const Json& json) const;
   void claim(const std::filesystem::path& path, bool written);
   [[nodiscard]] std::string out_of_memory(const std::string& why);
   void say_line(const std::string& text) const;

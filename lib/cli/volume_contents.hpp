@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-/// What is in a volume, told to who chooses from it.
+/// What is in a volume, for who chooses from it.
 namespace tunica::cli {
 
 /// Where a label is.

@@ -2,7 +2,7 @@
 
 namespace tunica {
 
-/// The smallest number of so many significant digits that is not below a positive value: a bound that is told shortly
+/// The smallest number of so many significant digits that is not below a positive value: a bound in few digits
 /// stays one. Round-off of the value itself (a part of 1e-12) does not count. Other values stay as they are.
 double rounded_upwards(double value, int digits);
 

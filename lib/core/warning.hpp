@@ -12,7 +12,7 @@ enum class Weight {
   major,  ///< altogether: another organ, side, size or state than was meant
 };
 
-/// What a user has to know of a run that went on. It is told, stands in the report, and is counted over a cohort.
+/// What a user has to know of a run that went on. It is printed, stands in the report, and is counted over a cohort.
 struct Warning {
   Weight weight = Weight::minor;
   std::string kind;  ///< words that are the same in every run, such as "thick wall": cohorts count by them

@@ -23,7 +23,7 @@ constexpr std::array<Bytes, 8> control_colours{Bytes{243, 235, 219}, {251, 214, 
 
 std::uint8_t byte_of(double value) { return truncated<std::uint8_t>(std::clamp(std::round(value), 0.0, 255.0)); }
 
-Bytes mixed(const Bytes& a, const Bytes& b, double part) {
+Bytes blend(const Bytes& a, const Bytes& b, double part) {
   Bytes colour{};
   for (std::size_t c = 0; c < 3; ++c) {
     colour[c] = byte_of((1 - part) * a[c] + part * b[c]);
@@ -123,7 +123,7 @@ const Palette& surface_palette() {
     for (std::size_t i = 0; i < made.size(); ++i) {
       const double place = real(i) / 255 * real(control_colours.size() - 1);
       const auto before = std::min(truncated<std::size_t>(place), control_colours.size() - 2);
-      made[i] = mixed(control_colours[before], control_colours[before + 1], place - real(before));
+      made[i] = blend(control_colours[before], control_colours[before + 1], place - real(before));
     }
     return made;
   }();

@@ -186,7 +186,7 @@ double shortfall_of(const FitMesh& mesh, const std::vector<Index>& patches, cons
   return sum;
 }
 
-Trial tried(const FitMesh& mesh, const FitSamples& samples, const FitLimits& limits, Edit edit) {
+Trial try_edit(const FitMesh& mesh, const FitSamples& samples, const FitLimits& limits, Edit edit) {
   Trial trial;
   trial.edit = std::move(edit);
   for (const Index t : trial.edit.removed) {

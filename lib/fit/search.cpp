@@ -75,7 +75,7 @@ private:
       none.error = infinity;
       return none;
     }
-    return tried(mesh_, samples_, limits_, *std::move(edit));
+    return try_edit(mesh_, samples_, limits_, *std::move(edit));
   }
 
   /// Below the truth: the largest error around.
@@ -148,7 +148,7 @@ void flip_edges(FitMesh& mesh, const FitSamples& samples, const FitLimits& limit
   for (const auto& [u, v] : mesh.edges()) {
     if (auto edit = flip(mesh, u, v)) {
       const double angle = smallest_angle(mesh, edit->removed);
-      Trial trial = tried(mesh, samples, limits, *std::move(edit));
+      Trial trial = try_edit(mesh, samples, limits, *std::move(edit));
       if (trial.error < worth_it * trial.error_before ||
           (trial.error <= std::max(worth_it * limits.error, trial.error_before) &&
            smallest_angle(trial.piece, {0, 1}) > angle)) {
@@ -230,7 +230,7 @@ void mend_shapes(FitMesh& mesh, const FitSamples& samples, const FitLimits& limi
       return std::pair(unfolded, unfolded > 0 ? -trial.error : gain);
     };
     const auto consider = [&](Edit edit) {
-      Trial trial = tried(mesh, samples, limits, std::move(edit));
+      Trial trial = try_edit(mesh, samples, limits, std::move(edit));
       if (trial.error <= std::max(limits.error, trial.error_before) &&
           trial.shortfall < worth_it * trial.shortfall_before && (!best || merit(trial) > merit(*best))) {
         best = std::move(trial);
@@ -269,7 +269,7 @@ std::size_t split_worst(FitMesh& mesh, const FitSamples& samples, const FitLimit
     Trial trial;
     trial.error = infinity;
     const auto consider = [&](Edit edit) {
-      Trial other = tried(mesh, samples, anything, std::move(edit));
+      Trial other = try_edit(mesh, samples, anything, std::move(edit));
       if (other.error < trial.error) {
         trial = std::move(other);
       }

@@ -81,6 +81,14 @@ std::string share_of_bending(const CaseReport& one) {
   return share ? figure(*share) + " % of it bending; " : "";
 }
 
+// Of a motion the numbers are those of its end.
+std::string on_the_way(const CaseReport& one) {
+  const Json peak = one.source.at("simulate", "result.peak.max_displacement_mm");
+  return peak.is_number()
+             ? ", at the end of the motion; " + figure(peak.get<double>()) + " mm at most in the states written"
+             : "";
+}
+
 Markup three_numbers(const CaseReport& one) {
   const auto maximum = measure("stress_max_kpa").value(one.source);
   const auto percent = measure("distance_percent").value(one.source);
@@ -106,7 +114,8 @@ Markup three_numbers(const CaseReport& one) {
                  : rests_as_imaged(one.source)
                      ? "by construction: under " + one.redacted(pressure) + " the wall rests where the image shows it"
                      : plus_minus(one, "displacement_error_percent", "max_displacement_mm") +
-                           (pressure.empty() ? "of the curved surface" : "under " + one.redacted(pressure) + whence));
+                           (pressure.empty() ? "of the curved surface" : "under " + one.redacted(pressure) + whence) +
+                           on_the_way(one));
   const bool in_middle = is_fitted_to_middle(one);
   list +=
       big_number("distance_mm", in_middle ? "Shells to middle of the wall, at most" : "Shells to surface, at most", one,

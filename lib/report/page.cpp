@@ -46,7 +46,7 @@ void name_organs(std::vector<CaseReport>& cases) {
   }
 }
 
-CaseReport report_of(PipelineCase source, std::size_t number, const PageOptions& options) {
+CaseReport report_of(PipelineCase source, std::size_t number, const CaseFolders& folders, const PageOptions& options) {
   CaseReport one;
   one.source = std::move(source);
   one.number = number;
@@ -63,7 +63,7 @@ CaseReport report_of(PipelineCase source, std::size_t number, const PageOptions&
   }
   if (options.verify) {
     one.different = one.missing;
-    std::ranges::transform(differences(one.source), std::back_inserter(one.different), one.redacted);
+    std::ranges::transform(differences(one.source, folders), std::back_inserter(one.different), one.redacted);
   }
   return one;
 }
@@ -133,10 +133,11 @@ Markup body(const std::vector<CaseReport>& cases, const std::string& tsv, const 
 Page make_page(std::vector<PipelineCase> cases, const PageOptions& options) {
   TUNICA_ASSERT(!cases.empty());
   const Room room = room_for(cases.size());
+  const CaseFolders folders = folders_of(cases);
   std::vector<CaseReport> reports;
   for (std::size_t i = 0; i < cases.size(); ++i) {
     check_interrupt();
-    CaseReport one = report_of(std::move(cases[i]), i + 1, options);
+    CaseReport one = report_of(std::move(cases[i]), i + 1, folders, options);
     draw_organ(one, room);
     draw_slices(one, room);
     reports.push_back(std::move(one));

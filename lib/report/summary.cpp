@@ -3,10 +3,10 @@
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/core/rounding.hpp"
-#include "tunica/io/result/report_chart.hpp"
 #include "tunica/report/detail/html.hpp"
 #include "tunica/report/detail/measures.hpp"
 #include "tunica/report/detail/told_warnings.hpp"
+#include "tunica/report/report_chart.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

@@ -96,6 +96,26 @@ void compare_outputs(const PipelineCase& one, const std::string& stage, Strings&
   }
 }
 
+std::string called(const fs::path& folder) {
+  const fs::path place = (fs::absolute(folder) / "").lexically_normal().parent_path();
+  return (place.parent_path().filename() / place.filename()).string();
+}
+
+// Whether a stage wrote its files in what is another case's folder now: the two were exchanged.
+void compare_folder(const PipelineCase& one, const std::string& stage, const CaseFolders& all, Strings& found) {
+  const auto outputs = one.files(stage, "outputs");
+  if (outputs.empty() || !names_files(one, stage) || outputs.front().path.parent_path().empty()) {
+    return;
+  }
+  const std::string before = called(outputs.front().path.parent_path());
+  if (before != called(one.folder) && all.contains(before)) {
+    found.push_back(
+        fmt::format("{}: {} wrote it for {}: the folders of cases were exchanged, or files copied from one to "
+                    "the other; run the case again",
+                    report_file(one, stage), stage, before));
+  }
+}
+
 // Whether a stage read what the stages before it wrote: a chain may be mixed from the files of two cases or of two
 // runs.
 void compare_inputs(const PipelineCase& one, const std::string& stage, Strings& found) {
@@ -181,7 +201,17 @@ void find_strangers(const PipelineCase& one, Strings& found) {
 
 }  // namespace
 
-Strings differences(const PipelineCase& one) {
+CaseFolders folders_of(const std::vector<PipelineCase>& cases) {
+  CaseFolders folders;
+  for (const PipelineCase& one : cases) {
+    if (!one.folder.empty()) {  // one that was refused has none
+      folders.insert(called(one.folder));
+    }
+  }
+  return folders;
+}
+
+Strings differences(const PipelineCase& one, const CaseFolders& all) {
   Strings found;
   if (one.folder.empty()) {  // it was refused before any file was made
     return found;
@@ -190,6 +220,7 @@ Strings differences(const PipelineCase& one) {
     find_unclaimed(one, stage, found);
     compare_outputs(one, stage, found);
     compare_inputs(one, stage, found);
+    compare_folder(one, stage, all, found);
   }
   find_strangers(one, found);
   return found;

@@ -2,7 +2,7 @@
 
 #include "tunica/draw/chart.hpp"
 #include "tunica/io/file/report_file.hpp"
-#include "tunica/io/result/report_chart.hpp"
+#include "tunica/report/report_chart.hpp"
 
 #include <algorithm>
 

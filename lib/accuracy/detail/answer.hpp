@@ -31,9 +31,9 @@ struct MotionChoice {
 
 /// By runs on one mesh: the step is halved until max(|D_k|, |D_(k-1)| / 2^order) is below `share`; then the longest one
 /// serves whose answer differs from the shortest one's by no more, or rest.
-/// @param answered  solves with these settings, an answer that is not zero; a static run on at_its_end()
+/// @param solve_for_answer  solves with these settings, an answer that is not zero; a static run on at_its_end()
 /// @param may_rest  at_its_end() exists
 MotionChoice choose_motion(const RunSettings& settings, double share, bool may_rest,
-                           const std::function<Answer(const RunSettings&)>& answered);
+                           const std::function<Answer(const RunSettings&)>& solve_for_answer);
 
 }  // namespace tunica

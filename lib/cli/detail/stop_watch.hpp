@@ -7,9 +7,8 @@
 namespace tunica::cli {
 
 /// Ends a run that was asked to stop and does not look: a factorisation, a tree or a file of a library has no place
-/// where it could be told. A thread that sleeps until on_stop_signal() wakes it; where none can be started, such a run
-/// ends when its loops look again, as it would without this.
-/// One at a time in a process: signals belong to it.
+/// where it could be reported. A thread that sleeps until on_stop_signal() wakes it; where none can be started, such a
+/// run ends when its loops look again, as it would without this. One at a time in a process: signals belong to it.
 class StopWatch {
 public:
   /// @param end  called in the watching thread, while the work goes on, when nothing has looked for 1.5 s after the

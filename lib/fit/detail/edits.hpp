@@ -59,7 +59,7 @@ inline constexpr double out_of_reach = 8;
 
 /// Places the node by some steps of least squares; an error that stays far above `limits.error` ends them.
 /// Cost: some 0.1 ms per step.
-Trial tried(const FitMesh& mesh, const FitSamples& samples, const FitLimits& limits, Edit edit);
+Trial try_edit(const FitMesh& mesh, const FitSamples& samples, const FitLimits& limits, Edit edit);
 
 /// What the shapes of some patches lack, as Trial::shortfall has it.
 double shortfall_of(const FitMesh& mesh, const std::vector<Index>& patches, const FacetLimits& limits);

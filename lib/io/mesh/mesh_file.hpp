@@ -27,7 +27,7 @@ struct MeshFile {
   std::vector<std::pair<std::string, std::vector<double>>> vertex_properties;  ///< further scalar ones, e.g. thickness
 };
 
-/// Reads PLY (ASCII, binary of both byte orders), OBJ, STL, OFF and GLB. The format is told by content, then by
+/// Reads PLY (ASCII, binary of both byte orders), OBJ, STL, OFF and GLB. The format is known by content, then by
 /// extension. Polygons are split: a convex one into a fan, another ear by ear. PLY, OBJ and OFF keep their vertices as
 /// they are, also those no face uses; what comes as single triangles (STL, GLB, or a file whose faces share no vertex)
 /// is joined where coordinates are equal, without tolerance. Degenerate triangles are kept: lib/surface finds them.

@@ -14,7 +14,7 @@ MeshFacts require_surface(const MeshFile& file, const std::filesystem::path& pat
 
 /// Two meshes of one thing, as they were read. Refuses, from their boxes alone, what only a wrong unit explains: sizes
 /// in the ratio of two units of length, along every axis to a quarter, or 500 times and more apart.
-/// @param unit_mm  what read_mesh() was told for files that state none
+/// @param unit_mm  what read_mesh() was given for files that state none
 /// Errors: InputError that names the file, the factor and the likely unit. Cost: linear.
 void require_same_scale(const MeshFile& a, const std::filesystem::path& path_a, const MeshFile& b,
                         const std::filesystem::path& path_b, std::optional<double> unit_mm);

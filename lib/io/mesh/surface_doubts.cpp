@@ -93,6 +93,14 @@ std::vector<Warning> pressed_side_warnings(const TriangleMesh& mesh, double pres
                      path.string(), facing_phrase(facing), pressure < 0 ? "negative" : "positive",
                      pressure < 0 ? "outward" : "inward")});
   }
+  if (facing.bulging > 0) {
+    warnings.push_back(
+        {Weight::minor, "faces inward",
+         fmt::format("{}: is open and bulges away from its normals: positive pressure pushes along these, so here "
+                     "against the bulge; if the pressure is meant to fill it, give it the other sign, or turn the "
+                     "triangles around",
+                     path.string())});
+  }
   if (facing.hollows > 0) {
     warnings.push_back(
         {Weight::major, "nested surfaces",

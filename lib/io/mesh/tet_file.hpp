@@ -18,7 +18,7 @@ struct TetFile {
 
 /// Reads linear tetrahedra from Gmsh (.msh of the versions 2 and 4.1, ASCII and binary), VTK's legacy format (.vtk,
 /// ASCII and binary, both layouts of the cells) and its XML format (.vtu: ASCII, base64 or raw, plain or zlib). The
-/// format is told by content, then by extension. Points, lines and faces are passed over, vertices that no tetrahedron
+/// format is known by content, then by extension. Points, lines and faces are passed over, vertices that no tetrahedron
 /// uses are left out, tetrahedra that are inside out are turned, each with a note. All regions of a file are one mesh.
 /// @param unit_mm  size in mm of the file's unit, which none of these formats says
 /// @param scale    positions are multiplied by it, too

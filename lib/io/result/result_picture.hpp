@@ -24,7 +24,7 @@ struct ResultPictureOptions {
 
 /// A picture of a state of all bodies, as surface_picture(): the curved shells, welded where patches do not quite meet,
 /// the surfaces of solids, rigid bodies in grey (a plane only from the side on which the others are), the outline of
-/// the reference where it can be told from the state. @return PNG.
+/// the reference where it differs visibly from the state. @return PNG.
 /// Limits: a model without bodies that deform has no picture.
 std::string result_picture(const Model& model, const State& state, const ElementFields& fields,
                            const ResultPictureOptions& options);

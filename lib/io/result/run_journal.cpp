@@ -207,11 +207,11 @@ template <typename Archive, typename AnyCheckpoint>
 void checkpoint_members(Archive& archive, AnyCheckpoint& checkpoint) {
   auto& [summary, position, displacement, rotation, solid_pressure, contact, increment, rates] = checkpoint;
   auto& [dof, steps, parts, converged, residual, newton_iterations, cg_iterations, error, error_is_bound, volume_before,
-         volume_after, strain, largest, seconds_per_step, frequencies, factors, stiffened, energy, bend, motion, snaps,
-         limits, branches, contact_pressures] = summary;
+         volume_after, strain, largest, departure, seconds_per_step, frequencies, factors, stiffened, energy, bend,
+         motion, snaps, limits, branches, contact_pressures] = summary;
   each(archive, dof, steps, parts, converged, residual, newton_iterations, cg_iterations, error, error_is_bound,
-       volume_before, volume_after, strain, largest, seconds_per_step, frequencies, factors, stiffened, energy, bend,
-       motion, snaps, limits, branches, contact_pressures);
+       volume_before, volume_after, strain, largest, departure, seconds_per_step, frequencies, factors, stiffened,
+       energy, bend, motion, snaps, limits, branches, contact_pressures);
   each(archive, position, displacement, rotation, solid_pressure, contact, increment, rates);
 }
 

@@ -101,6 +101,7 @@ void prepare_result(Json& result, const Model& model) {
             {"step_parts", 0},
             {"converged", false},
             {"max_displacement_mm", nullptr},
+            {"peak", nullptr},
             {"displacement_p99_mm", nullptr},
             {"max_node_displacement_mm", nullptr},
             {"wall", nullptr},
@@ -178,6 +179,8 @@ void report_state(Json& result, const Model& model, const State& state, const El
   }
   report_contacts(result, model, state, dynamic);
 }
+
+Json peak_report(const Peak& peak) { return {{"max_displacement_mm", peak.displacement}, {"time_s", peak.time}}; }
 
 void report_summary(Json& result, const Summary& summary, bool converged, std::optional<double> duration) {
   result["dof"] = summary.dof;
@@ -377,7 +380,7 @@ std::vector<std::string> accuracy_notes(const Accuracy& accuracy) {
   for_each_notable(accuracy.estimates, [&](const TellingAnswer& answer, const Estimate& estimate) {
     if (answer.of != request.of) {
       lines.push_back(
-          fmt::format("{} was not asked for, and may be off by {:.2g} % by its mesh: --of {} (OF={}) asks "
+          fmt::format("{} was not asked for, and may be off by {:.2g} % by mesh and model: --of {} (OF={}) asks "
                       "for it",
                       answer.name, 100 * estimate.error, name_of(answer.of), name_of(answer.of)));
     }
@@ -459,13 +462,13 @@ std::vector<Warning> run_warnings(const RunSettings& run, const Summary& summary
              1e2 * last.wall.strain_p99)});
   }
   add_wall_notes(last.wall, warnings);
-  constexpr double notable_turn = 0.02, large_turn = 0.1;
-  if (const double error = 1 - std::cos(std::min(last.turn_p99, std::numbers::pi / 2)); error > notable_turn) {
+  constexpr double notable_departure = 0.05, large_departure = 0.2;
+  if (const double off = summary.linear_departure.value_or(0); off > notable_departure) {
     warnings.push_back(
-        {error > large_turn ? Weight::major : Weight::minor, "large rotation",
-         fmt::format("1 % of the body turns by more than {:.0f} degrees, and a linear run takes rotations for small: "
-                     "its displacements may be off by {:.0f} % or more; write geometry = \"nonlinear\"",
-                     last.turn_p99 * 180 / std::numbers::pi, 1e2 * error)});
+        {off > large_departure ? Weight::major : Weight::minor, "linear run",
+         fmt::format("a linear run takes displacements and rotations for small, and these are not: they may be off by "
+                     "{} in size or direction, stresses by as much or more; write geometry = \"nonlinear\"",
+                     off < 1 ? fmt::format("{:.0f} %", 1e2 * off) : "100 % and more")});
   }
   for (const Snap& snap : summary.snaps) {
     warnings.push_back(

@@ -55,12 +55,23 @@ std::vector<std::string> accuracy_notes(const Accuracy& accuracy);
 /// A line on the modes found.
 std::string modes_note(const Summary& summary, std::size_t asked);
 
-/// What of the last state tells how far it may be trusted.
+/// The largest displacement of a motion.
+struct Peak {
+  double displacement = 0;  ///< mm
+  double time = 0;          ///< s
+};
+
+/// The answer, and what tells how far it may be trusted.
 struct LastState {
   Wall wall;
-  std::size_t unresolved = 0;  ///< count_unresolved()
-  double turn_p99 = 0;         ///< rad, as in ElementFields
+  double largest_displacement = 0;  ///< mm
+  double displacement_p99 = 0;      ///< mm, as in ElementFields
+  std::size_t unresolved = 0;       ///< count_unresolved()
+  std::optional<Peak> peak{};       ///< of a motion, so far
 };
+
+/// The key `peak` of a motion's report.
+Json peak_report(const Peak& peak);
 
 /// What a user should know of a run that has ended well.
 std::vector<Warning> run_warnings(const RunSettings& run, const Summary& summary, const LastState& last);

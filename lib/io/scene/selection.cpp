@@ -230,6 +230,29 @@ void require_triangle(const SelectableBody& body, const std::vector<Index>& node
   }
 }
 
+namespace {
+
+/// Planes that differ by less than what fitting a surface leaves are one: the pressure would squeeze the vessel
+/// sideways out of so slight a wedge, without friction and without end.
+void make_parallel(std::vector<Rim>& rims) {
+  constexpr double slight = 0.002;  // rad
+  for (const Rim& first : std::vector<Rim>(rims)) {
+    Vec3 sum = Vec3::Zero();
+    for (const bool assigns : {false, true}) {
+      const Vec3 mean = sum.normalized();
+      for (Rim& rim : rims) {
+        if (rim.normal.cross(first.normal).norm() < slight) {
+          const double sign = rim.normal.dot(first.normal) < 0 ? -1 : 1;
+          sum += sign * rim.normal;
+          rim.normal = assigns ? Vec3(sign * mean) : rim.normal;
+        }
+      }
+    }
+  }
+}
+
+}  // namespace
+
 std::vector<Rim> rims_within(const SelectableBody& body, const std::vector<Index>& nodes, const Places& places) {
   DisjointSets joined(body.vertices().size());
   for (const auto& [from, to] : body.boundary_edges()) {
@@ -256,6 +279,7 @@ std::vector<Rim> rims_within(const SelectableBody& body, const std::vector<Index
     rim.normal = Eigen::SelfAdjointEigenSolver<Mat3>(spread).eigenvectors().col(0);
     rims.push_back(std::move(rim));
   }
+  make_parallel(rims);
   if (rims.empty()) {
     throw InputError(fmt::format("{}: no rim has all its nodes among the {} selected: select more, or all by boundary",
                                  places.of("where").text, nodes.size()));

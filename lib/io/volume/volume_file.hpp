@@ -47,7 +47,7 @@ struct VolumeFile {
 };
 
 /// Reads NIfTI-1/2 (.nii, .nii.gz, .hdr/.img, either named), NRRD (.nrrd, .seg.nrrd, .nhdr), MetaImage (.mha, .mhd),
-/// multi-page TIFF, or a folder of TIFF or PNG slices. The format is told by content, not by name. Errors: InputError
+/// multi-page TIFF, or a folder of TIFF or PNG slices. The format is known by content, not by name. Errors: InputError
 /// naming the file: missing, not a volume, truncated (with the bytes that are missing), hostile, or with more than one
 /// frame or layer and none chosen, with channels. UsageError: a slice stack without spacing, a spacing for others.
 /// Cost: memory for the voxels of one frame, and never more than the bytes in the file can hold.

@@ -55,6 +55,17 @@ std::optional<std::pair<std::string, std::uint64_t>> numbered(const fs::path& pa
   return value ? std::optional(std::pair(stem.substr(0, begin), *value)) : std::nullopt;
 }
 
+// Errors: InputError: two slices of one number, such as 3 and 003.
+void require_one_each(const fs::path& folder, const std::vector<fs::path>& slices) {
+  for (std::size_t i = 1; i < slices.size(); ++i) {
+    const auto before = numbered(slices[i - 1]);
+    if (before && before == numbered(slices[i])) {
+      throw InputError(fmt::format("{}: {} and {} have one number: leave one of them in the folder", folder.string(),
+                                   slices[i - 1].filename().string(), slices[i].filename().string()));
+    }
+  }
+}
+
 void warn_of_gaps(const fs::path& folder, const std::vector<fs::path>& slices, std::vector<Warning>& warnings) {
   std::vector<std::uint64_t> steps;
   for (std::size_t i = 1; i < slices.size(); ++i) {
@@ -149,6 +160,7 @@ std::vector<fs::path> slices_in(const fs::path& folder, std::vector<Warning>& wa
          fmt::format("{}: {} files that are no slices (.png, .tif, .tiff) are ignored", folder.string(), others)});
   }
   require_one_series(folder, slices);
+  require_one_each(folder, slices);
   warn_of_gaps(folder, slices, warnings);
   return slices;
 }

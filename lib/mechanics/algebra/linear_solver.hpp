@@ -30,7 +30,7 @@ struct CgResult {
 /// After the last iteration the recursion goes on for the sake of the error alone: x and the counts do not change.
 /// Cost of that: a tenth of the iterations where they ended before the tolerance; else as many as it takes to have most
 /// of the error: a few where convergence is fast, up to four times as many again where it stagnates; where that is not
-/// enough, the error is told as a lower bound. Errors: InputError also where a tolerance is asked for that is not
+/// enough, the error is a lower bound. Errors: InputError also where a tolerance is asked for that is not
 /// finite or below zero.
 CgResult conjugate_gradients(const BlockMatrix& matrix, const FreeMask& free, const VectorX& b,
                              const CgOptions& options, VectorX& x);

@@ -309,7 +309,7 @@ private:
   std::vector<double> largest_pressure_;  ///< MPa, per contact, of the last forces
   std::vector<double> pressed_;           ///< MPa, per contact, of all accepted states
   std::vector<std::array<Index, 2>> pairs_;
-  bool pairs_are_new_ = false;  ///< nobody has been told yet
+  bool pairs_are_new_ = false;  ///< nobody has asked yet
   const Configuration rest_;
   std::shared_ptr<const FaceMaps> accepted_;    ///< of the last accepted state
   std::shared_ptr<const FaceMaps> at_tangent_;  ///< where the last tangent was made

@@ -114,7 +114,7 @@ struct RigidMesh {
   std::optional<Expansion> expansion;
 };
 
-/// A body that does not deform and moves as it is told.
+/// A body that does not deform and moves as prescribed.
 struct RigidBody {
   std::string name;
   std::variant<RigidSphere, RigidCapsule, RigidCylinder, RigidPlane, RigidMesh> shape;

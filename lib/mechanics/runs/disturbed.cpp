@@ -161,7 +161,7 @@ std::vector<std::uint8_t> disturbed_nodes(const Model& model, std::size_t b) {
   };
   std::vector<std::uint8_t> slides(disturbed.size(), 0);  // as in a plane of symmetry: nothing bends there
   for (const Fix& fix : model.fixes) {
-    if (fix.body == b && fix.across && slant_of_rim(body, fix) <= upright) {
+    if (fix.body == b && fix.across && slant_of_rim(body, fix) <= negligible_slant) {
       for (const Index node : fix.nodes) {
         slides[node] = 1;
       }

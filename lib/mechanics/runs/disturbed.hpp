@@ -17,14 +17,14 @@ namespace tunica {
 double slant_of_rim(const ShellBody& body, const Fix& fix);
 
 /// The slant up to which a rim that slides disturbs nothing.
-constexpr double upright = 0.05;
+constexpr double negligible_slant = 0.05;
 
 /// Whether the thickness at the corners of a triangle differs by more than a quarter: the shell stands for a step, not
 /// for a place of the wall. Errors: InputError: no such triangle, not as many thicknesses as nodes.
 bool is_step(const ShellBody& body, std::size_t triangle);
 
 /// Nodes of a body at which its wall bends over a short length: those that are held or bear point loads, rims, where
-/// edge loads act as well, but for those that slide upright, and steps of the thickness.
+/// edge loads act as well, but for those that slide across the wall, and steps of the thickness.
 /// Errors: InputError: as require_valid(), no such body. Cost: linear.
 std::vector<std::uint8_t> disturbed_nodes(const Model& model, std::size_t body);
 

@@ -207,21 +207,21 @@ void doubt_voxels(const ShellBody& body, std::vector<Warning>& found) {
   const auto [shortest, longest] = *body.voxel;
   const double wall = *std::min_element(body.thickness.begin(), body.thickness.end());
   const bool slices = longest >= anisotropic * shortest;
-  if (longest > (slices ? 1 : 2) * wall) {
+  if (longest > wall) {
     found.push_back(
         {Weight::minor, "large voxels",
          fmt::format("{}: the {} of its image, {:.3g} mm, leave the surface uncertain by up to {:.3g} mm, "
                      "{:.2g} times the wall: what is left of its steps bends the wall; 99th percentiles may be "
-                     "too high by up to 10 % (membrane) and 30 % (faces) on smooth organs, and by much more "
-                     "on ragged ones; go by the mean membrane stress, or take a finer image",
+                     "too high by 10 % (membrane), and at the faces be two to three times those of a smooth organ; go "
+                     "by the mean membrane stress, or take a finer image",
                      at(body.said_at, body.name), slices ? "slices" : "voxels", longest, longest / 2,
                      longest / 2 / wall)});
   } else if (longest > wall / 2) {
     found.push_back(
         {Weight::note, "large voxels",
          fmt::format("{}: the voxels of its image, {:.3g} mm, are {:.2g} times the wall: what is left of their "
-                     "steps may add a quarter to the 99th percentile at the faces, and on vessels a few voxels "
-                     "wide as much again; the membrane stress holds to some per cent",
+                     "steps bends it, and the 99th percentile at the faces may be twice that of a smooth vessel; the "
+                     "membrane stress holds to some per cent",
                      at(body.said_at, body.name), longest, longest / wall)});
   }
 }

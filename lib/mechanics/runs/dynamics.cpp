@@ -711,13 +711,14 @@ private:
           time_, remedy_of_failure(model_, carried)));
     }
     throw RequirementError(
-        fmt::format("the step from {:.6g} s to {:.6g} s {} (relative residual {:.3g} after {} "
+        fmt::format("the step from {:.6g} s to {:.6g} s {} ({}after {} "
                     "iterations){}: take a smaller step, a ramp or damping; the last good state is at {:.6g} s",
                     time_, end,
                     !result.valid                        ? "made elements collapse or fold"
                     : result.converged && !result.stable ? "leads to a state that is not stable"
                                                          : "did not converge",
-                    result.residual, result.iterations, place, time_));
+                    result.valid ? fmt::format("relative residual {:.3g} ", result.residual) : "", result.iterations,
+                    place, time_));
   }
 
   [[nodiscard]] State state_now() const {

@@ -31,36 +31,6 @@ std::vector<double> lengths(const std::vector<Vec3>& vectors) {
   return result;
 }
 
-/// By which angle the shells' nodes or the tetrahedra of a linear state turn at least where they turn most.
-double turn_of(const ShellSystem& system, const State& state) {
-  const Model& model = *system.model;
-  double turn = system.elements.empty() ? 0 : area_quantile(model, lengths(state.rotation), rare);
-  std::vector<std::pair<double, double>> turns;  // with the volumes
-  double left = 0;
-  for (const SolidElement& element : system.solids) {
-    Mat3 displacement;
-    for (int k = 0; k < 3; ++k) {
-      displacement.col(k) = state.displacement[element.nodes[k + 1]] - state.displacement[element.nodes[0]];
-    }
-    Mat3 edges;
-    for (int k = 0; k < 3; ++k) {
-      edges.col(k) = system.reference[element.nodes[k + 1]] - system.reference[element.nodes[0]];
-    }
-    const Mat3 gradient = displacement * edges.inverse();
-    const double volume = std::abs(edges.determinant()) / 6;
-    turns.emplace_back((gradient - gradient.transpose()).norm() / std::sqrt(8.0), volume);
-    left += rare * volume;
-  }
-  std::ranges::sort(turns, std::greater());
-  for (const auto& [of_element, volume] : turns) {
-    left -= volume;
-    if (left <= 0) {
-      return std::max(turn, of_element);
-    }
-  }
-  return turn;
-}
-
 const Model& checked(const Model& model) {
   require_valid(model);
   return model;
@@ -370,9 +340,6 @@ ElementFields ElementFieldEvaluator::operator()(const State& state) const {
     fields.displacement_p99 = area_quantile(model, lengths(state.displacement), rare);
   }
   implementation_->add_solids(state, fields);
-  if (state.linear) {
-    fields.turn_p99 = turn_of(system, state);
-  }
   fields.largest_displacement = largest_displacement(model, state);
   return fields;
 }

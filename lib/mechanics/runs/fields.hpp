@@ -10,8 +10,8 @@
 namespace tunica {
 
 /// Numbers of an area of the wall: von Mises stress of either face, membrane stress (von Mises, mean over the
-/// wall) and tension, largest principal strain of either face. Of recovered fields (fields.cpp). p99 is passed on 1 %
-/// of the area.
+/// wall) and tension, largest principal strain of either face. Of recovered fields (fields.cpp). 1 % of the area has
+/// more than p99.
 struct WallNumbers {
   double stress_p99 = 0;  ///< MPa
   double stress_max = 0;
@@ -24,7 +24,7 @@ struct WallNumbers {
   double strain_max = 0;
   /// Where the faces' stress passes its p99, the part of it that the membrane stress there is not.
   double bending_share = 0;
-  /// What is passed on 2 and on .5 % of the area: where the 99th percentile of two meshes agrees by chance, these tell.
+  /// What 2 and .5 % of the area exceed: where the 99th percentile of two meshes agrees by chance, these tell.
   struct Beside {
     std::array<double, 2> stress{}, membrane{}, tension{}, strain{};
   } beside;
@@ -60,10 +60,8 @@ struct ElementFields {
   std::vector<double> membrane_stress;  ///< MPa, #nodes: von Mises of the mean over the wall; of solids the same
   std::vector<double> strain;           ///< #nodes: the largest principal strain of both faces, likewise
   Wall wall;
-  double largest_displacement = 0;  ///< mm, of the curved surfaces, also between the nodes
-  double displacement_p99 = 0;      ///< mm, passed on 1 % of the area of the shells
-  /// rad, by which 1 % of the shells' area or of the solids' volume turns at least; of a linear state, else 0.
-  double turn_p99 = 0;
+  double largest_displacement = 0;      ///< mm, of the curved surfaces, also between the nodes
+  double displacement_p99 = 0;          ///< mm, what 1 % of the area of the shells exceeds
   std::vector<double> solid_von_mises;  ///< MPa, #tetrahedra of all solids in order; of the true (Cauchy) stress
   std::vector<double> solid_pressure;   ///< MPa, the same; minus the mean stress: positive in compression
 };

@@ -98,12 +98,12 @@ std::vector<Lumen> lumens_of(const ShellMesh& mesh, const std::vector<char>& tou
   return lumens;
 }
 
-/// The rim that slides least upright, of a body under pressure.
+/// The rim that slides farthest from across the wall, of a body under pressure.
 void doubt_slides(const Model& model, std::size_t b, std::vector<Warning>& found) {
   constexpr double far_off = 0.2;
   const ShellBody& body = model.shells[b];
   const Fix* worst = nullptr;
-  double slant = upright;
+  double slant = negligible_slant;
   for (const Fix& fix : model.fixes) {
     if (const double here = fix.body == b && fix.across ? slant_of_rim(body, fix) : 0; here > slant) {
       worst = &fix;
@@ -282,14 +282,21 @@ ShellMesh joined_shells(const Model& model, const State* state) {
   return all;
 }
 
+/// But those of neighbours: that these fold over each other is an element's failure, which the run itself tells.
 std::vector<std::array<Index, 2>> crossings_of(const ShellMesh& shells) {
   if (!shells.corner_normals.empty()) {
     try {
-      return crossing_patches(shells);
+      return crossing_patches(shells, false);
     } catch (const InputError&) {  // folded over: there is no patch
     }
   }
-  return find_self_intersections(flat_facets(shells));
+  std::vector<std::array<Index, 2>> crossings = find_self_intersections(flat_facets(shells));
+  std::erase_if(crossings, [&](const auto& pair) {
+    const auto& other = shells.triangles[pair[1]];
+    return std::ranges::any_of(shells.triangles[pair[0]],
+                               [&](Index node) { return std::ranges::find(other, node) != other.end(); });
+  });
+  return crossings;
 }
 
 /// Bodies that pass through each other or themselves before anything moves. Contact refuses those that it holds apart.
@@ -309,10 +316,7 @@ void doubt_bodies(const Model& model, std::vector<Warning>& found) {
     const bool tied = std::ranges::any_of(model.attachments, [&, a = a, b = b](const Attachment& tie) {
       return std::minmax({tie.body, tie.to}) == std::pair(a, b);
     });
-    const bool meet = std::ranges::any_of(all.triangles[one], [&, &other = other](Index node) {
-      return std::ranges::find(all.triangles[other], node) != all.triangles[other].end();
-    });
-    if (!tied && !meet) {
+    if (!tied) {
       ++pairs.try_emplace({a, b}, 0, all.vertices[all.triangles[one][0]]).first->second.first;
     }
   }
@@ -443,12 +447,6 @@ void CrossingWatch::see(const State& state) {
   }
   std::vector<std::array<Index, 2>> made;
   std::ranges::set_difference(crossings, *before_, std::back_inserter(made));
-  // Neighbours that fold over each other are an element's failure, which the run itself tells.
-  std::erase_if(made, [&](const auto& pair) {
-    const auto& a = now.triangles[pair[0]];
-    const auto& b = now.triangles[pair[1]];
-    return std::ranges::any_of(a, [&](Index node) { return std::ranges::find(b, node) != b.end(); });
-  });
   if (made.empty()) {
     return;
   }

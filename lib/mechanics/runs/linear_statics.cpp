@@ -2,6 +2,7 @@
 
 #include "tunica/core/error.hpp"
 #include "tunica/mechanics/elements/rotation.hpp"
+#include "tunica/mechanics/runs/detail/prestress.hpp"
 #include "tunica/mechanics/runs/detail/stepped_run.hpp"
 #include "tunica/mechanics/runs/detail/supports.hpp"
 
@@ -9,6 +10,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace tunica {
 namespace {
@@ -117,6 +119,167 @@ LinearSolution LinearSolver::solve(const std::vector<double>& factors, const Vec
   return solution;
 }
 
+namespace {
+
+Configuration configuration_of(const ShellSystem& system, const VectorX& moved) {
+  Configuration configuration = reference_configuration(system);
+  for (std::size_t i = 0; i < system.node_count(); ++i) {
+    configuration.displacement[i] = moved.segment<3>(first_freedom(i));
+    if (i >= system.first_solid_node) {
+      configuration.pressure[i] = moved[first_freedom(i) + 3];
+    } else {
+      configuration.rotation[i] = exponential(moved.segment<3>(first_freedom(i) + 3));
+    }
+  }
+  return configuration;
+}
+
+/// The load, as a part of all of it, at which the deformation has reached 1 of its linear amount where it grows as
+/// load + second load^2 + third load^3: the smallest positive root of s - second s^2 + (2 second^2 - third) s^3 = 1,
+/// which is that series reverted. None: the load has a limit before, where Newton's method meets a slope of zero.
+std::optional<double> amount_at_load(double first, double second, double third) {
+  constexpr int most_steps = 60;
+  const double square = -second, cube = 2 * second * second - third;
+  double s = 0;
+  for (int k = 0; k < most_steps; ++k) {
+    const double slope = first + 2 * square * s + 3 * cube * s * s;
+    if (slope <= 0) {
+      return {};
+    }
+    const double step = (1 - s * (first + s * (square + s * cube))) / slope;
+    s += step;
+    if (std::abs(step) < 1e-6 * std::abs(s)) {
+      return s;
+    }
+  }
+  return s;
+}
+
+/// What the theory of large rotations leaves unbalanced beyond the linear one where a part of a linear solution, and
+/// what that bends to in the second order, has been followed.
+class BeyondLinear {
+public:
+  BeyondLinear(const ShellSystem& system, const LinearSolution& solution, const std::vector<double>& factors)
+      : system_(system), moved_(solution.moved), factors_(factors), scaled_(factors.size(), 0.0) {
+    Forces forces;
+    evaluate(system, {reference_configuration(system), scaled_}, forces, nullptr);
+    resting_ = forces.external;
+    brought_ = solution.external - resting_;
+    VectorX internal, at_rest;
+    linear_forces(system, moved_, internal);
+    linear_forces(system, VectorX::Zero(moved_.size()), at_rest);
+    energy_ = moved_.dot(internal - at_rest);
+  }
+
+  [[nodiscard]] double energy() const { return energy_; }  ///< N mm, twice that of the linear solution
+  [[nodiscard]] bool is_driven() const { return 2 * moved_.dot(brought_) < energy_; }  ///< by what is prescribed
+  [[nodiscard]] bool valid() const { return valid_; }
+
+  /// 6 per node, what grows as the square of the part.
+  VectorX even(double part) {
+    const VectorX moved = part * moved_;
+    return 0.5 * (at(moved, part) + at(-moved, -part));
+  }
+
+  /// The rest, over the part.
+  VectorX odd(double part, const VectorX& bent) {
+    const VectorX moved = part * moved_;
+    return 0.5 * (at(moved + bent, part) - at(bent - moved, -part)) / part;
+  }
+
+private:
+  VectorX at(const VectorX& moved, double part) {
+    std::ranges::transform(factors_, scaled_.begin(), [&](double factor) { return part * factor; });
+    Forces forces;
+    evaluate(system_, {configuration_of(system_, moved), scaled_}, forces, nullptr);
+    valid_ = valid_ && forces.valid;
+    VectorX internal;
+    linear_forces(system_, moved, internal);
+    return forces.external - resting_ - part * brought_ - forces.internal + internal;
+  }
+
+  const ShellSystem& system_;
+  const VectorX& moved_;
+  const std::vector<double>& factors_;
+  std::vector<double> scaled_;
+  VectorX resting_, brought_;
+  double energy_ = 0;
+  bool valid_ = true;
+};
+
+double largest_move(const VectorX& moved) {
+  double most = 0;
+  for (Eigen::Index i = 0; i < moved.size(); i += first_freedom(1)) {
+    most = std::max(most, moved.segment<3>(i).norm());
+  }
+  return most;
+}
+
+}  // namespace
+
+double LinearSolver::departure(const LinearSolution& solution, const std::vector<double>& factors) {
+  BeyondLinear beyond(system_, solution, factors);
+  if (!(beyond.energy() > 0)) {
+    return 0;  // nothing moves
+  }
+  const auto response_to = [&](VectorX left) {
+    condense(system_, reference_configuration(system_), left, nullptr);
+    mask(solver_.free(), left);
+    VectorX response = VectorX::Zero(left.size());
+    solver_.solve(matrix_, left, response, std::exchange(factored_, true));
+    expand(system_, response);
+    return response;
+  };
+  const double motion = largest_move(solution.moved);
+  constexpr double least = 1e-3, largest = 0.064;  // parts of the load
+  double first = 0, aside = 0;
+  if (system_.prestress_residual) {  // what the reference bears already counts in proportion to the load
+    const VectorX forces = beyond.odd(least, VectorX::Zero(solution.moved.size()));
+    first = solution.moved.dot(forces) / beyond.energy();
+    aside = largest_move(response_to(forces)) / motion;
+  }
+  // By ever smaller parts, until what is of higher order no longer shows, which is large in slender bodies, or what
+  // round-off leaves, which is large in thin ones, grows again.
+  constexpr double absolute = 0.02, relative = 0.1;
+  double second = 0, third = 0, change = infinity;
+  double bent_aside = 0;
+  for (double part = largest; part > least && change > absolute + relative * std::abs(third); part /= 2) {
+    const double square = part * part;
+    const VectorX forces = beyond.even(part) / square;
+    const VectorX bent = response_to(forces);
+    const double work = solution.moved.dot(beyond.odd(part, square * bent)) / beyond.energy();
+    const double found = (work - first) / square;
+    if (part < largest && std::abs(found - third) > change) {
+      break;
+    }
+    change = part < largest ? std::abs(found - third) : change;
+    third = found;
+    second = solution.moved.dot(forces) / beyond.energy();
+    bent_aside = largest_move(bent) / motion;
+  }
+  aside = std::max(aside, bent_aside);
+  if (!beyond.valid()) {
+    return 1;
+  }
+  if (beyond.is_driven()) {  // the forces differ
+    return std::max(aside, std::abs(first + second + third - 2 * second * second));
+  }
+  const auto amount = amount_at_load(1 - first, second, third);
+  return std::max(aside, amount ? std::abs(1 - *amount) / *amount : 1);
+}
+
+BlockMatrix stressed_tangent(ShellSystem& system, const VectorX& solution, const std::vector<double>& factors) {
+  Forces forces;
+  BlockMatrix tangent = system.pattern;
+  auto elements = system.elements;
+  auto solids = system.solids;
+  add_stress(system, solution);
+  evaluate(system, {reference_configuration(system), factors}, forces, &tangent);
+  system.elements = std::move(elements);
+  system.solids = std::move(solids);
+  return tangent;
+}
+
 double LinearSolver::residual(const LinearSolution& solution) const {
   VectorX internal;
   linear_forces(system_, solution.moved, internal);
@@ -161,21 +324,33 @@ private:
 
   State take_step() override {
     const double factor = run_.load_factors[summary_.steps];
-    return state_of(solver_.solve(load_factors(model_, true, factor), prescribed_positions(system_, factor)), factor);
+    const LinearSolution solution = solution_at(factor);
+    if (is_last()) {
+      const double most = *std::ranges::max_element(run_.load_factors, {}, [](double f) { return std::abs(f); });
+      summary_.linear_departure =
+          departure(most == factor ? solution : solution_at(most), load_factors(model_, true, most));
+    }
+    return state_of(solution, factor);
+  }
+
+  /// 1 at least beyond the buckling load: a strip pushed along itself shows nothing else of it.
+  double departure(const LinearSolution& solution, const std::vector<double>& factors) {
+    BlockMatrix tangent = stressed_tangent(system_, solution.moved, factors);
+    symmetrise(tangent);
+    TangentSolver solver(system_, settings_);
+    VectorX none;
+    const bool stable = solver.solve(tangent, VectorX::Zero(solution.moved.size()), none).positive_definite;
+    const double found = solver_.departure(solution, factors);
+    return stable ? found : std::max(found, 1.0);
+  }
+
+  LinearSolution solution_at(double factor) {
+    return solver_.solve(load_factors(model_, true, factor), prescribed_positions(system_, factor));
   }
 
   [[nodiscard]] State state_of(const LinearSolution& solution, double factor) const {
     const VectorX& moved = solution.moved;
-    Configuration configuration = reference_configuration(system_);
-    for (std::size_t i = 0; i < system_.node_count(); ++i) {
-      configuration.displacement[i] = moved.segment<3>(first_freedom(i));
-      if (i >= system_.first_solid_node) {
-        configuration.pressure[i] = moved[first_freedom(i) + 3];
-      } else {
-        configuration.rotation[i] = exponential(moved.segment<3>(first_freedom(i) + 3));
-      }
-    }
-    State state = make_state(system_, configuration, factor);
+    State state = make_state(system_, configuration_of(system_, moved), factor);
     for (std::size_t i = 0; i < system_.node_count(); ++i) {
       state.rotation[i] =
           i < system_.first_solid_node ? Vec3(moved.segment<3>(first_freedom(i) + 3)) : Vec3(Vec3::Zero());

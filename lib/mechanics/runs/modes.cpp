@@ -62,17 +62,10 @@ double largest_strain(const ShellSystem& system, const VectorX& solution) {
 /// stiffness, and where a flat plate is pressed aside it would make up modes that its stretching forbids.
 BlockMatrix tangent_change(ShellSystem& system, const VectorX& solution) {
   const Model& model = *system.model;
-  const Configuration reference = reference_configuration(system);
   Forces forces;
-  BlockMatrix change = system.pattern;
   BlockMatrix before = system.pattern;
-  evaluate(system, {reference, std::vector<double>(model.loads.size(), 0.0)}, forces, &before);
-  auto elements = system.elements;
-  auto solids = system.solids;
-  add_stress(system, solution);
-  evaluate(system, {reference, load_factors(model, true, 1)}, forces, &change);
-  system.elements = std::move(elements);
-  system.solids = std::move(solids);
+  evaluate(system, {reference_configuration(system), std::vector<double>(model.loads.size(), 0.0)}, forces, &before);
+  BlockMatrix change = stressed_tangent(system, solution, load_factors(model, true, 1));
   for (std::size_t k = 0; k < change.values.size(); ++k) {
     change.values[k] -= before.values[k];
   }

@@ -76,8 +76,10 @@ struct Summary {
   bool algebraic_error_is_bound = false;  ///< some step's solve ended before its tolerance: at least this
   std::optional<double> volume_before;    ///< mm^3; none when a body is open
   std::optional<double> volume_after;
-  double strain_energy = 0;              ///< mJ
-  double max_displacement = 0;           ///< mm, of the nodes in the last state
+  double strain_energy = 0;     ///< mJ
+  double max_displacement = 0;  ///< mm, of the nodes in the last state
+  /// Of a linear static run under its largest load: by how much a nonlinear one differs, about, relative to that.
+  std::optional<double> linear_departure;
   std::vector<double> seconds_per_step;  ///< wall
   std::vector<double> frequencies;       ///< Hz, increasing
   std::vector<double> buckling_factors;  ///< increasing

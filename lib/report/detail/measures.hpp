@@ -33,7 +33,7 @@ struct Measure {
   [[nodiscard]] std::string text(double of) const;
 };
 
-/// Cases of a label, for outliers to be told.
+/// Cases of a label, among which outliers are marked.
 constexpr std::size_t fewest_compared = 5;
 
 /// All, in the order of the columns.

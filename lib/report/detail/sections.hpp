@@ -11,7 +11,7 @@ namespace tunica::report {
 
 /// What is said of one case: verdict, three numbers, the organ, slices, tables, files, commands, methods.
 /// @param level  of its headings, 2 or 3
-/// @param paths  whether files are told with their folders
+/// @param paths  whether files are named with their folders
 Markup case_section(const CaseReport& one, int level, bool paths);
 
 /// Counts, failures, table, outliers and strips of a cohort; the cases follow.

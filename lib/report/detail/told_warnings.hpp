@@ -11,7 +11,7 @@ namespace tunica::report {
 /// A warning of a stage.
 struct ToldWarning {
   std::string stage;
-  Warning warning;  ///< its kind is empty in reports of tools before they told kinds
+  Warning warning;  ///< its kind is empty in reports of tools from before warnings had kinds
 };
 
 /// The warnings of all stages, the heaviest first.

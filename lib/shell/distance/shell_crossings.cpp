@@ -14,8 +14,9 @@
 namespace tunica {
 namespace {
 
-constexpr double flat_enough = 1e-4;  // of the patch's longest edge: an eye sees no less in a drawing of it
-constexpr double edge_strip = 0.125;  // of the height over a shared edge
+constexpr double flat_enough = 1e-4;    // of the patch's longest edge: an eye sees no less in a drawing of it
+constexpr double edge_strip = 0.125;    // of the height over a shared edge
+constexpr int most_pair_cuts = 20'000;  // of a pair: some ten milliseconds
 
 /// A triangle of a patch's parameters, each corner as weights of the patch's corners.
 using Domain = std::array<Vec3, 3>;
@@ -102,7 +103,8 @@ bool certainly_apart(const Piece& one, const Piece& other) {
   });
 }
 
-bool meet(const Piece& one, const Piece& other) {
+/// @param left  cuts that are still allowed; patches so bent that these do not do count as meeting
+bool meet(const Piece& one, const Piece& other, int& left) {
   if (certainly_apart(one, other)) {
     return false;
   }
@@ -113,16 +115,30 @@ bool meet(const Piece& one, const Piece& other) {
                ? triangles_cross_beside_corner(one.triangle(one.node), other.triangle(other.node))
                : triangles_cross(one.triangle(0), other.triangle(0));
   }
+  if (--left < 0) {
+    return true;
+  }
   const bool cut_one = bend >= other_bend;
   const Piece& cut = cut_one ? one : other;
   const auto quarter = quarters(cut.patch);
   for (std::size_t k = 0; k < 4; ++k) {
     const Piece piece{quarter[k], cut.allowed, k < 3 && k == cut.node ? k : Piece::no_corner};
-    if (cut_one ? meet(piece, other) : meet(one, piece)) {
+    if (cut_one ? meet(piece, other, left) : meet(one, piece, left)) {
       return true;
     }
   }
   return false;
+}
+
+bool meet(const Piece& one, const Piece& other) {
+  int left = most_pair_cuts;
+  return meet(one, other, left);
+}
+
+bool share_a_node(const ShellMesh& shell, const std::array<Index, 2>& pair) {
+  const auto& other = shell.triangles[pair[1]];
+  return std::ranges::any_of(shell.triangles[pair[0]],
+                             [&](Index node) { return std::ranges::find(other, node) != other.end(); });
 }
 
 class Crossings {
@@ -191,9 +207,12 @@ private:
 
 }  // namespace
 
-std::vector<std::array<Index, 2>> crossing_patches(const ShellMesh& shell) {
+std::vector<std::array<Index, 2>> crossing_patches(const ShellMesh& shell, bool neighbours) {
   const Crossings crossings(shell);
-  const auto candidates = crossings.candidates();
+  auto candidates = crossings.candidates();
+  if (!neighbours) {
+    std::erase_if(candidates, [&](const auto& pair) { return share_a_node(shell, pair); });
+  }
   std::vector<std::uint8_t> cross(candidates.size(), 0);
   parallel_for_blocks(candidates.size(), items_per_block, [&](std::size_t begin, std::size_t end) {
     check_interrupt();

@@ -13,8 +13,10 @@ namespace tunica {
 /// 1e-4 of its longest edge, and these meet or not by exact predicates. What crosses less deeply may be missed, and
 /// what lies closer without crossing may be counted.
 /// @param shell  as require_fit() wants it
+/// @param neighbours  whether pairs that share a node count: bent far they take long
 /// @return pairs in ascending order, the smaller number first
-/// Errors: Interrupted. Cost: n log n, about 5 microseconds per shell, and a millisecond for each pair that meets.
-std::vector<std::array<Index, 2>> crossing_patches(const ShellMesh& shell);
+/// Errors: Interrupted. Cost: n log n, about 5 microseconds per shell, and a millisecond for each pair that meets, at
+/// most some ten for one that is bent far, which counts as one that meets.
+std::vector<std::array<Index, 2>> crossing_patches(const ShellMesh& shell, bool neighbours = true);
 
 }  // namespace tunica

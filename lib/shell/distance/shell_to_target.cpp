@@ -117,7 +117,7 @@ private:
       }
     });
     collected(middles, aim_, lower_, settled_, farthest_, beyond_);
-    const double bulge = bulge_share * aim_.enough(lower_);
+    const double bulge = bulge_share * aim_.stop_at(lower_);
     std::vector<Block> blocks((patches_.size() + items_per_block - 1) / items_per_block);
     parallel_for_blocks(patches_.size(), items_per_block, [&](std::size_t begin, std::size_t end) {
       check_interrupt();
@@ -181,7 +181,7 @@ private:
       block.settled = std::max(block.settled, std::min(piece.upper, c.distance[0] + reach + bulge_of(piece)));
       return;
     }
-    const double enough = aim_.enough(std::max(lower_, block.lower));
+    const double enough = aim_.stop_at(std::max(lower_, block.lower));
     const double bulge = bulge_of(piece);
     const double flat = flat_bound(tree_, cover_, piece.corners, std::max(enough - bulge, 0.0), block.visited);
     piece.upper = std::min(piece.upper, flat + bulge);

@@ -116,7 +116,7 @@ private:
 
   /// A corner so far away that it decides: either it is, for certain, or it gets a closer foot.
   void sharpen(Corner& corner, double& lower, Corner& farthest) const {
-    if (corner.foot.distance <= aim_.enough(lower) - sharp_share * aim_.width) {
+    if (corner.foot.distance <= aim_.stop_at(lower) - sharp_share * aim_.width) {
       return;
     }
     const double certain = search_.nearest(corner.at, sharp_tolerance * aim_.width, corner.foot);
@@ -166,7 +166,7 @@ private:
     sharpen(corners[first], lower_, farthest_);
     std::vector<Index> far;
     for (const Index v : used) {
-      if (corners[v].foot.distance > aim_.enough(lower_) - sharp_share * aim_.width) {
+      if (corners[v].foot.distance > aim_.stop_at(lower_) - sharp_share * aim_.width) {
         far.push_back(v);
       }
     }
@@ -189,7 +189,7 @@ private:
 
   /// Settles the piece, keeps or lists it.
   void bound(Piece piece, Block& block) const {
-    const double enough = aim_.enough(block.lower);
+    const double enough = aim_.stop_at(block.lower);
     const Corners& c = piece.corners;
     for (const Corner& corner : c) {
       SurfaceFoot foot = corner.foot;
@@ -234,7 +234,7 @@ private:
   }
 
   void cut(const Piece& piece, Block& block) const {
-    if (piece.upper <= aim_.enough(block.lower)) {
+    if (piece.upper <= aim_.stop_at(block.lower)) {
       block.settled = std::max(block.settled, piece.upper);
     } else if (!cut_along_edge(piece, block)) {
       halve(piece, block);
@@ -302,7 +302,7 @@ private:
         foot_there[l] = search_.on_patch(end[l].at, there, to.foot.at);
         Corner closer{end[l].at, end[l].foot.distance < foot_there[l].distance ? end[l].foot : foot_there[l]};
         sharpen(closer, block.lower, block.farthest);
-        if (std::max(end[l].foot.distance, foot_there[l].distance) > aim_.enough(block.lower)) {
+        if (std::max(end[l].foot.distance, foot_there[l].distance) > aim_.stop_at(block.lower)) {
           return false;
         }
       }

@@ -24,6 +24,7 @@ namespace tunica {
 namespace {
 
 constexpr double has_inside = 1.0 / 3;  // mean winding number; 1/2 of a closed surface, 0 of a sheet
+constexpr double bulges = 0.01;         // likewise: below it a sheet may well be meant
 constexpr std::size_t fewest_points = 16, most_points = 64;  // where that is taken
 constexpr std::size_t most_angles = 20'000'000;              // solid angles, about: half a second on two cores
 constexpr double no_volume = 1e-9;                           // of the area to the power of 3/2: rounding
@@ -44,6 +45,7 @@ struct Component {
   double area = 0;
   Box box;
   int sign = 0;  // 1: faces outward, -1: inward, 0: has no inside
+  bool bulges_back = false;
   std::size_t depth = 0;
 };
 
@@ -66,6 +68,7 @@ public:
     double largest = 0, largest_hollow = 0;
     for (const Component& piece : all_) {
       const Vec3& at = corner(piece.triangles.front(), 0);
+      found.bulging += piece.bulges_back ? 1 : 0;
       if (piece.depth > 0 && piece.sign < 0) {
         ++found.hollows;
         if (piece.area > largest_hollow) {
@@ -142,6 +145,7 @@ private:
     } else {
       const double mean = mean_winding(piece);
       piece.sign = mean >= has_inside ? 1 : mean <= -has_inside ? -1 : 0;
+      piece.bulges_back = piece.sign == 0 && mean <= -bulges;
     }
   }
 

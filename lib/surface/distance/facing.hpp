@@ -9,6 +9,7 @@ struct Facing {
   std::size_t pieces = 0;
   std::size_t inward = 0;            ///< pieces that face the wrong way: see facing_of()
   std::size_t outermost_inward = 0;  ///< of those the ones that lie within no other
+  std::size_t bulging = 0;           ///< open pieces too shallow to have an inside, that bulge away from their normals
   std::size_t hollows = 0;           ///< pieces that lie within others and face into what they enclose
   Vec3 place = Vec3::Zero();         ///< mm: a vertex of the largest piece that faces the wrong way
   Vec3 hollow_place = Vec3::Zero();  ///< mm: of the largest hollow

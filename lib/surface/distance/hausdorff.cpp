@@ -176,7 +176,7 @@ private:
   }
 
   // Pieces whose upper bound is at most this need no further work.
-  [[nodiscard]] double enough(double lower) const {
+  [[nodiscard]] double stop_at(double lower) const {
     const double wanted = lower + options_.width;
     return options_.limit ? std::max(wanted, *options_.limit - uncertainty()) : wanted;
   }
@@ -225,7 +225,7 @@ private:
       }
     }
     piece.upper = std::min(piece.upper, std::sqrt(squared));
-    const double wanted = enough(block.farthest.distance);
+    const double wanted = stop_at(block.farthest.distance);
     for (std::size_t i = 0; i < 3 && piece.upper > wanted; ++i) {
       if (i == 0 || (piece.nearest[i] != piece.nearest[i - 1] && piece.nearest[i] != piece.nearest[0])) {
         piece.upper = std::min(piece.upper, cover_(piece.corner, piece.nearest[i], wanted, block.visited));
@@ -235,7 +235,7 @@ private:
 
   // Keeps a piece, or settles it.
   void file(const Piece& piece, Block& block) const {
-    if (piece.upper <= enough(block.farthest.distance)) {
+    if (piece.upper <= stop_at(block.farthest.distance)) {
       block.settled = std::max(block.settled, piece.upper);
     } else {
       block.live.push_back(piece);
@@ -257,7 +257,7 @@ private:
         if (guess) {
           // The triangle of B that was closest to the neighbour often settles this one too.
           const double upper = std::sqrt(b_.max_squared_distance_to(piece.corner, *guess));
-          if (upper <= enough(block.farthest.distance)) {
+          if (upper <= stop_at(block.farthest.distance)) {
             block.settled = std::max(block.settled, upper);
             continue;
           }
@@ -282,7 +282,7 @@ private:
     }
     for (const Block& block : blocks) {
       for (const Piece& piece : block.live) {
-        if (piece.upper <= enough(farthest_.distance)) {
+        if (piece.upper <= stop_at(farthest_.distance)) {
           settled_ = std::max(settled_, piece.upper);
         } else {
           live.push_back(piece);
@@ -319,7 +319,7 @@ private:
   }
 
   void split(const Piece& piece, int levels, Block& block) const {
-    if (levels == 0 || piece.upper <= enough(block.farthest.distance)) {
+    if (levels == 0 || piece.upper <= stop_at(block.farthest.distance)) {
       file(piece, block);
       return;
     }

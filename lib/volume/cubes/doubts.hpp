@@ -12,10 +12,10 @@
 
 namespace tunica {
 
-/// What warnings of an extraction are about, and where its places are told.
+/// What warnings of an extraction are about, and in which axes its places are given.
 struct Subject {
   std::string name;  ///< "label 3 (aorta)"
-  bool ras = false;  ///< places are told in RAS, not in LPS
+  bool ras = false;  ///< places are in RAS, not in LPS
 
   /// "(1.5, -2.0, 30.0) mm".
   [[nodiscard]] std::string at(const Vec3& place) const;

@@ -138,8 +138,8 @@ TEST(Edits, EveryKindKeepsAClosedOrientedManifold) {
     if (!edits[kind]) {
       continue;
     }
-    Trial trial = tried(ball.mesh, ball.samples, limits,
-                        v % 8 < 4 ? *std::move(edits[kind]) : widened(ball.mesh, *std::move(edits[kind])));
+    Trial trial = try_edit(ball.mesh, ball.samples, limits,
+                           v % 8 < 4 ? *std::move(edits[kind]) : widened(ball.mesh, *std::move(edits[kind])));
     if (std::isfinite(trial.error)) {
       apply(ball.mesh, std::move(trial));
     }

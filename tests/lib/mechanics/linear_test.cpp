@@ -237,6 +237,85 @@ TEST(Linear, WholeHemisphere) {
   }
 }
 
+double departure_of(const Model& model) {
+  return *solve(model, linear_run(), [](const State&) {}).linear_departure;
+}
+
+/// Source: Timoshenko, Woinowsky-Krieger 1959, "Theory of plates and shells", eq. (232): of a clamped disc
+/// w + 0.488 w^3 / t^2 is q a^4 / (64 D).
+TEST(LinearDeparture, OfAClampedDiscIsTheTensionOfItsMembrane) {
+  const double radius = 10, thickness = 0.1;
+  const Grid grid = make_grid(24, 24, [&](double u, double v) {
+    const double x = 2 * u - 1, y = 2 * v - 1;
+    return Vec3(radius * x * std::sqrt(1 - y * y / 2), radius * y * std::sqrt(1 - x * x / 2), 0);
+  });
+  for (const double deflection : {0.2, 0.4, 0.8}) {  // linear, over the thickness
+    Model model = one_shell(flat_body(grid.mesh, 1000, 0.3, thickness), {});
+    hold(
+        model, [&](const Vec3& p) { return p.norm() > radius - 1e-6; }, "xyz", "xyz");
+    const double rigidity = 1000 * std::pow(thickness, 3) / (12 * (1 - 0.3 * 0.3));
+    const double pressure = 64 * rigidity * deflection * thickness / std::pow(radius, 4);
+    model.loads.push_back({0, AreaLoad{Vec3(0, 0, pressure)}, {}});
+    double part = 1;  // of the linear deflection
+    for (int k = 0; k < 20; ++k) {
+      const double cube = 0.488 * deflection * deflection;
+      part -= (part + cube * part * part * part - 1) / (1 + 3 * cube * part * part);
+    }
+    EXPECT_NEAR(departure_of(model), (1 - part) / part, 0.1 * (1 - part) / part) << deflection;
+  }
+}
+
+/// Of a cantilever of length L under P at its tip, a = P L^2 / EI, the tip goes a L / 3 down by the linear theory, and
+/// a^2 L / 15 aside in the second order of the elastica.
+TEST(LinearDeparture, OfABentStripIsHowItGoesAside) {
+  const Grid grid = make_grid(40, 2, [](double u, double v) { return Vec3(10 * u, v, 0); });
+  for (const double a : {0.1, 0.5}) {
+    Model model = one_shell(flat_body(grid.mesh, 1200, 0, 0.1), {});  // EI = 0.1 N mm^2
+    hold(
+        model, [](const Vec3& p) { return p.x() < eps; }, "xyz", "xyz");
+    const double force = a * 0.1 / 100;
+    for (std::size_t j = 0; j <= 2; ++j) {
+      model.loads.push_back({0, ForceLoad{{grid.node(40, j)}, Vec3(0, 0, (j == 1 ? 0.5 : 0.25) * force)}, {}});
+    }
+    EXPECT_NEAR(departure_of(model), a / 5, 0.03 * a / 5) << a;
+  }
+}
+
+TEST(LinearDeparture, BeyondTheBucklingLoadNothingIsRight) {
+  const Grid grid = make_grid(20, 2, [](double u, double v) { return Vec3(10 * u, v, 0); });
+  const double buckling = pi * pi * 0.1 / 400;  // pi^2 EI / (4 L^2) of a cantilever
+  for (const double part : {0.9, 1.1}) {
+    Model model = one_shell(flat_body(grid.mesh, 1200, 0, 0.1), {});
+    hold(
+        model, [](const Vec3& p) { return p.x() < eps; }, "xyz", "xyz");
+    for (std::size_t j = 0; j <= 2; ++j) {
+      model.loads.push_back(
+          {0, ForceLoad{{grid.node(20, j)}, Vec3((j == 1 ? -0.5 : -0.25) * part * buckling, 0, 0)}, {}});
+    }
+    EXPECT_EQ(departure_of(model) >= 1, part > 1) << departure_of(model);
+  }
+}
+
+TEST(LinearDeparture, OfWhatIsPrescribedIsThatOfTheForces) {
+  const Grid grid = make_grid(24, 24, [](double u, double v) { return Vec3(20 * u, 20 * v, 0); });
+  Model model = one_shell(flat_body(grid.mesh, 1000, 0.3, 0.1), {});
+  hold(
+      model,
+      [](const Vec3& p) {
+        return std::min({p.x(), p.y(), 20 - p.x(), 20 - p.y()}) < eps;
+      },
+      "xyz", "xyz");
+  hold(
+      model, [](const Vec3& p) { return (p - Vec3(10, 10, 0)).norm() < 2; }, "z", "");
+  double before = 0;
+  for (const double depth : {0.005, 0.01, 0.02}) {
+    model.fixes.back().displacement = Vec3(0, 0, depth);
+    const double departure = departure_of(model);
+    EXPECT_NEAR(departure, 4 * before, before > 0 ? 0.05 * departure : 1) << depth;
+    before = departure;
+  }
+}
+
 TEST(Linear, ThinTwistedBeam) {
   for (const Elements& elements : {adapt_dkt, curved}) {
     for (const std::size_t n : {12, 24, 48}) {

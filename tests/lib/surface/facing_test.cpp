@@ -6,6 +6,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <numbers>
+
 namespace tunica {
 namespace {
 
@@ -51,6 +54,20 @@ TEST(Facing, OfWhatHasNoInsideNothingIsSaid) {
   for (const TriangleMesh& mesh : {shapes::plane(10, 10), cap(0), cap(0.9), shapes::tube(24, 3, 5, 3)}) {
     EXPECT_EQ(facing_of(mesh).inward, 0U);
     EXPECT_EQ(facing_of(turned(mesh)).inward, 0U);
+  }
+}
+
+TEST(Facing, ShallowSurfacesBulge) {
+  for (const TriangleMesh& mesh : {cap(0), cap(0.5), cap(0.9)}) {
+    EXPECT_EQ(facing_of(mesh).bulging, 0U);
+    EXPECT_EQ(facing_of(turned(mesh)).bulging, 1U);
+  }
+  TriangleMesh wave = shapes::plane(20, 20, 10, 10);
+  for (Vec3& p : wave.vertices) {
+    p.z() = std::sin(0.4 * std::numbers::pi * p.x()) * std::sin(0.4 * std::numbers::pi * p.y());  // whole waves
+  }
+  for (const TriangleMesh& mesh : {shapes::plane(10, 10), wave, shapes::sphere(2, 1)}) {
+    EXPECT_EQ(facing_of(mesh).bulging + facing_of(turned(mesh)).bulging, 0U);
   }
 }
 

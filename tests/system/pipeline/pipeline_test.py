@@ -158,7 +158,7 @@ class Rules(WithStubs):
         self.assertFalse((folder / "refined.ply").exists(), "those of the last load")
         done = self.make(VOLUMES="a.nii.gz", LABEL=3, ACCURACY="2%", SHELLS=300, **LOAD)
         self.assertEqual(done.returncode, 2)
-        self.assertIn("leave out SHELLS and TOLERANCE", done.stderr)
+        self.assertIn("ACCURACY and SHELLS exclude each other: leave one out", done.stderr)
         done = self.make(VOLUMES="a.nii.gz", LABEL=3, ACCURACY="2%", MID_SURFACE="inner", **LOAD)
         self.assertEqual(done.returncode, 2)
         self.assertIn("give SHELLS or TOLERANCE instead", done.stderr)
@@ -359,14 +359,20 @@ class Rules(WithStubs):
         self.assertIn("outer or inner", self.refusal(VOLUMES="a.nii.gz", LABEL=1, MID_SURFACE="middle", **LOAD))
         self.assertIn("OPEN: 'nein' is not understood: 1 or 0", self.refusal(VOLUMES="a.nii.gz", LABEL=1, OPEN="nein", **LOAD))
 
+    def test_a_users_own_values_take_the_place_of_the_samples(self):
+        for given in ({"LABEL": 2}, {"ISOVALUE": "0.5"}, {"IMAGED_AT": "80mmHg"}, {"OPEN": 0}):
+            done = self.make("-n", **given)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertIn("aneurysm.nii.gz", done.stdout)
+
     def test_contradictions_are_refused(self):
-        self.assertIn("KIND=quick", self.refusal(VOLUMES="a.nii.gz", LABEL=1, KIND="quick", **LOAD))
+        self.assertIn("KIND: 'quick' is not understood", self.refusal(VOLUMES="a.nii.gz", LABEL=1, KIND="quick", **LOAD))
         self.assertIn("exclude each other", self.refusal(VOLUMES="a.nii.gz", LABEL=1, ISOVALUE=2, **LOAD))
         self.assertIn("nothing matches none*.nii", self.refusal(VOLUMES="none*.nii", LABEL=1, **LOAD))
         (self.folder / "a.nii").write_text("another")
         self.assertIn("same stem", self.refusal(VOLUMES="a.nii.gz a.nii", LABEL=1, **LOAD))
         self.assertIn("LABELS: a quotation mark", self.refusal(VOLUMES="a.nii.gz", LABELS="'aorta", **LOAD))
-        self.assertIn("VOLUMES is empty", self.refusal(VOLUMES="", LABEL=1, **LOAD))
+        self.assertIn("VOLUMES not given", self.refusal(VOLUMES="", LABEL=1, **LOAD))
         self.assertIn("OUT: has no name", self.refusal(VOLUMES="a.nii.gz", LABEL=1, **{**LOAD, "OUT": ""}))
         self.assertIn("folder", self.refusal(VOLUMES="a.nii.gz", LABELS="../1", **LOAD))
         for given, words in (({"DURATION": "1s"}, "DURATION is of KIND=dynamic: leave it out"),
@@ -727,10 +733,11 @@ class Runs(WithStubs):
         while len((self.bin / "calls").read_text().splitlines() if (self.bin / "calls").exists() else []) < count:
             time.sleep(0.01)
 
-    def tree(self, run):
-        """The processes of a run, the first first."""
-        listed = subprocess.run(["ps", "-o", "pid=", "-s", str(run.pid)], capture_output=True, text=True, check=True)
-        return sorted(int(word) for word in listed.stdout.split())
+    def tree(self, run, program=""):
+        """The processes of a run, or those of a program in it, the first first."""
+        listed = subprocess.run(["ps", "-o", "pid=,comm=", "-s", str(run.pid)], capture_output=True, text=True, check=True)
+        processes = (line.split() for line in listed.stdout.splitlines())
+        return sorted(int(pid) for pid, name, *_ in processes if program in name)
 
     def test_a_run_that_waits_says_for_what(self):
         self.out.mkdir()
@@ -801,7 +808,9 @@ class Runs(WithStubs):
     def test_a_stopped_run_says_so_leaves_nothing_at_work_and_goes_on(self):
         for stop in (lambda run: os.kill(run.pid, signal.SIGTERM), lambda run: os.killpg(run.pid, signal.SIGINT)):
             run = self.start("-j2", environment={"STUB_SECONDS": "1000"}, **self.ARGUMENTS)
-            self.wait_for(2)
+            # Both asleep: a shell that is stopped just before it sleeps does so first.
+            while len(self.tree(run, "sleep")) < 2:
+                time.sleep(0.01)
             stop(run)
             stdout, stderr = run.communicate(timeout=100)
             self.assertNotEqual(run.returncode, 0)

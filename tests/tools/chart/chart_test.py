@@ -183,6 +183,19 @@ class WhatIsDrawn(ChartCase):
         _, head, rows = self.draw(self.write("s.json", simulate))
         self.assertEqual(head[4], "seconds.solve")
 
+    def test_default_error_of_a_simulation_is_what_it_estimates(self):
+        simulate = report("tunica-simulate", seconds={"solve": 3.0}, ms_per_step={"median": 7.5, "max": 9},
+                          algebraic_error_percent=1e-7, estimates={"membrane_p99_mpa": {"percent": 2.5}})
+        root, head, rows = self.draw(self.write("s.json", simulate))
+        self.assertEqual((head[4:6], float(rows[0][5])),
+                         (["result.ms_per_step.median", "result.estimates.membrane_p99_mpa.percent"], 2.5))
+        self.assertIn("Estimated error, membrane stress p99 (%)", texts(root))
+        simulate["result"]["accuracy"] = {"estimate_percent": 1.5}
+        root, head, rows = self.draw(self.write("s.json", simulate))
+        self.assertEqual((head[4:6], [float(number) for number in rows[0][4:6]]),
+                         (["seconds.solve", "result.accuracy.estimate_percent"], [3.0, 1.5]))
+        self.assertIn("Accuracy, estimated error (%)", texts(root))
+
     def test_reports_of_one_name_are_told_apart_by_their_folders(self):
         paths = []
         for organ, error in (("aorta", 0.2), ("bladder", 0.4)):

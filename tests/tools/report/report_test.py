@@ -717,6 +717,17 @@ class Errors(ReportTest):
             (case / name).write_bytes(content)
         self.refuse(4, "--verify", says="simulate.json: simulate read another shell.ply than relax wrote")
 
+    def test_verify_names_folders_that_were_exchanged(self):
+        for name in ("one", "two"):
+            folder = self.copy(name)
+            for path in folder.glob("*.json"):
+                path.write_text(path.read_text().replace("/out/aneurysm/1/", f"/out/{name}/1/"))
+        self.report("--verify")
+        out = folder.parent.parent
+        for before, after in (("one", "other"), ("two", "one"), ("other", "two")):
+            (out / before).rename(out / after)
+        self.refuse(4, "--verify", says="one/1/simulate.json: simulate wrote it for two/1")
+
     def test_verify_names_files_that_no_report_tells_of(self):
         case = self.copy("aneurysm")
         (case / "map.png").write_bytes(b"of another case")

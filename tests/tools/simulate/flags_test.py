@@ -18,7 +18,7 @@ HELD = PRESSED + ["--fix", "rigid-motions", "--static"]
 DYNAMIC = PRESSED + ["--density", "1100kg/m3", "--duration", "0.1s", "--step", "10ms"]
 
 RESULT_KEYS = ["shells", "tetrahedra", "nodes", "dof", "steps", "step_parts", "converged", "max_displacement_mm",
-               "displacement_p99_mm", "max_node_displacement_mm", "wall", "volume_before_mm3",
+               "peak", "displacement_p99_mm", "max_node_displacement_mm", "wall", "volume_before_mm3",
                "volume_after_mm3", "strain_energy_mj", "residual", "algebraic_error_percent",
                "algebraic_error_is_lower_bound", "newton_iterations",
                "cg_iterations", "ms_per_step", "real_time_factor", "probes", "frequencies_hz", "buckling_factors",

@@ -43,6 +43,20 @@ class Holds(SimulateTest):
         self.assertLess(abs(wall["stress_p99_mpa"] / hoop - 1), 0.05)
         self.assertLess(wall["stress_max_mpa"] / wall["stress_p99_mpa"], 1.02)
 
+    def test_rims_that_are_nearly_parallel_slide_as_if_they_were(self):
+        """As those of a fitted surface: the pressure would drive the vessel out of the slight wedge between them."""
+        for wedge in (1e-4, 1.5e-3):  # rad
+            vertices, triangles, normals = self.tube
+            across, axis = normals[0], np.linalg.svd(normals)[2][2]  # no normal of the tube goes along it
+            along = vertices @ axis
+            part = (along - along.min()) / np.ptp(along)
+            write_ply(self.path("wedge.ply"), vertices + np.outer(wedge * part * (vertices @ across), axis), triangles, normals)
+            report = self.run_tool("wedge.ply", "out.hdf", *WALL, "--pressure", "1kPa", "--fix", "rims:slide")
+            hoop = 1e-3 * 10 / 0.5 * (1 - 0.45 + 0.45**2)**0.5
+            self.assertLess(abs(report["result"]["wall"]["membrane_p99_mpa"] / hoop - 1), 0.03)
+            moved = 1e-3 * 10 / 0.5 * 10 / 2 * (1 - 0.45**2)
+            self.assertLess(abs(report["result"]["max_displacement_mm"] / moved - 1), 0.01 + 30 * wedge)
+
     def test_imaged_under_pressure_with_sliding_rims(self):
         report = self.run_tool("tube.ply", "out.hdf", "--poisson", "0.45", "--thickness", "0.5mm", "--static", "--imaged-at",
                                "80mmHg", "--fix", "rims:slide", "--support", "1e5N/m3")

@@ -317,6 +317,10 @@ nearest = ["0mm", "0mm", "{RADIUS}mm"]
             self.assertEqual(vtk.attrs["Version"].tolist(), [2, 0])
             self.assertEqual(steps.attrs["NSteps"], 5)
             np.testing.assert_allclose(steps["Values"], [0, 0.01, 0.02, 0.03, 0.04], atol=1e-15)
+            largest = file["tunica/history/max_displacement"][:]
+            peak = int(np.argmax(largest))
+            self.assertLess(peak, 4)
+            self.assertEqual(result["peak"], {"max_displacement_mm": largest[peak], "time_s": steps["Values"][peak]})
             for name, expected in (("PartOffsets", 0), ("PointOffsets", 0), ("CellOffsets", 0),
                                    ("ConnectivityIdOffsets", 0), ("NumberOfParts", 1)):
                 self.assertEqual(steps[name][:].tolist(), [expected] * 5, name)

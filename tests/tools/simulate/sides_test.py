@@ -70,6 +70,18 @@ class Sides(SimulateTest):
             self.assertEqual(self.kinds(report)[0], "faces inward")
             self.assertIn(way, report["warnings"][0])
 
+    def test_a_shallow_surface_that_bulges_from_its_normals_is_said(self):
+        vertices, triangles, normals = self.ball
+        cup = triangles[(vertices[triangles].mean(1)[:, 2] > 0)]
+        used, cup = np.unique(cup, return_inverse=True)
+        cup = cup.reshape(-1, 3)
+        flags = ["boundary" if flag == "rigid-motions" else flag for flag in FLAGS]
+        for turned, counts in ((1, 0), (-1, 1)):
+            write_ply(self.path("cup.ply"), vertices[used], cup[:, ::turned], turned * normals[used])
+            report = self.run_tool("cup.ply", "out.hdf", *flags, "--force")
+            found = [text for text in report["warnings"] if "bulges away from its normals" in text]
+            self.assertEqual(len(found), counts, report["warnings"])
+
     def test_shells_within_shells_are_said(self):
         vertices, triangles, normals = self.ball
         write_ply(self.path("wall.ply"), np.vstack([vertices, 0.8 * vertices]),

@@ -25,6 +25,13 @@ public:
 
   /// What is left out of balance, of the forces.
   [[nodiscard]] double residual(const LinearSolution& solution) const;
+  /// By how much the theory of large rotations moves less, more or aside, relative to what it gives; of prescribed
+  /// motion, by how much its forces differ. From the path's expansion about the reference, to the third order, with the
+  /// wall free to relax in the second; 1 at least where that has a limit load before.
+  /// Source: Koiter 1945, "Over de stabiliteit van het elastisch evenwicht"; Haftka, Mallett, Nachbar 1971, "Adaption
+  /// of Koiter's method to finite element analysis of snap-through buckling behavior". Cost: two to seven solves, four
+  /// evaluations of the forces each. Limits: an order of magnitude where it passes 1.
+  double departure(const LinearSolution& solution, const std::vector<double>& factors);
   [[nodiscard]] std::size_t freedom_count() const { return solver_.freedom_count(); }
 
 private:
@@ -38,5 +45,9 @@ private:
   BlockMatrix matrix_;
   bool factored_ = false;
 };
+
+/// The tangent at the reference with the stress of a linear solution, under the loads: of linear buckling, which leaves
+/// out that the solution moves the shell. Cost: linear.
+BlockMatrix stressed_tangent(ShellSystem& system, const VectorX& solution, const std::vector<double>& factors);
 
 }  // namespace tunica

@@ -51,7 +51,7 @@ protected:
   bool ended_ = false;     ///< by the step that is being taken
 
 private:
-  std::function<void(const std::string&)> on_slow_step_;  ///< empty: nobody listens, or it has been told
+  std::function<void(const std::string&)> on_slow_step_;  ///< empty: nobody listens, or it was called
   const StateCallback& on_state_;
 };
 

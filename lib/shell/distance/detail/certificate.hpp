@@ -25,7 +25,7 @@ struct Aim {
   bool list_beyond = false;     ///< see ShellDistanceOptions; then there is a limit
 
   /// mm: an upper bound that does, when the distance is certainly at least `lower`
-  [[nodiscard]] double enough(double lower) const {
+  [[nodiscard]] double stop_at(double lower) const {
     if (list_beyond) {
       return std::max(std::min(lower, *limit) + width, *limit - uncertainty);
     }
@@ -85,7 +85,7 @@ auto collected(const std::vector<Block>& blocks, const Aim& aim, double& lower, 
     }
     settled = std::max(settled, block.settled);
   }
-  const double enough = aim.enough(lower);
+  const double enough = aim.stop_at(lower);
   decltype(Block::live) live;
   for (const Block& block : blocks) {
     for (const auto& piece : block.live) {

@@ -222,6 +222,7 @@ TEST(Folder, OneSeriesAlone) {
   const TemporaryFolder folder;
   const auto stack = folder / "stack";
   std::filesystem::create_directory(stack);
+  std::filesystem::create_directory(folder / "numbers");
   const std::string page = png_file(7, 5, sample_values<std::uint8_t>(35));
   for (const char* name : {"a000", "a001", "b000", "b001"}) {
     folder.file(std::string("stack/") + name + ".png", page);
@@ -238,6 +239,10 @@ TEST(Folder, OneSeriesAlone) {
   EXPECT_THAT(error_of(stack, with_spacing()), HasSubstr("numbers with and without a sign"));
   std::filesystem::remove(stack / "a1.5.png");
   EXPECT_EQ(read_both_ways(stack, with_spacing()).volume.dims[2], 2U);
+  for (const char* name : {"000", "001", "1"}) {
+    folder.file(std::string("numbers/") + name + ".png", page);
+  }
+  EXPECT_THAT(error_of(folder / "numbers", with_spacing()), HasSubstr("001.png and 1.png have one number"));
 }
 
 TEST(Folder, WhatIsNoStackIsRefused) {

@@ -1,4 +1,4 @@
-#include "tunica/io/result/report_chart.hpp"
+#include "tunica/report/report_chart.hpp"
 
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
@@ -16,6 +16,10 @@ namespace tunica {
 namespace {
 
 using Numbers = std::vector<std::optional<double>>;
+
+// The error of the answer as the run itself estimates it: of a run for an accuracy, and of any other run with a target.
+constexpr const char* estimate_key = "result.accuracy.estimate_percent";
+constexpr const char* membrane_estimate_key = "result.estimates.membrane_p99_mpa.percent";
 
 // A coordinate of the chart: its key or name, its label, and the values of each report.
 struct Coordinate {
@@ -35,6 +39,10 @@ bool all_of_tool(const std::vector<Report>& reports, const std::string& tool) {
   return std::ranges::all_of(reports, [&](const Report& report) { return report.tool() == tool; });
 }
 
+bool all_have(const std::vector<Report>& reports, const std::string& key) {
+  return std::ranges::all_of(reports, [&](const Report& report) { return has_number(report, key); });
+}
+
 Coordinate by_key(const std::vector<Report>& reports, const std::string& key) {
   Coordinate coordinate{key, describe_key(key), {}};
   for (const Report& report : reports) {
@@ -45,8 +53,8 @@ Coordinate by_key(const std::vector<Report>& reports, const std::string& key) {
 
 Coordinate time_of(const std::vector<Report>& reports) {
   const std::string step = "result.ms_per_step.median";
-  if (all_of_tool(reports, "tunica-simulate") &&
-      std::ranges::all_of(reports, [&](const Report& report) { return has_number(report, step); })) {
+  // Of a run for an accuracy it is the time of its finest level alone.
+  if (all_of_tool(reports, "tunica-simulate") && all_have(reports, step) && !all_have(reports, estimate_key)) {
     return by_key(reports, step);
   }
   if (all_of_tool(reports, reports.front().tool())) {
@@ -76,8 +84,9 @@ Coordinate natural_error(const std::vector<Report>& reports) {
     }
     return error;
   }
-  for (const char* key : {"result.hausdorff_percent.upper", "result.algebraic_error_percent"}) {
-    if (std::ranges::all_of(reports, [&](const Report& report) { return has_number(report, key); })) {
+  for (const char* key :
+       {"result.hausdorff_percent.upper", estimate_key, membrane_estimate_key, "result.algebraic_error_percent"}) {
+    if (all_have(reports, key)) {
       return by_key(reports, key);
     }
   }
@@ -398,8 +407,9 @@ ReportChart chart_of_reports(const std::vector<Report>& reports, const std::vect
 
 std::string describe_key(const std::string& key) {
   static const std::map<std::string, std::string> units{
-      {"percent", "%"}, {"mm", "mm"}, {"mm2", "mm²"}, {"mm3", "mm³"}, {"deg", "°"}, {"mj", "mJ"},
-      {"hz", "Hz"},     {"s", "s"},   {"rad", "rad"}, {"mib", "MiB"}, {"ms", "ms"}};
+      {"percent", "%"}, {"mm", "mm"},   {"mm2", "mm²"},      {"mm3", "mm³"}, {"deg", "°"},
+      {"mj", "mJ"},     {"hz", "Hz"},   {"s", "s"},          {"rad", "rad"}, {"mib", "MiB"},
+      {"ms", "ms"},     {"mpa", "MPa"}, {"n_per_mm", "N/mm"}};
   std::vector<std::string> parts;
   for (std::size_t start = 0; start <= key.size();) {
     const std::size_t dot = std::min(key.find('.', start), key.size());
@@ -433,12 +443,15 @@ std::string describe_key(const std::string& key) {
       words.emplace_back("time per step");
       continue;
     }
-    const std::size_t underscore = part.rfind('_');
-    if (underscore != std::string::npos) {
-      const auto found = units.find(part.substr(underscore + 1));
-      if (found != units.end()) {
+    if (const auto found = units.find(part); found != units.end() && i > 0) {
+      unit = found->second;
+      continue;
+    }
+    for (std::size_t at = part.find('_'); at != std::string::npos; at = part.find('_', at + 1)) {
+      if (const auto found = units.find(part.substr(at + 1)); found != units.end()) {
         unit = found->second;
-        part.resize(underscore);
+        part.resize(at);
+        break;
       }
     }
     distance = distance || part.find("hausdorff") != std::string::npos || part.find("one_sided") != std::string::npos ||
@@ -451,6 +464,9 @@ std::string describe_key(const std::string& key) {
            : part == "upper"          ? "upper bound"
            : part == "lower"          ? "lower bound"
            : part == "dof"            ? "degrees of freedom"
+           : part == "estimate"       ? "estimated error"
+           : part == "estimates"      ? "estimated error"
+           : part == "membrane_p99"   ? "membrane stress p99"
            : part == "peak"           ? "peak memory"
            : part == "triangles_in"   ? "triangles before"
                                       : part;

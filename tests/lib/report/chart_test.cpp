@@ -1,7 +1,7 @@
 #include "tunica/draw/chart.hpp"
 
 #include "tunica/draw/detail/ticks.hpp"
-#include "tunica/io/result/report_chart.hpp"
+#include "tunica/report/report_chart.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
