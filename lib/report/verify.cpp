@@ -96,19 +96,14 @@ void compare_outputs(const PipelineCase& one, const std::string& stage, Strings&
   }
 }
 
-std::string called(const fs::path& folder) {
-  const fs::path place = (fs::absolute(folder) / "").lexically_normal().parent_path();
-  return (place.parent_path().filename() / place.filename()).string();
-}
-
 // Whether a stage wrote its files in what is another case's folder now: the two were exchanged.
 void compare_folder(const PipelineCase& one, const std::string& stage, const CaseFolders& all, Strings& found) {
   const auto outputs = one.files(stage, "outputs");
   if (outputs.empty() || !names_files(one, stage) || outputs.front().path.parent_path().empty()) {
     return;
   }
-  const std::string before = called(outputs.front().path.parent_path());
-  if (before != called(one.folder) && all.contains(before)) {
+  const std::string before = name_of_case_folder(outputs.front().path.parent_path());
+  if (before != name_of_case_folder(one.folder) && all.contains(before)) {
     found.push_back(
         fmt::format("{}: {} wrote it for {}: the folders of cases were exchanged, or files copied from one to "
                     "the other; run the case again",
@@ -205,7 +200,7 @@ CaseFolders folders_of(const std::vector<PipelineCase>& cases) {
   CaseFolders folders;
   for (const PipelineCase& one : cases) {
     if (!one.folder.empty()) {  // one that was refused has none
-      folders.insert(called(one.folder));
+      folders.insert(name_of_case_folder(one.folder));
     }
   }
   return folders;

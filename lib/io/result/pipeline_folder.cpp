@@ -128,8 +128,7 @@ std::vector<fs::path> folders_in(const fs::path& folder) {
 }
 
 std::vector<PipelineCase> find_cases(const fs::path& folder) {
-  const fs::path place = (fs::absolute(folder) / "").lexically_normal().parent_path();
-  if (auto own = case_in(folder, (place.parent_path().filename() / place.filename()).string())) {
+  if (auto own = case_in(folder, name_of_case_folder(folder))) {
     return {*own};
   }
   std::vector<PipelineCase> cases;
@@ -175,6 +174,11 @@ std::vector<ReportedFile> PipelineCase::files(const std::string& stage_name, con
     found.push_back({text("path"), text("sha256")});
   }
   return found;
+}
+
+std::string name_of_case_folder(const fs::path& folder) {
+  const fs::path place = (fs::absolute(folder) / "").lexically_normal().parent_path();
+  return (place.parent_path().filename() / place.filename()).string();
 }
 
 std::vector<PipelineCase> read_pipeline_folder(const fs::path& folder) {

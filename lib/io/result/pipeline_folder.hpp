@@ -37,6 +37,9 @@ struct PipelineCase {
   [[nodiscard]] std::vector<ReportedFile> files(const std::string& stage_name, const std::string& kind) const;
 };
 
+/// What a case's folder is called within OUT, such as "aorta/1": the last two parts of its path, which is not empty.
+std::string name_of_case_folder(const std::filesystem::path& folder);
+
 /// The cases of a folder, as the last run of the pipeline left word of them in FOLDER/.cases (a line per case: name,
 /// folder within FOLDER, last stage, exit code, message, separated by tabs), or else all there are: folders with a
 /// stage's report, at most two levels down, or FOLDER itself.

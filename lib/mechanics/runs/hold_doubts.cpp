@@ -291,11 +291,7 @@ std::vector<std::array<Index, 2>> crossings_of(const ShellMesh& shells) {
     }
   }
   std::vector<std::array<Index, 2>> crossings = find_self_intersections(flat_facets(shells));
-  std::erase_if(crossings, [&](const auto& pair) {
-    const auto& other = shells.triangles[pair[1]];
-    return std::ranges::any_of(shells.triangles[pair[0]],
-                               [&](Index node) { return std::ranges::find(other, node) != other.end(); });
-  });
+  std::erase_if(crossings, [&](const auto& pair) { return share_a_node(shells, pair); });
   return crossings;
 }
 

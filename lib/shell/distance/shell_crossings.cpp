@@ -135,12 +135,6 @@ bool meet(const Piece& one, const Piece& other) {
   return meet(one, other, left);
 }
 
-bool share_a_node(const ShellMesh& shell, const std::array<Index, 2>& pair) {
-  const auto& other = shell.triangles[pair[1]];
-  return std::ranges::any_of(shell.triangles[pair[0]],
-                             [&](Index node) { return std::ranges::find(other, node) != other.end(); });
-}
-
 class Crossings {
 public:
   explicit Crossings(const ShellMesh& shell) : shell_(shell), patches_(curved_patches(shell)) {}
@@ -206,6 +200,12 @@ private:
 };
 
 }  // namespace
+
+bool share_a_node(const ShellMesh& shell, const std::array<Index, 2>& pair) {
+  const auto& other = shell.triangles[pair[1]];
+  return std::ranges::any_of(shell.triangles[pair[0]],
+                             [&](Index node) { return std::ranges::find(other, node) != other.end(); });
+}
 
 std::vector<std::array<Index, 2>> crossing_patches(const ShellMesh& shell, bool neighbours) {
   const Crossings crossings(shell);

@@ -4,6 +4,9 @@
 
 namespace tunica {
 
+/// Whether two shells of a pair have a corner in common. Limits: numbers of shells that are there.
+bool share_a_node(const ShellMesh& shell, const std::array<Index, 2>& pair);
+
 /// The pairs of shells whose curved surfaces touch or cross: anywhere, where they share no node; beside the node, where
 /// they share one; where they share two, further from their edge than an eighth of their heights: patches of the comas
 /// kind gape and overlap a little along each edge, which is gap and no crossing, while patches that fold over reach

@@ -19,9 +19,9 @@ struct Facing {
 /// Normals are to point out of the material: outward, and into its hollow from a piece that lies within another, and so
 /// on by turns. A closed piece says by its volume which way it faces. An open one has an inside where its points, on
 /// the mean, see it in more than two thirds of the directions on one side: tubes from one and a half diameters on, what
-/// is closed but for its rims; but no sheet, no half ball and no half pipe, of which nothing is said. Pieces that meet
-/// along seams count as one.
-/// How: the mean winding number of the surface at points of its own, half of that of its inside.
+/// is closed but for its rims; but no sheet, no half ball and no half pipe, of which only is said that they bulge away
+/// from their normals, where the mean winding number is below -1/100. Pieces that meet along seams count as one. How:
+/// the mean winding number of the surface at points of its own, half of that of its inside.
 /// @param mesh  an oriented manifold
 /// Source: Jacobson, Kavan, Sorkine-Hornung, Robust inside-outside segmentation using generalized winding numbers,
 /// SIGGRAPH 2013. Cost: linear; a million triangles of an open piece take half a second.
